@@ -1,0 +1,231 @@
+//! The one table of a unit's variables: what FMI says of each, and the field of the model that holds its value.
+
+use model_description::DefaultExperiment;
+use model_description::unit::Unit;
+use model_description::variable::{Causality, EnumerationType, Kind, Variability, Variable};
+
+type Lens<M, T> = Box<dyn Fn(&mut M) -> &mut T + Send + Sync>;
+
+/// The field that holds a variable's value.
+pub(crate) enum Access<M> {
+    Real(Lens<M, f64>),
+    Integer(Lens<M, i32>),
+    Boolean(Lens<M, bool>),
+    /// Enumerations are held as their 1-based item number.
+    Enumeration(Lens<M, i32>),
+    String(Lens<M, String>),
+}
+
+/// A declared variable together with its field.
+pub struct Entry<M> {
+    pub(crate) variable: Variable,
+    pub(crate) access: Access<M>,
+}
+
+/// All that makes a unit: the texts, the proposed experiment and the table.
+pub struct Description<M> {
+    /// Model name and archive name, for example `CRMPC`.
+    pub name: &'static str,
+    /// One line: what the unit is.
+    pub description: &'static str,
+    /// HTML fragment: what the unit computes, with equations and sources.
+    pub documentation: &'static str,
+    /// Crate version.
+    pub version: &'static str,
+    /// Whether the unit is also a model exchange unit (then it has states and derivatives).
+    pub model_exchange: bool,
+    /// Number of event indicators.
+    pub event_indicators: usize,
+    /// Proposed experiment.
+    pub default_experiment: DefaultExperiment,
+    /// The variables.
+    pub table: Table<M>,
+}
+
+/// The variables in order; the position is the value reference.
+pub struct Table<M> {
+    pub(crate) entries: Vec<Entry<M>>,
+}
+
+impl<M> Default for Table<M> {
+    fn default() -> Self {
+        Self { entries: Vec::new() }
+    }
+}
+
+impl<M: 'static> Table<M> {
+    /// An empty table.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a real variable.
+    #[must_use]
+    pub fn real(
+        mut self,
+        declaration: Real,
+        field: impl Fn(&mut M) -> &mut f64 + Send + Sync + 'static,
+    ) -> Self {
+        let kind = Kind::Real {
+            unit: declaration.unit,
+            min: declaration.min,
+            max: declaration.max,
+            nominal: declaration.nominal,
+            start: None,
+            derivative_of: declaration.derivative_of,
+        };
+        self.push(declaration.common, kind, Access::Real(Box::new(field)));
+        self
+    }
+
+    /// Adds an integer variable.
+    #[must_use]
+    pub fn integer(
+        mut self,
+        common: Common,
+        (min, max): (Option<i32>, Option<i32>),
+        field: impl Fn(&mut M) -> &mut i32 + Send + Sync + 'static,
+    ) -> Self {
+        self.push(common, Kind::Integer { min, max, start: None }, Access::Integer(Box::new(field)));
+        self
+    }
+
+    /// Adds a boolean variable.
+    #[must_use]
+    pub fn boolean(
+        mut self,
+        common: Common,
+        field: impl Fn(&mut M) -> &mut bool + Send + Sync + 'static,
+    ) -> Self {
+        self.push(common, Kind::Boolean { start: None }, Access::Boolean(Box::new(field)));
+        self
+    }
+
+    /// Adds an enumeration variable, held as its 1-based item number.
+    #[must_use]
+    pub fn enumeration(
+        mut self,
+        common: Common,
+        of: EnumerationType,
+        field: impl Fn(&mut M) -> &mut i32 + Send + Sync + 'static,
+    ) -> Self {
+        self.push(common, Kind::Enumeration { of, start: None }, Access::Enumeration(Box::new(field)));
+        self
+    }
+
+    /// Adds a text variable.
+    #[must_use]
+    pub fn string(
+        mut self,
+        common: Common,
+        field: impl Fn(&mut M) -> &mut String + Send + Sync + 'static,
+    ) -> Self {
+        self.push(common, Kind::String { start: None }, Access::String(Box::new(field)));
+        self
+    }
+
+    fn push(&mut self, common: Common, kind: Kind, access: Access<M>) {
+        let Common { name, description, causality, variability, dependencies } = common;
+        let variable = Variable { name, description, causality, variability, kind, dependencies };
+        self.entries.push(Entry { variable, access });
+    }
+}
+
+/// What every declaration says: name, text, role.
+#[derive(Clone, Debug)]
+pub struct Common {
+    name: String,
+    description: String,
+    causality: Causality,
+    variability: Variability,
+    dependencies: Vec<String>,
+}
+
+impl Common {
+    fn new(name: &str, description: &str, causality: Causality, variability: Variability) -> Self {
+        Self {
+            name: name.into(),
+            description: description.into(),
+            causality,
+            variability,
+            dependencies: Vec::new(),
+        }
+    }
+
+    /// For a calculated variable: the inputs and states its value at an instant depends on.
+    #[must_use]
+    pub fn depends_on<'a>(mut self, names: impl IntoIterator<Item = &'a str>) -> Self {
+        self.dependencies.extend(names.into_iter().map(String::from));
+        self
+    }
+
+    /// As a real variable.
+    pub fn real(self) -> Real {
+        Real { common: self, unit: None, min: None, max: None, nominal: None, derivative_of: None }
+    }
+}
+
+/// A fixed parameter with a start value.
+pub fn parameter(name: &str, description: &str) -> Common {
+    Common::new(name, description, Causality::Parameter, Variability::Fixed)
+}
+/// A continuous input.
+pub fn input(name: &str, description: &str) -> Common {
+    Common::new(name, description, Causality::Input, Variability::Continuous)
+}
+/// A continuous output.
+pub fn output(name: &str, description: &str) -> Common {
+    Common::new(name, description, Causality::Output, Variability::Continuous)
+}
+/// An output that changes at events or communication points only: anything sampled, integers, booleans.
+pub fn discrete_output(name: &str, description: &str) -> Common {
+    Common::new(name, description, Causality::Output, Variability::Discrete)
+}
+/// A continuous variable for looking at.
+pub fn local(name: &str, description: &str) -> Common {
+    Common::new(name, description, Causality::Local, Variability::Continuous)
+}
+
+/// Declaration of a real variable.
+#[derive(Clone, Debug)]
+pub struct Real {
+    common: Common,
+    unit: Option<Unit>,
+    min: Option<f64>,
+    max: Option<f64>,
+    nominal: Option<f64>,
+    derivative_of: Option<String>,
+}
+
+impl Real {
+    /// Physical unit.
+    #[must_use]
+    pub fn unit(mut self, unit: Unit) -> Self {
+        self.unit = Some(unit);
+        self
+    }
+    /// Smallest allowed value.
+    #[must_use]
+    pub fn min(mut self, min: f64) -> Self {
+        self.min = Some(min);
+        self
+    }
+    /// Largest allowed value.
+    #[must_use]
+    pub fn max(mut self, max: f64) -> Self {
+        self.max = Some(max);
+        self
+    }
+    /// Typical magnitude.
+    #[must_use]
+    pub fn nominal(mut self, nominal: f64) -> Self {
+        self.nominal = Some(nominal);
+        self
+    }
+    /// Declares the variable as the time derivative of the (state) variable `name`.
+    #[must_use]
+    pub fn derivative_of(mut self, name: &str) -> Self {
+        self.derivative_of = Some(name.into());
+        self
+    }
+}
