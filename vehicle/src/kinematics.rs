@@ -41,3 +41,28 @@ pub fn r_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
 pub fn r_dot(angles: &Vector3<f64>, angle_rates: &Vector3<f64>) -> Matrix3<f64> {
     r_alpha(angles) * angle_rates.x + r_beta(angles) * angle_rates.y
 }
+
+/// ∂²R/∂α².
+pub fn r_alpha_alpha(angles: &Vector3<f64>) -> Matrix3<f64> {
+    let (sa, ca) = angles.x.sin_cos();
+    let (sb, cb) = angles.y.sin_cos();
+    let tb = sb / cb;
+    Matrix3::new(ca * tb, 0.0, sa * tb, -sa, 0.0, ca, ca * cb, 0.0, cb * sa)
+}
+
+/// ∂²R/∂α∂β.
+pub fn r_alpha_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
+    let (sa, ca) = angles.x.sin_cos();
+    let (sb, cb) = angles.y.sin_cos();
+    let sec2 = 1.0 / (cb * cb);
+    Matrix3::new(sa * sec2, 0.0, -ca * sec2, 0.0, 0.0, 0.0, -sa * sb, 0.0, sb * ca)
+}
+
+/// ∂²R/∂β².
+pub fn r_beta_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
+    let (sa, ca) = angles.x.sin_cos();
+    let (sb, cb) = angles.y.sin_cos();
+    let tb = sb / cb;
+    let sec2 = 1.0 / (cb * cb);
+    Matrix3::new(-2.0 * ca * sec2 * tb, 0.0, -2.0 * sa * sec2 * tb, 0.0, 0.0, 0.0, ca * cb, sb, cb * sa)
+}
