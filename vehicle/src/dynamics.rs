@@ -1,5 +1,6 @@
 //! Rigid-body attitude dynamics, Chai 2022 (1)–(5).
 
+use crate::error::Error;
 use crate::kinematics;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,36 @@ impl Inertia {
     /// The tensor I, kg m².
     pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::new(self.Ixx, 0.0, -self.Ixz, 0.0, self.Iyy, 0.0, -self.Ixz, 0.0, self.Izz)
+    }
+
+    /// The rigid body of `scale` times this inertia.
+    ///
+    /// # Errors
+    /// Names the moment or product of inertia that no body can have: I must be positive definite, and no principal
+    /// moment may exceed the sum of the other two.
+    pub fn body(&self, scale: f64) -> Result<RigidBody, Error> {
+        let refuse = |name, problem: String| Err(Error::Parameter { name, problem });
+        for (name, value) in [("inertia.Ixx", self.Ixx), ("inertia.Iyy", self.Iyy), ("inertia.Izz", self.Izz)]
+        {
+            if !(value > 0.0 && value.is_finite()) {
+                return refuse(name, format!("= {value} kg m2 must be positive"));
+            }
+        }
+        let Some(body) = RigidBody::new(self.matrix() * scale) else {
+            let bound = (self.Ixx * self.Izz).sqrt();
+            let problem = format!(
+                "= {} kg m2 leaves no positive definite inertia: |Ixz| must be below {bound}",
+                self.Ixz
+            );
+            return refuse("inertia.Ixz", problem);
+        };
+        let principal = self.matrix().symmetric_eigenvalues();
+        if 2.0 * principal.max() > principal.sum() {
+            let problem =
+                "violate the triangle inequality: no principal moment may exceed the sum of the others";
+            return refuse("inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz", problem.into());
+        }
+        Ok(body)
     }
 }
 

@@ -1,0 +1,221 @@
+//! Disturbances: Δ on ẋ_ω of Chai 2022 (4b) in rad/s², bounded in each component, and a sinusoidal moment in N m.
+
+use crate::dynamics::RigidBody;
+use crate::error::Error;
+use crate::kinematics;
+use crate::time::{tick, tick_time, tolerance};
+use nalgebra::Vector3;
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+use serde::{Deserialize, Serialize};
+
+/// What the disturbance does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum Kind {
+    /// Nothing.
+    #[default]
+    None,
+    /// Each component of Δ uniform in [−bound, bound], drawn anew at every tick.
+    White,
+    /// Δ = bound · direction.
+    Constant,
+    /// A moment: offset + Σ amplitude · sin(frequency · t + phase).
+    Sine,
+    /// Δ = ± bound · direction, the sign changing every half square period, + first.
+    Square,
+    /// Each component of Δ = ± bound with the sign that increases ‖ω‖ fastest, chosen at every tick.
+    AlongRate,
+    /// Each component of Δ = ± bound against the control moment's R I⁻¹ m, chosen at every tick.
+    AgainstMoment,
+}
+
+/// A disturbance and all that determines it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Disturbance {
+    /// What it does.
+    pub kind: Kind,
+    /// Bound on each component of Δ, rad/s².
+    pub bound: f64,
+    /// Time between the ticks of white noise and of the state-dependent kinds, s.
+    pub period: f64,
+    /// Seed of the white noise.
+    pub seed: u64,
+    /// Factors of constant and square wave per component, in [−1, 1].
+    pub direction: Vector3<f64>,
+    /// Period of the square wave, s.
+    pub square_period: f64,
+    /// The sinusoidal moment.
+    pub sine: SineMoment,
+    /// The disturbance acts for start ≤ t < end, s. The square wave begins at `start`.
+    pub start: f64,
+    /// See `start`, s.
+    pub end: f64,
+}
+
+/// A moment offset + Σ amplitude · sin(frequency · t + phase), N m.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SineMoment {
+    /// Constant part, N m.
+    #[serde(default)]
+    pub offset: Vector3<f64>,
+    /// The sinusoids.
+    #[serde(default, rename = "wave")]
+    pub waves: Vec<MomentWave>,
+}
+
+/// One sinusoid of a moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MomentWave {
+    /// Amplitude about each body axis, N m.
+    pub amplitude: Vector3<f64>,
+    /// Angular frequency, rad/s.
+    pub frequency: f64,
+    /// Phase, rad.
+    #[serde(default)]
+    pub phase: f64,
+}
+
+/// What the state-dependent kinds look at when they choose.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// The vehicle.
+    pub body: &'a RigidBody,
+    /// Θ, rad.
+    pub angles: Vector3<f64>,
+    /// ω, rad/s.
+    pub rates: Vector3<f64>,
+    /// Control moment, N m.
+    pub moment: Vector3<f64>,
+}
+
+impl Default for Disturbance {
+    /// None, with the other values neutral.
+    fn default() -> Self {
+        Self {
+            kind: Kind::None,
+            bound: 0.0,
+            period: 1.0,
+            seed: 1,
+            direction: Vector3::repeat(1.0),
+            square_period: 1.0,
+            sine: SineMoment::default(),
+            start: 0.0,
+            end: f64::INFINITY,
+        }
+    }
+}
+
+impl Disturbance {
+    /// Refuses what the definitions above do not allow.
+    ///
+    /// # Errors
+    /// Names the value at fault as the units do.
+    pub fn check(&self) -> Result<(), Error> {
+        let refuse = |name, problem: String| Err(Error::Parameter { name, problem });
+        if !(self.bound >= 0.0 && self.bound.is_finite()) {
+            return refuse("disturbance.bound", format!("= {} rad/s2 must not be negative", self.bound));
+        }
+        if !(self.period > 0.0 && self.period.is_finite()) {
+            return refuse("disturbance.period", format!("= {} s must be positive", self.period));
+        }
+        if !(self.square_period > 0.0 && self.square_period.is_finite()) {
+            return refuse(
+                "disturbance.square.period",
+                format!("= {} s must be positive", self.square_period),
+            );
+        }
+        if !self.direction.iter().all(|component| component.abs() <= 1.0) {
+            return refuse("disturbance.direction", "must have components between -1 and 1".into());
+        }
+        if !(self.start.is_finite() && self.end > self.start) {
+            return refuse(
+                "disturbance.end",
+                format!("= {} s must come after disturbance.start = {} s", self.end, self.start),
+            );
+        }
+        let sine = &self.sine;
+        let finite = |vector: &Vector3<f64>| vector.iter().all(|value| value.is_finite());
+        let wave_is_finite = |wave: &MomentWave| {
+            finite(&wave.amplitude) && wave.frequency.is_finite() && wave.phase.is_finite()
+        };
+        if !(finite(&sine.offset) && sine.waves.iter().all(wave_is_finite)) {
+            return refuse("disturbance.sine", "holds a value that is not finite".into());
+        }
+        Ok(())
+    }
+
+    /// Whether the disturbance acts at `time` (s).
+    pub fn acts(&self, time: f64) -> bool {
+        self.kind != Kind::None && time + tolerance(time) >= self.start && time + tolerance(time) < self.end
+    }
+
+    /// Origin and length of the intervals over which Δ is held; `origin` is the start of the experiment (s).
+    fn intervals(&self, origin: f64) -> Option<(f64, f64)> {
+        match self.kind {
+            Kind::None | Kind::Constant | Kind::Sine => None,
+            Kind::White | Kind::AlongRate | Kind::AgainstMoment => Some((origin, self.period)),
+            Kind::Square => Some((self.start, self.square_period / 2.0)),
+        }
+    }
+
+    /// Number of the interval of constant Δ that holds `time` (s).
+    pub fn tick(&self, origin: f64, time: f64) -> i64 {
+        self.intervals(origin).map_or(0, |(start, length)| tick(time, start, length))
+    }
+
+    /// The first time (s) after `time` at which the disturbance may change by a jump.
+    pub fn next_change(&self, origin: f64, time: f64) -> Option<f64> {
+        if self.kind == Kind::None || time + tolerance(time) >= self.end {
+            return None;
+        }
+        if time + tolerance(time) < self.start {
+            return Some(self.start);
+        }
+        let next = self
+            .intervals(origin)
+            .map(|(start, length)| tick_time(tick(time, start, length) + 1, start, length));
+        let next = next.map_or(self.end, |next| next.min(self.end));
+        next.is_finite().then_some(next)
+    }
+
+    /// Δ (rad/s²) of the interval with number `tick`, as long as the disturbance acts.
+    pub fn sample(&self, tick: i64, view: &View) -> Vector3<f64> {
+        match self.kind {
+            Kind::None | Kind::Sine => Vector3::zeros(),
+            Kind::White => white(self.seed, tick) * self.bound,
+            Kind::Constant => self.direction * self.bound,
+            Kind::Square => self.direction * if tick.rem_euclid(2) == 0 { self.bound } else { -self.bound },
+            // d‖ω‖²/dt contains 2 ωᵀ R⁻¹ Δ
+            Kind::AlongRate => signs(&kinematics::r_inverse(&view.angles).tr_mul(&view.rates)) * self.bound,
+            Kind::AgainstMoment => {
+                signs(&(kinematics::r(&view.angles) * (view.body.inverse * view.moment))) * -self.bound
+            }
+        }
+    }
+
+    /// The disturbance moment (N m) at `time` (s), as long as the disturbance acts.
+    pub fn moment(&self, time: f64) -> Vector3<f64> {
+        if self.kind != Kind::Sine {
+            return Vector3::zeros();
+        }
+        let wave = |wave: &MomentWave| wave.amplitude * (wave.frequency * time + wave.phase).sin();
+        self.sine.waves.iter().fold(self.sine.offset, |sum, next| sum + wave(next))
+    }
+}
+
+/// Three numbers uniform in [−1, 1): a pure function of seed and tick, by jumping ahead in the generator's sequence.
+fn white(seed: u64, tick: i64) -> Vector3<f64> {
+    let mut generator = Pcg64::seed_from_u64(seed);
+    generator.advance(3 * i128::from(tick) as u128);
+    let mut uniform = || (generator.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0;
+    let (x, y, z) = (uniform(), uniform(), uniform());
+    Vector3::new(x, y, z)
+}
+
+/// Sign of each component, + for 0.
+fn signs(vector: &Vector3<f64>) -> Vector3<f64> {
+    vector.map(|component| if component < 0.0 { -1.0 } else { 1.0 })
+}

@@ -1,0 +1,121 @@
+//! Reference attitude Θ_r(t) with its first and second derivatives.
+
+use crate::table::Table;
+use crate::time::tolerance;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// The reference at one instant, `[alpha, beta, sigma]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Reference {
+    /// Θ_r, rad.
+    pub angles: Vector3<f64>,
+    /// Θ̇_r, rad/s.
+    pub rates: Vector3<f64>,
+    /// Θ̈_r, rad/s².
+    pub accelerations: Vector3<f64>,
+}
+
+/// A reference over time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Profile {
+    /// Pieces in order of time; the first one that has not ended applies, and the last one never ends.
+    Piecewise(Vec<Segment>),
+    /// Interpolated between given points.
+    Table(Table),
+}
+
+/// One piece: constant plus sinusoids in each angle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Segment {
+    /// The piece applies for t ≤ `until` (s).
+    pub until: f64,
+    /// α, β, σ.
+    pub angles: [Course; 3],
+}
+
+/// Course of one angle: c + Σ (a sin ω t + b cos ω t).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Course {
+    /// c, rad.
+    pub constant: f64,
+    /// The sinusoids.
+    pub waves: Vec<Wave>,
+}
+
+/// One sinusoid a sin ω t + b cos ω t.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Wave {
+    /// ω, rad/s.
+    pub frequency: f64,
+    /// a, rad.
+    pub sine: f64,
+    /// b, rad.
+    pub cosine: f64,
+}
+
+impl Profile {
+    /// Constant `angles` (rad).
+    pub fn constant(angles: Vector3<f64>) -> Self {
+        Self::Piecewise(vec![Segment::constant(f64::INFINITY, angles)])
+    }
+
+    /// `before` (rad) for t ≤ `time` (s), `after` (rad) for t > `time`.
+    pub fn step(before: Vector3<f64>, after: Vector3<f64>, time: f64) -> Self {
+        Self::Piecewise(vec![Segment::constant(time, before), Segment::constant(f64::INFINITY, after)])
+    }
+
+    /// `mean + amplitude · sin(frequency · t + phase)` in rad, rad/s, rad.
+    pub fn sine(mean: Vector3<f64>, amplitude: Vector3<f64>, frequency: f64, phase: f64) -> Self {
+        let (sine, cosine) = (phase.cos(), phase.sin());
+        let angles = [0, 1, 2].map(|i| Course {
+            constant: mean[i],
+            waves: vec![Wave { frequency, sine: amplitude[i] * sine, cosine: amplitude[i] * cosine }],
+        });
+        Self::Piecewise(vec![Segment { until: f64::INFINITY, angles }])
+    }
+
+    /// The reference at `time` (s). A piece applies up to and including its end.
+    pub fn at(&self, time: f64) -> Reference {
+        match self {
+            Self::Piecewise(segments) => {
+                let ended = |segment: &&Segment| time > segment.until + tolerance(time);
+                match segments.iter().find(|segment| !ended(segment)).or(segments.last()) {
+                    Some(segment) => segment.at(time),
+                    None => Reference::default(),
+                }
+            }
+            Self::Table(table) => table.at(time),
+        }
+    }
+
+    /// Times (s, ascending) right after which the reference may be discontinuous.
+    pub fn jumps(&self) -> impl Iterator<Item = f64> + '_ {
+        let segments = match self {
+            Self::Piecewise(segments) => segments.as_slice(),
+            Self::Table(_) => &[],
+        };
+        segments.iter().take(segments.len().saturating_sub(1)).map(|segment| segment.until)
+    }
+}
+
+impl Segment {
+    fn constant(until: f64, angles: Vector3<f64>) -> Self {
+        Self { until, angles: [0, 1, 2].map(|i| Course { constant: angles[i], waves: Vec::new() }) }
+    }
+
+    fn at(&self, time: f64) -> Reference {
+        let mut reference = Reference::default();
+        for (i, course) in self.angles.iter().enumerate() {
+            reference.angles[i] = course.constant;
+            for wave in &course.waves {
+                let (s, c) = (wave.frequency * time).sin_cos();
+                let value = wave.sine * s + wave.cosine * c;
+                reference.angles[i] += value;
+                reference.rates[i] += wave.frequency * (wave.sine * c - wave.cosine * s);
+                reference.accelerations[i] -= wave.frequency * wave.frequency * value;
+            }
+        }
+        reference
+    }
+}

@@ -1,0 +1,328 @@
+//! Scenarios: vehicle, start, limits, disturbance and reference as data, the papers' ones embedded.
+
+use crate::disturbance::{Disturbance, Kind, SineMoment};
+use crate::dynamics::Inertia;
+use crate::error::Error;
+use crate::plant::{self, Config};
+use crate::reference::{Course, Profile, Segment, Wave};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+const CRMPC_2022: (&str, &str) = ("crmpc-2022.toml", include_str!("../data/crmpc-2022.toml"));
+const TVSMC_2015: (&str, &str) = ("tvsmc-2015.toml", include_str!("../data/tvsmc-2015.toml"));
+const TWO_LOOP_SMC: (&str, &str) = ("two-loop-smc.toml", include_str!("../data/two-loop-smc.toml"));
+
+/// A vehicle and what is asked of it. SI units and radians.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scenario {
+    /// Length of the experiment, s.
+    pub duration: f64,
+    /// Nominal inertia, which a controller knows.
+    pub inertia: Inertia,
+    /// Factor from the nominal to the vehicle's inertia.
+    pub inertia_scale: f64,
+    /// Θ at the start, rad.
+    pub initial_angles: Vector3<f64>,
+    /// ω at the start, rad/s.
+    pub initial_rates: Vector3<f64>,
+    /// Limit on ‖ω‖, rad/s; infinite if none is stated.
+    pub limit_rate: f64,
+    /// Limit on ‖m‖, N m; infinite if none is stated.
+    pub limit_moment: f64,
+    /// The disturbance, with its bound (rad/s²) and period (s).
+    pub disturbance: Disturbance,
+    /// Θ_r over time.
+    pub reference: Profile,
+}
+
+impl Scenario {
+    /// Chai 2022, section 5.1.
+    pub fn crmpc2022() -> Self {
+        embedded(CRMPC_2022)
+    }
+
+    /// Wu 2015, section 6.
+    pub fn tvsmc2015() -> Self {
+        embedded(TVSMC_2015)
+    }
+
+    /// Jia, Zhou, Zhou, section V.
+    pub fn two_loop() -> Self {
+        embedded(TWO_LOOP_SMC)
+    }
+
+    /// From the text of a scenario file; `file` names it in messages. The files in `data/` show the form.
+    ///
+    /// # Errors
+    /// Says what is missing, unknown or out of range, and where.
+    pub fn from_toml(file: &str, text: &str) -> Result<Self, Error> {
+        let refuse = |problem: String| Error::Scenario { file: file.into(), problem };
+        let parsed: File = toml::from_str(text).map_err(|error| refuse(error.to_string()))?;
+        let scenario = parsed.into_scenario();
+        if let Profile::Piecewise(segments) = &scenario.reference {
+            let in_order = segments.windows(2).all(|pair| pair[0].until < pair[1].until);
+            if !in_order || segments.last().is_none_or(|last| last.until.is_finite()) {
+                return Err(refuse(
+                    "reference.segment: 'until' must increase, and only the last has none".into(),
+                ));
+            }
+        }
+        plant::Plant::new(&scenario.config(1.0), 0.0).map_err(|error| refuse(error.to_string()))?;
+        Ok(scenario)
+    }
+
+    /// The plant of this scenario, integrated in steps no longer than `step` (s).
+    pub fn config(&self, step: f64) -> Config {
+        Config {
+            inertia: self.inertia,
+            inertia_scale: self.inertia_scale,
+            initial: plant::state(&self.initial_angles, &self.initial_rates),
+            disturbance: self.disturbance.clone(),
+            step,
+        }
+    }
+}
+
+#[allow(clippy::panic)]
+fn embedded((file, text): (&str, &str)) -> Scenario {
+    // Cannot fail: a test reads every embedded file.
+    Scenario::from_toml(file, text).unwrap_or_else(|error| panic!("{error}"))
+}
+
+// The files' form: the units printed in the papers, named in the keys.
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    duration: f64,
+    inertia: FileInertia,
+    initial: FileInitial,
+    #[serde(default)]
+    limit: FileLimit,
+    disturbance: FileDisturbance,
+    reference: FileReference,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(non_snake_case)]
+struct FileInertia {
+    Ixx: f64,
+    Iyy: f64,
+    Izz: f64,
+    Ixz: f64,
+    scale: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileInitial {
+    angles_deg: Vector3<f64>,
+    rates_deg_s: Vector3<f64>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileLimit {
+    rate_deg_s: Option<f64>,
+    moment: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileDisturbance {
+    kind: Kind,
+    #[serde(default)]
+    bound_deg_s2: f64,
+    period: f64,
+    seed: Option<u64>,
+    direction: Option<Vector3<f64>>,
+    square_period: Option<f64>,
+    #[serde(default)]
+    sine: SineMoment,
+    start: Option<f64>,
+    end: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileReference {
+    segment: Vec<FileSegment>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileSegment {
+    until: Option<f64>,
+    alpha: FileCourse,
+    beta: FileCourse,
+    sigma: FileCourse,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileCourse {
+    constant_deg: f64,
+    #[serde(default)]
+    wave: Vec<FileWave>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileWave {
+    frequency: f64,
+    #[serde(default)]
+    sine_deg: f64,
+    #[serde(default)]
+    cosine_deg: f64,
+}
+
+impl File {
+    fn into_scenario(self) -> Scenario {
+        let FileInertia { Ixx, Iyy, Izz, Ixz, scale } = self.inertia;
+        let segments = self.reference.segment.into_iter().map(FileSegment::into_segment).collect();
+        Scenario {
+            duration: self.duration,
+            inertia: Inertia { Ixx, Iyy, Izz, Ixz },
+            inertia_scale: scale,
+            initial_angles: self.initial.angles_deg.map(f64::to_radians),
+            initial_rates: self.initial.rates_deg_s.map(f64::to_radians),
+            limit_rate: self.limit.rate_deg_s.map_or(f64::INFINITY, f64::to_radians),
+            limit_moment: self.limit.moment.unwrap_or(f64::INFINITY),
+            disturbance: self.disturbance.into_disturbance(),
+            reference: Profile::Piecewise(segments),
+        }
+    }
+}
+
+impl FileDisturbance {
+    fn into_disturbance(self) -> Disturbance {
+        let neutral = Disturbance::default();
+        Disturbance {
+            kind: self.kind,
+            bound: self.bound_deg_s2.to_radians(),
+            period: self.period,
+            seed: self.seed.unwrap_or(neutral.seed),
+            direction: self.direction.unwrap_or(neutral.direction),
+            square_period: self.square_period.unwrap_or(neutral.square_period),
+            sine: self.sine,
+            start: self.start.unwrap_or(neutral.start),
+            end: self.end.unwrap_or(neutral.end),
+        }
+    }
+}
+
+impl FileSegment {
+    fn into_segment(self) -> Segment {
+        let angles = [self.alpha, self.beta, self.sigma].map(FileCourse::into_course);
+        Segment { until: self.until.unwrap_or(f64::INFINITY), angles }
+    }
+}
+
+impl FileCourse {
+    fn into_course(self) -> Course {
+        let wave = |wave: FileWave| Wave {
+            frequency: wave.frequency,
+            sine: wave.sine_deg.to_radians(),
+            cosine: wave.cosine_deg.to_radians(),
+        };
+        Course { constant: self.constant_deg.to_radians(), waves: self.wave.into_iter().map(wave).collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn embedded_scenarios_can_be_read() {
+        for (file, text) in [CRMPC_2022, TVSMC_2015, TWO_LOOP_SMC] {
+            Scenario::from_toml(file, text).unwrap();
+        }
+    }
+
+    fn degrees(profile: &Profile, time: f64) -> Vector3<f64> {
+        profile.at(time).angles.map(f64::to_degrees)
+    }
+
+    #[test]
+    fn published_reference_of_crmpc2022() {
+        let reference = Scenario::crmpc2022().reference;
+        // Chai 2022, section 5.1, evaluated by hand at t = 0 and, with sin and cos of the printed arguments, elsewhere
+        let expected = [
+            (0.0, 10.0, -25.0),
+            (10.0, 10.0 + 2.5 * 5f64.sin(), -30.0 + 5.0 * 5f64.cos()),
+            (25.0, 10.0 + 2.5 * 12.5f64.sin(), -30.0 + 5.0 * 12.5f64.cos()),
+            (25.04, 10.0 + 0.5 * 6.26f64.cos(), -30.0 + 0.5 * 6.26f64.sin()),
+            (50.0, 10.0 + 0.5 * 12.5f64.cos(), -30.0 + 0.5 * 12.5f64.sin()),
+        ];
+        for (time, alpha, sigma) in expected {
+            let difference = degrees(&reference, time) - Vector3::new(alpha, 0.0, sigma);
+            assert!(difference.norm() < 1e-12, "{difference} at {time}");
+        }
+    }
+
+    #[test]
+    fn published_jump_of_crmpc2022() {
+        let reference = Scenario::crmpc2022().reference;
+        assert_eq!(reference.jumps().collect::<Vec<_>>(), [25.0]);
+        let jump = degrees(&reference, 25.0 + 2e-7) - degrees(&reference, 25.0);
+        assert!((jump - Vector3::new(0.67, 0.0, -5.0)).amax() < 0.006, "{jump}");
+        // The first piece applies at the jump, however the 625th tick of 0.04 s is rounded.
+        let accumulated = (0..625).fold(0.0, |time, _| time + 0.04);
+        for time in [625.0 * 0.04, 125.0 * 0.2, 25f64.next_up(), accumulated] {
+            assert!((reference.at(time).angles - reference.at(25.0).angles).norm() < 1e-9, "{time}");
+        }
+    }
+
+    #[test]
+    fn published_data_of_crmpc2022() {
+        let scenario = Scenario::crmpc2022();
+        assert_eq!(scenario.inertia, Inertia { Ixx: 588791.0, Iyy: 1303212.0, Izz: 1534163.0, Ixz: 24242.0 });
+        assert!(
+            (scenario.initial_angles.map(f64::to_degrees) - Vector3::new(7.5, 10.0, -30.0)).amax() < 1e-13
+        );
+        assert!((scenario.limit_rate - 0.0873).abs() < 5e-5);
+        assert_eq!(scenario.limit_moment, 1.356e5);
+        assert!((scenario.disturbance.bound - 0.0349).abs() < 1e-4);
+        assert_eq!(scenario.disturbance.period, 0.04);
+    }
+
+    #[test]
+    fn published_disturbance_and_command_of_tvsmc2015() {
+        let scenario = Scenario::tvsmc2015();
+        for time in [0.0, 3.0, 17.5] {
+            let printed = (0.5 + (0.1f64 * time).sin() + time.sin()) * 1e4; // Wu 2015, (66)
+            assert!((scenario.disturbance.moment(time) - Vector3::repeat(printed)).amax() < 1e-9);
+            assert!((degrees(&scenario.reference, time) - Vector3::new(30.0, 0.0, 60.0)).amax() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn two_loop_command_is_a_step_right_after_the_start() {
+        let reference = Scenario::two_loop().reference;
+        assert_eq!(degrees(&reference, 0.0), Vector3::zeros());
+        assert!((degrees(&reference, 0.01) - Vector3::repeat(5.0)).amax() < 1e-13);
+        assert_eq!(reference.jumps().collect::<Vec<_>>(), [0.0]);
+    }
+
+    #[test]
+    fn a_bad_file_is_refused_by_name() {
+        let refusal = |from: &str, to: &str| {
+            assert!(CRMPC_2022.1.contains(from));
+            Scenario::from_toml("my.toml", &CRMPC_2022.1.replace(from, to)).unwrap_err().to_string()
+        };
+        for (from, to, named) in [
+            ("Iyy = 1303212.0", "Iyyy = 1303212.0", "Iyyy"),
+            ("rate_deg_s = 5.0", "rate = 5.0", "rate"),
+            ("Ixz = 24242.0", "Ixz = 1e6", "inertia.Ixz"),
+            ("Ixx = 588791.0", "Ixx = 1.0e5", "triangle"),
+            ("period = 0.04", "period = 0.0", "disturbance.period"),
+            ("until = 25.0", "", "until"),
+            ("\"white\"", "\"pink\"", "pink"),
+        ] {
+            let message = refusal(from, to);
+            assert!(message.contains("my.toml") && message.contains(named), "{message}");
+        }
+    }
+}
