@@ -40,7 +40,9 @@ pub enum Error {
         beta_deg: f64,
     },
     /// A state or an input is no longer a finite number.
-    #[error("{what} not finite at t = {time} s: unstable loop, or an integrator step too long")]
+    #[error(
+        "{what} is not finite or beyond all bounds at t = {time} s: wrong input, unstable loop, or too long a step"
+    )]
     NotFinite {
         /// Time, s.
         time: f64,

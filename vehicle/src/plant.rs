@@ -73,6 +73,12 @@ pub struct Input {
     pub disturbance_moment: Vector3<f64>,
 }
 
+impl Input {
+    fn is_finite(&self) -> bool {
+        self.moment.iter().chain(&self.disturbance_moment).all(|value| value.is_finite())
+    }
+}
+
 impl From<Vector3<f64>> for Input {
     /// A control moment (N m) alone.
     fn from(moment: Vector3<f64>) -> Self {
@@ -241,7 +247,10 @@ impl Plant {
                     derivative(&self.body, state, &self.total_moment(t, &input(t), &held), &held.delta())
                 };
                 let next = rk4(&mut f, begin, &self.state, h);
-                check(&next, begin + h)?;
+                check(&next, begin + h).map_err(|error| {
+                    let fed = input(begin).is_finite() && input(begin + h).is_finite();
+                    if fed { error } else { Error::NotFinite { time: begin, what: "moment" } }
+                })?;
                 self.state = next;
             }
             time = end;

@@ -1,0 +1,269 @@
+//! The plant: conservation laws, order, cuts, reproducibility, refusals.
+
+use nalgebra::{Vector3, Vector6};
+use proptest::prelude::*;
+use vehicle::disturbance::{Disturbance, Kind, MomentWave, SineMoment};
+use vehicle::plant::{Config, Input, Plant, State, derivative, partial_derivatives};
+use vehicle::{Error, Scenario};
+
+fn config() -> Config {
+    Scenario::crmpc2022().config(0.01)
+}
+
+fn undisturbed(initial: State, step: f64) -> Config {
+    Config { initial, step, disturbance: Disturbance::default(), ..config() }
+}
+
+const TUMBLING: [f64; 6] = [0.2, 0.1, -0.5, 0.08, -0.05, 0.06];
+
+/// All kinds, each over the crmpc-2022 data.
+fn kinds() -> impl Iterator<Item = Config> {
+    use Kind::{AgainstMoment, AlongRate, Constant, None, Sine, Square, White};
+    [None, White, Constant, Sine, Square, AlongRate, AgainstMoment].into_iter().map(|kind| {
+        let wave = |frequency| MomentWave { amplitude: Vector3::new(1e4, 2e4, -1e4), frequency, phase: 0.2 };
+        let sine = SineMoment { offset: Vector3::repeat(5e3), waves: vec![wave(1.0), wave(0.1)] };
+        let disturbance =
+            Disturbance { kind, sine, square_period: 0.7, start: 0.5, end: 3.3, ..config().disturbance };
+        Config { disturbance, ..config() }
+    })
+}
+
+fn moment(k: u32) -> Vector3<f64> {
+    let t = f64::from(k) * 0.2;
+    Vector3::new(2e4 * t.sin(), -1e4 * (0.7 * t).cos(), 3e4 * (0.3 * t).sin())
+}
+
+#[test]
+fn oracle_torque_free_motion_conserves_energy_and_angular_momentum() {
+    let mut plant = Plant::new(&undisturbed(TUMBLING.into(), 0.01), 0.0).unwrap();
+    let body = *plant.body();
+    let energy = |plant: &Plant| plant.rates().dot(&(body.inertia * plant.rates())) / 2.0;
+    let momentum = |plant: &Plant| (body.inertia * plant.rates()).norm();
+    let (energy_0, momentum_0) = (energy(&plant), momentum(&plant));
+    let rates_0 = plant.rates();
+    for k in 0..10 {
+        plant.advance(f64::from(k), f64::from(k + 1), Vector3::zeros()).unwrap();
+        assert!((energy(&plant) / energy_0 - 1.0).abs() < 1e-13);
+        assert!((momentum(&plant) / momentum_0 - 1.0).abs() < 1e-13);
+    }
+    assert!((plant.rates() - rates_0).norm() > 0.01, "the body does not tumble");
+}
+
+#[test]
+fn oracle_integration_has_order_four() {
+    let end = |step: f64| {
+        let mut plant = Plant::new(&undisturbed(Vector6::from(TUMBLING) * 3.0, step), 0.0).unwrap();
+        plant
+            .advance_with(0.0, 4.0, |t| {
+                Vector3::new(1e5 * t.sin(), 2e5 * t.cos(), -1e5 * (2.0 * t).sin()).into()
+            })
+            .unwrap();
+        plant.state
+    };
+    let exact = end(0.002);
+    let error = |step| (end(step) - exact).norm();
+    for step in [0.2, 0.1, 0.05] {
+        let order = (error(step) / error(step / 2.0)).log2();
+        assert!((order - 4.0).abs() < 0.2, "order {order} at {step} s");
+    }
+}
+
+#[test]
+fn oracle_constant_moment_about_a_principal_axis() {
+    // About the pitch axis at beta = 0, sigma free: q = M t / Iyy, alpha = alpha_0 + M t² / 2 Iyy
+    let mut plant = Plant::new(&undisturbed(Vector6::new(0.1, 0.0, 0.3, 0.0, 0.0, 0.0), 0.01), 0.0).unwrap();
+    let inertia = plant.body().inertia[(1, 1)];
+    assert_eq!(inertia, 1303212.0 * 1.05);
+    plant.advance(0.0, 3.0, Vector3::new(0.0, 1e5, 0.0)).unwrap();
+    assert!((plant.rates() - Vector3::new(0.0, 1e5 * 3.0 / inertia, 0.0)).amax() < 1e-14);
+    assert!((plant.angles() - Vector3::new(0.1 + 1e5 * 4.5 / inertia, 0.0, 0.3)).amax() < 1e-14);
+}
+
+#[test]
+fn oracle_delta_is_an_acceleration_of_x_omega() {
+    let body = *Plant::new(&config(), 0.0).unwrap().body();
+    let (state, moment, delta) =
+        (State::from(TUMBLING), Vector3::new(1e4, 2e4, 3e4), Vector3::new(0.03, -0.02, 0.01));
+    // d(Rω)/dt by differences along the motion, with and without Δ
+    let x_omega_rate = |delta: &Vector3<f64>| {
+        let h = 1e-5;
+        let f = derivative(&body, &state, &moment, delta);
+        let x_omega = |state: State| {
+            vehicle::kinematics::r(&vehicle::plant::angles(&state)) * vehicle::plant::rates(&state)
+        };
+        (x_omega(state + f * h) - x_omega(state - f * h)) / (2.0 * h)
+    };
+    assert!((x_omega_rate(&delta) - x_omega_rate(&Vector3::zeros()) - delta).amax() < 1e-9);
+}
+
+fn long_and_short_steps(config: &Config) -> impl Iterator<Item = (State, State)> {
+    let [mut long, mut short] = [0, 1].map(|_| Plant::new(config, 0.0).unwrap());
+    let time = |tick: u32| f64::from(tick) * 0.04;
+    (0..25).map(move |k| {
+        long.advance(time(5 * k), time(5 * k + 5), moment(k)).unwrap();
+        for j in 5 * k..5 * k + 5 {
+            short.advance(time(j), time(j + 1), moment(k)).unwrap();
+        }
+        (long.state, short.state)
+    })
+}
+
+#[test]
+fn one_long_step_equals_five_short_ones_bit_for_bit() {
+    for kind in [Kind::White, Kind::AlongRate, Kind::AgainstMoment] {
+        let mut config = config();
+        config.disturbance.kind = kind;
+        assert!(long_and_short_steps(&config).all(|(long, short)| long == short), "{kind:?}");
+    }
+}
+
+#[test]
+fn one_long_step_equals_five_short_ones_if_the_disturbance_cuts_elsewhere() {
+    for config in kinds() {
+        for (long, short) in long_and_short_steps(&config) {
+            assert!((long - short).amax() < 1e-11, "{:?}: {}", config.disturbance.kind, long - short);
+        }
+    }
+}
+
+#[test]
+fn a_clock_that_is_accumulated_makes_no_slivers() {
+    let config = config();
+    let [mut exact, mut accumulated] = [0, 1].map(|_| Plant::new(&config, 0.0).unwrap());
+    let mut time = 0.0;
+    for k in 0..1250 {
+        exact.advance(f64::from(k) * 0.04, f64::from(k + 1) * 0.04, Vector3::zeros()).unwrap();
+        let mut calls = 0;
+        let count = |_| {
+            calls += 1;
+            Input::default()
+        };
+        accumulated.advance_with(time, time + 0.04, count).unwrap();
+        assert_eq!(calls, 1 + 4 * 4, "step {k}");
+        time += 0.04;
+        if exact.angles().y.abs() > 1.2 {
+            return;
+        }
+        assert!((exact.state - accumulated.state).amax() < 1e-11, "step {k}");
+    }
+}
+
+#[test]
+fn a_last_step_short_by_rounding_is_taken() {
+    let mut plant = Plant::new(&config(), 0.0).unwrap();
+    plant.advance(0.0, 0.04 - 1e-17, Vector3::zeros()).unwrap();
+    let before = plant.clone();
+    plant.advance(0.04, 0.04, Vector3::repeat(1e5)).unwrap();
+    assert_eq!(plant, before);
+    plant.advance(0.04, 0.04 + 1e-12, Vector3::repeat(1e5)).unwrap();
+    assert!((plant.state - before.state).amax() < 1e-12);
+}
+
+#[test]
+fn start_time_may_be_anything() {
+    for start in [-7.3, 0.0, 100.1] {
+        let mut config = config();
+        config.disturbance.start = start;
+        let mut plant = Plant::new(&config, start).unwrap();
+        plant.advance(start, start + 2.0, Vector3::zeros()).unwrap();
+        let mut origin = config.clone();
+        origin.disturbance.start = 0.0;
+        let mut reference = Plant::new(&origin, 0.0).unwrap();
+        reference.advance(0.0, 2.0, Vector3::zeros()).unwrap();
+        assert!((plant.state - reference.state).amax() < 1e-12, "start {start}");
+    }
+}
+
+#[test]
+fn state_dependent_disturbance_is_drawn_at_the_tick_and_held() {
+    let mut config = config();
+    config.disturbance.kind = Kind::AgainstMoment;
+    config.disturbance.period = 0.2;
+    let mut plant = Plant::new(&config, 0.0).unwrap();
+    let push = Vector3::new(1e4, 1e4, 1e4);
+    plant.advance(0.0, 0.04, push).unwrap();
+    let held = plant.held().unwrap();
+    plant.advance(0.04, 0.2, -push).unwrap();
+    assert_eq!(plant.held().unwrap().delta(), held.delta());
+    plant.advance(0.2, 0.24, -push).unwrap();
+    assert_eq!(plant.held().unwrap().delta(), -held.delta());
+}
+
+#[test]
+fn serialised_mid_run_it_goes_on_bit_for_bit() {
+    for config in kinds() {
+        let mut plant = Plant::new(&config, 0.0).unwrap();
+        plant.advance(0.0, 0.5, moment(1)).unwrap();
+        let text = toml::to_string(&plant).unwrap();
+        let mut restored: Plant = toml::from_str(&text).unwrap();
+        plant.advance(0.5, 1.5, moment(2)).unwrap();
+        restored.advance(0.5, 1.5, moment(2)).unwrap();
+        assert_eq!(plant, restored);
+    }
+}
+
+#[test]
+fn singular_attitude_and_wrong_input_stop_the_plant_with_a_reason() {
+    // Without Ixz the yaw rate alone carries beta straight into 90°.
+    let mut straight = undisturbed(Vector6::new(0.0, 1.5, 0.0, 0.0, 0.0, -0.5), 0.01);
+    straight.inertia.Ixz = 0.0;
+    let mut plant = Plant::new(&straight, 0.0).unwrap();
+    let error = plant.advance(0.0, 2.0, Vector3::zeros()).unwrap_err();
+    assert!(matches!(error, Error::Singular { .. }), "{error}");
+    assert!(
+        plant.state.iter().all(|value| value.is_finite()) && plant.angles().y < std::f64::consts::FRAC_PI_2
+    );
+
+    let mut plant = Plant::new(&config(), 0.0).unwrap();
+    for bad in [f64::NAN, f64::INFINITY] {
+        let error = plant.advance(0.0, 0.04, Vector3::repeat(bad)).unwrap_err();
+        assert!(matches!(error, Error::NotFinite { what: "moment", .. }), "{error}");
+        assert_eq!(plant.state, config().initial);
+    }
+}
+
+#[test]
+fn impossible_configurations_are_refused_by_name() {
+    let change = |change: fn(&mut Config)| {
+        let mut config = config();
+        change(&mut config);
+        Plant::new(&config, 0.0).unwrap_err().to_string()
+    };
+    for (message, name) in [
+        (change(|c| c.inertia.Ixx = 0.0), "inertia.Ixx"),
+        (change(|c| c.inertia.Iyy = f64::NAN), "inertia.Iyy"),
+        (change(|c| c.inertia.Ixz = 1e6), "inertia.Ixz"),
+        (change(|c| c.inertia.Izz = 3e6), "triangle"),
+        (change(|c| c.inertia_scale = 0.0), "inertia.scale"),
+        (change(|c| c.initial[1] = 1.6), "initial.beta"),
+        (change(|c| c.initial[3] = f64::NAN), "initial"),
+        (change(|c| c.step = 0.0), "integrator.step"),
+        (change(|c| c.disturbance.period = -1.0), "disturbance.period"),
+    ] {
+        assert!(message.contains(name), "{message}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn oracle_partial_derivatives_against_differences(
+        values in proptest::array::uniform6(-1.0..1.0),
+        pushes in proptest::array::uniform3(-1e5..1e5),
+        deltas in proptest::array::uniform3(-0.04..0.04),
+    ) {
+        let body = *Plant::new(&config(), 0.0).unwrap().body();
+        let (state, moment, delta) = (State::from(values), Vector3::from(pushes), Vector3::from(deltas));
+        let (by_state, by_moment) = partial_derivatives(&body, &state, &delta);
+        let f = |state: &State, moment: &Vector3<f64>| derivative(&body, state, moment, &delta);
+        for i in 0..6 {
+            let h = State::from_fn(|j, _| if i == j { 1e-5 } else { 0.0 });
+            let numeric = (f(&(state + h), &moment) - f(&(state - h), &moment)) / 2e-5;
+            prop_assert!((numeric - by_state.column(i)).amax() < 1e-7, "state {}: {}", i, numeric - by_state.column(i));
+        }
+        for i in 0..3 {
+            let h = Vector3::from_fn(|j, _| if i == j { 1e4 } else { 0.0 });
+            let numeric = (f(&state, &(moment + h)) - f(&state, &(moment - h))) / 2e4;
+            prop_assert!((numeric - by_moment.column(i)).amax() < 1e-16);
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! Reference profiles: derivatives against differences, the spline against closed forms, tables that are refused.
+
+use nalgebra::Vector3;
+use vehicle::table::Table;
+use vehicle::{Profile, Reference, Scenario};
+
+/// Largest difference between the profile's rates and accelerations and those of its angles, at times away from jumps.
+fn derivative_error(profile: &Profile, from: f64, to: f64) -> f64 {
+    let h = 1e-3;
+    let jumps: Vec<f64> = profile.jumps().collect();
+    let times = (0..400).map(|k| from + (to - from) * (f64::from(k) + 0.37) / 400.0);
+    times
+        .filter(|time| jumps.iter().all(|jump| (time - jump).abs() > 3.0 * h))
+        .map(|time| {
+            let [a, b, c, d, e] = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|k| profile.at(time + k * h));
+            let difference = |of: fn(&Reference) -> Vector3<f64>| {
+                (of(&a) - of(&b) * 8.0 + of(&d) * 8.0 - of(&e)) / (12.0 * h)
+            };
+            let rates = (difference(|r| r.angles) - c.rates).amax();
+            rates.max((difference(|r| r.rates) - c.accelerations).amax())
+        })
+        .fold(0.0, f64::max)
+}
+
+fn smooth(t: f64) -> Vector3<f64> {
+    Vector3::new(0.2 + 0.1 * (0.5 * t).sin(), 0.05 * (0.3 * t).cos(), -0.5 + 0.002 * t * t)
+}
+
+fn smooth_table(points: u32) -> Table {
+    let times: Vec<f64> = (0..=points).map(|k| 20.0 * f64::from(k) / f64::from(points)).collect();
+    let angles = times.iter().map(|&t| smooth(t)).collect();
+    Table::new(times, angles).unwrap()
+}
+
+#[test]
+fn oracle_derivatives_of_every_profile_against_differences() {
+    let (a, b) = (Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.4, 0.5, -0.6));
+    let profiles = [
+        ("crmpc2022", Scenario::crmpc2022().reference),
+        ("tvsmc2015", Scenario::tvsmc2015().reference),
+        ("twoLoop", Scenario::two_loop().reference),
+        ("constant", Profile::constant(a)),
+        ("step", Profile::step(a, b, 3.0)),
+        ("sine", Profile::sine(a, b, 0.8, 0.3)),
+    ];
+    for (name, profile) in profiles {
+        let error = derivative_error(&profile, 0.0, 50.0);
+        assert!(error < 1e-11, "{name}: {error}");
+    }
+    // Across knots the spline's third derivative jumps.
+    let error = derivative_error(&Profile::Table(smooth_table(200)), 0.1, 19.9);
+    assert!(error < 1e-4, "table: {error}");
+}
+
+#[test]
+fn step_keeps_the_value_before_at_its_time() {
+    let profile = Profile::step(Vector3::zeros(), Vector3::repeat(1.0), 5.0);
+    assert_eq!(profile.at(5.0).angles, Vector3::zeros());
+    assert_eq!(profile.at(5.01).angles, Vector3::repeat(1.0));
+    assert_eq!(profile.jumps().collect::<Vec<_>>(), [5.0]);
+}
+
+#[test]
+fn oracle_sine_has_its_phase_and_amplitude() {
+    let (mean, amplitude) = (Vector3::new(0.1, 0.2, 0.3), Vector3::new(1.0, -2.0, 3.0));
+    let at = Profile::sine(mean, amplitude, 0.8, 0.3).at(2.5);
+    assert!((at.angles - mean - amplitude * (0.8f64 * 2.5 + 0.3).sin()).amax() < 1e-15);
+    assert!((at.rates - amplitude * 0.8 * (0.8f64 * 2.5 + 0.3).cos()).amax() < 1e-15);
+}
+
+#[test]
+fn oracle_spline_reproduces_polynomials_of_its_degree() {
+    for (points, degree) in [(2, 1), (3, 2), (4, 3), (5, 3), (9, 3)] {
+        let times: Vec<f64> = (0..points).map(|k| f64::from(k) * (1.0 + 0.1 * f64::from(k))).collect();
+        let polynomial =
+            |t: f64| Vector3::new(1.0 + t, 2.0 - t.powi(degree.min(2)), t.powi(degree) - 3.0 * t);
+        let table = Table::new(times.clone(), times.iter().map(|&t| polynomial(t)).collect()).unwrap();
+        for k in 0..=100 {
+            let t = times[times.len() - 1] * f64::from(k) / 100.0;
+            let error = (table.at(t).angles - polynomial(t)).amax();
+            assert!(error < 1e-10, "{points} points at {t}: {error}");
+        }
+    }
+}
+
+#[test]
+fn oracle_spline_converges_with_fourth_order() {
+    let error = |points| {
+        let table = smooth_table(points);
+        (0..997)
+            .map(|k| 20.0 * f64::from(k) / 997.0)
+            .map(|t| (table.at(t).angles - smooth(t)).amax())
+            .fold(0.0, f64::max)
+    };
+    let order = f64::log2(error(20) / error(40));
+    assert!(order > 3.7, "order {order}");
+}
+
+#[test]
+fn spline_is_continuous_to_the_second_derivative_and_meets_its_points() {
+    let table = smooth_table(7);
+    for k in 0..=7 {
+        let knot = 20.0 * f64::from(k) / 7.0;
+        assert!((table.at(knot).angles - smooth(knot)).amax() < 1e-14);
+        if (1..7).contains(&k) {
+            let (before, after) = (table.at(knot - 1e-9), table.at(knot + 1e-9));
+            assert!((before.rates - after.rates).amax() < 1e-9);
+            assert!((before.accelerations - after.accelerations).amax() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn table_is_held_beyond_its_ends() {
+    let table = smooth_table(7);
+    for (time, end) in [(-1.0, 0.0), (20.5, 20.0), (1e9, 20.0)] {
+        assert_eq!(table.at(time), Reference { angles: table.at(end).angles, ..Reference::default() });
+    }
+    let one = Table::new(vec![1.0], vec![Vector3::repeat(0.1)]).unwrap();
+    assert_eq!(one.at(1.0).angles, Vector3::repeat(0.1));
+}
+
+fn read(text: &str) -> Result<Table, vehicle::Error> {
+    Table::from_csv("turn.csv", text.as_bytes())
+}
+
+#[test]
+fn csv_is_read_in_the_stated_units_and_any_order_of_columns() {
+    let table =
+        read("# turn\nsigma_deg, time_s, alpha_rad, beta_deg\n-30, 0, 0.1, 0\n\n-20, 2.5, 0.2, 9\n").unwrap();
+    let end = table.at(2.5).angles;
+    assert!((end - Vector3::new(0.2, 9f64.to_radians(), -20f64.to_radians())).amax() < 1e-15);
+}
+
+#[test]
+fn csv_faults_are_named_with_file_line_and_column() {
+    let head = "time_s,alpha_deg,beta_deg,sigma_deg\n";
+    for (text, named) in [
+        (format!("{head}0,1,2,3\n1,1,x,3\n"), "turn.csv, line 3, column beta_deg: 'x'"),
+        (format!("{head}0,1,2,3\n1,1,NaN,3\n"), "line 3, column beta_deg"),
+        (format!("{head}# c\n0,1,2,3\n0,1,2,3\n"), "line 4, column time_s: 0 does not come after"),
+        (format!("{head}0,1,2\n"), "line 2: 3 values where the headings name 4"),
+        (head.to_string(), "no points"),
+        (
+            "time_s,alpha,beta_deg,sigma_deg\n".into(),
+            "column alpha: is missing; head it alpha_rad or alpha_deg",
+        ),
+        (format!("q,{head}"), "column q: is not known"),
+        ("time_s,alpha_deg,alpha_rad,beta_deg,sigma_deg\n".into(), "column alpha: is given twice"),
+        (String::new(), "column time: is missing; head it time_s"),
+    ] {
+        let message = read(&text).unwrap_err().to_string();
+        assert!(message.contains(named) && message.contains("turn.csv"), "{message}\nshould hold {named}");
+    }
+    let missing = Table::from_csv_file("no/such.csv".as_ref()).unwrap_err().to_string();
+    assert!(missing.contains("no/such.csv"), "{missing}");
+}
