@@ -1,1 +1,13 @@
-//! Placeholder.
+//! Attitude controllers of the papers. Knows the vehicle, not FMI. SI units and radians throughout.
+
+pub mod controller;
+pub mod crmpc;
+pub mod error;
+pub mod linearise;
+pub mod lq;
+pub mod sampled;
+pub mod settings;
+
+pub use controller::{Controller, Measurement};
+pub use crmpc::Crmpc;
+pub use error::DesignError;

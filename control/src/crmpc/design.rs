@@ -1,0 +1,303 @@
+//! Offline design of CRMPC: every constant of Chai 2022 from the raw data, and the tightening of the `robust` set.
+
+use crate::error::DesignError;
+use crate::sampled::{Gain, Reach, SampledError};
+use nalgebra::{Matrix2, Vector2};
+use serde::{Deserialize, Serialize};
+use vehicle::dynamics::RigidBody;
+
+/// Which sets the optimisation keeps the nominal motion in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum Constraints {
+    /// ‖ω‖ and ‖m‖ themselves, tightened stage by stage by what the sampled error dynamics can reach.
+    Robust,
+    /// ‖x_ω‖ ≤ x̄_tube and ‖u‖ ≤ ū_tube as printed.
+    Paper,
+}
+
+/// Where the nominal motion may start at a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum InitialState {
+    /// At the measured state.
+    Measured,
+    /// Anywhere with the measured state inside an invariant set around it.
+    Tube,
+}
+
+/// Everything CRMPC is built from. Units SI, angles rad.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// The vehicle as the controller believes it to be.
+    pub body: RigidBody,
+    /// ‖ω‖ must stay below this, rad/s.
+    pub limit_rate: f64,
+    /// ‖m‖ must stay below this, N m.
+    pub limit_moment: f64,
+    /// Constraint sets.
+    pub constraints: Constraints,
+    /// Initial state of the nominal motion.
+    pub initial_state: InitialState,
+    /// Number of prediction steps N.
+    pub horizon: usize,
+    /// Optimisation period h, s; a whole multiple of the feedback period.
+    pub period_optimisation: f64,
+    /// Feedback period, s.
+    pub period_feedback: f64,
+    /// P, diagonal: angles, rates.
+    pub p: [f64; 6],
+    /// Q, diagonal.
+    pub q: [f64; 3],
+    /// K of the feedback law (20).
+    pub feedback: Gain,
+    /// K̃ of the terminal law (14).
+    pub terminal: Gain,
+    /// Gain that the paper's c̄ is computed with.
+    pub tube: Gain,
+    /// Δ̄ per component of x_ω, rad/s².
+    pub disturbance_bound: f64,
+    /// Relative error of the inertia that the robust set allows for.
+    pub inertia_error: f64,
+    /// |β| that the bounds of Lemma 1 allow for, rad.
+    pub sideslip_bound: f64,
+    /// Bound Θ̄₁ on ‖Θ̇_r‖, rad/s.
+    pub reference_rate: f64,
+    /// Bound Θ̄₂ on ‖Θ̈_r‖, rad/s².
+    pub reference_acceleration: f64,
+    /// Iteration limit of the cone solver.
+    pub max_iterations: u32,
+}
+
+/// The constants printed in Chai 2022, section 5.1, computed from the raw data.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PaperConstants {
+    /// r̄₀ = √(1 + tan β̄). The proof of Lemma 1 has tan²; the printed number lacks the square.
+    pub r0: f64,
+    /// r̄₁: the rate limit in rad/s. Not a bound of ‖Ṙ‖ for all |β| ≤ 10°.
+    pub r1: f64,
+    /// Ω̄ = √3 ω̄, a component-wise bound.
+    pub omega: f64,
+    /// Ī·Ī′, the condition number of I.
+    pub condition: f64,
+    /// x̄_ω = r̄₀ ω̄ of (6), rad/s.
+    pub x: f64,
+    /// ū = r̄₀ M̄ / λ_min(I) of (6), rad/s².
+    pub u: f64,
+    /// c̄ of (21), the peak of the step response, s.
+    pub c: f64,
+    /// x̄_tube of (21), rad/s.
+    pub x_tube: f64,
+    /// ū_tube of (21), rad/s².
+    pub u_tube: f64,
+    /// ε₁ of (13).
+    pub epsilon1: f64,
+    /// ε₂ of (13).
+    pub epsilon2: f64,
+    /// Tube of the angles, Δ̄/|k₁| of (26), rad.
+    pub angle_tube: f64,
+    /// Tube of the rates, c̄ Δ̄ of (26) with c̄ of the feedback gain, rad/s.
+    pub rate_tube: f64,
+}
+
+/// G of (15) per axis, with equality: AᵀG + G A + K̃ᵀQ K̃ + P = 0, A = [0 1; k̃₁ k̃₂]. The print demands < 0, which
+/// its own G does not satisfy.
+pub fn terminal_weight(gain: Gain, p: Vector2<f64>, q: f64) -> Matrix2<f64> {
+    let Gain { k1, k2 } = gain;
+    let load = Matrix2::from_diagonal(&p) + gain.row().transpose() * gain.row() * q;
+    let g12 = -load.m11 / (2.0 * k1);
+    let g22 = -(load.m22 + 2.0 * g12) / (2.0 * k2);
+    let g11 = -(load.m12 + k2 * g12 + k1 * g22);
+    Matrix2::new(g11, g12, g12, g22)
+}
+
+/// c̄ of (21): the peak over time of G_i(τ) = (e^{λ₂τ} − e^{λ₁τ})/√(k₂² + 4k₁), with λ₁ the faster root.
+pub fn step_response_peak(gain: Gain) -> Option<f64> {
+    let (slow, fast) = gain.eigenvalues()?;
+    let peak_time = (slow / fast).ln() / (fast - slow);
+    Some(((slow * peak_time).exp() - (fast * peak_time).exp()) / (slow - fast))
+}
+
+/// Smallest eigenvalue of a symmetric 2×2 matrix.
+fn smallest_eigenvalue(m: &Matrix2<f64>) -> f64 {
+    0.5 * m.trace() - (0.25 * (m.m11 - m.m22).powi(2) + m.m12 * m.m12).sqrt()
+}
+
+/// How the robust set is tightened, per feedback tick of the prediction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tightening {
+    /// Reach of the error dynamics per unit disturbance at prediction step k = 0..=N.
+    pub at_stage: Vec<Reach>,
+    /// Largest reach of K·o at the feedback ticks within prediction interval k = 0..N.
+    pub within_stage: Vec<Reach>,
+    /// Δ̄ per component, rad/s².
+    pub disturbance: f64,
+    /// Relative moment error that an inertia error is equivalent to.
+    pub inertia: f64,
+    /// Bound on the norm of the whole disturbance, inertia error included, rad/s².
+    pub norm: f64,
+}
+
+/// The result of the offline design.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Design {
+    /// G per axis.
+    pub g: [Matrix2<f64>; 3],
+    /// The paper's constants; `None` where its assumptions (real distinct eigenvalues) do not hold.
+    pub paper: Option<PaperConstants>,
+    /// Exact sampled bounds of the error dynamics for all times, per unit Δ̄.
+    pub reach: Reach,
+    /// Invariant ellipse per unit-free axis (same for all axes): measured − nominal stays in {o : oᵀX⁻¹o ≤ 1}.
+    pub invariant: Matrix2<f64>,
+    /// Stage-wise tightening of the robust set.
+    pub tightening: Tightening,
+    /// Feedback ticks per optimisation.
+    pub ratio: usize,
+    /// √λ_min(G), the smallest over the axes.
+    pub terminal_scale: f64,
+    /// Largest eigenvalue of I, kg m².
+    pub largest_inertia: f64,
+}
+
+impl Design {
+    /// Computes all constants.
+    ///
+    /// # Errors
+    /// Names the setting that is out of range, or the gain and its spectral radius if it does not stabilise.
+    pub fn new(s: &Settings) -> Result<Self, DesignError> {
+        let ratio = ratio(s)?;
+        for (name, gain) in [("feedback", s.feedback), ("terminal", s.terminal), ("tube", s.tube)] {
+            if gain.eigenvalues().is_none() && name != "feedback" {
+                return Err(DesignError::NotReal { name });
+            }
+        }
+        let error = SampledError::new(s.feedback, s.period_feedback);
+        let reach = error.reach_forever().ok_or(DesignError::Unstable {
+            k1: s.feedback.k1,
+            k2: s.feedback.k2,
+            period: s.period_feedback,
+            radius: error.spectral_radius(),
+        })?;
+
+        let g: [Matrix2<f64>; 3] =
+            std::array::from_fn(|i| terminal_weight(s.terminal, Vector2::new(s.p[i], s.p[i + 3]), s.q[i]));
+        let terminal_scale = g.iter().map(smallest_eigenvalue).fold(f64::INFINITY, f64::min).sqrt();
+        let eigenvalues = s.body.inertia.symmetric_eigenvalues();
+        let (smallest_inertia, largest_inertia) = (eigenvalues.min(), eigenvalues.max());
+
+        let inertia = s.inertia_error / (1.0 - s.inertia_error);
+        // ‖R‖ = sec β, Chai 2022, Lemma 1.
+        let input_of_moment = 1.0 / (s.sideslip_bound.cos() * smallest_inertia);
+        let inertia_disturbance = inertia * s.limit_moment * input_of_moment;
+        let per_axis = s.disturbance_bound + inertia_disturbance;
+        let invariant = error.invariant_ellipse(per_axis.max(1e-9)).unwrap_or_else(Matrix2::identity);
+        let tightening = Tightening {
+            at_stage: match s.initial_state {
+                InitialState::Measured => {
+                    error.reach(ratio * s.horizon).into_iter().step_by(ratio).collect()
+                }
+                InitialState::Tube => vec![extents(&invariant, s.feedback, per_axis); s.horizon + 1],
+            },
+            within_stage: match s.initial_state {
+                InitialState::Measured => {
+                    error.reach(ratio * s.horizon).into_iter().skip(ratio - 1).step_by(ratio).collect()
+                }
+                InitialState::Tube => vec![extents(&invariant, s.feedback, per_axis); s.horizon],
+            },
+            disturbance: s.disturbance_bound,
+            inertia,
+            norm: 3.0_f64.sqrt() * s.disturbance_bound + inertia_disturbance,
+        };
+
+        Ok(Self {
+            paper: paper_constants(s, terminal_scale, smallest_inertia, largest_inertia),
+            g,
+            reach,
+            invariant,
+            tightening,
+            ratio,
+            terminal_scale,
+            largest_inertia,
+        })
+    }
+}
+
+/// Extents of the invariant ellipse per unit of the disturbance bound it was made for.
+fn extents(shape: &Matrix2<f64>, gain: Gain, bound: f64) -> Reach {
+    let feedback = (gain.row() * shape * gain.row().transpose()).x.sqrt();
+    let bound = bound.max(1e-9);
+    Reach { angle: shape.m11.sqrt() / bound, rate: shape.m22.sqrt() / bound, feedback: feedback / bound }
+}
+
+fn ratio(s: &Settings) -> Result<usize, DesignError> {
+    let positive = [
+        ("period.feedback", s.period_feedback),
+        ("period.optimisation", s.period_optimisation),
+        ("limit.rate", s.limit_rate),
+        ("limit.moment", s.limit_moment),
+    ];
+    for (name, value) in positive {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(DesignError::NotPositive { name, value });
+        }
+    }
+    for (i, &value) in s.p.iter().enumerate() {
+        if !(value >= 0.0 && value.is_finite()) {
+            return Err(DesignError::Weight { name: "P", index: i + 1, value });
+        }
+    }
+    for (i, &value) in s.q.iter().enumerate() {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(DesignError::Weight { name: "Q", index: i + 1, value });
+        }
+    }
+    if s.horizon == 0 {
+        return Err(DesignError::NotPositive { name: "horizon", value: 0.0 });
+    }
+    if !(0.0..1.0).contains(&s.inertia_error) {
+        return Err(DesignError::OutOfRange { name: "inertia.error", value: s.inertia_error, low: 0.0, high: 1.0 });
+    }
+    let ratio = (s.period_optimisation / s.period_feedback).round();
+    if ratio < 1.0 || (ratio * s.period_feedback - s.period_optimisation).abs() > 1e-9 * s.period_optimisation {
+        return Err(DesignError::Periods { optimisation: s.period_optimisation, feedback: s.period_feedback });
+    }
+    Ok(ratio as usize)
+}
+
+fn paper_constants(s: &Settings, terminal_scale: f64, smallest: f64, largest: f64) -> Option<PaperConstants> {
+    let root3 = 3.0_f64.sqrt();
+    let r0 = (1.0 + s.sideslip_bound.tan()).sqrt();
+    let r1 = s.limit_rate;
+    let omega = root3 * s.limit_rate;
+    let condition = largest / smallest;
+    let c = step_response_peak(s.tube)?;
+
+    // (6): outer sets.
+    let x = r0 * s.limit_rate;
+    let u = r0 * s.limit_moment / smallest;
+    // r̄₀ Ī′ Ω̄ Ī r̄₀′ with r̄₀′ = 1, the recurring product of (13), (17) and (21).
+    let gyroscopic = r0 * condition * omega;
+    // (21)
+    let x_tube = x - root3 * s.disturbance_bound * c;
+    let u_tube = u - 2.0 * gyroscopic * x + root3 * s.disturbance_bound * c * (r1 + gyroscopic);
+    // (13), with "− r̄₁" as printed; the triangle inequality would give "+ r̄₁".
+    let terminal_gain = s.terminal.k1.hypot(s.terminal.k2);
+    let epsilon1 = terminal_scale * (x_tube - s.reference_rate);
+    let epsilon2 =
+        terminal_scale * (u_tube - (gyroscopic - r1) * x_tube - s.reference_acceleration) / terminal_gain;
+    Some(PaperConstants {
+        r0,
+        r1,
+        omega,
+        condition,
+        x,
+        u,
+        c,
+        x_tube,
+        u_tube,
+        epsilon1,
+        epsilon2,
+        angle_tube: s.disturbance_bound / s.feedback.k1.abs(),
+        rate_tube: s.disturbance_bound * step_response_peak(s.feedback)?,
+    })
+}

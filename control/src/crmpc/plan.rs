@@ -1,0 +1,52 @@
+//! A nominal motion over the horizon.
+
+use nalgebra::{Vector3, Vector6};
+use serde::{Deserialize, Serialize};
+
+/// States x̃_0 … x̃_N and the accelerations a_0 … a_{N−1} held between them.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// (Θ̃, x̃_ω), N + 1 of them.
+    pub states: Vec<Vector6<f64>>,
+    /// a = ẋ̃_ω, N of them, rad/s².
+    pub accelerations: Vec<Vector3<f64>>,
+}
+
+impl Clone for Plan {
+    fn clone(&self) -> Self {
+        Self { states: self.states.clone(), accelerations: self.accelerations.clone() }
+    }
+
+    // Keeps the memory it has.
+    fn clone_from(&mut self, source: &Self) {
+        self.states.clone_from(&source.states);
+        self.accelerations.clone_from(&source.accelerations);
+    }
+}
+
+impl Plan {
+    /// A plan of `horizon` intervals at rest at the origin.
+    pub fn new(horizon: usize) -> Self {
+        Self { states: vec![Vector6::zeros(); horizon + 1], accelerations: vec![Vector3::zeros(); horizon] }
+    }
+
+    pub(super) fn resize(&mut self, horizon: usize) {
+        self.states.resize(horizon + 1, Vector6::zeros());
+        self.accelerations.resize(horizon, Vector3::zeros());
+    }
+
+    /// Largest difference of any state component.
+    pub(super) fn distance(&self, other: &Self) -> f64 {
+        self.states.iter().zip(&other.states).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
+    }
+}
+
+/// Exact motion of the double integrator over `h` with `a` held.
+pub(super) fn advance(state: &Vector6<f64>, a: &Vector3<f64>, h: f64) -> Vector6<f64> {
+    let mut next = *state;
+    for i in 0..3 {
+        next[i] += h * (state[3 + i] + 0.5 * h * a[i]);
+        next[3 + i] += h * a[i];
+    }
+    next
+}

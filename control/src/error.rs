@@ -1,0 +1,77 @@
+//! What can be wrong with a controller's settings.
+
+/// A setting that the design refuses. Names follow the FMUs' parameters.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DesignError {
+    /// The feedback gain does not stabilise the sampled error dynamics.
+    #[error(
+        "feedback gain K = [{k1}, {k2}] sampled every {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter period.feedback"
+    )]
+    Unstable {
+        /// Gain on the angle, 1/s².
+        k1: f64,
+        /// Gain on the rate, 1/s.
+        k2: f64,
+        /// Feedback period, s.
+        period: f64,
+        /// Spectral radius of the sampled error dynamics.
+        radius: f64,
+    },
+    /// A gain violates Lemma 2 or 3 of Chai 2022.
+    #[error("{name}.k1 and {name}.k2 need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)")]
+    NotReal {
+        /// Which gain.
+        name: &'static str,
+    },
+    /// A quantity must be positive and finite.
+    #[error("{name} = {value} must be positive and finite")]
+    NotPositive {
+        /// Which setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A weight must not be negative, and weights on the input must be positive.
+    #[error("weight.{name}[{index}] = {value} is not allowed: P must not be negative, Q must be positive")]
+    Weight {
+        /// P or Q.
+        name: &'static str,
+        /// Position on the diagonal, from 1.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// A quantity is outside its range.
+    #[error("{name} = {value} must be at least {low} and below {high}")]
+    OutOfRange {
+        /// Which setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Smallest allowed value.
+        low: f64,
+        /// First value no longer allowed.
+        high: f64,
+    },
+    /// The two rates do not fit.
+    #[error("period.optimisation = {optimisation} s must be a whole multiple of period.feedback = {feedback} s")]
+    Periods {
+        /// Optimisation period, s.
+        optimisation: f64,
+        /// Feedback period, s.
+        feedback: f64,
+    },
+    /// Nothing is left of one of the paper's sets after tightening.
+    #[error(
+        "nothing is left of the paper's set: {name} = {value:.4}; lower disturbance.bound or the reference bounds, or raise the limits"
+    )]
+    EmptySet {
+        /// Which set's size.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The solver refuses the problem.
+    #[error("the cone solver refuses the problem: {0}")]
+    Solver(String),
+}

@@ -1,0 +1,119 @@
+//! The published settings, from `data/crmpc-2022.toml`.
+
+use crate::crmpc::{Constraints, InitialState, Settings};
+use crate::sampled::Gain;
+use serde::Deserialize;
+use vehicle::dynamics::RigidBody;
+use vehicle::scenario::Scenario;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    weights: Weights,
+    schedule: Schedule,
+    gains: Gains,
+    bounds: Bounds,
+    solver: Solver,
+    published: Published,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Weights {
+    p: [f64; 6],
+    q: [f64; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Schedule {
+    horizon: usize,
+    period_optimisation: f64,
+    period_feedback: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Gains {
+    feedback: Gain,
+    terminal: Gain,
+    tube: Gain,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Bounds {
+    inertia_error: f64,
+    sideslip_deg: f64,
+    reference_rate_deg_s: f64,
+    reference_acceleration_deg_s2: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Solver {
+    max_iterations: u32,
+}
+
+/// What Chai 2022, section 5.1 prints of its own design.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Published {
+    /// G per axis: G11, G12, G22.
+    pub g: [f64; 3],
+    /// r̄₀.
+    pub r0: f64,
+    /// r̄₁.
+    pub r1: f64,
+    /// Ω̄.
+    pub omega: f64,
+    /// Ī·Ī′.
+    pub condition: f64,
+    /// c̄.
+    pub c: f64,
+    /// ε₁.
+    pub epsilon1: f64,
+    /// ε₂.
+    pub epsilon2: f64,
+}
+
+#[allow(clippy::panic)]
+fn embedded() -> File {
+    // Cannot fail: every test that uses the published settings reads it.
+    toml::from_str(include_str!("../data/crmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
+}
+
+impl Settings {
+    /// Chai 2022, section 5.1, for the vehicle and limits of `scenario`; robust set, measured initial state.
+    pub fn crmpc2022(scenario: &Scenario, body: RigidBody) -> Self {
+        let File { weights, schedule, gains, bounds, solver, .. } = embedded();
+        Self {
+            body,
+            limit_rate: scenario.limit_rate,
+            limit_moment: scenario.limit_moment,
+            constraints: Constraints::Robust,
+            initial_state: InitialState::Measured,
+            horizon: schedule.horizon,
+            period_optimisation: schedule.period_optimisation,
+            period_feedback: schedule.period_feedback,
+            p: weights.p,
+            q: weights.q,
+            feedback: gains.feedback,
+            terminal: gains.terminal,
+            tube: gains.tube,
+            disturbance_bound: scenario.disturbance.bound,
+            inertia_error: bounds.inertia_error,
+            sideslip_bound: bounds.sideslip_deg.to_radians(),
+            reference_rate: bounds.reference_rate_deg_s.to_radians(),
+            reference_acceleration: bounds.reference_acceleration_deg_s2.to_radians(),
+            max_iterations: solver.max_iterations,
+        }
+    }
+}
+
+impl Published {
+    /// The printed constants.
+    pub fn crmpc2022() -> Self {
+        embedded().published
+    }
+}
