@@ -106,6 +106,8 @@ pub struct Config {
 pub struct Held {
     /// Number of the interval.
     tick: i64,
+    /// When it was drawn, s.
+    since: f64,
     /// Δ drawn at its beginning, rad/s².
     sample: Vector3<f64>,
     /// Whether the disturbance acts.
@@ -179,17 +181,17 @@ impl Plant {
         self.disturbance.next_change(self.start_time, time)
     }
 
-    /// The disturbance that holds from `time` (s) on: drawn from the present state and `input` if a tick has come, the
-    /// one already held otherwise.
+    /// The disturbance that holds from `time` (s) on: drawn from the present state and `input` if a tick has come (again,
+    /// if asked again at the tick), the one already held otherwise.
     pub fn disturbance_at(&self, time: f64, input: &Input) -> Held {
         let tick = self.disturbance.tick(self.start_time, time);
         let acts = self.disturbance.acts(time);
         match self.held {
-            Some(held) if held.tick == tick => Held { acts, ..held },
+            Some(held) if held.tick == tick && time > held.since + tolerance(time) => Held { acts, ..held },
             _ => {
                 let (angles, rates) = (self.angles(), self.rates());
                 let view = View { body: &self.body, angles, rates, moment: input.moment };
-                Held { tick, sample: self.disturbance.sample(tick, &view), acts }
+                Held { tick, since: time, sample: self.disturbance.sample(tick, &view), acts }
             }
         }
     }
@@ -204,10 +206,15 @@ impl Plant {
         self.held
     }
 
+    /// The disturbing moment (N m) at `time` (s): the external one and that of the disturbance.
+    pub fn disturbance_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
+        let own = if held.acts { self.disturbance.moment(time) } else { Vector3::zeros() };
+        input.disturbance_moment + own
+    }
+
     /// All moments together (N m) at `time` (s).
     pub fn total_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
-        let own = if held.acts { self.disturbance.moment(time) } else { Vector3::zeros() };
-        input.moment + input.disturbance_moment + own
+        input.moment + self.disturbance_moment(time, input, held)
     }
 
     /// State derivative at `time` (s), at the present state.

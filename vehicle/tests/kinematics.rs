@@ -8,6 +8,8 @@ fn attitude() -> impl Strategy<Value = Vector3<f64>> {
     (-3.0..3.0, -1.4..1.4, -3.0..3.0).prop_map(|(alpha, beta, sigma)| Vector3::new(alpha, beta, sigma))
 }
 
+type Of = fn(&Vector3<f64>) -> Matrix3<f64>;
+
 proptest! {
     #[test]
     fn oracle_r_times_its_inverse_is_the_identity(angles in attitude()) {
@@ -35,7 +37,6 @@ proptest! {
     fn oracle_partial_derivatives_against_differences(angles in attitude()) {
         let h = 1e-5;
         let scale = 1.0 / angles.y.cos().powi(5);
-        type Of = fn(&Vector3<f64>) -> Matrix3<f64>;
         let pairs: [(Of, usize, Of); 6] = [
             (r, 0, r_alpha),
             (r, 1, r_beta),

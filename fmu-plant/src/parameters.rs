@@ -1,0 +1,106 @@
+//! The unit's parameters, with their default: the scenario of Chai 2022.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::Scenario;
+use vehicle::disturbance::{Disturbance, Kind, MomentWave, SineMoment};
+use vehicle::dynamics::Inertia;
+use vehicle::plant::{Config, state};
+
+/// Longest integration step by default, s.
+const STEP: f64 = 0.01;
+/// An end of the disturbance (s) that no simulation reaches; FMI importers do not all read an infinite number.
+const NEVER: f64 = 1e9;
+
+/// The kinds in the order of their enumeration values 1, 2, …, with name and description.
+pub(crate) const KINDS: [(Kind, &str, &str); 7] = [
+    (Kind::None, "none", "no disturbance"),
+    (Kind::White, "white", "each component uniform within the bound, drawn anew every disturbance.period"),
+    (Kind::Constant, "constant", "bound times direction"),
+    (Kind::Sine, "sine", "a moment: offset plus two sinusoids"),
+    (Kind::Square, "square", "bound times direction, the sign changing every half disturbance.square.period"),
+    (
+        Kind::AlongRate,
+        "alongRate",
+        "plus or minus the bound so that the angular rate grows fastest, chosen every disturbance.period",
+    ),
+    (
+        Kind::AgainstMoment,
+        "againstMoment",
+        "plus or minus the bound against the control moment, chosen every disturbance.period",
+    ),
+];
+
+/// What a user sets before the simulation, named as in the table.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Parameters {
+    pub(crate) inertia: Inertia,
+    pub(crate) inertia_scale: f64,
+    pub(crate) initial_angles: Vector3<f64>,
+    pub(crate) initial_rates: Vector3<f64>,
+    /// Number of the item of [`KINDS`], from 1.
+    pub(crate) kind: i32,
+    pub(crate) bound: f64,
+    pub(crate) period: f64,
+    pub(crate) seed: i32,
+    pub(crate) direction: Vector3<f64>,
+    pub(crate) square_period: f64,
+    pub(crate) sine_offset: Vector3<f64>,
+    pub(crate) waves: [MomentWave; 2],
+    pub(crate) start: f64,
+    pub(crate) end: f64,
+    pub(crate) step: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        let scenario = Scenario::crmpc2022();
+        let sine = Scenario::tvsmc2015().disturbance.sine;
+        let Disturbance { kind, bound, period, seed, direction, square_period, start, end, .. } =
+            scenario.disturbance;
+        let number = (1..).zip(KINDS).find(|(_, item)| item.0 == kind).map_or(1, |(number, _)| number);
+        let wave = |i: usize| sine.waves.get(i).copied().unwrap_or_default();
+        Self {
+            inertia: scenario.inertia,
+            inertia_scale: scenario.inertia_scale,
+            initial_angles: scenario.initial_angles,
+            initial_rates: scenario.initial_rates,
+            kind: number,
+            bound,
+            period,
+            seed: i32::try_from(seed).unwrap_or(i32::MAX),
+            direction,
+            square_period,
+            sine_offset: sine.offset,
+            waves: [wave(0), wave(1)],
+            start,
+            end: end.min(NEVER),
+            step: STEP,
+        }
+    }
+}
+
+impl Parameters {
+    /// The plant they describe.
+    pub(crate) fn config(&self) -> Config {
+        let kind =
+            usize::try_from(self.kind - 1).ok().and_then(|i| KINDS.get(i)).map_or(Kind::None, |item| item.0);
+        Config {
+            inertia: self.inertia,
+            inertia_scale: self.inertia_scale,
+            initial: state(&self.initial_angles, &self.initial_rates),
+            disturbance: Disturbance {
+                kind,
+                bound: self.bound,
+                period: self.period,
+                seed: self.seed as u64,
+                direction: self.direction,
+                square_period: self.square_period,
+                sine: SineMoment { offset: self.sine_offset, waves: self.waves.to_vec() },
+                start: self.start,
+                end: self.end,
+            },
+            step: self.step,
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! The unit: parameters, inputs, outputs and the plant that computes them.
+
+use crate::parameters::Parameters;
+use crate::table::{self, Known, Unknown};
+use fmi2_export::{Context, Description, EventInfo, Failure, Inputs, Model};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::plant::{Held, Input, Plant, State, check, partial_derivatives};
+
+/// The re-entry vehicle.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ReentryPlant {
+    pub(crate) parameters: Parameters,
+    pub(crate) input: Input,
+    pub(crate) output: Output,
+    /// From initialization on.
+    plant: Option<Plant>,
+    /// Model exchange: the disturbance changes at events only, not when time passes a tick.
+    event_driven: bool,
+}
+
+/// What the unit shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Output {
+    pub(crate) angles: Vector3<f64>,
+    pub(crate) rates: Vector3<f64>,
+    pub(crate) angle_rates: Vector3<f64>,
+    pub(crate) angular_acceleration: Vector3<f64>,
+    pub(crate) applied_moment: Vector3<f64>,
+    pub(crate) delta: Vector3<f64>,
+    pub(crate) disturbance_moment: Vector3<f64>,
+}
+
+impl ReentryPlant {
+    fn ready(&self) -> Result<&Plant, Failure> {
+        self.plant.as_ref().ok_or_else(|| Failure::Error("the plant is not initialized".into()))
+    }
+
+    /// The disturbance in force at `time` (s).
+    fn disturbance(&self, plant: &Plant, time: f64) -> Held {
+        let held = if self.event_driven { plant.held() } else { None };
+        held.unwrap_or_else(|| plant.disturbance_at(time, &self.input))
+    }
+
+    /// Refuses a state at which the equations do not hold. In model exchange it may be an integrator's trial, which the
+    /// importer can take back.
+    fn check(&self, state: &State, time: f64) -> Result<(), Failure> {
+        let failure = if self.event_driven { Failure::Discard } else { Failure::Error };
+        check(state, time).map_err(|error| failure(error.to_string()))
+    }
+}
+
+impl Model for ReentryPlant {
+    fn description() -> Description<Self> {
+        table::description()
+    }
+
+    fn new() -> Self {
+        Self {
+            parameters: Parameters::default(),
+            input: Input::default(),
+            output: Output::default(),
+            plant: None,
+            event_driven: false,
+        }
+    }
+
+    fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
+        let plant = Plant::new(&self.parameters.config(), context.start_time);
+        self.plant = Some(plant.map_err(|error| Failure::Error(error.to_string()))?);
+        self.event_driven = false;
+        Ok(())
+    }
+
+    fn calculate(&mut self, time: f64) -> Result<(), Failure> {
+        let plant = self.ready()?;
+        self.check(&plant.state, time)?;
+        let held = self.disturbance(plant, time);
+        let derivative = plant.derivative(time, &self.input, &held);
+        if !derivative.iter().all(|value| value.is_finite()) {
+            return Err(Failure::Error(format!("an input moment is not a finite number at t = {time} s")));
+        }
+        self.output = Output {
+            angles: plant.angles(),
+            rates: plant.rates(),
+            angle_rates: derivative.fixed_rows::<3>(0).into(),
+            angular_acceleration: derivative.fixed_rows::<3>(3).into(),
+            applied_moment: self.input.moment,
+            delta: held.delta(),
+            disturbance_moment: plant.disturbance_moment(time, &self.input, &held),
+        };
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        from: f64,
+        to: f64,
+        inputs: &dyn Inputs<Self>,
+        _log: &mut dyn FnMut(&str),
+    ) -> Result<(), Failure> {
+        self.ready()?;
+        let Some(mut plant) = self.plant.take() else { return Ok(()) };
+        let result = plant.advance_with(from, to, |time| {
+            inputs.advance(self, time);
+            self.input
+        });
+        self.plant = Some(plant);
+        result.map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    fn continuous_states(&self, states: &mut [f64]) {
+        if let Some(plant) = &self.plant {
+            states.copy_from_slice(plant.state.as_slice());
+        }
+    }
+
+    fn set_continuous_states(&mut self, states: &[f64]) {
+        if let Some(plant) = &mut self.plant {
+            plant.state.copy_from_slice(states);
+        }
+    }
+
+    fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure> {
+        self.ready()?;
+        self.event_driven = true;
+        let Some(plant) = &mut self.plant else { return Ok(EventInfo::default()) };
+        plant.hold_disturbance(time, &self.input);
+        Ok(EventInfo { next_event_time: plant.next_change(time), states_changed: false })
+    }
+
+    fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure> {
+        let plant = self.ready()?;
+        self.check(&plant.state, time)?;
+        let delta = self.disturbance(plant, time).delta();
+        let (by_state, by_moment) = partial_derivatives(plant.body(), &plant.state, &delta);
+        Ok(match (Unknown::of(unknown), Known::of(known)) {
+            (Some(Unknown::Derivative(i)), Some(Known::State(j))) => by_state[(i, j)],
+            (Some(Unknown::Derivative(i)), Some(Known::Moment(j) | Known::DisturbanceMoment(j))) => {
+                by_moment[(i, j)]
+            }
+            (Some(Unknown::State(i)), Some(Known::State(j)))
+            | (Some(Unknown::AppliedMoment(i)), Some(Known::Moment(j)))
+            | (Some(Unknown::DisturbanceMoment(i)), Some(Known::DisturbanceMoment(j)))
+                if i == j =>
+            {
+                1.0
+            }
+            (Some(_), Some(_)) => 0.0,
+            _ => {
+                let text = "there are derivatives of outputs by states and inputs only";
+                return Err(Failure::Error(format!("variable {unknown} by variable {known}: {text}")));
+            }
+        })
+    }
+}

@@ -1,0 +1,263 @@
+//! The one table of the unit's variables. The first 27 positions are those of outputs and inputs, see [`Unknown`] and
+//! [`Known`]; the parameters follow.
+
+use crate::parameters::KINDS;
+use crate::plant::ReentryPlant;
+use fmi2_export::table::{Description, Real, Table, discrete_output, input, output, parameter};
+use model_description::DefaultExperiment;
+use model_description::unit;
+use model_description::variable::EnumerationType;
+use nalgebra::Vector3;
+use vehicle::Scenario;
+use vehicle::plant::BETA_LIMIT;
+
+const ANGLES: [(&str, &str); 3] =
+    [("alpha", "angle of attack"), ("beta", "sideslip angle"), ("sigma", "bank angle")];
+const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
+const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
+
+/// A calculated variable, by position in the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Unknown {
+    State(usize),
+    Derivative(usize),
+    AppliedMoment(usize),
+    Delta,
+    DisturbanceMoment(usize),
+}
+
+impl Unknown {
+    pub(crate) fn of(position: usize) -> Option<Self> {
+        Some(match position {
+            0..6 => Self::State(position),
+            6..12 => Self::Derivative(position - 6),
+            12..15 => Self::AppliedMoment(position - 12),
+            15..18 => Self::Delta,
+            18..21 => Self::DisturbanceMoment(position - 18),
+            _ => return None,
+        })
+    }
+}
+
+/// A state or an input, by position in the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Known {
+    State(usize),
+    Moment(usize),
+    DisturbanceMoment(usize),
+}
+
+impl Known {
+    pub(crate) fn of(position: usize) -> Option<Self> {
+        Some(match position {
+            0..6 => Self::State(position),
+            21..24 => Self::Moment(position - 21),
+            24..27 => Self::DisturbanceMoment(position - 24),
+            _ => return None,
+        })
+    }
+}
+
+/// The unit as FMI sees it.
+pub(crate) fn description() -> Description<ReentryPlant> {
+    let scenario = Scenario::crmpc2022();
+    let table = disturbance(initial(inertia(inputs(outputs(Table::new())))));
+    let step = parameter("integrator.step", "Longest step of the Runge-Kutta integration in co-simulation");
+    let table = table
+        .real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| &mut m.parameters.step);
+    Description {
+        name: "ReentryPlant",
+        description: "Attitude motion of a re-entry vehicle under moments and bounded disturbances",
+        documentation: include_str!("plant.html"),
+        version: env!("CARGO_PKG_VERSION"),
+        model_exchange: true,
+        event_indicators: 0,
+        default_experiment: DefaultExperiment {
+            start: 0.0,
+            stop: scenario.duration,
+            tolerance: 1e-8,
+            step: scenario.disturbance.period,
+        },
+        table,
+    }
+}
+
+type Plant = Table<ReentryPlant>;
+
+/// Adds the three components of a vector; `declare` gets name and meaning of each axis.
+fn vector(
+    mut table: Plant,
+    axes: [(&'static str, &'static str); 3],
+    declare: impl Fn(&str, &str) -> Real,
+    field: impl Fn(&mut ReentryPlant) -> &mut Vector3<f64> + Copy + Send + Sync + 'static,
+) -> Plant {
+    for (i, (axis, meaning)) in axes.into_iter().enumerate() {
+        table = table.real(declare(axis, meaning), move |m| &mut field(m)[i]);
+    }
+    table
+}
+
+fn outputs(table: Plant) -> Plant {
+    let motion = ["attitude.alpha", "attitude.beta", "rate.p", "rate.q", "rate.r"];
+    let moment = ["moment.x", "moment.y", "moment.z"];
+    let external = ["disturbanceMoment.x", "disturbanceMoment.y", "disturbanceMoment.z"];
+    let angle = |axis: &str, meaning: &str| {
+        output(&format!("attitude.{axis}"), &sentence(meaning)).real().unit(unit::angle()).nominal(0.1)
+    };
+    let rate = |axis: &str, meaning: &str| {
+        let text = format!("Body {meaning} rate");
+        output(&format!("rate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
+    };
+    let angle_rate = |axis: &str, meaning: &str| {
+        // The attitude kinematics of each angle: R has no roll-yaw terms beyond these (Chai 2022, (2)).
+        let depends =
+            if axis == "beta" { vec!["attitude.alpha", "rate.p", "rate.r"] } else { motion.to_vec() };
+        let common = output(&format!("attitudeRate.{axis}"), &format!("Time derivative of the {meaning}"));
+        let real = common.depends_on(depends).real().unit(unit::angular_rate()).nominal(0.05);
+        real.derivative_of(&format!("attitude.{axis}"))
+    };
+    let acceleration = |axis: &str, meaning: &str| {
+        let common = output(&format!("angularAcceleration.{axis}"), &format!("Body {meaning} acceleration"));
+        let real = common.depends_on(motion).depends_on(moment).depends_on(external).real();
+        real.unit(unit::angular_acceleration()).nominal(0.05).derivative_of(&format!("rate.{axis}"))
+    };
+    let applied = |axis: &str, meaning: &str| {
+        let common = output(
+            &format!("appliedMoment.{axis}"),
+            &format!("Control {meaning} moment that acts on the vehicle"),
+        );
+        common.depends_on([format!("moment.{axis}").as_str()]).real().unit(unit::moment()).nominal(1e5)
+    };
+    let delta = |axis: &str, meaning: &str| {
+        let text = format!("Disturbance in force on the second derivative of the {meaning}");
+        let common = discrete_output(&format!("disturbance.delta.{axis}"), &text)
+            .depends_on(motion)
+            .depends_on(moment);
+        common.real().unit(unit::angular_acceleration()).nominal(0.03)
+    };
+    let disturbing = |axis: &str, meaning: &str| {
+        let text = format!("Disturbance {meaning} moment in force: external and sine");
+        let common = output(&format!("disturbance.moment.{axis}"), &text);
+        common
+            .depends_on([format!("disturbanceMoment.{axis}").as_str()])
+            .real()
+            .unit(unit::moment())
+            .nominal(1e4)
+    };
+    let table = vector(table, ANGLES, angle, |m| &mut m.output.angles);
+    let table = vector(table, RATES, rate, |m| &mut m.output.rates);
+    let table = vector(table, ANGLES, angle_rate, |m| &mut m.output.angle_rates);
+    let table = vector(table, RATES, acceleration, |m| &mut m.output.angular_acceleration);
+    let table = vector(table, AXES, applied, |m| &mut m.output.applied_moment);
+    let table = vector(table, ANGLES, delta, |m| &mut m.output.delta);
+    vector(table, AXES, disturbing, |m| &mut m.output.disturbance_moment)
+}
+
+fn inputs(table: Plant) -> Plant {
+    let control = |axis: &str, meaning: &str| {
+        let common = input(&format!("moment.{axis}"), &format!("Control {meaning} moment"));
+        common.real().unit(unit::moment()).nominal(1e5)
+    };
+    let external = |axis: &str, meaning: &str| {
+        let common = input(&format!("disturbanceMoment.{axis}"), &format!("External {meaning} moment"));
+        common.real().unit(unit::moment()).nominal(1e4)
+    };
+    let table = vector(table, AXES, control, |m| &mut m.input.moment);
+    vector(table, AXES, external, |m| &mut m.input.disturbance_moment)
+}
+
+fn inertia(table: Plant) -> Plant {
+    let entry = |name: &str, text: &str| {
+        parameter(&format!("inertia.{name}"), text).real().unit(unit::inertia()).nominal(1e6)
+    };
+    let scale =
+        parameter("inertia.scale", "Factor from the nominal inertia to the vehicle's: 1.05 is 5 % more");
+    table
+        .real(entry("Ixx", "Nominal roll moment of inertia").min(0.0), |m| &mut m.parameters.inertia.Ixx)
+        .real(entry("Iyy", "Nominal pitch moment of inertia").min(0.0), |m| &mut m.parameters.inertia.Iyy)
+        .real(entry("Izz", "Nominal yaw moment of inertia").min(0.0), |m| &mut m.parameters.inertia.Izz)
+        .real(entry("Ixz", "Nominal roll-yaw product of inertia; the tensor holds -Ixz"), |m| {
+            &mut m.parameters.inertia.Ixz
+        })
+        .real(scale.real().min(0.01).max(100.0).nominal(1.0), |m| &mut m.parameters.inertia_scale)
+}
+
+fn initial(table: Plant) -> Plant {
+    let angle = |axis: &str, meaning: &str| {
+        let limit = if axis == "beta" { BETA_LIMIT } else { 2.0 * std::f64::consts::PI };
+        let common = parameter(&format!("initial.{axis}"), &format!("{} at the start", sentence(meaning)));
+        common.real().unit(unit::angle()).min(-limit).max(limit).nominal(0.1)
+    };
+    let rate = |axis: &str, meaning: &str| {
+        let common = parameter(&format!("initial.{axis}"), &format!("Body {meaning} rate at the start"));
+        common.real().unit(unit::angular_rate()).min(-10.0).max(10.0).nominal(0.05)
+    };
+    let table = vector(table, ANGLES, angle, |m| &mut m.parameters.initial_angles);
+    vector(table, RATES, rate, |m| &mut m.parameters.initial_rates)
+}
+
+fn disturbance(table: Plant) -> Plant {
+    let kinds = EnumerationType {
+        name: "DisturbanceKind".into(),
+        description: "Course of the disturbance".into(),
+        items: KINDS.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect(),
+    };
+    let bound = parameter(
+        "disturbance.bound",
+        "Bound on each component of the disturbance on the attitude's acceleration",
+    );
+    let period =
+        parameter("disturbance.period", "Time for which white, alongRate and againstMoment hold a value");
+    let seed = parameter("disturbance.seed", "Seed of the white noise: the same seed gives the same noise");
+    let direction = |axis: &str, meaning: &str| {
+        let text = format!("Factor on the bound for constant and square: component of the {meaning}");
+        parameter(&format!("disturbance.direction.{axis}"), &text).real().min(-1.0).max(1.0).nominal(1.0)
+    };
+    let square = parameter(
+        "disturbance.square.period",
+        "Period of the square wave, which begins positive at disturbance.start",
+    );
+    let offset = |axis: &str, meaning: &str| {
+        let text = format!("Constant part of the sine disturbance's {meaning} moment");
+        parameter(&format!("disturbance.sine.offset.{axis}"), &text).real().unit(unit::moment()).nominal(1e4)
+    };
+    let start = parameter("disturbance.start", "Time from which the disturbance acts");
+    let end = parameter("disturbance.end", "Time at which the disturbance ends");
+    let time = |common: fmi2_export::table::Common| common.real().unit(unit::time());
+
+    let table = table
+        .enumeration(parameter("disturbance.kind", "Course of the disturbance"), kinds, |m| {
+            &mut m.parameters.kind
+        })
+        .real(bound.real().unit(unit::angular_acceleration()).min(0.0).max(10.0).nominal(0.03), |m| {
+            &mut m.parameters.bound
+        })
+        .real(time(period).min(1e-4).nominal(0.04), |m| &mut m.parameters.period)
+        .integer(seed, (Some(0), None), |m| &mut m.parameters.seed);
+    let table = vector(table, ANGLES, direction, |m| &mut m.parameters.direction)
+        .real(time(square).min(1e-3).nominal(10.0), |m| &mut m.parameters.square_period);
+    let table = vector(table, AXES, offset, |m| &mut m.parameters.sine_offset);
+    let table = sine(sine(table, "first", 0), "second", 1);
+    table.real(time(start), |m| &mut m.parameters.start).real(time(end), |m| &mut m.parameters.end)
+}
+
+fn sine(table: Plant, which: &'static str, i: usize) -> Plant {
+    let name = |part: &str| format!("disturbance.sine.{which}.{part}");
+    let amplitude = |axis: &str, meaning: &str| {
+        let text = format!("Amplitude of the {which} sinusoid's {meaning} moment");
+        parameter(&name(&format!("amplitude.{axis}")), &text).real().unit(unit::moment()).nominal(1e4)
+    };
+    let frequency = parameter(&name("frequency"), &format!("Angular frequency of the {which} sinusoid"));
+    let phase = parameter(&name("phase"), &format!("Phase of the {which} sinusoid at time 0"));
+    vector(table, AXES, amplitude, move |m| &mut m.parameters.waves[i].amplitude)
+        .real(frequency.real().unit(unit::angular_rate()).min(0.0).nominal(1.0), move |m| {
+            &mut m.parameters.waves[i].frequency
+        })
+        .real(phase.real().unit(unit::angle()).nominal(1.0), move |m| &mut m.parameters.waves[i].phase)
+}
+
+/// With a capital.
+fn sentence(text: &str) -> String {
+    let mut characters = text.chars();
+    characters.next().map(|first| first.to_ascii_uppercase()).into_iter().chain(characters).collect()
+}
