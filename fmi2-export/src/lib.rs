@@ -1,7 +1,32 @@
 //! The FMI 2.0 C interface, written once: a unit implements [`Model`], and [`export_fmus!`] makes a library of it.
+//!
+//! | module | what it knows |
+//! |---|---|
+//! | [`model`], [`table`] | what a unit must offer |
+//! | `unit` | a model bound to its table, without its type |
+//! | `instance` | one instance: checks, laziness, saved states; no pointers |
+//! | `call` | the table of calls allowed in each state |
+//! | [`interface`], [`types`] | the C signatures and the checks of pointers |
+//! | `logger`, `resource`, `saved` | messages, the resource URI, the bytes of a saved state |
+//!
+//! Every entry point ends a panic: it returns `fmi2Fatal`, says so in the log, and leaves the process and all other
+//! instances alone. The process-wide panic hook is not touched, so the standard one writes a line to stderr, once, for what
+//! is always a defect.
 
+mod call;
+mod export;
+mod instance;
+#[doc(hidden)]
+pub mod interface;
+mod logger;
 pub mod model;
+mod resource;
+mod saved;
 pub mod table;
+#[doc(hidden)]
+pub mod types;
+mod unit;
 
 pub use model::{Context, EventInfo, Failure, Inputs, Model};
 pub use table::{Description, Table};
+pub use unit::{Export, MAX_INPUT_DERIVATIVE_ORDER, describe};

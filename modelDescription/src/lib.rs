@@ -1,11 +1,86 @@
 //! The description of an FMI 2.0 unit as data, the XML made from it, and the packing of `.fmu` archives.
 //! Knows no physics.
 
+pub mod check;
+pub mod html;
+pub mod library;
+pub mod pack;
+pub mod structure;
 pub mod unit;
 pub mod variable;
+pub mod xml;
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::fmt::Write;
+use std::path::PathBuf;
 use variable::Variable;
+
+/// Who answers for the units, as `modelDescription.xml` names them.
+pub const AUTHOR: &str = "The authors of reentry-attitude-control";
+/// SPDX expression of the licence of every unit.
+pub const LICENSE: &str = env!("CARGO_PKG_LICENSE");
+
+/// Log categories every unit declares: name and what is reported under it.
+pub const LOG_CATEGORIES: [(&str, &str); 6] = [
+    ("logAll", "Everything below"),
+    ("logEvents", "Changes of the call state: initialized, reset, state restored, terminated"),
+    ("logStatusWarning", "Something is not as it should be, but the result holds"),
+    ("logStatusDiscard", "A call was refused, the unit can go on"),
+    (
+        "logStatusError",
+        "A call failed: reset the unit or restore a saved state; reported even if logging is off",
+    ),
+    ("logStatusFatal", "A defect in the unit: free it; reported even if logging is off"),
+];
+
+/// Why a unit could not be described or packed.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The table of variables contradicts itself or FMI 2.0.
+    #[error("unit '{unit}': {problem}")]
+    Description {
+        /// The unit's name.
+        unit: String,
+        /// What is wrong, with the variable's name.
+        problem: String,
+    },
+    /// The file is not a library that can be opened.
+    #[error("cannot open library '{}': {source}", path.display())]
+    Open {
+        /// The library.
+        path: PathBuf,
+        /// The loader's reason.
+        source: libloading::Error,
+    },
+    /// The library does not hand out descriptions.
+    #[error("'{}' hands out no unit descriptions ({problem}): build it with fmi2-export's export_fmus!", path.display())]
+    NoDescriptions {
+        /// The library.
+        path: PathBuf,
+        /// What is missing.
+        problem: String,
+    },
+    /// Two libraries, or two units of one library, have the same name.
+    #[error("two units are named '{0}': their archives would overwrite each other")]
+    SameName(String),
+    /// A file could not be read or written.
+    #[error("'{}': {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The archive could not be written.
+    #[error("archive '{}': {source}", path.display())]
+    Archive {
+        /// The archive.
+        path: PathBuf,
+        /// The archiver's reason.
+        source: zip::result::ZipError,
+    },
+}
 
 /// Everything `modelDescription.xml` says of a unit. Handed out by a built library as JSON, through its exported function
 /// `fmu_model_descriptions`.
@@ -42,4 +117,29 @@ pub struct DefaultExperiment {
     pub tolerance: f64,
     /// Communication step, s.
     pub step: f64,
+}
+
+impl ModelDescription {
+    /// The GUID: SHA-256 over the description as JSON, cut to 128 bits and written as a UUID (version 8). Two libraries
+    /// have the same GUID exactly if their tables, texts and versions agree.
+    ///
+    /// # Panics
+    /// Never: the description holds nothing that JSON cannot.
+    pub fn guid(&self) -> String {
+        let json = serde_json::to_vec(self).expect("plain data");
+        let mut bytes: [u8; 16] = std::array::from_fn({
+            let digest = Sha256::digest(&json);
+            move |i| digest[i]
+        });
+        bytes[6] = bytes[6] & 0x0f | 0x80;
+        bytes[8] = bytes[8] & 0x3f | 0x80;
+        let mut guid = String::with_capacity(36);
+        for (i, byte) in bytes.iter().enumerate() {
+            if matches!(i, 4 | 6 | 8 | 10) {
+                guid.push('-');
+            }
+            write!(guid, "{byte:02x}").expect("writing to a string");
+        }
+        guid
+    }
 }

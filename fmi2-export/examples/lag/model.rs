@@ -1,0 +1,211 @@
+//! A first-order lag x' = (k u − x) / T whose gain changes at a time event. Every kind of variable occurs in it.
+
+use fmi2_export::table::{discrete_output, input, local, output, parameter};
+use fmi2_export::{Context, Description, EventInfo, Failure, Inputs, Model, Table};
+use model_description::DefaultExperiment;
+use model_description::unit;
+use model_description::variable::EnumerationType;
+use serde::{Deserialize, Serialize};
+
+/// Runge–Kutta steps in a communication step.
+const SUBSTEPS: i32 = 4;
+/// Items of the enumeration `shape`.
+const SHAPE_SATURATED: i32 = 2;
+
+/// The model: parameters, input, state, outputs.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Lag {
+    time_constant: f64,
+    gain: f64,
+    late_gain: f64,
+    switch_time: f64,
+    initial: f64,
+    order: i32,
+    inverted: bool,
+    shape: i32,
+    label: String,
+
+    u: f64,
+    x: f64,
+    switched: bool,
+
+    derivative: f64,
+    y: f64,
+    gain_now: f64,
+    description: String,
+}
+
+impl Lag {
+    fn gain(&self, time: f64) -> f64 {
+        let gain = if time >= self.switch_time { self.late_gain } else { self.gain };
+        if self.inverted { -gain } else { gain }
+    }
+
+    fn rate(&self, x: f64, gain: f64) -> f64 {
+        (gain * self.u - x) / self.time_constant
+    }
+
+    /// From one time to another without an event between them.
+    fn integrate(&mut self, from: f64, to: f64, inputs: &dyn Inputs<Self>) {
+        let gain = self.gain(from);
+        let h = (to - from) / f64::from(SUBSTEPS);
+        for k in 0..SUBSTEPS {
+            let t = from + f64::from(k) * h;
+            let x = self.x;
+            inputs.advance(self, t);
+            let k1 = self.rate(x, gain);
+            inputs.advance(self, t + h / 2.0);
+            let k2 = self.rate(x + h / 2.0 * k1, gain);
+            let k3 = self.rate(x + h / 2.0 * k2, gain);
+            inputs.advance(self, t + h);
+            let k4 = self.rate(x + h * k3, gain);
+            self.x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+        }
+    }
+}
+
+impl Model for Lag {
+    fn description() -> Description<Self> {
+        let shape = EnumerationType {
+            name: "Shape".into(),
+            description: "What is done to the output".into(),
+            items: vec![
+                ("linear".into(), "Nothing".into()),
+                ("saturated".into(), "Kept between -1 and 1".into()),
+            ],
+        };
+        let table = Table::new()
+            .real(
+                parameter("timeConstant", "Time constant T").real().unit(unit::time()).min(1e-3).max(1e3),
+                |m: &mut Self| &mut m.time_constant,
+            )
+            .real(parameter("gain.early", "Gain k before the switch").real(), |m| &mut m.gain)
+            .real(parameter("gain.late", "Gain k after the switch").real(), |m| &mut m.late_gain)
+            .real(parameter("switchTime", "When the gain changes").real().unit(unit::time()), |m| {
+                &mut m.switch_time
+            })
+            .real(parameter("initial.x", "Initial state").real().unit(unit::angle()), |m| &mut m.initial)
+            .integer(parameter("order", "Order of the lag; only 1 is there"), (Some(1), Some(2)), |m| {
+                &mut m.order
+            })
+            .boolean(parameter("inverted", "Whether the gain changes its sign"), |m| &mut m.inverted)
+            .enumeration(parameter("shape", "What is done to the output"), shape, |m| &mut m.shape)
+            .string(parameter("label", "Text that is passed on; \"boom\" makes the unit panic"), |m| {
+                &mut m.label
+            })
+            .real(input("u", "Input").real().unit(unit::angle()).min(-100.0).max(100.0), |m| &mut m.u)
+            .real(output("x", "State").real().unit(unit::angle()).nominal(2.0), |m| &mut m.x)
+            .real(
+                local("der(x)", "Derivative of the state")
+                    .depends_on(["u", "x"])
+                    .real()
+                    .unit(unit::angular_rate())
+                    .derivative_of("x"),
+                |m| &mut m.derivative,
+            )
+            .real(
+                output("y", "State plus input, shaped").depends_on(["u", "x"]).real().unit(unit::angle()),
+                |m| &mut m.y,
+            )
+            .real(discrete_output("gain.now", "Gain in force").real(), |m| &mut m.gain_now)
+            .boolean(discrete_output("switched", "Whether the switch is behind"), |m| &mut m.switched)
+            .string(discrete_output("text", "The label"), |m| &mut m.description);
+        Description {
+            name: "Lag",
+            description: "First-order lag with a gain that changes at a time event",
+            documentation: "<p>x' = (k u − x) / T, y = x + u.</p>",
+            version: env!("CARGO_PKG_VERSION"),
+            model_exchange: true,
+            event_indicators: 0,
+            default_experiment: DefaultExperiment { start: 0.0, stop: 2.0, tolerance: 1e-6, step: 0.1 },
+            table,
+        }
+    }
+
+    fn new() -> Self {
+        Self {
+            time_constant: 0.5,
+            gain: 2.0,
+            late_gain: 1.0,
+            switch_time: 1.25,
+            initial: 0.5,
+            order: 1,
+            inverted: false,
+            shape: 1,
+            label: "lag".into(),
+            u: 0.0,
+            x: 0.0,
+            switched: false,
+            derivative: 0.0,
+            y: 0.0,
+            gain_now: 0.0,
+            description: String::new(),
+        }
+    }
+
+    fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
+        if self.order != 1 {
+            return Err(Failure::Error(format!("order = {}, but only 1 is there", self.order)));
+        }
+        self.x = self.initial;
+        self.switched = context.start_time >= self.switch_time;
+        Ok(())
+    }
+
+    fn calculate(&mut self, time: f64) -> Result<(), Failure> {
+        self.gain_now = self.gain(time);
+        self.derivative = self.rate(self.x, self.gain_now);
+        self.y = self.x + self.u;
+        if self.shape == SHAPE_SATURATED {
+            self.y = self.y.clamp(-1.0, 1.0);
+        }
+        self.description.clone_from(&self.label);
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        from: f64,
+        to: f64,
+        inputs: &dyn Inputs<Self>,
+        log: &mut dyn FnMut(&str),
+    ) -> Result<(), Failure> {
+        assert!(self.label != "boom", "the label is boom");
+        if self.label == "refuse" && to - from > 0.5 {
+            return Err(Failure::Discard("steps above 0.5 s are too long".into()));
+        }
+        if from < self.switch_time && self.switch_time <= to {
+            self.integrate(from, self.switch_time, inputs);
+            self.integrate(self.switch_time, to, inputs);
+            self.switched = true;
+            log("the gain changed by 50 %");
+        } else {
+            self.integrate(from, to, inputs);
+        }
+        Ok(())
+    }
+
+    fn continuous_states(&self, states: &mut [f64]) {
+        states[0] = self.x;
+    }
+
+    fn set_continuous_states(&mut self, states: &[f64]) {
+        self.x = states[0];
+    }
+
+    fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure> {
+        self.switched = time >= self.switch_time;
+        let next = (!self.switched).then_some(self.switch_time);
+        Ok(EventInfo { next_event_time: next, states_changed: false })
+    }
+
+    fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure> {
+        let gain = self.gain(time);
+        match (unknown, known) {
+            (11, 9) => Ok(gain / self.time_constant),
+            (11, 10) => Ok(-1.0 / self.time_constant),
+            (10, 10) | (12, 9 | 10) => Ok(1.0),
+            _ => Ok(0.0),
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The macro that turns models into the exported functions of a library.
+
+/// Exports the models as FMI 2.0 units of the library that this is called in, once per library.
+///
+/// Defines a module `fmi2` with the 44 functions of FMI 2.0 under their C names, and with
+/// - `fmu_model_descriptions() -> char*`: a NUL-terminated JSON list of the units' descriptions, null on failure. The
+///   memory is the library's: hand it back to
+/// - `fmu_free_model_descriptions(char*)`, which also takes null.
+///
+/// The GUID given to `fmi2Instantiate` picks the unit. The crate needs `crate-type = ["cdylib", …]` and
+/// `build = "../fmi2-export/link.rs"`, which keeps the library loaded once it is.
+///
+/// ```ignore
+/// fmi2_export::export_fmus!(Plant);
+/// fmi2_export::export_fmus!(crmpc::Crmpc, lqr::Lqr);
+/// ```
+#[macro_export]
+macro_rules! export_fmus {
+    ($($model:ty),+ $(,)?) => {
+        #[allow(unsafe_code, non_snake_case, missing_docs, unused_imports, unreachable_pub)]
+        #[allow(clippy::all, clippy::pedantic, clippy::undocumented_unsafe_blocks)]
+        pub mod fmi2 {
+            //! The C interface of this library.
+            use super::*;
+            use $crate::interface as shell;
+            use $crate::types::{CEventInfo, Callbacks, Status};
+            use ::std::ffi::{c_char, c_int, c_void};
+
+            const EXPORTS: &[$crate::Export] = &[$($crate::Export::of::<$model>()),+];
+
+            #[unsafe(no_mangle)]
+            pub extern "C" fn fmu_model_descriptions() -> *mut c_char {
+                shell::fmu_model_descriptions(EXPORTS)
+            }
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn fmi2Instantiate(
+                name: *const c_char,
+                fmu_type: c_int,
+                guid: *const c_char,
+                resources: *const c_char,
+                callbacks: *const Callbacks,
+                visible: c_int,
+                logging_on: c_int,
+            ) -> *mut c_void {
+                unsafe {
+                    shell::fmi2Instantiate(
+                        EXPORTS, name, fmu_type, guid, resources, callbacks, visible, logging_on,
+                    )
+                }
+            }
+            #[unsafe(no_mangle)]
+            pub extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
+                shell::fmi2GetTypesPlatform()
+            }
+            #[unsafe(no_mangle)]
+            pub extern "C" fn fmi2GetVersion() -> *const c_char {
+                shell::fmi2GetVersion()
+            }
+            $crate::forward! {
+                fmu_free_model_descriptions(a: *mut c_char) -> ();
+                fmi2FreeInstance(c: *mut c_void) -> ();
+                fmi2SetDebugLogging(c: *mut c_void, on: c_int, n: usize, names: *const *const c_char) -> Status;
+                fmi2SetupExperiment(c: *mut c_void, td: c_int, t: f64, start: f64, sd: c_int, stop: f64) -> Status;
+                fmi2EnterInitializationMode(c: *mut c_void) -> Status;
+                fmi2ExitInitializationMode(c: *mut c_void) -> Status;
+                fmi2Terminate(c: *mut c_void) -> Status;
+                fmi2Reset(c: *mut c_void) -> Status;
+                fmi2GetReal(c: *mut c_void, vr: *const u32, n: usize, value: *mut f64) -> Status;
+                fmi2GetInteger(c: *mut c_void, vr: *const u32, n: usize, value: *mut c_int) -> Status;
+                fmi2GetBoolean(c: *mut c_void, vr: *const u32, n: usize, value: *mut c_int) -> Status;
+                fmi2GetString(c: *mut c_void, vr: *const u32, n: usize, value: *mut *const c_char) -> Status;
+                fmi2SetReal(c: *mut c_void, vr: *const u32, n: usize, value: *const f64) -> Status;
+                fmi2SetInteger(c: *mut c_void, vr: *const u32, n: usize, value: *const c_int) -> Status;
+                fmi2SetBoolean(c: *mut c_void, vr: *const u32, n: usize, value: *const c_int) -> Status;
+                fmi2SetString(c: *mut c_void, vr: *const u32, n: usize, value: *const *const c_char) -> Status;
+                fmi2GetFMUstate(c: *mut c_void, state: *mut *mut c_void) -> Status;
+                fmi2SetFMUstate(c: *mut c_void, state: *mut c_void) -> Status;
+                fmi2FreeFMUstate(c: *mut c_void, state: *mut *mut c_void) -> Status;
+                fmi2SerializedFMUstateSize(c: *mut c_void, state: *mut c_void, size: *mut usize) -> Status;
+                fmi2SerializeFMUstate(c: *mut c_void, state: *mut c_void, to: *mut c_char, size: usize) -> Status;
+                fmi2DeSerializeFMUstate(c: *mut c_void, from: *const c_char, size: usize, state: *mut *mut c_void) -> Status;
+                fmi2GetDirectionalDerivative(c: *mut c_void, unknown: *const u32, nu: usize, known: *const u32, nk: usize, seed: *const f64, value: *mut f64) -> Status;
+                fmi2EnterEventMode(c: *mut c_void) -> Status;
+                fmi2NewDiscreteStates(c: *mut c_void, info: *mut CEventInfo) -> Status;
+                fmi2EnterContinuousTimeMode(c: *mut c_void) -> Status;
+                fmi2CompletedIntegratorStep(c: *mut c_void, no_set_prior: c_int, event: *mut c_int, end: *mut c_int) -> Status;
+                fmi2SetTime(c: *mut c_void, time: f64) -> Status;
+                fmi2SetContinuousStates(c: *mut c_void, x: *const f64, n: usize) -> Status;
+                fmi2GetDerivatives(c: *mut c_void, derivatives: *mut f64, n: usize) -> Status;
+                fmi2GetEventIndicators(c: *mut c_void, indicators: *mut f64, n: usize) -> Status;
+                fmi2GetContinuousStates(c: *mut c_void, x: *mut f64, n: usize) -> Status;
+                fmi2GetNominalsOfContinuousStates(c: *mut c_void, nominals: *mut f64, n: usize) -> Status;
+                fmi2SetRealInputDerivatives(c: *mut c_void, vr: *const u32, n: usize, order: *const c_int, value: *const f64) -> Status;
+                fmi2GetRealOutputDerivatives(c: *mut c_void, vr: *const u32, n: usize, order: *const c_int, value: *mut f64) -> Status;
+                fmi2DoStep(c: *mut c_void, point: f64, size: f64, no_set_prior: c_int) -> Status;
+                fmi2CancelStep(c: *mut c_void) -> Status;
+                fmi2GetStatus(c: *mut c_void, kind: c_int, value: *mut Status) -> Status;
+                fmi2GetRealStatus(c: *mut c_void, kind: c_int, value: *mut f64) -> Status;
+                fmi2GetIntegerStatus(c: *mut c_void, kind: c_int, value: *mut c_int) -> Status;
+                fmi2GetBooleanStatus(c: *mut c_void, kind: c_int, value: *mut c_int) -> Status;
+                fmi2GetStringStatus(c: *mut c_void, kind: c_int, value: *mut *const c_char) -> Status;
+            }
+        }
+    };
+}
+
+/// Defines exported functions that call those of the shell with the same name.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! forward {
+    ($($name:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {$(
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name($($argument: $type),*) -> $result {
+            unsafe { shell::$name($($argument),*) }
+        }
+    )*};
+}

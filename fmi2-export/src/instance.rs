@@ -1,0 +1,669 @@
+//! One instance of a unit: the part of the shell without pointers.
+
+use crate::call::{Call, State};
+use crate::logger::{Category, Logger};
+use crate::model::{Context, EventInfo, Failure};
+use crate::saved;
+use crate::types::{Interface, Status};
+use crate::unit::{Export, Extrapolation, MAX_INPUT_DERIVATIVE_ORDER, Progress, Unit};
+use model_description::variable::{Causality, Kind, Variability, Variable};
+use std::any::Any;
+use std::ffi::CString;
+use std::mem;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+
+/// How far the communication point may be from the unit's time, relative to both and to the step: importers add up time.
+const TIME_TOLERANCE: f64 = 1e-9;
+/// How far a step may reach beyond the stop time, relative to it. The standard wants an error for computing past a defined
+/// stop time; importers that add up time overshoot it by some 1e-9.
+const STOP_TOLERANCE: f64 = 1e-6;
+
+/// Result of the body of a call.
+pub(crate) type Outcome = Result<(), Failure>;
+
+pub(crate) fn error<T>(text: impl Into<String>) -> Result<T, Failure> {
+    Err(Failure::Error(text.into()))
+}
+
+/// What `fmi2Component` points at.
+pub(crate) struct Instance {
+    unit: Box<dyn Unit>,
+    variables: Vec<Variable>,
+    /// State and derivative pairs.
+    states: Vec<(usize, usize)>,
+    event_indicators: usize,
+    guid: String,
+    interface: Interface,
+    logger: Logger,
+    resources: Option<PathBuf>,
+    /// Its list of extrapolations has room for every variable: nothing is allocated between steps.
+    progress: Progress,
+    /// Whether calculated variables are behind state, inputs or time.
+    stale: bool,
+    last_step: Status,
+    /// States handed out by fmi2GetFMUstate; the importer holds their addresses.
+    #[expect(clippy::vec_box, reason = "the address is the importer's handle and must not move")]
+    saved: Vec<Box<Saved>>,
+    /// What the last fmi2GetString handed out.
+    strings: Vec<CString>,
+}
+
+/// A saved state. Never empty, so every one has an address of its own.
+pub(crate) struct Saved(Box<[u8]>);
+
+/// What fmi2Instantiate knows besides the unit.
+pub(crate) struct Setting {
+    pub(crate) guid: String,
+    pub(crate) interface: Interface,
+    pub(crate) logger: Logger,
+    pub(crate) resources: Option<PathBuf>,
+}
+
+/// A type that variables have, with how the shell reaches and checks it.
+pub(crate) trait Scalar: PartialEq + Sized {
+    const TYPE: &'static str;
+    fn field(unit: &mut dyn Unit, reference: usize) -> Option<&mut Self>;
+    /// Whether setting the other value would change nothing.
+    fn same(&self, other: &Self) -> bool {
+        self == other
+    }
+    /// What is wrong with the value for a variable of this kind.
+    fn problem(&self, _kind: &Kind) -> Option<String> {
+        None
+    }
+}
+
+impl Scalar for f64 {
+    const TYPE: &'static str = "Real";
+    fn field(unit: &mut dyn Unit, reference: usize) -> Option<&mut Self> {
+        unit.real(reference)
+    }
+    fn same(&self, other: &Self) -> bool {
+        // 0 and −0 are equal, but not the same to what is computed from them.
+        self.to_bits() == other.to_bits()
+    }
+    fn problem(&self, kind: &Kind) -> Option<String> {
+        if !self.is_finite() {
+            return Some("is not a finite number".into());
+        }
+        match kind {
+            Kind::Real { min: Some(min), .. } if self < min => Some(format!("is below the minimum {min}")),
+            Kind::Real { max: Some(max), .. } if self > max => Some(format!("is above the maximum {max}")),
+            _ => None,
+        }
+    }
+}
+
+impl Scalar for i32 {
+    const TYPE: &'static str = "Integer or Enumeration";
+    fn field(unit: &mut dyn Unit, reference: usize) -> Option<&mut Self> {
+        unit.integer(reference)
+    }
+    fn problem(&self, kind: &Kind) -> Option<String> {
+        match kind {
+            Kind::Integer { min: Some(min), .. } if self < min => Some(format!("is below the minimum {min}")),
+            Kind::Integer { max: Some(max), .. } if self > max => Some(format!("is above the maximum {max}")),
+            Kind::Enumeration { of, .. } if *self < 1 || *self as usize > of.items.len() => {
+                Some(format!("is not an item of {}: these are 1 to {}", of.name, of.items.len()))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Scalar for bool {
+    const TYPE: &'static str = "Boolean";
+    fn field(unit: &mut dyn Unit, reference: usize) -> Option<&mut Self> {
+        unit.boolean(reference)
+    }
+}
+
+impl Scalar for String {
+    const TYPE: &'static str = "String";
+    fn field(unit: &mut dyn Unit, reference: usize) -> Option<&mut Self> {
+        unit.string(reference)
+    }
+}
+
+impl Instance {
+    pub(crate) fn new(
+        export: &Export,
+        description: model_description::ModelDescription,
+        setting: Setting,
+    ) -> Self {
+        let Setting { guid, interface, logger, resources } = setting;
+        let states = description.states();
+        let mut progress = Progress::default();
+        progress.extrapolations.reserve(description.variables.len());
+        Self {
+            unit: (export.create)(),
+            states,
+            event_indicators: description.event_indicators,
+            variables: description.variables,
+            guid,
+            interface,
+            logger,
+            resources,
+            progress,
+            stale: true,
+            last_step: Status::Ok,
+            saved: Vec::new(),
+            strings: Vec::new(),
+        }
+    }
+
+    /// Runs the body of a call: refuses it in a wrong state, reports what went wrong, and ends every panic here.
+    pub(crate) fn run(&mut self, call: &Call, body: impl FnOnce(&mut Self) -> Outcome) -> Status {
+        if self.progress.state == State::Fatal {
+            return Status::Fatal;
+        }
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            self.permit(call)?;
+            body(self)
+        }));
+        match outcome {
+            Ok(Ok(())) => Status::Ok,
+            Ok(Err(Failure::Discard(problem))) => {
+                self.logger.log(Category::Discard, &format!("{}: {problem}", call.name));
+                Status::Discard
+            }
+            Ok(Err(Failure::Error(problem))) => {
+                if !call.leaves_state {
+                    self.progress.state = State::Error;
+                }
+                self.logger.log(Category::Error, &format!("{}: {problem}", call.name));
+                Status::Error
+            }
+            Err(panic) => {
+                self.progress.state = State::Fatal;
+                let text = format!("{}: defect in the unit: {}", call.name, panic_text(panic.as_ref()));
+                self.logger.log(Category::Fatal, &text);
+                // Dropping what was thrown could run code of the unit again.
+                mem::forget(panic);
+                Status::Fatal
+            }
+        }
+    }
+
+    fn permit(&self, call: &Call) -> Outcome {
+        if call.interface.is_some_and(|interface| interface != self.interface) {
+            let own = match self.interface {
+                Interface::ModelExchange => "model exchange",
+                Interface::CoSimulation => "co-simulation",
+            };
+            return error(format!("not available, as the unit was instantiated for {own}"));
+        }
+        if call.allowed_in(self.progress.state) {
+            return Ok(());
+        }
+        error(format!("not allowed in state {}", self.progress.state.name()))
+    }
+
+    pub(crate) fn logger(&mut self) -> &mut Logger {
+        &mut self.logger
+    }
+
+    pub(crate) fn warn(&self, text: &str) {
+        self.logger.log(Category::Warning, text);
+    }
+
+    // Life cycle
+
+    pub(crate) fn setup_experiment(
+        &mut self,
+        start: f64,
+        stop: Option<f64>,
+        tolerance: Option<f64>,
+    ) -> Outcome {
+        if !start.is_finite() {
+            return error(format!("start time {start} is not finite"));
+        }
+        if let Some(stop) = stop
+            && (stop.is_nan() || stop < start)
+        {
+            return error(format!("stop time {stop} is not after the start time {start}"));
+        }
+        if let Some(tolerance) = tolerance
+            && !(tolerance.is_finite() && tolerance >= 0.0)
+        {
+            return error(format!("tolerance {tolerance} is not a positive number"));
+        }
+        let progress = &mut self.progress;
+        (progress.time, progress.start_time, progress.stop_time) = (start, start, stop);
+        Ok(())
+    }
+
+    pub(crate) fn enter_initialization_mode(&mut self) {
+        self.progress.state = State::InitializationMode;
+        self.progress.initialized = false;
+    }
+
+    pub(crate) fn exit_initialization_mode(&mut self) -> Outcome {
+        self.initialize()?;
+        self.progress.state = match self.interface {
+            Interface::ModelExchange => State::EventMode,
+            Interface::CoSimulation => State::StepComplete,
+        };
+        self.logger.log(Category::Events, "initialized");
+        Ok(())
+    }
+
+    pub(crate) fn terminate(&mut self) {
+        self.progress.state = State::Terminated;
+        self.logger.log(Category::Events, "terminated");
+    }
+
+    /// Makes the instance what fmi2Instantiate returned, but for the logging and the saved states.
+    pub(crate) fn reset(&mut self) {
+        self.unit.reset();
+        let extrapolations = mem::take(&mut self.progress.extrapolations);
+        self.progress = Progress { extrapolations, ..Progress::default() };
+        self.progress.extrapolations.clear();
+        self.stale = true;
+        self.last_step = Status::Ok;
+        self.logger.log(Category::Events, "reset");
+    }
+
+    /// Takes up the parameters, unless this was done since the last of them was set.
+    fn initialize(&mut self) -> Outcome {
+        if !self.progress.initialized {
+            let context = Context {
+                start_time: self.progress.start_time,
+                stop_time: self.progress.stop_time,
+                resources: self.resources.as_deref(),
+            };
+            self.unit.initialize(&context)?;
+            self.progress.initialized = true;
+            self.stale = true;
+        }
+        Ok(())
+    }
+
+    /// Brings calculated variables up to date. After an error they stay as they are, for looking at only.
+    fn refresh(&mut self) -> Outcome {
+        if self.progress.state == State::Error {
+            return Ok(());
+        }
+        if self.progress.state == State::InitializationMode {
+            self.initialize()?;
+        }
+        if self.stale {
+            self.unit.calculate(self.progress.time)?;
+            self.stale = false;
+        }
+        Ok(())
+    }
+
+    // Variables
+
+    fn variable(&self, reference: u32) -> Result<&Variable, Failure> {
+        self.variables.get(reference as usize).map_or_else(
+            || {
+                error(format!(
+                    "value reference {reference} does not exist: {} is the last",
+                    self.variables.len() - 1
+                ))
+            },
+            Ok,
+        )
+    }
+
+    /// The field of the variable, if it is of the type `T`.
+    fn field<T: Scalar>(&mut self, reference: u32) -> Result<&mut T, Failure> {
+        // The usual case asks the table once; what is wrong is found out only if something is.
+        if T::field(self.unit.as_mut(), reference as usize).is_none() {
+            let name = &self.variable(reference)?.name;
+            return error(format!("'{name}' (value reference {reference}) is not of type {}", T::TYPE));
+        }
+        Ok(T::field(self.unit.as_mut(), reference as usize).expect("present"))
+    }
+
+    /// Hands the values of the variables to `sink`, with their positions.
+    pub(crate) fn get<T: Scalar>(&mut self, references: &[u32], mut sink: impl FnMut(usize, &T)) -> Outcome {
+        let calculated =
+            |&reference: &u32| self.variables.get(reference as usize).is_some_and(Variable::is_calculated);
+        if references.iter().any(calculated) {
+            self.refresh()?;
+        }
+        for (i, &reference) in references.iter().enumerate() {
+            sink(i, self.field::<T>(reference)?);
+        }
+        Ok(())
+    }
+
+    /// Sets all variables, or none if one value is refused.
+    pub(crate) fn set<T: Scalar + std::fmt::Debug>(
+        &mut self,
+        references: &[u32],
+        value: impl Fn(usize) -> Result<T, String>,
+    ) -> Outcome {
+        for (i, &reference) in references.iter().enumerate() {
+            self.field::<T>(reference)?;
+            let variable = self.variable(reference)?;
+            self.settable(variable)?;
+            let name = &variable.name;
+            let value = value(i).map_err(|problem| Failure::Error(format!("'{name}': {problem}")))?;
+            if let Some(problem) = value.problem(&variable.kind) {
+                return error(format!("'{name}' = {value:?} {problem}; it keeps its value"));
+            }
+        }
+        for (i, &reference) in references.iter().enumerate() {
+            let value = value(i).map_err(Failure::Error)?;
+            let field = self.field::<T>(reference)?;
+            if !field.same(&value) {
+                *field = value;
+                self.stale = true;
+                if self.variables[reference as usize].causality == Causality::Parameter {
+                    self.progress.initialized = false;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn settable(&self, variable: &Variable) -> Outcome {
+        let name = &variable.name;
+        let state = self.progress.state;
+        match variable.causality {
+            Causality::Parameter if !matches!(state, State::Instantiated | State::InitializationMode) => {
+                error(format!(
+                    "'{name}' is a fixed parameter: it can be set before and in initialization mode only"
+                ))
+            }
+            Causality::Input
+                if state == State::ContinuousTimeMode && variable.variability != Variability::Continuous =>
+            {
+                error(format!("'{name}' is a discrete input: it can be set in event mode only"))
+            }
+            Causality::Parameter | Causality::Input => Ok(()),
+            _ => error(format!("'{name}' is calculated by the unit and cannot be set")),
+        }
+    }
+
+    /// Keeps texts alive for the importer until the next call of this.
+    pub(crate) fn get_strings(&mut self, references: &[u32]) -> Result<&[CString], Failure> {
+        let mut strings = mem::take(&mut self.strings);
+        strings.clear();
+        self.get::<String>(references, |_, text| {
+            strings.push(CString::new(text.replace('\0', " ")).unwrap_or_default());
+        })?;
+        self.strings = strings;
+        Ok(&self.strings)
+    }
+
+    // Saved states
+
+    /// A handle of the present state. With `reuse` the state behind that handle is overwritten.
+    pub(crate) fn save(&mut self, reuse: Option<*const Saved>) -> Result<*const Saved, Failure> {
+        let payload = self.unit.save(&self.progress)?;
+        let bytes = saved::wrap(&self.guid, self.interface, &payload);
+        match reuse {
+            Some(handle) => {
+                let position = self.find(handle)?;
+                self.saved[position].0 = bytes;
+                Ok(handle)
+            }
+            None => Ok(self.keep(bytes)),
+        }
+    }
+
+    fn keep(&mut self, bytes: Box<[u8]>) -> *const Saved {
+        let kept = Box::new(Saved(bytes));
+        let handle = &raw const *kept;
+        self.saved.push(kept);
+        handle
+    }
+
+    fn find(&self, handle: *const Saved) -> Result<usize, Failure> {
+        let found = self.saved.iter().position(|saved| std::ptr::eq(&raw const **saved, handle));
+        found.map_or_else(
+            || {
+                error(
+                    "this FMUstate was not made by this instance, or was freed; \
+                     carry states between instances with fmi2SerializeFMUstate",
+                )
+            },
+            Ok,
+        )
+    }
+
+    pub(crate) fn restore(&mut self, handle: *const Saved) -> Outcome {
+        let position = self.find(handle)?;
+        let payload =
+            saved::unwrap(&self.guid, self.interface, &self.saved[position].0).map_err(Failure::Error)?;
+        self.progress = self.unit.restore(payload)?;
+        self.progress.extrapolations.reserve(self.variables.len());
+        self.stale = true;
+        self.last_step = Status::Ok;
+        self.logger.log(Category::Events, "state restored");
+        Ok(())
+    }
+
+    pub(crate) fn free_saved(&mut self, handle: *const Saved) -> Outcome {
+        let position = self.find(handle)?;
+        self.saved.swap_remove(position);
+        Ok(())
+    }
+
+    pub(crate) fn serialized(&self, handle: *const Saved) -> Result<&[u8], Failure> {
+        Ok(&self.saved[self.find(handle)?].0)
+    }
+
+    pub(crate) fn deserialize(&mut self, bytes: &[u8]) -> Result<*const Saved, Failure> {
+        saved::unwrap(&self.guid, self.interface, bytes).map_err(Failure::Error)?;
+        Ok(self.keep(bytes.into()))
+    }
+
+    // Co-simulation
+
+    pub(crate) fn set_input_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Outcome {
+        for ((&reference, &order), value) in references.iter().zip(orders).zip(values) {
+            self.field::<f64>(reference)?;
+            let variable = self.variable(reference)?;
+            let name = &variable.name;
+            if variable.causality != Causality::Input || variable.variability != Variability::Continuous {
+                return error(format!("'{name}' is not a continuous input"));
+            }
+            if order < 1 || order as usize > MAX_INPUT_DERIVATIVE_ORDER {
+                return error(format!(
+                    "'{name}': order {order} is not between 1 and {MAX_INPUT_DERIVATIVE_ORDER}"
+                ));
+            }
+            if !value.is_finite() {
+                return error(format!("'{name}': derivative {value} is not finite"));
+            }
+        }
+        for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
+            let reference = reference as usize;
+            let all = &mut self.progress.extrapolations;
+            let position = all.iter().position(|input| input.reference == reference).unwrap_or_else(|| {
+                let derivatives = [0.0; MAX_INPUT_DERIVATIVE_ORDER];
+                all.push(Extrapolation { reference, base: 0.0, derivatives });
+                all.len() - 1
+            });
+            all[position].derivatives[order as usize - 1] = value;
+        }
+        Ok(())
+    }
+
+    /// Derivatives of inputs hold for one step. The step begins exactly where the last one ended, however the importer
+    /// adds up its time.
+    pub(crate) fn do_step(&mut self, point: f64, size: f64) -> Outcome {
+        if !point.is_finite() || !size.is_finite() || size < 0.0 {
+            return error(format!("cannot step from {point} s by {size} s"));
+        }
+        let from = self.progress.time;
+        if (point - from).abs() > TIME_TOLERANCE * from.abs().max(point.abs()).max(size) {
+            return error(format!("communication point {point} s, but the unit is at {from} s"));
+        }
+        let to = (point + size).max(from);
+        if let Some(stop) = self.progress.stop_time
+            && to - stop > STOP_TOLERANCE * stop.abs().max(size)
+        {
+            return error(format!(
+                "a step to {to} s goes beyond the stop time {stop} s given to fmi2SetupExperiment"
+            ));
+        }
+        for input in &mut self.progress.extrapolations {
+            input.base = *self.unit.real(input.reference).expect("checked when it was set");
+        }
+        let logger = &self.logger;
+        let mut log = |text: &str| logger.log(Category::Warning, text);
+        match self.unit.step(from, to, &self.progress.extrapolations, &mut log) {
+            Ok(()) => {
+                self.progress.time = to;
+                self.progress.extrapolations.clear();
+                self.stale = true;
+                self.last_step = Status::Ok;
+                Ok(())
+            }
+            Err(failure) => {
+                self.last_step = match failure {
+                    Failure::Discard(_) => Status::Discard,
+                    Failure::Error(_) => Status::Error,
+                };
+                self.progress.state = State::StepFailed;
+                self.stale = true;
+                Err(failure)
+            }
+        }
+    }
+
+    pub(crate) fn last_step(&self) -> Status {
+        self.last_step
+    }
+
+    pub(crate) fn time(&self) -> f64 {
+        self.progress.time
+    }
+
+    // Model exchange
+
+    pub(crate) fn set_time(&mut self, time: f64) -> Outcome {
+        if !time.is_finite() {
+            return error(format!("time {time} is not finite"));
+        }
+        self.stale |= time != self.progress.time;
+        self.progress.time = time;
+        Ok(())
+    }
+
+    pub(crate) fn enter_event_mode(&mut self) {
+        self.progress.state = State::EventMode;
+    }
+
+    pub(crate) fn enter_continuous_time_mode(&mut self) {
+        self.progress.state = State::ContinuousTimeMode;
+    }
+
+    pub(crate) fn new_discrete_states(&mut self) -> Result<EventInfo, Failure> {
+        let info = self.unit.new_discrete_states(self.progress.time)?;
+        self.stale = true;
+        Ok(info)
+    }
+
+    fn expect_length(what: &str, given: usize, wanted: usize) -> Outcome {
+        if given == wanted {
+            return Ok(());
+        }
+        error(format!("room for {given} {what}, but the unit has {wanted}"))
+    }
+
+    pub(crate) fn set_continuous_states(&mut self, states: &[f64]) -> Outcome {
+        Self::expect_length("continuous states", states.len(), self.states.len())?;
+        if let Some(i) = states.iter().position(|x| !x.is_finite()) {
+            let name = &self.variables[self.states[i].0].name;
+            // Not an error: an integrator that went too far tries a smaller step.
+            return Err(Failure::Discard(format!(
+                "state '{name}' = {} is not finite; it keeps its value",
+                states[i]
+            )));
+        }
+        self.unit.set_continuous_states(states);
+        self.stale = true;
+        Ok(())
+    }
+
+    pub(crate) fn continuous_states(&mut self, states: &mut [f64]) -> Outcome {
+        Self::expect_length("continuous states", states.len(), self.states.len())?;
+        if self.progress.state == State::InitializationMode {
+            self.initialize()?;
+        }
+        self.unit.continuous_states(states);
+        Ok(())
+    }
+
+    pub(crate) fn derivatives(&mut self, derivatives: &mut [f64]) -> Outcome {
+        Self::expect_length("derivatives", derivatives.len(), self.states.len())?;
+        self.refresh()?;
+        for (value, &(_, reference)) in derivatives.iter_mut().zip(&self.states) {
+            *value = *self.unit.real(reference).expect("only a Real is a derivative");
+        }
+        Ok(())
+    }
+
+    pub(crate) fn event_indicators(&mut self, indicators: &mut [f64]) -> Outcome {
+        Self::expect_length("event indicators", indicators.len(), self.event_indicators)?;
+        self.refresh()?;
+        self.unit.event_indicators(indicators);
+        Ok(())
+    }
+
+    pub(crate) fn nominals(&self, nominals: &mut [f64]) -> Outcome {
+        Self::expect_length("nominal values", nominals.len(), self.states.len())?;
+        for (value, &(state, _)) in nominals.iter_mut().zip(&self.states) {
+            *value = match self.variables[state].kind {
+                Kind::Real { nominal: Some(nominal), .. } => nominal,
+                _ => 1.0,
+            };
+        }
+        Ok(())
+    }
+
+    pub(crate) fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        derivative: &mut [f64],
+    ) -> Outcome {
+        if self.states.is_empty() {
+            return error("this unit offers no directional derivatives");
+        }
+        for &reference in unknowns {
+            self.field::<f64>(reference)?;
+            let variable = self.variable(reference)?;
+            if !variable.is_calculated() {
+                return error(format!("'{}' is set from outside, so it has no derivative", variable.name));
+            }
+        }
+        for &reference in knowns {
+            self.field::<f64>(reference)?;
+            let variable = self.variable(reference)?;
+            let is_state = self.states.iter().any(|&(state, _)| state == reference as usize);
+            if variable.causality != Causality::Input && !is_state {
+                return error(format!("'{}' is neither an input nor a state", variable.name));
+            }
+        }
+        self.refresh()?;
+        for (&unknown, sum) in unknowns.iter().zip(derivative) {
+            *sum = 0.0;
+            for (&known, seed) in knowns.iter().zip(seed) {
+                let time = self.progress.time;
+                *sum += self.unit.partial_derivative(time, unknown as usize, known as usize)? * seed;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn panic_text(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
+}

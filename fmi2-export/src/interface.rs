@@ -1,0 +1,661 @@
+//! The functions of FMI 2.0 with their C signatures: pointers are checked here and nowhere else.
+//!
+//! [`export_fmus!`](crate::export_fmus) makes an exported function of the same name out of each. They are `unsafe` as any
+//! C function is: a pointer that is neither null nor what the standard says cannot be recognized.
+#![allow(unsafe_code, non_snake_case, clippy::missing_safety_doc, clippy::too_many_arguments, missing_docs)]
+#![allow(clippy::not_unsafe_ptr_arg_deref)]
+
+use crate::call::{Call, table};
+use crate::instance::{Instance, Outcome, Saved, Setting, error};
+use crate::logger::{Category, Logger};
+use crate::model::Failure;
+use crate::resource;
+use crate::types::{
+    CEventInfo, Callbacks, DO_STEP_STATUS, Interface, LAST_SUCCESSFUL_TIME, PENDING_STATUS, Status,
+    TERMINATED,
+};
+use crate::unit::Export;
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ptr::null_mut;
+
+/// `fmi2Component`.
+type Component = *mut c_void;
+
+/// Runs a call on the instance behind `component`. A null component has no logger to report to.
+unsafe fn run(component: Component, call: &Call, body: impl FnOnce(&mut Instance) -> Outcome) -> Status {
+    // SAFETY: not null means that it came from fmi2Instantiate and was not freed, and that no other call is under way.
+    match unsafe { component.cast::<Instance>().as_mut() } {
+        Some(instance) => instance.run(call, body),
+        None => Status::Error,
+    }
+}
+
+fn check_room<T>(name: &str, is_null: bool, n: usize) -> Result<(), Failure> {
+    if is_null {
+        return error(format!("argument '{name}' is NULL"));
+    }
+    if n > isize::MAX as usize / size_of::<T>().max(1) {
+        return error(format!("argument '{name}' cannot have {n} elements"));
+    }
+    Ok(())
+}
+
+/// The `n` values at `pointer`, which may be null if there are none.
+unsafe fn slice<'a, T>(name: &str, pointer: *const T, n: usize) -> Result<&'a [T], Failure> {
+    if n == 0 {
+        return Ok(&[]);
+    }
+    check_room::<T>(name, pointer.is_null(), n)?;
+    // SAFETY: not null, and the importer vouches for n elements during the call.
+    Ok(unsafe { std::slice::from_raw_parts(pointer, n) })
+}
+
+/// The room for `n` values at `pointer`, which may be null if there are none.
+unsafe fn room<'a, T>(name: &str, pointer: *mut T, n: usize) -> Result<&'a mut [T], Failure> {
+    if n == 0 {
+        return Ok(&mut []);
+    }
+    check_room::<T>(name, pointer.is_null(), n)?;
+    // SAFETY: not null, and the importer vouches for n elements that nobody else uses during the call. The types
+    // used here have no invalid bit patterns.
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, n) })
+}
+
+/// Writes the one result of a call.
+unsafe fn put<T>(name: &str, pointer: *mut T, value: T) -> Outcome {
+    check_room::<T>(name, pointer.is_null(), 1)?;
+    // SAFETY: not null, and the importer vouches for room for one value, which may be uninitialized.
+    unsafe { pointer.write(value) };
+    Ok(())
+}
+
+/// Text of the importer.
+unsafe fn text<'a>(name: &str, pointer: *const c_char) -> Result<&'a str, String> {
+    if pointer.is_null() {
+        return Err(format!("argument '{name}' is NULL"));
+    }
+    // SAFETY: not null, so it is NUL-terminated and lives during the call.
+    let text = unsafe { CStr::from_ptr(pointer) };
+    text.to_str().map_err(|_| format!("'{}' is not UTF-8", text.to_string_lossy()))
+}
+
+// Common functions
+
+/// The descriptions of `exports` as a JSON list in memory of this library; null if that fails.
+pub fn fmu_model_descriptions(exports: &[Export]) -> *mut c_char {
+    let json = || {
+        let descriptions: Vec<_> = exports.iter().map(|export| (export.describe)()).collect();
+        CString::new(serde_json::to_vec(&descriptions).ok()?).ok()
+    };
+    catch_unwind(AssertUnwindSafe(json)).ok().flatten().map_or(null_mut(), CString::into_raw)
+}
+
+pub unsafe fn fmu_free_model_descriptions(descriptions: *mut c_char) {
+    if !descriptions.is_null() {
+        // SAFETY: not null, so it came from fmu_model_descriptions, and is given back once.
+        drop(unsafe { CString::from_raw(descriptions) });
+    }
+}
+
+pub fn fmi2GetTypesPlatform() -> *const c_char {
+    c"default".as_ptr()
+}
+
+pub fn fmi2GetVersion() -> *const c_char {
+    c"2.0".as_ptr()
+}
+
+pub unsafe fn fmi2Instantiate(
+    exports: &[Export],
+    instance_name: *const c_char,
+    fmu_type: c_int,
+    guid: *const c_char,
+    resource_location: *const c_char,
+    callbacks: *const Callbacks,
+    _visible: c_int,
+    logging_on: c_int,
+) -> Component {
+    // SAFETY: null or a struct that lives during the call.
+    let callbacks = unsafe { callbacks.as_ref() };
+    // SAFETY: null or NUL-terminated.
+    let name = unsafe { text("instanceName", instance_name) };
+    let c_name = CString::new(name.as_deref().unwrap_or_default()).unwrap_or_default();
+    let logger = || Logger::new(callbacks, c_name.clone(), logging_on != 0);
+    let instantiate = || {
+        if name?.is_empty() {
+            return Err("the instance name is empty".to_string());
+        }
+        // SAFETY: null or NUL-terminated.
+        let guid = unsafe { text("fmuGUID", guid) }?;
+        let interface = Interface::from_c(fmu_type).ok_or_else(|| {
+            format!("fmuType {fmu_type} is neither 0 (model exchange) nor 1 (co-simulation)")
+        })?;
+        let described = exports.iter().map(|export| (export, (export.describe)()));
+        let known: Vec<_> =
+            described.map(|(export, description)| (description.guid(), export, description)).collect();
+        let list = known.iter().map(|(guid, _, unit)| format!("{} {guid}", unit.name)).collect::<Vec<_>>();
+        let (guid, export, description) =
+            known.into_iter().find(|(own, ..)| own == guid).ok_or_else(|| {
+                format!(
+                    "no unit with GUID '{guid}' in this library, which holds {}: pack it again",
+                    list.join(", ")
+                )
+            })?;
+        if interface == Interface::ModelExchange && !description.model_exchange {
+            return Err(format!("{} is for co-simulation only", description.name));
+        }
+        let resources = if resource_location.is_null() {
+            None
+        } else {
+            // SAFETY: not null, so NUL-terminated.
+            Some(resource::folder(unsafe { text("fmuResourceLocation", resource_location) }?)?)
+        };
+        let setting = Setting { guid, interface, logger: logger(), resources };
+        Ok(Box::into_raw(Box::new(Instance::new(export, description, setting))).cast())
+    };
+    match catch_unwind(AssertUnwindSafe(instantiate)) {
+        Ok(Ok(component)) => component,
+        Ok(Err(problem)) => {
+            logger().log(Category::Error, &format!("fmi2Instantiate: {problem}"));
+            null_mut()
+        }
+        Err(panic) => {
+            logger().log(Category::Fatal, "fmi2Instantiate: defect in the unit");
+            std::mem::forget(panic);
+            null_mut()
+        }
+    }
+}
+
+pub unsafe fn fmi2FreeInstance(component: Component) {
+    if component.is_null() {
+        return;
+    }
+    // SAFETY: not null, so it came from fmi2Instantiate and is freed once.
+    let instance = unsafe { Box::from_raw(component.cast::<Instance>()) };
+    if let Err(panic) = catch_unwind(AssertUnwindSafe(|| drop(instance))) {
+        std::mem::forget(panic);
+    }
+}
+
+pub unsafe fn fmi2SetDebugLogging(
+    component: Component,
+    logging_on: c_int,
+    n_categories: usize,
+    categories: *const *const c_char,
+) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: see `slice`.
+        let categories = unsafe { slice("categories", categories, n_categories) }?;
+        // SAFETY: null or NUL-terminated.
+        let names =
+            categories.iter().map(|&name| unsafe { text("categories", name) }).collect::<Result<Vec<_>, _>>();
+        let names = names.map_err(Failure::Error)?;
+        if let Some(unknown) = instance.logger().choose(logging_on != 0, &names) {
+            instance.warn(&format!("fmi2SetDebugLogging: there is no log category '{unknown}'"));
+        }
+        Ok(())
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SET_DEBUG_LOGGING, body) }
+}
+
+pub unsafe fn fmi2SetupExperiment(
+    component: Component,
+    tolerance_defined: c_int,
+    tolerance: f64,
+    start_time: f64,
+    stop_time_defined: c_int,
+    stop_time: f64,
+) -> Status {
+    let tolerance = (tolerance_defined != 0).then_some(tolerance);
+    let stop = (stop_time_defined != 0).then_some(stop_time);
+    let body = |instance: &mut Instance| instance.setup_experiment(start_time, stop, tolerance);
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SETUP_EXPERIMENT, body) }
+}
+
+pub unsafe fn fmi2EnterInitializationMode(component: Component) -> Status {
+    let body = |instance: &mut Instance| {
+        instance.enter_initialization_mode();
+        Ok(())
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::ENTER_INITIALIZATION_MODE, body) }
+}
+
+pub unsafe fn fmi2ExitInitializationMode(component: Component) -> Status {
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::EXIT_INITIALIZATION_MODE, Instance::exit_initialization_mode) }
+}
+
+pub unsafe fn fmi2Terminate(component: Component) -> Status {
+    let body = |instance: &mut Instance| {
+        instance.terminate();
+        Ok(())
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::TERMINATE, body) }
+}
+
+pub unsafe fn fmi2Reset(component: Component) -> Status {
+    let body = |instance: &mut Instance| {
+        instance.reset();
+        Ok(())
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::RESET, body) }
+}
+
+// Getting and setting
+
+pub unsafe fn fmi2GetReal(component: Component, vr: *const u32, n: usize, value: *mut f64) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: see `slice` and `room`.
+        let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
+        instance.get::<f64>(references, |i, value| values[i] = *value)
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_REAL, body) }
+}
+
+pub unsafe fn fmi2GetInteger(component: Component, vr: *const u32, n: usize, value: *mut c_int) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: see `slice` and `room`.
+        let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
+        instance.get::<i32>(references, |i, value| values[i] = *value)
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_INTEGER, body) }
+}
+
+pub unsafe fn fmi2GetBoolean(component: Component, vr: *const u32, n: usize, value: *mut c_int) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: see `slice` and `room`.
+        let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
+        instance.get::<bool>(references, |i, value| values[i] = c_int::from(*value))
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_BOOLEAN, body) }
+}
+
+/// The texts live until the next call of this function on the same instance.
+pub unsafe fn fmi2GetString(
+    component: Component,
+    vr: *const u32,
+    n: usize,
+    value: *mut *const c_char,
+) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: see `slice` and `room`.
+        let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
+        for (value, text) in values.iter_mut().zip(instance.get_strings(references)?) {
+            *value = text.as_ptr();
+        }
+        Ok(())
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_STRING, body) }
+}
+
+pub unsafe fn fmi2SetReal(component: Component, vr: *const u32, n: usize, value: *const f64) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: see `slice`.
+        let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
+        instance.set(references, |i| Ok(values[i]))
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SET_REAL, body) }
+}
+
+pub unsafe fn fmi2SetInteger(component: Component, vr: *const u32, n: usize, value: *const c_int) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: see `slice`.
+        let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
+        instance.set(references, |i| Ok(values[i]))
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SET_INTEGER, body) }
+}
+
+pub unsafe fn fmi2SetBoolean(component: Component, vr: *const u32, n: usize, value: *const c_int) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: see `slice`.
+        let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
+        instance.set(references, |i| match values[i] {
+            0 => Ok(false),
+            1 => Ok(true),
+            other => Err(format!("{other} is neither fmi2False (0) nor fmi2True (1)")),
+        })
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SET_BOOLEAN, body) }
+}
+
+pub unsafe fn fmi2SetString(
+    component: Component,
+    vr: *const u32,
+    n: usize,
+    value: *const *const c_char,
+) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: see `slice`.
+        let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
+        // SAFETY: null or NUL-terminated.
+        instance.set(references, |i| unsafe { text("value", values[i]) }.map(String::from))
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SET_STRING, body) }
+}
+
+// Saved states. The handle is an address that is compared, never followed.
+
+/// Overwrites the state behind `*state` if that is not null.
+pub unsafe fn fmi2GetFMUstate(component: Component, state: *mut *mut c_void) -> Status {
+    let body = |instance: &mut Instance| {
+        check_room::<*mut c_void>("FMUstate", state.is_null(), 1)?;
+        // SAFETY: not null, and the standard wants it initialized.
+        let present = unsafe { state.read() };
+        let handle = instance.save((!present.is_null()).then(|| present.cast::<Saved>().cast_const()))?;
+        // SAFETY: see `put`.
+        unsafe { put("FMUstate", state, handle.cast_mut().cast()) }
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_FMU_STATE, body) }
+}
+
+pub unsafe fn fmi2SetFMUstate(component: Component, state: *mut c_void) -> Status {
+    let body = |instance: &mut Instance| {
+        check_room::<Saved>("FMUstate", state.is_null(), 1)?;
+        instance.restore(state.cast())
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SET_FMU_STATE, body) }
+}
+
+/// Sets `*state` to null; does nothing if it, or `state`, is null already.
+pub unsafe fn fmi2FreeFMUstate(component: Component, state: *mut *mut c_void) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: null or a handle variable of the importer.
+        let Some(state) = (unsafe { state.as_mut() }) else { return Ok(()) };
+        if !state.is_null() {
+            instance.free_saved(state.cast())?;
+            *state = null_mut();
+        }
+        Ok(())
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::FREE_FMU_STATE, body) }
+}
+
+pub unsafe fn fmi2SerializedFMUstateSize(
+    component: Component,
+    state: *mut c_void,
+    size: *mut usize,
+) -> Status {
+    let body = |instance: &mut Instance| {
+        let length = instance.serialized(state.cast())?.len();
+        // SAFETY: see `put`.
+        unsafe { put("size", size, length) }
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SERIALIZED_SIZE, body) }
+}
+
+pub unsafe fn fmi2SerializeFMUstate(
+    component: Component,
+    state: *mut c_void,
+    serialized: *mut c_char,
+    size: usize,
+) -> Status {
+    let body = |instance: &mut Instance| {
+        let bytes = instance.serialized(state.cast())?;
+        if size < bytes.len() {
+            return error(format!("room for {size} bytes, but the state has {}", bytes.len()));
+        }
+        // SAFETY: see `room`.
+        unsafe { room("serializedState", serialized.cast::<u8>(), bytes.len()) }?.copy_from_slice(bytes);
+        Ok(())
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SERIALIZE, body) }
+}
+
+/// Always makes a new state: what `*state` was before is not looked at.
+pub unsafe fn fmi2DeSerializeFMUstate(
+    component: Component,
+    serialized: *const c_char,
+    size: usize,
+    state: *mut *mut c_void,
+) -> Status {
+    let body = |instance: &mut Instance| {
+        check_room::<*mut c_void>("FMUstate", state.is_null(), 1)?;
+        // SAFETY: see `slice`.
+        let handle =
+            instance.deserialize(unsafe { slice("serializedState", serialized.cast::<u8>(), size) }?)?;
+        // SAFETY: see `put`.
+        unsafe { put("FMUstate", state, handle.cast_mut().cast()) }
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::DESERIALIZE, body) }
+}
+
+pub unsafe fn fmi2GetDirectionalDerivative(
+    component: Component,
+    unknown: *const u32,
+    n_unknown: usize,
+    known: *const u32,
+    n_known: usize,
+    dv_known: *const f64,
+    dv_unknown: *mut f64,
+) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: see `slice`.
+        let (unknowns, knowns, seed) = unsafe {
+            (
+                slice("vUnknown_ref", unknown, n_unknown)?,
+                slice("vKnown_ref", known, n_known)?,
+                slice("dvKnown", dv_known, n_known)?,
+            )
+        };
+        // SAFETY: see `room`.
+        let derivative = unsafe { room("dvUnknown", dv_unknown, n_unknown) }?;
+        instance.directional_derivative(unknowns, knowns, seed, derivative)
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::DIRECTIONAL_DERIVATIVE, body) }
+}
+
+// Model exchange
+
+pub unsafe fn fmi2EnterEventMode(component: Component) -> Status {
+    let body = |instance: &mut Instance| {
+        instance.enter_event_mode();
+        Ok(())
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::ENTER_EVENT_MODE, body) }
+}
+
+pub unsafe fn fmi2NewDiscreteStates(component: Component, event_info: *mut CEventInfo) -> Status {
+    let body = |instance: &mut Instance| {
+        check_room::<CEventInfo>("fmi2eventInfo", event_info.is_null(), 1)?;
+        let event = instance.new_discrete_states()?;
+        let info = CEventInfo {
+            values_of_continuous_states_changed: c_int::from(event.states_changed),
+            next_event_time_defined: c_int::from(event.next_event_time.is_some()),
+            next_event_time: event.next_event_time.unwrap_or_default(),
+            ..CEventInfo::default()
+        };
+        // SAFETY: see `put`.
+        unsafe { put("fmi2eventInfo", event_info, info) }
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::NEW_DISCRETE_STATES, body) }
+}
+
+pub unsafe fn fmi2EnterContinuousTimeMode(component: Component) -> Status {
+    let body = |instance: &mut Instance| {
+        instance.enter_continuous_time_mode();
+        Ok(())
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::ENTER_CONTINUOUS_TIME, body) }
+}
+
+/// The units know their events by time or indicator, so a completed step never asks for event mode.
+pub unsafe fn fmi2CompletedIntegratorStep(
+    component: Component,
+    _no_set_state_prior: c_int,
+    enter_event_mode: *mut c_int,
+    terminate: *mut c_int,
+) -> Status {
+    // SAFETY: see `put`.
+    let body = |_: &mut Instance| unsafe {
+        put("enterEventMode", enter_event_mode, 0)?;
+        put("terminateSimulation", terminate, 0)
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::COMPLETED_STEP, body) }
+}
+
+pub unsafe fn fmi2SetTime(component: Component, time: f64) -> Status {
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SET_TIME, |instance| instance.set_time(time)) }
+}
+
+pub unsafe fn fmi2SetContinuousStates(component: Component, x: *const f64, nx: usize) -> Status {
+    // SAFETY: see `slice`.
+    let body = |instance: &mut Instance| instance.set_continuous_states(unsafe { slice("x", x, nx) }?);
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SET_CONTINUOUS_STATES, body) }
+}
+
+pub unsafe fn fmi2GetDerivatives(component: Component, derivatives: *mut f64, nx: usize) -> Status {
+    // SAFETY: see `room`.
+    let body =
+        |instance: &mut Instance| instance.derivatives(unsafe { room("derivatives", derivatives, nx) }?);
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_DERIVATIVES, body) }
+}
+
+pub unsafe fn fmi2GetEventIndicators(component: Component, indicators: *mut f64, ni: usize) -> Status {
+    let body =
+        // SAFETY: see `room`.
+        |instance: &mut Instance| instance.event_indicators(unsafe { room("eventIndicators", indicators, ni) }?);
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_EVENT_INDICATORS, body) }
+}
+
+pub unsafe fn fmi2GetContinuousStates(component: Component, x: *mut f64, nx: usize) -> Status {
+    // SAFETY: see `room`.
+    let body = |instance: &mut Instance| instance.continuous_states(unsafe { room("x", x, nx) }?);
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_CONTINUOUS_STATES, body) }
+}
+
+pub unsafe fn fmi2GetNominalsOfContinuousStates(
+    component: Component,
+    nominals: *mut f64,
+    nx: usize,
+) -> Status {
+    // SAFETY: see `room`.
+    let body = |instance: &mut Instance| instance.nominals(unsafe { room("x_nominal", nominals, nx) }?);
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_NOMINALS, body) }
+}
+
+// Co-simulation
+
+/// Orders 1 to [`MAX_INPUT_DERIVATIVE_ORDER`](crate::MAX_INPUT_DERIVATIVE_ORDER), for the next step only.
+pub unsafe fn fmi2SetRealInputDerivatives(
+    component: Component,
+    vr: *const u32,
+    n: usize,
+    order: *const c_int,
+    value: *const f64,
+) -> Status {
+    let body = |instance: &mut Instance| {
+        // SAFETY: see `slice`.
+        let (references, orders, values) =
+            unsafe { (slice("vr", vr, n)?, slice("order", order, n)?, slice("value", value, n)?) };
+        instance.set_input_derivatives(references, orders, values)
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::SET_INPUT_DERIVATIVES, body) }
+}
+
+pub unsafe fn fmi2GetRealOutputDerivatives(
+    component: Component,
+    _vr: *const u32,
+    n: usize,
+    _order: *const c_int,
+    _value: *mut f64,
+) -> Status {
+    let body = |_: &mut Instance| match n {
+        0 => Ok(()),
+        _ => error("the units offer no output derivatives (maxOutputDerivativeOrder is 0)"),
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_OUTPUT_DERIVATIVES, body) }
+}
+
+pub unsafe fn fmi2DoStep(component: Component, point: f64, size: f64, _no_set_state_prior: c_int) -> Status {
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::DO_STEP, |instance| instance.do_step(point, size)) }
+}
+
+pub unsafe fn fmi2CancelStep(component: Component) -> Status {
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::CANCEL_STEP, |_| Ok(())) }
+}
+
+fn no_status(kind: c_int) -> Outcome {
+    Err(Failure::Discard(format!("there is no status of kind {kind} here")))
+}
+
+pub unsafe fn fmi2GetStatus(component: Component, kind: c_int, value: *mut Status) -> Status {
+    let body = |instance: &mut Instance| match kind {
+        // SAFETY: see `put`.
+        DO_STEP_STATUS => unsafe { put("value", value, instance.last_step()) },
+        _ => no_status(kind),
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_STATUS, body) }
+}
+
+pub unsafe fn fmi2GetRealStatus(component: Component, kind: c_int, value: *mut f64) -> Status {
+    let body = |instance: &mut Instance| match kind {
+        // SAFETY: see `put`.
+        LAST_SUCCESSFUL_TIME => unsafe { put("value", value, instance.time()) },
+        _ => no_status(kind),
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_REAL_STATUS, body) }
+}
+
+pub unsafe fn fmi2GetIntegerStatus(component: Component, kind: c_int, _value: *mut c_int) -> Status {
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_INTEGER_STATUS, |_| no_status(kind)) }
+}
+
+pub unsafe fn fmi2GetBooleanStatus(component: Component, kind: c_int, value: *mut c_int) -> Status {
+    let body = |_: &mut Instance| match kind {
+        // SAFETY: see `put`.
+        TERMINATED => unsafe { put("value", value, 0) },
+        _ => no_status(kind),
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_BOOLEAN_STATUS, body) }
+}
+
+pub unsafe fn fmi2GetStringStatus(component: Component, kind: c_int, value: *mut *const c_char) -> Status {
+    let body = |_: &mut Instance| match kind {
+        // SAFETY: see `put`.
+        PENDING_STATUS => unsafe { put("value", value, c"no step is pending".as_ptr()) },
+        _ => no_status(kind),
+    };
+    // SAFETY: see `run`.
+    unsafe { run(component, &table::GET_STRING_STATUS, body) }
+}

@@ -1,0 +1,153 @@
+//! Messages to the importer, through its callback and nowhere else.
+//!
+//! Errors and fatal errors are always reported, as nobody wants to search for them a second time with logging on.
+//! Everything else is reported only while logging is on (`loggingOn` of fmi2Instantiate, fmi2SetDebugLogging), and of
+//! this only the categories chosen.
+#![allow(unsafe_code)]
+
+use crate::types::{Callbacks, LogCallback, Status};
+use model_description::LOG_CATEGORIES;
+use std::ffi::{CString, c_void};
+
+/// A row of [`LOG_CATEGORIES`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Category {
+    All,
+    Events,
+    Warning,
+    Discard,
+    Error,
+    Fatal,
+}
+
+impl Category {
+    const ROWS: [Self; LOG_CATEGORIES.len()] =
+        [Self::All, Self::Events, Self::Warning, Self::Discard, Self::Error, Self::Fatal];
+
+    fn named(name: &str) -> Option<Self> {
+        Self::ROWS.into_iter().find(|category| category.name() == name)
+    }
+
+    fn name(self) -> &'static str {
+        LOG_CATEGORIES[self as usize].0
+    }
+
+    fn status(self) -> Status {
+        match self {
+            Self::All | Self::Events => Status::Ok,
+            Self::Warning => Status::Warning,
+            Self::Discard => Status::Discard,
+            Self::Error => Status::Error,
+            Self::Fatal => Status::Fatal,
+        }
+    }
+}
+
+/// The importer's logger with what it wants to hear.
+pub(crate) struct Logger {
+    callback: Option<LogCallback>,
+    environment: *mut c_void,
+    instance: CString,
+    /// One bit for every category that is reported.
+    active: u8,
+}
+
+const EVERYTHING: u8 = u8::MAX;
+const ALWAYS: u8 = 1 << Category::Error as u8 | 1 << Category::Fatal as u8;
+
+impl Logger {
+    /// Copies what is needed of `callbacks`, which the importer may free afterwards.
+    pub(crate) fn new(callbacks: Option<&Callbacks>, instance: CString, on: bool) -> Self {
+        Self {
+            callback: callbacks.and_then(|callbacks| callbacks.logger),
+            environment: callbacks.map_or(std::ptr::null_mut(), |callbacks| callbacks.component_environment),
+            instance,
+            active: if on { EVERYTHING } else { ALWAYS },
+        }
+    }
+
+    /// Switches the named categories, or all if none is named. Returns a name that is not a category.
+    pub(crate) fn choose<'a>(&mut self, on: bool, names: &[&'a str]) -> Option<&'a str> {
+        let mut unknown = None;
+        let mut chosen = if names.is_empty() { EVERYTHING } else { 0 };
+        for name in names {
+            match Category::named(name) {
+                Some(Category::All) => chosen = EVERYTHING,
+                Some(category) => chosen |= 1 << category as u8,
+                None => unknown = Some(*name),
+            }
+        }
+        // Switching categories on means these and no others; switching off leaves the others as they were.
+        self.active = ALWAYS | if on { chosen } else { self.active & !chosen };
+        unknown
+    }
+
+    pub(crate) fn log(&self, category: Category, text: &str) {
+        let Some(callback) = self.callback else { return };
+        if self.active & (1 << category as u8) == 0 {
+            return;
+        }
+        let message = to_c(text);
+        let category_name = to_c(category.name());
+        // SAFETY: the importer's function with its own environment; all strings live until it returns, and the message
+        // holds no `%`, so no further argument is read.
+        unsafe {
+            callback(
+                self.environment,
+                self.instance.as_ptr(),
+                category.status(),
+                category_name.as_ptr(),
+                message.as_ptr(),
+            );
+        }
+    }
+}
+
+/// The importer reads the text as a printf format, so it must not hold a `%`.
+fn to_c(text: &str) -> CString {
+    CString::new(text.replace('%', "percent").replace('\0', " ")).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn silent(on: bool) -> Logger {
+        Logger::new(None, CString::default(), on)
+    }
+
+    fn hears(logger: &Logger, category: Category) -> bool {
+        logger.active & (1 << category as u8) != 0
+    }
+
+    #[test]
+    fn rows_are_in_the_order_of_the_declared_categories() {
+        for (i, category) in Category::ROWS.into_iter().enumerate() {
+            assert_eq!(category as usize, i);
+        }
+    }
+
+    #[test]
+    fn errors_are_heard_even_if_logging_is_off() {
+        let logger = silent(false);
+        assert!(hears(&logger, Category::Error) && hears(&logger, Category::Fatal));
+        assert!(!hears(&logger, Category::Warning) && !hears(&logger, Category::Events));
+    }
+
+    #[test]
+    fn only_chosen_categories_are_heard() {
+        let mut logger = silent(true);
+        assert_eq!(logger.choose(true, &["logStatusWarning"]), None);
+        assert!(hears(&logger, Category::Warning) && !hears(&logger, Category::Events));
+        assert_eq!(logger.choose(true, &["logAll"]), None);
+        assert!(hears(&logger, Category::Events));
+        assert_eq!(logger.choose(false, &["logEvents"]), None);
+        assert!(hears(&logger, Category::Warning) && !hears(&logger, Category::Events));
+        assert_eq!(logger.choose(true, &["logWeather"]), Some("logWeather"));
+    }
+
+    #[test]
+    fn messages_hold_no_format() {
+        assert_eq!(to_c("at 5 %\0s").to_str(), Ok("at 5 percent s"));
+    }
+}

@@ -1,0 +1,276 @@
+//! A model bound to its table, seen without its type: what the shell works with.
+
+use crate::call::State;
+use crate::model::{Context, EventInfo, Failure, Inputs, Model};
+use crate::table::{Access, Description, Table};
+use model_description::ModelDescription;
+use model_description::variable::Kind;
+use serde::{Deserialize, Serialize};
+
+/// Highest order of fmi2SetRealInputDerivatives.
+pub const MAX_INPUT_DERIVATIVE_ORDER: usize = 3;
+
+/// An input that is extrapolated during the next step: u(t) = u₀ + Σ u⁽ᵏ⁾ (t − t₀)ᵏ / k!.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Extrapolation {
+    pub(crate) reference: usize,
+    /// Value at the start of the step.
+    pub(crate) base: f64,
+    /// Derivatives of order 1, 2, ….
+    pub(crate) derivatives: [f64; MAX_INPUT_DERIVATIVE_ORDER],
+}
+
+impl Extrapolation {
+    /// Value after the time `dt` by Horner's rule.
+    pub(crate) fn at(&self, dt: f64) -> f64 {
+        let mut sum = 0.0;
+        for (i, derivative) in self.derivatives.iter().enumerate().rev() {
+            sum = (derivative + sum) * dt / (i as f64 + 1.0);
+        }
+        self.base + sum
+    }
+}
+
+/// The shell's own part of what determines the future.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Progress {
+    pub(crate) state: State,
+    pub(crate) time: f64,
+    pub(crate) start_time: f64,
+    pub(crate) stop_time: Option<f64>,
+    /// Whether the model was initialized with the parameters now set.
+    pub(crate) initialized: bool,
+    pub(crate) extrapolations: Vec<Extrapolation>,
+}
+
+impl Default for Progress {
+    fn default() -> Self {
+        Self {
+            state: State::Instantiated,
+            time: 0.0,
+            start_time: 0.0,
+            stop_time: None,
+            initialized: false,
+            extrapolations: Vec::new(),
+        }
+    }
+}
+
+/// A model with its table.
+pub(crate) trait Unit: Send {
+    fn real(&mut self, reference: usize) -> Option<&mut f64>;
+    /// Integers and enumerations.
+    fn integer(&mut self, reference: usize) -> Option<&mut i32>;
+    fn boolean(&mut self, reference: usize) -> Option<&mut bool>;
+    fn string(&mut self, reference: usize) -> Option<&mut String>;
+
+    fn reset(&mut self);
+    fn initialize(&mut self, context: &Context) -> Result<(), Failure>;
+    fn calculate(&mut self, time: f64) -> Result<(), Failure>;
+    /// Leaves the inputs at their values at `to`.
+    fn step(
+        &mut self,
+        from: f64,
+        to: f64,
+        inputs: &[Extrapolation],
+        log: &mut dyn FnMut(&str),
+    ) -> Result<(), Failure>;
+
+    fn save(&self, progress: &Progress) -> Result<Vec<u8>, Failure>;
+    /// On an error the model is as it was.
+    fn restore(&mut self, payload: &[u8]) -> Result<Progress, Failure>;
+
+    fn continuous_states(&self, states: &mut [f64]);
+    fn set_continuous_states(&mut self, states: &[f64]);
+    fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure>;
+    fn event_indicators(&self, indicators: &mut [f64]);
+    fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure>;
+}
+
+struct Bound<M> {
+    model: M,
+    table: Table<M>,
+}
+
+/// Inputs of one step for the typed model.
+struct Extrapolated<'a, M> {
+    table: &'a Table<M>,
+    from: f64,
+    inputs: &'a [Extrapolation],
+}
+
+impl<M> Inputs<M> for Extrapolated<'_, M> {
+    fn advance(&self, model: &mut M, time: f64) {
+        for input in self.inputs {
+            if let Access::Real(field) = &self.table.entries[input.reference].access {
+                *field(model) = input.at(time - self.from);
+            }
+        }
+    }
+}
+
+impl<M: Model> Unit for Bound<M> {
+    fn real(&mut self, reference: usize) -> Option<&mut f64> {
+        match &self.table.entries.get(reference)?.access {
+            Access::Real(field) => Some(field(&mut self.model)),
+            _ => None,
+        }
+    }
+
+    fn integer(&mut self, reference: usize) -> Option<&mut i32> {
+        match &self.table.entries.get(reference)?.access {
+            Access::Integer(field) | Access::Enumeration(field) => Some(field(&mut self.model)),
+            _ => None,
+        }
+    }
+
+    fn boolean(&mut self, reference: usize) -> Option<&mut bool> {
+        match &self.table.entries.get(reference)?.access {
+            Access::Boolean(field) => Some(field(&mut self.model)),
+            _ => None,
+        }
+    }
+
+    fn string(&mut self, reference: usize) -> Option<&mut String> {
+        match &self.table.entries.get(reference)?.access {
+            Access::String(field) => Some(field(&mut self.model)),
+            _ => None,
+        }
+    }
+
+    fn reset(&mut self) {
+        self.model = M::new();
+    }
+
+    fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
+        self.model.initialize(context)
+    }
+
+    fn calculate(&mut self, time: f64) -> Result<(), Failure> {
+        self.model.calculate(time)
+    }
+
+    fn step(
+        &mut self,
+        from: f64,
+        to: f64,
+        inputs: &[Extrapolation],
+        log: &mut dyn FnMut(&str),
+    ) -> Result<(), Failure> {
+        let inputs = Extrapolated { table: &self.table, from, inputs };
+        self.model.step(from, to, &inputs, log)?;
+        inputs.advance(&mut self.model, to);
+        Ok(())
+    }
+
+    fn save(&self, progress: &Progress) -> Result<Vec<u8>, Failure> {
+        postcard::to_stdvec(&(progress, &self.model))
+            .map_err(|error| Failure::Error(format!("the state cannot be saved: {error}")))
+    }
+
+    fn restore(&mut self, payload: &[u8]) -> Result<Progress, Failure> {
+        let unfit = |problem: String| Failure::Error(format!("the saved state does not fit: {problem}"));
+        let ((progress, mut model), rest): ((Progress, M), _) =
+            postcard::take_from_bytes(payload).map_err(|error| unfit(error.to_string()))?;
+        if !rest.is_empty() {
+            return Err(unfit(format!("{} bytes are left over", rest.len())));
+        }
+        model.restored()?;
+        self.model = model;
+        Ok(progress)
+    }
+
+    fn continuous_states(&self, states: &mut [f64]) {
+        self.model.continuous_states(states);
+    }
+
+    fn set_continuous_states(&mut self, states: &[f64]) {
+        self.model.set_continuous_states(states);
+    }
+
+    fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure> {
+        self.model.new_discrete_states(time)
+    }
+
+    fn event_indicators(&self, indicators: &mut [f64]) {
+        self.model.event_indicators(indicators);
+    }
+
+    fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure> {
+        self.model.partial_derivative(time, unknown, known)
+    }
+}
+
+/// A unit that a library exports.
+#[derive(Clone, Copy)]
+pub struct Export {
+    pub(crate) describe: fn() -> ModelDescription,
+    pub(crate) create: fn() -> Box<dyn Unit>,
+}
+
+impl Export {
+    /// The unit that `M` is the model of.
+    pub const fn of<M: Model>() -> Self {
+        Self { describe: describe::<M>, create: create::<M> }
+    }
+}
+
+fn create<M: Model>() -> Box<dyn Unit> {
+    Box::new(Bound { model: M::new(), table: M::description().table })
+}
+
+/// The description of the unit that `M` is the model of. Start values of parameters and inputs are those of `M::new()`.
+pub fn describe<M: Model>() -> ModelDescription {
+    let Description {
+        name,
+        description,
+        documentation,
+        version,
+        model_exchange,
+        event_indicators,
+        default_experiment,
+        table,
+    } = M::description();
+    let mut model = M::new();
+    let mut variables = Vec::with_capacity(table.entries.len());
+    for entry in table.entries {
+        let mut variable = entry.variable;
+        if !variable.is_calculated() {
+            match (&mut variable.kind, &entry.access) {
+                (Kind::Real { start, .. }, Access::Real(field)) => *start = Some(*field(&mut model)),
+                (Kind::Integer { start, .. }, Access::Integer(field))
+                | (Kind::Enumeration { start, .. }, Access::Enumeration(field)) => {
+                    *start = Some(*field(&mut model))
+                }
+                (Kind::Boolean { start }, Access::Boolean(field)) => *start = Some(*field(&mut model)),
+                (Kind::String { start }, Access::String(field)) => *start = Some(field(&mut model).clone()),
+                _ => unreachable!("Table::push is called with a kind and a field of the same type only"),
+            }
+        }
+        variables.push(variable);
+    }
+    ModelDescription {
+        name: name.into(),
+        description: description.into(),
+        documentation: documentation.into(),
+        version: version.into(),
+        co_simulation: true,
+        model_exchange,
+        event_indicators,
+        default_experiment,
+        variables,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oracle_extrapolation_is_the_taylor_polynomial() {
+        let input = Extrapolation { reference: 0, base: 1.0, derivatives: [2.0, 6.0, -12.0] };
+        let dt = 0.5;
+        assert_eq!(input.at(dt), 1.0 + 2.0 * dt + 6.0 * dt * dt / 2.0 - 12.0 * dt * dt * dt / 6.0);
+        assert_eq!(input.at(0.0), 1.0);
+    }
+}

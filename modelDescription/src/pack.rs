@@ -1,0 +1,120 @@
+//! Writes a unit's `.fmu` archive. The same input gives the same bytes: entries are sorted, times and permissions fixed.
+
+use crate::{Error, LICENSE, ModelDescription};
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+/// What goes into the archives besides the unit itself.
+#[derive(Clone, Debug, Default)]
+pub struct Extras {
+    /// Folder whose files go under `resources/`.
+    pub resources: Option<PathBuf>,
+    /// Licence texts, for `documentation/licenses/`.
+    pub licenses: Vec<PathBuf>,
+}
+
+/// Some importers pass no resource location for a unit without the folder.
+const RESOURCES_README: &str = "Files that the unit reads while it initializes. This unit needs none.\n";
+
+/// Folder and file suffix of the libraries of the platform this program was built for.
+fn platform() -> (&'static str, &'static str) {
+    match (std::env::consts::OS, cfg!(target_pointer_width = "64")) {
+        ("windows", true) => ("win64", "dll"),
+        ("windows", false) => ("win32", "dll"),
+        ("macos", _) => ("darwin64", "dylib"),
+        (_, true) => ("linux64", "so"),
+        (_, false) => ("linux32", "so"),
+    }
+}
+
+/// Writes `NAME.fmu` of one unit of `library` into the folder `output` and returns its path.
+///
+/// # Errors
+/// If the description contradicts itself, or a file cannot be read or written.
+pub fn pack(
+    description: &ModelDescription,
+    library: &Path,
+    output: &Path,
+    extras: &Extras,
+) -> Result<PathBuf, Error> {
+    let (folder, suffix) = platform();
+    let name = &description.name;
+    let mut entries = vec![
+        ("modelDescription.xml".to_string(), description.to_xml()?.into_bytes()),
+        (format!("binaries/{folder}/{name}.{suffix}"), read(library)?),
+        ("documentation/index.html".to_string(), description.to_html().into_bytes()),
+    ];
+    add_licenses(&mut entries, &extras.licenses)?;
+    let before = entries.len();
+    if let Some(resources) = &extras.resources {
+        add_folder(&mut entries, "resources", resources)?;
+    }
+    if entries.len() == before {
+        entries.push(("resources/README.txt".into(), RESOURCES_README.into()));
+    }
+    // The description first, as readers of streams expect; the rest by name.
+    entries[1..].sort();
+
+    let path = output.join(format!("{name}.fmu"));
+    // Written under another name first: nobody ever opens half an archive.
+    let partial = output.join(format!("{name}.fmu.part"));
+    let file = File::create(&partial).map_err(|source| Error::File { path: partial.clone(), source })?;
+    write_archive(BufWriter::new(file), &entries)
+        .map_err(|source| Error::Archive { path: path.clone(), source })?;
+    fs::rename(&partial, &path).map_err(|source| Error::File { path: path.clone(), source })?;
+    Ok(path)
+}
+
+fn write_archive(file: BufWriter<File>, entries: &[(String, Vec<u8>)]) -> zip::result::ZipResult<()> {
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default());
+    let mut archive = ZipWriter::new(file);
+    for (name, content) in entries {
+        let mode = if name.starts_with("binaries/") { 0o755 } else { 0o644 };
+        archive.start_file(name.as_str(), options.unix_permissions(mode))?;
+        archive.write_all(content)?;
+    }
+    archive.finish()?.flush()?;
+    Ok(())
+}
+
+/// FMI wants one entry point `license.txt`; several texts stand beside it.
+fn add_licenses(entries: &mut Vec<(String, Vec<u8>)>, licenses: &[PathBuf]) -> Result<(), Error> {
+    let folder = "documentation/licenses";
+    if let [only] = licenses {
+        entries.push((format!("{folder}/license.txt"), read(only)?));
+        return Ok(());
+    }
+    let mut entry_point = format!("SPDX-License-Identifier: {LICENSE}\n");
+    for path in licenses {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        entry_point.extend(["See ", &name, ".\n"]);
+        entries.push((format!("{folder}/{name}"), read(path)?));
+    }
+    if !licenses.is_empty() {
+        entries.push((format!("{folder}/license.txt"), entry_point.into_bytes()));
+    }
+    Ok(())
+}
+
+fn add_folder(entries: &mut Vec<(String, Vec<u8>)>, prefix: &str, folder: &Path) -> Result<(), Error> {
+    let failed = |source| Error::File { path: folder.to_owned(), source };
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let name = format!("{prefix}/{}", path.file_name().unwrap_or_default().to_string_lossy());
+        if path.is_dir() {
+            add_folder(entries, &name, &path)?;
+        } else {
+            entries.push((name, read(&path)?));
+        }
+    }
+    Ok(())
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })
+}

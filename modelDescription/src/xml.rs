@@ -1,0 +1,292 @@
+//! `modelDescription.xml` of a unit, FMI 2.0 section 2.2.
+
+use crate::unit::Unit;
+use crate::variable::{Causality, EnumerationType, Kind, Variability, Variable};
+use crate::{AUTHOR, Error, LICENSE, LOG_CATEGORIES, ModelDescription};
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, Event};
+use std::borrow::Cow;
+use std::io;
+
+type Xml = Writer<Vec<u8>>;
+/// Attributes in the order of the schema.
+type Attributes = Vec<(&'static str, String)>;
+
+impl ModelDescription {
+    /// The text of `modelDescription.xml`.
+    ///
+    /// # Errors
+    /// If [`ModelDescription::check`] finds a contradiction.
+    ///
+    /// # Panics
+    /// Never: writing to memory does not fail and everything written is text.
+    pub fn to_xml(&self) -> Result<String, Error> {
+        self.check()?;
+        let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
+        self.write(&mut xml).expect("writing to memory");
+        let mut text = String::from_utf8(xml.into_inner()).expect("only text was written");
+        text.push('\n');
+        Ok(text)
+    }
+
+    fn write(&self, xml: &mut Xml) -> io::Result<()> {
+        xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
+        let mut attributes: Attributes = vec![
+            // Several importers compare this text; "2.0.4" would be refused.
+            ("fmiVersion", "2.0".into()),
+            ("modelName", self.name.clone()),
+            ("guid", self.guid()),
+            ("description", self.description.clone()),
+            ("author", AUTHOR.into()),
+            ("version", self.version.clone()),
+            ("license", LICENSE.into()),
+            ("generationTool", concat!("fmu-pack ", env!("CARGO_PKG_VERSION")).into()),
+            ("variableNamingConvention", "structured".into()),
+        ];
+        if self.model_exchange {
+            attributes.push(("numberOfEventIndicators", self.event_indicators.to_string()));
+        }
+        parent(xml, "fmiModelDescription", attributes, |xml| {
+            self.write_interfaces(xml)?;
+            self.write_units(xml)?;
+            self.write_enumerations(xml)?;
+            parent(xml, "LogCategories", vec![], |xml| {
+                LOG_CATEGORIES.iter().try_for_each(|(name, description)| {
+                    let attributes = vec![("name", (*name).into()), ("description", (*description).into())];
+                    leaf(xml, "Category", attributes)
+                })
+            })?;
+            let experiment = self.default_experiment;
+            let attributes = vec![
+                ("startTime", real(experiment.start)),
+                ("stopTime", real(experiment.stop)),
+                ("tolerance", real(experiment.tolerance)),
+                ("stepSize", real(experiment.step)),
+            ];
+            leaf(xml, "DefaultExperiment", attributes)?;
+            parent(xml, "ModelVariables", vec![], |xml| {
+                (0..self.variables.len()).try_for_each(|i| self.write_variable(xml, i))
+            })?;
+            self.write_structure(xml)
+        })
+    }
+
+    fn write_interfaces(&self, xml: &mut Xml) -> io::Result<()> {
+        let mut derivatives = vec![];
+        if self.directional_derivatives() {
+            derivatives.push(("providesDirectionalDerivative", "true".to_string()));
+        }
+        let state: Attributes = vec![
+            ("canNotUseMemoryManagementFunctions", "true".into()),
+            ("canGetAndSetFMUstate", "true".into()),
+            ("canSerializeFMUstate", "true".into()),
+        ];
+        let identifier = vec![("modelIdentifier", self.name.clone())];
+        if self.model_exchange {
+            let own = vec![("completedIntegratorStepNotNeeded", "true".into())];
+            leaf(
+                xml,
+                "ModelExchange",
+                [identifier.clone(), own, state.clone(), derivatives.clone()].concat(),
+            )?;
+        }
+        if self.co_simulation {
+            let own = vec![
+                ("canHandleVariableCommunicationStepSize", "true".into()),
+                ("canInterpolateInputs", "true".into()),
+                ("maxOutputDerivativeOrder", "0".into()),
+                ("canBeInstantiatedOnlyOncePerProcess", "false".into()),
+            ];
+            leaf(xml, "CoSimulation", [identifier, own, state, derivatives].concat())?;
+        }
+        Ok(())
+    }
+
+    fn write_units(&self, xml: &mut Xml) -> io::Result<()> {
+        let mut units: Vec<&Unit> = vec![];
+        for variable in &self.variables {
+            if let Kind::Real { unit: Some(unit), .. } = &variable.kind
+                && !units.contains(&unit)
+            {
+                units.push(unit);
+            }
+        }
+        if units.is_empty() {
+            return Ok(());
+        }
+        units.sort_by(|a, b| a.name.cmp(&b.name));
+        parent(xml, "UnitDefinitions", vec![], |xml| {
+            units.iter().try_for_each(|unit| {
+                parent(xml, "Unit", vec![("name", unit.name.clone())], |xml| {
+                    let exponents = [
+                        ("kg", unit.kg),
+                        ("m", unit.m),
+                        ("s", unit.s),
+                        ("K", unit.kelvin),
+                        ("rad", unit.rad),
+                    ];
+                    let exponents = exponents.into_iter().filter(|(_, power)| *power != 0);
+                    leaf(
+                        xml,
+                        "BaseUnit",
+                        exponents.map(|(name, power)| (name, power.to_string())).collect(),
+                    )?;
+                    unit.display.iter().try_for_each(|display| {
+                        let attributes =
+                            vec![("name", display.name.clone()), ("factor", real(display.factor))];
+                        leaf(xml, "DisplayUnit", attributes)
+                    })
+                })
+            })
+        })
+    }
+
+    fn write_enumerations(&self, xml: &mut Xml) -> io::Result<()> {
+        let mut enumerations: Vec<&EnumerationType> = vec![];
+        for variable in &self.variables {
+            if let Kind::Enumeration { of, .. } = &variable.kind
+                && !enumerations.contains(&of)
+            {
+                enumerations.push(of);
+            }
+        }
+        if enumerations.is_empty() {
+            return Ok(());
+        }
+        enumerations.sort_by(|a, b| a.name.cmp(&b.name));
+        parent(xml, "TypeDefinitions", vec![], |xml| {
+            enumerations.iter().try_for_each(|of| {
+                let attributes = vec![("name", of.name.clone()), ("description", of.description.clone())];
+                parent(xml, "SimpleType", attributes, |xml| {
+                    parent(xml, "Enumeration", vec![], |xml| {
+                        of.items.iter().zip(1..).try_for_each(|((name, description), value)| {
+                            let attributes = vec![
+                                ("name", name.clone()),
+                                ("value", value.to_string()),
+                                ("description", description.clone()),
+                            ];
+                            leaf(xml, "Item", attributes)
+                        })
+                    })
+                })
+            })
+        })
+    }
+
+    fn write_variable(&self, xml: &mut Xml, reference: usize) -> io::Result<()> {
+        let variable = &self.variables[reference];
+        // `initial` is left out: parameters are exact and outputs and locals calculated by the standard's own defaults.
+        let attributes = vec![
+            ("name", variable.name.clone()),
+            ("valueReference", reference.to_string()),
+            ("description", variable.description.clone()),
+            ("causality", causality(variable).into()),
+            ("variability", variability(variable).into()),
+        ];
+        parent(xml, "ScalarVariable", attributes, |xml| match &variable.kind {
+            Kind::Real { unit, min, max, nominal, start, derivative_of } => {
+                let index = derivative_of.as_deref().and_then(|name| self.position(name)).map(|i| i + 1);
+                let display = unit.as_ref().and_then(|unit| unit.display.as_ref());
+                let attributes = [
+                    ("unit", unit.as_ref().map(|unit| unit.name.clone())),
+                    ("displayUnit", display.map(|display| display.name.clone())),
+                    ("min", min.map(real)),
+                    ("max", max.map(real)),
+                    ("nominal", nominal.map(real)),
+                    ("start", start.map(real)),
+                    ("derivative", index.map(|i| i.to_string())),
+                ];
+                leaf(xml, "Real", given(attributes))
+            }
+            Kind::Integer { min, max, start } => {
+                let attributes = [("min", *min), ("max", *max), ("start", *start)];
+                leaf(xml, "Integer", given(attributes.map(|(name, x)| (name, x.map(|x| x.to_string())))))
+            }
+            Kind::Boolean { start } => leaf(xml, "Boolean", given([("start", start.map(|x| x.to_string()))])),
+            Kind::Enumeration { of, start } => {
+                let attributes =
+                    [("declaredType", Some(of.name.clone())), ("start", start.map(|x| x.to_string()))];
+                leaf(xml, "Enumeration", given(attributes))
+            }
+            Kind::String { start } => leaf(xml, "String", given([("start", start.clone())])),
+        })
+    }
+
+    fn write_structure(&self, xml: &mut Xml) -> io::Result<()> {
+        let states = self.states();
+        let is_output = |i: &usize| self.variables[*i].causality == Causality::Output;
+        let outputs: Vec<_> = (0..self.variables.len()).filter(is_output).collect();
+        let derivatives: Vec<_> = states.iter().map(|&(_, derivative)| derivative).collect();
+        let of = |i| self.dependencies(i, &states);
+        let initially = |i| self.initial_dependencies(i, &states);
+        parent(xml, "ModelStructure", vec![], |xml| {
+            unknowns(xml, "Outputs", &outputs, of)?;
+            unknowns(xml, "Derivatives", &derivatives, of)?;
+            unknowns(xml, "InitialUnknowns", &self.initial_unknowns(&states), initially)
+        })
+    }
+}
+
+/// One list of ModelStructure. FMI counts variables from 1 here; an empty `dependencies` says that there are none.
+fn unknowns(
+    xml: &mut Xml,
+    name: &str,
+    list: &[usize],
+    dependencies: impl Fn(usize) -> Vec<usize>,
+) -> io::Result<()> {
+    if list.is_empty() {
+        return Ok(());
+    }
+    parent(xml, name, vec![], |xml| {
+        list.iter().try_for_each(|&i| {
+            let known: Vec<_> = dependencies(i).iter().map(|known| (known + 1).to_string()).collect();
+            leaf(xml, "Unknown", vec![("index", (i + 1).to_string()), ("dependencies", known.join(" "))])
+        })
+    })
+}
+
+pub(crate) fn causality(variable: &Variable) -> &'static str {
+    match variable.causality {
+        Causality::Parameter => "parameter",
+        Causality::Input => "input",
+        Causality::Output => "output",
+        Causality::Local => "local",
+        Causality::Independent => "independent",
+    }
+}
+
+fn variability(variable: &Variable) -> &'static str {
+    match variable.variability {
+        Variability::Fixed => "fixed",
+        Variability::Discrete => "discrete",
+        Variability::Continuous => "continuous",
+    }
+}
+
+/// The shortest text that reads back as the same number.
+fn real(x: f64) -> String {
+    format!("{x:?}")
+}
+
+fn given<const N: usize>(attributes: [(&'static str, Option<String>); N]) -> Attributes {
+    attributes.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
+}
+
+fn attribute((name, value): (&'static str, String)) -> (&'static str, Cow<'static, str>) {
+    (name, value.into())
+}
+
+fn leaf(xml: &mut Xml, name: &str, attributes: Attributes) -> io::Result<()> {
+    let attributes = attributes.into_iter().map(attribute);
+    xml.create_element(name).with_attributes(attributes).write_empty().map(drop)
+}
+
+fn parent(
+    xml: &mut Xml,
+    name: &str,
+    attributes: Attributes,
+    content: impl FnOnce(&mut Xml) -> io::Result<()>,
+) -> io::Result<()> {
+    let attributes = attributes.into_iter().map(attribute);
+    xml.create_element(name).with_attributes(attributes).write_inner_content(content).map(drop)
+}
