@@ -1,4 +1,4 @@
-//! The constrained tracking problem as a second-order cone programme for Clarabel.
+//! The constrained tracking problem, or a window of its horizon, as a second-order cone programme for Clarabel.
 //!
 //! Unknowns are the tracking errors E_k = x̃_k − x_r(t_k), k = 0..=N, scaled; the inputs are eliminated, as
 //! v_k = (E_ω,k+1 − E_ω,k − d_ω,k)/h. The affine terms d_k carry the reference's curvature and jumps. Set up once, then
@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3, Vector6};
 
 /// A ball constraint ‖offset + J_θ E_(α,β) + J_ω E_ω + J_v v‖ ≤ bound on the motion of one stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ball {
+pub(super) struct Ball {
     /// Value at E = 0, v = 0.
     pub offset: Vector3<f64>,
     /// J_θ.
@@ -36,22 +36,32 @@ impl Default for Ball {
     }
 }
 
+/// How the programme's first stage is tied down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Start {
+    /// E_0 is given.
+    Fixed,
+    /// The given E_0 may differ from the programme's by a deviation o with oᵀX⁻¹o ≤ 1 in each axis.
+    Within(Matrix2<f64>),
+    /// Free, at the cost of arriving there from the true start.
+    Arrival,
+}
+
 /// What does not change between samples.
 #[derive(Clone, Debug)]
-pub struct Structure {
-    /// N.
-    pub horizon: usize,
+pub(super) struct Structure {
+    /// Number of intervals.
+    pub stages: usize,
     /// h, s.
     pub step: f64,
     /// P, diagonal.
     pub p: [f64; 6],
     /// Q, diagonal.
     pub q: [f64; 3],
-    /// Terminal weight G per axis.
-    pub g: [Matrix2<f64>; 3],
-    /// Shape X of the set {o : oᵀX⁻¹o ≤ 1} that measured − nominal lies in at the first stage; `None` if the nominal
-    /// motion starts at the measured state.
-    pub initial: Option<Matrix2<f64>>,
+    /// First stage.
+    pub start: Start,
+    /// Whether the last stage must lie in the terminal ball, and Lᵀ of its G = L Lᵀ per axis.
+    pub terminal: Option<[Matrix2<f64>; 3]>,
     /// Typical angle error, rad.
     pub angle_scale: f64,
     /// Typical rate, rad/s.
@@ -60,25 +70,37 @@ pub struct Structure {
     pub max_iterations: u32,
 }
 
-/// What changes at every sample.
+/// A quadratic cost EᵀW E + 2 wᵀE per axis, as (W, w).
+pub(super) type AxisCosts = [(Matrix2<f64>, Vector2<f64>); 3];
+
+/// What changes at every sample. The lengths are those of the structure.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample<'a> {
-    /// Measured tracking error.
+pub(super) struct Sample<'a> {
+    /// The given E_0, for [`Start::Fixed`] and [`Start::Within`].
     pub start: Vector6<f64>,
-    /// d_0 … d_{N−1}.
+    /// Cost of arriving at the first stage, for [`Start::Arrival`].
+    pub arrival: &'a AxisCosts,
+    /// Cost of going on from the last stage.
+    pub to_go: &'a AxisCosts,
+    /// d of each interval.
     pub affine: &'a [Vector6<f64>],
-    /// State ball of stages 1 … N (index 0 belongs to stage 1).
+    /// State ball at the end of each interval.
     pub state_balls: &'a [Ball],
-    /// Input ball of stages 0 … N−1.
+    /// Input ball of each interval.
     pub input_balls: &'a [Ball],
     /// Radius of the terminal ball in the G-norm.
     pub terminal_radius: f64,
 }
 
 /// The programme with its solver.
-pub struct ConeProblem {
+pub(super) struct ConeProblem {
     structure: Structure,
     solver: DefaultSolver<f64>,
+    /// Values of ½ xᵀP x in the solver's order, and without the costs of the two ends.
+    cost: Vec<f64>,
+    inner_cost: Vec<f64>,
+    /// Positions of angle², angle·rate and rate² per axis at the first and the last stage.
+    end_costs: [[[usize; 3]; 3]; 2],
     linear_cost: Vec<f64>,
     /// Values of A in the solver's order.
     matrix: Vec<f64>,
@@ -87,9 +109,7 @@ pub struct ConeProblem {
     state_slots: Vec<Slots>,
     input_slots: Vec<Slots>,
     initial_row: usize,
-    terminal_row: usize,
-    /// Lᵀ with G = L Lᵀ, per axis.
-    terminal_root: [Matrix2<f64>; 3],
+    terminal_row: Option<usize>,
     /// X^{-1/2} of the initial set.
     initial_root: Option<Matrix2<f64>>,
 }
@@ -140,14 +160,14 @@ impl ConeProblem {
     ///
     /// # Errors
     /// The solver's own message if it refuses the data, for example weights that are not positive semidefinite.
-    pub fn new(structure: Structure) -> Result<Self, String> {
-        let n = structure.horizon;
+    pub(super) fn new(structure: Structure) -> Result<Self, String> {
+        let n = structure.stages;
         let (sa, sw) = (structure.angle_scale, structure.rate_scale);
         let h = structure.step;
         let angle = |k: usize, i: usize| 6 * k + i;
         let rate = |k: usize, i: usize| 6 * k + 3 + i;
 
-        let cost = cost_matrix(&structure);
+        let (cost, end_costs) = cost_matrix(&structure);
 
         let mut a = Triplets::default();
         let mut cones: Vec<SupportedConeT<f64>> = Vec::new();
@@ -164,23 +184,28 @@ impl ConeProblem {
         }
         cones.push(ZeroConeT(row));
         let initial_row = row;
-        let initial_root = structure.initial.map(|x| inverse_square_root(&x));
-        if let Some(root) = initial_root {
-            // ‖X^{-1/2} (E − E_measured)‖ ≤ 1 per axis.
-            for i in 0..3 {
-                for j in 0..2 {
-                    a.push(row + 1 + j, angle(0, i), -root[(j, 0)] * sa);
-                    a.push(row + 1 + j, rate(0, i), -root[(j, 1)] * sw);
+        let mut initial_root = None;
+        match structure.start {
+            Start::Fixed => {
+                for i in 0..6 {
+                    a.push(row, i, 1.0);
+                    row += 1;
                 }
-                row += 3;
-                cones.push(SecondOrderConeT(3));
+                cones.push(ZeroConeT(6));
             }
-        } else {
-            for i in 0..6 {
-                a.push(row, i, 1.0);
-                row += 1;
+            Start::Within(shape) => {
+                // ‖X^{-1/2} (E − E_given)‖ ≤ 1 per axis.
+                let root = *initial_root.insert(inverse_square_root(&shape));
+                for i in 0..3 {
+                    for j in 0..2 {
+                        a.push(row + 1 + j, angle(0, i), -root[(j, 0)] * sa);
+                        a.push(row + 1 + j, rate(0, i), -root[(j, 1)] * sw);
+                    }
+                    row += 3;
+                    cones.push(SecondOrderConeT(3));
+                }
             }
-            cones.push(ZeroConeT(6));
+            Start::Arrival => {}
         }
         let mut ball = |a: &mut Triplets, k: usize, next: bool| {
             let column = |j: usize| if j < 2 { angle(k, j) } else { rate(k, j - 2) };
@@ -195,16 +220,18 @@ impl ConeProblem {
         };
         let mut state_slots: Vec<Slots> = (1..=n).map(|k| ball(&mut a, k, false)).collect();
         let mut input_slots: Vec<Slots> = (0..n).map(|k| ball(&mut a, k, true)).collect();
-        let terminal_row = row;
-        let terminal_root = structure.g.map(|g| square_root(&g));
-        for (i, root) in terminal_root.iter().enumerate() {
-            for j in 0..2 {
-                a.push(row + 1 + 2 * i + j, angle(n, i), 0.0 - root[(j, 0)]);
-                a.push(row + 1 + 2 * i + j, rate(n, i), 0.0 - root[(j, 1)] * sw / sa);
+        let terminal_row = structure.terminal.map(|roots| {
+            // ‖Lᵀ E_N‖ ≤ ε, divided by the angle scale.
+            for (i, root) in roots.iter().enumerate() {
+                for j in 0..2 {
+                    a.push(row + 1 + 2 * i + j, angle(n, i), -root[(j, 0)]);
+                    a.push(row + 1 + 2 * i + j, rate(n, i), -root[(j, 1)] * sw / sa);
+                }
             }
-        }
-        cones.push(SecondOrderConeT(7));
-        row += 7;
+            cones.push(SecondOrderConeT(7));
+            row += 7;
+            row - 7
+        });
 
         let columns = 6 * (n + 1);
         let (matrix, position) = a.compress(row, columns);
@@ -235,6 +262,9 @@ impl ConeProblem {
         Ok(Self {
             structure,
             solver,
+            inner_cost: cost.nzval.clone(),
+            cost: cost.nzval,
+            end_costs,
             linear_cost,
             matrix: matrix.nzval,
             right_side,
@@ -242,15 +272,15 @@ impl ConeProblem {
             input_slots,
             initial_row,
             terminal_row,
-            terminal_root,
             initial_root,
         })
     }
 
-    /// Solves one sample; writes E_0 … E_N into `errors` if the status is `Solved`. Returns status and iterations.
-    pub fn solve(&mut self, sample: &Sample, errors: &mut [Vector6<f64>]) -> (SolverStatus, u32) {
+    /// Solves one sample; writes the errors of all its stages into `errors` if the status is `Solved`. Returns status and iterations.
+    pub(super) fn solve(&mut self, sample: &Sample, errors: &mut [Vector6<f64>]) -> (SolverStatus, u32) {
         self.update(sample);
-        let accepted = self.solver.update_q(&self.linear_cost).is_ok()
+        let accepted = self.solver.update_P(&self.cost).is_ok()
+            && self.solver.update_q(&self.linear_cost).is_ok()
             && self.solver.update_A(&self.matrix).is_ok()
             && self.solver.update_b(&self.right_side).is_ok();
         if !accepted {
@@ -268,7 +298,7 @@ impl ConeProblem {
     }
 
     fn update(&mut self, sample: &Sample) {
-        let Structure { horizon: n, step: h, q, angle_scale: sa, rate_scale: sw, .. } = self.structure;
+        let Structure { stages: n, start, step: h, q, angle_scale: sa, rate_scale: sw, .. } = self.structure;
         self.linear_cost.fill(0.0);
         for (k, d) in sample.affine.iter().enumerate() {
             for i in 0..3 {
@@ -279,19 +309,26 @@ impl ConeProblem {
                 self.right_side[3 * k + i] = (d[i] - 0.5 * h * d[3 + i]) / sa;
             }
         }
-        let start = &sample.start;
-        if let Some(root) = self.initial_root {
-            for i in 0..3 {
-                let centre = root * Vector2::new(start[i], start[3 + i]);
-                let row = self.initial_row + 3 * i;
-                self.right_side[row] = 1.0;
-                self.right_side[row + 1] = -centre.x;
-                self.right_side[row + 2] = -centre.y;
+        self.cost.copy_from_slice(&self.inner_cost);
+        self.add_cost(1, sample.to_go);
+        let given = &sample.start;
+        match start {
+            Start::Fixed => {
+                for i in 0..6 {
+                    self.right_side[self.initial_row + i] = given[i] / if i < 3 { sa } else { sw };
+                }
             }
-        } else {
-            for i in 0..6 {
-                self.right_side[self.initial_row + i] = start[i] / if i < 3 { sa } else { sw };
+            Start::Within(_) => {
+                let root = self.initial_root.unwrap_or_else(Matrix2::identity);
+                for i in 0..3 {
+                    let centre = root * Vector2::new(given[i], given[3 + i]);
+                    let row = self.initial_row + 3 * i;
+                    self.right_side[row] = 1.0;
+                    self.right_side[row + 1] = -centre.x;
+                    self.right_side[row + 2] = -centre.y;
+                }
             }
+            Start::Arrival => self.add_cost(0, sample.arrival),
         }
         for (slots, ball) in self.state_slots.iter().zip(sample.state_balls) {
             write_ball(&mut self.matrix, &mut self.right_side, slots, ball, &ball.by_rates, &ball.offset, sa, sw);
@@ -308,39 +345,24 @@ impl ConeProblem {
                 }
             }
         }
-        // ‖Lᵀ E_N‖ ≤ ε, divided by the angle scale.
-        self.right_side[self.terminal_row] = sample.terminal_radius / sa;
+        if let Some(row) = self.terminal_row {
+            self.right_side[row] = sample.terminal_radius / sa;
+        }
         debug_assert_eq!(sample.affine.len(), n);
     }
 
-    /// Cost of errors E_0 … E_N: Σ h(EᵀPE + vᵀQv) + E_NᵀG E_N.
-    pub fn cost(structure: &Structure, errors: &[Vector6<f64>], affine: &[Vector6<f64>]) -> f64 {
-        let h = structure.step;
-        let mut cost = 0.0;
-        for (k, d) in affine.iter().enumerate() {
-            let change = errors[k + 1] - errors[k] - d;
-            for i in 0..3 {
-                let v = change[3 + i] / h;
-                cost += h
-                    * (structure.p[i] * errors[k][i].powi(2)
-                        + structure.p[3 + i] * errors[k][3 + i].powi(2)
-                        + structure.q[i] * v * v);
-            }
+    /// Adds a cost at the first (0) or the last (1) stage.
+    fn add_cost(&mut self, end: usize, costs: &AxisCosts) {
+        let (sa, sw) = (self.structure.angle_scale, self.structure.rate_scale);
+        let stage = 6 * self.structure.stages * end;
+        for (i, (weight, slope)) in costs.iter().enumerate() {
+            let [angle, mixed, rate] = self.end_costs[end][i];
+            self.cost[angle] += 2.0 * weight.m11 * sa * sa;
+            self.cost[mixed] += 2.0 * weight.m12 * sa * sw;
+            self.cost[rate] += 2.0 * weight.m22 * sw * sw;
+            self.linear_cost[stage + i] += 2.0 * slope.x * sa;
+            self.linear_cost[stage + 3 + i] += 2.0 * slope.y * sw;
         }
-        let last = errors[affine.len()];
-        for (i, g) in structure.g.iter().enumerate() {
-            let e = Vector2::new(last[i], last[3 + i]);
-            cost += e.dot(&(g * e));
-        }
-        cost
-    }
-
-    /// ‖E‖_G.
-    pub fn terminal_norm(&self, error: &Vector6<f64>) -> f64 {
-        let square: f64 = (0..3)
-            .map(|i| (self.terminal_root[i] * Vector2::new(error[i], error[3 + i])).norm_squared())
-            .sum();
-        square.sqrt()
     }
 }
 
@@ -368,33 +390,34 @@ fn write_ball(
     right_side[slots.row] = 1.0;
 }
 
-/// ½ xᵀ P x with the cost Σ h EᵀPE + (Q/h)(ΔE_ω)² + E_NᵀG E_N, upper triangle, scaled.
-fn cost_matrix(structure: &Structure) -> CscMatrix<f64> {
-    let Structure { horizon: n, step: h, p, q, g, angle_scale: sa, rate_scale: sw, .. } = structure;
+/// ½ xᵀ P x with the cost Σ h EᵀPE + (Q/h)(ΔE_ω)² over the intervals, upper triangle, scaled; and where the costs of
+/// the first and the last stage are to be added.
+fn cost_matrix(structure: &Structure) -> (CscMatrix<f64>, [[[usize; 3]; 3]; 2]) {
+    let Structure { stages: n, step: h, p, q, angle_scale: sa, rate_scale: sw, .. } = structure;
     let mut cost = Triplets::default();
+    let mut ends = [[[0; 3]; 3]; 2];
     for k in 0..=*n {
         for i in 0..3 {
             let (angle, rate) = (6 * k + i, 6 * k + 3 + i);
-            let neighbours = if k == 0 || k == *n { 1.0 } else { 2.0 };
-            let mut by_angle = 2.0 * h * p[i];
-            let mut by_rate = 2.0 * h * p[3 + i];
-            if k == *n {
-                (by_angle, by_rate) = (2.0 * g[i].m11, 2.0 * g[i].m22);
-                cost.push(angle, rate, 2.0 * g[i].m12 * sa * sw);
+            let intervals = if k == 0 || k == *n { 1.0 } else { 2.0 };
+            let counted = if k == *n { 0.0 } else { 1.0 };
+            let by_angle = counted * 2.0 * h * p[i];
+            let by_rate = counted * 2.0 * h * p[3 + i] + intervals * 2.0 * q[i] / h;
+            let angle_slot = cost.push(angle, angle, by_angle * sa * sa);
+            let rate_slot = cost.push(rate, rate, by_rate * sw * sw);
+            if k == 0 || k == *n {
+                ends[usize::from(k == *n)][i] = [angle_slot, cost.push(angle, rate, 0.0), rate_slot];
             }
-            cost.push(angle, angle, by_angle * sa * sa);
-            cost.push(rate, rate, (by_rate + neighbours * 2.0 * q[i] / h) * sw * sw);
             if k > 0 {
                 cost.push(rate - 6, rate, -2.0 * q[i] / h * sw * sw);
             }
         }
     }
-    cost.compress(6 * (n + 1), 6 * (n + 1)).0
-}
-
-/// Lᵀ with G = L Lᵀ; zero where G is zero.
-fn square_root(g: &Matrix2<f64>) -> Matrix2<f64> {
-    g.cholesky().map_or_else(Matrix2::zeros, |factor| factor.l().transpose())
+    let (matrix, position) = cost.compress(6 * (n + 1), 6 * (n + 1));
+    for slot in ends.iter_mut().flatten().flatten() {
+        *slot = position[*slot];
+    }
+    (matrix, ends)
 }
 
 /// L⁻¹ with X = L Lᵀ, so that ‖L⁻¹ o‖² = oᵀX⁻¹o.

@@ -7,7 +7,6 @@ mod cone;
 mod design;
 mod plan;
 
-pub use cone::ConeProblem;
 pub use design::{
     Constraints, Design, InitialState, PaperConstants, Settings, Tightening, step_response_peak, terminal_weight,
 };
@@ -19,9 +18,10 @@ use crate::linearise::{self, Linear, Linearisation};
 use crate::lq::TrackingLq;
 use crate::sampled::{Reach, response, transition};
 use clarabel::solver::SolverStatus;
-use cone::{Ball, Sample, Structure};
-use nalgebra::{Matrix3, Vector2, Vector3, Vector6};
+use cone::{AxisCosts, Ball, ConeProblem, Sample, Start, Structure};
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 use std::time::Instant;
 use vehicle::kinematics;
 use vehicle::reference::Reference;
@@ -90,9 +90,12 @@ pub struct Crmpc {
     settings: Settings,
     sets: Sets,
     design: Design,
-    structure: Structure,
+    /// Lᵀ with G = L Lᵀ, per axis.
+    terminal_root: [Matrix2<f64>; 3],
     lq: [TrackingLq; 3],
-    problem: ConeProblem,
+    /// The whole horizon.
+    whole: ConeProblem,
+    windows: Option<Windows>,
     // Scratch of one optimisation.
     references: Vec<Reference>,
     affine: Vec<Vector6<f64>>,
@@ -101,6 +104,21 @@ pub struct Crmpc {
     state_balls: Vec<Ball>,
     input_balls: Vec<Ball>,
 }
+
+/// Parts of the horizon that stand for the whole of it while no constraint outside is active.
+struct Windows {
+    /// The first [`HEAD`] intervals.
+    head: ConeProblem,
+    /// [`MIDDLE`] intervals anywhere later.
+    middle: ConeProblem,
+    /// The last [`TAIL`] intervals, with the terminal ball.
+    tail: ConeProblem,
+}
+
+/// Lengths of the windows in intervals: the start of a manoeuvre, a jump of the reference ahead, a jump at the horizon.
+const HEAD: usize = 32;
+const MIDDLE: usize = 12;
+const TAIL: usize = 24;
 
 /// The constraint sets in force.
 #[derive(Clone, Copy, Debug)]
@@ -114,9 +132,11 @@ enum Sets {
 /// Passes of the first optimisation at most.
 const FIRST_PASSES: usize = 20;
 /// The first optimisation has converged when no state moves by more than this (rad, rad/s) between passes.
-const FIRST_TOLERANCE: f64 = 1e-8;
+const FIRST_TOLERANCE: f64 = 1e-7;
 /// Relative slack when the exact constraints are checked, for rounding.
 const CHECK_SLACK: f64 = 1e-9;
+/// Typical angle error, by which the solver's unknowns are scaled, rad.
+const ANGLE_SCALE: f64 = 0.1;
 /// Smallest share of a limit that a tightened bound keeps, so that the problem stays well posed.
 const SMALLEST_SHARE: f64 = 0.02;
 /// Smallest terminal radius in the G-norm: 0.03° of angle.
@@ -134,29 +154,45 @@ impl Crmpc {
             Constraints::Paper => paper_sets(&design)?,
         };
         let n = settings.horizon;
-        let structure = Structure {
-            horizon: n,
-            step: settings.period_optimisation,
-            p: settings.p,
-            q: settings.q,
-            g: design.g,
-            initial: (settings.initial_state == InitialState::Tube).then_some(design.invariant),
-            angle_scale: 0.1,
-            rate_scale: settings.limit_rate,
-            max_iterations: settings.max_iterations,
+        let terminal_root = design.g.map(|g| square_root(&g));
+        let problem = |stages, start, terminal| {
+            ConeProblem::new(Structure {
+                stages,
+                step: settings.period_optimisation,
+                p: settings.p,
+                q: settings.q,
+                start,
+                terminal,
+                angle_scale: ANGLE_SCALE,
+                rate_scale: settings.limit_rate,
+                max_iterations: settings.max_iterations,
+            })
+            .map_err(DesignError::Solver)
+        };
+        let (whole, windows) = match settings.initial_state {
+            InitialState::Tube => (problem(n, Start::Within(design.invariant), Some(terminal_root))?, None),
+            InitialState::Measured => {
+                let windows = Windows {
+                    head: problem(HEAD, Start::Fixed, None)?,
+                    middle: problem(MIDDLE, Start::Arrival, None)?,
+                    tail: problem(TAIL, Start::Arrival, Some(terminal_root))?,
+                };
+                let fits = n >= HEAD + 2;
+                (problem(n, Start::Fixed, Some(terminal_root))?, fits.then_some(windows))
+            }
         };
         let lq = std::array::from_fn(|i| {
             let p = Vector2::new(settings.p[i], settings.p[i + 3]);
             TrackingLq::new(n, settings.period_optimisation, p, settings.q[i], design.g[i])
         });
-        let problem = ConeProblem::new(structure.clone()).map_err(DesignError::Solver)?;
         Ok(Self {
             settings,
             sets,
             design,
-            structure,
+            terminal_root,
             lq,
-            problem,
+            whole,
+            windows,
             references: vec![Reference::default(); n + 1],
             affine: vec![Vector6::zeros(); n],
             errors: vec![Vector6::zeros(); n + 1],
@@ -185,14 +221,17 @@ impl Crmpc {
 
         self.unconstrained(measured);
         let (mut status, mut iterations) = (Status::Unconstrained, 0);
-        if self.settings.initial_state == InitialState::Tube || !self.is_feasible() {
-            let outcome = if first {
-                self.constrained_first(measured)
+        let violated = match self.settings.initial_state {
+            InitialState::Measured => self.violated(0..0),
+            InitialState::Tube => Some(0..self.settings.horizon),
+        };
+        if let Some(violated) = violated {
+            let solved = if first {
+                self.constrained_first(measured, &violated, &mut iterations)
             } else {
-                self.constrained(&memory.plan, measured)
+                self.constrained(&memory.plan, measured, &violated, &mut iterations)
             };
-            iterations = outcome.1;
-            status = if outcome.0 { Status::Constrained } else { Status::Fallback };
+            status = if solved { Status::Constrained } else { Status::Fallback };
         }
         if status == Status::Fallback {
             if first {
@@ -206,7 +245,7 @@ impl Crmpc {
             memory.plan.clone_from(&self.candidate);
         }
         memory.report.status = status;
-        memory.report.cost = ConeProblem::cost(&self.structure, &self.errors, &self.affine);
+        memory.report.cost = self.cost();
         memory.report.iterations = iterations;
         memory.report.solves += 1;
         memory.report.time = clock.elapsed().as_secs_f64();
@@ -262,8 +301,7 @@ impl Crmpc {
         let Self { lq, references, affine, errors, candidate, settings, .. } = self;
         let start = measured - state(&references[0]);
         for (i, lq) in lq.iter_mut().enumerate() {
-            let d = |k: usize| Vector2::new(affine[k][i], affine[k][3 + i]);
-            let last = lq.solve(Vector2::new(start[i], start[3 + i]), d, |k, error, v| {
+            let last = lq.solve(axis(&start, i), |k| axis(&affine[k], i), |k, error, v| {
                 errors[k][i] = error.x;
                 errors[k][3 + i] = error.y;
                 candidate.accelerations[k][i] = v + references[k].accelerations[i];
@@ -277,51 +315,79 @@ impl Crmpc {
         candidate.states[0] = measured;
     }
 
-    /// Whether `candidate` satisfies every constraint exactly.
-    fn is_feasible(&self) -> bool {
+    /// The intervals, from the first to the last, in which `candidate` violates a constraint (exactly evaluated), where the
+    /// terminal ball counts as interval N. Those in `skip` are not looked at.
+    fn violated(&self, skip: Range<usize>) -> Option<Range<usize>> {
         let n = self.settings.horizon;
+        let violates = |&k: &usize| !skip.contains(&k) && !self.is_feasible(k);
+        let first = (0..=n).find(violates)?;
+        let last = (first..=n).rfind(violates).unwrap_or(first);
+        Some(first..last + 1)
+    }
+
+    /// Whether `candidate` satisfies the input constraint of interval `k` and the state constraint at its end, or for k = N
+    /// the terminal constraint.
+    fn is_feasible(&self, k: usize) -> bool {
         let within = |value: f64, bound: f64| value <= bound * (1.0 + CHECK_SLACK);
-        for k in 0..n {
-            let (angles, rates) = split(&self.candidate.states[k]);
-            let (next_angles, next_rates) = split(&self.candidate.states[k + 1]);
-            let a = &self.candidate.accelerations[k];
-            let body = &self.settings.body;
-            let feasible = match self.sets {
-                Sets::Paper { x_tube, u_tube, .. } => {
-                    within(next_rates.norm(), x_tube)
-                        && within(linearise::input(body, &angles, &rates, a).norm(), u_tube)
+        if k == self.settings.horizon {
+            return within(self.terminal_norm(), self.terminal_radius());
+        }
+        let (angles, rates) = split(&self.candidate.states[k]);
+        let (next_angles, next_rates) = split(&self.candidate.states[k + 1]);
+        let a = &self.candidate.accelerations[k];
+        let body = &self.settings.body;
+        match self.sets {
+            Sets::Paper { x_tube, u_tube, .. } => {
+                within(next_rates.norm(), x_tube)
+                    && within(linearise::input(body, &angles, &rates, a).norm(), u_tube)
+            }
+            Sets::Robust => {
+                // The untightened limits first: most of what fails, fails here.
+                let (limit_rate, limit_moment) = (self.settings.limit_rate, self.settings.limit_moment);
+                let limits = within(linearise::body_rates(&next_angles, &next_rates).norm(), limit_rate)
+                    && within(linearise::moment(body, &angles, &rates, a).norm(), limit_moment);
+                limits && {
+                    let here = linearise::linearise(body, &angles, &rates, a);
+                    let next = linearise::linearise(body, &next_angles, &next_rates, a);
+                    within(here.moment.value.norm(), self.moment_bound(k, &here, &next))
+                        && within(next.rates.value.norm(), self.rate_bound(k + 1, &next))
                 }
-                Sets::Robust => {
-                    // The untightened limits first: most of what fails, fails here.
-                    within(next_rates.norm(), 2.0 * self.settings.limit_rate)
-                        && within(
-                            linearise::moment(body, &angles, &rates, a).norm(),
-                            self.settings.limit_moment,
-                        )
-                        && {
-                            let here = linearise::linearise(body, &angles, &rates, a);
-                            let next = linearise::linearise(body, &next_angles, &next_rates, a);
-                            within(here.moment.value.norm(), self.moment_bound(k, &here, &next))
-                                && within(next.rates.value.norm(), self.rate_bound(k + 1, &next))
-                        }
-                }
-            };
-            if !feasible {
-                return false;
             }
         }
-        within(self.problem.terminal_norm(&self.errors[n]), self.terminal_radius())
+    }
+
+    /// ‖E_N‖_G.
+    fn terminal_norm(&self) -> f64 {
+        let end = &self.errors[self.settings.horizon];
+        let axis = |i: usize| (self.terminal_root[i] * axis(end, i)).norm_squared();
+        (0..3).map(axis).sum::<f64>().sqrt()
+    }
+
+    /// Σ h(EᵀPE + vᵀQv) + E_NᵀG E_N of `errors`.
+    fn cost(&self) -> f64 {
+        let Settings { period_optimisation: h, p, q, .. } = self.settings;
+        let mut cost = self.terminal_norm().powi(2);
+        for (k, d) in self.affine.iter().enumerate() {
+            for i in 0..3 {
+                let v = (self.errors[k + 1][3 + i] - self.errors[k][3 + i] - d[3 + i]) / h;
+                let error = &self.errors[k];
+                cost += h * (p[i] * error[i].powi(2) + p[3 + i] * error[3 + i].powi(2) + q[i] * v * v);
+            }
+        }
+        cost
     }
 
     /// The first optimisation: linearised again about its own solution until that stands still.
-    fn constrained_first(&mut self, measured: Vector6<f64>) -> (bool, u32) {
+    fn constrained_first(
+        &mut self,
+        measured: Vector6<f64>,
+        violated: &Range<usize>,
+        iterations: &mut u32,
+    ) -> bool {
         let mut about = self.candidate.clone();
-        let mut iterations = 0;
         for _ in 0..FIRST_PASSES {
-            let (solved, spent) = self.constrained(&about, measured);
-            iterations += spent;
-            if !solved {
-                return (false, iterations);
+            if !self.constrained(&about, measured, violated, iterations) {
+                return false;
             }
             let moved = about.distance(&self.candidate);
             about.clone_from(&self.candidate);
@@ -329,37 +395,112 @@ impl Crmpc {
                 break;
             }
         }
-        (true, iterations)
+        true
     }
 
-    /// The cone programme with the constraints linearised about a plan; the result goes into `candidate` and `errors`.
-    fn constrained(&mut self, about: &Plan, measured: Vector6<f64>) -> (bool, u32) {
+    /// The optimum with the constraints linearised about a plan, into `candidate` and `errors`; whether there is one.
+    fn constrained(
+        &mut self,
+        about: &Plan,
+        measured: Vector6<f64>,
+        violated: &Range<usize>,
+        iterations: &mut u32,
+    ) -> bool {
         self.linearise_balls(about, &measured);
+        self.in_window(measured, violated, iterations) || self.over_whole_horizon(measured, iterations)
+    }
+
+    /// Solves only a window around the violated intervals, with arrival cost and cost-to-go for the rest of the horizon. If
+    /// the rest then satisfies its constraints exactly, this is the optimum of the whole, as it is that of a relaxation.
+    fn in_window(&mut self, measured: Vector6<f64>, violated: &Range<usize>, iterations: &mut u32) -> bool {
+        let n = self.settings.horizon;
+        let terminal_radius = self.terminal_radius();
+        let Some(Windows { head, middle, tail }) = &mut self.windows else { return false };
+        let centred = (violated.start + violated.end).saturating_sub(MIDDLE) / 2;
+        let (problem, window) = if violated.end <= n - TAIL / 2 && violated.len() <= MIDDLE / 2 && centred >= 2 {
+            (middle, centred..centred + MIDDLE)
+        } else if violated.start > n - TAIL {
+            (tail, n - TAIL..n)
+        } else {
+            (head, 0..HEAD)
+        };
+        if violated.end > window.end + usize::from(window.end == n) {
+            return false;
+        }
+
+        let start = measured - state(&self.references[0]);
+        let affine = &self.affine;
+        let mut arrival = AxisCosts::default();
+        let mut to_go = AxisCosts::default();
+        for (i, lq) in self.lq.iter_mut().enumerate() {
+            to_go[i] = lq.cost_to_go(window.end);
+            if window.start > 0 {
+                let (weight, centre) = lq.arrival_cost(window.start, axis(&start, i), |k| axis(&affine[k], i));
+                arrival[i] = (weight, -(weight * centre));
+            }
+        }
+        let sample = Sample {
+            start,
+            arrival: &arrival,
+            to_go: &to_go,
+            affine: &affine[window.clone()],
+            state_balls: &self.state_balls[window.clone()],
+            input_balls: &self.input_balls[window.clone()],
+            terminal_radius,
+        };
+        let (status, spent) = problem.solve(&sample, &mut self.errors[window.start..=window.end]);
+        *iterations += spent;
+        if status != SolverStatus::Solved {
+            return false;
+        }
+        let (begin, end) = (self.errors[window.start], self.errors[window.end]);
+        for (i, lq) in self.lq.iter().enumerate() {
+            let errors = &mut self.errors;
+            let mut set = |k: usize, error: Vector2<f64>| {
+                errors[k][i] = error.x;
+                errors[k][3 + i] = error.y;
+            };
+            lq.trace_back(window.start, axis(&begin, i), &mut set);
+            let last = lq.follow(window.end, axis(&end, i), |k| axis(&affine[k], i), |k, error, _| set(k, error));
+            set(n, last);
+        }
+        self.plan_from_errors(measured);
+        let solved_for = window.start..window.end + usize::from(window.end == n);
+        self.violated(solved_for).is_none()
+    }
+
+    fn over_whole_horizon(&mut self, measured: Vector6<f64>, iterations: &mut u32) -> bool {
         let sample = Sample {
             start: measured - state(&self.references[0]),
+            arrival: &AxisCosts::default(),
+            to_go: &self.design.g.map(|g| (g, Vector2::zeros())),
             affine: &self.affine,
             state_balls: &self.state_balls,
             input_balls: &self.input_balls,
             terminal_radius: self.terminal_radius(),
         };
-        let (status, iterations) = self.problem.solve(&sample, &mut self.errors);
-        if status != SolverStatus::Solved {
-            return (false, iterations);
+        let (status, spent) = self.whole.solve(&sample, &mut self.errors);
+        *iterations += spent;
+        if status == SolverStatus::Solved {
+            self.plan_from_errors(measured);
         }
+        status == SolverStatus::Solved
+    }
+
+    /// `candidate` from `errors`, rolled out so that it is an exact motion of the nominal model.
+    fn plan_from_errors(&mut self, measured: Vector6<f64>) {
         let h = self.settings.period_optimisation;
-        let start = match self.settings.initial_state {
+        let plan = &mut self.candidate;
+        plan.states[0] = match self.settings.initial_state {
             InitialState::Measured => measured,
             InitialState::Tube => self.errors[0] + state(&self.references[0]),
         };
-        self.candidate.states[0] = start;
         for k in 0..self.settings.horizon {
-            // Rolled out from the start, so that the plan is an exact motion of the nominal model.
-            let next_rates = (self.errors[k + 1] + state(&self.references[k + 1])).fixed_rows::<3>(3).into_owned();
-            let a = (next_rates - self.candidate.states[k].fixed_rows::<3>(3)) / h;
-            self.candidate.accelerations[k] = a;
-            self.candidate.states[k + 1] = plan::advance(&self.candidate.states[k], &a, h);
+            let (_, next_rates) = split(&(self.errors[k + 1] + state(&self.references[k + 1])));
+            let a = (next_rates - plan.states[k].fixed_rows::<3>(3)) / h;
+            plan.accelerations[k] = a;
+            plan.states[k + 1] = plan::advance(&plan.states[k], &a, h);
         }
-        (true, iterations)
     }
 
     /// State and input balls of every stage, linearised about `about` with the measured state as its start.
@@ -480,6 +621,16 @@ fn paper_sets(design: &Design) -> Result<Sets, DesignError> {
         }
     }
     Ok(Sets::Paper { x_tube, u_tube, epsilon })
+}
+
+/// Lᵀ with G = L Lᵀ; zero where G is zero.
+fn square_root(g: &Matrix2<f64>) -> Matrix2<f64> {
+    g.cholesky().map_or_else(Matrix2::zeros, |factor| factor.l().transpose())
+}
+
+/// Angle and rate of one axis.
+fn axis(state: &Vector6<f64>, i: usize) -> Vector2<f64> {
+    Vector2::new(state[i], state[3 + i])
 }
 
 fn state(reference: &Reference) -> Vector6<f64> {
