@@ -3,5 +3,9 @@
 mod parameters;
 mod plant;
 mod table;
+#[cfg(test)]
+mod tests;
 
 pub use plant::ReentryPlant;
+
+fmi2_export::export_fmus!(ReentryPlant);
