@@ -1,0 +1,155 @@
+//! Unpacks an `.fmu` archive without trusting it.
+
+use crate::error::Error;
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+use tempfile::TempDir;
+use zip::ZipArchive;
+
+/// An archive may hold this much when unpacked, bytes.
+const SIZE_LIMIT: u64 = 1 << 30;
+/// An archive may hold this many entries.
+const ENTRY_LIMIT: usize = 20_000;
+
+/// Unpacks into a new temporary folder, which vanishes with the value returned.
+///
+/// # Errors
+/// If the file is no archive, or one with absolute paths, paths that lead out of the folder, duplicate names, links,
+/// encrypted entries, or more content than any FMU has.
+pub fn unpack(path: &Path) -> Result<TempDir, Error> {
+    unpack_limited(path, SIZE_LIMIT, ENTRY_LIMIT)
+}
+
+fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<TempDir, Error> {
+    let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
+    let file = File::open(path).map_err(|source| refuse(format!("cannot be opened: {source}")))?;
+    let mut archive =
+        ZipArchive::new(file).map_err(|source| refuse(format!("is not a zip archive: {source}")))?;
+    if archive.has_duplicate_names() {
+        return Err(refuse("refused: two entries of the archive have the same name".into()));
+    }
+    if archive.len() > entry_limit {
+        return Err(refuse(format!("refused: {} entries, at most {entry_limit} allowed", archive.len())));
+    }
+
+    let folder =
+        tempfile::Builder::new().prefix("fmu-").tempdir().map_err(Error::file(std::env::temp_dir()))?;
+    let mut left = size_limit;
+    for index in 0..archive.len() {
+        let mut entry =
+            archive.by_index(index).map_err(|source| refuse(format!("entry {index}: {source}")))?;
+        let name = String::from_utf8(entry.name_raw().to_vec())
+            .map_err(|_| refuse(format!("refused: the name of entry {index} is not UTF-8")))?;
+        if let Some(reason) = unsafe_name(&name) {
+            return Err(refuse(format!("refused: entry \"{}\" {reason}", name.escape_default())));
+        }
+        if entry.is_symlink() {
+            return Err(refuse(format!("refused: entry \"{name}\" is a symbolic link")));
+        }
+        let target = folder.path().join(&name);
+        if name.ends_with('/') {
+            fs::create_dir_all(&target).map_err(Error::file(target))?;
+            continue;
+        }
+        if let Some(parent) = target.parent() {
+            fs::create_dir_all(parent).map_err(Error::file(parent))?;
+        }
+        let mut out = File::create_new(&target).map_err(Error::file(&target))?;
+        // The sizes an archive declares are claims: count what really comes out.
+        let written = io::copy(&mut (&mut entry).take(left + 1), &mut out)
+            .map_err(|source| refuse(format!("entry \"{name}\" cannot be unpacked: {source}")))?;
+        left = left.checked_sub(written).ok_or_else(|| {
+            refuse(format!("refused: unpacks to more than {} MiB", size_limit.div_ceil(1 << 20)))
+        })?;
+    }
+    Ok(folder)
+}
+
+/// Why an entry of this name must not be written, if so.
+fn unsafe_name(name: &str) -> Option<&'static str> {
+    if name.is_empty() {
+        Some("has no name")
+    } else if name.starts_with('/') || name.contains(':') {
+        Some("is an absolute path")
+    } else if name.contains('\\') {
+        Some("uses backslashes; FMI wants forward slashes")
+    } else if name.contains('\0') {
+        Some("holds a zero byte")
+    } else if name.split('/').any(|part| part == ".." || part == ".") {
+        Some("leads out of the archive")
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+    use zip::write::SimpleFileOptions;
+
+    fn archive(entries: &[(&str, &[u8])]) -> tempfile::NamedTempFile {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        let mut zip = zip::ZipWriter::new(file.as_file_mut());
+        for (name, content) in entries {
+            zip.start_file(*name, SimpleFileOptions::default()).unwrap();
+            zip.write_all(content).unwrap();
+        }
+        zip.finish().unwrap();
+        file
+    }
+
+    fn refusal(file: &tempfile::NamedTempFile) -> String {
+        unpack_limited(file.path(), 1000, 10).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn good_archives_are_unpacked() {
+        let file = archive(&[("modelDescription.xml", b"<x/>"), ("resources/a b/ü.csv", b"1")]);
+        let folder = unpack(file.path()).unwrap();
+        assert_eq!(fs::read(folder.path().join("modelDescription.xml")).unwrap(), b"<x/>");
+        assert_eq!(fs::read(folder.path().join("resources/a b/ü.csv")).unwrap(), b"1");
+    }
+
+    #[test]
+    fn paths_that_lead_outside_are_refused() {
+        for name in ["../evil", "a/../../evil", "/etc/evil", "C:/evil", "a\\..\\evil", "./a"] {
+            let message = refusal(&archive(&[(name, b"x")]));
+            assert!(message.contains("refused: entry"), "{name}: {message}");
+            assert_eq!(message.lines().count(), 1);
+        }
+    }
+
+    #[test]
+    fn bombs_are_refused_by_what_comes_out() {
+        assert!(refusal(&archive(&[("a", &[0; 600]), ("b", &[0; 600])])).contains("unpacks to more than"));
+        let many: Vec<String> = (0..11).map(|i| format!("f{i}")).collect();
+        let entries: Vec<(&str, &[u8])> = many.iter().map(|name| (name.as_str(), &b""[..])).collect();
+        assert!(refusal(&archive(&entries)).contains("11 entries"));
+    }
+
+    #[test]
+    fn duplicate_names_are_refused() {
+        // The writer refuses to make such an archive, so rename an entry of a good one in place.
+        let file = archive(&[("aaaa", b"1"), ("bbbb", b"2")]);
+        let bytes = fs::read(file.path()).unwrap();
+        let mut renamed = bytes.clone();
+        for start in 0..bytes.len() - 4 {
+            if &bytes[start..start + 4] == b"bbbb" {
+                renamed[start..start + 4].copy_from_slice(b"aaaa");
+            }
+        }
+        assert_ne!(bytes, renamed);
+        fs::write(file.path(), renamed).unwrap();
+        assert!(refusal(&file).contains("same name"));
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(b"no zip at all").unwrap();
+        assert!(refusal(&file).contains("is not a zip archive"));
+        assert!(unpack(Path::new("/nowhere/x.fmu")).unwrap_err().to_string().contains("cannot be opened"));
+    }
+}

@@ -1,0 +1,108 @@
+//! Simulation time on integer ticks.
+
+/// Communication points `start + k · step`, never accumulated; the last one is `stop` itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clock {
+    start: f64,
+    step: f64,
+    stop: f64,
+    ticks: u64,
+}
+
+impl Clock {
+    /// From `start` to `stop` in steps of `step`, all s.
+    ///
+    /// # Errors
+    /// If `stop` is not a whole, positive number of steps after `start`.
+    pub fn new(start: f64, stop: f64, step: f64) -> Result<Self, String> {
+        if !(step > 0.0 && step.is_finite() && start.is_finite() && stop.is_finite()) {
+            return Err(format!(
+                "start = {start} s, stop = {stop} s, step = {step} s: all must be finite, the step positive"
+            ));
+        }
+        let exact = (stop - start) / step;
+        let ticks = exact.round();
+        if ticks < 1.0 {
+            return Err(format!(
+                "stop = {stop} s must be at least one step of {step} s after start = {start} s"
+            ));
+        }
+        if (exact - ticks).abs() > 1e-9 * ticks.max(1.0) {
+            let (below, above) = (start + exact.floor() * step, start + exact.ceil() * step);
+            return Err(format!(
+                "stop = {stop} s is {exact} steps of {step} s after start = {start} s: \
+                 choose a whole number of steps, {below} s or {above} s"
+            ));
+        }
+        Ok(Self { start, step, stop, ticks: ticks as u64 })
+    }
+
+    /// Number of steps.
+    pub fn ticks(&self) -> u64 {
+        self.ticks
+    }
+
+    /// Time at a tick, s.
+    pub fn time(&self, tick: u64) -> f64 {
+        if tick == self.ticks { self.stop } else { self.start + tick as f64 * self.step }
+    }
+
+    /// Length of one step, s.
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// Start time, s.
+    pub fn start(&self) -> f64 {
+        self.start
+    }
+
+    /// Stop time, s.
+    pub fn stop(&self) -> f64 {
+        self.stop
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oracle_a_million_ticks_do_not_drift() {
+        let clock = Clock::new(0.0, 40_000.0, 0.04).unwrap();
+        assert_eq!(clock.ticks(), 1_000_000);
+        assert_eq!(clock.time(1_000_000), 40_000.0);
+        for tick in [1_u64, 3, 333_333, 999_999] {
+            // The nearest double of the exact rational number tick/25, to the last bit or its neighbour.
+            let exact = tick as f64 / 25.0;
+            assert!((clock.time(tick) - exact).abs() <= exact * f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn stops_between_ticks_are_refused_with_both_numbers() {
+        let message = Clock::new(0.0, 50.01, 0.04).unwrap_err();
+        assert!(
+            message.contains("50.01") && message.contains("0.04") && message.contains("50.04"),
+            "{message}"
+        );
+        assert!(Clock::new(0.0, 1.0, 0.3).is_err());
+        assert!(Clock::new(0.0, 0.3, 0.1).is_ok());
+        assert!(Clock::new(1.0, 1.0, 0.1).is_err());
+        assert!(Clock::new(2.0, 1.0, 0.1).is_err());
+        assert!(Clock::new(0.0, 1.0, 0.0).is_err());
+        assert!(Clock::new(0.0, f64::NAN, 0.1).is_err());
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn whole_numbers_of_steps_are_taken_exactly(ticks in 1u64..2_000_000, step in 1e-4f64..10.0, start in -10.0f64..10.0) {
+            let stop = start + ticks as f64 * step;
+            let clock = Clock::new(start, stop, step).unwrap();
+            proptest::prop_assert_eq!(clock.ticks(), ticks);
+            proptest::prop_assert_eq!(clock.time(0), start);
+            proptest::prop_assert_eq!(clock.time(ticks), stop);
+            proptest::prop_assert!(clock.time(ticks - 1) < stop);
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! The crate's one error type. A message names the culprit and what to do about it.
+
+use std::path::PathBuf;
+
+/// What can go wrong, from reading an experiment to writing its results.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The experiment or the command line asks for something that cannot be done.
+    #[error("{at}{message}")]
+    Experiment {
+        /// File and line, `lqr.toml:12: `, or empty where there is none.
+        at: String,
+        /// The culprit and the remedy.
+        message: String,
+    },
+    /// A file is not an FMU that this program can use.
+    #[error("{}: {message}", path.display())]
+    Fmu {
+        /// The archive.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// A unit failed in a call.
+    #[error("{component} failed at t = {time} s in {}: {}", failure.call, failure.message)]
+    Unit {
+        /// Name of the component in the experiment.
+        component: String,
+        /// Communication point, s.
+        time: f64,
+        /// The call and the unit's own words.
+        failure: UnitFailure,
+    },
+    /// A file or folder could not be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// Standard output could not be written.
+    #[error("standard output: {0}")]
+    Output(#[from] std::io::Error),
+}
+
+impl Error {
+    /// A fault of the experiment that has no line of its own.
+    pub fn experiment(message: impl Into<String>) -> Self {
+        Self::Experiment { at: String::new(), message: message.into() }
+    }
+
+    /// Adds the name of a file to a system error.
+    pub fn file(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::File { path, source }
+    }
+
+    /// The process's exit code: 1 for a run that failed, 2 for bad usage or a bad experiment.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Experiment { .. } | Self::Fmu { .. } => 2,
+            Self::Unit { .. } | Self::File { .. } | Self::Output(_) => 1,
+        }
+    }
+
+    /// Whether the reader of standard output went away, which is no failure.
+    pub fn is_broken_pipe(&self) -> bool {
+        matches!(self, Self::Output(source) if source.kind() == std::io::ErrorKind::BrokenPipe)
+    }
+}
+
+/// A call to a unit that did not succeed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnitFailure {
+    /// The call, for example `doStep`.
+    pub call: &'static str,
+    /// What the unit said of it, or else its status.
+    pub message: String,
+}

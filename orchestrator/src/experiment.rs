@@ -1,0 +1,332 @@
+//! An experiment file: which FMUs, their parameters, their wiring, how they are stepped, what is recorded.
+//!
+//! ```toml
+//! title = "CRMPC on the paper's scenario"
+//! description = "Optional, as long as you like."
+//!
+//! [simulation]
+//! start = 0.0                       # s, default 0
+//! stop = 50.0                       # s, a whole number of steps after start
+//! step = 0.04                       # communication step, s
+//! coupling = "gauss-seidel"         # default; or "jacobi"
+//! order = ["controller", "plant"]   # Gauss-Seidel: whose inputs are set first at each communication point
+//!
+//! [components.plant]
+//! fmu = "ReentryPlant.fmu"          # searched beside the experiment, in each --fmu-dir and in target/fmu
+//! every = 1                         # steps at every n-th communication point, default 1
+//! unconnected = ["disturbanceMoment.*"]   # inputs that stay at their start value
+//!
+//! [components.plant.parameters]     # parameters, and constant values for inputs without connection
+//! "inertia.scale" = 1.05            # a number is in the variable's own unit
+//! "disturbance.kind" = "white"      # an enumeration takes the name of an item
+//! "disturbance.bound" = "2 deg/s2"  # text with a unit is converted by the FMU's own unit definitions
+//!
+//! [[connections]]
+//! from = "plant.attitude.*"         # a final * stands for every rest that both sides have
+//! to = "controller.attitude.*"
+//!
+//! [record]
+//! variables = ["plant.attitude.*", "controller.moment.*"]
+//! every = 1                         # a row at every n-th communication point and at the stop, default 1
+//!
+//! [metrics]                         # where the figures of merit find their variables; these are the defaults
+//! attitude = "plant.attitude"       # .alpha .beta .sigma
+//! reference = "controller.reference"
+//! rate = "plant.rate"               # .p .q .r
+//! moment = "controller.moment"      # .x .y .z
+//! limit = "controller.limit"        # parameters .rate and .moment
+//! solver = "controller.solver"      # .time .solves .fallbacks
+//! ```
+
+use crate::error::Error;
+use crate::names;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::{Spanned, Value};
+
+/// An experiment as it is written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// One line.
+    pub title: String,
+    /// Whatever there is to say.
+    #[serde(default)]
+    pub description: String,
+    /// Time and coupling.
+    pub simulation: Simulation,
+    /// The units, by name.
+    pub components: BTreeMap<String, Component>,
+    /// The wiring.
+    #[serde(default)]
+    pub connections: Vec<Connection>,
+    /// What goes into the results.
+    pub record: Record,
+    /// Where the figures of merit find their variables.
+    #[serde(default)]
+    pub metrics: Roles,
+    /// The file and its text.
+    #[serde(skip)]
+    pub source: Source,
+}
+
+/// Time and coupling.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Simulation {
+    /// Start time, s.
+    #[serde(default)]
+    pub start: f64,
+    /// Stop time, s.
+    pub stop: f64,
+    /// Communication step, s.
+    pub step: f64,
+    /// How values are passed on at a communication point.
+    #[serde(default)]
+    pub coupling: Coupling,
+    /// Order of the components.
+    #[serde(default)]
+    pub order: Vec<String>,
+}
+
+/// How values are passed on at a communication point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Coupling {
+    /// One component after the other: each gets what those before it make of their new inputs.
+    #[default]
+    GaussSeidel,
+    /// All at once: each gets what the others had before this point's inputs were set.
+    Jacobi,
+}
+
+/// A unit and its settings.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Component {
+    /// File name of the archive.
+    pub fmu: Spanned<String>,
+    /// Steps at every n-th communication point.
+    #[serde(default = "one")]
+    pub every: u32,
+    /// Inputs that stay at their start value.
+    #[serde(default)]
+    pub unconnected: Vec<Spanned<String>>,
+    /// Values for parameters and for inputs without connection.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Spanned<Value>>,
+}
+
+/// One line of wiring.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Connection {
+    /// `component.output`, or `component.prefix.*`.
+    pub from: Spanned<String>,
+    /// `component.input`, or `component.prefix.*`.
+    pub to: Spanned<String>,
+}
+
+/// What goes into the results.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// `component.variable`, or `component.prefix.*`.
+    pub variables: Vec<Spanned<String>>,
+    /// A row at every n-th communication point.
+    #[serde(default = "one")]
+    pub every: u32,
+}
+
+/// Prefixes below which the figures of merit find their variables. `None` takes the default, if it exists.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Roles {
+    /// Attitude angles.
+    pub attitude: Option<String>,
+    /// Reference of the attitude angles.
+    pub reference: Option<String>,
+    /// Angular rate.
+    pub rate: Option<String>,
+    /// Control moment.
+    pub moment: Option<String>,
+    /// Limits of rate and moment.
+    pub limit: Option<String>,
+    /// Statistics of the controller's solver.
+    pub solver: Option<String>,
+}
+
+fn one() -> u32 {
+    1
+}
+
+/// Settings that the command line may change.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Overrides {
+    /// Set a parameter: `plant.disturbance.seed=7`, `controller.constraints=paper`, `plant.disturbance.bound="1 deg/s2"`.
+    #[arg(long = "set", value_name = "COMPONENT.PARAMETER=VALUE")]
+    pub set: Vec<String>,
+    /// Stop time, s.
+    #[arg(long, value_name = "SECONDS")]
+    pub stop: Option<f64>,
+    /// Communication step, s.
+    #[arg(long, value_name = "SECONDS")]
+    pub step: Option<f64>,
+    /// Coupling at communication points.
+    #[arg(long, value_enum)]
+    pub coupling: Option<Coupling>,
+}
+
+/// The file an experiment was read from.
+#[derive(Clone, Debug, Default)]
+pub struct Source {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+}
+
+impl Source {
+    /// An error at a place in the file; `0..0` is no place.
+    pub fn error(&self, span: &Range<usize>, message: impl Into<String>) -> Error {
+        let mut at = format!("{}: ", self.path.display());
+        if !span.is_empty() {
+            let before = self.text.get(..span.start).unwrap_or(&self.text);
+            let line = 1 + before.matches('\n').count();
+            at = format!("{}:{line}: ", self.path.display());
+        }
+        Error::Experiment { at, message: message.into() }
+    }
+}
+
+impl Experiment {
+    /// Reads an experiment file.
+    ///
+    /// # Errors
+    /// If it cannot be read, is no TOML, or holds an unknown key.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| Error::experiment(format!("{}: {source}", path.display())))?;
+        Self::parse(path, text)
+    }
+
+    /// Reads the text of an experiment file; `path` is for messages, and for finding FMUs beside it.
+    ///
+    /// # Errors
+    /// If it is no TOML, or holds an unknown key.
+    pub fn parse(path: &Path, text: String) -> Result<Self, Error> {
+        let source = Source { path: path.to_path_buf(), text };
+        let mut experiment: Self = toml::from_str(&source.text).map_err(|error| {
+            let message = error.message().replace('\n', " ");
+            source.error(&error.span().map_or(0..0, |s| s.start..s.end.max(s.start + 1)), message)
+        })?;
+        experiment.source = source;
+        Ok(experiment)
+    }
+
+    /// Applies what the command line says.
+    ///
+    /// # Errors
+    /// If an assignment is malformed or names no component.
+    pub fn apply(&mut self, overrides: &Overrides) -> Result<(), Error> {
+        self.simulation.stop = overrides.stop.unwrap_or(self.simulation.stop);
+        self.simulation.step = overrides.step.unwrap_or(self.simulation.step);
+        self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
+        for assignment in &overrides.set {
+            let malformed = || {
+                Error::experiment(format!(
+                    "--set {assignment}: wants component.parameter=value, for example plant.disturbance.seed=7"
+                ))
+            };
+            let (target, value) = assignment.split_once('=').ok_or_else(malformed)?;
+            let (name, parameter) = names::split(target.trim()).ok_or_else(malformed)?;
+            let hint = names::hint(name, self.components.keys().map(String::as_str));
+            let component = self.components.get_mut(name).ok_or_else(|| {
+                Error::experiment(format!("--set {assignment}: there is no component \"{name}\"{hint}"))
+            })?;
+            // What is no TOML value is text: an enumeration's item needs no quotes within quotes.
+            let value = value.trim();
+            let value = toml::from_str::<BTreeMap<String, Value>>(&format!("x = {value}"))
+                .ok()
+                .filter(|table| table.len() == 1)
+                .and_then(|mut table| table.remove("x"))
+                .unwrap_or_else(|| Value::String(value.to_string()));
+            component.parameters.insert(parameter.to_string(), Spanned::new(0..0, value));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = r#"
+title = "x"
+[simulation]
+stop = 1.0
+step = 0.1
+[components.a]
+fmu = "A.fmu"
+[components.a.parameters]
+"p.q" = 1
+[record]
+variables = ["a.*"]
+"#;
+
+    fn parse(text: &str) -> Result<Experiment, Error> {
+        Experiment::parse(Path::new("x.toml"), text.to_string())
+    }
+
+    #[test]
+    fn defaults_are_filled_in() {
+        let experiment = parse(TEXT).unwrap();
+        assert_eq!(experiment.simulation.coupling, Coupling::GaussSeidel);
+        assert_eq!(
+            (experiment.simulation.start, experiment.components["a"].every, experiment.record.every),
+            (0.0, 1, 1)
+        );
+    }
+
+    #[test]
+    fn unknown_keys_are_refused_with_their_line() {
+        let message = parse(&TEXT.replace("step = 0.1", "stepp = 0.1")).unwrap_err().to_string();
+        assert!(
+            message.starts_with("x.toml:5: ") && message.contains("`stepp`") && message.contains("`step`"),
+            "{message}"
+        );
+        let message = parse(&TEXT.replace("fmu =", "fum =")).unwrap_err().to_string();
+        assert!(message.starts_with("x.toml:7: ") && message.contains("`fum`"), "{message}");
+        let message = parse("title = ").unwrap_err().to_string();
+        assert!(message.starts_with("x.toml:1: "), "{message}");
+        assert_eq!(message.lines().count(), 1);
+    }
+
+    #[test]
+    fn the_command_line_wins() {
+        let mut experiment = parse(TEXT).unwrap();
+        let set = ["a.p.q=2.5", "a.kind=white", "a.bound=2 deg/s2", "a.text=\"1\"", "a.flag=true"];
+        let set = set.map(String::from).to_vec();
+        experiment.apply(&Overrides { set, stop: Some(3.0), ..Overrides::default() }).unwrap();
+        let value = |name: &str| experiment.components["a"].parameters[name].get_ref().clone();
+        assert_eq!(experiment.simulation.stop, 3.0);
+        assert_eq!(value("p.q"), Value::Float(2.5));
+        assert_eq!(value("kind"), Value::String("white".into()));
+        assert_eq!(value("bound"), Value::String("2 deg/s2".into()));
+        assert_eq!(value("text"), Value::String("1".into()));
+        assert_eq!(value("flag"), Value::Boolean(true));
+    }
+
+    #[test]
+    fn bad_assignments_are_refused() {
+        let refusal = |text: &str| {
+            let overrides = Overrides { set: vec![text.into()], ..Overrides::default() };
+            parse(TEXT).unwrap().apply(&overrides).unwrap_err().to_string()
+        };
+        assert!(refusal("a.p").contains("wants component.parameter=value"));
+        assert!(refusal("a=1").contains("wants component.parameter=value"));
+        assert!(refusal("b.p=1").contains("there is no component \"b\""));
+    }
+}

@@ -1,0 +1,30 @@
+//! Steps FMUs along an experiment file and reports what they did. It knows FMUs only: nothing of vehicles or controllers
+//! but the names by which an experiment's figures of merit find their variables.
+//!
+//! [`experiment`] is read, [`run::Plan`] resolves it ([`wiring`], [`settings`], [`delay`]) against what the archives say
+//! ([`fmu`], [`archive`], [`description`], [`quantity`]), [`master`] steps the units ([`unit`]) on integer ticks
+//! ([`clock`]), and observers look on: [`recorder`], [`metrics`], [`plot`], [`progress`]. [`report`] and [`sidecar`] tell
+//! what came of it.
+
+pub mod archive;
+pub mod clock;
+pub mod delay;
+pub mod description;
+pub mod error;
+pub mod experiment;
+pub mod fmu;
+pub mod inspect;
+pub mod list;
+pub mod master;
+pub mod metrics;
+pub mod names;
+pub mod plot;
+pub mod progress;
+pub mod quantity;
+pub mod recorder;
+pub mod report;
+pub mod run;
+pub mod settings;
+pub mod sidecar;
+pub mod unit;
+pub mod wiring;

@@ -1,0 +1,318 @@
+//! The paper's figures of merit, summed up while the run goes on.
+
+use crate::error::Error;
+use crate::experiment::Roles;
+use crate::master::{Observer, Sample};
+use crate::names;
+use crate::wiring::{Part, Port, find};
+use serde::Serialize;
+
+/// Variables that observers look at, each read once.
+#[derive(Default)]
+pub struct Probes {
+    /// What the master is to read.
+    pub ports: Vec<Port>,
+}
+
+impl Probes {
+    /// The place of a variable among a sample's values.
+    pub fn place(&mut self, port: Port) -> usize {
+        self.ports.iter().position(|known| *known == port).unwrap_or_else(|| {
+            self.ports.push(port);
+            self.ports.len() - 1
+        })
+    }
+}
+
+/// Places of the variables that play a role in the figures of merit; what an experiment does not have is `None`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Places {
+    /// Attitude angles α, β, σ.
+    pub attitude: Option<[usize; 3]>,
+    /// Their reference.
+    pub reference: Option<[usize; 3]>,
+    /// Angular rate p, q, r.
+    pub rate: Option<[usize; 3]>,
+    /// Control moment.
+    pub moment: Option<[usize; 3]>,
+    /// Duration of the solver's last solution.
+    pub solver_time: Option<usize>,
+    /// Number of solutions so far.
+    pub solver_solves: Option<usize>,
+    /// Number of fallbacks so far.
+    pub solver_fallbacks: Option<usize>,
+}
+
+/// Limits against which rate and moment are held.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Limits {
+    /// Bound of ‖ω‖, rad/s.
+    pub rate: Option<f64>,
+    /// Bound of ‖m‖, N m.
+    pub moment: Option<f64>,
+}
+
+const ANGLES: [&str; 3] = ["alpha", "beta", "sigma"];
+const RATES: [&str; 3] = ["p", "q", "r"];
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Finds the variables of the roles, and the ports of the two limits.
+///
+/// # Errors
+/// If a role that the experiment states has no such variables. A default that fits nothing is left out.
+pub fn places(
+    roles: &Roles,
+    parts: &[Part],
+    probes: &mut Probes,
+) -> Result<(Places, [Option<Port>; 2]), Error> {
+    let mut triple = |role: &str, stated: &Option<String>, default: &str, names: [&str; 3]| {
+        let prefix = stated.as_deref().unwrap_or(default);
+        let mut ports = [None; 3];
+        for (port, name) in ports.iter_mut().zip(names) {
+            let path = format!("{prefix}.{name}");
+            *port = find(&path, parts);
+            if port.is_none() && stated.is_some() {
+                return Err(unknown(role, &path, parts));
+            }
+        }
+        Ok(match ports {
+            [Some(a), Some(b), Some(c)] => Some([a, b, c].map(|port| probes.place(port))),
+            _ => None,
+        })
+    };
+    let mut places = Places {
+        attitude: triple("attitude", &roles.attitude, "plant.attitude", ANGLES)?,
+        reference: triple("reference", &roles.reference, "controller.reference", ANGLES)?,
+        rate: triple("rate", &roles.rate, "plant.rate", RATES)?,
+        moment: triple("moment", &roles.moment, "controller.moment", AXES)?,
+        ..Places::default()
+    };
+    let single = |role: &str, stated: &Option<String>, default: &str, name: &str| {
+        let path = format!("{}.{name}", stated.as_deref().unwrap_or(default));
+        let port = find(&path, parts);
+        if port.is_none() && stated.is_some() { Err(unknown(role, &path, parts)) } else { Ok(port) }
+    };
+    let mut solver = |name| {
+        single("solver", &roles.solver, "controller.solver", name)
+            .map(|port| port.map(|port| probes.place(port)))
+    };
+    places.solver_time = solver("time")?;
+    places.solver_solves = solver("solves")?;
+    places.solver_fallbacks = solver("fallbacks")?;
+    let limit = |name| single("limit", &roles.limit, "controller.limit", name);
+    Ok((places, [limit("rate")?, limit("moment")?]))
+}
+
+fn unknown(role: &str, path: &str, parts: &[Part]) -> Error {
+    let known: Vec<String> = parts
+        .iter()
+        .flat_map(|part| part.description.variables.iter().map(|v| format!("{}.{}", part.name, v.name)))
+        .collect();
+    let hint = names::hint(path, known.iter().map(String::as_str));
+    Error::experiment(format!("[metrics] {role}: there is no variable \"{path}\"{hint}"))
+}
+
+/// The figures of merit, as `metrics.json` has them; `None` (null) where the experiment has no such quantity.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Metrics {
+    /// √(mean of ‖Θ − Θ_r‖²) over the communication points before each step, deg.
+    pub ems_deg: Option<f64>,
+    /// √(mean of ‖m/M̄‖²) over the same points.
+    pub cms: Option<f64>,
+    /// Largest ‖ω‖ over all communication points, deg/s.
+    pub max_rate_deg_s: Option<f64>,
+    /// Bound of ‖ω‖, deg/s.
+    pub rate_limit_deg_s: Option<f64>,
+    /// Largest ‖m‖/M̄ over all communication points.
+    pub max_moment_ratio: Option<f64>,
+    /// M̄, N m.
+    pub moment_limit: Option<f64>,
+    /// Mean duration of a solution, ms.
+    pub solver_ms_mean: Option<f64>,
+    /// Duration that 99 % of the solutions do not exceed, ms.
+    pub solver_ms_p99: Option<f64>,
+    /// Longest duration of a solution, ms.
+    pub solver_ms_max: Option<f64>,
+    /// Number of solutions.
+    pub solves: Option<u64>,
+    /// How often the controller fell back.
+    pub fallbacks: Option<u64>,
+    /// Simulated time over elapsed time.
+    pub real_time_factor: Option<f64>,
+    /// Elapsed time, s.
+    pub wall_s: f64,
+    /// Largest delay of a feedback loop beyond what the units have themselves, s; null without a loop.
+    pub loop_delay_s: Option<f64>,
+    /// Number of communication points that were reached.
+    pub samples: u64,
+    /// Whether the run got to its stop time.
+    pub completed: bool,
+}
+
+/// Sums up the figures of merit.
+pub struct Merit {
+    places: Places,
+    limits: Limits,
+    /// Squares summed over the points before each step: angle error, moment; and the number of points.
+    sums: [f64; 2],
+    steps: u64,
+    largest: [f64; 2],
+    solves: f64,
+    solver_seconds: Vec<f64>,
+    fallbacks: Option<f64>,
+    samples: u64,
+    completed: bool,
+}
+
+fn norm_squared(values: &[f64], places: [usize; 3]) -> f64 {
+    places.iter().map(|&place| values[place] * values[place]).sum()
+}
+
+impl Merit {
+    /// An empty sum. `points` is how many communication points there will be at most.
+    pub fn new(places: Places, limits: Limits, points: u64) -> Self {
+        let capacity = if places.solver_time.is_some() { points as usize } else { 0 };
+        Self {
+            places,
+            limits,
+            sums: [0.0; 2],
+            steps: 0,
+            largest: [0.0; 2],
+            solves: 0.0,
+            solver_seconds: Vec::with_capacity(capacity),
+            fallbacks: None,
+            samples: 0,
+            completed: false,
+        }
+    }
+
+    /// The figures of merit of what was seen. `wall` is the elapsed, `simulated` the simulated time, both s.
+    pub fn metrics(&self, wall: f64, simulated: f64, loop_delay: Option<f64>) -> Metrics {
+        let Places { attitude, reference, rate, moment, .. } = self.places;
+        let root_mean = |sum: f64| (self.steps > 0).then(|| (sum / self.steps as f64).sqrt());
+        let mut times = self.solver_seconds.clone();
+        times.sort_by(f64::total_cmp);
+        let milliseconds = |seconds: Option<&f64>| seconds.map(|seconds| seconds * 1e3);
+        // Nearest rank.
+        let p99 = (times.len() * 99).div_ceil(100).checked_sub(1).and_then(|rank| times.get(rank));
+        let mean = times.iter().sum::<f64>() / times.len() as f64;
+        Metrics {
+            ems_deg: attitude.and(reference).and_then(|_| root_mean(self.sums[0])).map(f64::to_degrees),
+            cms: moment.and(self.limits.moment).and_then(|limit| root_mean(self.sums[1]).map(|m| m / limit)),
+            max_rate_deg_s: rate.map(|_| self.largest[0].sqrt().to_degrees()),
+            rate_limit_deg_s: self.limits.rate.map(f64::to_degrees),
+            max_moment_ratio: moment.and(self.limits.moment).map(|limit| self.largest[1].sqrt() / limit),
+            moment_limit: self.limits.moment,
+            solver_ms_mean: milliseconds(times.first().map(|_| &mean)),
+            solver_ms_p99: milliseconds(p99),
+            solver_ms_max: milliseconds(times.last()),
+            solves: self.places.solver_solves.map(|_| self.solves as u64),
+            fallbacks: self.fallbacks.map(|count| count as u64),
+            real_time_factor: (wall > 0.0).then(|| simulated / wall),
+            wall_s: wall,
+            loop_delay_s: loop_delay,
+            samples: self.samples,
+            completed: self.completed,
+        }
+    }
+}
+
+impl Observer for Merit {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        let Sample { values, last, .. } = *sample;
+        let angle = match (self.places.attitude, self.places.reference) {
+            (Some(attitude), Some(reference)) => {
+                attitude.iter().zip(reference).map(|(&a, r)| (values[a] - values[r]).powi(2)).sum()
+            }
+            _ => 0.0,
+        };
+        let moment = self.places.moment.map_or(0.0, |places| norm_squared(values, places));
+        let rate = self.places.rate.map_or(0.0, |places| norm_squared(values, places));
+        if !last {
+            self.sums[0] += angle;
+            self.sums[1] += moment;
+            self.steps += 1;
+        }
+        self.largest = [self.largest[0].max(rate), self.largest[1].max(moment)];
+
+        if let Some(solves) = self.places.solver_solves {
+            if let Some(time) = self.places.solver_time
+                && values[solves] > self.solves
+            {
+                self.solver_seconds.push(values[time]);
+            }
+            self.solves = values[solves];
+        }
+        self.fallbacks = self.places.solver_fallbacks.map(|place| values[place]);
+        self.samples += 1;
+        self.completed |= last;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn merit() -> Merit {
+        let places = Places {
+            attitude: Some([0, 1, 2]),
+            reference: Some([3, 4, 5]),
+            rate: Some([6, 7, 8]),
+            moment: Some([9, 10, 11]),
+            solver_time: Some(12),
+            solver_solves: Some(13),
+            solver_fallbacks: Some(14),
+        };
+        Merit::new(places, Limits { rate: Some(0.1), moment: Some(10.0) }, 3)
+    }
+
+    fn feed(merit: &mut Merit, rows: &[[f64; 15]]) {
+        for (tick, row) in rows.iter().enumerate() {
+            let sample = Sample { tick: tick as u64, time: 0.0, last: tick + 1 == rows.len(), values: row };
+            merit.observe(&sample).unwrap();
+        }
+    }
+
+    #[test]
+    fn oracle_figures_of_merit_by_hand() {
+        let mut merit = merit();
+        feed(
+            &mut merit,
+            &[
+                // Error (3, 4, 0) rad: square 25. Moment (6, 8, 0): square 100.
+                [3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 6.0, 8.0, 0.0, 0.001, 1.0, 0.0],
+                // Error (0, 0, 1): square 1. No new solution: its time is not counted twice.
+                [1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.03, 0.04, 0.0, 0.0, 0.0, 0.001, 1.0, 1.0],
+                // The stop: counts for the largest values and the solver, not for the means.
+                [9.0, 9.0, 9.0, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 12.0, 0.0, 0.0, 0.003, 2.0, 1.0],
+            ],
+        );
+        let metrics = merit.metrics(0.5, 2.0, Some(0.0));
+        let near = |a: Option<f64>, b: f64| assert!((a.unwrap() - b).abs() < 1e-12, "{a:?} {b}");
+        near(metrics.ems_deg, 13.0_f64.sqrt().to_degrees());
+        near(metrics.cms, 0.5_f64.sqrt());
+        near(metrics.max_rate_deg_s, 0.2_f64.to_degrees());
+        near(metrics.max_moment_ratio, 1.2);
+        near(metrics.solver_ms_mean, 2.0);
+        near(metrics.solver_ms_p99, 3.0);
+        near(metrics.solver_ms_max, 3.0);
+        near(metrics.real_time_factor, 4.0);
+        assert_eq!((metrics.solves, metrics.fallbacks, metrics.samples), (Some(2), Some(1), 3));
+        assert!(metrics.completed);
+    }
+
+    #[test]
+    fn what_is_missing_is_null() {
+        let mut merit = Merit::new(Places::default(), Limits::default(), 1);
+        feed(&mut merit, &[[0.0; 15]]);
+        let json = serde_json::to_value(merit.metrics(0.0, 0.0, None)).unwrap();
+        for key in ["ems_deg", "cms", "max_rate_deg_s", "max_moment_ratio", "solver_ms_mean", "solver_ms_p99"]
+        {
+            assert!(json[key].is_null(), "{key}");
+        }
+        for key in ["solver_ms_max", "fallbacks", "real_time_factor"] {
+            assert!(json.as_object().unwrap()[key].is_null(), "{key}");
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Names as people mistype them: the nearest right one, and patterns that end in `*`.
+
+/// The known name nearest to `wrong`: a few letters away, or the same with a prefix that was left out.
+pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let tolerance = (wrong.chars().count() / 3).clamp(1, 4);
+    let lower = wrong.to_lowercase();
+    known
+        .into_iter()
+        .filter_map(|name| {
+            let candidate = name.to_lowercase();
+            let tail = !lower.is_empty() && candidate.ends_with(&format!(".{lower}"));
+            let distance = if tail { 1 } else { strsim::damerau_levenshtein(&lower, &candidate) };
+            (distance <= tolerance).then_some((distance, name))
+        })
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, name)| name)
+}
+
+/// `; did you mean "x"?`, or the names there are, or nothing.
+pub fn hint<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str> + Clone) -> String {
+    const LISTED: usize = 12;
+    if let Some(name) = nearest(wrong, known.clone()) {
+        return format!("; did you mean \"{name}\"?");
+    }
+    let names: Vec<&str> = known.into_iter().collect();
+    match names.len() {
+        0 => "; there are none".into(),
+        n if n <= LISTED => format!("; there are: {}", names.join(", ")),
+        n => format!("; there are {n}: {}, …", names[..LISTED].join(", ")),
+    }
+}
+
+/// Whether `name` is meant by `pattern`: the same name, or everything that begins as the pattern does before a final `*`.
+pub fn matches(pattern: &str, name: &str) -> bool {
+    pattern.strip_suffix('*').map_or(pattern == name, |prefix| name.starts_with(prefix))
+}
+
+/// Splits `component.variable` at the first dot.
+pub fn split(path: &str) -> Option<(&str, &str)> {
+    path.split_once('.').filter(|(component, variable)| !component.is_empty() && !variable.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAMES: [&str; 4] = ["inertia.scale", "disturbance.kind", "disturbance.bound", "initial.p"];
+
+    #[test]
+    fn nearest_finds_swapped_missing_and_wrong_letters() {
+        for wrong in ["inertia.scael", "inertia.scal", "Inertia.Scale", "intertia.scale", "scale"] {
+            assert_eq!(nearest(wrong, NAMES), Some("inertia.scale"), "{wrong}");
+        }
+        assert_eq!(nearest("horizon", NAMES), None);
+    }
+
+    #[test]
+    fn hint_lists_the_names_when_none_is_near() {
+        assert_eq!(hint("x", ["alpha", "beta"]), "; there are: alpha, beta");
+        assert_eq!(hint("x", []), "; there are none");
+    }
+
+    #[test]
+    fn patterns_match_below_their_prefix_only() {
+        assert!(matches("attitude.*", "attitude.alpha"));
+        assert!(!matches("attitude.*", "attitudeRate.alpha"));
+        assert!(!matches("attitude", "attitude.alpha"));
+        assert!(matches("*", "anything"));
+    }
+}

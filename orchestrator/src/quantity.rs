@@ -1,0 +1,177 @@
+//! Physical units by an FMU's own definitions: conversion of `"2 deg/s2"`, and whether two variables may be connected.
+
+use crate::names;
+
+/// A unit: `base = factor · value + offset` in SI base units, and what it can be shown in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnitDefinition {
+    /// Name, for example `rad/s`.
+    pub name: String,
+    /// Exponents of kg, m, s, A, K, mol, cd, rad; `None` if the FMU does not say.
+    pub exponents: Option<[i32; 8]>,
+    /// Multiplier to SI base units.
+    pub factor: f64,
+    /// Summand to SI base units.
+    pub offset: f64,
+    /// Display units as name, factor, offset: `display = factor · value + offset`.
+    pub displays: Vec<(String, f64, f64)>,
+}
+
+/// Reads `"2 deg/s2"` as a value in the unit `wanted`; a bare `"2"` is in that unit already.
+///
+/// # Errors
+/// If the text is not a number with a unit that the FMU defines and that measures the same as `wanted`.
+pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Result<f64, String> {
+    let text = text.trim();
+    if let Ok(value) = text.parse::<f64>() {
+        return Ok(value);
+    }
+    let (number, name) = text
+        .split_once(char::is_whitespace)
+        .map(|(number, name)| (number, name.trim()))
+        .ok_or_else(|| format!("\"{text}\" is neither a number nor a number, a space and a unit"))?;
+    let value: f64 = number.parse().map_err(|_| format!("\"{number}\" is not a number"))?;
+    let wanted = wanted.ok_or_else(|| format!("\"{text}\" has a unit, but the variable has none"))?;
+    if name == wanted {
+        return Ok(value);
+    }
+
+    let target = units
+        .iter()
+        .find(|unit| unit.name == wanted)
+        .ok_or_else(|| format!("the FMU does not define its unit \"{wanted}\": give a plain number"))?;
+    // A display unit of the variable's own unit is read first: another unit may have one of the same name.
+    let own = target.displays.iter().find(|(display, ..)| display == name);
+    if let Some((_, factor, offset)) = own {
+        return Ok((value - offset) / factor);
+    }
+    let (unit, in_unit) = units
+        .iter()
+        .find_map(|unit| {
+            if unit.name == name {
+                return Some((unit, value));
+            }
+            let (_, factor, offset) = unit.displays.iter().find(|(display, ..)| display == name)?;
+            Some((unit, (value - offset) / factor))
+        })
+        .ok_or_else(|| {
+            let known: Vec<&str> = units
+                .iter()
+                .flat_map(|unit| {
+                    std::iter::once(unit.name.as_str()).chain(unit.displays.iter().map(|d| d.0.as_str()))
+                })
+                .collect();
+            format!("the FMU defines no unit \"{name}\"{}", names::hint(name, known.iter().copied()))
+        })?;
+    if unit.exponents.is_none() || unit.exponents != target.exponents {
+        return Err(format!("\"{text}\" cannot be converted to {wanted}: they measure different things"));
+    }
+    Ok((unit.factor * in_unit + unit.offset - target.offset) / target.factor)
+}
+
+/// Whether a value in the one unit can be passed on unchanged as a value in the other.
+///
+/// # Errors
+/// Says how the units differ.
+pub fn same(
+    from: Option<&str>,
+    from_units: &[UnitDefinition],
+    to: Option<&str>,
+    to_units: &[UnitDefinition],
+) -> Result<(), String> {
+    let (Some(from), Some(to)) = (from, to) else {
+        return match (from, to) {
+            (None, None) => Ok(()),
+            _ => Err(format!("{} against {}", from.unwrap_or("no unit"), to.unwrap_or("no unit"))),
+        };
+    };
+    let find = |name: &str, units: &[UnitDefinition]| units.iter().find(|unit| unit.name == name).cloned();
+    match (find(from, from_units), find(to, to_units)) {
+        (Some(a), Some(b)) if a.exponents.is_some() && b.exponents.is_some() => {
+            if a.exponents != b.exponents {
+                Err(format!("{from} against {to}"))
+            } else if a.factor != b.factor || a.offset != b.offset {
+                Err(format!("{from} against {to}: the same quantity in another scale"))
+            } else {
+                Ok(())
+            }
+        }
+        _ if from == to => Ok(()),
+        _ => Err(format!("{from} against {to}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn units() -> Vec<UnitDefinition> {
+        let unit = |name: &str, exponents, factor, offset, displays: &[(&str, f64, f64)]| UnitDefinition {
+            name: name.into(),
+            exponents: Some(exponents),
+            factor,
+            offset,
+            displays: displays.iter().map(|(n, f, o)| ((*n).to_string(), *f, *o)).collect(),
+        };
+        vec![
+            unit("rad", [0, 0, 0, 0, 0, 0, 0, 1], 1.0, 0.0, &[("deg", 180.0 / std::f64::consts::PI, 0.0)]),
+            unit(
+                "rad/s",
+                [0, 0, -1, 0, 0, 0, 0, 1],
+                1.0,
+                0.0,
+                &[("deg/s", 180.0 / std::f64::consts::PI, 0.0)],
+            ),
+            unit("s", [0, 0, 1, 0, 0, 0, 0, 0], 1.0, 0.0, &[("ms", 1000.0, 0.0)]),
+            unit("min", [0, 0, 1, 0, 0, 0, 0, 0], 60.0, 0.0, &[]),
+            unit("K", [0, 0, 0, 0, 1, 0, 0, 0], 1.0, 0.0, &[("degC", 1.0, -273.15)]),
+        ]
+    }
+
+    #[test]
+    fn oracle_conversion_by_hand() {
+        let units = units();
+        assert_eq!(convert("2", Some("rad"), &units), Ok(2.0));
+        assert_eq!(convert("2 rad", Some("rad"), &units), Ok(2.0));
+        let angle = convert("180 deg", Some("rad"), &units).unwrap();
+        assert!((angle - std::f64::consts::PI).abs() < 1e-15);
+        assert_eq!(convert("2 min", Some("s"), &units), Ok(120.0));
+        assert_eq!(convert("500 ms", Some("min"), &units), Ok(0.5 / 60.0));
+        assert!((convert("20 degC", Some("K"), &units).unwrap() - 293.15).abs() < 1e-12);
+    }
+
+    #[test]
+    fn wrong_units_are_refused() {
+        let units = units();
+        assert!(convert("2 deg/s", Some("rad"), &units).unwrap_err().contains("measure different things"));
+        assert!(convert("2 degs", Some("rad"), &units).unwrap_err().contains("did you mean \"deg\""));
+        assert!(convert("2 deg", None, &units).unwrap_err().contains("has none"));
+        assert!(convert("two deg", Some("rad"), &units).unwrap_err().contains("not a number"));
+        assert!(convert("2deg", Some("rad"), &units).unwrap_err().contains("a space and a unit"));
+    }
+
+    #[test]
+    fn connections_need_equal_dimension_and_scale() {
+        let units = units();
+        let check = |a, b| same(a, &units, b, &units);
+        assert!(check(Some("rad"), Some("rad")).is_ok());
+        assert!(check(None, None).is_ok());
+        assert!(check(Some("rad"), None).is_err());
+        assert!(check(Some("rad"), Some("rad/s")).is_err());
+        assert!(check(Some("s"), Some("min")).unwrap_err().contains("another scale"));
+        // Another name for the same unit is no mismatch.
+        let mut renamed = units.clone();
+        renamed[0].name = "radian".into();
+        assert!(same(Some("rad"), &units, Some("radian"), &renamed).is_ok());
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn oracle_display_units_convert_back(value in -1e6f64..1e6) {
+            let units = units();
+            let there = convert(&format!("{value:?} deg"), Some("rad"), &units).unwrap();
+            let back = there * (180.0 / std::f64::consts::PI);
+            proptest::prop_assert!((back - value).abs() <= 1e-12 * value.abs().max(1.0));
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! What a run says for itself on standard output.
+
+use crate::experiment::Coupling;
+use crate::run::Report;
+use std::io::{self, Write};
+
+/// Prints the summary of a run.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
+    let Report { clock, metrics, .. } = report;
+    let coupling = match report.coupling {
+        Coupling::GaussSeidel => "Gauss-Seidel",
+        Coupling::Jacobi => "Jacobi",
+    };
+    writeln!(out, "{}", report.title)?;
+    writeln!(
+        out,
+        "  {} s to {} s in {} steps of {} s, {coupling}: {}",
+        clock.start(),
+        clock.stop(),
+        clock.ticks(),
+        clock.step(),
+        report.order.join(", ")
+    )?;
+    let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
+    if let Some(ems) = metrics.ems_deg {
+        line("EMS", format!("{ems:.4} deg"))?;
+    }
+    if let Some(cms) = metrics.cms {
+        line("CMS", format!("{cms:.4}"))?;
+    }
+    if let Some(rate) = metrics.max_rate_deg_s {
+        let against = metrics
+            .rate_limit_deg_s
+            .map_or(String::new(), |limit| against(rate / limit, &format!("{limit:.4} deg/s")));
+        line("largest rate", format!("{rate:.4} deg/s{against}"))?;
+    }
+    if let (Some(ratio), Some(limit)) = (metrics.max_moment_ratio, metrics.moment_limit) {
+        line(
+            "largest moment",
+            format!("{:.4e} N m{}", ratio * limit, against(ratio, &format!("{limit:.4e} N m"))),
+        )?;
+    }
+    if let (Some(mean), Some(p99), Some(max), Some(solves)) =
+        (metrics.solver_ms_mean, metrics.solver_ms_p99, metrics.solver_ms_max, metrics.solves)
+    {
+        line(
+            "solver time",
+            format!("mean {mean:.3} ms, p99 {p99:.3} ms, max {max:.3} ms, {solves} solutions"),
+        )?;
+    }
+    if let Some(fallbacks) = metrics.fallbacks {
+        line("solver fallbacks", format!("{fallbacks}"))?;
+    }
+    if report.loops.is_empty() {
+        line("loop delay", "no feedback loop".into())?;
+    }
+    for feedback in &report.loops {
+        let names: Vec<&str> = feedback
+            .components
+            .iter()
+            .chain(feedback.components.first())
+            .map(|&index| report.order[index].as_str())
+            .collect();
+        let steps = match feedback.ticks {
+            0 => "none".to_string(),
+            1 => format!("{} s, 1 step", clock.step()),
+            n => format!("{} s, {n} steps", n as f64 * clock.step()),
+        };
+        let reason = match (feedback.ticks, report.coupling) {
+            (0, _) => "",
+            (_, Coupling::Jacobi) => ", from the Jacobi coupling",
+            (_, Coupling::GaussSeidel) => {
+                ", from the order: an output is read before its unit's inputs are set"
+            }
+        };
+        let undeclared: Vec<&str> =
+            feedback.undeclared.iter().map(|&index| report.order[index].as_str()).collect();
+        let assumed = if undeclared.is_empty() {
+            String::new()
+        } else {
+            format!(" (assumed: {} does not declare what its outputs depend on)", undeclared.join(", "))
+        };
+        line("loop delay", format!("{steps} ({}){reason}{assumed}", names.join(" -> ")))?;
+    }
+    if let Some(factor) = metrics.real_time_factor {
+        line("real-time factor", format!("{factor:.1} ({:.3} s elapsed)", metrics.wall_s))?;
+    }
+    line("results", format!("{}: {}", report.out.display(), report.files.join(", ")))
+}
+
+/// How a value stands against its limit.
+fn against(ratio: f64, limit: &str) -> String {
+    if ratio > 1.0 {
+        format!("   EXCEEDS its limit {limit}: {:.1} %", ratio * 100.0)
+    } else {
+        format!("   within its limit {limit}: {:.1} %", ratio * 100.0)
+    }
+}

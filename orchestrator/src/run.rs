@@ -1,0 +1,315 @@
+//! Runs an experiment from its file to its results.
+
+use crate::clock::Clock;
+use crate::delay::{self, FeedbackLoop};
+use crate::description::{Kind, ModelDescription};
+use crate::error::Error;
+use crate::experiment::{Coupling, Experiment};
+use crate::fmu::Fmu;
+use crate::master::{Master, Member, Observer};
+use crate::metrics::{self, Limits, Merit, Metrics, Places, Probes};
+use crate::names;
+use crate::plot::Curves;
+use crate::progress::Progress;
+use crate::recorder::Recorder;
+use crate::settings::{self, Setting};
+use crate::sidecar;
+use crate::unit::CoSimulationUnit;
+use crate::wiring::{self, Column, Part, Port, Wire};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::time::Instant;
+
+/// Where results go, and how much is said.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Folder for the results; `out/<experiment>` if there is none.
+    pub out: Option<PathBuf>,
+    /// Show no progress.
+    pub quiet: bool,
+}
+
+/// What a run leaves behind.
+#[derive(Debug)]
+pub struct Report {
+    /// Title of the experiment.
+    pub title: String,
+    /// Start, stop and step.
+    pub clock: Clock,
+    /// Coupling at communication points.
+    pub coupling: Coupling,
+    /// Components in their order.
+    pub order: Vec<String>,
+    /// The figures of merit.
+    pub metrics: Metrics,
+    /// Feedback loops with their delays; components are indices into `order`.
+    pub loops: Vec<FeedbackLoop>,
+    /// Folder of the results.
+    pub out: PathBuf,
+    /// The files in it.
+    pub files: Vec<&'static str>,
+}
+
+/// An experiment with all names resolved: nothing of it can be wrong any more, except in the units themselves.
+pub struct Plan {
+    /// The experiment.
+    pub experiment: Experiment,
+    /// Start, stop and step.
+    pub clock: Clock,
+    /// Components in their order.
+    pub order: Vec<String>,
+    /// Their FMUs.
+    pub fmus: Vec<Rc<Fmu>>,
+    /// Their settings.
+    pub settings: Vec<Vec<Setting>>,
+    /// The connections.
+    pub wires: Vec<Wire>,
+    /// The recorded variables.
+    pub columns: Vec<Column>,
+    /// Feedback loops.
+    pub loops: Vec<FeedbackLoop>,
+    probes: Probes,
+    places: Places,
+    limits: [Option<Port>; 2],
+}
+
+impl Plan {
+    /// Resolves an experiment.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the experiment or with an FMU's archive.
+    pub fn new(experiment: Experiment, fmu_dirs: &[PathBuf]) -> Result<Self, Error> {
+        let simulation = &experiment.simulation;
+        let clock = Clock::new(simulation.start, simulation.stop, simulation.step)
+            .map_err(|message| experiment.source.error(&(0..0), format!("[simulation] {message}")))?;
+        let order = order(&experiment)?;
+
+        let mut opened: BTreeMap<PathBuf, Rc<Fmu>> = BTreeMap::new();
+        let mut fmus = Vec::new();
+        for name in &order {
+            let path = find_fmu(&experiment, name, fmu_dirs)?;
+            let fmu = match opened.get(&path) {
+                Some(fmu) => Rc::clone(fmu),
+                None => Rc::new(Fmu::open(&path)?),
+            };
+            opened.insert(path, Rc::clone(&fmu));
+            fmus.push(fmu);
+        }
+        let parts: Vec<Part> =
+            order.iter().zip(&fmus).map(|(name, fmu)| Part { name, description: &fmu.description }).collect();
+
+        let wires = wiring::wires(&experiment, &parts)?;
+        let settings = (0..parts.len())
+            .map(|index| settings::resolve(&experiment, &parts, index, &wires))
+            .collect::<Result<Vec<_>, _>>()?;
+        let columns = wiring::columns(&experiment, &parts)?;
+        let mut probes = Probes::default();
+        let (places, limits) = metrics::places(&experiment.metrics, &parts, &mut probes)?;
+        for column in &columns {
+            probes.place(column.port);
+        }
+        if let Some(names) = delay::algebraic_loop(&parts, &wires) {
+            let message = format!(
+                "algebraic loop: each of these inputs depends on the next at the same instant: {}. \
+                 Put a unit with a state or a delay between them",
+                names.join(" <- ")
+            );
+            return Err(experiment.source.error(&(0..0), message));
+        }
+        let every = periods(&experiment, &order);
+        let loops = delay::feedback_loops(&parts, &every, &wires, simulation.coupling);
+        Ok(Self { experiment, clock, order, fmus, settings, wires, columns, loops, probes, places, limits })
+    }
+
+    /// The components' names and descriptions.
+    pub fn parts(&self) -> Vec<Part<'_>> {
+        self.order
+            .iter()
+            .zip(&self.fmus)
+            .map(|(name, fmu)| Part { name, description: &fmu.description })
+            .collect()
+    }
+
+    /// Runs the experiment and writes its results. If a unit fails, what was seen until then is written all the same.
+    ///
+    /// # Errors
+    /// What a unit said; files that cannot be written.
+    pub fn run(&self, options: &Options) -> Result<Report, Error> {
+        let experiment = &self.experiment;
+        let stem = experiment.source.path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy());
+        let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(stem.as_ref()));
+
+        let mut master = self.master()?;
+        master.initialize()?;
+        let limit = |port: Option<Port>, master: &mut Master| {
+            port.map(|port| master.read(&[port]).map(|values| values[0])).transpose()
+        };
+        let limits =
+            Limits { rate: limit(self.limits[0], &mut master)?, moment: limit(self.limits[1], &mut master)? };
+        let parameters = self.parameters(&mut master)?;
+
+        fs::create_dir_all(&out).map_err(Error::file(&out))?;
+        let columns: Vec<_> = self
+            .columns
+            .iter()
+            .filter_map(|column| {
+                let place = self.probes.ports.iter().position(|port| *port == column.port)?;
+                Some((column.name.as_str(), place, column.port.carrier))
+            })
+            .collect();
+        let mut recorder = Recorder::create(&out.join("results.csv"), &columns, experiment.record.every)?;
+        let mut merit = Merit::new(self.places, limits, self.clock.ticks() + 1);
+        let mut curves = Curves::new(self.places, limits, self.clock.ticks());
+        let mut progress = Progress::new(&experiment.title, self.clock.ticks(), options.quiet);
+
+        let begin = Instant::now();
+        let observers: &mut [&mut dyn Observer] =
+            &mut [&mut recorder, &mut merit, &mut curves, &mut progress];
+        let outcome = master.run(observers);
+        let wall = begin.elapsed().as_secs_f64();
+        drop(progress);
+
+        recorder.finish()?;
+        let reached = self.clock.step() * merit.metrics(0.0, 0.0, None).samples.saturating_sub(1) as f64;
+        let loop_delay =
+            self.loops.iter().map(|l| l.ticks).max().map(|ticks| ticks as f64 * self.clock.step());
+        let metrics = merit.metrics(wall, reached, loop_delay);
+        let mut files = vec!["results.csv", "results.json", "metrics.json"];
+        write_json(&out.join("results.json"), &sidecar::sidecar(self, &parameters, outcome.as_ref().err()))?;
+        write_json(&out.join("metrics.json"), &metrics)?;
+        if curves.draw(&out.join("plot.svg"), &experiment.title)? {
+            files.push("plot.svg");
+        }
+        if outcome.is_err() {
+            tracing::warn!("the results until then are in {}", out.display());
+        }
+        outcome?;
+        Ok(Report {
+            title: experiment.title.clone(),
+            clock: self.clock,
+            coupling: experiment.simulation.coupling,
+            order: self.order.clone(),
+            metrics,
+            loops: self.loops.clone(),
+            out,
+            files,
+        })
+    }
+
+    /// Instantiates the units and sets their parameters.
+    fn master(&self) -> Result<Master, Error> {
+        let every = periods(&self.experiment, &self.order);
+        let mut members = Vec::new();
+        for (index, name) in self.order.iter().enumerate() {
+            let mut unit: Box<dyn CoSimulationUnit> = Box::new(self.fmus[index].instantiate(name)?);
+            settings::apply(&self.settings[index], unit.as_mut()).map_err(|failure| Error::Unit {
+                component: name.clone(),
+                time: self.clock.start(),
+                failure,
+            })?;
+            members.push(Member { name: name.clone(), every: every[index], unit });
+        }
+        let coupling = self.experiment.simulation.coupling;
+        Ok(Master::new(self.clock, coupling, members, &self.wires, &self.probes.ports))
+    }
+
+    /// All parameters as the units have them after initialization, except texts.
+    fn parameters(&self, master: &mut Master) -> Result<sidecar::Parameters, Error> {
+        let parts = self.parts();
+        let mut all = sidecar::Parameters::new();
+        for part in &parts {
+            let mut own = BTreeMap::new();
+            for name in part.description.names("parameter") {
+                let Some(port) = wiring::find(&format!("{}.{name}", part.name), &parts) else { continue };
+                let value = master.read(&[port])?[0];
+                own.insert(name.to_string(), plain_value(part.description, port, value));
+            }
+            all.insert(part.name.to_string(), own);
+        }
+        Ok(all)
+    }
+}
+
+fn plain_value(description: &ModelDescription, port: Port, value: f64) -> serde_json::Value {
+    match &description.variables[port.variable].kind {
+        Kind::Boolean => (value != 0.0).into(),
+        Kind::Integer { .. } => (value as i64).into(),
+        Kind::Enumeration { items } => items
+            .iter()
+            .find(|(_, item)| f64::from(*item) == value)
+            .map_or_else(|| (value as i64).into(), |(name, _)| name.as_str().into()),
+        Kind::Real { .. } | Kind::String => value.into(),
+    }
+}
+
+fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), Error> {
+    let mut text = serde_json::to_string_pretty(value).map_err(|error| Error::file(path)(error.into()))?;
+    text.push('\n');
+    fs::write(path, text).map_err(Error::file(path))
+}
+
+fn periods(experiment: &Experiment, order: &[String]) -> Vec<u32> {
+    order.iter().map(|name| experiment.components[name].every).collect()
+}
+
+/// The components in the order in which their inputs are set.
+fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
+    let refuse = |message: String| Err(experiment.source.error(&(0..0), message));
+    let names: Vec<&str> = experiment.components.keys().map(String::as_str).collect();
+    if let Some(name) = names.iter().find(|name| name.is_empty() || name.contains('.')) {
+        return refuse(format!("the component name \"{name}\" must not be empty or hold a dot"));
+    }
+    if let Some((name, _)) = experiment.components.iter().find(|(_, component)| component.every == 0) {
+        return refuse(format!("[components.{name}] every = 0: must be at least 1"));
+    }
+    if experiment.record.every == 0 {
+        return refuse("[record] every = 0: must be at least 1".into());
+    }
+    let order = &experiment.simulation.order;
+    for name in order {
+        if !names.contains(&name.as_str()) {
+            let hint = names::hint(name, names.iter().copied());
+            return refuse(format!("[simulation] order: there is no component \"{name}\"{hint}"));
+        }
+        if order.iter().filter(|other| *other == name).count() > 1 {
+            return refuse(format!("[simulation] order names \"{name}\" twice"));
+        }
+    }
+    if order.is_empty() && (names.len() == 1 || experiment.simulation.coupling == Coupling::Jacobi) {
+        return Ok(names.iter().map(ToString::to_string).collect());
+    }
+    if let Some(name) = names.iter().find(|name| !order.iter().any(|other| other == *name)) {
+        return refuse(format!("[simulation] order does not name \"{name}\": name every component once"));
+    }
+    Ok(order.clone())
+}
+
+/// The archive of a component: beside the experiment, in the folders given, in `target/fmu`.
+fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result<PathBuf, Error> {
+    let written = &experiment.components[name].fmu;
+    let beside = experiment.source.path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
+    let mut folders = vec![if beside.as_os_str().is_empty() { PathBuf::from(".") } else { beside }];
+    folders.extend(fmu_dirs.iter().cloned());
+    folders.push(PathBuf::from("target/fmu"));
+    if let Some(path) =
+        folders.iter().map(|folder| folder.join(written.get_ref())).find(|path| path.is_file())
+    {
+        return Ok(path);
+    }
+    let there: Vec<String> = folders
+        .iter()
+        .flat_map(|folder| fs::read_dir(folder).into_iter().flatten().flatten())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|file| Path::new(file).extension().is_some_and(|extension| extension == "fmu"))
+        .collect();
+    let hint = names::hint(written.get_ref(), there.iter().map(String::as_str));
+    let searched: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
+    let message = format!(
+        "[components.{name}] there is no file \"{}\" in {}{hint}",
+        written.get_ref(),
+        searched.join(", ")
+    );
+    Err(experiment.source.error(&written.span(), message))
+}

@@ -1,0 +1,108 @@
+//! `results.json`: everything that is needed to know, years later, what `results.csv` came from.
+
+use crate::description::Kind;
+use crate::error::Error;
+use crate::run::Plan;
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// Values of all parameters, by component and name.
+pub type Parameters = BTreeMap<String, BTreeMap<String, Value>>;
+
+/// The content of the file. `failure` is why the run ended early, if it did.
+pub fn sidecar(plan: &Plan, parameters: &Parameters, failure: Option<&Error>) -> Value {
+    let experiment = &plan.experiment;
+    let simulation = &experiment.simulation;
+    let seeds: BTreeMap<String, &Value> = parameters
+        .iter()
+        .flat_map(|(component, own)| own.iter().map(move |(name, value)| (component, name, value)))
+        .filter(|(_, name, _)| name.rsplit('.').next() == Some("seed"))
+        .map(|(component, name, value)| (format!("{component}.{name}"), value))
+        .collect();
+    let parts = plan.parts();
+    let variable = |component: usize, variable: usize| {
+        let part = parts[component];
+        format!("{}.{}", part.name, part.description.variables[variable].name)
+    };
+    let connections: Vec<Value> = plan
+        .wires
+        .iter()
+        .map(|w| {
+            json!({
+                "from": variable(w.from.component, w.from.variable),
+                "to": variable(w.to.component, w.to.variable),
+            })
+        })
+        .collect();
+    let columns: Vec<Value> = plan
+        .columns
+        .iter()
+        .map(|column| {
+            let variable = &parts[column.port.component].description.variables[column.port.variable];
+            let unit = if let Kind::Real { unit, .. } = &variable.kind { unit.clone() } else { None };
+            json!({
+                "name": column.name,
+                "type": variable.kind.name(),
+                "unit": unit,
+                "description": variable.description,
+            })
+        })
+        .collect();
+    let loops: Vec<Value> = plan
+        .loops
+        .iter()
+        .map(|l| {
+            let components: Vec<&String> = l.components.iter().map(|&index| &plan.order[index]).collect();
+            json!({ "components": components, "delay_steps": l.ticks, "delay_s": l.ticks as f64 * plan.clock.step() })
+        })
+        .collect();
+    let mut components = serde_json::Map::new();
+    for (index, name) in plan.order.iter().enumerate() {
+        components.insert(name.clone(), component(plan, index, name, parameters));
+    }
+    json!({
+        "title": experiment.title,
+        "status": failure.map_or_else(|| "completed".to_string(), |error| format!("failed: {error}")),
+        "orchestrator": env!("CARGO_PKG_VERSION"),
+        "simulation": {
+            "start": simulation.start, "stop": simulation.stop, "step": simulation.step,
+            "steps": plan.clock.ticks(), "coupling": simulation.coupling, "order": plan.order,
+        },
+        "components": components,
+        "seeds": seeds,
+        "connections": connections,
+        "feedback_loops": loops,
+        "columns": columns,
+        "experiment": {
+            "file": experiment.source.path.file_name().map(|name| name.to_string_lossy()),
+            "text": experiment.source.text,
+        },
+    })
+}
+
+fn component(plan: &Plan, index: usize, name: &str, parameters: &Parameters) -> Value {
+    let fmu = &plan.fmus[index];
+    let set: BTreeMap<&str, Value> =
+        plan.settings[index].iter().map(|s| (s.name.as_str(), s.value.to_json())).collect();
+    json!({
+        "fmu": fmu.path.file_name().map(|name| name.to_string_lossy()),
+        "sha256": std::fs::read(&fmu.path).ok().map(|bytes| hexadecimal(&Sha256::digest(bytes))),
+        "guid": fmu.description.guid,
+        "model": fmu.description.model_name,
+        "version": fmu.description.version,
+        "generation_tool": fmu.description.generation_tool,
+        "every": plan.experiment.components[name].every,
+        "set": set,
+        "parameters": parameters.get(name),
+    })
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
