@@ -83,7 +83,6 @@ impl Scenario {
     }
 }
 
-#[allow(clippy::panic)]
 fn embedded((file, text): (&str, &str)) -> Scenario {
     // Cannot fail: a test reads every embedded file.
     Scenario::from_toml(file, text).unwrap_or_else(|error| panic!("{error}"))

@@ -246,6 +246,26 @@ fn impossible_configurations_are_refused_by_name() {
 
 proptest! {
     #[test]
+    fn any_communication_points_lead_to_the_same_state(
+        mut points in proptest::collection::vec(0.0..2.0, 0..40),
+        kind in prop::sample::select(vec![Kind::White, Kind::Constant, Kind::Sine, Kind::Square]),
+    ) {
+        let mut config = kinds().find(|config| config.disturbance.kind == kind).unwrap();
+        config.disturbance.end = 1.5;
+        let [mut whole, mut parts] = [0, 1].map(|_| Plant::new(&config, 0.0).unwrap());
+        let push = |t: f64| Vector3::new(2e4 * t.sin(), -1e4, 1e4 * t).into();
+        whole.advance_with(0.0, 2.0, push).unwrap();
+        points.push(2.0);
+        points.sort_by(f64::total_cmp);
+        let mut from = 0.0;
+        for to in points {
+            parts.advance_with(from, to, push).unwrap();
+            from = to;
+        }
+        prop_assert!((whole.state - parts.state).amax() < 1e-11, "{}", whole.state - parts.state);
+    }
+
+    #[test]
     fn oracle_partial_derivatives_against_differences(
         values in proptest::array::uniform6(-1.0..1.0),
         pushes in proptest::array::uniform3(-1e5..1e5),
