@@ -75,6 +75,7 @@ const ME: Option<Interface> = Some(Interface::ModelExchange);
 const CS: Option<Interface> = Some(Interface::CoSimulation);
 
 /// The table. Where the standard allows a call for some variables only, [`crate::instance`] looks at the variable.
+/// fmi2GetDerivatives is allowed in initialization mode too, as derivatives are initial unknowns.
 #[rustfmt::skip]
 pub(crate) mod table {
     use super::{CS, Call, ME, call};
@@ -123,9 +124,9 @@ pub(crate) mod table {
     pub(crate) const GET_OUTPUT_DERIVATIVES:    Call = call("fmi2GetRealOutputDerivatives",       CS,   "----SFTX");
     pub(crate) const DO_STEP:                   Call = call("fmi2DoStep",                         CS,   "----S---");
     pub(crate) const CANCEL_STEP:               Call = call("fmi2CancelStep",                     CS,   "--------");
-    pub(crate) const GET_STATUS:                Call = call("fmi2GetStatus",                      CS,   "----SFTX");
-    pub(crate) const GET_REAL_STATUS:           Call = call("fmi2GetRealStatus",                  CS,   "----SFTX");
-    pub(crate) const GET_INTEGER_STATUS:        Call = call("fmi2GetIntegerStatus",               CS,   "----SFTX");
-    pub(crate) const GET_BOOLEAN_STATUS:        Call = call("fmi2GetBooleanStatus",               CS,   "----SFTX");
-    pub(crate) const GET_STRING_STATUS:         Call = call("fmi2GetStringStatus",                CS,   "----SFTX");
+    pub(crate) const GET_STATUS:                Call = call("fmi2GetStatus",                      CS,   "----SFT-");
+    pub(crate) const GET_REAL_STATUS:           Call = call("fmi2GetRealStatus",                  CS,   "----SFT-");
+    pub(crate) const GET_INTEGER_STATUS:        Call = call("fmi2GetIntegerStatus",               CS,   "----SFT-");
+    pub(crate) const GET_BOOLEAN_STATUS:        Call = call("fmi2GetBooleanStatus",               CS,   "----SFT-");
+    pub(crate) const GET_STRING_STATUS:         Call = call("fmi2GetStringStatus",                CS,   "----SFT-");
 }

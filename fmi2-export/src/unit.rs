@@ -240,7 +240,7 @@ pub fn describe<M: Model>() -> ModelDescription {
                 (Kind::Real { start, .. }, Access::Real(field)) => *start = Some(*field(&mut model)),
                 (Kind::Integer { start, .. }, Access::Integer(field))
                 | (Kind::Enumeration { start, .. }, Access::Enumeration(field)) => {
-                    *start = Some(*field(&mut model))
+                    *start = Some(*field(&mut model));
                 }
                 (Kind::Boolean { start }, Access::Boolean(field)) => *start = Some(*field(&mut model)),
                 (Kind::String { start }, Access::String(field)) => *start = Some(field(&mut model).clone()),

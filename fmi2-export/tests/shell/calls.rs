@@ -1,0 +1,219 @@
+//! Which call is allowed in which state.
+
+use crate::support::{CO_SIMULATION, Instance, MODEL_EXCHANGE, U, X, c};
+use fmi2_export::types::{CEventInfo, Status};
+use std::ffi::{c_int, c_void};
+use std::ptr::{null, null_mut};
+
+/// States with their letters in the tables below. Each makes a new instance in that state.
+type Maker = fn() -> Instance;
+
+const CS_STATES: &[(char, Maker)] = &[
+    ('I', || Instance::lag(CO_SIMULATION)),
+    ('N', || {
+        let instance = Instance::lag(CO_SIMULATION);
+        instance.enter_initialization();
+        instance
+    }),
+    ('S', Instance::stepping),
+    ('F', || {
+        let instance = Instance::lag(CO_SIMULATION);
+        instance.set_string(crate::support::LABEL, c"refuse");
+        instance.initialize();
+        assert_eq!(instance.step(0.0, 0.75), Status::Discard);
+        instance
+    }),
+    ('T', || {
+        let instance = Instance::stepping();
+        assert_eq!(c!(fmi2Terminate(instance.component)), Status::Ok);
+        instance
+    }),
+    ('X', || {
+        let instance = Instance::stepping();
+        assert_eq!(instance.set_real(U, f64::NAN), Status::Error);
+        instance
+    }),
+];
+
+const ME_STATES: &[(char, Maker)] = &[
+    ('I', || Instance::lag(MODEL_EXCHANGE)),
+    ('N', || {
+        let instance = Instance::lag(MODEL_EXCHANGE);
+        instance.enter_initialization();
+        instance
+    }),
+    ('E', Instance::in_event_mode),
+    ('C', || {
+        let instance = Instance::in_event_mode();
+        assert_eq!(c!(fmi2EnterContinuousTimeMode(instance.component)), Status::Ok);
+        instance
+    }),
+    ('T', || {
+        let instance = Instance::in_event_mode();
+        assert_eq!(c!(fmi2Terminate(instance.component)), Status::Ok);
+        instance
+    }),
+    ('X', || {
+        let instance = Instance::in_event_mode();
+        assert_eq!(instance.set_real(U, f64::INFINITY), Status::Error);
+        instance
+    }),
+];
+
+type Caller = fn(*mut c_void) -> Status;
+
+/// Every function that takes a component and returns a status, with arguments that are right, and the states of
+/// co-simulation and of model exchange in which FMI 2.0 (4.2.4, 3.2.3) allows it.
+const FUNCTIONS: &[(&str, Caller, &str, &str)] = &[
+    ("fmi2SetDebugLogging", |c| c!(fmi2SetDebugLogging(c, 1, 0, null())), "INSFTX", "INECTX"),
+    ("fmi2SetupExperiment", |c| c!(fmi2SetupExperiment(c, 0, 0.0, 0.0, 0, 0.0)), "I", "I"),
+    ("fmi2EnterInitializationMode", |c| c!(fmi2EnterInitializationMode(c)), "I", "I"),
+    ("fmi2ExitInitializationMode", |c| c!(fmi2ExitInitializationMode(c)), "N", "N"),
+    ("fmi2Terminate", |c| c!(fmi2Terminate(c)), "SF", "EC"),
+    ("fmi2Reset", |c| c!(fmi2Reset(c)), "INSFTX", "INECTX"),
+    ("fmi2GetReal", |c| c!(fmi2GetReal(c, &X, 1, &mut 0.0)), "NSFTX", "NECTX"),
+    ("fmi2GetInteger", |c| c!(fmi2GetInteger(c, null(), 0, null_mut())), "NSFTX", "NECTX"),
+    ("fmi2GetBoolean", |c| c!(fmi2GetBoolean(c, null(), 0, null_mut())), "NSFTX", "NECTX"),
+    ("fmi2GetString", |c| c!(fmi2GetString(c, null(), 0, null_mut())), "NSFTX", "NECTX"),
+    ("fmi2SetReal", |c| c!(fmi2SetReal(c, &U, 1, &UNIT)), "INS", "INEC"),
+    ("fmi2SetInteger", |c| c!(fmi2SetInteger(c, null(), 0, null())), "INS", "INE"),
+    ("fmi2SetBoolean", |c| c!(fmi2SetBoolean(c, null(), 0, null())), "INS", "INE"),
+    ("fmi2SetString", |c| c!(fmi2SetString(c, null(), 0, null())), "INS", "INE"),
+    ("fmi2GetFMUstate", |c| c!(fmi2GetFMUstate(c, &mut null_mut())), "INSFTX", "INECTX"),
+    ("fmi2FreeFMUstate", |c| c!(fmi2FreeFMUstate(c, &mut null_mut())), "INSFTX", "INECTX"),
+    (
+        "fmi2SetFMUstate",
+        |c| {
+            let mut state = null_mut();
+            assert_eq!(c!(fmi2GetFMUstate(c, &mut state)), Status::Ok);
+            c!(fmi2SetFMUstate(c, state))
+        },
+        "INSFTX",
+        "INECTX",
+    ),
+    (
+        "fmi2GetDirectionalDerivative",
+        |c| c!(fmi2GetDirectionalDerivative(c, null(), 0, null(), 0, null(), null_mut())),
+        "NSFTX",
+        "NECTX",
+    ),
+    ("fmi2EnterEventMode", |c| c!(fmi2EnterEventMode(c)), "", "EC"),
+    ("fmi2NewDiscreteStates", |c| c!(fmi2NewDiscreteStates(c, &mut CEventInfo::default())), "", "E"),
+    ("fmi2EnterContinuousTimeMode", |c| c!(fmi2EnterContinuousTimeMode(c)), "", "E"),
+    ("fmi2CompletedIntegratorStep", |c| c!(fmi2CompletedIntegratorStep(c, 1, &mut 0, &mut 0)), "", "C"),
+    ("fmi2SetTime", |c| c!(fmi2SetTime(c, 0.0)), "", "EC"),
+    ("fmi2SetContinuousStates", |c| c!(fmi2SetContinuousStates(c, &UNIT, 1)), "", "C"),
+    ("fmi2GetDerivatives", |c| c!(fmi2GetDerivatives(c, &mut 0.0, 1)), "", "NECTX"),
+    ("fmi2GetEventIndicators", |c| c!(fmi2GetEventIndicators(c, null_mut(), 0)), "", "NECTX"),
+    ("fmi2GetContinuousStates", |c| c!(fmi2GetContinuousStates(c, &mut 0.0, 1)), "", "NECTX"),
+    (
+        "fmi2GetNominalsOfContinuousStates",
+        |c| c!(fmi2GetNominalsOfContinuousStates(c, &mut 0.0, 1)),
+        "",
+        "INECTX",
+    ),
+    ("fmi2SetRealInputDerivatives", |c| c!(fmi2SetRealInputDerivatives(c, &U, 1, &ONE, &UNIT)), "INS", ""),
+    (
+        "fmi2GetRealOutputDerivatives",
+        |c| c!(fmi2GetRealOutputDerivatives(c, null(), 0, null(), null_mut())),
+        "SFTX",
+        "",
+    ),
+    ("fmi2DoStep", |c| c!(fmi2DoStep(c, 0.0, 0.1, 1)), "S", ""),
+    ("fmi2CancelStep", |c| c!(fmi2CancelStep(c)), "", ""),
+    ("fmi2GetStatus", |c| c!(fmi2GetStatus(c, 0, &mut { Status::Ok })), "SFT", ""),
+    ("fmi2GetRealStatus", |c| c!(fmi2GetRealStatus(c, 2, &mut 0.0)), "SFT", ""),
+    ("fmi2GetBooleanStatus", |c| c!(fmi2GetBooleanStatus(c, 3, &mut 0)), "SFT", ""),
+    ("fmi2GetStringStatus", |c| c!(fmi2GetStringStatus(c, 1, &mut null())), "SFT", ""),
+];
+
+const UNIT: f64 = 1.0;
+const ONE: c_int = 1;
+
+fn check(
+    states: &[(char, Maker)],
+    allowed: impl Fn(&(&str, Caller, &'static str, &'static str)) -> &'static str,
+) {
+    for function in FUNCTIONS {
+        let &(name, caller, ..) = function;
+        for &(letter, make) in states {
+            let instance = make();
+            let before = instance.messages().len();
+            let status = caller(instance.component);
+            if allowed(function).contains(letter) {
+                assert_eq!(status, Status::Ok, "{name} in {letter}: {:?}", instance.messages().last());
+                continue;
+            }
+            assert_eq!(status, Status::Error, "{name} in {letter} must be refused");
+            let messages = instance.messages();
+            assert_eq!(messages.len(), before + 1, "{name} in {letter} says so once");
+            let text = &messages[before].text;
+            assert!(text.starts_with(name), "{text}");
+            assert!(text.contains("not allowed in state") || text.contains("not available"), "{text}");
+            // After that the instance is usable again.
+            assert_eq!(c!(fmi2Reset(instance.component)), Status::Ok);
+            instance.initialize();
+            assert_eq!(instance.real(X), 0.5);
+        }
+    }
+}
+
+#[test]
+fn oracle_calls_of_co_simulation_are_allowed_where_the_standard_says() {
+    check(CS_STATES, |function| function.2);
+}
+
+#[test]
+fn oracle_calls_of_model_exchange_are_allowed_where_the_standard_says() {
+    check(ME_STATES, |function| function.3);
+}
+
+#[test]
+fn a_null_component_is_an_error() {
+    for (name, caller, ..) in FUNCTIONS {
+        if *name != "fmi2SetFMUstate" {
+            assert_eq!(caller(null_mut()), Status::Error, "{name}");
+        }
+    }
+    assert_eq!(c!(fmi2SetFMUstate(null_mut(), null_mut())), Status::Error);
+    c!(fmi2FreeInstance(null_mut()));
+    c!(fmu_free_model_descriptions(null_mut()));
+}
+
+#[test]
+fn null_arguments_are_named() {
+    type Case = (&'static str, Caller);
+    let in_init: &[Case] = &[
+        ("'vr'", |c| c!(fmi2GetReal(c, null(), 1, &mut 0.0))),
+        ("'value'", |c| c!(fmi2GetReal(c, &X, 1, null_mut()))),
+        ("'vr'", |c| c!(fmi2GetInteger(c, null(), 1, &mut 0))),
+        ("'value'", |c| c!(fmi2GetBoolean(c, &X, 1, null_mut()))),
+        ("'value'", |c| c!(fmi2GetString(c, &X, 1, null_mut()))),
+        ("'vr'", |c| c!(fmi2SetReal(c, null(), 1, &UNIT))),
+        ("'value'", |c| c!(fmi2SetReal(c, &U, 1, null()))),
+        ("'value'", |c| c!(fmi2SetInteger(c, &U, 1, null()))),
+        ("'value'", |c| c!(fmi2SetBoolean(c, &U, 1, null()))),
+        ("'value'", |c| c!(fmi2SetString(c, &crate::support::LABEL, 1, null()))),
+        ("'value' is NULL", |c| c!(fmi2SetString(c, &crate::support::LABEL, 1, &null()))),
+        ("'categories'", |c| c!(fmi2SetDebugLogging(c, 1, 1, null()))),
+        ("'FMUstate'", |c| c!(fmi2GetFMUstate(c, null_mut()))),
+        ("'FMUstate'", |c| c!(fmi2SetFMUstate(c, null_mut()))),
+        ("'FMUstate'", |c| c!(fmi2DeSerializeFMUstate(c, null(), 0, null_mut()))),
+        ("'serializedState'", |c| c!(fmi2DeSerializeFMUstate(c, null(), 9, &mut null_mut()))),
+        ("'order'", |c| c!(fmi2SetRealInputDerivatives(c, &U, 1, null(), &UNIT))),
+        ("'dvUnknown'", |c| c!(fmi2GetDirectionalDerivative(c, &X, 1, null(), 0, null(), null_mut()))),
+        ("elements", |c| c!(fmi2GetReal(c, &X, usize::MAX, &mut 0.0))),
+    ];
+    for (part, caller) in in_init {
+        let instance = Instance::lag(CO_SIMULATION);
+        instance.enter_initialization();
+        assert_eq!(caller(instance.component), Status::Error, "{part}");
+        instance.said(&[part]);
+    }
+    let instance = Instance::in_event_mode();
+    assert_eq!(c!(fmi2NewDiscreteStates(instance.component, null_mut())), Status::Error);
+    instance.said(&["'fmi2eventInfo' is NULL"]);
+    let instance = Instance::stepping();
+    assert_eq!(c!(fmi2GetRealStatus(instance.component, 2, null_mut())), Status::Error);
+    instance.said(&["'value' is NULL"]);
+}

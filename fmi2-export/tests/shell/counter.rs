@@ -1,0 +1,75 @@
+//! The second unit of the library: for co-simulation only, with a defect for every place where a panic can start.
+
+use fmi2_export::table::{discrete_output, input, parameter};
+use fmi2_export::{Context, Description, Failure, Inputs, Model, Table};
+use model_description::DefaultExperiment;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Counts its steps.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct Counter {
+    defect: String,
+    increment: f64,
+    count: f64,
+    seen: f64,
+    resources: String,
+}
+
+impl Counter {
+    fn meet(&self, place: &str) {
+        assert!(self.defect != place, "defect in {place}");
+    }
+}
+
+impl Model for Counter {
+    fn description() -> Description<Self> {
+        Description {
+            name: "Counter",
+            description: "Counts its steps",
+            documentation: "",
+            version: "1",
+            model_exchange: false,
+            event_indicators: 0,
+            default_experiment: DefaultExperiment { start: 0.0, stop: 1.0, tolerance: 1e-6, step: 0.1 },
+            table: Table::new()
+                .string(parameter("defect", "Where to panic"), |m: &mut Self| &mut m.defect)
+                .real(input("increment", "What a step adds").real(), |m| &mut m.increment)
+                .real(discrete_output("count", "Sum of the increments").real(), |m| &mut m.seen)
+                .string(discrete_output("resources", "The resource folder"), |m| &mut m.resources),
+        }
+    }
+
+    fn new() -> Self {
+        Self { defect: String::new(), increment: 1.0, count: 0.0, seen: 0.0, resources: String::new() }
+    }
+
+    fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
+        self.meet("initialize");
+        if self.defect == "parameter" {
+            return Err(Failure::Error("defect = parameter is not allowed".into()));
+        }
+        self.resources =
+            context.resources.map_or("none", |path: &Path| path.to_str().unwrap_or_default()).into();
+        self.count = context.start_time;
+        Ok(())
+    }
+
+    fn calculate(&mut self, _time: f64) -> Result<(), Failure> {
+        self.meet("calculate");
+        self.seen = self.count;
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        _from: f64,
+        _to: f64,
+        _inputs: &dyn Inputs<Self>,
+        _log: &mut dyn FnMut(&str),
+    ) -> Result<(), Failure> {
+        self.meet("step");
+        self.count += self.increment;
+        Ok(())
+    }
+}

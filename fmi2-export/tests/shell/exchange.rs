@@ -1,0 +1,134 @@
+//! Model exchange: states, derivatives, events, directional derivatives.
+
+use crate::support::*;
+use fmi2_export::types::Status;
+
+fn state(instance: &Instance) -> f64 {
+    let mut x = f64::NAN;
+    assert_eq!(c!(fmi2GetContinuousStates(instance.component, &mut x, 1)), Status::Ok);
+    x
+}
+
+fn derivative(instance: &Instance) -> f64 {
+    let mut value = f64::NAN;
+    assert_eq!(c!(fmi2GetDerivatives(instance.component, &mut value, 1)), Status::Ok);
+    value
+}
+
+#[test]
+fn oracle_an_euler_loop_with_the_time_event_agrees_with_the_closed_form() {
+    let instance = Instance::in_event_mode();
+    let component = instance.component;
+    assert_eq!(instance.set_real(U, 1.0), Status::Ok);
+    let info = instance.event_info();
+    assert_eq!((info.next_event_time_defined, info.next_event_time), (1, 1.25));
+    assert_eq!((info.new_discrete_states_needed, info.terminate_simulation), (0, 0));
+    assert_eq!(c!(fmi2EnterContinuousTimeMode(component)), Status::Ok);
+    let (n, h) = (20_000, 1e-4);
+    for k in 0..n {
+        let x = state(&instance) + h * derivative(&instance);
+        let t = f64::from(k + 1) * h;
+        assert_eq!(c!(fmi2SetTime(component, t)), Status::Ok);
+        assert_eq!(c!(fmi2SetContinuousStates(component, &x, 1)), Status::Ok);
+        let (mut event, mut end) = (-1, -1);
+        assert_eq!(c!(fmi2CompletedIntegratorStep(component, 1, &mut event, &mut end)), Status::Ok);
+        assert_eq!((event, end), (0, 0));
+        if k + 1 == 12_500 {
+            assert_eq!(c!(fmi2EnterEventMode(component)), Status::Ok);
+            assert_eq!(instance.event_info().next_event_time_defined, 0);
+            assert_eq!(instance.boolean(SWITCHED), 1);
+            assert_eq!(c!(fmi2EnterContinuousTimeMode(component)), Status::Ok);
+        }
+    }
+    let at_switch = 2.0 + (0.5 - 2.0) * (-1.25f64 / 0.5).exp();
+    let exact = 1.0 + (at_switch - 1.0) * (-0.75f64 / 0.5).exp();
+    // Explicit Euler: error of the order of h.
+    assert!((state(&instance) - exact).abs() < 2.0 * h, "{} {exact}", state(&instance));
+    assert_eq!(instance.real(X), state(&instance));
+}
+
+#[test]
+fn states_have_nominal_values_and_lengths_are_checked() {
+    let instance = Instance::in_event_mode();
+    let component = instance.component;
+    let mut two = [f64::NAN; 2];
+    assert_eq!(c!(fmi2GetNominalsOfContinuousStates(component, two.as_mut_ptr(), 1)), Status::Ok);
+    assert_eq!(two[0], 2.0);
+    assert_eq!(c!(fmi2GetContinuousStates(component, two.as_mut_ptr(), 2)), Status::Error);
+    instance.said(&["room for 2 continuous states, but the unit has 1"]);
+    let instance = Instance::in_event_mode();
+    assert_eq!(c!(fmi2GetEventIndicators(instance.component, two.as_mut_ptr(), 1)), Status::Error);
+    instance.said(&["room for 1 event indicators, but the unit has 0"]);
+}
+
+#[test]
+fn a_state_that_is_not_finite_is_discarded() {
+    let instance = Instance::in_event_mode();
+    assert_eq!(c!(fmi2EnterContinuousTimeMode(instance.component)), Status::Ok);
+    let x = f64::INFINITY;
+    assert_eq!(c!(fmi2SetContinuousStates(instance.component, &x, 1)), Status::Discard);
+    instance.said(&["state 'x' = inf is not finite"]);
+    assert_eq!(state(&instance), 0.5);
+    assert_eq!(c!(fmi2SetTime(instance.component, f64::NAN)), Status::Error);
+}
+
+#[test]
+fn oracle_directional_derivatives_agree_with_differences() {
+    let instance = Instance::in_event_mode();
+    let component = instance.component;
+    let (unknown, known, seed) = ([DERIVATIVE, Y], [U, X], [0.5, -2.0]);
+    let mut analytic = [f64::NAN; 2];
+    let (unknowns, knowns) = (unknown.as_ptr(), known.as_ptr());
+    let status = c!(fmi2GetDirectionalDerivative(
+        component,
+        unknowns,
+        2,
+        knowns,
+        2,
+        seed.as_ptr(),
+        analytic.as_mut_ptr()
+    ));
+    assert_eq!(status, Status::Ok);
+    let values = || unknown.map(|reference| instance.real(reference));
+    let before = values();
+    assert_eq!(c!(fmi2EnterContinuousTimeMode(component)), Status::Ok);
+    // The model is linear: one difference of any size is exact but for rounding.
+    let x = state(&instance) + seed[1];
+    assert_eq!(instance.set_real(U, seed[0]), Status::Ok);
+    assert_eq!(c!(fmi2SetContinuousStates(component, &x, 1)), Status::Ok);
+    let after = values();
+    for i in 0..2 {
+        assert!((after[i] - before[i] - analytic[i]).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn directional_derivatives_by_or_of_the_wrong_variables_are_refused() {
+    for (unknown, known, part) in [
+        (U, X, "'u' is set from outside"),
+        (Y, GAIN, "'gain.early' is neither an input nor a state"),
+        (Y, Y, "'y' is neither an input nor a state"),
+        (TEXT, U, "not of type Real"),
+    ] {
+        let instance = Instance::in_event_mode();
+        let (seed, mut value) = (1.0, 0.0);
+        let component = instance.component;
+        let status = c!(fmi2GetDirectionalDerivative(component, &unknown, 1, &known, 1, &seed, &mut value,));
+        assert_eq!(status, Status::Error);
+        instance.said(&["fmi2GetDirectionalDerivative", part]);
+    }
+}
+
+#[test]
+fn saved_states_hold_in_model_exchange_too() {
+    let instance = Instance::in_event_mode();
+    let component = instance.component;
+    assert_eq!(c!(fmi2EnterContinuousTimeMode(component)), Status::Ok);
+    let saved = instance.save();
+    let x = 7.0;
+    assert_eq!(c!(fmi2SetTime(component, 0.5)), Status::Ok);
+    assert_eq!(c!(fmi2SetContinuousStates(component, &x, 1)), Status::Ok);
+    assert_eq!(derivative(&instance), -14.0);
+    assert_eq!(c!(fmi2SetFMUstate(component, saved)), Status::Ok);
+    assert_eq!((state(&instance), derivative(&instance)), (0.5, -1.0));
+}

@@ -1,0 +1,121 @@
+//! Instantiation, several instances and units side by side, panics.
+
+use crate::support::*;
+use fmi2_export::types::Status;
+use std::ffi::CStr;
+use std::ptr::{null, null_mut};
+
+#[test]
+#[allow(unsafe_code)]
+fn the_library_says_what_it_is() {
+    // SAFETY: both are texts of the library itself.
+    let texts = [crate::fmi2::fmi2GetVersion(), crate::fmi2::fmi2GetTypesPlatform()]
+        .map(|text| unsafe { CStr::from_ptr(text) });
+    assert_eq!(texts, [c"2.0", c"default"]);
+}
+
+#[test]
+fn what_cannot_be_instantiated_is_refused_with_a_message() {
+    let own = guid("Counter");
+    let cases = [
+        (None, CO_SIMULATION, Some(own.as_c_str()), None, "'instanceName' is NULL"),
+        (Some(c""), CO_SIMULATION, Some(&own), None, "instance name is empty"),
+        (Some(c"\xff"), CO_SIMULATION, Some(&own), None, "is not UTF-8"),
+        (Some(c"it"), CO_SIMULATION, None, None, "'fmuGUID' is NULL"),
+        (Some(c"it"), CO_SIMULATION, Some(c"{8c4e810f}"), None, "no unit with GUID '{8c4e810f}'"),
+        (Some(c"it"), 2, Some(&own), None, "fmuType 2"),
+        (Some(c"it"), MODEL_EXCHANGE, Some(&own), None, "Counter is for co-simulation only"),
+        (Some(c"it"), CO_SIMULATION, Some(&own), Some(c"http://example.org"), "scheme 'http'"),
+    ];
+    for (name, fmu_type, guid, resources, part) in cases {
+        let refused = instantiate(name, fmu_type, guid, resources, false);
+        assert!(refused.component.is_null(), "{part}");
+        refused.said(&["fmi2Instantiate", part]);
+        assert_eq!(refused.messages()[0].status, Status::Error);
+    }
+}
+
+#[test]
+fn no_callbacks_and_no_logger_are_fine() {
+    let own = guid("Lag");
+    let mut silent = callbacks(null());
+    silent.logger = None;
+    for callbacks in [null(), &raw const silent] {
+        let component = c!(fmi2Instantiate(c"it".as_ptr(), 1, own.as_ptr(), null(), callbacks, 0, 1));
+        assert!(!component.is_null());
+        assert_eq!(c!(fmi2DoStep(component, 0.0, 0.1, 1)), Status::Error);
+        c!(fmi2FreeInstance(component));
+        assert_eq!(
+            c!(fmi2Instantiate(c"it".as_ptr(), 1, c"x".as_ptr(), null(), callbacks, 0, 1)),
+            null_mut()
+        );
+    }
+}
+
+#[test]
+fn the_resource_folder_reaches_the_unit() {
+    const RESOURCES: u32 = 3;
+    for (uri, expected) in [
+        (None, "none"),
+        (Some(c"file:///tmp/a%20b/resources/"), "/tmp/a b/resources"),
+        (Some(c"file:/tmp/Gr%C3%B6%C3%9Fe"), "/tmp/Größe"),
+    ] {
+        let instance = instantiate(Some(c"it"), CO_SIMULATION, Some(&guid("Counter")), uri, true);
+        instance.initialize();
+        assert_eq!(instance.string(RESOURCES), expected);
+    }
+}
+
+#[test]
+fn interleaved_instances_and_units_do_not_see_each_other() {
+    const COUNT: u32 = 2;
+    let alone = |gain: f64| {
+        let instance = Instance::lag(CO_SIMULATION);
+        assert_eq!(instance.set_real(GAIN, gain), Status::Ok);
+        instance.initialize();
+        assert_eq!(instance.set_real(U, 1.0), Status::Ok);
+        instance
+    };
+    let steps = |instance: &Instance, k: i32| {
+        assert_eq!(instance.step(f64::from(k) * 0.1, 0.1), Status::Ok);
+        instance.real(X).to_bits()
+    };
+    let (one, two) = (alone(2.0), alone(-3.0));
+    let expected: Vec<_> = (0..20).map(|k| steps(&one, k)).zip((0..20).map(|k| steps(&two, k))).collect();
+    let (one, two, counter) = (alone(2.0), alone(-3.0), Instance::of("Counter", CO_SIMULATION));
+    counter.initialize();
+    for k in 0..20 {
+        assert_eq!((steps(&one, k), steps(&two, k)), expected[k as usize]);
+        assert_eq!(counter.step(f64::from(k) * 0.1, 0.1), Status::Ok);
+        assert_eq!(counter.real(COUNT), f64::from(k + 1));
+    }
+}
+
+#[test]
+fn a_panic_is_fatal_for_the_instance_only() {
+    const DEFECT: u32 = 0;
+    const COUNT: u32 = 2;
+    type Provoke = fn(&Instance) -> Status;
+    let bystander = Instance::stepping();
+    let places: [(&CStr, Provoke); 3] = [
+        (c"initialize", |instance| c!(fmi2ExitInitializationMode(instance.component))),
+        (c"calculate", |instance| instance.get_real(COUNT).0),
+        (c"step", |instance| {
+            assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), Status::Ok);
+            instance.step(0.0, 0.1)
+        }),
+    ];
+    for (place, provoke) in places {
+        let instance = Instance::of("Counter", CO_SIMULATION);
+        assert_eq!(instance.set_string(DEFECT, place), Status::Ok);
+        instance.enter_initialization();
+        assert_eq!(provoke(&instance), Status::Fatal);
+        instance.said(&["defect in the unit: defect in", place.to_str().unwrap()]);
+        assert_eq!(instance.messages().last().unwrap().status, Status::Fatal);
+        // From now on it only says so again, until it is freed.
+        assert_eq!(c!(fmi2Reset(instance.component)), Status::Fatal);
+        assert_eq!(instance.get_real(COUNT).0, Status::Fatal);
+        assert_eq!(instance.step(0.0, 0.1), Status::Fatal);
+    }
+    assert_eq!(bystander.step(0.0, 0.1), Status::Ok);
+}

@@ -1,0 +1,18 @@
+//! Drives the exported C functions of a library with two units, as an importer does.
+#![allow(clippy::borrow_as_ptr, reason = "calls read better with `&x`")]
+
+mod counter;
+#[path = "../../examples/lag/model.rs"]
+#[allow(unreachable_pub)]
+mod lag;
+mod support;
+
+mod calls;
+mod exchange;
+mod instances;
+mod logging;
+mod saved;
+mod steps;
+mod values;
+
+fmi2_export::export_fmus!(lag::Lag, counter::Counter);

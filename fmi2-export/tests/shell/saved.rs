@@ -1,0 +1,171 @@
+//! Saved states: in memory, as bytes, in another instance; what does not fit is refused.
+
+use crate::support::*;
+use fmi2_export::types::Status;
+use std::ptr::null_mut;
+
+/// Drives an instance over three steps from `k` on and returns the bits of everything it says.
+fn run(instance: &Instance, from: i32) -> Vec<u64> {
+    let h = 0.3;
+    let mut bits = vec![];
+    for k in from..from + 3 {
+        assert_eq!(instance.set_real(U, f64::from(k).sin()), Status::Ok);
+        assert_eq!(instance.step(f64::from(k) * h, h), Status::Ok);
+        bits.extend([X, DERIVATIVE, Y].map(|reference| instance.real(reference).to_bits()));
+        bits.push(instance.boolean(SWITCHED) as u64);
+    }
+    bits
+}
+
+#[test]
+fn a_restored_state_goes_on_bit_for_bit() {
+    let instance = Instance::stepping();
+    run(&instance, 0);
+    let mut state = instance.save();
+    let expected = run(&instance, 3);
+    for _ in 0..2 {
+        assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), Status::Ok);
+        assert_eq!(run(&instance, 3), expected);
+    }
+    assert_eq!(c!(fmi2FreeFMUstate(instance.component, &mut state)), Status::Ok);
+    assert!(state.is_null());
+    assert_eq!(c!(fmi2FreeFMUstate(instance.component, &mut state)), Status::Ok);
+    assert_eq!(c!(fmi2FreeFMUstate(instance.component, null_mut())), Status::Ok);
+}
+
+#[test]
+fn a_state_can_be_written_over() {
+    let instance = Instance::stepping();
+    let mut state = instance.save();
+    run(&instance, 0);
+    let before = state;
+    assert_eq!(c!(fmi2GetFMUstate(instance.component, &mut state)), Status::Ok);
+    assert_eq!(state, before);
+    let expected = run(&instance, 3);
+    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), Status::Ok);
+    assert_eq!(run(&instance, 3), expected);
+}
+
+#[test]
+fn bytes_restore_another_instance_bit_for_bit() {
+    let first = Instance::stepping();
+    run(&first, 0);
+    let bytes = first.serialize();
+    let second = Instance::lag(CO_SIMULATION);
+    let (status, state) = second.deserialize(&bytes);
+    assert_eq!(status, Status::Ok);
+    assert_eq!(c!(fmi2SetFMUstate(second.component, state)), Status::Ok);
+    assert_eq!(second.serialize(), bytes);
+    assert_eq!(run(&second, 3), run(&first, 3));
+}
+
+#[test]
+fn pending_input_derivatives_are_part_of_the_state() {
+    let instance = Instance::stepping();
+    let (order, value) = (1, 2.0);
+    let component = instance.component;
+    let status = c!(fmi2SetRealInputDerivatives(component, &U, 1, &order, &value));
+    assert_eq!(status, Status::Ok);
+    let state = instance.save();
+    assert_eq!(instance.step(0.0, 0.5), Status::Ok);
+    let expected = instance.real(X);
+    assert_eq!(c!(fmi2SetFMUstate(component, state)), Status::Ok);
+    assert_eq!(instance.step(0.0, 0.5), Status::Ok);
+    assert_eq!(instance.real(X).to_bits(), expected.to_bits());
+}
+
+#[test]
+fn every_damaged_byte_and_every_truncation_is_refused() {
+    let instance = Instance::stepping();
+    run(&instance, 0);
+    let bytes = instance.serialize();
+    let refused = |bytes: &[u8], what: &str| {
+        let (status, state) = instance.deserialize(bytes);
+        assert_eq!(status, Status::Error, "{what}");
+        assert!(state.is_null());
+        instance.said(&["fmi2DeSerializeFMUstate", "saved state"]);
+    };
+    for i in 0..bytes.len() {
+        for bit in 0..8 {
+            let mut damaged = bytes.clone();
+            damaged[i] ^= 1 << bit;
+            refused(&damaged, &format!("bit {bit} of byte {i}"));
+        }
+        refused(&bytes[..i], &format!("cut to {i} bytes"));
+    }
+    let longer = [bytes.as_slice(), &[0]].concat();
+    refused(&longer, "one byte more");
+    // The instance is as it was.
+    assert_eq!(instance.serialize(), bytes);
+    run(&instance, 3);
+}
+
+#[test]
+fn a_state_of_another_unit_or_interface_is_refused() {
+    let lag = Instance::stepping();
+    let bytes = lag.serialize();
+    let counter = Instance::of("Counter", CO_SIMULATION);
+    assert_eq!(counter.deserialize(&bytes).0, Status::Error);
+    counter.said(&["belongs to a unit with GUID"]);
+    let exchange = Instance::lag(MODEL_EXCHANGE);
+    assert_eq!(exchange.deserialize(&bytes).0, Status::Error);
+    exchange.said(&["other interface"]);
+    let empty = lag.deserialize(&[]);
+    assert_eq!(empty.0, Status::Error);
+}
+
+#[test]
+fn a_handle_that_is_not_ones_own_is_refused() {
+    let (one, other) = (Instance::stepping(), Instance::stepping());
+    let state = one.save();
+    assert_eq!(c!(fmi2SetFMUstate(other.component, state)), Status::Error);
+    other.said(&["not made by this instance"]);
+    let mut freed = state;
+    assert_eq!(c!(fmi2FreeFMUstate(one.component, &mut freed)), Status::Ok);
+    assert_eq!(c!(fmi2SetFMUstate(one.component, state)), Status::Error);
+    let mut twice = state;
+    assert_eq!(c!(fmi2FreeFMUstate(one.component, &mut twice)), Status::Error);
+    let mut size = 0;
+    assert_eq!(c!(fmi2SerializedFMUstateSize(one.component, state, &mut size)), Status::Error);
+    // None of this ends the simulation.
+    assert_eq!(one.step(0.0, 0.1), Status::Ok);
+    assert_eq!(other.step(0.0, 0.1), Status::Ok);
+}
+
+#[test]
+fn a_buffer_that_is_too_small_is_refused() {
+    let instance = Instance::stepping();
+    let state = instance.save();
+    let mut buffer = [0u8; 8];
+    let component = instance.component;
+    assert_eq!(c!(fmi2SerializeFMUstate(component, state, buffer.as_mut_ptr().cast(), 8)), Status::Error);
+    instance.said(&["room for 8 bytes"]);
+    assert_eq!(buffer, [0; 8]);
+}
+
+#[test]
+fn an_instance_in_error_goes_on_from_a_saved_state() {
+    let instance = Instance::stepping();
+    run(&instance, 0);
+    let state = instance.save();
+    assert_eq!(instance.set_real(U, f64::NAN), Status::Error);
+    assert_eq!(instance.step(0.9, 0.3), Status::Error);
+    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), Status::Ok);
+    run(&instance, 3);
+}
+
+#[test]
+fn reset_equals_a_new_instance_bit_for_bit() {
+    let new = Instance::lag(CO_SIMULATION);
+    let used = Instance::lag(CO_SIMULATION);
+    assert_eq!(used.set_real(GAIN, 9.0), Status::Ok);
+    assert_eq!(used.set_string(LABEL, c"used"), Status::Ok);
+    used.initialize();
+    run(&used, 0);
+    assert_eq!(c!(fmi2Reset(used.component)), Status::Ok);
+    assert_eq!(used.serialize(), new.serialize());
+    new.initialize();
+    used.initialize();
+    assert_eq!(run(&used, 0), run(&new, 0));
+    assert_eq!(used.serialize(), new.serialize());
+}

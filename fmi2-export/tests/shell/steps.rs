@@ -1,0 +1,170 @@
+//! Co-simulation: time, input derivatives, status.
+
+use crate::support::*;
+use fmi2_export::types::Status;
+use std::ffi::CStr;
+use std::ptr::null;
+
+#[test]
+fn oracle_the_step_response_is_the_exponential() {
+    let instance = Instance::stepping();
+    assert_eq!(instance.set_real(U, 1.0), Status::Ok);
+    let h = 0.01;
+    for k in 0..100 {
+        assert_eq!(instance.step(f64::from(k) * h, h), Status::Ok);
+    }
+    // x(t) = k u + (x₀ − k u) e^(−t/T)
+    let exact = 2.0 + (0.5 - 2.0) * (-1.0f64 / 0.5).exp();
+    assert!((instance.real(X) - exact).abs() < 1e-10);
+}
+
+#[test]
+fn the_last_step_may_be_shorter_by_rounding_or_empty() {
+    let instance = Instance::stepping();
+    assert_eq!(instance.step(0.0, 0.1), Status::Ok);
+    assert_eq!(instance.step(0.1, 0.1 - 1e-17), Status::Ok);
+    let before = instance.real(X);
+    assert_eq!(instance.step(0.2, 0.0), Status::Ok);
+    assert_eq!(instance.real(X), before);
+    // A master that adds up its time: ten times 0.1 is not 1.
+    let mut time = 0.2;
+    for _ in 0..300 {
+        assert_eq!(instance.step(time, 0.1), Status::Ok);
+        time += 0.1;
+    }
+}
+
+#[test]
+fn a_wrong_communication_point_or_step_is_refused() {
+    for (point, size, part) in [
+        (0.2, 0.1, "communication point 0.2 s, but the unit is at 0 s"),
+        (0.0, -0.1, "cannot step"),
+        (0.0, f64::NAN, "cannot step"),
+        (f64::INFINITY, 0.1, "cannot step"),
+    ] {
+        let instance = Instance::stepping();
+        assert_eq!(instance.step(point, size), Status::Error);
+        instance.said(&["fmi2DoStep", part]);
+    }
+}
+
+#[test]
+fn the_stop_time_holds_if_it_is_defined() {
+    let with_stop = |stop| {
+        let instance = Instance::lag(CO_SIMULATION);
+        assert_eq!(c!(fmi2SetupExperiment(instance.component, 0, 0.0, 0.0, 1, stop)), Status::Ok);
+        assert_eq!(c!(fmi2EnterInitializationMode(instance.component)), Status::Ok);
+        assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), Status::Ok);
+        instance
+    };
+    assert_eq!(with_stop(0.5).step(0.0, 0.5 + 1e-9), Status::Ok);
+    assert_eq!(with_stop(f64::INFINITY).step(0.0, 1e3), Status::Ok);
+    let instance = with_stop(0.5);
+    assert_eq!(instance.step(0.0, 0.6), Status::Error);
+    instance.said(&["beyond the stop time 0.5 s"]);
+    assert_eq!(Instance::stepping().step(0.0, 100.0), Status::Ok);
+}
+
+#[test]
+fn a_senseless_experiment_is_refused() {
+    let instance = || Instance::lag(CO_SIMULATION);
+    assert_eq!(c!(fmi2SetupExperiment(instance().component, 0, 0.0, f64::NAN, 0, 0.0)), Status::Error);
+    assert_eq!(c!(fmi2SetupExperiment(instance().component, 0, 0.0, 1.0, 1, 0.5)), Status::Error);
+    assert_eq!(c!(fmi2SetupExperiment(instance().component, 1, -1.0, 0.0, 0, 0.0)), Status::Error);
+    assert_eq!(c!(fmi2SetupExperiment(instance().component, 0, f64::NAN, 0.0, 0, f64::NAN)), Status::Ok);
+}
+
+fn set_derivative(instance: &Instance, reference: u32, order: i32, value: f64) -> Status {
+    let component = instance.component;
+    c!(fmi2SetRealInputDerivatives(component, &reference, 1, &order, &value))
+}
+
+#[test]
+fn oracle_input_derivatives_make_a_ramp() {
+    let instance = Instance::stepping();
+    let h = 0.01;
+    for k in 0..100 {
+        let t = f64::from(k) * h;
+        assert_eq!(set_derivative(&instance, U, 1, 3.0), Status::Ok);
+        assert_eq!(instance.set_real(U, 3.0 * t), Status::Ok);
+        assert_eq!(instance.step(t, h), Status::Ok);
+    }
+    // Ramp u = a t: x(t) = k a (t − T) + (x₀ + k a T) e^(−t/T)
+    let (k, a, time_constant) = (2.0, 3.0, 0.5);
+    let exact =
+        k * a * (1.0 - time_constant) + (0.5 + k * a * time_constant) * (-1.0f64 / time_constant).exp();
+    assert!((instance.real(X) - exact).abs() < 1e-9, "{} {exact}", instance.real(X));
+    assert!((instance.real(U) - 3.0).abs() < 1e-12, "the input ends where it was extrapolated to");
+}
+
+#[test]
+fn input_derivatives_hold_for_one_step() {
+    let instance = Instance::stepping();
+    assert_eq!(set_derivative(&instance, U, 2, 4.0), Status::Ok);
+    assert_eq!(instance.step(0.0, 0.5), Status::Ok);
+    assert_eq!(instance.real(U), 4.0 * 0.25 / 2.0);
+    assert_eq!(instance.step(0.5, 0.5), Status::Ok);
+    assert_eq!(instance.real(U), 0.5);
+}
+
+#[test]
+fn senseless_input_derivatives_are_refused() {
+    for (reference, order, value, part) in [
+        (U, 0, 1.0, "order 0"),
+        (U, 4, 1.0, "order 4"),
+        (U, 1, f64::NAN, "NaN is not finite"),
+        (X, 1, 1.0, "'x' is not a continuous input"),
+        (LABEL, 1, 1.0, "not of type Real"),
+        (99, 1, 1.0, "does not exist"),
+    ] {
+        let instance = Instance::stepping();
+        assert_eq!(set_derivative(&instance, reference, order, value), Status::Error);
+        instance.said(&["fmi2SetRealInputDerivatives", part]);
+    }
+}
+
+#[test]
+fn output_derivatives_are_not_offered() {
+    let instance = Instance::stepping();
+    let mut value = 0.0;
+    let status = c!(fmi2GetRealOutputDerivatives(instance.component, &X, 1, &1, &mut value));
+    assert_eq!(status, Status::Error);
+    instance.said(&["maxOutputDerivativeOrder is 0"]);
+}
+
+#[test]
+fn a_step_that_the_unit_refuses_can_be_taken_again_from_a_saved_state() {
+    let instance = Instance::lag(CO_SIMULATION);
+    assert_eq!(instance.set_string(LABEL, c"refuse"), Status::Ok);
+    instance.initialize();
+    assert_eq!(instance.step(0.0, 0.5), Status::Ok);
+    let state = instance.save();
+    assert_eq!(instance.step(0.5, 0.75), Status::Discard);
+    instance.said(&["fmi2DoStep: steps above 0.5 s are too long"]);
+    let mut time = f64::NAN;
+    assert_eq!(c!(fmi2GetRealStatus(instance.component, 2, &mut time)), Status::Ok);
+    assert_eq!(time, 0.5);
+    let mut status = Status::Ok;
+    assert_eq!(c!(fmi2GetStatus(instance.component, 0, &mut status)), Status::Ok);
+    assert_eq!(status, Status::Discard);
+    let mut terminated = -1;
+    assert_eq!(c!(fmi2GetBooleanStatus(instance.component, 3, &mut terminated)), Status::Ok);
+    assert_eq!(terminated, 0);
+    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), Status::Ok);
+    assert_eq!(instance.step(0.5, 0.25), Status::Ok);
+}
+
+#[test]
+#[allow(unsafe_code)]
+fn status_of_other_kinds_is_discarded() {
+    let instance = Instance::stepping();
+    let mut text = null();
+    assert_eq!(c!(fmi2GetStringStatus(instance.component, 1, &mut text)), Status::Ok);
+    // SAFETY: the call succeeded.
+    assert_eq!(unsafe { CStr::from_ptr(text) }, c"no step is pending");
+    let mut integer = 0;
+    assert_eq!(c!(fmi2GetIntegerStatus(instance.component, 2, &mut integer)), Status::Discard);
+    let mut real = 0.0;
+    assert_eq!(c!(fmi2GetRealStatus(instance.component, 7, &mut real)), Status::Discard);
+    assert_eq!(instance.step(0.0, 0.1), Status::Ok);
+}

@@ -1,0 +1,261 @@
+//! An importer in a few lines: an instance with its log, and calls that return what they answer.
+#![allow(unsafe_code)]
+
+use crate::fmi2;
+use fmi2_export::types::{CEventInfo, Callbacks, LogCallback, Status};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::ptr::{null, null_mut};
+use std::sync::Mutex;
+
+pub(crate) const MODEL_EXCHANGE: c_int = 0;
+pub(crate) const CO_SIMULATION: c_int = 1;
+
+/// Value references of the unit `Lag`.
+pub(crate) const TIME_CONSTANT: u32 = 0;
+pub(crate) const GAIN: u32 = 1;
+pub(crate) const INITIAL: u32 = 4;
+pub(crate) const ORDER: u32 = 5;
+pub(crate) const INVERTED: u32 = 6;
+pub(crate) const SHAPE: u32 = 7;
+pub(crate) const LABEL: u32 = 8;
+pub(crate) const U: u32 = 9;
+pub(crate) const X: u32 = 10;
+pub(crate) const DERIVATIVE: u32 = 11;
+pub(crate) const Y: u32 = 12;
+pub(crate) const SWITCHED: u32 = 14;
+pub(crate) const TEXT: u32 = 15;
+
+/// What the importer's logger was told.
+#[derive(Clone, Debug)]
+pub(crate) struct Message {
+    pub(crate) status: Status,
+    pub(crate) category: String,
+    pub(crate) text: String,
+    pub(crate) instance: String,
+}
+
+type Log = Mutex<Vec<Message>>;
+
+extern "C" fn log(
+    environment: *mut c_void,
+    instance: *const c_char,
+    status: Status,
+    category: *const c_char,
+    message: *const c_char,
+) {
+    // SAFETY: the environment is the log that `Instance` keeps alive, the texts are NUL-terminated.
+    let (log, [instance, category, text]) = unsafe {
+        let texts =
+            [instance, category, message].map(|text| CStr::from_ptr(text).to_str().unwrap().to_owned());
+        (&*environment.cast::<Log>(), texts)
+    };
+    log.lock().unwrap().push(Message { status, category, text, instance });
+}
+
+pub(crate) fn callbacks(log_to: *const Log) -> Callbacks {
+    type Fixed = extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char);
+    // SAFETY: a variadic call without variadic arguments passes the fixed ones like any other on the supported platforms.
+    let logger = unsafe { std::mem::transmute::<Fixed, LogCallback>(log) };
+    Callbacks {
+        logger: Some(logger),
+        allocate_memory: None,
+        free_memory: None,
+        step_finished: None,
+        component_environment: log_to.cast_mut().cast(),
+    }
+}
+
+/// Calls an exported function.
+macro_rules! c {
+    ($function:ident($($argument:expr),* $(,)?)) => {{
+        // SAFETY: every pointer that a test passes is null or valid for the call, as the standard wants it.
+        #[allow(unsafe_code)]
+        let result = unsafe { crate::fmi2::$function($($argument),*) };
+        result
+    }};
+}
+pub(crate) use c;
+
+/// An instance with its log.
+pub(crate) struct Instance {
+    pub(crate) component: *mut c_void,
+    log: Box<Log>,
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        c!(fmi2FreeInstance(self.component));
+    }
+}
+
+/// GUID of the unit of this library with that name.
+pub(crate) fn guid(name: &str) -> CString {
+    let text = fmi2::fmu_model_descriptions();
+    assert!(!text.is_null());
+    // SAFETY: not null, NUL-terminated.
+    let json = unsafe { CStr::from_ptr(text) }.to_str().unwrap().to_owned();
+    c!(fmu_free_model_descriptions(text));
+    let units: Vec<model_description::ModelDescription> = serde_json::from_str(&json).unwrap();
+    let unit = units.iter().find(|unit| unit.name == name).unwrap();
+    CString::new(unit.guid()).unwrap()
+}
+
+/// Instantiates; the component is null if that was refused.
+pub(crate) fn instantiate(
+    name: Option<&CStr>,
+    fmu_type: c_int,
+    guid: Option<&CStr>,
+    resources: Option<&CStr>,
+    logging: bool,
+) -> Instance {
+    let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
+    let log: Box<Log> = Box::default();
+    // Lives during the call only, as with some importers.
+    let callbacks = Box::new(callbacks(&raw const *log));
+    let component = c!(fmi2Instantiate(
+        pointer(name),
+        fmu_type,
+        pointer(guid),
+        pointer(resources),
+        &raw const *callbacks,
+        0,
+        c_int::from(logging),
+    ));
+    drop(callbacks);
+    Instance { component, log }
+}
+
+impl Instance {
+    pub(crate) fn lag(fmu_type: c_int) -> Self {
+        Self::of("Lag", fmu_type)
+    }
+
+    pub(crate) fn of(unit: &str, fmu_type: c_int) -> Self {
+        let instance = instantiate(Some(c"it"), fmu_type, Some(&guid(unit)), None, true);
+        assert!(!instance.component.is_null(), "{:?}", instance.messages());
+        instance
+    }
+
+    /// A `Lag` for co-simulation at t = 0.
+    pub(crate) fn stepping() -> Self {
+        let instance = Self::lag(CO_SIMULATION);
+        instance.initialize();
+        instance
+    }
+
+    /// A `Lag` for model exchange in event mode at t = 0.
+    pub(crate) fn in_event_mode() -> Self {
+        let instance = Self::lag(MODEL_EXCHANGE);
+        instance.initialize();
+        instance
+    }
+
+    pub(crate) fn initialize(&self) {
+        self.enter_initialization();
+        assert_eq!(c!(fmi2ExitInitializationMode(self.component)), Status::Ok, "{:?}", self.messages());
+    }
+
+    pub(crate) fn enter_initialization(&self) {
+        assert_eq!(c!(fmi2SetupExperiment(self.component, 1, 1e-4, 0.0, 0, 0.0)), Status::Ok);
+        assert_eq!(c!(fmi2EnterInitializationMode(self.component)), Status::Ok);
+    }
+
+    pub(crate) fn messages(&self) -> Vec<Message> {
+        self.log.lock().unwrap().clone()
+    }
+
+    /// The last message, which must hold all of `parts`.
+    #[track_caller]
+    pub(crate) fn said(&self, parts: &[&str]) {
+        let messages = self.messages();
+        let last = messages.last().expect("no message at all");
+        for part in parts {
+            assert!(last.text.contains(part), "no '{part}' in '{}'", last.text);
+        }
+    }
+
+    pub(crate) fn set_real(&self, reference: u32, value: f64) -> Status {
+        c!(fmi2SetReal(self.component, &reference, 1, &value))
+    }
+
+    pub(crate) fn set_integer(&self, reference: u32, value: i32) -> Status {
+        c!(fmi2SetInteger(self.component, &reference, 1, &value))
+    }
+
+    pub(crate) fn set_boolean(&self, reference: u32, value: i32) -> Status {
+        c!(fmi2SetBoolean(self.component, &reference, 1, &value))
+    }
+
+    pub(crate) fn set_string(&self, reference: u32, value: &CStr) -> Status {
+        let value = value.as_ptr();
+        c!(fmi2SetString(self.component, &reference, 1, &value))
+    }
+
+    pub(crate) fn get_real(&self, reference: u32) -> (Status, f64) {
+        let mut value = f64::NAN;
+        (c!(fmi2GetReal(self.component, &reference, 1, &mut value)), value)
+    }
+
+    #[track_caller]
+    pub(crate) fn real(&self, reference: u32) -> f64 {
+        let (status, value) = self.get_real(reference);
+        assert_eq!(status, Status::Ok, "{:?}", self.messages());
+        value
+    }
+
+    pub(crate) fn integer(&self, reference: u32) -> i32 {
+        let mut value = i32::MIN;
+        assert_eq!(c!(fmi2GetInteger(self.component, &reference, 1, &mut value)), Status::Ok);
+        value
+    }
+
+    pub(crate) fn boolean(&self, reference: u32) -> i32 {
+        let mut value = i32::MIN;
+        assert_eq!(c!(fmi2GetBoolean(self.component, &reference, 1, &mut value)), Status::Ok);
+        value
+    }
+
+    pub(crate) fn string(&self, reference: u32) -> String {
+        let mut value = null();
+        assert_eq!(c!(fmi2GetString(self.component, &reference, 1, &mut value)), Status::Ok);
+        // SAFETY: the call succeeded, so this is NUL-terminated until the next one.
+        unsafe { CStr::from_ptr(value) }.to_str().unwrap().to_owned()
+    }
+
+    pub(crate) fn step(&self, point: f64, size: f64) -> Status {
+        c!(fmi2DoStep(self.component, point, size, 1))
+    }
+
+    pub(crate) fn event_info(&self) -> CEventInfo {
+        let mut info = CEventInfo::default();
+        assert_eq!(c!(fmi2NewDiscreteStates(self.component, &mut info)), Status::Ok);
+        info
+    }
+
+    pub(crate) fn save(&self) -> *mut c_void {
+        let mut state = null_mut();
+        assert_eq!(c!(fmi2GetFMUstate(self.component, &mut state)), Status::Ok, "{:?}", self.messages());
+        assert!(!state.is_null());
+        state
+    }
+
+    pub(crate) fn serialize(&self) -> Vec<u8> {
+        let mut state = self.save();
+        let mut size = 0;
+        assert_eq!(c!(fmi2SerializedFMUstateSize(self.component, state, &mut size)), Status::Ok);
+        let mut bytes = vec![0u8; size];
+        assert_eq!(
+            c!(fmi2SerializeFMUstate(self.component, state, bytes.as_mut_ptr().cast(), size)),
+            Status::Ok
+        );
+        assert_eq!(c!(fmi2FreeFMUstate(self.component, &mut state)), Status::Ok);
+        bytes
+    }
+
+    pub(crate) fn deserialize(&self, bytes: &[u8]) -> (Status, *mut c_void) {
+        let mut state = null_mut();
+        let status =
+            c!(fmi2DeSerializeFMUstate(self.component, bytes.as_ptr().cast(), bytes.len(), &mut state));
+        (status, state)
+    }
+}

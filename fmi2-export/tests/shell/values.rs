@@ -1,0 +1,142 @@
+//! Getting and setting: types, limits, causality, laziness.
+
+use crate::support::*;
+use fmi2_export::types::Status;
+use std::ptr::null;
+
+fn initializing() -> Instance {
+    let instance = Instance::lag(CO_SIMULATION);
+    instance.enter_initialization();
+    instance
+}
+
+#[test]
+fn a_refused_value_leaves_the_old_one_in_place() {
+    let cases: &[(u32, f64, &str)] = &[
+        (TIME_CONSTANT, f64::NAN, "'timeConstant' = NaN is not a finite number"),
+        (TIME_CONSTANT, f64::NEG_INFINITY, "is not a finite number"),
+        (TIME_CONSTANT, 0.0, "'timeConstant' = 0.0 is below the minimum 0.001"),
+        (U, 100.5, "'u' = 100.5 is above the maximum 100"),
+        (X, 1.0, "'x' is calculated by the unit"),
+        (ORDER, 1.0, "'order' (value reference 5) is not of type Real"),
+        (16, 1.0, "value reference 16 does not exist"),
+        (u32::MAX, 1.0, "does not exist"),
+    ];
+    for &(reference, value, part) in cases {
+        let instance = initializing();
+        let before = (reference < 5 || reference == U).then(|| instance.real(reference));
+        assert_eq!(instance.set_real(reference, value), Status::Error);
+        instance.said(&["fmi2SetReal", part]);
+        if let Some(before) = before {
+            assert_eq!(instance.real(reference), before);
+        }
+    }
+}
+
+#[test]
+fn one_refused_value_refuses_all_of_the_call() {
+    let instance = initializing();
+    let references = [GAIN, TIME_CONSTANT];
+    let values = [7.0, -1.0];
+    assert_eq!(c!(fmi2SetReal(instance.component, references.as_ptr(), 2, values.as_ptr())), Status::Error);
+    assert_eq!(instance.real(GAIN), 2.0);
+}
+
+#[test]
+fn integers_enumerations_booleans_and_strings_are_checked() {
+    let instance = initializing();
+    assert_eq!(instance.set_integer(ORDER, 3), Status::Error);
+    instance.said(&["'order' = 3 is above the maximum 2"]);
+
+    for item in [0, 3, i32::MIN] {
+        let instance = initializing();
+        assert_eq!(instance.set_integer(SHAPE, item), Status::Error);
+        instance.said(&["'shape'", "is not an item of Shape: these are 1 to 2"]);
+        assert_eq!(instance.integer(SHAPE), 1);
+    }
+
+    let instance = initializing();
+    assert_eq!(instance.set_boolean(INVERTED, 2), Status::Error);
+    instance.said(&["'inverted'", "neither fmi2False (0) nor fmi2True (1)"]);
+    assert_eq!(instance.boolean(INVERTED), 0);
+
+    let instance = initializing();
+    assert_eq!(instance.set_string(LABEL, c"Gr\xf6\xdfe"), Status::Error);
+    instance.said(&["'label'", "is not UTF-8"]);
+    assert_eq!(instance.string(LABEL), "lag");
+}
+
+#[test]
+fn every_type_is_set_and_read_back() {
+    let instance = initializing();
+    assert_eq!(instance.set_real(TIME_CONSTANT, 0.25), Status::Ok);
+    assert_eq!(instance.set_integer(SHAPE, 2), Status::Ok);
+    assert_eq!(instance.set_boolean(INVERTED, 1), Status::Ok);
+    assert_eq!(instance.set_string(LABEL, c"Größe"), Status::Ok);
+    assert_eq!(instance.real(TIME_CONSTANT), 0.25);
+    assert_eq!(instance.integer(SHAPE), 2);
+    assert_eq!(instance.boolean(INVERTED), 1);
+    assert_eq!(instance.string(LABEL), "Größe");
+    assert_eq!(instance.string(TEXT), "Größe");
+    assert_eq!(instance.boolean(SWITCHED), 0);
+}
+
+#[test]
+fn a_fixed_parameter_cannot_be_set_after_initialization() {
+    let instance = Instance::stepping();
+    assert_eq!(instance.set_real(GAIN, 3.0), Status::Error);
+    instance.said(&["'gain.early' is a fixed parameter"]);
+    assert_eq!(instance.real(GAIN), 2.0);
+}
+
+#[test]
+fn parameters_set_in_initialization_mode_are_taken_up_before_the_next_read() {
+    let instance = initializing();
+    assert_eq!(instance.real(X), 0.5);
+    assert_eq!(instance.set_real(INITIAL, 3.0), Status::Ok);
+    assert_eq!(instance.real(X), 3.0);
+    assert_eq!(instance.set_real(U, 1.0), Status::Ok);
+    assert_eq!(instance.real(Y), 4.0);
+    // der(x) = (k u − x) / T
+    assert_eq!(instance.real(DERIVATIVE), (2.0 * 1.0 - 3.0) / 0.5);
+    assert_eq!(instance.set_real(INITIAL, -1.0), Status::Ok);
+    assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), Status::Ok);
+    assert_eq!(instance.real(X), -1.0);
+}
+
+#[test]
+fn a_parameter_that_the_unit_refuses_stops_initialization() {
+    let instance = initializing();
+    assert_eq!(instance.set_integer(ORDER, 2), Status::Ok);
+    assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), Status::Error);
+    instance.said(&["fmi2ExitInitializationMode: order = 2, but only 1 is there"]);
+    assert_eq!(c!(fmi2Reset(instance.component)), Status::Ok);
+    instance.initialize();
+}
+
+#[test]
+fn after_an_error_values_can_be_read_but_not_set() {
+    let instance = Instance::stepping();
+    assert_eq!(instance.set_real(U, f64::NAN), Status::Error);
+    assert_eq!(instance.get_real(U), (Status::Ok, 0.0));
+    assert_eq!(instance.set_real(U, 1.0), Status::Error);
+    instance.said(&["not allowed in state error"]);
+    assert_eq!(instance.step(0.0, 0.1), Status::Error);
+    assert_eq!(c!(fmi2Reset(instance.component)), Status::Ok);
+    instance.initialize();
+    assert_eq!(instance.set_real(U, 1.0), Status::Ok);
+    assert_eq!(instance.step(0.0, 0.1), Status::Ok);
+}
+
+#[test]
+fn no_values_need_no_pointers() {
+    let instance = Instance::stepping();
+    assert_eq!(c!(fmi2SetReal(instance.component, null(), 0, null())), Status::Ok);
+}
+
+#[test]
+fn negative_zero_is_another_value_than_zero() {
+    let instance = initializing();
+    assert_eq!(instance.set_real(U, -0.0), Status::Ok);
+    assert!(instance.real(U).is_sign_negative());
+}

@@ -1,0 +1,290 @@
+//! A small unit described by hand: its GUID, checks, XML, page and archive.
+
+use model_description::pack::{Extras, pack};
+use model_description::unit::{angle, angular_rate};
+use model_description::variable::{Causality, EnumerationType, Kind, Variability, Variable};
+use model_description::{DefaultExperiment, Error, ModelDescription, library};
+use std::fs;
+use std::io::Read;
+use std::path::Path;
+
+fn variable(name: &str, causality: Causality, variability: Variability, kind: Kind) -> Variable {
+    let description = format!("What <{name}> & co. are");
+    Variable { name: name.into(), description, causality, variability, kind, dependencies: vec![] }
+}
+
+fn real(start: Option<f64>) -> Kind {
+    Kind::Real { unit: Some(angle()), min: None, max: None, nominal: None, start, derivative_of: None }
+}
+
+/// Position 0: parameter, 1: enumeration, 2: input, 3: state, 4: derivative, 5: output with feedthrough.
+fn unit() -> ModelDescription {
+    use Causality::{Input, Local, Output, Parameter};
+    use Variability::{Continuous, Discrete, Fixed};
+    let kind = EnumerationType {
+        name: "Shape".into(),
+        description: "How".into(),
+        items: vec![("flat".into(), "Nothing".into()), ("steep".into(), "Much".into())],
+    };
+    let rate = Kind::Real {
+        unit: Some(angular_rate()),
+        min: None,
+        max: None,
+        nominal: None,
+        start: None,
+        derivative_of: Some("angle".into()),
+    };
+    let mut variables = vec![
+        variable(
+            "gain",
+            Parameter,
+            Fixed,
+            Kind::Real {
+                unit: None,
+                min: Some(0.0),
+                max: Some(10.0),
+                nominal: None,
+                start: Some(2.5),
+                derivative_of: None,
+            },
+        ),
+        variable("shape", Parameter, Fixed, Kind::Enumeration { of: kind, start: Some(2) }),
+        variable("u[1]", Input, Continuous, real(Some(std::f64::consts::PI / 180.0))),
+        variable("angle", Output, Continuous, real(None)),
+        variable("der(angle)", Local, Continuous, rate),
+        variable("y", Output, Continuous, real(None)),
+        variable("count", Output, Discrete, Kind::Integer { min: None, max: None, start: None }),
+    ];
+    for (i, names) in [(4, vec!["u[1]"]), (5, vec!["angle", "u[1]"])] {
+        variables[i].dependencies = names.into_iter().map(String::from).collect();
+    }
+    ModelDescription {
+        name: "Small".into(),
+        description: "A small unit".into(),
+        documentation: "<p>Not much.</p>".into(),
+        version: "1.2.3".into(),
+        co_simulation: true,
+        model_exchange: true,
+        event_indicators: 0,
+        default_experiment: DefaultExperiment { start: 0.0, stop: 50.0, tolerance: 1e-4, step: 0.04 },
+        variables,
+    }
+}
+
+#[test]
+fn the_guid_is_a_uuid_that_follows_every_change() {
+    let guid = unit().guid();
+    assert_eq!(guid, unit().guid());
+    let parts: Vec<_> = guid.split('-').collect();
+    assert_eq!(parts.iter().map(|part| part.len()).collect::<Vec<_>>(), [8, 4, 4, 4, 12]);
+    assert!(guid.chars().all(|c| c == '-' || c.is_ascii_digit() || ('a'..='f').contains(&c)));
+    let mut other = unit();
+    other.variables[0].description.push('.');
+    assert_ne!(other.guid(), guid);
+    let mut other = unit();
+    other.version = "1.2.4".into();
+    assert_ne!(other.guid(), guid);
+}
+
+#[test]
+fn contradictions_are_found_and_name_the_variable() {
+    type Change = fn(&mut ModelDescription);
+    let cases: &[(Change, &str)] = &[
+        (|unit| unit.name = "a b".into(), "C identifier"),
+        (|unit| unit.variables[5].name = "angle".into(), "'angle' is declared twice"),
+        (|unit| unit.variables[2].name = "u[1".into(), "'u[1' is not a structured name"),
+        (|unit| unit.variables[2].name = "1u".into(), "not a structured name"),
+        (|unit| unit.variables[5].dependencies.push("gain".into()), "'y' depends on 'gain'"),
+        (|unit| unit.variables[5].dependencies.push("v".into()), "'y' depends on 'v'"),
+        (|unit| unit.variables[2].kind = real(None), "'u[1]' needs a start value"),
+        (|unit| unit.variables[5].kind = real(Some(1.0)), "'y' is calculated and has a start value"),
+        (|unit| unit.variables[6].variability = Variability::Continuous, "'count' is not a Real"),
+        (
+            |unit| unit.variables[0].variability = Variability::Discrete,
+            "'gain' must be both a parameter and fixed",
+        ),
+        (
+            |unit| {
+                if let Kind::Real { start, .. } = &mut unit.variables[0].kind {
+                    *start = Some(11.0);
+                }
+            },
+            "'gain' has a start value outside its limits",
+        ),
+        (
+            |unit| {
+                if let Kind::Enumeration { start, .. } = &mut unit.variables[1].kind {
+                    *start = Some(0);
+                }
+            },
+            "'shape' has a start value outside its limits",
+        ),
+        (
+            |unit| {
+                if let Kind::Real { derivative_of, .. } = &mut unit.variables[4].kind {
+                    *derivative_of = Some("gain".into());
+                }
+            },
+            "'der(angle)' is the derivative of 'gain'",
+        ),
+        (
+            |unit| {
+                if let Kind::Real { unit: Some(unit), .. } = &mut unit.variables[5].kind {
+                    unit.m = 1;
+                }
+            },
+            "'y' defines unit 'rad' differently",
+        ),
+        (|unit| unit.default_experiment.step = f64::NAN, "default experiment"),
+    ];
+    assert!(unit().check().is_ok());
+    for (change, part) in cases {
+        let mut changed = unit();
+        change(&mut changed);
+        let text = changed.to_xml().expect_err(part).to_string();
+        assert!(text.contains(part), "no '{part}' in '{text}'");
+    }
+}
+
+#[test]
+fn the_xml_says_what_the_table_says() {
+    let xml = unit().to_xml().unwrap();
+    for part in [
+        "fmiVersion=\"2.0\"",
+        &format!("guid=\"{}\"", unit().guid()),
+        "<ModelExchange modelIdentifier=\"Small\"",
+        "<CoSimulation modelIdentifier=\"Small\"",
+        "<DisplayUnit name=\"deg\" factor=\"57.29577951308232\"/>",
+        "<BaseUnit s=\"-1\" rad=\"1\"/>",
+        "<Item name=\"steep\" value=\"2\" description=\"Much\"/>",
+        "<DefaultExperiment startTime=\"0.0\" stopTime=\"50.0\" tolerance=\"0.0001\" stepSize=\"0.04\"/>",
+        "description=\"What &lt;gain&gt; &amp; co. are\"",
+        "<Real min=\"0.0\" max=\"10.0\" start=\"2.5\"/>",
+        "<Enumeration declaredType=\"Shape\" start=\"2\"/>",
+        "<Real unit=\"rad\" displayUnit=\"deg\" start=\"0.017453292519943295\"/>",
+        "<Real unit=\"rad/s\" displayUnit=\"deg/s\" derivative=\"4\"/>",
+    ] {
+        assert!(xml.contains(part), "no {part} in\n{xml}");
+    }
+    assert!(!xml.contains("xmlns"));
+    assert!(!xml.contains("initial="));
+}
+
+#[test]
+fn the_model_structure_has_true_dependencies() {
+    let xml = unit().to_xml().unwrap();
+    let structure: Vec<_> =
+        xml.lines().map(str::trim).skip_while(|line| *line != "<ModelStructure>").collect();
+    assert_eq!(
+        structure[..structure.len() - 1],
+        [
+            "<ModelStructure>",
+            "<Outputs>",
+            "<Unknown index=\"4\" dependencies=\"4\"/>",
+            "<Unknown index=\"6\" dependencies=\"3 4\"/>",
+            "<Unknown index=\"7\" dependencies=\"\"/>",
+            "</Outputs>",
+            "<Derivatives>",
+            "<Unknown index=\"5\" dependencies=\"3\"/>",
+            "</Derivatives>",
+            "<InitialUnknowns>",
+            "<Unknown index=\"4\" dependencies=\"1 2\"/>",
+            "<Unknown index=\"5\" dependencies=\"1 2 3\"/>",
+            "<Unknown index=\"6\" dependencies=\"1 2 3\"/>",
+            "<Unknown index=\"7\" dependencies=\"1 2\"/>",
+            "</InitialUnknowns>",
+            "</ModelStructure>",
+        ]
+    );
+}
+
+#[test]
+fn the_page_shows_start_values_in_display_units_and_enumerations_by_name() {
+    let page = unit().to_html();
+    for part in [
+        "<p>Not much.</p>",
+        "<code>gain</code></td><td>–</td><td>2.5</td><td>0 to 10</td>",
+        "<td>0.01745329252 = 1 deg</td>",
+        "<td>rad (shown in deg)</td>",
+        "<td>steep</td>",
+        "What &lt;gain&gt; &amp; co. are",
+    ] {
+        assert!(page.contains(part), "no {part} in\n{page}");
+    }
+    assert!(!page.contains("http"), "the page needs no network");
+}
+
+fn entries(path: &Path) -> Vec<(String, String)> {
+    let mut archive = zip::ZipArchive::new(fs::File::open(path).unwrap()).unwrap();
+    let length = archive.len();
+    let read = |i| {
+        let mut entry = archive.by_index(i).unwrap();
+        let mut text = String::new();
+        entry.read_to_string(&mut text).unwrap();
+        (entry.name().unwrap().into_owned(), text)
+    };
+    (0..length).map(read).collect()
+}
+
+#[test]
+fn the_archive_is_complete_and_the_same_every_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("library"), "machine code").unwrap();
+    fs::write(at("LICENSE-A"), "text a").unwrap();
+    fs::write(at("LICENSE-B"), "text b").unwrap();
+    fs::create_dir_all(at("data/deep")).unwrap();
+    fs::write(at("data/z.csv"), "1").unwrap();
+    fs::write(at("data/deep/a.csv"), "2").unwrap();
+    let extras = Extras { resources: Some(at("data")), licenses: vec![at("LICENSE-A"), at("LICENSE-B")] };
+    let path = pack(&unit(), &at("library"), folder.path(), &extras).unwrap();
+    assert_eq!(path, at("Small.fmu"));
+    let first = fs::read(&path).unwrap();
+    let content = entries(&path);
+    let names: Vec<_> = content.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names[0], "modelDescription.xml");
+    assert!(names[1].starts_with("binaries/") && names[1].contains("/Small."));
+    assert_eq!(
+        names[2..],
+        [
+            "documentation/index.html",
+            "documentation/licenses/LICENSE-A",
+            "documentation/licenses/LICENSE-B",
+            "documentation/licenses/license.txt",
+            "resources/deep/a.csv",
+            "resources/z.csv",
+        ]
+    );
+    assert_eq!(content[1].1, "machine code");
+    assert_eq!(content[0].1, unit().to_xml().unwrap());
+
+    // Other times and another order of the folder: still the same bytes.
+    std::thread::sleep(std::time::Duration::from_millis(20));
+    fs::write(at("data/z.csv"), "1").unwrap();
+    pack(&unit(), &at("library"), folder.path(), &extras).unwrap();
+    assert_eq!(fs::read(&path).unwrap(), first);
+    assert!(!at("Small.fmu.part").exists());
+}
+
+#[test]
+fn an_archive_without_resources_has_the_folder_all_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = folder.path().join("library");
+    fs::write(&library, "machine code").unwrap();
+    let path = pack(&unit(), &library, folder.path(), &Extras::default()).unwrap();
+    assert!(entries(&path).iter().any(|(name, _)| name == "resources/README.txt"));
+}
+
+#[test]
+fn files_that_are_no_unit_library_are_refused() {
+    let missing = library::descriptions(Path::new("/no/such/library.so")).unwrap_err();
+    assert!(matches!(missing, Error::File { .. }), "{missing}");
+    let folder = tempfile::tempdir().unwrap();
+    let text = folder.path().join("text.so");
+    fs::write(&text, "not a library").unwrap();
+    let error = library::descriptions(&text).unwrap_err();
+    assert!(matches!(error, Error::Open { .. }), "{error}");
+    let missing =
+        pack(&unit(), &folder.path().join("nothing"), folder.path(), &Extras::default()).unwrap_err();
+    assert!(missing.to_string().contains("nothing"));
+}
