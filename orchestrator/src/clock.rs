@@ -28,9 +28,12 @@ impl Clock {
             ));
         }
         if (exact - ticks).abs() > 1e-9 * ticks.max(1.0) {
+            // Ten digits after the point tell it from a whole number, and hide the rounding.
+            let shown = format!("{exact:.10}");
+            let shown = shown.trim_end_matches('0');
             let (below, above) = (start + exact.floor() * step, start + exact.ceil() * step);
             return Err(format!(
-                "stop = {stop} s is {exact} steps of {step} s after start = {start} s: \
+                "stop = {stop} s is {shown} steps of {step} s after start = {start} s: \
                  choose a whole number of steps, {below} s or {above} s"
             ));
         }

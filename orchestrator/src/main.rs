@@ -5,7 +5,7 @@ use orchestrator::error::Error;
 use orchestrator::experiment::{Experiment, Overrides};
 use orchestrator::run::{Options, Plan};
 use orchestrator::{inspect, list, report};
-use std::io::{BufWriter, Write, stdout};
+use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
@@ -57,7 +57,8 @@ fn main() -> ExitCode {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(std::io::stderr)
+        .with_writer(stderr)
+        .with_ansi(stderr().is_terminal())
         .without_time()
         .with_target(false)
         .init();

@@ -81,7 +81,7 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
         let assumed = if undeclared.is_empty() {
             String::new()
         } else {
-            format!(" (assumed: {} does not declare what its outputs depend on)", undeclared.join(", "))
+            format!(" (the worst case; not declared what outputs depend on: {})", undeclared.join(", "))
         };
         line("loop delay", format!("{steps} ({}){reason}{assumed}", names.join(" -> ")))?;
     }

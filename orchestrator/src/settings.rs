@@ -77,7 +77,9 @@ pub fn resolve(
             }
             "parameter" | "input" => {}
             other => {
-                return Err(refuse(format!("is of causality {other}, only parameters and inputs can be set")));
+                return Err(refuse(format!(
+                    "is of causality {other}, only parameters and inputs can be set"
+                )));
             }
         }
         let value = value(written.get_ref(), variable, part).map_err(refuse)?;
