@@ -309,14 +309,21 @@ impl Instance {
         )
     }
 
-    /// The field of the variable, if it is of the type `T`.
-    fn field<T: Scalar>(&mut self, reference: u32) -> Result<&mut T, Failure> {
-        // The usual case asks the table once; what is wrong is found out only if something is.
-        if T::field(self.unit.as_mut(), reference as usize).is_none() {
-            let name = &self.variable(reference)?.name;
-            return error(format!("'{name}' (value reference {reference}) is not of type {}", T::TYPE));
+    /// Why there is no field of type `T` behind the value reference.
+    fn misfit<T: Scalar>(&self, reference: u32) -> Failure {
+        match self.variable(reference) {
+            Ok(Variable { name, .. }) => {
+                Failure::Error(format!("'{name}' (value reference {reference}) is not of type {}", T::TYPE))
+            }
+            Err(failure) => failure,
         }
-        Ok(T::field(self.unit.as_mut(), reference as usize).expect("present"))
+    }
+
+    fn expect_type<T: Scalar>(&mut self, reference: u32) -> Outcome {
+        match T::field(self.unit.as_mut(), reference as usize) {
+            Some(_) => Ok(()),
+            None => Err(self.misfit::<T>(reference)),
+        }
     }
 
     /// Hands the values of the variables to `sink`, with their positions.
@@ -327,7 +334,10 @@ impl Instance {
             self.refresh()?;
         }
         for (i, &reference) in references.iter().enumerate() {
-            sink(i, self.field::<T>(reference)?);
+            match T::field(self.unit.as_mut(), reference as usize) {
+                Some(value) => sink(i, value),
+                None => return Err(self.misfit::<T>(reference)),
+            }
         }
         Ok(())
     }
@@ -339,7 +349,7 @@ impl Instance {
         value: impl Fn(usize) -> Result<T, String>,
     ) -> Outcome {
         for (i, &reference) in references.iter().enumerate() {
-            self.field::<T>(reference)?;
+            self.expect_type::<T>(reference)?;
             let variable = self.variable(reference)?;
             self.settable(variable)?;
             let name = &variable.name;
@@ -350,7 +360,9 @@ impl Instance {
         }
         for (i, &reference) in references.iter().enumerate() {
             let value = value(i).map_err(Failure::Error)?;
-            let field = self.field::<T>(reference)?;
+            let Some(field) = T::field(self.unit.as_mut(), reference as usize) else {
+                return Err(self.misfit::<T>(reference));
+            };
             if !field.same(&value) {
                 *field = value;
                 self.stale = true;
@@ -464,7 +476,7 @@ impl Instance {
         values: &[f64],
     ) -> Outcome {
         for ((&reference, &order), value) in references.iter().zip(orders).zip(values) {
-            self.field::<f64>(reference)?;
+            self.expect_type::<f64>(reference)?;
             let variable = self.variable(reference)?;
             let name = &variable.name;
             if variable.causality != Causality::Input || variable.variability != Variability::Continuous {
@@ -637,14 +649,14 @@ impl Instance {
             return error("this unit offers no directional derivatives");
         }
         for &reference in unknowns {
-            self.field::<f64>(reference)?;
+            self.expect_type::<f64>(reference)?;
             let variable = self.variable(reference)?;
             if !variable.is_calculated() {
                 return error(format!("'{}' is set from outside, so it has no derivative", variable.name));
             }
         }
         for &reference in knowns {
-            self.field::<f64>(reference)?;
+            self.expect_type::<f64>(reference)?;
             let variable = self.variable(reference)?;
             let is_state = self.states.iter().any(|&(state, _)| state == reference as usize);
             if variable.causality != Causality::Input && !is_state {
