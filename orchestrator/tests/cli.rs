@@ -1,0 +1,327 @@
+//! The program as its users see it: exit codes, messages, files. Runs a unit in C that `cc` compiles here.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use tempfile::TempDir;
+use zip::write::SimpleFileOptions;
+
+const LOOP: &str = r#"
+title = "gain and integrator"
+[simulation]
+stop = 3.0
+step = 1.0
+order = ["gain", "plant"]
+[components.gain]
+fmu = "Unit.fmu"
+[components.plant]
+fmu = "Unit.fmu"
+[[connections]]
+from = "plant.output.integral"
+to = "gain.input"
+[[connections]]
+from = "gain.output.direct"
+to = "plant.input"
+[record]
+variables = ["gain.output.direct", "plant.output.integral", "plant.steps"]
+"#;
+
+/// A folder with `Unit.fmu` and `loop.toml`.
+struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self::with(LOOP)
+    }
+
+    fn with(experiment: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/unit");
+        let library = folder.path().join("unit.so");
+        let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
+        let status = Command::new(compiler)
+            .args(["-shared", "-fPIC", "-O1", "-Wall", "-Werror", "-o"])
+            .arg(&library)
+            .arg(source.join("unit.c"))
+            .status()
+            .expect("a C compiler");
+        assert!(status.success());
+        let mut zip = zip::ZipWriter::new(fs::File::create(folder.path().join("Unit.fmu")).unwrap());
+        let mut add = |name: &str, content: &[u8]| {
+            zip.start_file(name, SimpleFileOptions::default()).unwrap();
+            zip.write_all(content).unwrap();
+        };
+        add("modelDescription.xml", &fs::read(source.join("modelDescription.xml")).unwrap());
+        add("binaries/linux64/unit.so", &fs::read(&library).unwrap());
+        zip.finish().unwrap();
+        fs::write(folder.path().join("loop.toml"), experiment).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_orchestrator"));
+        command.args(arguments).current_dir(self.folder.path()).env_remove("RUST_LOG");
+        command
+    }
+
+    fn call(&self, arguments: &[&str]) -> (i32, String, String) {
+        let Output { status, stdout, stderr } = self.command(arguments).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (status.code().expect("no signal"), text(stdout), text(stderr))
+    }
+
+    fn run(&self, arguments: &[&str]) -> (i32, String, String) {
+        self.call(&[&["run", "loop.toml"], arguments].concat())
+    }
+
+    /// Refusal of an experiment: exit code 2, and one line.
+    fn refusal(&self, arguments: &[&str]) -> String {
+        let (code, _, errors) = self.run(arguments);
+        assert_eq!(code, 2, "{errors}");
+        assert_eq!(errors.lines().count(), 1, "{errors}");
+        errors
+    }
+
+    fn json(&self, name: &str) -> serde_json::Value {
+        serde_json::from_str(&fs::read_to_string(self.path(name)).unwrap()).unwrap()
+    }
+}
+
+fn refusal_of(from: &str, to: &str) -> String {
+    let changed = LOOP.replace(from, to);
+    assert_ne!(changed, LOOP, "{from}");
+    Bench::with(&changed).refusal(&[])
+}
+
+#[test]
+fn oracle_a_run_writes_its_results() {
+    let bench = Bench::new();
+    let (code, summary, errors) = bench.run(&["--set", "gain.gain=500 mm", "--set", "gain.kind=rough"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(summary.contains("loop delay        none (gain -> plant -> gain)"), "{summary}");
+    // x⁺ = x + x/2.
+    let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+    let expected = "time,gain.output.direct,plant.output.integral,plant.steps\n\
+                    0.0,0.5,1.0,0\n1.0,0.75,1.5,1\n2.0,1.125,2.25,2\n3.0,1.6875,3.375,3\n";
+    assert_eq!(rows, expected);
+
+    let sidecar = bench.json("out/loop/results.json");
+    assert_eq!(sidecar["status"], "completed");
+    assert_eq!(sidecar["experiment"]["text"], LOOP);
+    assert_eq!(sidecar["components"]["gain"]["guid"], "{u-1}");
+    assert_eq!(sidecar["components"]["gain"]["set"]["gain"], 0.5);
+    assert_eq!(sidecar["components"]["gain"]["parameters"]["kind"], "rough");
+    assert_eq!(sidecar["components"]["plant"]["parameters"]["kind"], "calm");
+    assert_eq!(sidecar["seeds"]["plant.noise.seed"], 0);
+    let metrics = bench.json("out/loop/metrics.json");
+    for key in [
+        "ems_deg",
+        "cms",
+        "max_rate_deg_s",
+        "max_moment_ratio",
+        "solver_ms_mean",
+        "solver_ms_p99",
+        "solver_ms_max",
+        "fallbacks",
+        "real_time_factor",
+    ] {
+        assert!(metrics.as_object().unwrap().contains_key(key), "{key}");
+    }
+}
+
+#[test]
+fn the_same_run_gives_the_same_bytes() {
+    let bench = Bench::new();
+    for out in ["a", "b"] {
+        assert_eq!(bench.run(&["--out", out, "--quiet"]), (0, String::new(), String::new()));
+    }
+    for file in ["results.csv", "results.json"] {
+        assert_eq!(
+            fs::read(bench.path("a").join(file)).unwrap(),
+            fs::read(bench.path("b").join(file)).unwrap()
+        );
+    }
+}
+
+#[test]
+fn couplings_and_orders_that_delay_the_loop_say_so() {
+    let bench = Bench::new();
+    let (_, summary, _) = bench.run(&["--coupling", "jacobi"]);
+    assert!(summary.contains("1 s, 1 step (gain -> plant -> gain), from the Jacobi coupling"), "{summary}");
+    let bench = Bench::with(&LOOP.replace("[\"gain\", \"plant\"]", "[\"plant\", \"gain\"]"));
+    let (_, summary, _) = bench.run(&[]);
+    assert!(summary.contains("1 s, 1 step (plant -> gain -> plant), from the order"), "{summary}");
+    assert_eq!(bench.json("out/loop/metrics.json")["loop_delay_s"], 1.0);
+}
+
+#[test]
+fn a_failing_unit_ends_the_run_with_its_own_words_and_keeps_the_results() {
+    let bench = Bench::new();
+    // fmi2Discard, fmi2Error, and fmi2Fatal, after which not even fmi2FreeInstance may be called.
+    for (status, name) in [("2", "fmi2Discard"), ("3", "fmi2Error"), ("4", "fmi2Fatal")] {
+        let status = format!("plant.fail.status={status}");
+        let (code, _, errors) = bench.run(&["--set", "plant.fail.time=2", "--set", &status]);
+        assert_eq!(code, 1, "{errors}");
+        let last = errors.lines().last().unwrap();
+        assert!(
+            last.starts_with("error: plant failed at t = 2 s in doStep: out of propellant at 2"),
+            "{last}"
+        );
+        assert!(last.contains(name), "{last}");
+        assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(), 4);
+        assert_eq!(bench.json("out/loop/metrics.json")["completed"], false);
+        let status = bench.json("out/loop/results.json")["status"].as_str().unwrap().to_string();
+        assert!(status.contains("out of propellant"), "{status}");
+    }
+    let (code, _, errors) = bench.run(&["--set", "gain.gain=500"]);
+    assert_eq!(code, 1);
+    assert!(
+        errors.contains("gain failed at t = 0 s in enterInitializationMode: gain too large: 500"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn bad_usage_exits_with_2() {
+    let bench = Bench::new();
+    for arguments in [&["run"][..], &["jump"], &[], &["run", "loop.toml", "--stop", "soon"]] {
+        assert_eq!(bench.call(arguments).0, 2, "{arguments:?}");
+    }
+    assert_eq!(bench.call(&["--help"]).0, 0);
+    assert_eq!(bench.call(&["run", "missing.toml"]).0, 2);
+    assert_eq!(bench.call(&["inspect", "missing.fmu"]).0, 2);
+    assert_eq!(bench.call(&["inspect", "loop.toml"]).0, 2);
+    assert_eq!(bench.call(&["list", "missing"]).0, 2);
+}
+
+#[test]
+fn wrong_names_are_refused_with_place_and_remedy() {
+    let message = refusal_of("plant.output.integral\"\nto", "plant.output.integrall\"\nto");
+    assert!(
+        message.contains("loop.toml:12: ") && message.contains("did you mean \"output.integral\""),
+        "{message}"
+    );
+    let message = refusal_of("to = \"gain.input\"", "to = \"gian.input\"");
+    assert!(message.contains("loop.toml:13: ") && message.contains("did you mean \"gain\""), "{message}");
+    let message = refusal_of("\"plant.steps\"", "\"plant.step\"");
+    assert!(message.contains("loop.toml:18: ") && message.contains("did you mean \"steps\""), "{message}");
+    let message = refusal_of("Unit.fmu\"\n[components.plant]", "Unti.fmu\"\n[components.plant]");
+    assert!(message.contains("loop.toml:8: ") && message.contains("did you mean \"Unit.fmu\""), "{message}");
+    let message = refusal_of("[\"gain\", \"plant\"]", "[\"gain\", \"palnt\"]");
+    assert!(message.contains("did you mean \"plant\""), "{message}");
+    let message = refusal_of("[\"gain\", \"plant\"]", "[\"gain\"]");
+    assert!(message.contains("does not name \"plant\""), "{message}");
+    let message = refusal_of("stop = 3.0", "stopp = 3.0");
+    assert!(message.contains("loop.toml:4: ") && message.contains("`stop`"), "{message}");
+}
+
+#[test]
+fn wrong_settings_are_refused() {
+    let bench = Bench::new();
+    for (setting, remedy) in [
+        ("gain.gian=1", "did you mean \"gain\""),
+        ("gain.kind=ruogh", "did you mean \"rough\""),
+        ("gain.kind=2", "the name of an item (calm, rough)"),
+        ("gain.gain=1 m/s", "measure different things"),
+        ("gain.gain=1 mmm", "did you mean \"mm\""),
+        ("gain.gain=2000", "above its maximum 1000"),
+        ("gain.fail.status=7", "not between 2 and 4"),
+        ("gain.flag=1", "wants true or false"),
+        ("gain.steps=1", "is of causality output"),
+        ("gain.input=1", "is an input with a connection"),
+    ] {
+        let message = bench.refusal(&["--set", setting]);
+        assert!(message.contains(remedy), "{setting}: {message}");
+    }
+    assert!(bench.refusal(&["--stop", "2.5"]).contains("2 s or 3 s"));
+    let (code, _, errors) = bench.run(&["--set", "gain.text=hello", "--set", "gain.flag=true"]);
+    assert_eq!(code, 0, "{errors}");
+    assert_eq!(bench.json("out/loop/results.json")["components"]["gain"]["parameters"]["flag"], true);
+}
+
+#[test]
+fn wrong_wiring_is_refused() {
+    let message = refusal_of("plant.output.integral\"\nto", "plant.speed\"\nto");
+    assert!(message.contains("units") && message.contains("m/s against m"), "{message}");
+    let message = refusal_of("plant.output.integral\"\nto", "plant.steps\"\nto");
+    assert!(message.contains("Integer against Real"), "{message}");
+    let message = refusal_of("plant.output.integral\"\nto", "plant.gain\"\nto");
+    assert!(message.contains("is of causality parameter, not an output"), "{message}");
+    let message = refusal_of("to = \"plant.input\"", "to = \"plant.output.direct\"");
+    assert!(message.contains("is of causality output, not an input"), "{message}");
+    let message = refusal_of("to = \"plant.input\"", "to = \"gain.input\"");
+    assert!(message.contains("loop.toml:16: ") && message.contains("connected twice"), "{message}");
+    let message = refusal_of("plant.output.integral\"\nto", "plant.output.direct\"\nto");
+    assert!(message.contains("algebraic loop") && message.contains("gain.input"), "{message}");
+    let message = refusal_of(
+        "from = \"gain.output.direct\"\nto = \"plant.input\"",
+        "from = \"plant.*\"\nto = \"gain.none.*\"",
+    );
+    assert!(message.contains("there are: input"), "{message}");
+}
+
+#[test]
+fn inputs_without_connection_must_be_meant() {
+    let open = LOOP.replace("[[connections]]\nfrom = \"gain.output.direct\"\nto = \"plant.input\"\n", "");
+    let message = Bench::with(&open).refusal(&[]);
+    assert!(message.contains("inputs of \"plant\" are not connected: input"), "{message}");
+    // The line that the message proposes is the remedy.
+    let (_, line) = message.split_once("[components.plant]: ").unwrap();
+    let meant = open.replace("[components.plant]\n", &format!("[components.plant]\n{line}"));
+    assert_eq!(Bench::with(&meant).run(&[]).0, 0);
+    // A value will do as well.
+    let bench = Bench::with(&open);
+    assert_eq!(bench.run(&["--set", "plant.input=3"]).0, 0);
+    assert!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().contains("\n3.0,20.0,10.0,3\n"));
+    let message =
+        Bench::with(&LOOP.replace("[components.plant]\n", "[components.plant]\nunconnected = [\"input\"]\n"))
+            .refusal(&[]);
+    assert!(message.contains("is said to be unconnected, but is connected"), "{message}");
+}
+
+#[test]
+fn inspect_and_list_show_what_there_is() {
+    let bench = Bench::new();
+    let (code, text, _) = bench.call(&["inspect", "Unit.fmu"]);
+    assert_eq!(code, 0);
+    for part in
+        ["{u-1}", "linux64", "canHandleVariableCommunicationStepSize", "output.integral", "{calm, rough}"]
+    {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let (code, text, _) = bench.call(&["list"]);
+    assert_eq!(code, 0);
+    assert!(text.contains("loop.toml  gain and integrator") && text.contains("Unit.fmu"), "{text}");
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_failure() {
+    let bench = Bench::new();
+    let mut child = bench
+        .command(&["inspect", "Unit.fmu"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(output.stderr.is_empty());
+}
+
+#[test]
+fn nothing_is_left_in_the_temporary_folder() {
+    let bench = Bench::new();
+    let temporary = bench.path("tmp with space");
+    fs::create_dir(&temporary).unwrap();
+    let status = bench.command(&["run", "loop.toml", "--quiet"]).env("TMPDIR", &temporary).status().unwrap();
+    assert!(status.success());
+    assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);
+}

@@ -1,0 +1,123 @@
+/* A small FMI 2.0 co-simulation unit, to try the orchestrator on a library that is not ours: it keeps the pointer to the
+   callbacks, wants memory from its environment, and logs with printf arguments.
+   Output 1 = gain * input (direct), output 2 = integral of the input. It fails as its parameters say. */
+#include <stddef.h>
+
+typedef struct {
+    void (*logger)(void *, const char *, int, const char *, const char *, ...);
+    void *(*allocate)(size_t, size_t);
+    void (*release)(void *);
+    void (*step_finished)(void *, int);
+    void *environment;
+} Callbacks;
+
+typedef struct {
+    const Callbacks *callbacks;
+    const char *name;
+    double input, state, gain, fail_time;
+    int fail_status, flag, kind, count;
+    char text[64];
+} Unit;
+
+enum { OK = 0, ERROR = 3, FATAL = 4 };
+
+static int complain(Unit *unit, int status, const char *what, double value) {
+    unit->callbacks->logger(unit->callbacks->environment, unit->name, status, "trouble", "%s %g", what, value);
+    return status;
+}
+
+void *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources, const Callbacks *callbacks,
+                      int visible, int logging) {
+    (void)type, (void)guid, (void)resources, (void)visible, (void)logging;
+    Unit *unit = callbacks->allocate(1, sizeof(Unit));
+    unit->callbacks = callbacks;
+    unit->name = "unit";
+    unit->gain = 2.0;
+    unit->state = 1.0;
+    unit->fail_time = 1e9;
+    unit->fail_status = ERROR;
+    unit->kind = 1;
+    return name ? unit : NULL;
+}
+
+void fmi2FreeInstance(Unit *unit) {
+    unit->callbacks->release(unit);
+}
+
+int fmi2SetupExperiment(Unit *unit, int tolerance_defined, double tolerance, double start, int stop_defined, double stop) {
+    (void)tolerance_defined, (void)tolerance, (void)stop_defined;
+    return stop > start ? OK : complain(unit, ERROR, "bad stop time", stop);
+}
+
+int fmi2EnterInitializationMode(Unit *unit) {
+    return unit->gain < 100.0 ? OK : complain(unit, ERROR, "gain too large:", unit->gain);
+}
+int fmi2ExitInitializationMode(Unit *unit) { return unit ? OK : ERROR; }
+int fmi2Terminate(Unit *unit) { return unit ? OK : ERROR; }
+
+int fmi2GetReal(Unit *unit, const unsigned *references, size_t n, double *values) {
+    for (size_t i = 0; i < n; i++) {
+        switch (references[i]) {
+        case 0: values[i] = unit->input; break;
+        case 1: values[i] = unit->gain * unit->input; break;
+        case 2: values[i] = unit->state; break;
+        case 3: values[i] = unit->gain; break;
+        case 4: values[i] = unit->fail_time; break;
+        default: return complain(unit, ERROR, "no such real:", references[i]);
+        }
+    }
+    return OK;
+}
+
+int fmi2SetReal(Unit *unit, const unsigned *references, size_t n, const double *values) {
+    for (size_t i = 0; i < n; i++) {
+        switch (references[i]) {
+        case 0: unit->input = values[i]; break;
+        case 3: unit->gain = values[i]; break;
+        case 4: unit->fail_time = values[i]; break;
+        default: return complain(unit, ERROR, "real cannot be set:", references[i]);
+        }
+    }
+    return OK;
+}
+
+int fmi2GetInteger(Unit *unit, const unsigned *references, size_t n, int *values) {
+    for (size_t i = 0; i < n; i++)
+        values[i] = references[i] == 5 ? unit->fail_status : references[i] == 7 ? unit->kind : unit->count;
+    return OK;
+}
+
+int fmi2SetInteger(Unit *unit, const unsigned *references, size_t n, const int *values) {
+    for (size_t i = 0; i < n; i++)
+        *(references[i] == 5 ? &unit->fail_status : &unit->kind) = values[i];
+    return OK;
+}
+
+int fmi2GetBoolean(Unit *unit, const unsigned *references, size_t n, int *values) {
+    for (size_t i = 0; i < n; i++) values[i] = references ? unit->flag : 0;
+    return OK;
+}
+
+int fmi2SetBoolean(Unit *unit, const unsigned *references, size_t n, const int *values) {
+    for (size_t i = 0; i < n; i++) unit->flag = references ? values[i] : 0;
+    return OK;
+}
+
+int fmi2SetString(Unit *unit, const unsigned *references, size_t n, const char *const *values) {
+    for (size_t i = 0; i < n && references; i++)
+        for (size_t k = 0; k < sizeof unit->text - 1 && values[i][k]; k++) unit->text[k] = values[i][k];
+    return OK;
+}
+
+int fmi2DoStep(Unit *unit, double time, double step, int no_set_state) {
+    (void)no_set_state;
+    if (time >= unit->fail_time - 1e-9) return complain(unit, unit->fail_status, "out of propellant at", time);
+    unit->state += step * unit->input;
+    unit->count += 1;
+    return OK;
+}
+
+int fmi2GetRealStatus(Unit *unit, int kind, double *value) {
+    *value = unit->fail_time + 0.5 * kind;
+    return OK;
+}
