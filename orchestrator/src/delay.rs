@@ -152,3 +152,95 @@ fn follow(
     done[last] = true;
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::{Kind, ModelDescription, Variable};
+    use crate::wiring::{Carrier, Port};
+
+    /// Variable 0 is an input; outputs 1, 2, … depend on it directly, not at all, or by no declaration.
+    fn unit(outputs: &[Option<bool>]) -> ModelDescription {
+        let variable = |(position, causality): (usize, &str)| Variable {
+            name: format!("v{position}"),
+            reference: position as u32,
+            description: String::new(),
+            causality: causality.into(),
+            variability: "continuous".into(),
+            kind: Kind::Boolean,
+            start: None,
+        };
+        let causalities = std::iter::once("input").chain(outputs.iter().map(|_| "output"));
+        let mut description = ModelDescription {
+            variables: causalities.enumerate().map(variable).collect(),
+            ..ModelDescription::default()
+        };
+        for (place, direct) in outputs.iter().enumerate() {
+            if let Some(direct) = direct {
+                description.dependencies.insert(place + 1, if *direct { vec![0] } else { vec![] });
+            }
+        }
+        description
+    }
+
+    fn wire((from, output): (usize, usize), to: usize) -> Wire {
+        let port = |component, variable: usize| Port {
+            component,
+            variable,
+            reference: variable as u32,
+            carrier: Carrier::Real,
+        };
+        Wire { from: port(from, output), to: port(to, 0) }
+    }
+
+    fn ticks(units: &[ModelDescription], every: &[u32], wires: &[Wire], coupling: Coupling) -> Vec<u64> {
+        let parts: Vec<Part> = units.iter().map(|description| Part { name: "c", description }).collect();
+        feedback_loops(&parts, every, wires, coupling).iter().map(|l| l.ticks).collect()
+    }
+
+    #[test]
+    fn oracle_controller_and_plant() {
+        let (controller, plant) = (unit(&[Some(true)]), unit(&[Some(false)]));
+        let wires = [wire((0, 1), 1), wire((1, 1), 0)];
+        let in_order = [controller.clone(), plant.clone()];
+        let against = [plant, controller];
+        assert_eq!(ticks(&in_order, &[1, 1], &wires, Coupling::GaussSeidel), [0]);
+        assert_eq!(ticks(&against, &[1, 1], &wires, Coupling::GaussSeidel), [1]);
+        assert_eq!(ticks(&in_order, &[1, 1], &wires, Coupling::Jacobi), [1]);
+        assert_eq!(ticks(&against, &[1, 1], &wires, Coupling::Jacobi), [1]);
+        // What is read too early is read again only at the reader's next point.
+        assert_eq!(ticks(&against, &[5, 1], &wires, Coupling::GaussSeidel), [5]);
+    }
+
+    #[test]
+    fn oracle_three_in_a_ring_and_a_loop_within() {
+        // 0 -> 1 -> 2 -> 0, and 1 -> 0; only 2 has a state.
+        let units = [unit(&[Some(true)]), unit(&[Some(true), Some(false)]), unit(&[Some(false)])];
+        let wires = [wire((0, 1), 1), wire((1, 1), 2), wire((2, 1), 0), wire((1, 2), 0)];
+        assert_eq!(ticks(&units, &[1; 3], &wires[..3], Coupling::GaussSeidel), [0]);
+        assert_eq!(ticks(&units, &[1; 3], &wires[..3], Coupling::Jacobi), [2]);
+        assert_eq!(ticks(&units, &[1; 3], &wires, Coupling::GaussSeidel), [0, 0]);
+        assert!(ticks(&units, &[1; 3], &wires[..2], Coupling::Jacobi).is_empty());
+    }
+
+    #[test]
+    fn what_is_not_declared_counts_as_direct_and_is_named() {
+        let units = [unit(&[None]), unit(&[Some(false)])];
+        let parts: Vec<Part> = units.iter().map(|description| Part { name: "c", description }).collect();
+        let wires = [wire((0, 1), 1), wire((1, 1), 0)];
+        let loops = feedback_loops(&parts, &[1, 1], &wires, Coupling::Jacobi);
+        assert_eq!(loops, [FeedbackLoop { components: vec![0, 1], ticks: 1, undeclared: vec![0] }]);
+        assert_eq!(algebraic_loop(&parts, &wires), None);
+    }
+
+    #[test]
+    fn algebraic_loops_are_found_through_any_number_of_units() {
+        let direct = unit(&[Some(true)]);
+        let units = [direct.clone(), direct.clone(), direct];
+        let parts: Vec<Part> = units.iter().map(|description| Part { name: "c", description }).collect();
+        let ring = [wire((0, 1), 1), wire((1, 1), 2), wire((2, 1), 0)];
+        assert_eq!(algebraic_loop(&parts, &ring).unwrap().len(), 3);
+        assert_eq!(algebraic_loop(&parts, &ring[..2]), None);
+        assert_eq!(algebraic_loop(&parts, &[wire((0, 1), 0)]), Some(vec!["c.v0".into()]));
+    }
+}

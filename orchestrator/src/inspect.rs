@@ -40,7 +40,7 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
         ("tolerance", experiment.tolerance, ""),
     ];
     let proposed: Vec<String> =
-        named.iter().filter_map(|(name, value, unit)| value.map(|v| format!("{name} {v}{unit}"))).collect();
+        named.iter().filter_map(|(name, value, unit)| value.map(|v| format!("{name} {v:?}{unit}"))).collect();
     line("experiment", &proposed.join(", "))?;
 
     for causality in ["parameter", "calculatedParameter", "input", "output", "local", "independent"] {

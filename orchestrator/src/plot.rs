@@ -3,13 +3,15 @@
 use crate::error::Error;
 use crate::master::{Observer, Sample};
 use crate::metrics::{Limits, Places};
-use plotters::chart::SeriesLabelPosition;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use std::path::Path;
 
 /// A figure holds at most about this many points per curve.
 const POINTS: u64 = 5000;
+
+const WIDTH: u32 = 1000;
+const LEGEND_WIDTH: u32 = 120;
 
 const COLORS: [RGBColor; 3] = [RGBColor(31, 119, 180), RGBColor(44, 160, 44), RGBColor(214, 39, 40)];
 const GREY: RGBColor = RGBColor(110, 110, 110);
@@ -54,11 +56,7 @@ impl Curves {
         let degrees =
             |curves: &[Vec<f64>; 3]| curves.clone().map(|c| c.iter().map(|v| v.to_degrees()).collect());
         if self.places.attitude.is_some() {
-            let mut panel = Panel::new(
-                "attitude, deg (thin: reference)",
-                ["alpha", "beta", "sigma"],
-                degrees(&self.attitude),
-            );
+            let mut panel = Panel::new("attitude, deg", ["alpha", "beta", "sigma"], degrees(&self.attitude));
             panel.reference = self.places.reference.map(|_| degrees(&self.reference));
             panels.push(panel);
             if self.places.reference.is_some() {
@@ -152,7 +150,7 @@ type DrawError = Box<dyn std::error::Error>;
 
 fn draw(path: &Path, title: &str, time: &[f64], panels: &[Panel]) -> Result<(), DrawError> {
     let height = 40 + 260 * panels.len() as u32;
-    let root = SVGBackend::new(path, (1000, height)).into_drawing_area();
+    let root = SVGBackend::new(path, (WIDTH, height)).into_drawing_area();
     root.fill(&WHITE)?;
     let root = root.titled(title, ("sans-serif", 20))?;
     let areas = root.split_evenly((panels.len(), 1));
@@ -169,8 +167,10 @@ fn draw_panel(
     area: &DrawingArea<SVGBackend, Shift>,
     last: bool,
 ) -> Result<(), DrawError> {
-    let mut chart = ChartBuilder::on(area)
+    let (left, right) = area.split_horizontally(WIDTH - LEGEND_WIDTH);
+    let mut chart = ChartBuilder::on(&left)
         .margin(6)
+        .margin_right(16)
         .x_label_area_size(if last { 34 } else { 18 })
         .y_label_area_size(64)
         .build_cartesian_2d(time[0]..time[time.len() - 1], panel.range())?;
@@ -184,35 +184,29 @@ fn draw_panel(
     let points = |curve: &[f64]| -> Vec<(f64, f64)> {
         time.iter().copied().zip(curve.iter().copied()).filter(|(_, value)| value.is_finite()).collect()
     };
-    if let Some(reference) = &panel.reference {
-        for (curve, color) in reference.iter().zip(COLORS) {
-            chart.draw_series(LineSeries::new(points(curve), color.mix(0.5).stroke_width(1)))?;
-        }
+    let mut legend: Vec<(&str, ShapeStyle)> = Vec::new();
+    for (curve, color) in panel.reference.iter().flatten().zip(COLORS) {
+        chart.draw_series(LineSeries::new(points(curve), color.mix(0.45).stroke_width(1)))?;
     }
     for ((curve, color), name) in panel.curves.iter().zip(COLORS).zip(panel.names) {
-        chart
-            .draw_series(LineSeries::new(points(curve), color.stroke_width(2)))?
-            .label(name)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(2)));
+        chart.draw_series(LineSeries::new(points(curve), color.stroke_width(2)))?;
+        legend.push((name, color.stroke_width(2)));
+    }
+    if panel.reference.is_some() {
+        legend.push(("thin: reference", GREY.mix(0.6).stroke_width(1)));
     }
     if panel.norm {
-        chart
-            .draw_series(LineSeries::new(points(&panel.norms()), GREY.stroke_width(1)))?
-            .label("norm")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], GREY.stroke_width(1)));
+        chart.draw_series(LineSeries::new(points(&panel.norms()), GREY.stroke_width(1)))?;
+        legend.push(("norm", GREY.stroke_width(1)));
     }
     if let Some(limit) = panel.limit {
         let ends = [(time[0], limit), (time[time.len() - 1], limit)];
-        chart
-            .draw_series(DashedLineSeries::new(ends, 6, 4, LIMIT.stroke_width(2)))?
-            .label("limit of the norm")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], LIMIT.stroke_width(2)));
+        chart.draw_series(DashedLineSeries::new(ends, 6, 4, LIMIT.stroke_width(2)))?;
+        legend.push(("limit of norm", LIMIT.stroke_width(2)));
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .background_style(WHITE.mix(0.8))
-        .label_font(("sans-serif", 13))
-        .draw()?;
+    for (y, (name, style)) in (20..).step_by(18).zip(legend) {
+        right.draw(&PathElement::new([(0, y), (18, y)], style))?;
+        right.draw(&Text::new(name, (24, y - 6), ("sans-serif", 13)))?;
+    }
     Ok(())
 }
