@@ -28,9 +28,7 @@ pub fn list(folder: &Path, out: &mut impl Write) -> Result<(), Error> {
     print("experiments", &rows, out)?;
 
     let mut fmus = files(folder, "fmu");
-    if !folder.join("target").exists() || !fmus.iter().any(|path| path.starts_with(folder.join("target"))) {
-        fmus.extend(files(Path::new("target/fmu"), "fmu"));
-    }
+    fmus.extend(files(Path::new("target/fmu"), "fmu"));
     let rows: Vec<(PathBuf, String)> = fmus
         .into_iter()
         .map(|path| {
@@ -48,12 +46,16 @@ fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     WalkDir::new(folder)
         .sort_by_file_name()
         .into_iter()
-        // Hidden folders and results hold nothing to be run.
-        .filter_entry(|e| e.depth() == 0 || !e.file_name().to_string_lossy().starts_with('.'))
+        .filter_entry(|entry| entry.depth() == 0 || !is_passed_over(&entry.file_name().to_string_lossy()))
         .flatten()
         .map(walkdir::DirEntry::into_path)
         .filter(|path| path.is_file() && path.extension().is_some_and(|e| e == extension))
         .collect()
+}
+
+/// Hidden folders and build folders are large and hold nothing to be run, but for `target/fmu`, which is asked for by name.
+fn is_passed_over(name: &str) -> bool {
+    name.starts_with('.') || name == "target"
 }
 
 fn print(what: &str, rows: &[(PathBuf, String)], out: &mut impl Write) -> Result<(), Error> {

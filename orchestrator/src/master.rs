@@ -415,7 +415,7 @@ mod tests {
         coupling: Coupling,
         order: [&'static str; 2],
         every: [u32; 2],
-        stop: f64,
+        [step, stop]: [f64; 2],
         fails_after: f64,
     ) -> (Result<(), Error>, Vec<Vec<f64>>, Vec<String>) {
         let journal = Journal::default();
@@ -434,7 +434,7 @@ mod tests {
         let integrator = 1 - gain;
         let wires = [wire(integrator, gain), wire(gain, integrator)];
         let probes = [port(gain, 1), port(integrator, 0), port(integrator, 1)];
-        let clock = Clock::new(0.0, stop, 1.0).unwrap();
+        let clock = Clock::new(0.0, stop, step).unwrap();
         let mut master = Master::new(clock, coupling, members, &wires, &probes);
         let mut rows = Rows::default();
         let outcome = master.initialize().and_then(|()| master.run(&mut [&mut rows]));
@@ -444,7 +444,7 @@ mod tests {
 
     #[test]
     fn oracle_gauss_seidel_in_the_order_of_the_loop_has_no_delay() {
-        let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], 3.0, 1e9);
+        let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 3.0], 1e9);
         outcome.unwrap();
         // x⁺ = x + 2x, and at each row the moment in force belongs to the state of that row.
         let expected =
@@ -454,7 +454,7 @@ mod tests {
 
     #[test]
     fn oracle_the_other_order_delays_by_one_step() {
-        let (outcome, rows, _) = run(Coupling::GaussSeidel, ["integrator", "gain"], [1, 1], 3.0, 1e9);
+        let (outcome, rows, _) = run(Coupling::GaussSeidel, ["integrator", "gain"], [1, 1], [1.0, 3.0], 1e9);
         outcome.unwrap();
         // The integrator gets 2·x of the tick before. In initialization mode it got the gain's 0, at tick 0 its 2·x₀.
         let expected =
@@ -465,7 +465,7 @@ mod tests {
     #[test]
     fn oracle_jacobi_delays_by_one_step_in_either_order() {
         for order in [["gain", "integrator"], ["integrator", "gain"]] {
-            let (outcome, rows, _) = run(Coupling::Jacobi, order, [1, 1], 3.0, 1e9);
+            let (outcome, rows, _) = run(Coupling::Jacobi, order, [1, 1], [1.0, 3.0], 1e9);
             outcome.unwrap();
             // After initialization the gain holds 2·x₀ in either order.
             let expected =
@@ -476,7 +476,7 @@ mod tests {
 
     #[test]
     fn units_are_set_before_they_are_stepped() {
-        let (_, _, journal) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], 1.0, 1e9);
+        let (_, _, journal) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 1.0], 1e9);
         let expected = [
             "gain enter 0..1",
             "integrator enter 0..1",
@@ -498,7 +498,8 @@ mod tests {
 
     #[test]
     fn oracle_a_slow_unit_holds_its_outputs_and_shows_nothing_early() {
-        let (outcome, rows, journal) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 2], 5.0, 1e9);
+        let (outcome, rows, journal) =
+            run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 2], [1.0, 5.0], 1e9);
         outcome.unwrap();
         // The integrator is at 0, 2, 4 only; x⁺ = x + 2·2x there.
         let states: Vec<f64> = rows.iter().map(|row| row[3]).collect();
@@ -506,7 +507,7 @@ mod tests {
         let steps: Vec<&String> = journal.iter().filter(|line| line.starts_with("integrator step")).collect();
         assert_eq!(steps, ["integrator step 0+2", "integrator step 2+2"]);
 
-        let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [2, 1], 4.0, 1e9);
+        let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [2, 1], [1.0, 4.0], 1e9);
         outcome.unwrap();
         // The gain is sampled at 0, 2, 4 and held between.
         let held: Vec<f64> = rows.iter().map(|row| row[1]).collect();
@@ -515,10 +516,24 @@ mod tests {
 
     #[test]
     fn a_failing_unit_is_named_with_time_and_words_and_the_rows_stay() {
-        let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], 5.0, 2.0);
+        let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 5.0], 2.0);
         let error = outcome.unwrap_err();
         assert_eq!(error.to_string(), "gain failed at t = 2 s in doStep: out of propellant");
         assert_eq!(error.exit_code(), 1);
         assert_eq!(rows.len(), 3);
+    }
+
+    proptest::proptest! {
+        /// Units that all step at every n-th tick do what they do at every tick of a clock n times slower.
+        #[test]
+        fn oracle_equal_periods_are_a_slower_clock(n in 1u32..6, periods in 1u32..6, jacobi: bool, swap: bool) {
+            let coupling = if jacobi { Coupling::Jacobi } else { Coupling::GaussSeidel };
+            let order = if swap { ["integrator", "gain"] } else { ["gain", "integrator"] };
+            let stop = f64::from(n * periods) * 0.25;
+            let (_, fine, _) = run(coupling, order, [n, n], [0.25, stop], 1e9);
+            let (_, coarse, _) = run(coupling, order, [1, 1], [0.25 * f64::from(n), stop], 1e9);
+            let sampled: Vec<Vec<f64>> = fine.into_iter().step_by(n as usize).collect();
+            proptest::prop_assert_eq!(sampled, coarse);
+        }
     }
 }

@@ -217,6 +217,11 @@ impl Merit {
     }
 }
 
+/// The larger value. Unlike `f64::max` it does not hide a value that is not a number.
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
+}
+
 impl Observer for Merit {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
         let Sample { values, last, .. } = *sample;
@@ -233,7 +238,7 @@ impl Observer for Merit {
             self.sums[1] += moment;
             self.steps += 1;
         }
-        self.largest = [self.largest[0].max(rate), self.largest[1].max(moment)];
+        self.largest = [larger(self.largest[0], rate), larger(self.largest[1], moment)];
 
         if let Some(solves) = self.places.solver_solves {
             if let Some(time) = self.places.solver_time
@@ -300,6 +305,15 @@ mod tests {
         near(metrics.real_time_factor, 4.0);
         assert_eq!((metrics.solves, metrics.fallbacks, metrics.samples), (Some(2), Some(1), 3));
         assert!(metrics.completed);
+    }
+
+    #[test]
+    fn a_value_that_is_not_a_number_is_not_hidden() {
+        let mut merit = merit();
+        let mut rows = [[1.0; 15]; 3];
+        rows[1][6] = f64::NAN;
+        feed(&mut merit, &rows);
+        assert!(merit.metrics(1.0, 1.0, None).max_rate_deg_s.unwrap().is_nan());
     }
 
     #[test]

@@ -93,9 +93,7 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
 
 /// How a value stands against its limit.
 fn against(ratio: f64, limit: &str) -> String {
-    if ratio > 1.0 {
-        format!("   EXCEEDS its limit {limit}: {:.1} %", ratio * 100.0)
-    } else {
-        format!("   within its limit {limit}: {:.1} %", ratio * 100.0)
-    }
+    // What is not a number is not within a limit.
+    let verdict = if ratio <= 1.0 { "within" } else { "EXCEEDS" };
+    format!("   {verdict} its limit {limit}: {:.1} %", ratio * 100.0)
 }

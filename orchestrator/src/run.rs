@@ -97,8 +97,8 @@ impl Plan {
             opened.insert(path, Rc::clone(&fmu));
             fmus.push(fmu);
         }
-        let parts: Vec<Part> =
-            order.iter().zip(&fmus).map(|(name, fmu)| Part { name, description: &fmu.description }).collect();
+        let parts = parts(&order, &fmus);
+        check_single_instances(&experiment, &order, &fmus)?;
 
         let wires = wiring::wires(&experiment, &parts)?;
         let settings = (0..parts.len())
@@ -125,11 +125,7 @@ impl Plan {
 
     /// The components' names and descriptions.
     pub fn parts(&self) -> Vec<Part<'_>> {
-        self.order
-            .iter()
-            .zip(&self.fmus)
-            .map(|(name, fmu)| Part { name, description: &fmu.description })
-            .collect()
+        parts(&self.order, &self.fmus)
     }
 
     /// Runs the experiment and writes its results. If a unit fails, what was seen until then is written all the same.
@@ -230,6 +226,31 @@ impl Plan {
         }
         Ok(all)
     }
+}
+
+fn parts<'a>(order: &'a [String], fmus: &'a [Rc<Fmu>]) -> Vec<Part<'a>> {
+    order.iter().zip(fmus).map(|(name, fmu)| Part { name, description: &fmu.description }).collect()
+}
+
+/// Some FMUs can be used by one component only.
+fn check_single_instances(experiment: &Experiment, order: &[String], fmus: &[Rc<Fmu>]) -> Result<(), Error> {
+    for (index, fmu) in fmus.iter().enumerate() {
+        let only_once = fmu
+            .description
+            .co_simulation
+            .as_ref()
+            .is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"));
+        if only_once && let Some(other) = fmus[..index].iter().position(|other| Rc::ptr_eq(other, fmu)) {
+            let message = format!(
+                "\"{}\" and \"{}\" both use {}, which can be instantiated only once per process",
+                order[other],
+                order[index],
+                fmu.path.display()
+            );
+            return Err(experiment.source.error(&(0..0), message));
+        }
+    }
+    Ok(())
 }
 
 fn plain_value(description: &ModelDescription, port: Port, value: f64) -> serde_json::Value {

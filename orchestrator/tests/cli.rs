@@ -325,3 +325,11 @@ fn nothing_is_left_in_the_temporary_folder() {
     assert!(status.success());
     assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);
 }
+
+#[test]
+fn all_experiments_of_the_project_can_be_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let (code, text, _) = Bench::new().call(&["list", folder.to_str().unwrap()]);
+    assert_eq!(code, 0);
+    assert!(text.contains("crmpc-robust.toml") && !text.contains("FAULT"), "{text}");
+}
