@@ -1,11 +1,11 @@
 //! What every controller is: a function of memory, tick and measurement.
 
 use nalgebra::Vector3;
-use serde::{Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use vehicle::reference::Reference;
 
 /// What a controller is told about the vehicle.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
     /// Θ = [α, β, σ], rad.
     pub angles: Vector3<f64>,

@@ -5,9 +5,12 @@ pub mod crmpc;
 pub mod error;
 pub mod linearise;
 pub mod lq;
+pub mod lqr;
 pub mod sampled;
+pub mod schedule;
 pub mod settings;
 
 pub use controller::{Controller, Measurement};
 pub use crmpc::Crmpc;
 pub use error::DesignError;
+pub use lqr::Lqr;

@@ -1,0 +1,115 @@
+//! The linear-quadratic regulator that Chai 2022, section 5 compares with: "an unconstrained version of MPC", same P and Q.
+
+use crate::controller::{Controller, Measurement, ReferenceAt};
+use crate::error::DesignError;
+use crate::linearise;
+use crate::sampled::{Gain, SampledError};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::dynamics::RigidBody;
+use vehicle::kinematics;
+
+/// Settings of the regulator. Units SI, angles rad.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LqrSettings {
+    /// The vehicle as the controller believes it to be.
+    pub body: RigidBody,
+    /// P, diagonal: angles, rates.
+    pub p: [f64; 6],
+    /// Q, diagonal.
+    pub q: [f64; 3],
+    /// Time between ticks, s.
+    pub period: f64,
+}
+
+/// Linear feedback on E = x − x_r with cancellation of the drift f: u = −f + Θ̈_r + K E.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lqr {
+    settings: LqrSettings,
+    /// K per axis, with the papers' signs (negative).
+    gains: [Gain; 3],
+}
+
+/// Gain of one axis from the Riccati equation AᵀS + S A − S B Q⁻¹ Bᵀ S + P = 0 of the double integrator, which has the
+/// closed form k1 = −√(P₁/Q), k2 = −√((P₂ + 2 √(P₁ Q))/Q).
+pub fn riccati_gain(p1: f64, p2: f64, q: f64) -> Gain {
+    Gain { k1: -(p1 / q).sqrt(), k2: -((p2 + 2.0 * (p1 * q).sqrt()) / q).sqrt() }
+}
+
+impl Lqr {
+    /// Computes the gains.
+    ///
+    /// # Errors
+    /// Names the weight or period at fault; refuses gains that the sampling makes unstable, naming the spectral radius.
+    pub fn new(settings: LqrSettings) -> Result<Self, DesignError> {
+        if !(settings.period > 0.0 && settings.period.is_finite()) {
+            return Err(DesignError::NotPositive { name: "period.feedback", value: settings.period });
+        }
+        let weights = settings.p.iter().enumerate().map(|(i, &value)| ("P", i, value, i >= 3 && value >= 0.0));
+        let weights = weights.chain(settings.q.iter().enumerate().map(|(i, &value)| ("Q", i, value, false)));
+        for (name, i, value, zero_allowed) in weights {
+            if !(value.is_finite() && (value > 0.0 || zero_allowed)) {
+                return Err(DesignError::Weight { name, index: i + 1, value });
+            }
+        }
+        let gains = std::array::from_fn(|i| riccati_gain(settings.p[i], settings.p[i + 3], settings.q[i]));
+        for Gain { k1, k2 } in gains {
+            let radius = SampledError::new(Gain { k1, k2 }, settings.period).spectral_radius();
+            if radius >= 1.0 {
+                return Err(DesignError::Unstable { k1, k2, period: settings.period, radius });
+            }
+        }
+        Ok(Self { settings, gains })
+    }
+
+    /// K per axis.
+    pub fn gains(&self) -> [Gain; 3] {
+        self.gains
+    }
+}
+
+impl Controller for Lqr {
+    type Memory = ();
+
+    fn period(&self) -> f64 {
+        self.settings.period
+    }
+
+    fn update(
+        &mut self,
+        _memory: &mut (),
+        _tick: u64,
+        time: f64,
+        measured: &Measurement,
+        reference: ReferenceAt,
+    ) -> Vector3<f64> {
+        let reference = reference(time);
+        let angle_rates = kinematics::r(&measured.angles) * measured.rates;
+        let mut acceleration = reference.accelerations;
+        for (i, gain) in self.gains.iter().enumerate() {
+            acceleration[i] += gain.k1 * (measured.angles[i] - reference.angles[i])
+                + gain.k2 * (angle_rates[i] - reference.rates[i]);
+        }
+        linearise::moment(&self.settings.body, &measured.angles, &angle_rates, &acceleration)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix2, Vector2};
+
+    #[test]
+    fn oracle_gain_satisfies_the_riccati_equation() {
+        for (p1, p2, q) in [(50.0, 50.0, 10.0), (3.0, 0.0, 0.7), (1.0, 200.0, 5.0)] {
+            let Gain { k1, k2 } = riccati_gain(p1, p2, q);
+            // S from K = −Q⁻¹BᵀS and the (1,2) entry of the equation.
+            let s = Matrix2::new(k1 * k2 * q, -k1 * q, -k1 * q, -k2 * q);
+            let (a, b) = (Matrix2::new(0.0, 1.0, 0.0, 0.0), Vector2::new(0.0, 1.0));
+            let residual = a.transpose() * s + s * a - s * b * b.transpose() * s / q
+                + Matrix2::from_diagonal(&Vector2::new(p1, p2));
+            assert!(residual.norm() < 1e-12 * s.norm(), "{residual}");
+            assert!(s.cholesky().is_some());
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! The sampled side of a controller on integer ticks: t_k = t₀ + k·period, never accumulated.
+
+use crate::controller::{Controller, Measurement, ReferenceAt};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::time::{tick_time, tolerance};
+
+/// Memory of a controller and where it stands in time. At a tick the output is a function of the committed memory and of
+/// the measurement now given: it may be evaluated any number of times, and is committed when time leaves the tick.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sampled<Memory> {
+    start: f64,
+    /// The first tick that is not committed.
+    next: u64,
+    committed: Memory,
+    held: Vector3<f64>,
+    /// Outcome of `next`, if it was evaluated, and what it was evaluated for.
+    pending: Memory,
+    pending_moment: Vector3<f64>,
+    evaluated: Option<Evaluated>,
+}
+
+/// What an evaluation depends on beside the committed memory.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Evaluated {
+    measured: Measurement,
+    /// Mark of the caller's further inputs (an external reference).
+    mark: [f64; 9],
+}
+
+impl<Memory: Clone + Default> Sampled<Memory> {
+    /// At tick 0, which is due at `start` (s).
+    pub fn new(start: f64) -> Self {
+        Self { start, ..Self::default() }
+    }
+
+    /// Time of the first uncommitted tick, s.
+    pub fn next_time(&self, period: f64) -> f64 {
+        tick_time(self.next as i64, self.start, period)
+    }
+
+    /// Whether a tick is due at `time` (s).
+    pub fn is_due(&self, time: f64, period: f64) -> bool {
+        self.next_time(period) <= time + tolerance(time)
+    }
+
+    /// Whether the first uncommitted tick comes before `time` (s).
+    pub fn comes_before(&self, time: f64, period: f64) -> bool {
+        self.next_time(period) < time - tolerance(time)
+    }
+
+    /// Evaluates the first uncommitted tick. `mark` must change whenever `reference` does; nothing is computed again if
+    /// both inputs are the same.
+    pub fn evaluate<C: Controller<Memory = Memory>>(
+        &mut self,
+        controller: &mut C,
+        measured: &Measurement,
+        mark: [f64; 9],
+        reference: ReferenceAt,
+    ) {
+        let evaluated = Some(Evaluated { measured: *measured, mark });
+        if self.evaluated == evaluated {
+            return;
+        }
+        self.pending.clone_from(&self.committed);
+        let time = self.next_time(controller.period());
+        self.pending_moment = controller.update(&mut self.pending, self.next, time, measured, reference);
+        self.evaluated = evaluated;
+    }
+
+    /// Commits the evaluated tick: its outcome is held from now on.
+    pub fn commit(&mut self) {
+        if self.evaluated.take().is_some() {
+            std::mem::swap(&mut self.committed, &mut self.pending);
+            self.held = self.pending_moment;
+            self.next += 1;
+        }
+    }
+
+    /// The moment in force (N m) and the memory behind it: of the evaluated tick, else of the last committed one.
+    pub fn in_force(&self) -> (Vector3<f64>, &Memory) {
+        if self.evaluated.is_some() { (self.pending_moment, &self.pending) } else { (self.held, &self.committed) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vehicle::reference::Reference;
+
+    /// Sums what it measured, so that every evaluation that is lost or counted twice shows.
+    struct Sum;
+
+    impl Controller for Sum {
+        type Memory = f64;
+        fn period(&self) -> f64 {
+            0.04
+        }
+        fn update(&mut self, memory: &mut f64, tick: u64, _: f64, measured: &Measurement, _: ReferenceAt) -> Vector3<f64> {
+            *memory += measured.angles.x;
+            Vector3::new(*memory, tick as f64, 0.0)
+        }
+    }
+
+    fn measured(x: f64) -> Measurement {
+        Measurement { angles: Vector3::new(x, 0.0, 0.0), ..Measurement::default() }
+    }
+
+    fn evaluate(sampled: &mut Sampled<f64>, x: f64) {
+        sampled.evaluate(&mut Sum, &measured(x), [0.0; 9], &|_| Reference::default());
+    }
+
+    #[test]
+    fn a_tick_is_a_function_of_committed_memory_and_present_inputs() {
+        let mut sampled = Sampled::new(0.0);
+        evaluate(&mut sampled, 1.0);
+        evaluate(&mut sampled, 5.0);
+        assert_eq!(sampled.in_force().0.x, 5.0, "the first evaluation leaves no trace");
+        sampled.commit();
+        sampled.commit();
+        evaluate(&mut sampled, 2.0);
+        assert_eq!(sampled.in_force().0, Vector3::new(7.0, 1.0, 0.0));
+    }
+
+    #[test]
+    fn ticks_are_due_at_integer_multiples_from_either_side_of_rounding() {
+        let mut sampled = Sampled::<f64>::new(0.1);
+        for k in 0..10_000_u32 {
+            let time = 0.1 + f64::from(k) * 0.04;
+            assert!(sampled.is_due(time.next_down(), 0.04) && sampled.is_due(time, 0.04));
+            assert!(!sampled.is_due(time - 0.01, 0.04) && !sampled.comes_before(time.next_up(), 0.04));
+            evaluate(&mut sampled, 0.0);
+            sampled.commit();
+        }
+    }
+}
