@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use variable::Variable;
 
 /// Who answers for the units, as `modelDescription.xml` names them.
-pub const AUTHOR: &str = "The authors of reentry-attitude-control";
+pub const AUTHOR: &str = "Re-entry Attitude Control contributors";
 /// SPDX expression of the licence of every unit.
 pub const LICENSE: &str = env!("CARGO_PKG_LICENSE");
 
