@@ -18,7 +18,9 @@ pub enum DesignError {
         radius: f64,
     },
     /// A gain violates Lemma 2 or 3 of Chai 2022.
-    #[error("{name}.k1 and {name}.k2 need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)")]
+    #[error(
+        "{name}.k1 and {name}.k2 need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)"
+    )]
     NotReal {
         /// Which gain.
         name: &'static str,
@@ -54,7 +56,9 @@ pub enum DesignError {
         high: f64,
     },
     /// The two rates do not fit.
-    #[error("period.optimisation = {optimisation} s must be a whole multiple of period.feedback = {feedback} s")]
+    #[error(
+        "period.optimisation = {optimisation} s must be a whole multiple of period.feedback = {feedback} s"
+    )]
     Periods {
         /// Optimisation period, s.
         optimisation: f64,

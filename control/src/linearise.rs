@@ -147,7 +147,11 @@ mod tests {
         };
         let all = |z: &[f64; 9]| {
             let (angles, rates, a) = split(z);
-            [body_rates(&angles, &rates), moment(&body, &angles, &rates, &a), input(&body, &angles, &rates, &a)]
+            [
+                body_rates(&angles, &rates),
+                moment(&body, &angles, &rates, &a),
+                input(&body, &angles, &rates, &a),
+            ]
         };
         let (angles, rates, a) = split(&point);
         let exact = linearise(&body, &angles, &rates, &a);

@@ -102,7 +102,8 @@ impl TrackingLq {
         self.costate[n] = Vector2::zeros();
         for k in (0..n).rev() {
             let stage = &self.stages[k];
-            self.costate[k] = stage.closed_loop_transposed * (self.costate[k + 1] + stage.next_weight * affine(k));
+            self.costate[k] =
+                stage.closed_loop_transposed * (self.costate[k + 1] + stage.next_weight * affine(k));
         }
         self.follow(0, start, affine, visit)
     }
@@ -120,7 +121,8 @@ impl TrackingLq {
         for k in first..self.stages.len() {
             let stage = &self.stages[k];
             let d = affine(k);
-            let v = (stage.gain * error - stage.feedforward * (stage.next_weight * d + self.costate[k + 1])).x;
+            let v =
+                (stage.gain * error - stage.feedforward * (stage.next_weight * d + self.costate[k + 1])).x;
             visit(k, error, v);
             error = self.a * error + self.b * v + d;
         }
@@ -186,9 +188,12 @@ mod tests {
         };
         let zero = residual(&DVector::zeros(n));
         let jacobian = DMatrix::from_columns(
-            &(0..n).map(|k| residual(&DVector::from_fn(n, |i, _| f64::from(i == k))) - &zero).collect::<Vec<_>>(),
+            &(0..n)
+                .map(|k| residual(&DVector::from_fn(n, |i, _| f64::from(i == k))) - &zero)
+                .collect::<Vec<_>>(),
         );
-        let oracle = (jacobian.transpose() * &jacobian).cholesky().unwrap().solve(&(-jacobian.transpose() * zero));
+        let oracle =
+            (jacobian.transpose() * &jacobian).cholesky().unwrap().solve(&(-jacobian.transpose() * zero));
         let mut ours = DVector::zeros(n);
         TrackingLq::new(n, h, p, q, g).solve(start, affine, |k, _, v| ours[k] = v);
         assert!((ours - &oracle).norm() < 1e-11 * oracle.norm());
@@ -209,7 +214,9 @@ mod tests {
             let (arrival, centre) = lq.arrival_cost(k, start, affine);
             let joint = (to_go + arrival).try_inverse().unwrap() * (arrival * centre - costate);
             assert!((joint - optimum[k]).norm() < 1e-11, "stage {k}");
-            lq.trace_back(k, optimum[k], |j, error| assert!((error - optimum[j]).norm() < 1e-11, "{j} from {k}"));
+            lq.trace_back(k, optimum[k], |j, error| {
+                assert!((error - optimum[j]).norm() < 1e-11, "{j} from {k}")
+            });
             let last = lq.follow(k, optimum[k], affine, |j, error, _| {
                 assert!((error - optimum[j]).norm() < 1e-11, "{j} from {k}");
             });

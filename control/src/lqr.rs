@@ -45,7 +45,8 @@ impl Lqr {
         if !(settings.period > 0.0 && settings.period.is_finite()) {
             return Err(DesignError::NotPositive { name: "period.feedback", value: settings.period });
         }
-        let weights = settings.p.iter().enumerate().map(|(i, &value)| ("P", i, value, i >= 3 && value >= 0.0));
+        let weights =
+            settings.p.iter().enumerate().map(|(i, &value)| ("P", i, value, i >= 3 && value >= 0.0));
         let weights = weights.chain(settings.q.iter().enumerate().map(|(i, &value)| ("Q", i, value, false)));
         for (name, i, value, zero_allowed) in weights {
             if !(value.is_finite() && (value > 0.0 || zero_allowed)) {

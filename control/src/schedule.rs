@@ -77,9 +77,19 @@ impl<Memory: Clone + Default> Sampled<Memory> {
         }
     }
 
+    /// Looks at the memories before and after the tick that was just committed.
+    pub fn last_change<T>(&self, look: impl FnOnce(&Memory, &Memory) -> T) -> T {
+        // `commit` swapped the older one into `pending`.
+        look(&self.pending, &self.committed)
+    }
+
     /// The moment in force (N m) and the memory behind it: of the evaluated tick, else of the last committed one.
     pub fn in_force(&self) -> (Vector3<f64>, &Memory) {
-        if self.evaluated.is_some() { (self.pending_moment, &self.pending) } else { (self.held, &self.committed) }
+        if self.evaluated.is_some() {
+            (self.pending_moment, &self.pending)
+        } else {
+            (self.held, &self.committed)
+        }
     }
 }
 
@@ -96,7 +106,14 @@ mod tests {
         fn period(&self) -> f64 {
             0.04
         }
-        fn update(&mut self, memory: &mut f64, tick: u64, _: f64, measured: &Measurement, _: ReferenceAt) -> Vector3<f64> {
+        fn update(
+            &mut self,
+            memory: &mut f64,
+            tick: u64,
+            _: f64,
+            measured: &Measurement,
+            _: ReferenceAt,
+        ) -> Vector3<f64> {
             *memory += measured.angles.x;
             Vector3::new(*memory, tick as f64, 0.0)
         }

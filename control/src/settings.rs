@@ -84,6 +84,15 @@ fn embedded() -> File {
 }
 
 impl Settings {
+    /// Chai 2022, section 5.1, with its vehicle at the nominal inertia.
+    #[allow(clippy::panic)]
+    pub fn published() -> Self {
+        let scenario = Scenario::crmpc2022();
+        // Cannot fail: the scenario's own tests read its inertia.
+        let body = scenario.inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
+        Self::crmpc2022(&scenario, body)
+    }
+
     /// Chai 2022, section 5.1, for the vehicle and limits of `scenario`; robust set, measured initial state.
     pub fn crmpc2022(scenario: &Scenario, body: RigidBody) -> Self {
         let File { weights, schedule, gains, bounds, solver, .. } = embedded();

@@ -1,1 +1,20 @@
-//! Placeholder.
+//! The FMI 2.0 units of the controllers, for co-simulation: the crate `control` behind tables of variables. All units have the
+//! same inputs and outputs, so that one can take another's place without rewiring.
+
+mod crmpc;
+mod law;
+mod lqr;
+mod reference;
+mod table;
+#[cfg(test)]
+mod tests;
+mod unit;
+
+pub use unit::Unit;
+
+/// `CRMPC`: centralised robust model predictive control.
+pub type Crmpc = Unit<crmpc::CrmpcLaw>;
+/// `LQR`: linear-quadratic regulator.
+pub type Lqr = Unit<lqr::LqrLaw>;
+
+fmi2_export::export_fmus!(Crmpc, Lqr);

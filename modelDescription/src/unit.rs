@@ -63,3 +63,11 @@ pub fn time() -> Unit {
 pub fn frequency() -> Unit {
     unit("Hz", [0, 0, -1, 0, 0], None)
 }
+/// Gain from an angle to its second derivative.
+pub fn gain_angle() -> Unit {
+    unit("1/s2", [0, 0, -2, 0, 0], None)
+}
+/// Gain from a rate to its derivative.
+pub fn gain_rate() -> Unit {
+    unit("1/s", [0, 0, -1, 0, 0], None)
+}

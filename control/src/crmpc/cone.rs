@@ -331,7 +331,16 @@ impl ConeProblem {
             Start::Arrival => self.add_cost(0, sample.arrival),
         }
         for (slots, ball) in self.state_slots.iter().zip(sample.state_balls) {
-            write_ball(&mut self.matrix, &mut self.right_side, slots, ball, &ball.by_rates, &ball.offset, sa, sw);
+            write_ball(
+                &mut self.matrix,
+                &mut self.right_side,
+                slots,
+                ball,
+                &ball.by_rates,
+                &ball.offset,
+                sa,
+                sw,
+            );
         }
         for (k, (slots, ball)) in self.input_slots.iter().zip(sample.input_balls).enumerate() {
             // v_k = (E_ω,k+1 − E_ω,k − d_ω,k)/h

@@ -193,9 +193,7 @@ impl Design {
         let invariant = error.invariant_ellipse(per_axis.max(1e-9)).unwrap_or_else(Matrix2::identity);
         let tightening = Tightening {
             at_stage: match s.initial_state {
-                InitialState::Measured => {
-                    error.reach(ratio * s.horizon).into_iter().step_by(ratio).collect()
-                }
+                InitialState::Measured => error.reach(ratio * s.horizon).into_iter().step_by(ratio).collect(),
                 InitialState::Tube => vec![extents(&invariant, s.feedback, per_axis); s.horizon + 1],
             },
             within_stage: match s.initial_state {
@@ -255,11 +253,20 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
         return Err(DesignError::NotPositive { name: "horizon", value: 0.0 });
     }
     if !(0.0..1.0).contains(&s.inertia_error) {
-        return Err(DesignError::OutOfRange { name: "inertia.error", value: s.inertia_error, low: 0.0, high: 1.0 });
+        return Err(DesignError::OutOfRange {
+            name: "inertia.error",
+            value: s.inertia_error,
+            low: 0.0,
+            high: 1.0,
+        });
     }
     let ratio = (s.period_optimisation / s.period_feedback).round();
-    if ratio < 1.0 || (ratio * s.period_feedback - s.period_optimisation).abs() > 1e-9 * s.period_optimisation {
-        return Err(DesignError::Periods { optimisation: s.period_optimisation, feedback: s.period_feedback });
+    if ratio < 1.0 || (ratio * s.period_feedback - s.period_optimisation).abs() > 1e-9 * s.period_optimisation
+    {
+        return Err(DesignError::Periods {
+            optimisation: s.period_optimisation,
+            feedback: s.period_feedback,
+        });
     }
     Ok(ratio as usize)
 }

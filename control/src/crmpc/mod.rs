@@ -8,7 +8,8 @@ mod design;
 mod plan;
 
 pub use design::{
-    Constraints, Design, InitialState, PaperConstants, Settings, Tightening, step_response_peak, terminal_weight,
+    Constraints, Design, InitialState, PaperConstants, Settings, Tightening, step_response_peak,
+    terminal_weight,
 };
 pub use plan::Plan;
 
@@ -96,6 +97,8 @@ pub struct Crmpc {
     /// The whole horizon.
     whole: ConeProblem,
     windows: Option<Windows>,
+    /// Whether the unconstrained optimum is tried first.
+    exits: bool,
     // Scratch of one optimisation.
     references: Vec<Reference>,
     affine: Vec<Vector6<f64>>,
@@ -193,6 +196,7 @@ impl Crmpc {
             lq,
             whole,
             windows,
+            exits: true,
             references: vec![Reference::default(); n + 1],
             affine: vec![Vector6::zeros(); n],
             errors: vec![Vector6::zeros(); n + 1],
@@ -200,6 +204,14 @@ impl Crmpc {
             state_balls: vec![Ball::default(); n],
             input_balls: vec![Ball::default(); n],
         })
+    }
+
+    /// Always solves the cone programme of the whole horizon, for comparison: the same optimum, only later.
+    #[must_use]
+    pub fn without_exits(mut self) -> Self {
+        self.exits = false;
+        self.windows = None;
+        self
     }
 
     /// The offline design.
@@ -222,8 +234,8 @@ impl Crmpc {
         self.unconstrained(measured);
         let (mut status, mut iterations) = (Status::Unconstrained, 0);
         let violated = match self.settings.initial_state {
-            InitialState::Measured => self.violated(0..0),
-            InitialState::Tube => Some(0..self.settings.horizon),
+            InitialState::Measured if self.exits => self.violated(0..0),
+            _ => Some(0..self.settings.horizon),
         };
         if let Some(violated) = violated {
             let solved = if first {
@@ -301,11 +313,15 @@ impl Crmpc {
         let Self { lq, references, affine, errors, candidate, settings, .. } = self;
         let start = measured - state(&references[0]);
         for (i, lq) in lq.iter_mut().enumerate() {
-            let last = lq.solve(axis(&start, i), |k| axis(&affine[k], i), |k, error, v| {
-                errors[k][i] = error.x;
-                errors[k][3 + i] = error.y;
-                candidate.accelerations[k][i] = v + references[k].accelerations[i];
-            });
+            let last = lq.solve(
+                axis(&start, i),
+                |k| axis(&affine[k], i),
+                |k, error, v| {
+                    errors[k][i] = error.x;
+                    errors[k][3 + i] = error.y;
+                    candidate.accelerations[k][i] = v + references[k].accelerations[i];
+                },
+            );
             errors[settings.horizon][i] = last.x;
             errors[settings.horizon][3 + i] = last.y;
         }
@@ -417,13 +433,14 @@ impl Crmpc {
         let terminal_radius = self.terminal_radius();
         let Some(Windows { head, middle, tail }) = &mut self.windows else { return false };
         let centred = (violated.start + violated.end).saturating_sub(MIDDLE) / 2;
-        let (problem, window) = if violated.end <= n - TAIL / 2 && violated.len() <= MIDDLE / 2 && centred >= 2 {
-            (middle, centred..centred + MIDDLE)
-        } else if violated.start > n - TAIL {
-            (tail, n - TAIL..n)
-        } else {
-            (head, 0..HEAD)
-        };
+        let (problem, window) =
+            if violated.end <= n - TAIL / 2 && violated.len() <= MIDDLE / 2 && centred >= 2 {
+                (middle, centred..centred + MIDDLE)
+            } else if violated.start > n - TAIL {
+                (tail, n - TAIL..n)
+            } else {
+                (head, 0..HEAD)
+            };
         if violated.end > window.end + usize::from(window.end == n) {
             return false;
         }
@@ -435,7 +452,8 @@ impl Crmpc {
         for (i, lq) in self.lq.iter_mut().enumerate() {
             to_go[i] = lq.cost_to_go(window.end);
             if window.start > 0 {
-                let (weight, centre) = lq.arrival_cost(window.start, axis(&start, i), |k| axis(&affine[k], i));
+                let (weight, centre) =
+                    lq.arrival_cost(window.start, axis(&start, i), |k| axis(&affine[k], i));
                 arrival[i] = (weight, -(weight * centre));
             }
         }
@@ -461,7 +479,8 @@ impl Crmpc {
                 errors[k][3 + i] = error.y;
             };
             lq.trace_back(window.start, axis(&begin, i), &mut set);
-            let last = lq.follow(window.end, axis(&end, i), |k| axis(&affine[k], i), |k, error, _| set(k, error));
+            let last =
+                lq.follow(window.end, axis(&end, i), |k| axis(&affine[k], i), |k, error, _| set(k, error));
             set(n, last);
         }
         self.plan_from_errors(measured);
@@ -554,9 +573,11 @@ impl Crmpc {
         let limit = self.settings.limit_moment;
         // I R⁻¹ K o for disturbances in a box, and for the inertia error, which acts along m.
         let by_acceleration = &here.moment.by_acceleration;
-        let feedback = feedback * (tightening.disturbance * largest_over_box(by_acceleration) + tightening.inertia * limit);
+        let feedback = feedback
+            * (tightening.disturbance * largest_over_box(by_acceleration) + tightening.inertia * limit);
         // The cancellation of f sees the deviation too.
-        let drift = (here.moment.by_angles.norm() * angle + here.moment.by_rates.norm() * rate) * tightening.norm;
+        let drift =
+            (here.moment.by_angles.norm() * angle + here.moment.by_rates.norm() * rate) * tightening.norm;
         // With a held, m̃ moves within the interval.
         let within = (next.moment.value.norm() - here.moment.value.norm()).max(0.0);
         (limit - feedback - drift - within).max(SMALLEST_SHARE * limit)
@@ -570,11 +591,13 @@ impl Crmpc {
             Sets::Paper { epsilon, .. } => epsilon,
             Sets::Robust => {
                 let end = &self.references[n];
-                let at = linearise::linearise(&self.settings.body, &end.angles, &end.rates, &end.accelerations);
+                let at =
+                    linearise::linearise(&self.settings.body, &end.angles, &end.rates, &end.accelerations);
                 let rate = self.rate_bound(n, &at) - at.rates.value.norm();
                 let moment = self.moment_bound(n - 1, &at, &at) - at.moment.value.norm();
                 let gain = self.settings.terminal.k1.hypot(self.settings.terminal.k2);
-                let radius = self.design.terminal_scale * rate.min(moment / (self.design.largest_inertia * gain));
+                let radius =
+                    self.design.terminal_scale * rate.min(moment / (self.design.largest_inertia * gain));
                 radius.max(SMALLEST_RADIUS)
             }
         }
@@ -602,7 +625,8 @@ impl Controller for Crmpc {
             self.optimise(memory, time, join(&measured.angles, &angle_rates), reference);
         }
         let a = memory.plan.accelerations[0];
-        memory.nominal = plan::advance(&memory.plan.states[0], &a, within as f64 * self.settings.period_feedback);
+        memory.nominal =
+            plan::advance(&memory.plan.states[0], &a, within as f64 * self.settings.period_feedback);
         // (20): with ũ* = a − f(x̃*), u = K O_e − f(x) + a, and m = I R⁻¹ u.
         let (nominal_angles, nominal_rates) = split(&memory.nominal);
         let gain = self.settings.feedback;

@@ -1,0 +1,266 @@
+//! `CRMPC`: its own parameters and outputs.
+
+use crate::law::{Law, Vehicle};
+use crate::table::{self, ANGLES, sampled_inputs, vector};
+use crate::unit::Unit;
+use control::crmpc::{Constraints, Crmpc, InitialState, Memory, Settings, Status};
+use control::sampled::Gain;
+use fmi2_export::table::{discrete_output, parameter};
+use fmi2_export::{Failure, Table};
+use model_description::unit;
+use model_description::variable::EnumerationType;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Parameters and outputs of CRMPC. Enumerations are held as their 1-based item number.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct CrmpcLaw {
+    constraints: i32,
+    initial_state: i32,
+    horizon: i32,
+    period_optimisation: f64,
+    period_feedback: f64,
+    p: [f64; 6],
+    q: [f64; 3],
+    feedback: Gain,
+    terminal: Gain,
+    tube: Gain,
+    disturbance_bound: f64,
+    inertia_error: f64,
+    sideslip_bound: f64,
+    reference_rate: f64,
+    reference_acceleration: f64,
+    max_iterations: i32,
+    shown: Shown,
+}
+
+/// What the outputs show.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct Shown {
+    angles: Vector3<f64>,
+    rates: Vector3<f64>,
+    status: i32,
+    cost: f64,
+    iterations: i32,
+    time: f64,
+    solves: i32,
+    fallbacks: i32,
+}
+
+const CONSTRAINTS: [(Constraints, &str, &str); 2] = [
+    (Constraints::Robust, "robust", "the limits themselves, tightened by what the error dynamics can reach"),
+    (Constraints::Paper, "paper", "the sets as printed, which do not imply the limits"),
+];
+const INITIAL_STATES: [(InitialState, &str, &str); 2] = [
+    (InitialState::Measured, "measured", "the nominal motion starts at the measured state"),
+    (InitialState::Tube, "tube", "it starts anywhere in an invariant set around the measured state"),
+];
+const STATUSES: [(Status, &str, &str); 4] = [
+    (Status::None, "none", "no optimisation yet"),
+    (Status::Unconstrained, "unconstrained", "the unconstrained optimum, checked to satisfy every constraint"),
+    (Status::Constrained, "constrained", "the optimum of the cone programme"),
+    (Status::Fallback, "fallback", "the previous plan, shifted, with the terminal law"),
+];
+
+/// The item with number `number`, or the first.
+fn item<T: Copy>(items: &[(T, &str, &str)], number: i32) -> T {
+    usize::try_from(number - 1).ok().and_then(|i| items.get(i)).unwrap_or(&items[0]).0
+}
+
+/// The number of `value`, or 1.
+fn number<T: PartialEq>(items: &[(T, &str, &str)], value: &T) -> i32 {
+    (1..).zip(items).find(|(_, item)| item.0 == *value).map_or(1, |(number, _)| number)
+}
+
+fn enumeration<T>(name: &str, description: &str, items: &[(T, &str, &str)]) -> EnumerationType {
+    let items = items.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect();
+    EnumerationType { name: name.into(), description: description.into(), items }
+}
+
+impl Default for CrmpcLaw {
+    fn default() -> Self {
+        let s = Settings::published();
+        Self {
+            constraints: number(&CONSTRAINTS, &s.constraints),
+            initial_state: number(&INITIAL_STATES, &s.initial_state),
+            horizon: s.horizon as i32,
+            period_optimisation: s.period_optimisation,
+            period_feedback: s.period_feedback,
+            p: s.p,
+            q: s.q,
+            feedback: s.feedback,
+            terminal: s.terminal,
+            tube: s.tube,
+            disturbance_bound: s.disturbance_bound,
+            inertia_error: s.inertia_error,
+            sideslip_bound: s.sideslip_bound,
+            reference_rate: s.reference_rate,
+            reference_acceleration: s.reference_acceleration,
+            max_iterations: s.max_iterations as i32,
+            shown: Shown { status: 1, ..Shown::default() },
+        }
+    }
+}
+
+impl Law for CrmpcLaw {
+    type Controller = Crmpc;
+
+    const NAME: &'static str = "CRMPC";
+    const DESCRIPTION: &'static str =
+        "Centralised robust model predictive attitude controller of Chai et al. (2022)";
+    const DOCUMENTATION: &'static str = include_str!("crmpc.html");
+
+    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
+        outputs(bounds(gains(schedule(table))))
+    }
+
+    #[allow(private_interfaces)]
+    fn design(&self, vehicle: &Vehicle) -> Result<Crmpc, Failure> {
+        let settings = Settings {
+            body: vehicle.body,
+            limit_rate: vehicle.limit_rate,
+            limit_moment: vehicle.limit_moment,
+            constraints: item(&CONSTRAINTS, self.constraints),
+            initial_state: item(&INITIAL_STATES, self.initial_state),
+            horizon: self.horizon.max(0) as usize,
+            period_optimisation: self.period_optimisation,
+            period_feedback: self.period_feedback,
+            p: self.p,
+            q: self.q,
+            feedback: self.feedback,
+            terminal: self.terminal,
+            tube: self.tube,
+            disturbance_bound: self.disturbance_bound,
+            inertia_error: self.inertia_error,
+            sideslip_bound: self.sideslip_bound,
+            reference_rate: self.reference_rate,
+            reference_acceleration: self.reference_acceleration,
+            max_iterations: self.max_iterations.max(0) as u32,
+        };
+        Crmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    fn show(&mut self, memory: &Memory) {
+        let report = &memory.report;
+        self.shown = Shown {
+            angles: memory.nominal.fixed_rows::<3>(0).into(),
+            rates: memory.nominal.fixed_rows::<3>(3).into(),
+            status: number(&STATUSES, &report.status),
+            cost: report.cost,
+            iterations: report.iterations as i32,
+            time: report.time,
+            solves: report.solves as i32,
+            fallbacks: report.fallbacks as i32,
+        };
+    }
+
+    fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
+        (after.report.fallbacks > before.report.fallbacks).then_some(
+            "the optimisation did not succeed: the previous plan with the terminal law is used (solver.fallbacks)",
+        )
+    }
+}
+
+type Controller = Table<Unit<CrmpcLaw>>;
+
+fn schedule(table: Controller) -> Controller {
+    let constraints = parameter("constraints", "Sets that the optimisation keeps the nominal motion in");
+    let initial = parameter("initialState", "Where the nominal motion starts at each optimisation");
+    let horizon = parameter("horizon", "Number of prediction steps");
+    let optimisation = parameter(
+        "period.optimisation",
+        "Time between two optimisations and prediction step; a whole multiple of period.feedback",
+    );
+    let feedback = parameter("period.feedback", "Time between two evaluations of the feedback law");
+    let iterations = parameter("solver.maxIterations", "Iteration limit of the cone solver");
+    table
+        .enumeration(
+            constraints,
+            enumeration("Constraints", "Sets that the optimisation keeps the nominal motion in", &CONSTRAINTS),
+            |m| &mut m.law.constraints,
+        )
+        .enumeration(
+            initial,
+            enumeration("InitialState", "Where the nominal motion starts", &INITIAL_STATES),
+            |m| &mut m.law.initial_state,
+        )
+        .integer(horizon, (Some(2), Some(1000)), |m| &mut m.law.horizon)
+        .real(optimisation.real().unit(unit::time()).min(1e-3).max(10.0).nominal(0.2), |m| {
+            &mut m.law.period_optimisation
+        })
+        .real(feedback.real().unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| {
+            &mut m.law.period_feedback
+        })
+        .integer(iterations, (Some(1), Some(1000)), |m| &mut m.law.max_iterations)
+}
+
+fn gains(table: Controller) -> Controller {
+    let mut table = table::weights(table, |law| &mut law.p, |law| &mut law.q);
+    let sets: [(&str, &str, fn(&mut CrmpcLaw) -> &mut Gain); 3] = [
+        ("feedback", "feedback law K (20)", |law| &mut law.feedback),
+        ("terminal", "terminal law (14)", |law| &mut law.terminal),
+        ("tube", "paper's tube constant in (21)", |law| &mut law.tube),
+    ];
+    for (name, of, gain) in sets {
+        let k1 = parameter(&format!("{name}.k1"), &format!("Gain on the angles of the {of}, negative")).real();
+        let k2 = parameter(&format!("{name}.k2"), &format!("Gain on the rates of the {of}, negative")).real();
+        table = table
+            .real(k1.unit(unit::gain_angle()).max(0.0).nominal(5.0), move |m| &mut gain(&mut m.law).k1)
+            .real(k2.unit(unit::gain_rate()).max(0.0).nominal(5.0), move |m| &mut gain(&mut m.law).k2);
+    }
+    table
+}
+
+fn bounds(table: Controller) -> Controller {
+    let disturbance = parameter(
+        "disturbance.bound",
+        "Bound on each component of the disturbance of the angles' second derivatives that the sets are tightened for",
+    );
+    let inertia = parameter("inertia.error", "Relative inertia error that the robust set is tightened for");
+    let sideslip = parameter("bound.sideslip", "Sideslip angle up to which the bounds of the design hold");
+    let rate = parameter("bound.referenceRate", "Bound on the reference's rate in the paper's terminal set (13)");
+    let acceleration = parameter(
+        "bound.referenceAcceleration",
+        "Bound on the reference's acceleration in the paper's terminal set (13)",
+    );
+    table
+        .real(disturbance.real().unit(unit::angular_acceleration()).min(0.0).nominal(0.03), |m| {
+            &mut m.law.disturbance_bound
+        })
+        .real(inertia.real().min(0.0).max(0.9).nominal(0.05), |m| &mut m.law.inertia_error)
+        .real(sideslip.real().unit(unit::angle()).min(0.0).max(1.5).nominal(0.2), |m| {
+            &mut m.law.sideslip_bound
+        })
+        .real(rate.real().unit(unit::angular_rate()).min(0.0).nominal(0.05), |m| &mut m.law.reference_rate)
+        .real(acceleration.real().unit(unit::angular_acceleration()).min(0.0).nominal(0.02), |m| {
+            &mut m.law.reference_acceleration
+        })
+}
+
+fn outputs(table: Controller) -> Controller {
+    let sampled = |name: &str, text: &str| discrete_output(name, text).depends_on(sampled_inputs());
+    let nominal = |axis: &str, meaning: &str| {
+        let text = format!("Nominal {meaning} at the last tick");
+        sampled(&format!("nominal.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
+    };
+    let rate = |axis: &str, meaning: &str| {
+        let text = format!("Rate of the nominal {meaning} at the last tick");
+        sampled(&format!("nominalRate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
+    };
+    let table = vector(table, ANGLES, nominal, |m| &mut m.law.shown.angles);
+    let status = sampled("solver.status", "How the plan in force came about");
+    let cost = sampled("solver.cost", "Optimal cost of the plan in force");
+    let time = sampled("solver.time", "Wall-clock time of the last optimisation; differs from run to run");
+    let iterations = sampled("solver.iterations", "Iterations of the last optimisation, over all its passes");
+    let solves = sampled("solver.solves", "Optimisations so far");
+    let fallbacks = sampled("solver.fallbacks", "Optimisations so far that did not succeed");
+    vector(table, ANGLES, rate, |m| &mut m.law.shown.rates)
+        .enumeration(status, enumeration("SolverStatus", "How a plan came about", &STATUSES), |m| {
+            &mut m.law.shown.status
+        })
+        .real(cost.real(), |m| &mut m.law.shown.cost)
+        .real(time.real().unit(unit::time()).nominal(1e-3), |m| &mut m.law.shown.time)
+        .integer(iterations, (None, None), |m| &mut m.law.shown.iterations)
+        .integer(solves, (None, None), |m| &mut m.law.shown.solves)
+        .integer(fallbacks, (None, None), |m| &mut m.law.shown.fallbacks)
+}

@@ -1,0 +1,52 @@
+//! What one controller adds to the unit that all of them share: its own parameters, its design, its own outputs.
+
+use crate::unit::Unit;
+use control::Controller;
+use fmi2_export::{Failure, Table};
+use serde::{Serialize, de::DeserializeOwned};
+use vehicle::dynamics::RigidBody;
+
+/// What every controller is told about the vehicle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Vehicle {
+    /// The rigid body as the controller believes it to be.
+    pub(crate) body: RigidBody,
+    /// Limit on ‖ω‖, rad/s.
+    pub(crate) limit_rate: f64,
+    /// Limit on ‖m‖, N m.
+    pub(crate) limit_moment: f64,
+}
+
+/// A control law with the variables only it has. The value holds those variables.
+pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
+    /// The sampled controller behind it.
+    type Controller: Controller + Send;
+
+    /// Name of the unit.
+    const NAME: &'static str;
+    /// One line: what the unit is.
+    const DESCRIPTION: &'static str;
+    /// What it computes, as an HTML fragment.
+    const DOCUMENTATION: &'static str;
+
+    /// Adds the law's own variables to the table.
+    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>>;
+
+    /// Builds the controller from the parameters.
+    ///
+    /// # Errors
+    /// Names the parameter at fault.
+    #[allow(private_interfaces)]
+    fn design(&self, vehicle: &Vehicle) -> Result<Self::Controller, Failure>;
+
+    /// Takes the law's own outputs from the memory in force.
+    fn show(&mut self, memory: &<Self::Controller as Controller>::Memory);
+
+    /// A warning for the log if something went wrong between two ticks.
+    fn warning(
+        _before: &<Self::Controller as Controller>::Memory,
+        _after: &<Self::Controller as Controller>::Memory,
+    ) -> Option<&'static str> {
+        None
+    }
+}

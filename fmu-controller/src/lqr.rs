@@ -1,0 +1,49 @@
+//! `LQR`: its own parameters.
+
+use crate::law::{Law, Vehicle};
+use crate::table;
+use crate::unit::Unit;
+use control::lqr::{Lqr, LqrSettings};
+use control::crmpc::Settings;
+use fmi2_export::table::parameter;
+use fmi2_export::{Failure, Table};
+use model_description::unit;
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the regulator.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct LqrLaw {
+    p: [f64; 6],
+    q: [f64; 3],
+    period: f64,
+}
+
+impl Default for LqrLaw {
+    fn default() -> Self {
+        let Settings { p, q, period_feedback, .. } = Settings::published();
+        Self { p, q, period: period_feedback }
+    }
+}
+
+impl Law for LqrLaw {
+    type Controller = Lqr;
+
+    const NAME: &'static str = "LQR";
+    const DESCRIPTION: &'static str =
+        "Linear-quadratic attitude regulator, the unconstrained comparison of Chai et al. (2022)";
+    const DOCUMENTATION: &'static str = include_str!("lqr.html");
+
+    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
+        let period = parameter("period.feedback", "Time between two evaluations of the law").real();
+        let table = table.real(period.unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| &mut m.law.period);
+        table::weights(table, |law| &mut law.p, |law| &mut law.q)
+    }
+
+    #[allow(private_interfaces)]
+    fn design(&self, vehicle: &Vehicle) -> Result<Lqr, Failure> {
+        let settings = LqrSettings { body: vehicle.body, p: self.p, q: self.q, period: self.period };
+        Lqr::new(settings).map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    fn show(&mut self, (): &()) {}
+}

@@ -1,0 +1,214 @@
+//! The table of variables that every controller has; each law adds its own.
+
+use crate::law::Law;
+use crate::reference::PROFILES;
+use crate::unit::Unit;
+use fmi2_export::table::{Description, Real, Table, discrete_output, input, output, parameter};
+use model_description::DefaultExperiment;
+use model_description::unit;
+use model_description::variable::EnumerationType;
+use nalgebra::Vector3;
+use vehicle::Scenario;
+
+pub(crate) const ANGLES: [(&str, &str); 3] =
+    [("alpha", "angle of attack"), ("beta", "sideslip angle"), ("sigma", "bank angle")];
+const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
+const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
+
+/// Inputs that the outputs of a tick depend on.
+pub(crate) const MEASURED: [&str; 6] =
+    ["attitude.alpha", "attitude.beta", "attitude.sigma", "rate.p", "rate.q", "rate.r"];
+const EXTERNAL: [&str; 9] = [
+    "reference.external.alpha",
+    "reference.external.beta",
+    "reference.external.sigma",
+    "reference.externalRate.alpha",
+    "reference.externalRate.beta",
+    "reference.externalRate.sigma",
+    "reference.externalAcceleration.alpha",
+    "reference.externalAcceleration.beta",
+    "reference.externalAcceleration.sigma",
+];
+
+/// Names of the inputs that a sampled output depends on.
+pub(crate) fn sampled_inputs() -> impl Iterator<Item = &'static str> {
+    MEASURED.into_iter().chain(EXTERNAL)
+}
+
+/// The unit as FMI sees it.
+pub(crate) fn description<L: Law>() -> Description<Unit<L>> {
+    let scenario = Scenario::crmpc2022();
+    let table = L::declare(vehicle(reference(outputs(inputs(Table::new())))));
+    Description {
+        name: L::NAME,
+        description: L::DESCRIPTION,
+        documentation: L::DOCUMENTATION,
+        version: env!("CARGO_PKG_VERSION"),
+        model_exchange: false,
+        event_indicators: 0,
+        default_experiment: DefaultExperiment {
+            start: 0.0,
+            stop: scenario.duration,
+            tolerance: 1e-6,
+            step: scenario.disturbance.period,
+        },
+        table,
+    }
+}
+
+/// Adds the three components of a vector; `declare` gets name and meaning of each axis.
+pub(crate) fn vector<L: Law>(
+    mut table: Table<Unit<L>>,
+    axes: [(&'static str, &'static str); 3],
+    declare: impl Fn(&str, &str) -> Real,
+    field: impl Fn(&mut Unit<L>) -> &mut Vector3<f64> + Copy + Send + Sync + 'static,
+) -> Table<Unit<L>> {
+    for (i, (axis, meaning)) in axes.into_iter().enumerate() {
+        table = table.real(declare(axis, meaning), move |m| &mut field(m)[i]);
+    }
+    table
+}
+
+fn inputs<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
+    let angle = |axis: &str, meaning: &str| {
+        let text = format!("Measured {meaning}");
+        input(&format!("attitude.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
+    };
+    let rate = |axis: &str, meaning: &str| {
+        let text = format!("Measured body {meaning} rate");
+        input(&format!("rate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
+    };
+    let achieved = |axis: &str, meaning: &str| {
+        let text = format!("{meaning} moment that the actuators really give; for laws with an observer, others ignore it");
+        input(&format!("achievedMoment.{axis}"), &capital(&text)).real().unit(unit::moment()).nominal(1e5)
+    };
+    let table = vector(table, ANGLES, angle, |m| &mut m.input.measured.angles);
+    let table = vector(table, RATES, rate, |m| &mut m.input.measured.rates);
+    let table = vector(table, AXES, achieved, |m| &mut m.input.achieved_moment);
+
+    let external = |name: &'static str, what: &'static str, unit: unit::Unit| {
+        move |axis: &str, meaning: &str| {
+            let text = format!("{what} of the {meaning}, used if reference.profile is 'external'");
+            input(&format!("reference.{name}.{axis}"), &text).real().unit(unit.clone()).nominal(0.1)
+        }
+    };
+    let angles = external("external", "Reference", unit::angle());
+    let rates = external("externalRate", "First derivative of the reference", unit::angular_rate());
+    let accelerations =
+        external("externalAcceleration", "Second derivative of the reference", unit::angular_acceleration());
+    let table = vector(table, ANGLES, angles, |m| &mut m.input.reference.angles);
+    let table = vector(table, ANGLES, rates, |m| &mut m.input.reference.rates);
+    vector(table, ANGLES, accelerations, |m| &mut m.input.reference.accelerations)
+}
+
+fn outputs<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
+    let moment = |axis: &str, meaning: &str| {
+        let text = format!("Commanded {meaning} moment, held between the ticks of period.feedback");
+        let common = discrete_output(&format!("moment.{axis}"), &text).depends_on(sampled_inputs());
+        common.real().unit(unit::moment()).nominal(1e5)
+    };
+    let table = vector(table, AXES, moment, |m| &mut m.output.moment);
+    let in_force = |name: &'static str, external: &'static str, what: &'static str, unit: unit::Unit| {
+        move |axis: &str, meaning: &str| {
+            let common = output(&format!("{name}.{axis}"), &format!("{what} of the {meaning} in force"));
+            let source = format!("reference.{external}.{axis}");
+            common.depends_on([source.as_str()]).real().unit(unit.clone()).nominal(0.1)
+        }
+    };
+    let angles = in_force("reference", "external", "Reference", unit::angle());
+    let rates =
+        in_force("referenceRate", "externalRate", "First derivative of the reference", unit::angular_rate());
+    let accelerations = in_force(
+        "referenceAcceleration",
+        "externalAcceleration",
+        "Second derivative of the reference",
+        unit::angular_acceleration(),
+    );
+    let table = vector(table, ANGLES, angles, |m| &mut m.output.reference.angles);
+    let table = vector(table, ANGLES, rates, |m| &mut m.output.reference.rates);
+    vector(table, ANGLES, accelerations, |m| &mut m.output.reference.accelerations)
+}
+
+fn reference<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
+    let of = EnumerationType {
+        name: "ReferenceProfile".into(),
+        description: "Where the reference attitude comes from".into(),
+        items: PROFILES.map(|(name, text)| (name.into(), text.into())).to_vec(),
+    };
+    let profile = parameter("reference.profile", "Where the reference attitude comes from");
+    let file = parameter(
+        "reference.file",
+        "CSV file with time and angles, if reference.profile is 'table'; a path, or a name inside the unit's resources",
+    );
+    let angle = |axis: &str, meaning: &str| {
+        let text = format!("Reference {meaning} if reference.profile is 'constant' or 'sine'");
+        parameter(&format!("reference.angle.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
+    };
+    let amplitude = |axis: &str, meaning: &str| {
+        let text = format!("Amplitude of the {meaning} if reference.profile is 'sine'");
+        parameter(&format!("reference.amplitude.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
+    };
+    let frequency = parameter("reference.frequency", "Angular frequency if reference.profile is 'sine'").real();
+    let phase = parameter("reference.phase", "Phase at t = 0 if reference.profile is 'sine'").real();
+    let table = table
+        .enumeration(profile, of, |m| &mut m.parameters.reference.profile)
+        .string(file, |m| &mut m.parameters.reference.file);
+    let table = vector(table, ANGLES, angle, |m| &mut m.parameters.reference.angle);
+    vector(table, ANGLES, amplitude, |m| &mut m.parameters.reference.amplitude)
+        .real(frequency.unit(unit::angular_rate()).min(0.0).nominal(1.0), |m| {
+            &mut m.parameters.reference.frequency
+        })
+        .real(phase.unit(unit::angle()), |m| &mut m.parameters.reference.phase)
+}
+
+fn vehicle<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
+    let moment_of_inertia = |name: &str, meaning: &str| {
+        let text = format!("{meaning} as the controller believes it to be");
+        parameter(name, &text).real().unit(unit::inertia()).nominal(1e6)
+    };
+    let rate = parameter("limit.rate", "Limit on the norm of the body rates").real();
+    let moment = parameter("limit.moment", "Limit on the norm of the control moment").real();
+    let saturation = parameter("saturation", "Whether the commanded moment is scaled into limit.moment");
+    table
+        .real(moment_of_inertia("inertia.Ixx", "Roll moment of inertia").min(1.0), |m| {
+            &mut m.parameters.inertia.Ixx
+        })
+        .real(moment_of_inertia("inertia.Iyy", "Pitch moment of inertia").min(1.0), |m| {
+            &mut m.parameters.inertia.Iyy
+        })
+        .real(moment_of_inertia("inertia.Izz", "Yaw moment of inertia").min(1.0), |m| {
+            &mut m.parameters.inertia.Izz
+        })
+        .real(moment_of_inertia("inertia.Ixz", "Product of inertia, which stands in the tensor as -Ixz,"), |m| {
+            &mut m.parameters.inertia.Ixz
+        })
+        .real(rate.unit(unit::angular_rate()).min(1e-6).nominal(0.1), |m| &mut m.parameters.limit_rate)
+        .real(moment.unit(unit::moment()).min(1e-3).nominal(1e5), |m| &mut m.parameters.limit_moment)
+        .boolean(saturation, |m| &mut m.parameters.saturation)
+}
+
+/// The weights P and Q on the tracking error and the input.
+pub(crate) fn weights<L: Law>(
+    mut table: Table<Unit<L>>,
+    p: impl Fn(&mut L) -> &mut [f64; 6] + Copy + Send + Sync + 'static,
+    q: impl Fn(&mut L) -> &mut [f64; 3] + Copy + Send + Sync + 'static,
+) -> Table<Unit<L>> {
+    for i in 0..6 {
+        let (_, meaning) = ANGLES[i % 3];
+        let of = if i < 3 { "error" } else { "error rate" };
+        let text = format!("Diagonal entry {} of P: weight on the {of} of the {meaning}", i + 1);
+        let real = parameter(&format!("weight.P[{}]", i + 1), &text).real().min(0.0).nominal(50.0);
+        table = table.real(real, move |m| &mut p(&mut m.law)[i]);
+    }
+    for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
+        let text = format!("Diagonal entry {} of Q: weight on the second derivative of the {meaning}'s error", i + 1);
+        let real = parameter(&format!("weight.Q[{}]", i + 1), &text).real().min(0.0).nominal(10.0);
+        table = table.real(real, move |m| &mut q(&mut m.law)[i]);
+    }
+    table
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}

@@ -1,0 +1,175 @@
+//! The unit that all controllers share: inputs, reference, limits, the schedule on integer ticks.
+
+use crate::law::{Law, Vehicle};
+use crate::reference::{self, Source};
+use crate::table;
+use control::controller::{Controller, Measurement};
+use control::schedule::Sampled;
+use fmi2_export::{Context, Description, Failure, Inputs, Model};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::Scenario;
+use vehicle::dynamics::Inertia;
+use vehicle::reference::Reference;
+
+type Memory<L> = <<L as Law>::Controller as Controller>::Memory;
+
+/// A controller as a unit.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Unit<L: Law> {
+    pub(crate) parameters: Parameters,
+    pub(crate) input: Input,
+    pub(crate) output: Output,
+    /// The law's own parameters and outputs.
+    pub(crate) law: L,
+    source: Source,
+    /// From initialization on.
+    sampled: Option<Sampled<Memory<L>>>,
+    #[serde(skip)]
+    controller: Option<L::Controller>,
+}
+
+/// Parameters of every controller.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Parameters {
+    pub(crate) reference: reference::Parameters,
+    pub(crate) inertia: Inertia,
+    pub(crate) limit_rate: f64,
+    pub(crate) limit_moment: f64,
+    pub(crate) saturation: bool,
+}
+
+/// Inputs of every controller.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Input {
+    pub(crate) measured: Measurement,
+    pub(crate) achieved_moment: Vector3<f64>,
+    pub(crate) reference: Reference,
+}
+
+/// Outputs of every controller.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Output {
+    pub(crate) moment: Vector3<f64>,
+    pub(crate) reference: Reference,
+}
+
+impl<L: Law> Unit<L> {
+    /// The controller and its schedule; there from initialization on.
+    fn parts(&mut self) -> Result<(&mut L::Controller, &mut Sampled<Memory<L>>, &Input, &Source), Failure> {
+        match (&mut self.controller, &mut self.sampled) {
+            (Some(controller), Some(sampled)) => Ok((controller, sampled, &self.input, &self.source)),
+            _ => Err(Failure::Error("the unit is not initialized".into())),
+        }
+    }
+
+    /// Brings the first uncommitted tick up to date with the inputs.
+    fn evaluate(&mut self) -> Result<(), Failure> {
+        let (controller, sampled, input, source) = self.parts()?;
+        let now = sampled.next_time(controller.period());
+        let external = match source {
+            Source::External => input.reference,
+            Source::Profile(_) => Reference::default(),
+        };
+        let mut mark = [0.0; 9];
+        for (i, part) in [external.angles, external.rates, external.accelerations].iter().enumerate() {
+            mark[3 * i..3 * i + 3].copy_from_slice(part.as_slice());
+        }
+        sampled.evaluate(controller, &input.measured, mark, &|time| source.at(time, now, &external));
+        if sampled.in_force().0.iter().all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        Err(Failure::Error(format!(
+            "the control moment at t = {now} s is not finite; the attitude may be singular (sideslip angle near 90 deg)"
+        )))
+    }
+
+    fn design(&self) -> Result<L::Controller, Failure> {
+        let Parameters { inertia, limit_rate, limit_moment, .. } = self.parameters;
+        let body = inertia.body(1.0).map_err(|error| Failure::Error(error.to_string()))?;
+        self.law.design(&Vehicle { body, limit_rate, limit_moment })
+    }
+}
+
+impl<L: Law> Model for Unit<L> {
+    fn description() -> Description<Self> {
+        table::description()
+    }
+
+    fn new() -> Self {
+        let scenario = Scenario::crmpc2022();
+        Self {
+            parameters: Parameters {
+                reference: reference::Parameters::default(),
+                inertia: scenario.inertia,
+                limit_rate: scenario.limit_rate,
+                limit_moment: scenario.limit_moment,
+                saturation: false,
+            },
+            input: Input {
+                measured: Measurement { angles: scenario.initial_angles, rates: scenario.initial_rates },
+                reference: scenario.reference.at(0.0),
+                ..Input::default()
+            },
+            output: Output::default(),
+            law: L::default(),
+            source: Source::Profile(scenario.reference),
+            sampled: None,
+            controller: None,
+        }
+    }
+
+    fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
+        self.source = Source::new(&self.parameters.reference, context)?;
+        self.controller = Some(self.design()?);
+        self.sampled = Some(Sampled::new(context.start_time));
+        Ok(())
+    }
+
+    fn calculate(&mut self, time: f64) -> Result<(), Failure> {
+        let (controller, sampled, ..) = self.parts()?;
+        if sampled.is_due(time, controller.period()) {
+            self.evaluate()?;
+        }
+        let Some(sampled) = &self.sampled else { return Ok(()) };
+        let (moment, memory) = sampled.in_force();
+        self.law.show(memory);
+        let limit = self.parameters.limit_moment;
+        let excess = if self.parameters.saturation { moment.norm() / limit } else { 0.0 };
+        self.output = Output {
+            moment: if excess > 1.0 { moment / excess } else { moment },
+            reference: self.source.at(time, time, &self.input.reference),
+        };
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        from: f64,
+        to: f64,
+        inputs: &dyn Inputs<Self>,
+        log: &mut dyn FnMut(&str),
+    ) -> Result<(), Failure> {
+        loop {
+            let (controller, sampled, ..) = self.parts()?;
+            let period = controller.period();
+            if !sampled.comes_before(to, period) {
+                return Ok(());
+            }
+            let tick = sampled.next_time(period).max(from);
+            inputs.advance(self, tick);
+            self.evaluate()?;
+            let Some(sampled) = &mut self.sampled else { return Ok(()) };
+            sampled.commit();
+            if let Some(text) = sampled.last_change(L::warning) {
+                log(text);
+            }
+        }
+    }
+
+    fn restored(&mut self) -> Result<(), Failure> {
+        self.controller = if self.sampled.is_some() { Some(self.design()?) } else { None };
+        Ok(())
+    }
+}
