@@ -19,7 +19,7 @@ fn main() {
     if let Some(b) = get("--k") { let k: f64 = b.parse().unwrap(); s.feedback = control::sampled::Gain { k1: k, k2: k } }
     let mut c = Crmpc::new(s).unwrap();
     if args.iter().any(|a| a == "-v") { println!("{:#?}", c.design().paper); println!("{:?} {:?}", c.design().reach, c.design().g[0]); 
-      println!("{:?}", &c.design().tightening.at_stage[..6]); println!("{:?}", &c.design().tightening.within_stage[..6]); println!("{:?}", c.design().invariant)}
+      println!("{:?}", &c.design().tightening.at_stage[..6]); println!("{:?}", &c.design().tightening.within_stage[..6]); println!("{:?} {:?}", c.design().tightening.disturbance, c.design().invariant.as_ref().map(|i| i.reach()))}
     let seeds: u64 = get("--seeds").map_or(1, |x| x.parse().unwrap());
     let kind = match get("--kind").as_deref() { Some("none") => Kind::None, Some("constant") => Kind::Constant, Some("square") => Kind::Square, Some("along") => Kind::AlongRate, Some("against") => Kind::AgainstMoment, _ => Kind::White };
     let mut tall = vec![];

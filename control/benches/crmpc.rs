@@ -1,0 +1,126 @@
+//! Time of one optimisation of CRMPC on the scenario of Chai 2022 (white noise, inertia + 5 %).
+//!
+//! First the distribution over every sample of 50 s is printed. Each sample is repeated from the same memory, and the
+//! smallest time counts: what else the machine does can only add to it. Then Criterion takes single samples apart.
+
+#[path = "../tests/harness/mod.rs"]
+mod harness;
+
+use control::crmpc::{Constraints, Memory, Status};
+use control::{Controller, Crmpc, Measurement};
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use harness::{disturbance, settings, simulate};
+use std::hint::black_box;
+use vehicle::disturbance::Kind;
+use vehicle::scenario::Scenario;
+
+/// Repetitions of each sample.
+const REPETITIONS: usize = 20;
+
+/// What goes into one tick of the run, and how its optimisation came out.
+struct Tick {
+    number: u64,
+    before: Memory,
+    measured: Measurement,
+    status: Status,
+}
+
+fn run(constraints: Constraints) -> (Crmpc, Vec<Tick>) {
+    let mut controller = Crmpc::new(settings(constraints)).unwrap();
+    let mut before = Memory::default();
+    let mut ticks = Vec::new();
+    simulate(
+        &mut controller,
+        &mut Memory::default(),
+        1.05,
+        disturbance(Kind::White),
+        |after, number, &measured| {
+            ticks.push(Tick { number, before: before.clone(), measured, status: after.report.status });
+            before.clone_from(after);
+        },
+    );
+    (controller, ticks)
+}
+
+fn update(controller: &mut Crmpc, tick: &Tick, scenario: &Scenario, memory: &mut Memory) {
+    let time = tick.number as f64 * controller.period();
+    let reference = |time| scenario.reference.at(time);
+    black_box(controller.update(memory, tick.number, time, black_box(&tick.measured), &reference));
+}
+
+fn print_distribution(name: &str, controller: &mut Crmpc, ticks: &[Tick]) {
+    let scenario = Scenario::crmpc2022();
+    let ratio = controller.design().ratio as u64;
+    let mut times_ms: Vec<f64> = ticks
+        .iter()
+        .filter(|tick| tick.number % ratio == 0)
+        .map(|tick| {
+            let time = |_| {
+                let mut memory = tick.before.clone();
+                update(controller, tick, &scenario, &mut memory);
+                memory.report.time * 1e3
+            };
+            (0..REPETITIONS).map(time).fold(f64::INFINITY, f64::min)
+        })
+        .collect();
+    let first = times_ms[0];
+    let mean = times_ms.iter().sum::<f64>() / times_ms.len() as f64;
+    times_ms.sort_by(f64::total_cmp);
+    let at = |share: f64| times_ms[((times_ms.len() - 1) as f64 * share).round() as usize];
+    println!(
+        "{name}: {} optimisations, smallest of {REPETITIONS} repetitions each, ms: first {first:.3}, mean {mean:.3}, \
+         median {:.3}, p99 {:.3}, worst {:.3}",
+        times_ms.len(),
+        at(0.5),
+        at(0.99),
+        at(1.0),
+    );
+}
+
+fn optimisations(criterion: &mut Criterion) {
+    let scenario = Scenario::crmpc2022();
+    for (name, constraints) in [("robust", Constraints::Robust), ("paper", Constraints::Paper)] {
+        let (mut controller, ticks) = run(constraints);
+        print_distribution(name, &mut controller, &ticks);
+
+        let ratio = controller.design().ratio as u64;
+        let mut group = criterion.benchmark_group(name);
+        let after = |time: f64, status: Status| {
+            let first = (time / controller.period()).round() as u64;
+            let mut optimised = ticks.iter().filter(|tick| tick.number >= first && tick.number % ratio == 0);
+            optimised.find(|tick| tick.status == status)
+        };
+        let situations = [
+            ("first optimisation", Some(&ticks[0])),
+            ("start of the manoeuvre", after(0.2, Status::Constrained)),
+            ("jump of the reference ahead", after(8.0, Status::Constrained)),
+            ("jump of the reference near", after(24.0, Status::Constrained)),
+            ("unconstrained optimum", after(40.0, Status::Unconstrained)),
+            ("feedback between optimisations", Some(&ticks[1])),
+        ];
+        for (situation, tick) in situations {
+            let Some(tick) = tick else { continue };
+            group.bench_function(situation, |bencher| {
+                bencher.iter_batched_ref(
+                    || tick.before.clone(),
+                    |memory| update(&mut controller, tick, &scenario, memory),
+                    BatchSize::SmallInput,
+                );
+            });
+        }
+        if let Some(tick) = after(0.2, Status::Constrained) {
+            let mut whole = Crmpc::new(settings(constraints)).unwrap().without_exits();
+            group.bench_function("whole horizon", |bencher| {
+                bencher.iter_batched_ref(
+                    || tick.before.clone(),
+                    |memory| update(&mut whole, tick, &scenario, memory),
+                    BatchSize::SmallInput,
+                );
+            });
+        }
+        group.finish();
+    }
+}
+
+criterion_group!(benches, optimisations);
+criterion_main!(benches);

@@ -1,0 +1,144 @@
+//! The closed loop of Chai 2022, section 5: 50 s, both inertia errors, rates looked at between samples too. The example
+//! `campaign` runs the same with 200 seeds.
+
+mod harness;
+
+use control::Controller;
+use control::crmpc::{Constraints, InitialState, Settings, Status};
+use control::{Crmpc, crmpc::Memory};
+use harness::{Case, adversaries, constant, disturbance, in_parallel, settings, simulate, square, white};
+use vehicle::disturbance::{Disturbance, Kind};
+use vehicle::scenario::Scenario;
+
+/// Largest EMS (deg) over the cases, each of which must keep both limits without a fallback.
+fn assert_robust(cases: &[Case]) -> f64 {
+    let outcomes = in_parallel(cases, |case| {
+        harness::run(settings(Constraints::Robust), case.inertia_scale, case.disturbance.clone())
+    });
+    for (case, (outcome, fallbacks)) in cases.iter().zip(&outcomes) {
+        let name = &case.name;
+        assert!(outcome.rate <= 1.0, "{name}: rate {} of its limit", outcome.rate);
+        assert!(outcome.moment <= 1.0, "{name}: moment {} of its limit", outcome.moment);
+        assert_eq!(*fallbacks, 0, "{name}");
+    }
+    outcomes.iter().map(|(outcome, _)| outcome.ems_deg).fold(0.0, f64::max)
+}
+
+#[test]
+fn robust_keeps_both_limits_under_white_noise_and_tracks() {
+    let largest_deg = assert_robust(&white(1..=12, 0.04));
+    assert!(largest_deg <= 2.2, "{largest_deg}");
+}
+
+#[test]
+fn robust_keeps_both_limits_under_noise_faster_than_its_feedback() {
+    assert_robust(&white(1..=3, 0.01));
+}
+
+#[test]
+fn robust_keeps_both_limits_under_every_constant_disturbance() {
+    assert_robust(&constant());
+}
+
+#[test]
+fn robust_keeps_both_limits_under_square_waves() {
+    assert_robust(&square(&[0.4, 1.0, 2.5, 10.0]));
+}
+
+#[test]
+fn robust_keeps_both_limits_under_disturbances_that_look_at_the_motion() {
+    assert_robust(&adversaries(0.04));
+}
+
+#[test]
+fn robust_keeps_both_limits_under_adversaries_faster_than_its_feedback() {
+    assert_robust(&adversaries(harness::CHECK));
+}
+
+#[test]
+fn paper_set_tracks_better_and_violates_both_limits() {
+    // (6) is an outer set: it implies neither ‖ω‖ ≤ 5°/s nor ‖m‖ ≤ 1.356e5 N m (docs/errata.md).
+    for case in white(1..=3, 0.04) {
+        let (outcome, fallbacks) =
+            harness::run(settings(Constraints::Paper), case.inertia_scale, case.disturbance);
+        assert!(outcome.ems_deg <= 1.85, "{}: {outcome:?}", case.name);
+        assert!(outcome.rate > 1.0 && outcome.moment > 1.5, "{}: {outcome:?}", case.name);
+        assert_eq!(fallbacks, 0, "{}", case.name);
+    }
+}
+
+#[test]
+fn lqr_violates_both_limits() {
+    // As Chai 2022, section 5.2 says.
+    for case in white(1..=3, 0.04) {
+        let outcome =
+            simulate(&mut harness::lqr(), &mut (), case.inertia_scale, case.disturbance, |(), _, _| {});
+        assert!(outcome.rate > 1.0 && outcome.moment > 1.0, "{}: {outcome:?}", case.name);
+    }
+}
+
+#[test]
+fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_ellipse() {
+    let settings = Settings { initial_state: InitialState::Tube, ..settings(Constraints::Paper) };
+    let mut controller = Crmpc::new(settings).unwrap();
+    let design = controller.design().clone();
+    let inverse = design.invariant.try_inverse().unwrap();
+    let mut moved = 0.0f64;
+    let mut memory = Memory::default();
+    simulate(&mut controller, &mut memory, 1.05, disturbance(Kind::White), |memory, tick, measured| {
+        if tick % design.ratio as u64 == 0 {
+            assert_eq!(memory.report.status, Status::Constrained);
+            let angle_rates = vehicle::kinematics::r(&measured.angles) * measured.rates;
+            for i in 0..3 {
+                let o = nalgebra::Vector2::new(measured.angles[i], angle_rates[i])
+                    - nalgebra::Vector2::new(memory.nominal[i], memory.nominal[3 + i]);
+                let size = (o.transpose() * inverse * o).x;
+                assert!(size <= 1.0 + 1e-4, "tick {tick}: {size}");
+                moved = moved.max(size);
+            }
+        }
+    });
+    assert_eq!(memory.report.fallbacks, 0);
+    assert!(moved > 0.5, "the freedom is never used: {moved}");
+}
+
+#[test]
+fn a_run_repeats_bit_for_bit() {
+    let run = || {
+        let mut trace = Vec::new();
+        let mut controller = Crmpc::new(settings(Constraints::Robust)).unwrap();
+        let outcome = simulate(
+            &mut controller,
+            &mut Memory::default(),
+            1.05,
+            disturbance(Kind::White),
+            |memory, _, measured| {
+                trace.push((
+                    *measured,
+                    memory.nominal,
+                    memory.report.cost.to_bits(),
+                    memory.report.iterations,
+                ));
+            },
+        );
+        (trace, outcome.ems_deg.to_bits())
+    };
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn without_disturbance_nothing_is_constrained_once_the_jump_is_over() {
+    let mut controller = Crmpc::new(settings(Constraints::Robust)).unwrap();
+    let jump = Scenario::crmpc2022().reference.jumps().next().unwrap();
+    let period = controller.period();
+    let mut constrained = Vec::new();
+    simulate(&mut controller, &mut Memory::default(), 1.0, Disturbance::default(), |memory, tick, _| {
+        if memory.report.status == Status::Constrained {
+            constrained.push(tick as f64 * period);
+        }
+    });
+    let until = |from: f64, to: f64| constrained.iter().filter(|&&time| from <= time && time < to).count();
+    assert_eq!(constrained.first(), Some(&0.0));
+    assert!(until(jump - 1.0, jump) > 0, "{constrained:?}");
+    assert_eq!(until(jump + 3.0, f64::INFINITY), 0, "{constrained:?}");
+}

@@ -1,0 +1,298 @@
+//! The offline design of CRMPC against what Chai 2022, section 5.1 prints, and the exact sampled bounds against simulation.
+//! Tolerances are half a unit of the last digit that is printed.
+
+use control::DesignError;
+use control::crmpc::{Design, PaperConstants, Settings, step_response_peak, terminal_weight};
+use control::sampled::{Gain, SampledError};
+use control::settings::Published;
+use nalgebra::{Matrix2, Vector2};
+use vehicle::scenario::Scenario;
+
+fn settings() -> Settings {
+    let scenario = Scenario::crmpc2022();
+    let body = scenario.inertia.body(1.0).unwrap();
+    Settings::crmpc2022(&scenario, body)
+}
+
+fn constants(settings: &Settings) -> PaperConstants {
+    Design::new(settings).unwrap().paper.unwrap()
+}
+
+fn gain(k: f64) -> Gain {
+    Gain { k1: k, k2: k }
+}
+
+#[track_caller]
+fn assert_digits(value: f64, printed: f64, decimals: i32) {
+    let tolerance = 0.5 * 10f64.powi(-decimals) * (1.0 + 1e-9);
+    assert!((value - printed).abs() <= tolerance, "{value} is not {printed} to {decimals} decimals");
+}
+
+#[test]
+fn published_terminal_weight_satisfies_15_with_equality() {
+    let settings = settings();
+    let [g11, g12, g22] = Published::crmpc2022().g;
+    assert_eq!([g11, g12, g22], [80.0, 30.0, 36.0]);
+    let g = Matrix2::new(g11, g12, g12, g22);
+    let Gain { k1, k2 } = settings.terminal;
+    let a = Matrix2::new(0.0, 1.0, k1, k2);
+    for i in 0..3 {
+        // Every number in it is an integer, so the residual is exactly zero.
+        let row = settings.terminal.row();
+        let p = Vector2::new(settings.p[i], settings.p[3 + i]);
+        let residual =
+            a.transpose() * g + g * a + row.transpose() * row * settings.q[i] + Matrix2::from_diagonal(&p);
+        assert_eq!(residual, Matrix2::zeros());
+        assert_eq!(terminal_weight(settings.terminal, p, settings.q[i]), g);
+    }
+    assert_eq!(Design::new(&settings).unwrap().g, [g; 3]);
+}
+
+#[test]
+fn published_bounds_of_lemma_1() {
+    let (ours, printed) = (constants(&settings()), Published::crmpc2022());
+    assert_eq!([printed.r0, printed.r1, printed.omega, printed.condition], [1.0846, 0.0873, 0.1511, 2.6094]);
+    assert_digits(ours.r0, printed.r0, 4);
+    assert_digits(ours.r1, printed.r1, 4);
+    assert_digits(ours.omega, printed.omega, 4);
+    assert_digits(ours.condition, printed.condition, 4);
+}
+
+#[test]
+fn published_r0_is_not_the_norm_of_the_matrix() {
+    // Lemma 1 proves sec β = √(1 + tan² β); the printed number lacks the square, on the safe side.
+    let ours = constants(&settings()).r0;
+    assert_digits(1.0 / settings().sideslip_bound.cos(), 1.0154, 4);
+    assert!(ours > 1.0154);
+}
+
+#[test]
+fn published_tube_and_terminal_radii() {
+    let (ours, printed) = (constants(&settings()), Published::crmpc2022());
+    assert_eq!([printed.c, printed.epsilon1, printed.epsilon2], [0.0835, 0.2096, 0.0770]);
+    assert_digits(ours.c, printed.c, 4);
+    assert_digits(ours.epsilon1, printed.epsilon1, 4);
+    assert_digits(ours.epsilon2, printed.epsilon2, 4);
+}
+
+#[test]
+fn published_peak_of_the_step_response_belongs_to_another_gain() {
+    let printed = Published::crmpc2022().c;
+    assert_digits(step_response_peak(gain(-10.0)).unwrap(), printed, 4);
+    // The gain that the text names gives another number.
+    assert_digits(step_response_peak(gain(-5.0)).unwrap(), 0.1525, 4);
+}
+
+#[test]
+fn oracle_sets_between_the_printed_constants() {
+    // By hand from (6) and (21) with the readings of docs/errata.md; the paper prints what follows from them only.
+    let ours = constants(&settings());
+    assert_digits(ours.x, 0.09465, 5);
+    assert_digits(ours.u, 0.25005, 5);
+    assert_digits(ours.x_tube, 0.0896, 4);
+    assert_digits(ours.u_tube, 0.1717, 4);
+}
+
+#[test]
+fn oracle_second_terminal_radius_with_the_triangle_inequality() {
+    // (13) has − r̄₁ x̄_tube where the triangle inequality gives + r̄₁ x̄_tube.
+    let settings = settings();
+    let ours = constants(&settings);
+    let printed = Published::crmpc2022();
+    let [g11, g12, g22] = printed.g;
+    let eigenvalues = Matrix2::new(g11, g12, g12, g22).symmetric_eigenvalues();
+    let terminal_gain = settings.terminal.k1.hypot(settings.terminal.k2);
+    let radius = |sign: f64| {
+        let factor = ours.r0 * ours.condition * ours.omega + sign * ours.r1;
+        eigenvalues.min().sqrt() * (ours.u_tube - factor * ours.x_tube - settings.reference_acceleration)
+            / terminal_gain
+    };
+    assert_digits(radius(-1.0), printed.epsilon2, 4);
+    assert_digits(radius(1.0), 0.0669, 4);
+    assert!((radius(-1.0) - ours.epsilon2).abs() < 1e-12);
+}
+
+#[test]
+fn published_tubes_of_the_angles() {
+    // The two cases of Fig. 6: 0.2° and 0.1°, which need Δ̄ = 1°/s², half of what section 5.1 states.
+    for (k, printed_deg) in [(-5.0, 0.2), (-10.0, 0.1)] {
+        let with = |bound_deg: f64| {
+            let settings =
+                Settings { feedback: gain(k), disturbance_bound: bound_deg.to_radians(), ..settings() };
+            constants(&settings).angle_tube.to_degrees()
+        };
+        assert!((with(1.0) - printed_deg).abs() < 1e-12);
+        assert!((with(2.0) - 2.0 * printed_deg).abs() < 1e-12);
+    }
+}
+
+/// Deviation of one axis simulated without the code under test: ö = K o + Δ with K o held over each period of
+/// `parts.len()` equal parts, and Δ given part by part.
+struct Simulation {
+    gain: Gain,
+    period: f64,
+    deviation: Vector2<f64>,
+}
+
+impl Simulation {
+    fn new(gain: Gain, period: f64) -> Self {
+        Self { gain, period, deviation: Vector2::zeros() }
+    }
+
+    fn feedback(&self) -> f64 {
+        self.gain.k1 * self.deviation.x + self.gain.k2 * self.deviation.y
+    }
+
+    fn advance(&mut self, parts: &[f64]) {
+        let (feedback, h) = (self.feedback(), self.period / parts.len() as f64);
+        for disturbance in parts {
+            let a = feedback + disturbance;
+            self.deviation.x += h * self.deviation.y + 0.5 * h * h * a;
+            self.deviation.y += h * a;
+        }
+    }
+
+    /// Angle, rate, feedback.
+    fn outputs(&self) -> [f64; 3] {
+        [self.deviation.x, self.deviation.y, self.feedback()]
+    }
+}
+
+const PUBLISHED_CASES: [(f64, f64, [f64; 3]); 3] = [
+    (-5.0, 0.04, [0.2000, 0.3147, 1.2472]),
+    (-5.0, 0.2, [0.2000, 0.4000, 1.3800]),
+    (-10.0, 0.04, [0.1000, 0.1743, 1.1518]),
+];
+
+#[test]
+fn oracle_sampled_bounds() {
+    // L1 norms under zero-order hold, by an independent calculation (docs/errata.md).
+    for (k, period, expected) in PUBLISHED_CASES {
+        let reach = SampledError::new(gain(k), period).reach_forever().unwrap();
+        for (value, expected) in [reach.angle, reach.rate, reach.feedback].into_iter().zip(expected) {
+            assert_digits(value, expected, 4);
+        }
+    }
+}
+
+#[test]
+fn oracle_marginal_gain_is_refused_with_its_spectral_radius() {
+    // Φ = [0.8 0; −2 −1]
+    let settings = Settings { feedback: gain(-10.0), period_feedback: 0.2, ..settings() };
+    let error = Design::new(&settings).unwrap_err();
+    let DesignError::Unstable { k1, k2, period, radius } = error else { panic!("{error}") };
+    assert_eq!([k1, k2, period], [-10.0, -10.0, 0.2]);
+    assert!((radius - 1.0).abs() < 1e-12);
+    assert!(error.to_string().contains("spectral radius 1.000000"), "{error}");
+    // At 25 Hz the same gain is fine.
+    Design::new(&Settings { period_feedback: 0.04, ..settings }).unwrap();
+}
+
+#[test]
+fn oracle_bang_bang_disturbance_reaches_the_sampled_bounds() {
+    for (k, period, _) in PUBLISHED_CASES {
+        let n = 300;
+        let reach = SampledError::new(gain(k), period).reach(n);
+        let mut impulse = Simulation::new(gain(k), period);
+        impulse.advance(&[1.0]);
+        let mut response = Vec::new();
+        for _ in 0..n {
+            response.push(impulse.outputs());
+            impulse.advance(&[0.0]);
+        }
+        for output in 0..3 {
+            for steps in [1, 2, 5, 20, n] {
+                let mut worst = Simulation::new(gain(k), period);
+                for j in (0..steps).rev() {
+                    worst.advance(&[response[j][output].signum()]);
+                }
+                let bound = [reach[steps].angle, reach[steps].rate, reach[steps].feedback][output];
+                let reached = worst.outputs()[output];
+                assert!(
+                    (reached - bound).abs() < 1e-12,
+                    "K {k}, {steps} steps, output {output}: {reached} {bound}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn oracle_constant_disturbance_reaches_the_peak_of_the_step_response_only() {
+    // (24) and (26): c̄Δ̄ bounds the rate under a constant Δ. One change of sign after it has settled gives twice as much.
+    let c = Published::crmpc2022().c;
+    let mut simulation = Simulation::new(gain(-10.0), 1e-4);
+    let mut peak = |disturbance: f64| {
+        let mut peak = 0.0f64;
+        for _ in 0..200_000 {
+            simulation.advance(&[disturbance]);
+            peak = peak.max(simulation.deviation.y.abs());
+        }
+        peak
+    };
+    assert_digits(peak(-1.0), c, 4);
+    assert_digits(peak(1.0) / 2.0, c, 4);
+    // It cannot be more than that, as the exact bound tends to 2 c̄ with the period.
+    let reach = SampledError::new(gain(-10.0), 1e-4).reach_forever().unwrap();
+    assert!((reach.rate / (2.0 * step_response_peak(gain(-10.0)).unwrap()) - 1.0).abs() < 1e-3);
+}
+
+mod properties {
+    use super::{PUBLISHED_CASES, Simulation, gain};
+    use control::sampled::SampledError;
+    use nalgebra::Vector2;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn no_held_disturbance_exceeds_the_sampled_bounds(
+            case in 0..3usize,
+            disturbances in prop::collection::vec(prop_oneof![-1.0..=1.0f64, Just(1.0), Just(-1.0)], 1..400),
+        ) {
+            let (k, period, _) = PUBLISHED_CASES[case];
+            let reach = SampledError::new(gain(k), period).reach(disturbances.len());
+            let mut simulation = Simulation::new(gain(k), period);
+            for (disturbance, bound) in disturbances.iter().zip(&reach[1..]) {
+                simulation.advance(&[*disturbance]);
+                let bounds = [bound.angle, bound.rate, bound.feedback];
+                for (value, bound) in simulation.outputs().into_iter().zip(bounds) {
+                    prop_assert!(value.abs() <= bound + 1e-12);
+                }
+            }
+        }
+
+        #[test]
+        fn one_period_is_what_simulation_says(
+            k1 in -30.0..-0.1f64, k2 in -30.0..-0.1f64, period in 0.001..0.2f64,
+            angle in -1.0..1.0f64, rate in -1.0..1.0f64, disturbance in -1.0..1.0f64,
+        ) {
+            let gain = control::sampled::Gain { k1, k2 };
+            let mut simulation = Simulation { gain, period, deviation: Vector2::new(angle, rate) };
+            let ours = SampledError::new(gain, period).advance(&simulation.deviation, disturbance);
+            simulation.advance(&[disturbance; 7]);
+            prop_assert!((ours - simulation.deviation).norm() < 1e-12);
+        }
+
+        #[test]
+        fn no_disturbance_leaves_the_invariant_ellipse(
+            case in 0..3usize,
+            bound in 1e-3..1.0f64,
+            direction in 0.0..std::f64::consts::TAU,
+            disturbances in prop::collection::vec(prop_oneof![Just(1.0), Just(-1.0)], 1..200),
+        ) {
+            // From anywhere on its border.
+            let (k, period, _) = PUBLISHED_CASES[case];
+            let shape = SampledError::new(gain(k), period).invariant_ellipse(bound).unwrap();
+            let border = shape.cholesky().unwrap().l() * Vector2::new(direction.cos(), direction.sin());
+            let inverse = shape.try_inverse().unwrap();
+            let mut simulation = Simulation { gain: gain(k), period, deviation: border };
+            for disturbance in disturbances {
+                simulation.advance(&[disturbance * bound]);
+                let o = simulation.deviation;
+                prop_assert!((o.transpose() * inverse * o).x <= 1.0 + 1e-9);
+            }
+        }
+    }
+}

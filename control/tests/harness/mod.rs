@@ -1,0 +1,170 @@
+//! A closed loop of the scenario of Chai 2022 in one process, for tests, the campaign example and the benchmark.
+#![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
+
+use control::crmpc::{Constraints, Memory, Settings, Status};
+use control::lqr::LqrSettings;
+use control::{Controller, Crmpc, Lqr, Measurement};
+use nalgebra::Vector3;
+use vehicle::disturbance::{Disturbance, Kind};
+use vehicle::plant::Plant;
+use vehicle::scenario::Scenario;
+
+/// Time between the checks of the rates within a tick, s.
+pub const CHECK: f64 = 0.01;
+
+/// Settings of Chai 2022 with these sets.
+pub fn settings(constraints: Constraints) -> Settings {
+    let scenario = Scenario::crmpc2022();
+    let body = scenario.inertia.body(1.0).unwrap();
+    Settings { constraints, ..Settings::crmpc2022(&scenario, body) }
+}
+
+/// The regulator of the comparison, with the weights of CRMPC.
+pub fn lqr() -> Lqr {
+    let Settings { body, p, q, period_feedback: period, .. } = settings(Constraints::Robust);
+    Lqr::new(LqrSettings { body, p, q, period }).unwrap()
+}
+
+/// The disturbance of the scenario with another kind.
+pub fn disturbance(kind: Kind) -> Disturbance {
+    Disturbance { kind, ..Scenario::crmpc2022().disturbance }
+}
+
+/// What one run shows.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Root mean square over the ticks of ‖Θ − Θ_r‖, deg: the EMS of the paper.
+    pub ems_deg: f64,
+    /// Root mean square over the ticks of ‖m‖ over its limit: the CMS of the paper.
+    pub cms: f64,
+    /// Largest ‖ω‖ over its limit, looked at every [`CHECK`].
+    pub rate: f64,
+    /// Largest ‖m‖ over its limit.
+    pub moment: f64,
+}
+
+/// The loop over the whole scenario (50 s); `observe` sees memory, tick and measurement after each update.
+pub fn simulate<C: Controller>(
+    controller: &mut C,
+    memory: &mut C::Memory,
+    inertia_scale: f64,
+    disturbance: Disturbance,
+    mut observe: impl FnMut(&C::Memory, u64, &Measurement),
+) -> Outcome {
+    let scenario = Scenario::crmpc2022();
+    let mut config = scenario.config(CHECK);
+    config.inertia_scale = inertia_scale;
+    config.disturbance = disturbance;
+    let mut plant = Plant::new(&config, 0.0).unwrap();
+    let reference = |time: f64| scenario.reference.at(time);
+    let period = controller.period();
+    let ticks = (scenario.duration / period).round() as u64;
+    let checks = (period / CHECK).round() as u32;
+    let (mut error, mut effort) = (0.0, 0.0);
+    let (mut largest_rate, mut largest_moment) = (0.0f64, 0.0f64);
+    for tick in 0..ticks {
+        let time = tick as f64 * period;
+        let measured = Measurement { angles: plant.angles(), rates: plant.rates() };
+        let moment = controller.update(memory, tick, time, &measured, &reference);
+        observe(memory, tick, &measured);
+        error += (measured.angles - reference(time).angles).norm_squared();
+        effort += (moment.norm() / scenario.limit_moment).powi(2);
+        largest_moment = largest_moment.max(moment.norm());
+        for i in 0..checks {
+            let at = |i: u32| time + f64::from(i) * CHECK;
+            plant.advance(at(i), at(i + 1), moment).unwrap();
+            largest_rate = largest_rate.max(plant.rates().norm());
+        }
+    }
+    Outcome {
+        ems_deg: (error / ticks as f64).sqrt().to_degrees(),
+        cms: (effort / ticks as f64).sqrt(),
+        rate: largest_rate / scenario.limit_rate,
+        moment: largest_moment / scenario.limit_moment,
+    }
+}
+
+/// One CRMPC run from the start with a new controller: the outcome and the number of fallbacks.
+pub fn run(settings: Settings, inertia_scale: f64, disturbance: Disturbance) -> (Outcome, u32) {
+    let mut memory = Memory::default();
+    let mut controller = Crmpc::new(settings).unwrap();
+    let outcome = simulate(&mut controller, &mut memory, inertia_scale, disturbance, |memory, _, _| {
+        assert_ne!(memory.report.status, Status::None);
+    });
+    (outcome, memory.report.fallbacks)
+}
+
+/// A run to do: a name for messages, the vehicle's inertia and the disturbance.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// For messages.
+    pub name: String,
+    /// Vehicle's inertia over the one the controller knows.
+    pub inertia_scale: f64,
+    /// The disturbance.
+    pub disturbance: Disturbance,
+}
+
+/// Both inertia errors of the paper's 5 %.
+pub const INERTIA_SCALES: [f64; 2] = [0.95, 1.05];
+
+/// Cases with both inertia errors.
+pub fn cases(disturbances: impl IntoIterator<Item = (String, Disturbance)>) -> Vec<Case> {
+    let both = |(name, disturbance): (String, Disturbance)| {
+        INERTIA_SCALES.map(|inertia_scale| Case {
+            name: format!("{name}, inertia x {inertia_scale}"),
+            inertia_scale,
+            disturbance: disturbance.clone(),
+        })
+    };
+    disturbances.into_iter().flat_map(both).collect()
+}
+
+/// White noise with these seeds.
+pub fn white(seeds: std::ops::RangeInclusive<u64>, period: f64) -> Vec<Case> {
+    cases(seeds.map(|seed| {
+        let disturbance = Disturbance { seed, period, ..disturbance(Kind::White) };
+        (format!("white noise every {period} s, seed {seed}"), disturbance)
+    }))
+}
+
+/// Δ at each corner of its box.
+pub fn constant() -> Vec<Case> {
+    let signs = |i: u32| [0, 1, 2].map(|bit| if i >> bit & 1 == 0 { 1.0 } else { -1.0 });
+    cases((0..8).map(|i| {
+        let direction = Vector3::from(signs(i));
+        let name = format!("constant along {:?}", signs(i));
+        (name, Disturbance { direction, ..disturbance(Kind::Constant) })
+    }))
+}
+
+/// Square waves between opposite corners of the box, for each of these periods.
+pub fn square(periods: &[f64]) -> Vec<Case> {
+    let directions = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+    let all = periods.iter().flat_map(|&period| directions.map(|(y, z)| (period, Vector3::new(1.0, y, z))));
+    cases(all.map(|(square_period, direction)| {
+        let name = format!("square wave of {square_period} s along {:?}", direction.as_slice());
+        (name, Disturbance { square_period, direction, ..disturbance(Kind::Square) })
+    }))
+}
+
+/// Disturbances that look at the motion, choosing anew every `period`.
+pub fn adversaries(period: f64) -> Vec<Case> {
+    let kinds = [Kind::AlongRate, Kind::AgainstMoment];
+    cases(
+        kinds.map(|kind| (format!("{kind:?} every {period} s"), Disturbance { period, ..disturbance(kind) })),
+    )
+}
+
+/// Results of `work` on all items, in their order, computed on all processors.
+pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(items.len().max(1));
+    let chunk = items.len().div_ceil(threads).max(1);
+    std::thread::scope(|scope| {
+        let handles: Vec<_> = items
+            .chunks(chunk)
+            .map(|chunk| scope.spawn(|| chunk.iter().map(&work).collect::<Vec<_>>()))
+            .collect();
+        handles.into_iter().flat_map(|handle| handle.join().unwrap()).collect()
+    })
+}

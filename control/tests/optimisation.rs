@@ -1,0 +1,342 @@
+//! The optimisation of CRMPC: its exits, fallback (31), and that its solvers carry nothing from sample to sample.
+
+mod harness;
+
+use control::crmpc::{Constraints, Memory, Plan, Report, Settings, Status};
+use control::schedule::Sampled;
+use control::{Controller, Crmpc, Measurement};
+use harness::{disturbance, settings, simulate};
+use nalgebra::{Vector2, Vector3};
+use proptest::prelude::*;
+use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
+use std::cell::{Cell, RefCell};
+use std::ops::Range;
+use vehicle::disturbance::Kind;
+use vehicle::kinematics;
+use vehicle::reference::Reference;
+use vehicle::scenario::Scenario;
+
+fn reference() -> impl Fn(f64) -> Reference {
+    let scenario = Scenario::crmpc2022();
+    move |time| scenario.reference.at(time)
+}
+
+fn controller(constraints: Constraints) -> Crmpc {
+    Crmpc::new(settings(constraints)).unwrap()
+}
+
+/// The memory without what a clock wrote into it.
+fn timeless(memory: &Memory) -> Memory {
+    Memory { report: Report { time: 0.0, ..memory.report }, ..memory.clone() }
+}
+
+/// What goes into an optimisation of a recorded run.
+struct Recorded {
+    tick: u64,
+    before: Memory,
+    measured: Measurement,
+}
+
+impl Recorded {
+    fn update(&self, controller: &mut Crmpc) -> (Memory, Vector3<f64>) {
+        let mut memory = self.before.clone();
+        let time = self.tick as f64 * controller.period();
+        let moment = controller.update(&mut memory, self.tick, time, &self.measured, &reference());
+        (memory, moment)
+    }
+}
+
+/// All optimisations of the scenario with white noise.
+fn recorded(constraints: Constraints) -> Vec<Recorded> {
+    let mut controller = controller(constraints);
+    let ratio = controller.design().ratio as u64;
+    let mut before = Memory::default();
+    let mut all = Vec::new();
+    simulate(
+        &mut controller,
+        &mut Memory::default(),
+        1.05,
+        disturbance(Kind::White),
+        |after, tick, &measured| {
+            if tick % ratio == 0 {
+                all.push(Recorded { tick, before: before.clone(), measured });
+            }
+            before.clone_from(after);
+        },
+    );
+    all
+}
+
+#[test]
+fn exits_lead_to_the_optimum_of_the_whole_horizon() {
+    // First optimisations, which iterate to convergence, from random states at random times.
+    let cube = |half_deg: f64| {
+        let half = half_deg.to_radians();
+        [-half..half, -half..half, -half..half]
+    };
+    let states = (0.0..1.0f64, cube(8.0), cube(1.5), 0..225u64);
+    for constraints in [Constraints::Robust, Constraints::Paper] {
+        let (with, without) = (controller(constraints), controller(constraints).without_exits());
+        let (with, without) = (RefCell::new(with), RefCell::new(without));
+        let limit = settings(constraints).limit_moment;
+        let counts = [Cell::new(0), Cell::new(0)];
+        let property = |(size, offset, rates, sample): (f64, [f64; 3], [f64; 3], u64)| {
+            let time = sample as f64 * 0.2;
+            let angles = reference()(time).angles + Vector3::from(offset) * size;
+            let measured = Measurement { angles, rates: Vector3::from(rates) * size };
+            let [(status, cost, moment), (status_whole, cost_whole, moment_whole)] =
+                [&with, &without].map(|controller| {
+                    let mut memory = Memory::default();
+                    let mut controller = controller.borrow_mut();
+                    let moment = controller.update(&mut memory, 0, time, &measured, &reference());
+                    (memory.report.status, memory.report.cost, moment)
+                });
+            prop_assume!(status_whole == Status::Constrained);
+            prop_assert_ne!(status, Status::Fallback);
+            counts[usize::from(status == Status::Constrained)].update(|count| count + 1);
+            prop_assert!((cost - cost_whole).abs() <= 1e-6 * cost_whole, "{cost} {cost_whole}");
+            let difference = (moment - moment_whole).norm() / limit;
+            prop_assert!(difference < 1e-4, "{status:?}: {difference}");
+            Ok(())
+        };
+        let config = ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() };
+        let random = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+        TestRunner::new_with_rng(config, random).run(&states, property).unwrap();
+        assert!(counts.iter().all(|count| count.get() >= 10), "{constraints:?}: {counts:?}");
+    }
+}
+
+#[test]
+fn exits_change_nothing_along_a_run() {
+    for constraints in [Constraints::Robust, Constraints::Paper] {
+        let (mut with, mut without) = (controller(constraints), controller(constraints).without_exits());
+        let limit = settings(constraints).limit_moment;
+        let mut counts = [0, 0];
+        for sample in recorded(constraints).iter().step_by(3) {
+            let (memory, moment) = sample.update(&mut with);
+            let (whole, moment_whole) = sample.update(&mut without);
+            counts[usize::from(memory.report.status == Status::Constrained)] += 1;
+            let (cost, cost_whole) = (memory.report.cost, whole.report.cost);
+            assert!(
+                (cost - cost_whole).abs() <= 1e-7 * cost_whole,
+                "tick {}: {cost} {cost_whole}",
+                sample.tick
+            );
+            let difference = (moment - moment_whole).norm() / limit;
+            assert!(difference < 1e-4, "tick {}: {difference}", sample.tick);
+        }
+        assert!(counts.iter().all(|&count| count > 2), "{constraints:?}: {counts:?}");
+    }
+}
+
+/// (31) written out again: the plan before without its first interval, then one interval under (14).
+fn assert_is_shifted(after: &Plan, before: &Plan, end: &Reference, settings: &Settings) {
+    let n = settings.horizon;
+    assert_eq!(after.states[..n], before.states[1..]);
+    assert_eq!(after.accelerations[..n - 1], before.accelerations[1..]);
+    let h = settings.period_optimisation;
+    let last = before.states[n];
+    for i in 0..3 {
+        let (angle, rate) = (last[i] - end.angles[i], last[3 + i] - end.rates[i]);
+        let a = settings.terminal.k1 * angle + settings.terminal.k2 * rate + end.accelerations[i];
+        assert!((after.accelerations[n - 1][i] - a).abs() < 1e-14);
+        assert!((after.states[n][3 + i] - (last[3 + i] + h * a)).abs() < 1e-14);
+        assert!((after.states[n][i] - (last[i] + h * last[3 + i] + 0.5 * h * h * a)).abs() < 1e-14);
+    }
+}
+
+#[test]
+fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
+    let settings = settings(Constraints::Robust);
+    let mut failing = Crmpc::new(Settings { max_iterations: 1, ..settings }).unwrap();
+    let recorded = recorded(Constraints::Robust);
+    let constrained = |sample: &&Recorded| {
+        sample.tick > 0
+            && sample.update(&mut controller(Constraints::Robust)).0.report.status == Status::Constrained
+    };
+    let samples: Vec<_> = recorded.iter().filter(constrained).take(3).collect();
+    assert_eq!(samples.len(), 3);
+    for sample in samples {
+        let (after, moment) = sample.update(&mut failing);
+        assert_eq!(after.report.status, Status::Fallback);
+        assert_eq!(after.report.fallbacks, sample.before.report.fallbacks + 1);
+        assert_eq!(after.report.solves, sample.before.report.solves + 1);
+        let time = sample.tick as f64 * settings.period_feedback;
+        let h = settings.period_optimisation;
+        let at = |k: usize| reference()(time + k as f64 * h);
+        assert_is_shifted(&after.plan, &sample.before.plan, &at(settings.horizon - 1), &settings);
+
+        // Its cost, written out.
+        let mut cost = 0.0;
+        for k in 0..=settings.horizon {
+            let reference = at(k);
+            for i in 0..3 {
+                let state = &after.plan.states[k];
+                let e = Vector2::new(state[i] - reference.angles[i], state[3 + i] - reference.rates[i]);
+                if k < settings.horizon {
+                    let v = after.plan.accelerations[k][i] - reference.accelerations[i];
+                    cost += h
+                        * (settings.p[i] * e.x * e.x + settings.p[3 + i] * e.y * e.y + settings.q[i] * v * v);
+                } else {
+                    cost += (e.transpose() * failing.design().g[i] * e).x;
+                }
+            }
+        }
+        assert!((after.report.cost - cost).abs() < 1e-9 * cost, "{} {cost}", after.report.cost);
+
+        // (20) about the shifted plan: R I⁻¹ m = u = K O_e + ũ, ũ = a − f(x).
+        let Measurement { angles, rates } = sample.measured;
+        let angle_rates = kinematics::r(&angles) * rates;
+        let u = kinematics::r(&angles) * (settings.body.inverse * moment);
+        let nominal = &after.plan.states[0];
+        let acceleration = u + settings.body.drift(&angles, &angle_rates);
+        for i in 0..3 {
+            let feedback = settings.feedback.k1 * (angles[i] - nominal[i])
+                + settings.feedback.k2 * (angle_rates[i] - nominal[3 + i]);
+            assert!((acceleration[i] - after.plan.accelerations[0][i] - feedback).abs() < 1e-12);
+        }
+    }
+}
+
+/// A controller whose solver fails during some ticks.
+struct Failing {
+    working: Crmpc,
+    failing: Crmpc,
+    during: Range<u64>,
+}
+
+impl Controller for Failing {
+    type Memory = Memory;
+
+    fn period(&self) -> f64 {
+        self.working.period()
+    }
+
+    fn update(
+        &mut self,
+        memory: &mut Memory,
+        tick: u64,
+        time: f64,
+        measured: &Measurement,
+        reference: control::controller::ReferenceAt,
+    ) -> Vector3<f64> {
+        let controller = if self.during.contains(&tick) { &mut self.failing } else { &mut self.working };
+        controller.update(memory, tick, time, measured, reference)
+    }
+}
+
+/// Scenario with a solver that fails `during` some ticks: outcome, fallbacks inside and outside, last memory.
+fn run_failing(during: Range<u64>) -> (harness::Outcome, [u32; 2], Memory) {
+    let settings = settings(Constraints::Robust);
+    let mut controller = Failing {
+        working: Crmpc::new(settings).unwrap(),
+        failing: Crmpc::new(Settings { max_iterations: 1, ..settings }).unwrap(),
+        during: during.clone(),
+    };
+    let mut memory = Memory::default();
+    let mut fallbacks = [0, 0];
+    let mut last = 0;
+    let outcome =
+        simulate(&mut controller, &mut memory, 1.05, disturbance(Kind::White), |memory, tick, _| {
+            fallbacks[usize::from(!during.contains(&tick))] += memory.report.fallbacks - last;
+            last = memory.report.fallbacks;
+        });
+    (outcome, fallbacks, memory)
+}
+
+#[test]
+fn a_solver_that_fails_for_a_while_costs_no_limit() {
+    // In the manoeuvre at the start, with the jump of the reference ahead, about the jump.
+    for during in [10..50, 200..300, 575..660] {
+        let (outcome, [inside, outside], memory) = run_failing(during.clone());
+        assert!(inside > 0 && outside == 0, "{during:?}: {inside} fallbacks inside, {outside} outside");
+        assert!(outcome.rate <= 1.0 && outcome.moment <= 1.0, "{during:?}: {outcome:?}");
+        assert_eq!(memory.report.status, Status::Unconstrained, "{during:?}");
+    }
+}
+
+#[test]
+fn a_solver_that_fails_from_the_start_is_outlived() {
+    // Without a plan there is nothing to shift: the terminal law alone, which knows no limits.
+    for during in [0..5, 0..u64::MAX] {
+        let (outcome, [inside, outside], memory) = run_failing(during.clone());
+        assert!(inside > 0 && outside < 25, "{during:?}: {inside} fallbacks inside, {outside} outside");
+        assert!(outcome.ems_deg < 2.2, "{during:?}: {outcome:?}");
+        assert_eq!(memory.report.status, Status::Unconstrained, "{during:?}");
+    }
+}
+
+#[test]
+fn another_evaluation_of_a_tick_leaves_no_trace() {
+    let reference = reference();
+    let garbage = [
+        Measurement { angles: Vector3::new(0.5, -0.4, 1.0), rates: Vector3::new(0.2, -0.3, 0.1) },
+        Measurement { angles: Vector3::repeat(f64::NAN), rates: Vector3::repeat(f64::NAN) },
+        Measurement { angles: Vector3::repeat(1.0), rates: Vector3::repeat(f64::INFINITY) },
+        Measurement { angles: Vector3::repeat(1e300), rates: Vector3::repeat(-1e300) },
+    ];
+    let mut truth = Vec::new();
+    simulate(
+        &mut controller(Constraints::Robust),
+        &mut Memory::default(),
+        1.05,
+        disturbance(Kind::White),
+        |_, _, &measured| truth.push(measured),
+    );
+    let (mut disturbed_controller, mut calm_controller) =
+        (controller(Constraints::Robust), controller(Constraints::Robust));
+    let (mut disturbed, mut calm) = (Sampled::<Memory>::new(0.0), Sampled::<Memory>::new(0.0));
+    for (tick, measured) in truth.iter().enumerate().take(300) {
+        let wrong = &garbage[tick / 5 % garbage.len()];
+        disturbed.evaluate(&mut disturbed_controller, wrong, [0.0; 9], &reference);
+        disturbed.evaluate(&mut disturbed_controller, measured, [0.0; 9], &reference);
+        calm.evaluate(&mut calm_controller, measured, [0.0; 9], &reference);
+        let ((moment, memory), (calm_moment, calm_memory)) = (disturbed.in_force(), calm.in_force());
+        assert_eq!(moment, calm_moment, "tick {tick}");
+        assert_eq!(timeless(memory), timeless(calm_memory), "tick {tick}");
+        disturbed.commit();
+        calm.commit();
+    }
+}
+
+#[test]
+fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
+    for constraints in [Constraints::Robust, Constraints::Paper] {
+        let mut truth = Vec::new();
+        simulate(
+            &mut controller(constraints),
+            &mut Memory::default(),
+            0.95,
+            disturbance(Kind::White),
+            |_, _, &measured| truth.push(measured),
+        );
+        let reference = reference();
+        let mut used = controller(constraints);
+        let mut sampled = Sampled::<Memory>::new(0.0);
+        for (tick, measured) in truth.iter().enumerate().take(750) {
+            // Within and at the beginning of an optimisation period, with the tick evaluated and not.
+            if tick % 7 == 3 {
+                if tick % 2 == 0 {
+                    sampled.evaluate(&mut used, measured, [0.0; 9], &reference);
+                }
+                let saved = postcard::to_stdvec(&sampled).unwrap();
+                let mut restored: Sampled<Memory> = postcard::from_bytes(&saved).unwrap();
+                let mut copy = sampled.clone();
+                let mut fresh = controller(constraints);
+                for later in &truth[tick..tick + 7] {
+                    for (sampled, controller) in [(&mut restored, &mut fresh), (&mut copy, &mut used)] {
+                        sampled.evaluate(controller, later, [0.0; 9], &reference);
+                    }
+                    let ((moment, memory), (moment_used, memory_used)) =
+                        (restored.in_force(), copy.in_force());
+                    assert_eq!(moment, moment_used, "saved at tick {tick}");
+                    assert_eq!(timeless(memory), timeless(memory_used), "saved at tick {tick}");
+                    restored.commit();
+                    copy.commit();
+                }
+            }
+            sampled.evaluate(&mut used, measured, [0.0; 9], &reference);
+            sampled.commit();
+        }
+    }
+}
