@@ -1,0 +1,209 @@
+"""FMI 2.0 units driven by hand through FMPy: variables by name, log messages kept."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import fmpy
+from fmpy import fmi2
+
+ANGLES = [f"attitude.{axis}" for axis in ("alpha", "beta", "sigma")]
+RATES = [f"rate.{axis}" for axis in ("p", "q", "r")]
+MOMENT = [f"moment.{axis}" for axis in ("x", "y", "z")]
+REFERENCE = [f"reference.{axis}" for axis in ("alpha", "beta", "sigma")]
+
+# Differs from run to run, as it is wall-clock time.
+NOT_REPRODUCIBLE = {"solver.time"}
+
+
+@dataclass
+class Fmu:
+    """An archive, unpacked."""
+
+    path: Path
+    folder: Path
+    description: fmpy.model_description.ModelDescription
+    variables: dict = field(default_factory=dict)
+
+    @classmethod
+    def open(cls, path: Path, folder: Path) -> Fmu:
+        shutil.unpack_archive(path, folder, "zip")
+        description = fmpy.read_model_description(str(folder))
+        return cls(path, folder, description, {v.name: v for v in description.modelVariables})
+
+    @property
+    def name(self) -> str:
+        return self.description.modelName
+
+    def names(self, causality: str) -> list[str]:
+        return [v.name for v in self.description.modelVariables if v.causality == causality]
+
+    def item(self, name: str, text: str) -> int:
+        """Value of an enumeration's item."""
+        items = self.variables[name].declaredType.items
+        return next(int(item.value) for item in items if item.name == text)
+
+    def arguments(self, kind: str = "coSimulation") -> dict:
+        identifier = getattr(self.description, kind).modelIdentifier
+        return dict(guid=self.description.guid, unzipDirectory=str(self.folder), modelIdentifier=identifier)
+
+
+class Unit:
+    """A co-simulation instance. Parameters by name, enumerations by their item's name."""
+
+    def __init__(self, fmu: Fmu, parameters: dict | None = None, instance: str = "unit", guid: str | None = None):
+        self.fmu = fmu
+        # Status, category and message of each call of the logger.
+        self.log: list[tuple[int, str, str]] = []
+        arguments = fmu.arguments()
+        if guid is not None:
+            arguments["guid"] = guid
+        self.slave = fmi2.FMU2Slave(instanceName=instance, **arguments)
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._logged)
+        callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
+        callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
+        try:
+            self.slave.instantiate(callbacks=callbacks, loggingOn=True)
+        except Exception as error:
+            raise RuntimeError(self.messages()) from error
+        self.set(parameters or {})
+
+    def _logged(self, _environment, _instance, status, category, message):
+        self.log.append((status, category.decode(), message.decode()))
+
+    def messages(self) -> str:
+        """The log's warnings and errors."""
+        return "\n".join(message for status, _, message in self.log if status >= fmi2.fmi2Warning)
+
+    # Values by name
+
+    def set(self, values: dict) -> None:
+        groups: dict[str, tuple[list, list]] = {}
+        for name, value in values.items():
+            variable = self.fmu.variables[name]
+            if variable.type == "Enumeration" and isinstance(value, str):
+                value = self.fmu.item(name, value)
+            references, group = groups.setdefault(variable.type, ([], []))
+            references.append(variable.valueReference)
+            group.append(value)
+        setters = {
+            "Real": self.slave.setReal,
+            "Integer": self.slave.setInteger,
+            "Enumeration": self.slave.setInteger,
+            "Boolean": self.slave.setBoolean,
+            "String": self.slave.setString,
+        }
+        for kind, (references, group) in groups.items():
+            setters[kind](references, group)
+
+    def get(self, names: list[str]) -> list:
+        """Values in the order of the names. Reals come in one call, so do integers."""
+        values = {}
+        getters = {
+            "Real": self.slave.getReal,
+            "Integer": self.slave.getInteger,
+            "Enumeration": self.slave.getInteger,
+            "Boolean": self.slave.getBoolean,
+            "String": self.slave.getString,
+        }
+        for kind, getter in getters.items():
+            own = [name for name in names if self.fmu.variables[name].type == kind]
+            if own:
+                values.update(zip(own, getter([self.fmu.variables[name].valueReference for name in own])))
+        return [values[name] for name in names]
+
+    def outputs(self) -> list:
+        """All reproducible outputs."""
+        return self.get([name for name in self.fmu.names("output") if name not in NOT_REPRODUCIBLE])
+
+    # Life
+
+    def enter(self, start: float = 0.0, stop: float | None = None) -> None:
+        self.slave.setupExperiment(startTime=start, stopTime=stop)
+        self.slave.enterInitializationMode()
+
+    def exit(self) -> None:
+        self.slave.exitInitializationMode()
+
+    def start(self, start: float = 0.0, inputs: dict | None = None) -> Unit:
+        self.enter(start)
+        self.set(inputs or {})
+        self.exit()
+        return self
+
+    def step(self, time: float, step: float) -> None:
+        self.slave.doStep(currentCommunicationPoint=time, communicationStepSize=step)
+
+    def save(self) -> bytes:
+        state = self.slave.getFMUstate()
+        saved = self.slave.serializeFMUstate(state)
+        self.slave.freeFMUstate(state)
+        return saved
+
+    def restore(self, saved: bytes) -> None:
+        state = self.slave.deSerializeFMUstate(saved)
+        self.slave.setFMUstate(state)
+        self.slave.freeFMUstate(state)
+
+    def reset(self, parameters: dict | None = None) -> None:
+        """Back to the state of a new instance. FMI leaves parameters at their start values: they are set anew."""
+        self.slave.reset()
+        self.set(parameters or {})
+
+    def close(self) -> None:
+        self.slave.freeInstance()
+
+    def __enter__(self) -> Unit:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
+
+def number(written):
+    """A parameter of an experiment file as a number in SI: text carries a unit in degrees."""
+    if not isinstance(written, str):
+        return written
+    match = re.fullmatch(r"(\S+) deg(/s2?)?", written)
+    return float(match[1]) * 3.141592653589793 / 180.0 if match else written
+
+
+class Loop:
+    """Controller and plant stepped by hand.
+
+    At each communication point the plant's state goes to the controller, then its moment to the plant (Gauss-Seidel in the order controller, plant). Or else (Jacobi) both are read before either is set."""
+
+    def __init__(self, controller: Unit, plant: Unit, step: float, jacobi: bool = False):
+        self.controller, self.plant, self.step, self.jacobi = controller, plant, step, jacobi
+        self.tick = 0
+
+    def pass_on(self) -> None:
+        names = ANGLES + RATES
+        self.controller.set(dict(zip(names, self.plant.get(names))))
+        self.plant.set(dict(zip(MOMENT, self.controller.get(MOMENT))))
+
+    def start(self) -> None:
+        self.controller.enter()
+        self.plant.enter()
+        self.pass_on()
+        self.controller.exit()
+        self.plant.exit()
+        self.couple()
+
+    def couple(self) -> None:
+        if not self.jacobi:
+            return self.pass_on()
+        state, moment = self.plant.get(ANGLES + RATES), self.controller.get(MOMENT)
+        self.controller.set(dict(zip(ANGLES + RATES, state)))
+        self.plant.set(dict(zip(MOMENT, moment)))
+
+    def advance(self) -> None:
+        time = self.tick * self.step
+        self.controller.step(time, self.step)
+        self.plant.step(time, self.step)
+        self.tick += 1
+        self.couple()

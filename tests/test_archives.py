@@ -1,0 +1,65 @@
+"""The archives themselves: valid, complete, reproducible, and as committed."""
+
+import subprocess
+import zipfile
+
+import pytest
+from fmpy.validation import validate_fmu
+
+from conftest import NAMES, ROOT, archive, library, program
+
+
+def pack(folder, *arguments):
+    libraries = [library("fmu_plant"), library("fmu_controller")]
+    subprocess.run([program("fmu-pack"), *libraries, "--output", folder, *arguments], check=True, capture_output=True)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_fmpy_finds_no_problem(name):
+    assert validate_fmu(str(archive(name))) == []
+
+
+def test_every_unit_was_packed_and_tested():
+    assert sorted(path.stem for path in archive("LQR").parent.glob("*.fmu")) == sorted(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_description_says_what_tools_rely_on(fmu, name):
+    description = fmu(name).description
+    assert description.fmiVersion == "2.0"
+    assert description.coSimulation.canHandleVariableCommunicationStepSize
+    assert description.coSimulation.canGetAndSetFMUstate and description.coSimulation.canSerializeFMUstate
+    assert (description.modelExchange is not None) == (name == "ReentryPlant")
+    assert description.defaultExperiment.stopTime == "50" or float(description.defaultExperiment.stopTime) == 50.0
+    for variable in description.modelVariables:
+        assert variable.description, f"{variable.name} has no description"
+    with zipfile.ZipFile(archive(name)) as packed:
+        files = packed.namelist()
+    assert "documentation/index.html" in files
+    assert any(file.startswith("documentation/licenses/LICENSE-") for file in files)
+
+
+def test_controllers_can_be_exchanged_without_rewiring(fmu):
+    crmpc, lqr = fmu("CRMPC"), fmu("LQR")
+    assert crmpc.names("input") == lqr.names("input")
+    assert set(lqr.names("output")) <= set(crmpc.names("output"))
+    for name in lqr.names("input") + lqr.names("output"):
+        assert crmpc.variables[name].unit == lqr.variables[name].unit, name
+
+
+def test_packing_twice_gives_the_same_bytes(tmp_path):
+    pack(tmp_path / "first")
+    pack(tmp_path / "second")
+    for name in NAMES:
+        first, second = ((tmp_path / run / f"{name}.fmu").read_bytes() for run in ("first", "second"))
+        assert first == second, name
+
+
+def test_committed_snapshots_are_what_the_libraries_say(tmp_path):
+    pack(tmp_path / "fmu", "--xml-snapshot", tmp_path / "generated")
+    generated = {path.name: path.read_text() for path in (tmp_path / "generated").glob("*.xml")}
+    committed = {path.name: path.read_text() for path in (ROOT / "modelDescription" / "generated").glob("*.xml")}
+    differing = sorted(
+        name for name in generated.keys() | committed.keys() if generated.get(name) != committed.get(name)
+    )
+    assert not differing, f"{differing} in modelDescription/generated are out of date: run scripts/update-generated"

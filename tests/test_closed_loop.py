@@ -1,0 +1,68 @@
+"""Plant and controller stepped by hand against the orchestrator: the same binaries in the same order."""
+
+import csv
+import json
+import sys
+
+import pytest
+
+from conftest import EXPERIMENTS
+from fmi import Loop, Unit, number
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+STEP = 0.04
+COLUMNS = {
+    "plant": ["attitude.alpha", "attitude.beta", "attitude.sigma", "rate.p", "rate.q", "rate.r"],
+    "controller": ["moment.x", "moment.y", "moment.z", "reference.alpha", "reference.beta", "reference.sigma"],
+}
+
+
+def compare(fmu, text: str, results, jacobi: bool = False) -> None:
+    """Steps the components of an experiment by hand, next to the orchestrator's results."""
+    written = tomllib.loads(text)["components"]
+    units = {}
+    for component in ("controller", "plant"):
+        settings = {key: number(value) for key, value in written[component]["parameters"].items()}
+        units[component] = Unit(fmu(written[component]["fmu"].removesuffix(".fmu")), settings, component)
+    with open(results / "results.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 1251
+
+    loop = Loop(units["controller"], units["plant"], STEP, jacobi)
+    loop.start()
+    largest = {}
+    difference = {}
+    for tick, row in enumerate(rows):
+        if tick > 0:
+            loop.advance()
+        assert float(row["time"]) == pytest.approx(tick * STEP, abs=1e-12)
+        for component, names in COLUMNS.items():
+            for column, value in zip(names, units[component].get(names)):
+                expected = float(row[f"{component}.{column}"])
+                largest[column] = max(largest.get(column, 0.0), abs(expected))
+                difference[column] = max(difference.get(column, 0.0), abs(value - expected))
+    for column, error in difference.items():
+        assert error <= 1e-12 * largest[column], f"{column}: {error}"
+    assert largest["moment.x"] > 1e3
+    for unit in units.values():
+        assert unit.messages() == ""
+        unit.close()
+
+
+@pytest.mark.parametrize("name", ["crmpc-robust", "crmpc-paper", "lqr"])
+def test_oracle_stepping_by_hand_gives_the_orchestrators_trajectory(fmu, experiment, name):
+    compare(fmu, (EXPERIMENTS / f"{name}.toml").read_text(), experiment(name))
+
+
+def test_oracle_jacobi_by_hand_adds_one_communication_step_of_delay(fmu, orchestrate, tmp_path):
+    text = (EXPERIMENTS / "crmpc-robust.toml").read_text()
+    jacobi = tmp_path / "jacobi.toml"
+    jacobi.write_text(text.replace('coupling = "gauss-seidel"', 'coupling = "jacobi"'))
+    finished, out = orchestrate(jacobi)
+    assert finished.returncode == 0, finished.stderr
+    assert json.loads((out / "metrics.json").read_text())["loop_delay_s"] == pytest.approx(STEP)
+    compare(fmu, text, out, jacobi=True)

@@ -1,0 +1,129 @@
+"""Saved states, reset, and instances side by side: all bit for bit."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from conftest import NAMES
+from fmi import ANGLES, MOMENT, RATES, Loop, Unit
+
+STEP = 0.04
+PLANT = {"inertia.scale": 1.05, "disturbance.kind": "white", "disturbance.seed": 3}
+SETTINGS = {"ReentryPlant": PLANT, "CRMPC": {"constraints": "robust"}, "LQR": {}}
+
+
+def course(tick: int) -> dict:
+    """Measurements near the initial state, moving enough to change every optimisation."""
+    values = [0.13 + 1e-3 * tick, 0.15 - 1e-3 * tick, -0.5 + 5e-4 * tick, 1e-2, -2e-3, 1e-4 * tick]
+    return dict(zip(ANGLES + RATES, values))
+
+
+def inputs(name: str, tick: int) -> dict:
+    if name != "ReentryPlant":
+        return course(tick)
+    return dict(zip(MOMENT, [1e4 * (-1) ** (tick // 10), 2e3 * tick, -3e4 + 1e3 * tick]))
+
+
+def drive(unit: Unit, ticks: range) -> list:
+    """Outputs at each tick, exactly."""
+    rows = []
+    for tick in ticks:
+        unit.set(inputs(unit.fmu.name, tick))
+        rows.append([float(value).hex() for value in unit.outputs()])
+        unit.step(tick * STEP, STEP)
+    return rows
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_reset_equals_a_new_instance(fmu, name):
+    with Unit(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as unit:
+        expected = drive(unit, range(60))
+        assert len({tuple(row) for row in expected}) == 60, "the outputs must move for this test to mean anything"
+        unit.reset(SETTINGS[name])
+        unit.start(inputs=inputs(name, 0))
+        assert drive(unit, range(60)) == expected
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_restored_state_goes_on_bit_for_bit(fmu, name):
+    with Unit(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as unit:
+        drive(unit, range(23))
+        saved = unit.save()
+        expected = drive(unit, range(23, 60))
+        unit.restore(saved)
+        assert drive(unit, range(23, 60)) == expected
+        assert unit.save() != saved
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_state_saved_to_a_file_goes_on_in_a_new_process(fmu, name, tmp_path):
+    with Unit(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as unit:
+        drive(unit, range(23))
+        (tmp_path / "state").write_bytes(unit.save())
+        expected = drive(unit, range(23, 60))
+    script = {"parameters": SETTINGS[name], "inputs": [inputs(name, tick) for tick in range(23, 60)]}
+    (tmp_path / "script.json").write_text(json.dumps(script))
+    program = Path(__file__).with_name("continue_elsewhere.py")
+    arguments = [fmu(name).path, tmp_path / "unpacked", tmp_path / "script.json", tmp_path / "state", "23", str(STEP)]
+    finished = subprocess.run([sys.executable, program, *arguments], capture_output=True, text=True, timeout=120)
+    assert finished.returncode == 0, finished.stderr
+    assert [json.loads(line) for line in finished.stdout.splitlines()] == expected
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_new_instance_takes_the_parameters_from_the_state(fmu, name):
+    with Unit(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as unit:
+        drive(unit, range(7))
+        saved = unit.save()
+        expected = drive(unit, range(7, 30))
+    with Unit(fmu(name)).start() as other:
+        other.restore(saved)
+        assert drive(other, range(7, 30)) == expected
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_interleaved_instances_do_not_disturb_each_other(fmu, name):
+    other_settings = {
+        "ReentryPlant": {"disturbance.kind": "white", "disturbance.seed": 4},
+        "CRMPC": {"constraints": "paper"},
+        "LQR": {"weight.P[1]": 20.0},
+    }[name]
+    alone = []
+    for settings in (SETTINGS[name], other_settings):
+        with Unit(fmu(name), settings).start(inputs=inputs(name, 0)) as unit:
+            alone.append(drive(unit, range(40)))
+    assert alone[0] != alone[1]
+    both = [Unit(fmu(name), s).start(inputs=inputs(name, 0)) for s in (SETTINGS[name], other_settings)]
+    together = [[], []]
+    for tick in range(40):
+        for unit, rows in zip(both, together):
+            rows += drive(unit, range(tick, tick + 1))
+    for unit in both:
+        unit.close()
+    assert together == alone
+
+
+def test_a_closed_loop_goes_on_from_saved_states(fmu):
+    loop = Loop(Unit(fmu("CRMPC"), SETTINGS["CRMPC"]), Unit(fmu("ReentryPlant"), PLANT), STEP)
+    loop.start()
+    for _ in range(62):
+        loop.advance()
+    saved, tick = (loop.controller.save(), loop.plant.save()), loop.tick
+
+    def go_on() -> list:
+        rows = []
+        for _ in range(125):
+            loop.advance()
+            rows.append(loop.plant.outputs() + loop.controller.outputs())
+        return rows
+
+    expected = go_on()
+    loop.controller.restore(saved[0])
+    loop.plant.restore(saved[1])
+    loop.tick = tick
+    assert go_on() == expected
+    loop.controller.close()
+    loop.plant.close()

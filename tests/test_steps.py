@@ -1,0 +1,116 @@
+"""A controller runs its own ticks whatever the communication step is."""
+
+import numpy as np
+import pytest
+
+from fmi import ANGLES, MOMENT, RATES, REFERENCE, Unit
+
+CONTROLLERS = ["CRMPC", "LQR"]
+# Inputs are held for this long, s.
+HOLD = 0.2
+HOLDS = 30
+FEEDBACK = 0.04
+# How each hold is divided; the last one differs from hold to hold.
+DIVISIONS = {
+    "20 ms": lambda _: [0.02] * 10,
+    "40 ms": lambda _: [0.04] * 5,
+    "irregular": lambda k: [0.013, 0.007 + 0.001 * (k % 20), 0.1, 0.08 - 0.001 * (k % 20)],
+    "10 ms and the rest": lambda _: [0.01, 0.19],
+}
+
+
+def held(k: int) -> dict:
+    return dict(zip(ANGLES + RATES, [0.13 + 2e-3 * k, 0.16 - 4e-3 * k, -0.5 + 1e-3 * k, 0.01, -0.02, 1e-3 * k]))
+
+
+def sampled(unit: Unit) -> list:
+    """Outputs that change at ticks only, exactly, and the reference, which depends on time."""
+    names = [n for n in unit.fmu.names("output") if not n.startswith("reference") and n != "solver.time"]
+    return unit.get(names), unit.get(REFERENCE)
+
+
+def run(fmu, division) -> list:
+    rows = []
+    with Unit(fmu).start(inputs=held(0)) as unit:
+        for k in range(HOLDS):
+            unit.set(held(k))
+            rows.append(sampled(unit))
+            begin = k * HOLD
+            for step in division(k):
+                unit.step(begin, step)
+                begin += step
+    return rows
+
+
+@pytest.mark.parametrize("division", DIVISIONS)
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_any_communication_step_gives_the_same_outputs_at_common_ticks(fmu, name, division):
+    expected = run(fmu(name), lambda _: [HOLD])
+    found = run(fmu(name), DIVISIONS[division])
+    assert len({tuple(row) for row, _ in expected}) == HOLDS
+    for (row, reference), (other, other_reference) in zip(expected, found):
+        assert row == other
+        np.testing.assert_allclose(other_reference, reference, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_outputs_are_held_between_ticks_and_follow_inputs_at_a_tick(fmu, name):
+    with Unit(fmu(name)).start(inputs=held(0)) as unit:
+        at_tick = unit.get(MOMENT)
+        unit.set(held(1))
+        changed = unit.get(MOMENT)
+        assert changed != at_tick
+        unit.set(held(0))
+        assert unit.get(MOMENT) == at_tick, "the evaluation for other inputs must leave no trace"
+        unit.step(0.0, FEEDBACK / 2)
+        unit.set(held(1))
+        assert unit.get(MOMENT) == at_tick
+        unit.step(FEEDBACK / 2, FEEDBACK / 2)
+        assert unit.get(MOMENT) != at_tick
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_input_derivatives_give_the_inputs_between(fmu, name):
+    names = ANGLES + RATES
+    value = np.array([0.13, 0.16, -0.5, 0.01, -0.02, 0.0])
+    slope = np.array([0.02, -0.04, 0.01, 0.002, 0.001, -0.003])
+    references = [fmu(name).variables[n].valueReference for n in names]
+
+    def ramp(time: float) -> dict:
+        return dict(zip(names, value + slope * time))
+
+    with Unit(fmu(name)).start(inputs=ramp(0.0)) as fine:
+        for tick in range(25):
+            fine.set(ramp(tick * FEEDBACK))
+            fine.step(tick * FEEDBACK, FEEDBACK)
+        fine.set(ramp(1.0))
+        expected = fine.get(MOMENT)
+    with Unit(fmu(name)).start(inputs=ramp(0.0)) as coarse:
+        for k in range(5):
+            coarse.set(ramp(k * HOLD))
+            coarse.slave.setRealInputDerivatives(references, [1] * 6, slope)
+            coarse.step(k * HOLD, HOLD)
+        coarse.set(ramp(1.0))
+        found = coarse.get(MOMENT)
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_a_constant_external_reference_is_the_constant_profile(fmu, name):
+    angles = [0.16, 0.01, -0.45]
+    constant = {f"reference.angle.{axis}": value for axis, value in zip(("alpha", "beta", "sigma"), angles)}
+    external = {f"reference.external.{axis}": value for axis, value in zip(("alpha", "beta", "sigma"), angles)}
+    for kind in ("Rate", "Acceleration"):
+        external |= {f"reference.external{kind}.{axis}": 0.0 for axis in ("alpha", "beta", "sigma")}
+    outcomes = []
+    for profile, parameters, inputs in (("constant", constant, {}), ("external", {}, external)):
+        settings = {"reference.profile": profile, **parameters}
+        with Unit(fmu(name), settings).start(inputs=held(0) | inputs) as unit:
+            rows = []
+            for tick in range(20):
+                unit.set(held(tick))
+                rows.append(unit.get(MOMENT + REFERENCE))
+                unit.step(tick * FEEDBACK, FEEDBACK)
+            outcomes.append(rows)
+    assert outcomes[0][0][3:] == angles
+    assert outcomes[0] == outcomes[1]
