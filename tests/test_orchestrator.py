@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 
+import numpy as np
 import pytest
 
 from conftest import EXPERIMENTS, NAMES, archive, program
@@ -67,6 +68,39 @@ def test_regress_lqr_violates_both_limits(experiment):
     found = metrics(experiment("lqr"))
     assert found["max_rate_deg_s"] > 5.0
     assert found["max_moment_ratio"] > 1.0
+
+
+@pytest.mark.parametrize("scale", [0.95, 1.05])
+@pytest.mark.parametrize("kind", ["white", "constant", "square", "alongRate", "againstMoment"])
+def test_regress_robust_keeps_both_limits_under_any_disturbance(orchestrate, kind, scale):
+    settings = ["--set", f"plant.disturbance.kind={kind}", "--set", f"plant.inertia.scale={scale}"]
+    finished, out = orchestrate(EXPERIMENTS / "crmpc-robust.toml", *settings)
+    assert finished.returncode == 0, finished.stderr
+    used = json.loads((out / "results.json").read_text())["components"]["plant"]["parameters"]
+    assert (used["disturbance.kind"], used["inertia.scale"]) == (kind, scale)
+    found = metrics(out)
+    assert found["max_rate_deg_s"] <= 5.0
+    assert found["max_moment_ratio"] <= 1.0
+    assert found["fallbacks"] == 0
+
+
+@pytest.mark.parametrize("name", ["crmpc-robust", "lqr"])
+def test_oracle_figures_of_merit_follow_from_the_recorded_trajectory(experiment, name):
+    found = metrics(experiment(name))
+    data = np.genfromtxt(experiment(name) / "results.csv", delimiter=",", names=True, deletechars="")
+
+    def vector(*names):
+        return np.array([data[name] for name in names]).T
+
+    axes = ("alpha", "beta", "sigma")
+    error = vector(*(f"plant.attitude.{a}" for a in axes)) - vector(*(f"controller.reference.{a}" for a in axes))
+    moment = np.linalg.norm(vector(*(f"controller.moment.{a}" for a in "xyz")), axis=1) / 1.356e5
+    rate = np.linalg.norm(vector(*(f"plant.rate.{a}" for a in "pqr")), axis=1)
+    # Means over the steps, each counted by its beginning.
+    assert found["ems_deg"] == pytest.approx(np.degrees(np.sqrt((error[:-1] ** 2).sum(axis=1).mean())), rel=1e-12)
+    assert found["cms"] == pytest.approx(np.sqrt((moment[:-1] ** 2).mean()), rel=1e-12)
+    assert found["max_rate_deg_s"] == pytest.approx(np.degrees(rate.max()), rel=1e-12)
+    assert found["max_moment_ratio"] == pytest.approx(moment.max(), rel=1e-12)
 
 
 def test_runs_repeat_bit_for_bit(experiment, orchestrate):
