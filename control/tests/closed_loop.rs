@@ -7,6 +7,7 @@ use control::Controller;
 use control::crmpc::{Constraints, InitialState, Settings, Status};
 use control::{Crmpc, crmpc::Memory};
 use harness::{Case, adversaries, constant, disturbance, in_parallel, settings, simulate, square, white};
+use nalgebra::Vector2;
 use vehicle::disturbance::{Disturbance, Kind};
 use vehicle::scenario::Scenario;
 
@@ -78,28 +79,29 @@ fn lqr_violates_both_limits() {
 }
 
 #[test]
-fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_ellipse() {
+fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_set() {
     let settings = Settings { initial_state: InitialState::Tube, ..settings(Constraints::Paper) };
     let mut controller = Crmpc::new(settings).unwrap();
     let design = controller.design().clone();
-    let inverse = design.invariant.try_inverse().unwrap();
-    let mut moved = 0.0f64;
+    let normals = design.invariant.as_ref().unwrap().normals();
+    let mut largest = 0.0f64;
     let mut memory = Memory::default();
     simulate(&mut controller, &mut memory, 1.05, disturbance(Kind::White), |memory, tick, measured| {
         if tick % design.ratio as u64 == 0 {
             assert_eq!(memory.report.status, Status::Constrained);
             let angle_rates = vehicle::kinematics::r(&measured.angles) * measured.rates;
             for i in 0..3 {
-                let o = nalgebra::Vector2::new(measured.angles[i], angle_rates[i])
-                    - nalgebra::Vector2::new(memory.nominal[i], memory.nominal[3 + i]);
-                let size = (o.transpose() * inverse * o).x;
-                assert!(size <= 1.0 + 1e-4, "tick {tick}: {size}");
-                moved = moved.max(size);
+                let o = Vector2::new(measured.angles[i], angle_rates[i])
+                    - Vector2::new(memory.nominal[i], memory.nominal[3 + i]);
+                let bound = design.tightening.disturbance[i];
+                let size = normals.iter().map(|normal| normal.dot(&o).abs() / bound).fold(0.0, f64::max);
+                assert!(size <= 1.0 + 1e-6, "tick {tick}: {size}");
+                largest = largest.max(size);
             }
         }
     });
     assert_eq!(memory.report.fallbacks, 0);
-    assert!(moved > 0.5, "the freedom is never used: {moved}");
+    assert!(largest > 0.9, "the freedom is not used: {largest}");
 }
 
 #[test]
@@ -137,8 +139,9 @@ fn without_disturbance_nothing_is_constrained_once_the_jump_is_over() {
             constrained.push(tick as f64 * period);
         }
     });
-    let until = |from: f64, to: f64| constrained.iter().filter(|&&time| from <= time && time < to).count();
+    let within = |from: f64, to: f64| constrained.iter().filter(|&&time| from <= time && time < to).count();
     assert_eq!(constrained.first(), Some(&0.0));
-    assert!(until(jump - 1.0, jump) > 0, "{constrained:?}");
-    assert_eq!(until(jump + 3.0, f64::INFINITY), 0, "{constrained:?}");
+    // While the jump is ahead within the horizon, the plan for it is constrained.
+    assert!(within(jump - 19.0, jump - 2.0) > 400, "{constrained:?}");
+    assert_eq!(within(jump, f64::INFINITY), 0, "{constrained:?}");
 }

@@ -276,23 +276,39 @@ mod properties {
         }
 
         #[test]
-        fn no_disturbance_leaves_the_invariant_ellipse(
+        fn no_disturbance_leaves_the_invariant_set(
             case in 0..3usize,
-            bound in 1e-3..1.0f64,
             direction in 0.0..std::f64::consts::TAU,
             disturbances in prop::collection::vec(prop_oneof![Just(1.0), Just(-1.0)], 1..200),
         ) {
-            // From anywhere on its border.
             let (k, period, _) = PUBLISHED_CASES[case];
-            let shape = SampledError::new(gain(k), period).invariant_ellipse(bound).unwrap();
-            let border = shape.cholesky().unwrap().l() * Vector2::new(direction.cos(), direction.sin());
-            let inverse = shape.try_inverse().unwrap();
-            let mut simulation = Simulation { gain: gain(k), period, deviation: border };
+            let set = SampledError::new(gain(k), period).invariant_set().unwrap();
+            let normals = set.normals();
+            let size = |o: &Vector2<f64>| normals.iter().map(|normal| normal.dot(o).abs()).fold(0.0, f64::max);
+            // From anywhere on its border.
+            let direction = Vector2::new(direction.cos(), direction.sin());
+            let mut simulation = Simulation { gain: gain(k), period, deviation: direction / size(&direction) };
+            let reach = set.reach();
             for disturbance in disturbances {
-                simulation.advance(&[disturbance * bound]);
-                let o = simulation.deviation;
-                prop_assert!((o.transpose() * inverse * o).x <= 1.0 + 1e-9);
+                for (value, bound) in simulation.outputs().into_iter().zip([reach.angle, reach.rate, reach.feedback]) {
+                    prop_assert!(value.abs() <= bound * (1.0 + 1e-9));
+                }
+                simulation.advance(&[disturbance]);
+                prop_assert!(size(&simulation.deviation) <= 1.0 + 1e-9, "{}", size(&simulation.deviation));
             }
+        }
+    }
+}
+
+#[test]
+fn oracle_invariant_set_holds_what_can_be_reached_and_is_less_than_half_larger() {
+    for (k, period, _) in PUBLISHED_CASES {
+        let error = SampledError::new(gain(k), period);
+        let (set, least) = (error.invariant_set().unwrap().reach(), error.reach_forever().unwrap());
+        let pairs = [(set.angle, least.angle), (set.rate, least.rate), (set.feedback, least.feedback)];
+        for (of_set, least) in pairs {
+            assert!(of_set >= least * (1.0 - 1e-12), "K {k}, period {period}: {of_set} {least}");
+            assert!(of_set < 1.5 * least, "K {k}, period {period}: {of_set} {least}");
         }
     }
 }
