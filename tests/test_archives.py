@@ -3,7 +3,9 @@
 import subprocess
 import zipfile
 
+import numpy as np
 import pytest
+from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
 from conftest import NAMES, ROOT, archive, library, program
@@ -37,6 +39,16 @@ def test_description_says_what_tools_rely_on(fmu, name):
         files = packed.namelist()
     assert "documentation/index.html" in files
     assert any(file.startswith("documentation/licenses/LICENSE-") for file in files)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_fmpy_simulates_a_unit_as_it_is(fmu, name):
+    """Dropped into a tool and started: the scenario of the paper, with whatever the tool passes by default."""
+    result = simulate_fmu(str(archive(name)), output=fmu(name).names("output"), stop_time=10.0, output_interval=0.04)
+    assert len(result) == 251
+    values = np.array(result.tolist())
+    assert np.isfinite(values).all()
+    assert (np.ptp(values, axis=0) > 0.0).sum() > 6
 
 
 def test_controllers_can_be_exchanged_without_rewiring(fmu):

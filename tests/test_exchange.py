@@ -1,8 +1,11 @@
 """ReentryPlant as model exchange under FMPy's CVode against its own co-simulation."""
 
+from ctypes import c_double
+
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
+from fmpy.fmi2 import FMU2Model
 
 from fmi import ANGLES, MOMENT, RATES, Unit
 
@@ -67,3 +70,38 @@ def test_oracle_cvode_agrees_with_co_simulation(fmu, settings):
     assert np.ptp(expected[:, :3], axis=0).min() > 0.02
     found = exchanged(plant, settings, "CVode", relative_tolerance=1e-10)
     assert np.abs(found - expected).max() < 1e-6
+
+
+def test_oracle_directional_derivatives_are_central_differences(fmu):
+    plant = fmu("ReentryPlant")
+    derivatives = [v for v in plant.variables.values() if v.derivative is not None]
+    states = [v.derivative for v in derivatives]
+    assert [v.name for v in states] == ANGLES + RATES
+    inputs = [plant.variables[name] for name in MOMENT + [f"disturbanceMoment.{axis}" for axis in "xyz"]]
+    model = FMU2Model(instanceName="model", **plant.arguments("modelExchange"))
+    model.instantiate()
+    model.setupExperiment()
+    model.enterInitializationMode()
+    model.exitInitializationMode()
+    while model.newDiscreteStates()[0]:
+        pass
+    model.enterContinuousTimeMode()
+    point = np.array([0.3, -0.4, 0.5, 0.05, -0.08, 0.11])
+    load = np.array([2e4, -3e4, 5e4, 1e3, 2e3, -3e3])
+    references = [v.valueReference for v in derivatives]
+
+    def right_side(state, moments):
+        model.setContinuousStates((c_double * 6)(*state), 6)
+        model.setReal([v.valueReference for v in inputs], moments)
+        return np.array(model.getReal(references))
+
+    steps = [(1e-5, np.eye(6)[i], np.zeros(6), states[i]) for i in range(6)]
+    steps += [(10.0, np.zeros(6), np.eye(6)[i], inputs[i]) for i in range(6)]
+    for h, by_state, by_input, known in steps:
+        ahead = right_side(point + h * by_state, load + h * by_input)
+        behind = right_side(point - h * by_state, load - h * by_input)
+        right_side(point, load)
+        found = model.getDirectionalDerivative(references, [known.valueReference], [1.0])
+        expected = (ahead - behind) / (2.0 * h)
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-7 * max(1e-6, np.abs(expected).max()))
+    model.freeInstance()
