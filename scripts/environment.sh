@@ -58,8 +58,7 @@ library() {
 build_fmus() {
     need_rust
     say "Building in release"
-    cargo build --release --locked \
-        --package orchestrator --package model-description --package fmu-plant --package fmu-controller
+    cargo build --release --locked --workspace
     say "Packing the FMUs"
     local plant controller licence licences=()
     plant="$(library fmu_plant)"

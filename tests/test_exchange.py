@@ -37,7 +37,7 @@ def co_simulated(fmu, settings) -> np.ndarray:
     return np.array(rows)
 
 
-def exchanged(fmu, settings, solver, **options) -> np.ndarray:
+def exchanged(fmu, settings) -> np.ndarray:
     # A jump at each tick: a row for the old value and one for the new, which FMPy takes for an event.
     rows = []
     for tick in range(round(STOP / STEP) + 1):
@@ -51,14 +51,14 @@ def exchanged(fmu, settings, solver, **options) -> np.ndarray:
     result = simulate_fmu(
         str(fmu.path),
         fmi_type="ModelExchange",
-        solver=solver,
+        solver="CVode",
+        relative_tolerance=1e-10,
         start_values=values,
         input=signal,
         stop_time=STOP,
         output_interval=STEP,
         output=ANGLES + RATES,
         record_events=False,
-        **options,
     )
     np.testing.assert_allclose(result["time"], STEP * np.arange(len(result)), atol=1e-9)
     return np.array([result[name] for name in ANGLES + RATES]).T
@@ -68,8 +68,9 @@ def test_oracle_cvode_agrees_with_co_simulation(fmu, settings):
     plant = fmu("ReentryPlant")
     expected = co_simulated(plant, settings)
     assert np.ptp(expected[:, :3], axis=0).min() > 0.02
-    found = exchanged(plant, settings, "CVode", relative_tolerance=1e-10)
-    assert np.abs(found - expected).max() < 1e-6
+    found = exchanged(plant, settings)
+    # rad and rad/s, over a swing of about one.
+    assert np.abs(found - expected).max() < 3e-7
 
 
 def test_oracle_directional_derivatives_are_central_differences(fmu):

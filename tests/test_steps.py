@@ -10,12 +10,12 @@ CONTROLLERS = ["CRMPC", "LQR"]
 HOLD = 0.2
 HOLDS = 30
 FEEDBACK = 0.04
-# How each hold is divided; the last one differs from hold to hold.
+# How the k-th hold is divided.
 DIVISIONS = {
     "20 ms": lambda _: [0.02] * 10,
     "40 ms": lambda _: [0.04] * 5,
     "irregular": lambda k: [0.013, 0.007 + 0.001 * (k % 20), 0.1, 0.08 - 0.001 * (k % 20)],
-    "10 ms and the rest": lambda _: [0.01, 0.19],
+    "10 ms, then the rest": lambda _: [0.01, 0.19],
 }
 
 
