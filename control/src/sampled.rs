@@ -4,7 +4,7 @@
 //! with K o computed every `period` and held. The bounds here are exact: sums of absolute impulse responses (L1 norms)
 //! under zero-order hold, not the peak of the step response that the paper's c̄ is (that one holds for a constant Δ only).
 
-use nalgebra::{Matrix2, RowVector2, SMatrix, Vector2};
+use nalgebra::{Matrix2, RowVector2, Vector2};
 use serde::{Deserialize, Serialize};
 
 /// Feedback gain of one axis with the paper's signs: u = k1 · angle + k2 · rate, both negative (1/s², 1/s).
@@ -64,6 +64,40 @@ pub struct SampledError {
     gamma: Vector2<f64>,
 }
 
+/// Impulse responses that an invariant set holds one by one; the rest of them is bounded along the eigenvectors.
+const EXPLICIT: usize = 30;
+
+/// A zonotope {Σ c_i g_i : |c_i| ≤ 1}: the impulse responses Φⁱ Γ for i < n, and the sum of all later ones bounded along the two
+/// eigenvectors. One step of the error dynamics leads from it into itself, exactly: the first of the later responses
+/// moves into the place that the step makes free.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InvariantSet {
+    generators: Vec<Vector2<f64>>,
+    gain: Gain,
+}
+
+impl InvariantSet {
+    /// max nᵀo over the set.
+    pub fn support(&self, normal: &Vector2<f64>) -> f64 {
+        self.generators.iter().map(|g| normal.dot(g).abs()).sum()
+    }
+
+    /// The set as {o : |nᵀo| ≤ 1 for each n}.
+    pub fn normals(&self) -> Vec<Vector2<f64>> {
+        let across = self.generators.iter().map(|g| Vector2::new(-g.y, g.x));
+        across.map(|normal| normal / self.support(&normal)).collect()
+    }
+
+    /// Its largest angle, rate and feedback.
+    pub fn reach(&self) -> Reach {
+        Reach {
+            angle: self.support(&Vector2::x()),
+            rate: self.support(&Vector2::y()),
+            feedback: self.support(&self.gain.row().transpose()),
+        }
+    }
+}
+
 impl SampledError {
     /// Error dynamics under `gain` sampled every `period` s.
     pub fn new(gain: Gain, period: f64) -> Self {
@@ -105,40 +139,29 @@ impl SampledError {
         self.reach(steps).pop()
     }
 
-    /// Shape X of an ellipse {o : oᵀ X⁻¹ o ≤ 1} that |Δ| ≤ `bound` can never drive the deviation out of:
-    /// X = Φ X Φᵀ/(1−s) + Γ Γᵀ bound²/s, with the s that makes the product of its angle and rate extents smallest.
-    /// `None` if the dynamics are not stable or the bound is not positive.
-    pub fn invariant_ellipse(&self, bound: f64) -> Option<Matrix2<f64>> {
-        let radius = self.spectral_radius();
-        if radius >= 1.0 - 1e-9 || bound <= 0.0 {
+    /// A set that |Δ| ≤ 1, held over each period, can never drive the deviation out of. `None` if the dynamics are not
+    /// stable with real, distinct eigenvalues.
+    pub fn invariant_set(&self) -> Option<InvariantSet> {
+        let (trace, det) = (self.phi.trace(), self.phi.determinant());
+        let discriminant = 0.25 * trace * trace - det;
+        if discriminant <= 0.0 || self.spectral_radius() >= 1.0 - 1e-9 {
             return None;
         }
-        let shape = |s: f64| self.ellipse(s, bound);
-        let largest = 1.0 - radius * radius;
-        let candidates = (1..200).filter_map(|i| shape(largest * f64::from(i) / 200.0));
-        candidates.min_by(|a, b| (a.m11 * a.m22).total_cmp(&(b.m11 * b.m22)))
-    }
+        let eigenvalues = [0.5 * trace + discriminant.sqrt(), 0.5 * trace - discriminant.sqrt()];
+        let vectors = eigenvalues.map(|lambda| Vector2::new(self.phi.m12, lambda - self.phi.m11));
+        let basis = Matrix2::from_columns(&vectors).try_inverse()?;
 
-    fn ellipse(&self, s: f64, bound: f64) -> Option<Matrix2<f64>> {
-        // The three unknowns of the symmetric X from X − Φ X Φᵀ/(1−s) = Γ Γᵀ bound²/s.
-        let phi = self.phi / (1.0 - s).sqrt();
-        let (a, b, c, d) = (phi.m11, phi.m12, phi.m21, phi.m22);
-        let system = SMatrix::<f64, 3, 3>::identity()
-            - SMatrix::<f64, 3, 3>::new(
-                a * a,
-                2.0 * a * b,
-                b * b,
-                a * c,
-                a * d + b * c,
-                b * d,
-                c * c,
-                2.0 * c * d,
-                d * d,
-            );
-        let w = self.gamma * self.gamma.transpose() * (bound * bound / s);
-        let x = system.lu().solve(&nalgebra::Vector3::new(w.m11, w.m12, w.m22))?;
-        let x = Matrix2::new(x.x, x.y, x.y, x.z);
-        (x.m11 > 0.0 && x.determinant() > 0.0).then_some(x)
+        let mut generators = Vec::with_capacity(EXPLICIT + 2);
+        let mut impulse = self.gamma;
+        for _ in 0..EXPLICIT {
+            generators.push(impulse);
+            impulse = self.phi * impulse;
+        }
+        let rest = basis * impulse;
+        for i in 0..2 {
+            generators.push(vectors[i] * (rest[i].abs() / (1.0 - eigenvalues[i].abs())));
+        }
+        Some(InvariantSet { generators, gain: self.gain })
     }
 
     /// Sampling period, s.
@@ -149,5 +172,41 @@ impl SampledError {
     /// One period: o⁺ = Φ o + Γ Δ.
     pub fn advance(&self, deviation: &Vector2<f64>, disturbance: f64) -> Vector2<f64> {
         self.phi * deviation + self.gamma * disturbance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oracle_no_step_leads_out_of_the_invariant_set() {
+        // Support functions: h(Φᵀn) + |nᵀΓ| ≤ h(n) for every facet of the set.
+        for (k, period) in [(-5.0, 0.04), (-5.0, 0.2), (-10.0, 0.04), (-4.5, 0.1)] {
+            let error = SampledError::new(Gain { k1: k, k2: k }, period);
+            let set = error.invariant_set().unwrap();
+            let normals = set.normals();
+            assert!(normals.len() > EXPLICIT);
+            for normal in normals {
+                assert!((set.support(&normal) - 1.0).abs() < 1e-12);
+                let after = set.support(&(error.phi.transpose() * normal)) + normal.dot(&error.gamma).abs();
+                assert!(after <= 1.0 + 1e-12, "K = {k} at {period} s: {after}");
+            }
+            let (set, reach) = (set.reach(), error.reach_forever().unwrap());
+            for (outer, exact) in
+                [(set.angle, reach.angle), (set.rate, reach.rate), (set.feedback, reach.feedback)]
+            {
+                assert!(outer >= exact * (1.0 - 1e-12) && outer < 1.25 * exact, "{outer} {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_papers_box_is_not_invariant() {
+        // From the corner (1/|k1|, 0) of (26), where the rate may still be c̄: the angle leaves the box within one tick.
+        let error = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04);
+        let (angle, rate) = (0.2, 0.1525);
+        let next = error.advance(&Vector2::new(angle, rate), 1.0);
+        assert!(next.x > angle);
     }
 }

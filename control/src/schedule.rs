@@ -36,7 +36,7 @@ impl<Memory: Clone + Default> Sampled<Memory> {
 
     /// Time of the first uncommitted tick, s.
     pub fn next_time(&self, period: f64) -> f64 {
-        tick_time(self.next as i64, self.start, period)
+        tick_time(self.next.cast_signed(), self.start, period)
     }
 
     /// Whether a tick is due at `time` (s).

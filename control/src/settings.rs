@@ -77,7 +77,6 @@ pub struct Published {
     pub epsilon2: f64,
 }
 
-#[allow(clippy::panic)]
 fn embedded() -> File {
     // Cannot fail: every test that uses the published settings reads it.
     toml::from_str(include_str!("../data/crmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
@@ -85,7 +84,7 @@ fn embedded() -> File {
 
 impl Settings {
     /// Chai 2022, section 5.1, with its vehicle at the nominal inertia.
-    #[allow(clippy::panic)]
+    #[allow(clippy::missing_panics_doc)]
     pub fn published() -> Self {
         let scenario = Scenario::crmpc2022();
         // Cannot fail: the scenario's own tests read its inertia.

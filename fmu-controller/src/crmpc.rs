@@ -57,7 +57,11 @@ const INITIAL_STATES: [(InitialState, &str, &str); 2] = [
 ];
 const STATUSES: [(Status, &str, &str); 4] = [
     (Status::None, "none", "no optimisation yet"),
-    (Status::Unconstrained, "unconstrained", "the unconstrained optimum, checked to satisfy every constraint"),
+    (
+        Status::Unconstrained,
+        "unconstrained",
+        "the unconstrained optimum, checked to satisfy every constraint",
+    ),
     (Status::Constrained, "constrained", "the optimum of the cone programme"),
     (Status::Fallback, "fallback", "the previous plan, shifted, with the terminal law"),
 ];
@@ -176,7 +180,11 @@ fn schedule(table: Controller) -> Controller {
     table
         .enumeration(
             constraints,
-            enumeration("Constraints", "Sets that the optimisation keeps the nominal motion in", &CONSTRAINTS),
+            enumeration(
+                "Constraints",
+                "Sets that the optimisation keeps the nominal motion in",
+                &CONSTRAINTS,
+            ),
             |m| &mut m.law.constraints,
         )
         .enumeration(
@@ -202,7 +210,8 @@ fn gains(table: Controller) -> Controller {
         ("tube", "paper's tube constant in (21)", |law| &mut law.tube),
     ];
     for (name, of, gain) in sets {
-        let k1 = parameter(&format!("{name}.k1"), &format!("Gain on the angles of the {of}, negative")).real();
+        let k1 =
+            parameter(&format!("{name}.k1"), &format!("Gain on the angles of the {of}, negative")).real();
         let k2 = parameter(&format!("{name}.k2"), &format!("Gain on the rates of the {of}, negative")).real();
         table = table
             .real(k1.unit(unit::gain_angle()).max(0.0).nominal(5.0), move |m| &mut gain(&mut m.law).k1)
@@ -218,7 +227,8 @@ fn bounds(table: Controller) -> Controller {
     );
     let inertia = parameter("inertia.error", "Relative inertia error that the robust set is tightened for");
     let sideslip = parameter("bound.sideslip", "Sideslip angle up to which the bounds of the design hold");
-    let rate = parameter("bound.referenceRate", "Bound on the reference's rate in the paper's terminal set (13)");
+    let rate =
+        parameter("bound.referenceRate", "Bound on the reference's rate in the paper's terminal set (13)");
     let acceleration = parameter(
         "bound.referenceAcceleration",
         "Bound on the reference's acceleration in the paper's terminal set (13)",

@@ -3,8 +3,8 @@
 use crate::law::{Law, Vehicle};
 use crate::table;
 use crate::unit::Unit;
-use control::lqr::{Lqr, LqrSettings};
 use control::crmpc::Settings;
+use control::lqr::{Lqr, LqrSettings};
 use fmi2_export::table::parameter;
 use fmi2_export::{Failure, Table};
 use model_description::unit;
@@ -35,7 +35,8 @@ impl Law for LqrLaw {
 
     fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
         let period = parameter("period.feedback", "Time between two evaluations of the law").real();
-        let table = table.real(period.unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| &mut m.law.period);
+        let table =
+            table.real(period.unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| &mut m.law.period);
         table::weights(table, |law| &mut law.p, |law| &mut law.q)
     }
 

@@ -81,7 +81,8 @@ impl Source {
 /// A file name as it stands, or inside the unit's resources.
 fn table(file: &str, context: &Context) -> Result<Table, Failure> {
     if file.is_empty() {
-        let text = "reference.profile is 'table' but reference.file is empty; set it to the path of a CSV file";
+        let text =
+            "reference.profile is 'table' but reference.file is empty; set it to the path of a CSV file";
         return Err(Failure::Error(text.into()));
     }
     let path = Path::new(file);

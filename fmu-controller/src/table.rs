@@ -79,7 +79,9 @@ fn inputs<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
         input(&format!("rate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
     };
     let achieved = |axis: &str, meaning: &str| {
-        let text = format!("{meaning} moment that the actuators really give; for laws with an observer, others ignore it");
+        let text = format!(
+            "{meaning} moment that the actuators really give; for laws with an observer, others ignore it"
+        );
         input(&format!("achievedMoment.{axis}"), &capital(&text)).real().unit(unit::moment()).nominal(1e5)
     };
     let table = vector(table, ANGLES, angle, |m| &mut m.input.measured.angles);
@@ -148,7 +150,8 @@ fn reference<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
         let text = format!("Amplitude of the {meaning} if reference.profile is 'sine'");
         parameter(&format!("reference.amplitude.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
     };
-    let frequency = parameter("reference.frequency", "Angular frequency if reference.profile is 'sine'").real();
+    let frequency =
+        parameter("reference.frequency", "Angular frequency if reference.profile is 'sine'").real();
     let phase = parameter("reference.phase", "Phase at t = 0 if reference.profile is 'sine'").real();
     let table = table
         .enumeration(profile, of, |m| &mut m.parameters.reference.profile)
@@ -179,9 +182,10 @@ fn vehicle<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
         .real(moment_of_inertia("inertia.Izz", "Yaw moment of inertia").min(1.0), |m| {
             &mut m.parameters.inertia.Izz
         })
-        .real(moment_of_inertia("inertia.Ixz", "Product of inertia, which stands in the tensor as -Ixz,"), |m| {
-            &mut m.parameters.inertia.Ixz
-        })
+        .real(
+            moment_of_inertia("inertia.Ixz", "Product of inertia, which stands in the tensor as -Ixz,"),
+            |m| &mut m.parameters.inertia.Ixz,
+        )
         .real(rate.unit(unit::angular_rate()).min(1e-6).nominal(0.1), |m| &mut m.parameters.limit_rate)
         .real(moment.unit(unit::moment()).min(1e-3).nominal(1e5), |m| &mut m.parameters.limit_moment)
         .boolean(saturation, |m| &mut m.parameters.saturation)
@@ -201,7 +205,10 @@ pub(crate) fn weights<L: Law>(
         table = table.real(real, move |m| &mut p(&mut m.law)[i]);
     }
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
-        let text = format!("Diagonal entry {} of Q: weight on the second derivative of the {meaning}'s error", i + 1);
+        let text = format!(
+            "Diagonal entry {} of Q: weight on the second derivative of the {meaning}'s error",
+            i + 1
+        );
         let real = parameter(&format!("weight.Q[{}]", i + 1), &text).real().min(0.0).nominal(10.0);
         table = table.real(real, move |m| &mut q(&mut m.law)[i]);
     }

@@ -5,7 +5,7 @@
 //! updated in place: only numbers change from sample to sample, never the sparsity.
 
 use clarabel::algebra::CscMatrix;
-use clarabel::solver::SupportedConeT::{self, SecondOrderConeT, ZeroConeT};
+use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT, ZeroConeT};
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3, Vector6};
 
@@ -37,12 +37,12 @@ impl Default for Ball {
 }
 
 /// How the programme's first stage is tied down.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Start {
     /// E_0 is given.
     Fixed,
-    /// The given E_0 may differ from the programme's by a deviation o with oᵀX⁻¹o ≤ 1 in each axis.
-    Within(Matrix2<f64>),
+    /// The given E_0 may differ from the programme's by a deviation o with |nᵀo| ≤ 1 for each of an axis's normals n.
+    Within([Vec<Vector2<f64>>; 3]),
     /// Free, at the cost of arriving there from the true start.
     Arrival,
 }
@@ -110,8 +110,6 @@ pub(super) struct ConeProblem {
     input_slots: Vec<Slots>,
     initial_row: usize,
     terminal_row: Option<usize>,
-    /// X^{-1/2} of the initial set.
-    initial_root: Option<Matrix2<f64>>,
 }
 
 struct Slots {
@@ -184,8 +182,7 @@ impl ConeProblem {
         }
         cones.push(ZeroConeT(row));
         let initial_row = row;
-        let mut initial_root = None;
-        match structure.start {
+        match &structure.start {
             Start::Fixed => {
                 for i in 0..6 {
                     a.push(row, i, 1.0);
@@ -193,17 +190,16 @@ impl ConeProblem {
                 }
                 cones.push(ZeroConeT(6));
             }
-            Start::Within(shape) => {
-                // ‖X^{-1/2} (E − E_given)‖ ≤ 1 per axis.
-                let root = *initial_root.insert(inverse_square_root(&shape));
-                for i in 0..3 {
-                    for j in 0..2 {
-                        a.push(row + 1 + j, angle(0, i), -root[(j, 0)] * sa);
-                        a.push(row + 1 + j, rate(0, i), -root[(j, 1)] * sw);
+            Start::Within(normals) => {
+                // ±nᵀ(E_given − E_0) ≤ 1
+                for (i, normals) in normals.iter().enumerate() {
+                    for (normal, sign) in normals.iter().flat_map(|normal| [(normal, 1.0), (normal, -1.0)]) {
+                        a.push(row, angle(0, i), -sign * normal.x * sa);
+                        a.push(row, rate(0, i), -sign * normal.y * sw);
+                        row += 1;
                     }
-                    row += 3;
-                    cones.push(SecondOrderConeT(3));
                 }
+                cones.push(NonnegativeConeT(row - initial_row));
             }
             Start::Arrival => {}
         }
@@ -246,17 +242,7 @@ impl ConeProblem {
         for slots in state_slots.iter().chain(&input_slots) {
             right_side[slots.row] = 1.0;
         }
-        let settings = DefaultSettings {
-            verbose: false,
-            max_iter: structure.max_iterations,
-            presolve_enable: false,
-            equilibrate_enable: false,
-            input_sparse_dropzeros: false,
-            iterative_refinement_enable: true,
-            direct_solve_method: "qdldl".into(),
-            max_threads: 1,
-            ..DefaultSettings::default()
-        };
+        let settings = solver_settings(structure.max_iterations);
         let solver = DefaultSolver::new(&cost, &linear_cost, &matrix, &right_side, &cones, settings)
             .map_err(|error| error.to_string())?;
         Ok(Self {
@@ -272,7 +258,6 @@ impl ConeProblem {
             input_slots,
             initial_row,
             terminal_row,
-            initial_root,
         })
     }
 
@@ -298,7 +283,7 @@ impl ConeProblem {
     }
 
     fn update(&mut self, sample: &Sample) {
-        let Structure { stages: n, start, step: h, q, angle_scale: sa, rate_scale: sw, .. } = self.structure;
+        let Structure { stages: n, step: h, q, angle_scale: sa, rate_scale: sw, .. } = self.structure;
         self.linear_cost.fill(0.0);
         for (k, d) in sample.affine.iter().enumerate() {
             for i in 0..3 {
@@ -312,20 +297,21 @@ impl ConeProblem {
         self.cost.copy_from_slice(&self.inner_cost);
         self.add_cost(1, sample.to_go);
         let given = &sample.start;
-        match start {
+        match &self.structure.start {
             Start::Fixed => {
                 for i in 0..6 {
                     self.right_side[self.initial_row + i] = given[i] / if i < 3 { sa } else { sw };
                 }
             }
-            Start::Within(_) => {
-                let root = self.initial_root.unwrap_or_else(Matrix2::identity);
-                for i in 0..3 {
-                    let centre = root * Vector2::new(given[i], given[3 + i]);
-                    let row = self.initial_row + 3 * i;
-                    self.right_side[row] = 1.0;
-                    self.right_side[row + 1] = -centre.x;
-                    self.right_side[row + 2] = -centre.y;
+            Start::Within(normals) => {
+                let mut row = self.initial_row;
+                for (i, normals) in normals.iter().enumerate() {
+                    let given = Vector2::new(given[i], given[3 + i]);
+                    for normal in normals {
+                        self.right_side[row] = 1.0 - normal.dot(&given);
+                        self.right_side[row + 1] = 1.0 + normal.dot(&given);
+                        row += 2;
+                    }
                 }
             }
             Start::Arrival => self.add_cost(0, sample.arrival),
@@ -399,6 +385,21 @@ fn write_ball(
     right_side[slots.row] = 1.0;
 }
 
+/// Data are updated in place, which forbids presolve, and scaled by hand.
+fn solver_settings(max_iter: u32) -> DefaultSettings<f64> {
+    DefaultSettings {
+        verbose: false,
+        max_iter,
+        presolve_enable: false,
+        equilibrate_enable: false,
+        input_sparse_dropzeros: false,
+        iterative_refinement_enable: true,
+        direct_solve_method: "qdldl".into(),
+        max_threads: 1,
+        ..DefaultSettings::default()
+    }
+}
+
 /// ½ xᵀ P x with the cost Σ h EᵀPE + (Q/h)(ΔE_ω)² over the intervals, upper triangle, scaled; and where the costs of
 /// the first and the last stage are to be added.
 fn cost_matrix(structure: &Structure) -> (CscMatrix<f64>, [[[usize; 3]; 3]; 2]) {
@@ -427,9 +428,4 @@ fn cost_matrix(structure: &Structure) -> (CscMatrix<f64>, [[[usize; 3]; 3]; 2]) 
         *slot = position[*slot];
     }
     (matrix, ends)
-}
-
-/// L⁻¹ with X = L Lᵀ, so that ‖L⁻¹ o‖² = oᵀX⁻¹o.
-fn inverse_square_root(x: &Matrix2<f64>) -> Matrix2<f64> {
-    x.cholesky().and_then(|factor| factor.l().try_inverse()).unwrap_or_else(Matrix2::identity)
 }

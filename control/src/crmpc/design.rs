@@ -1,10 +1,11 @@
 //! Offline design of CRMPC: every constant of Chai 2022 from the raw data, and the tightening of the `robust` set.
 
 use crate::error::DesignError;
-use crate::sampled::{Gain, Reach, SampledError};
-use nalgebra::{Matrix2, Vector2};
+use crate::sampled::{Gain, InvariantSet, Reach, SampledError};
+use nalgebra::{Matrix2, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
+use vehicle::kinematics;
 
 /// Which sets the optimisation keeps the nominal motion in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -130,9 +131,9 @@ pub struct Tightening {
     pub at_stage: Vec<Reach>,
     /// Largest reach of K·o at the feedback ticks within prediction interval k = 0..N.
     pub within_stage: Vec<Reach>,
-    /// Δ̄ per component, rad/s².
-    pub disturbance: f64,
-    /// Relative moment error that an inertia error is equivalent to.
+    /// Bound on the disturbance of each axis, rad/s².
+    pub disturbance: Vector3<f64>,
+    /// Relative moment error that an inertia error is equivalent to, where `disturbance` does not hold it.
     pub inertia: f64,
     /// Bound on the norm of the whole disturbance, inertia error included, rad/s².
     pub norm: f64,
@@ -147,8 +148,8 @@ pub struct Design {
     pub paper: Option<PaperConstants>,
     /// Exact sampled bounds of the error dynamics for all times, per unit Δ̄.
     pub reach: Reach,
-    /// Invariant ellipse per unit-free axis (same for all axes): measured − nominal stays in {o : oᵀX⁻¹o ≤ 1}.
-    pub invariant: Matrix2<f64>,
+    /// Invariant set of the deviation of one axis per unit of its disturbance bound; `None` if the eigenvalues are complex.
+    pub invariant: Option<InvariantSet>,
     /// Stage-wise tightening of the robust set.
     pub tightening: Tightening,
     /// Feedback ticks per optimisation.
@@ -185,26 +186,12 @@ impl Design {
         let eigenvalues = s.body.inertia.symmetric_eigenvalues();
         let (smallest_inertia, largest_inertia) = (eigenvalues.min(), eigenvalues.max());
 
-        let inertia = s.inertia_error / (1.0 - s.inertia_error);
-        // ‖R‖ = sec β, Chai 2022, Lemma 1.
-        let input_of_moment = 1.0 / (s.sideslip_bound.cos() * smallest_inertia);
-        let inertia_disturbance = inertia * s.limit_moment * input_of_moment;
-        let per_axis = s.disturbance_bound + inertia_disturbance;
-        let invariant = error.invariant_ellipse(per_axis.max(1e-9)).unwrap_or_else(Matrix2::identity);
-        let tightening = Tightening {
-            at_stage: match s.initial_state {
-                InitialState::Measured => error.reach(ratio * s.horizon).into_iter().step_by(ratio).collect(),
-                InitialState::Tube => vec![extents(&invariant, s.feedback, per_axis); s.horizon + 1],
-            },
-            within_stage: match s.initial_state {
-                InitialState::Measured => {
-                    error.reach(ratio * s.horizon).into_iter().skip(ratio - 1).step_by(ratio).collect()
-                }
-                InitialState::Tube => vec![extents(&invariant, s.feedback, per_axis); s.horizon],
-            },
-            disturbance: s.disturbance_bound,
-            inertia,
-            norm: 3.0_f64.sqrt() * s.disturbance_bound + inertia_disturbance,
+        let invariant = error.invariant_set();
+        let tightening = match s.initial_state {
+            InitialState::Measured => growing(s, &error, ratio, smallest_inertia),
+            InitialState::Tube => {
+                constant(s, invariant.as_ref().ok_or(DesignError::NotReal { name: "feedback" })?)
+            }
         };
 
         Ok(Self {
@@ -220,11 +207,53 @@ impl Design {
     }
 }
 
-/// Extents of the invariant ellipse per unit of the disturbance bound it was made for.
-fn extents(shape: &Matrix2<f64>, gain: Gain, bound: f64) -> Reach {
-    let feedback = (gain.row() * shape * gain.row().transpose()).x.sqrt();
-    let bound = bound.max(1e-9);
-    Reach { angle: shape.m11.sqrt() / bound, rate: shape.m22.sqrt() / bound, feedback: feedback / bound }
+/// Relative moment error that an inertia error e is equivalent to: I⁻¹ becomes I⁻¹/(1 ± e).
+fn moment_error(s: &Settings) -> f64 {
+    s.inertia_error / (1.0 - s.inertia_error)
+}
+
+/// Tightening by what k steps can do from a deviation of zero.
+fn growing(s: &Settings, error: &SampledError, ratio: usize, smallest_inertia: f64) -> Tightening {
+    let reach = error.reach(ratio * s.horizon);
+    let inertia = moment_error(s);
+    // ‖R‖ = sec β, Chai 2022, Lemma 1.
+    let input_of_moment = 1.0 / (s.sideslip_bound.cos() * smallest_inertia);
+    Tightening {
+        at_stage: reach.iter().step_by(ratio).copied().collect(),
+        within_stage: reach.iter().skip(ratio - 1).step_by(ratio).copied().collect(),
+        disturbance: Vector3::repeat(s.disturbance_bound),
+        inertia,
+        norm: 3.0_f64.sqrt() * s.disturbance_bound + inertia * s.limit_moment * input_of_moment,
+    }
+}
+
+/// Tightening by the whole invariant set, whose size counts the inertia error as a disturbance of each axis.
+fn constant(s: &Settings, invariant: &InvariantSet) -> Tightening {
+    let reach = invariant.reach();
+    let disturbance = axis_disturbances(s);
+    Tightening {
+        at_stage: vec![reach; s.horizon + 1],
+        within_stage: vec![reach; s.horizon],
+        disturbance,
+        inertia: 0.0,
+        norm: disturbance.norm(),
+    }
+}
+
+/// Angle of attack up to which the inertia error's share in each axis is counted.
+const ATTACK_BOUND: f64 = std::f64::consts::FRAC_PI_4;
+
+/// Δ̄ and the inertia error's part, per axis: the error of m times the largest row of R I⁻¹.
+fn axis_disturbances(s: &Settings) -> Vector3<f64> {
+    let mut largest = Vector3::<f64>::zeros();
+    for i in -20..=20 {
+        for beta in [-s.sideslip_bound, 0.0, s.sideslip_bound] {
+            let angles = Vector3::new(ATTACK_BOUND * f64::from(i) / 20.0, beta, 0.0);
+            let rows = kinematics::r(&angles) * s.body.inverse;
+            largest = largest.sup(&Vector3::from_fn(|i, _| rows.row(i).norm()));
+        }
+    }
+    largest * (moment_error(s) * s.limit_moment) + Vector3::repeat(s.disturbance_bound)
 }
 
 fn ratio(s: &Settings) -> Result<usize, DesignError> {

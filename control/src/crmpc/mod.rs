@@ -17,7 +17,7 @@ use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
 use crate::linearise::{self, Linear, Linearisation};
 use crate::lq::TrackingLq;
-use crate::sampled::{Reach, response, transition};
+use crate::sampled::{InvariantSet, Reach, response, transition};
 use clarabel::solver::SolverStatus;
 use cone::{AxisCosts, Ball, ConeProblem, Sample, Start, Structure};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3, Vector6};
@@ -142,6 +142,8 @@ const CHECK_SLACK: f64 = 1e-9;
 const ANGLE_SCALE: f64 = 0.1;
 /// Smallest share of a limit that a tightened bound keeps, so that the problem stays well posed.
 const SMALLEST_SHARE: f64 = 0.02;
+/// Disturbance bound (rad/s²) that the invariant set has at least, so that it keeps an inside.
+const SMALLEST_DISTURBANCE: f64 = 1e-6;
 /// Smallest terminal radius in the G-norm: 0.03° of angle.
 const SMALLEST_RADIUS: f64 = 5e-3;
 
@@ -173,7 +175,14 @@ impl Crmpc {
             .map_err(DesignError::Solver)
         };
         let (whole, windows) = match settings.initial_state {
-            InitialState::Tube => (problem(n, Start::Within(design.invariant), Some(terminal_root))?, None),
+            InitialState::Tube => {
+                let normals = design.invariant.as_ref().map(InvariantSet::normals).unwrap_or_default();
+                let disturbance = design.tightening.disturbance;
+                let start = std::array::from_fn(|i| {
+                    normals.iter().map(|n| n / disturbance[i].max(SMALLEST_DISTURBANCE)).collect()
+                });
+                (problem(n, Start::Within(start), Some(terminal_root))?, None)
+            }
             InitialState::Measured => {
                 let windows = Windows {
                     head: problem(HEAD, Start::Fixed, None)?,
@@ -574,7 +583,7 @@ impl Crmpc {
         // I R⁻¹ K o for disturbances in a box, and for the inertia error, which acts along m.
         let by_acceleration = &here.moment.by_acceleration;
         let feedback = feedback
-            * (tightening.disturbance * largest_over_box(by_acceleration) + tightening.inertia * limit);
+            * (largest_over_box(by_acceleration, &tightening.disturbance) + tightening.inertia * limit);
         // The cancellation of f sees the deviation too.
         let drift =
             (here.moment.by_angles.norm() * angle + here.moment.by_rates.norm() * rate) * tightening.norm;
@@ -631,7 +640,10 @@ impl Controller for Crmpc {
         let (nominal_angles, nominal_rates) = split(&memory.nominal);
         let gain = self.settings.feedback;
         let feedback = (measured.angles - nominal_angles) * gain.k1 + (angle_rates - nominal_rates) * gain.k2;
-        linearise::moment(&self.settings.body, &measured.angles, &angle_rates, &(a + feedback))
+        let moment = linearise::moment(&self.settings.body, &measured.angles, &angle_rates, &(a + feedback));
+        // Without a solution nothing keeps the moment within its limit.
+        let excess = moment.norm() / self.settings.limit_moment;
+        if memory.report.status == Status::Fallback && excess > 1.0 { moment / excess } else { moment }
     }
 }
 
@@ -679,10 +691,10 @@ fn ball(y: &Linear, at: &Vector6<f64>, a: &Vector3<f64>, reference: &Reference, 
     Ball { offset, by_angles: y.by_angles, by_rates: y.by_rates, by_acceleration: y.by_acceleration, bound }
 }
 
-/// max ‖M s‖ over s ∈ {±1}³.
-fn largest_over_box(m: &Matrix3<f64>) -> f64 {
+/// max ‖M s‖ over |s_i| ≤ b_i.
+fn largest_over_box(m: &Matrix3<f64>, b: &Vector3<f64>) -> f64 {
     [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
-        .map(|(y, z)| (m * Vector3::new(1.0, y, z)).norm())
+        .map(|(y, z)| (m * Vector3::new(b.x, y * b.y, z * b.z)).norm())
         .into_iter()
         .fold(0.0, f64::max)
 }
