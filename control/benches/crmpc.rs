@@ -85,16 +85,17 @@ fn optimisations(criterion: &mut Criterion) {
 
         let ratio = controller.design().ratio as u64;
         let mut group = criterion.benchmark_group(name);
+        let period = controller.period();
         let after = |time: f64, status: Status| {
-            let first = (time / controller.period()).round() as u64;
+            let first = (time / period).round() as u64;
             let mut optimised = ticks.iter().filter(|tick| tick.number >= first && tick.number % ratio == 0);
             optimised.find(|tick| tick.status == status)
         };
         let situations = [
             ("first optimisation", Some(&ticks[0])),
             ("start of the manoeuvre", after(0.2, Status::Constrained)),
-            ("jump of the reference ahead", after(8.0, Status::Constrained)),
-            ("jump of the reference near", after(24.0, Status::Constrained)),
+            ("jump at the end of the horizon", after(5.0, Status::Constrained)),
+            ("jump within the horizon", after(12.0, Status::Constrained)),
             ("unconstrained optimum", after(40.0, Status::Unconstrained)),
             ("feedback between optimisations", Some(&ticks[1])),
         ];
