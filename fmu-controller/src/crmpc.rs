@@ -165,6 +165,14 @@ impl Law for CrmpcLaw {
     }
 }
 
+#[cfg(test)]
+impl CrmpcLaw {
+    pub(crate) fn set_feedback(&mut self, k1: f64, k2: f64, period: f64) {
+        self.feedback = Gain { k1, k2 };
+        self.period_feedback = period;
+    }
+}
+
 type Controller = Table<Unit<CrmpcLaw>>;
 
 fn schedule(table: Controller) -> Controller {

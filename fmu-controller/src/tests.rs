@@ -1,1 +1,153 @@
-//! Tests of the units.
+//! Tests of the units through the trait the FMI shell works with.
+
+use crate::{Crmpc, Lqr};
+use fmi2_export::{Context, Failure, Inputs, Model, describe};
+use model_description::ModelDescription;
+use model_description::variable::Causality;
+use nalgebra::Vector3;
+
+/// Inputs that stay as they are.
+struct Held;
+
+impl<M> Inputs<M> for Held {
+    fn advance(&self, _model: &mut M, _time: f64) {}
+}
+
+fn context() -> Context<'static> {
+    Context { start_time: 0.0, stop_time: None, resources: None }
+}
+
+fn ready<M: Model>(change: impl FnOnce(&mut M)) -> M {
+    let mut unit = M::new();
+    change(&mut unit);
+    unit.initialize(&context()).unwrap();
+    unit
+}
+
+fn step<M: Model>(unit: &mut M, from: f64, to: f64) {
+    unit.step(from, to, &Held, &mut |text| panic!("{text}")).unwrap();
+    unit.calculate(to).unwrap();
+}
+
+fn refusal<M: Model>(change: impl FnOnce(&mut M)) -> String {
+    let mut unit = M::new();
+    change(&mut unit);
+    match unit.initialize(&context()) {
+        Err(Failure::Error(text) | Failure::Discard(text)) => text,
+        Ok(()) => String::new(),
+    }
+}
+
+#[test]
+fn descriptions_are_consistent_and_interchangeable() {
+    let names = |description: &ModelDescription, causality: Causality| -> Vec<String> {
+        let wanted = description.variables.iter().filter(|v| v.causality == causality);
+        wanted.map(|v| v.name.clone()).collect()
+    };
+    let (crmpc, lqr) = (describe::<Crmpc>(), describe::<Lqr>());
+    crmpc.check().unwrap();
+    lqr.check().unwrap();
+    assert_ne!(crmpc.guid(), lqr.guid());
+    assert_eq!(names(&crmpc, Causality::Input), names(&lqr, Causality::Input));
+    let outputs = names(&crmpc, Causality::Output);
+    assert!(names(&lqr, Causality::Output).iter().all(|name| outputs.contains(name)));
+}
+
+#[test]
+fn a_tick_evaluated_with_other_inputs_leaves_no_trace() {
+    let mut once: Crmpc = ready(|_| ());
+    let mut twice: Crmpc = ready(|_| ());
+    let measured = once.input.measured;
+    twice.input.measured.angles *= 1.1;
+    twice.calculate(0.0).unwrap();
+    let other = twice.output.moment;
+    twice.input.measured = measured;
+    for unit in [&mut once, &mut twice] {
+        unit.calculate(0.0).unwrap();
+        step(unit, 0.0, 0.2);
+    }
+    assert_ne!(other, once.output.moment);
+    assert_eq!(once.output.moment, twice.output.moment);
+}
+
+#[test]
+fn any_communication_steps_give_the_same_moments() {
+    let mut reference: Crmpc = ready(|_| ());
+    let expected: Vec<_> = (0..10_u32)
+        .map(|k| {
+            step(&mut reference, f64::from(k) * 0.2, f64::from(k + 1) * 0.2);
+            reference.output.moment
+        })
+        .collect();
+    for parts in [1, 3, 5, 10] {
+        let mut unit: Crmpc = ready(|_| ());
+        for (k, expected) in (0..10_u32).zip(&expected) {
+            let at = |part: u32| (f64::from(k) + f64::from(part) / f64::from(parts)) * 0.2;
+            for part in 0..parts {
+                step(&mut unit, at(part), at(part + 1));
+            }
+            assert_eq!(unit.output.moment, *expected, "{parts} steps of an optimisation period, period {k}");
+        }
+    }
+}
+
+#[test]
+fn moments_are_held_between_ticks() {
+    let mut unit: Lqr = ready(|_| ());
+    step(&mut unit, 0.0, 0.05);
+    let held = unit.output.moment;
+    unit.input.measured.angles *= 2.0;
+    step(&mut unit, 0.05, 0.07);
+    assert_eq!(unit.output.moment, held);
+    step(&mut unit, 0.07, 0.08);
+    assert_ne!(unit.output.moment, held);
+}
+
+#[test]
+fn parameters_that_cannot_work_are_refused_by_name() {
+    let text = refusal::<Crmpc>(|unit| unit.law.set_feedback(-10.0, -10.0, 0.2));
+    assert!(text.contains("spectral radius 1.0"), "{text}");
+    let text = refusal::<Crmpc>(|unit| unit.law.set_feedback(-5.0, -5.0, 0.03));
+    assert!(text.contains("period.optimisation") && text.contains("period.feedback"), "{text}");
+    let text = refusal::<Lqr>(|unit| {
+        unit.parameters.reference.profile = 6;
+        unit.parameters.reference.file = "no-such-file.csv".into();
+    });
+    assert!(text.contains("reference.file") && text.contains("no-such-file.csv"), "{text}");
+    let text = refusal::<Lqr>(|unit| unit.parameters.inertia.Ixz = 2e6);
+    assert!(text.contains("inertia"), "{text}");
+}
+
+#[test]
+fn the_external_reference_is_followed() {
+    let mut unit: Lqr = ready(|unit: &mut Lqr| unit.parameters.reference.profile = 7);
+    unit.input.reference.angles = unit.input.measured.angles;
+    unit.input.reference.rates = Vector3::zeros();
+    unit.input.reference.accelerations = Vector3::zeros();
+    unit.calculate(0.0).unwrap();
+    assert_eq!(unit.output.moment, Vector3::zeros());
+    assert_eq!(unit.output.reference.angles, unit.input.measured.angles);
+    unit.input.reference.angles.x += 0.01;
+    unit.calculate(0.0).unwrap();
+    assert!(unit.output.moment.y > 0.0, "a positive error of alpha asks for a pitch-up moment");
+}
+
+#[test]
+fn saturation_scales_into_the_limit() {
+    let mut free: Lqr = ready(|_| ());
+    let mut scaled: Lqr = ready(|unit: &mut Lqr| unit.parameters.saturation = true);
+    free.calculate(0.0).unwrap();
+    scaled.calculate(0.0).unwrap();
+    let limit = scaled.parameters.limit_moment;
+    assert!(free.output.moment.norm() > limit);
+    assert!((scaled.output.moment.norm() - limit).abs() < 1e-9 * limit);
+    assert!(free.output.moment.cross(&scaled.output.moment).norm() < 1e-9 * limit * limit);
+}
+
+#[test]
+fn a_singular_attitude_is_an_error_not_a_number() {
+    let mut unit: Lqr = ready(|_| ());
+    unit.input.measured.angles.y = f64::NAN;
+    let Err(Failure::Error(text)) = unit.calculate(0.0) else { panic!("accepted") };
+    assert!(text.contains("not finite"), "{text}");
+}
