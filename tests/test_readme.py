@@ -1,0 +1,22 @@
+"""The README's examples do what they say."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+
+from conftest import ROOT, TARGET
+
+EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+
+
+def test_there_is_an_example():
+    assert EXAMPLES
+
+
+@pytest.mark.parametrize("code", EXAMPLES, ids=range(1, len(EXAMPLES) + 1))
+def test_the_python_examples_run(code, tmp_path):
+    (tmp_path / "target").symlink_to(TARGET)
+    finished = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert finished.returncode == 0, finished.stderr
