@@ -35,7 +35,7 @@ fn main() {
     for (name, cases) in &families {
         let crmpc = |constraints| {
             in_parallel(cases, |case| {
-                run(settings(constraints), case.inertia_scale, case.disturbance.clone())
+                run(&settings(constraints), case.inertia_scale, case.disturbance.clone())
             })
         };
         report("robust", name, cases, &crmpc(Constraints::Robust));

@@ -215,7 +215,7 @@ mod tests {
             let joint = (to_go + arrival).try_inverse().unwrap() * (arrival * centre - costate);
             assert!((joint - optimum[k]).norm() < 1e-11, "stage {k}");
             lq.trace_back(k, optimum[k], |j, error| {
-                assert!((error - optimum[j]).norm() < 1e-11, "{j} from {k}")
+                assert!((error - optimum[j]).norm() < 1e-11, "{j} from {k}");
             });
             let last = lq.follow(k, optimum[k], affine, |j, error, _| {
                 assert!((error - optimum[j]).norm() < 1e-11, "{j} from {k}");

@@ -14,7 +14,7 @@ use vehicle::scenario::Scenario;
 /// Largest EMS (deg) over the cases, each of which must keep both limits without a fallback.
 fn assert_robust(cases: &[Case]) -> f64 {
     let outcomes = in_parallel(cases, |case| {
-        harness::run(settings(Constraints::Robust), case.inertia_scale, case.disturbance.clone())
+        harness::run(&settings(Constraints::Robust), case.inertia_scale, case.disturbance.clone())
     });
     for (case, (outcome, fallbacks)) in cases.iter().zip(&outcomes) {
         let name = &case.name;
@@ -61,7 +61,7 @@ fn paper_set_tracks_better_and_violates_both_limits() {
     // (6) is an outer set: it implies neither ‖ω‖ ≤ 5°/s nor ‖m‖ ≤ 1.356e5 N m (docs/errata.md).
     for case in white(1..=3, 0.04) {
         let (outcome, fallbacks) =
-            harness::run(settings(Constraints::Paper), case.inertia_scale, case.disturbance);
+            harness::run(&settings(Constraints::Paper), case.inertia_scale, case.disturbance);
         assert!(outcome.ems_deg <= 1.85, "{}: {outcome:?}", case.name);
         assert!(outcome.rate > 1.0 && outcome.moment > 1.5, "{}: {outcome:?}", case.name);
         assert_eq!(fallbacks, 0, "{}", case.name);

@@ -85,9 +85,9 @@ pub fn simulate<C: Controller>(
 }
 
 /// One CRMPC run from the start with a new controller: the outcome and the number of fallbacks.
-pub fn run(settings: Settings, inertia_scale: f64, disturbance: Disturbance) -> (Outcome, u32) {
+pub fn run(settings: &Settings, inertia_scale: f64, disturbance: Disturbance) -> (Outcome, u32) {
     let mut memory = Memory::default();
-    let mut controller = Crmpc::new(settings).unwrap();
+    let mut controller = Crmpc::new(*settings).unwrap();
     let outcome = simulate(&mut controller, &mut memory, inertia_scale, disturbance, |memory, _, _| {
         assert_ne!(memory.report.status, Status::None);
     });
