@@ -87,7 +87,7 @@ impl Default for CrmpcLaw {
         Self {
             constraints: number(&CONSTRAINTS, &s.constraints),
             initial_state: number(&INITIAL_STATES, &s.initial_state),
-            horizon: s.horizon as i32,
+            horizon: i32::try_from(s.horizon).unwrap_or(i32::MAX),
             period_optimisation: s.period_optimisation,
             period_feedback: s.period_feedback,
             p: s.p,
@@ -100,7 +100,7 @@ impl Default for CrmpcLaw {
             sideslip_bound: s.sideslip_bound,
             reference_rate: s.reference_rate,
             reference_acceleration: s.reference_acceleration,
-            max_iterations: s.max_iterations as i32,
+            max_iterations: s.max_iterations.cast_signed(),
             shown: Shown { status: 1, ..Shown::default() },
         }
     }
@@ -126,7 +126,7 @@ impl Law for CrmpcLaw {
             limit_moment: vehicle.limit_moment,
             constraints: item(&CONSTRAINTS, self.constraints),
             initial_state: item(&INITIAL_STATES, self.initial_state),
-            horizon: self.horizon.max(0) as usize,
+            horizon: self.horizon.max(0).cast_unsigned() as usize,
             period_optimisation: self.period_optimisation,
             period_feedback: self.period_feedback,
             p: self.p,
@@ -139,7 +139,7 @@ impl Law for CrmpcLaw {
             sideslip_bound: self.sideslip_bound,
             reference_rate: self.reference_rate,
             reference_acceleration: self.reference_acceleration,
-            max_iterations: self.max_iterations.max(0) as u32,
+            max_iterations: self.max_iterations.max(0).cast_unsigned(),
         };
         Crmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))
     }
@@ -151,10 +151,10 @@ impl Law for CrmpcLaw {
             rates: memory.nominal.fixed_rows::<3>(3).into(),
             status: number(&STATUSES, &report.status),
             cost: report.cost,
-            iterations: report.iterations as i32,
+            iterations: report.iterations.cast_signed(),
             time: report.time,
-            solves: report.solves as i32,
-            fallbacks: report.fallbacks as i32,
+            solves: report.solves.cast_signed(),
+            fallbacks: report.fallbacks.cast_signed(),
         };
     }
 
@@ -174,6 +174,7 @@ impl CrmpcLaw {
 }
 
 type Controller = Table<Unit<CrmpcLaw>>;
+type GainField = fn(&mut CrmpcLaw) -> &mut Gain;
 
 fn schedule(table: Controller) -> Controller {
     let constraints = parameter("constraints", "Sets that the optimisation keeps the nominal motion in");
@@ -212,7 +213,7 @@ fn schedule(table: Controller) -> Controller {
 
 fn gains(table: Controller) -> Controller {
     let mut table = table::weights(table, |law| &mut law.p, |law| &mut law.q);
-    let sets: [(&str, &str, fn(&mut CrmpcLaw) -> &mut Gain); 3] = [
+    let sets: [(&str, &str, GainField); 3] = [
         ("feedback", "feedback law K (20)", |law| &mut law.feedback),
         ("terminal", "terminal law (14)", |law| &mut law.terminal),
         ("tube", "paper's tube constant in (21)", |law| &mut law.tube),

@@ -55,18 +55,28 @@ pub(crate) struct Output {
     pub(crate) reference: Reference,
 }
 
+/// What works together at a tick.
+struct Parts<'a, L: Law> {
+    controller: &'a mut L::Controller,
+    sampled: &'a mut Sampled<Memory<L>>,
+    input: &'a Input,
+    source: &'a Source,
+}
+
 impl<L: Law> Unit<L> {
     /// The controller and its schedule; there from initialization on.
-    fn parts(&mut self) -> Result<(&mut L::Controller, &mut Sampled<Memory<L>>, &Input, &Source), Failure> {
+    fn parts(&mut self) -> Result<Parts<'_, L>, Failure> {
         match (&mut self.controller, &mut self.sampled) {
-            (Some(controller), Some(sampled)) => Ok((controller, sampled, &self.input, &self.source)),
+            (Some(controller), Some(sampled)) => {
+                Ok(Parts { controller, sampled, input: &self.input, source: &self.source })
+            }
             _ => Err(Failure::Error("the unit is not initialized".into())),
         }
     }
 
     /// Brings the first uncommitted tick up to date with the inputs.
     fn evaluate(&mut self) -> Result<(), Failure> {
-        let (controller, sampled, input, source) = self.parts()?;
+        let Parts { controller, sampled, input, source } = self.parts()?;
         let now = sampled.next_time(controller.period());
         let external = match source {
             Source::External => input.reference,
@@ -128,7 +138,7 @@ impl<L: Law> Model for Unit<L> {
     }
 
     fn calculate(&mut self, time: f64) -> Result<(), Failure> {
-        let (controller, sampled, ..) = self.parts()?;
+        let Parts { controller, sampled, .. } = self.parts()?;
         if sampled.is_due(time, controller.period()) {
             self.evaluate()?;
         }
@@ -152,7 +162,7 @@ impl<L: Law> Model for Unit<L> {
         log: &mut dyn FnMut(&str),
     ) -> Result<(), Failure> {
         loop {
-            let (controller, sampled, ..) = self.parts()?;
+            let Parts { controller, sampled, .. } = self.parts()?;
             let period = controller.period();
             if !sampled.comes_before(to, period) {
                 return Ok(());
