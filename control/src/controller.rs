@@ -25,6 +25,11 @@ pub trait Controller {
     /// Time between ticks, s.
     fn period(&self) -> f64;
 
+    /// What is carried into the first tick, with room for all that later ticks put into it.
+    fn memory(&self) -> Self::Memory {
+        Self::Memory::default()
+    }
+
     /// The tick with number `tick` at `time` (s): the moment to hold until the next one, N m.
     fn update(
         &mut self,

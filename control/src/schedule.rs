@@ -29,9 +29,9 @@ struct Evaluated {
 }
 
 impl<Memory: Clone + Default> Sampled<Memory> {
-    /// At tick 0, which is due at `start` (s).
-    pub fn new(start: f64) -> Self {
-        Self { start, ..Self::default() }
+    /// At tick 0, which is due at `start` (s), with the memory that a controller starts with.
+    pub fn new(start: f64, memory: Memory) -> Self {
+        Self { start, committed: memory.clone(), pending: memory, ..Self::default() }
     }
 
     /// Time of the first uncommitted tick, s.
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_tick_is_a_function_of_committed_memory_and_present_inputs() {
-        let mut sampled = Sampled::new(0.0);
+        let mut sampled = Sampled::new(0.0, 0.0);
         evaluate(&mut sampled, 1.0);
         evaluate(&mut sampled, 5.0);
         assert_eq!(sampled.in_force().0.x, 5.0, "the first evaluation leaves no trace");
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn ticks_are_due_at_integer_multiples_from_either_side_of_rounding() {
-        let mut sampled = Sampled::<f64>::new(0.1);
+        let mut sampled = Sampled::<f64>::new(0.1, 0.0);
         for k in 0..10_000_u32 {
             let time = 0.1 + f64::from(k) * 0.04;
             assert!(sampled.is_due(time.next_down(), 0.04) && sampled.is_due(time, 0.04));

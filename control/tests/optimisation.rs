@@ -286,7 +286,8 @@ fn another_evaluation_of_a_tick_leaves_no_trace() {
     );
     let (mut disturbed_controller, mut calm_controller) =
         (controller(Constraints::Robust), controller(Constraints::Robust));
-    let (mut disturbed, mut calm) = (Sampled::<Memory>::new(0.0), Sampled::<Memory>::new(0.0));
+    let (mut disturbed, mut calm) =
+        (Sampled::new(0.0, Memory::default()), Sampled::new(0.0, Memory::default()));
     for (tick, measured) in truth.iter().enumerate().take(300) {
         let wrong = &garbage[tick / 5 % garbage.len()];
         disturbed.evaluate(&mut disturbed_controller, wrong, [0.0; 9], &reference);
@@ -313,7 +314,7 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
         );
         let reference = reference();
         let mut used = controller(constraints);
-        let mut sampled = Sampled::<Memory>::new(0.0);
+        let mut sampled = Sampled::new(0.0, Memory::default());
         for (tick, measured) in truth.iter().enumerate().take(750) {
             // Within and at the beginning of an optimisation period, with the tick evaluated and not.
             if tick % 7 == 3 {

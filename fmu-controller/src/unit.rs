@@ -132,8 +132,9 @@ impl<L: Law> Model for Unit<L> {
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         self.source = Source::new(&self.parameters.reference, context)?;
-        self.controller = Some(self.design()?);
-        self.sampled = Some(Sampled::new(context.start_time));
+        let controller = self.design()?;
+        self.sampled = Some(Sampled::new(context.start_time, controller.memory()));
+        self.controller = Some(controller);
         Ok(())
     }
 

@@ -104,6 +104,7 @@ pub struct Crmpc {
     affine: Vec<Vector6<f64>>,
     errors: Vec<Vector6<f64>>,
     candidate: Plan,
+    previous: Plan,
     state_balls: Vec<Ball>,
     input_balls: Vec<Ball>,
 }
@@ -210,6 +211,7 @@ impl Crmpc {
             affine: vec![Vector6::zeros(); n],
             errors: vec![Vector6::zeros(); n + 1],
             candidate: Plan::new(n),
+            previous: Plan::new(n),
             state_balls: vec![Ball::default(); n],
             input_balls: vec![Ball::default(); n],
         })
@@ -409,18 +411,17 @@ impl Crmpc {
         violated: &Range<usize>,
         iterations: &mut u32,
     ) -> bool {
-        let mut about = self.candidate.clone();
+        let mut about = std::mem::take(&mut self.previous);
+        let mut solved = true;
         for _ in 0..FIRST_PASSES {
-            if !self.constrained(&about, measured, violated, iterations) {
-                return false;
-            }
-            let moved = about.distance(&self.candidate);
             about.clone_from(&self.candidate);
-            if moved < FIRST_TOLERANCE {
+            solved = self.constrained(&about, measured, violated, iterations);
+            if !solved || about.distance(&self.candidate) < FIRST_TOLERANCE {
                 break;
             }
         }
-        true
+        self.previous = about;
+        solved
     }
 
     /// The optimum with the constraints linearised about a plan, into `candidate` and `errors`; whether there is one.
@@ -618,6 +619,10 @@ impl Controller for Crmpc {
 
     fn period(&self) -> f64 {
         self.settings.period_feedback
+    }
+
+    fn memory(&self) -> Memory {
+        Memory { plan: Plan::new(self.settings.horizon), ..Memory::default() }
     }
 
     fn update(
