@@ -394,6 +394,9 @@ fn solver_settings(max_iter: u32) -> DefaultSettings<f64> {
         equilibrate_enable: false,
         input_sparse_dropzeros: false,
         iterative_refinement_enable: true,
+        // Steps to a relative 1e-8 need no more, and every refinement costs a solve.
+        iterative_refinement_reltol: 1e-9,
+        iterative_refinement_abstol: 1e-9,
         direct_solve_method: "qdldl".into(),
         max_threads: 1,
         ..DefaultSettings::default()

@@ -120,9 +120,9 @@ struct Windows {
 }
 
 /// Lengths of the windows in intervals: the start of a manoeuvre, a jump of the reference ahead, a jump at the horizon.
-const HEAD: usize = 40;
-const MIDDLE: usize = 12;
-const TAIL: usize = 24;
+const HEAD: usize = 36;
+const MIDDLE: usize = 8;
+const TAIL: usize = 16;
 
 /// The constraint sets in force.
 #[derive(Clone, Copy, Debug)]
@@ -136,7 +136,7 @@ enum Sets {
 /// Passes of the first optimisation at most.
 const FIRST_PASSES: usize = 20;
 /// The first optimisation has converged when no state moves by more than this (rad, rad/s) between passes.
-const FIRST_TOLERANCE: f64 = 1e-6;
+const FIRST_TOLERANCE: f64 = 1e-5;
 /// Relative slack when the exact constraints are checked, for rounding.
 const CHECK_SLACK: f64 = 1e-9;
 /// Typical angle error, by which the solver's unknowns are scaled, rad.
