@@ -106,3 +106,31 @@ def test_oracle_directional_derivatives_are_central_differences(fmu):
         expected = (ahead - behind) / (2.0 * h)
         np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-7 * max(1e-6, np.abs(expected).max()))
     model.freeInstance()
+
+
+def test_oracle_euler_converges_to_co_simulation_with_order_one(fmu):
+    vehicle = fmu("ReentryPlant")
+    start = {"initial.p": 0.05, "initial.q": 0.03}
+    with Unit(vehicle, {"disturbance.kind": "none", **start}).start() as plant:
+        for tick in range(100):
+            plant.step(tick * STEP, STEP)
+        expected = np.array(plant.get(ANGLES + RATES))
+
+    def error(step: float) -> float:
+        # FMPy's Euler integrates in steps of the output interval.
+        result = simulate_fmu(
+            str(vehicle.path),
+            fmi_type="ModelExchange",
+            solver="Euler",
+            start_values={"disturbance.kind": vehicle.item("disturbance.kind", "none"), **start},
+            stop_time=100 * STEP,
+            step_size=step,
+            output_interval=step,
+            output=ANGLES + RATES,
+        )
+        return np.abs(np.array(list(result[-1]))[1:] - expected).max()
+
+    errors = [error(STEP / parts) for parts in (1, 2, 4, 8)]
+    assert errors[0] < 1e-3
+    for coarse, fine in zip(errors, errors[1:]):
+        assert coarse / fine == pytest.approx(2.0, abs=0.1)
