@@ -13,9 +13,12 @@ use vehicle::scenario::Scenario;
 
 /// Largest EMS (deg) over the cases, each of which must keep both limits without a fallback.
 fn assert_robust(cases: &[Case]) -> f64 {
-    let outcomes = in_parallel(cases, |case| {
-        harness::run(&settings(Constraints::Robust), case.inertia_scale, case.disturbance.clone())
-    });
+    assert_keeps_limits(&settings(Constraints::Robust), cases)
+}
+
+fn assert_keeps_limits(settings: &Settings, cases: &[Case]) -> f64 {
+    let outcomes =
+        in_parallel(cases, |case| harness::run(settings, case.inertia_scale, case.disturbance.clone()));
     for (case, (outcome, fallbacks)) in cases.iter().zip(&outcomes) {
         let name = &case.name;
         assert!(outcome.rate <= 1.0, "{name}: rate {} of its limit", outcome.rate);
@@ -54,6 +57,14 @@ fn robust_keeps_both_limits_under_disturbances_that_look_at_the_motion() {
 #[test]
 fn robust_keeps_both_limits_under_adversaries_faster_than_its_feedback() {
     assert_robust(&adversaries(harness::CHECK));
+}
+
+#[test]
+fn robust_with_a_free_initial_state_keeps_both_limits() {
+    let settings = Settings { initial_state: InitialState::Tube, ..settings(Constraints::Robust) };
+    let mut cases = white(1..=2, 0.04);
+    cases.extend(adversaries(0.04));
+    assert_keeps_limits(&settings, &cases);
 }
 
 #[test]

@@ -18,7 +18,6 @@ use crate::error::DesignError;
 use crate::linearise::{self, Linear, Linearisation};
 use crate::lq::TrackingLq;
 use crate::sampled::{InvariantSet, Reach, response, transition};
-use clarabel::solver::SolverStatus;
 use cone::{AxisCosts, Ball, ConeProblem, Sample, Start, Structure};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -476,9 +475,9 @@ impl Crmpc {
             input_balls: &self.input_balls[window.clone()],
             terminal_radius,
         };
-        let (status, spent) = problem.solve(&sample, &mut self.errors[window.start..=window.end]);
+        let (solved, spent) = problem.solve(&sample, &mut self.errors[window.start..=window.end]);
         *iterations += spent;
-        if status != SolverStatus::Solved {
+        if !solved {
             return false;
         }
         let (begin, end) = (self.errors[window.start], self.errors[window.end]);
@@ -508,12 +507,12 @@ impl Crmpc {
             input_balls: &self.input_balls,
             terminal_radius: self.terminal_radius(),
         };
-        let (status, spent) = self.whole.solve(&sample, &mut self.errors);
+        let (solved, spent) = self.whole.solve(&sample, &mut self.errors);
         *iterations += spent;
-        if status == SolverStatus::Solved {
+        if solved {
             self.plan_from_errors(measured);
         }
-        status == SolverStatus::Solved
+        solved
     }
 
     /// `candidate` from `errors`, rolled out so that it is an exact motion of the nominal model.
