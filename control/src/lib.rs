@@ -1,11 +1,13 @@
 //! Attitude controllers of the papers. Knows the vehicle, not FMI. SI units and radians throughout.
 
+mod cone;
 pub mod controller;
 pub mod crmpc;
 pub mod error;
 pub mod linearise;
 pub mod lq;
 pub mod lqr;
+pub mod report;
 pub mod sampled;
 pub mod schedule;
 pub mod settings;

@@ -1,14 +1,14 @@
 //! `CRMPC`: its own parameters and outputs.
 
 use crate::law::{Law, Vehicle};
-use crate::table::{self, ANGLES, sampled_inputs, vector};
+use crate::solver::{self, SolverOutputs};
+use crate::table::{self, ANGLES, enumeration, item, number, sampled_inputs, vector};
 use crate::unit::Unit;
-use control::crmpc::{Constraints, Crmpc, InitialState, Memory, Settings, Status};
+use control::crmpc::{Constraints, Crmpc, InitialState, Memory, Settings};
 use control::sampled::Gain;
 use fmi2_export::table::{discrete_output, parameter};
 use fmi2_export::{Failure, Table};
 use model_description::unit;
-use model_description::variable::EnumerationType;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -39,12 +39,7 @@ pub struct CrmpcLaw {
 struct Shown {
     angles: Vector3<f64>,
     rates: Vector3<f64>,
-    status: i32,
-    cost: f64,
-    iterations: i32,
-    time: f64,
-    solves: i32,
-    fallbacks: i32,
+    solver: SolverOutputs,
 }
 
 const CONSTRAINTS: [(Constraints, &str, &str); 2] = [
@@ -55,31 +50,6 @@ const INITIAL_STATES: [(InitialState, &str, &str); 2] = [
     (InitialState::Measured, "measured", "the nominal motion starts at the measured state"),
     (InitialState::Tube, "tube", "it starts anywhere in an invariant set around the measured state"),
 ];
-const STATUSES: [(Status, &str, &str); 4] = [
-    (Status::None, "none", "no optimisation yet"),
-    (
-        Status::Unconstrained,
-        "unconstrained",
-        "the unconstrained optimum, checked to satisfy every constraint",
-    ),
-    (Status::Constrained, "constrained", "the optimum of the cone programme"),
-    (Status::Fallback, "fallback", "the previous plan, shifted, with the terminal law"),
-];
-
-/// The item with number `number`, or the first.
-fn item<T: Copy>(items: &[(T, &str, &str)], number: i32) -> T {
-    usize::try_from(number - 1).ok().and_then(|i| items.get(i)).unwrap_or(&items[0]).0
-}
-
-/// The number of `value`, or 1.
-fn number<T: PartialEq>(items: &[(T, &str, &str)], value: &T) -> i32 {
-    (1..).zip(items).find(|(_, item)| item.0 == *value).map_or(1, |(number, _)| number)
-}
-
-fn enumeration<T>(name: &str, description: &str, items: &[(T, &str, &str)]) -> EnumerationType {
-    let items = items.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect();
-    EnumerationType { name: name.into(), description: description.into(), items }
-}
 
 impl Default for CrmpcLaw {
     fn default() -> Self {
@@ -101,7 +71,7 @@ impl Default for CrmpcLaw {
             reference_rate: s.reference_rate,
             reference_acceleration: s.reference_acceleration,
             max_iterations: s.max_iterations.cast_signed(),
-            shown: Shown { status: 1, ..Shown::default() },
+            shown: Shown::default(),
         }
     }
 }
@@ -145,23 +115,15 @@ impl Law for CrmpcLaw {
     }
 
     fn show(&mut self, memory: &Memory) {
-        let report = &memory.report;
         self.shown = Shown {
             angles: memory.nominal.fixed_rows::<3>(0).into(),
             rates: memory.nominal.fixed_rows::<3>(3).into(),
-            status: number(&STATUSES, &report.status),
-            cost: report.cost,
-            iterations: report.iterations.cast_signed(),
-            time: report.time,
-            solves: report.solves.cast_signed(),
-            fallbacks: report.fallbacks.cast_signed(),
+            solver: SolverOutputs::from(&memory.report),
         };
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
-        (after.report.fallbacks > before.report.fallbacks).then_some(
-            "the optimisation did not succeed: the previous plan with the terminal law is used (solver.fallbacks)",
-        )
+        solver::warning(&before.report, &after.report)
     }
 }
 
@@ -185,8 +147,7 @@ fn schedule(table: Controller) -> Controller {
         "Time between two optimisations and prediction step; a whole multiple of period.feedback",
     );
     let feedback = parameter("period.feedback", "Time between two evaluations of the feedback law");
-    let iterations = parameter("solver.maxIterations", "Iteration limit of the cone solver");
-    table
+    let table = table
         .enumeration(
             constraints,
             enumeration(
@@ -207,8 +168,8 @@ fn schedule(table: Controller) -> Controller {
         })
         .real(feedback.real().unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| {
             &mut m.law.period_feedback
-        })
-        .integer(iterations, (Some(1), Some(1000)), |m| &mut m.law.max_iterations)
+        });
+    solver::max_iterations(table, |law| &mut law.max_iterations)
 }
 
 fn gains(table: Controller) -> Controller {
@@ -267,19 +228,6 @@ fn outputs(table: Controller) -> Controller {
         sampled(&format!("nominalRate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
     };
     let table = vector(table, ANGLES, nominal, |m| &mut m.law.shown.angles);
-    let status = sampled("solver.status", "How the plan in force came about");
-    let cost = sampled("solver.cost", "Optimal cost of the plan in force");
-    let time = sampled("solver.time", "Wall-clock time of the last optimisation; differs from run to run");
-    let iterations = sampled("solver.iterations", "Iterations of the last optimisation, over all its passes");
-    let solves = sampled("solver.solves", "Optimisations so far");
-    let fallbacks = sampled("solver.fallbacks", "Optimisations so far that did not succeed");
-    vector(table, ANGLES, rate, |m| &mut m.law.shown.rates)
-        .enumeration(status, enumeration("SolverStatus", "How a plan came about", &STATUSES), |m| {
-            &mut m.law.shown.status
-        })
-        .real(cost.real(), |m| &mut m.law.shown.cost)
-        .real(time.real().unit(unit::time()).nominal(1e-3), |m| &mut m.law.shown.time)
-        .integer(iterations, (None, None), |m| &mut m.law.shown.iterations)
-        .integer(solves, (None, None), |m| &mut m.law.shown.solves)
-        .integer(fallbacks, (None, None), |m| &mut m.law.shown.fallbacks)
+    let table = vector(table, ANGLES, rate, |m| &mut m.law.shown.rates);
+    solver::outputs(table, |law| &mut law.shown.solver)
 }

@@ -5,6 +5,7 @@ mod crmpc;
 mod law;
 mod lqr;
 mod reference;
+mod solver;
 mod table;
 #[cfg(test)]
 mod tests;

@@ -215,6 +215,22 @@ pub(crate) fn weights<L: Law>(
     table
 }
 
+/// Of items (value, name, text) the value of the one with number `number`, or of the first.
+pub(crate) fn item<T: Copy>(items: &[(T, &str, &str)], number: i32) -> T {
+    usize::try_from(number - 1).ok().and_then(|i| items.get(i)).unwrap_or(&items[0]).0
+}
+
+/// The number of `value`, or 1.
+pub(crate) fn number<T: PartialEq>(items: &[(T, &str, &str)], value: &T) -> i32 {
+    (1..).zip(items).find(|(_, item)| item.0 == *value).map_or(1, |(number, _)| number)
+}
+
+/// The items as an enumeration of the description.
+pub(crate) fn enumeration<T>(name: &str, description: &str, items: &[(T, &str, &str)]) -> EnumerationType {
+    let items = items.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect();
+    EnumerationType { name: name.into(), description: description.into(), items }
+}
+
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())

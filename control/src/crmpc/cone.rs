@@ -1,12 +1,11 @@
 //! The constrained tracking problem, or a window of its horizon, as a second-order cone programme for Clarabel.
 //!
 //! Unknowns are the tracking errors E_k = x̃_k − x_r(t_k), k = 0..=N, scaled; the inputs are eliminated, as
-//! v_k = (E_ω,k+1 − E_ω,k − d_ω,k)/h. The affine terms d_k carry the reference's curvature and jumps. Set up once, then
-//! updated in place: only numbers change from sample to sample, never the sparsity.
+//! v_k = (E_ω,k+1 − E_ω,k − d_ω,k)/h. The affine terms d_k carry the reference's curvature and jumps.
 
+use crate::cone::{Programme, Triplets};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT, ZeroConeT};
-use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3, Vector6};
 
 /// A ball constraint ‖offset + J_θ E_(α,β) + J_ω E_ω + J_v v‖ ≤ bound on the motion of one stage.
@@ -95,17 +94,12 @@ pub(super) struct Sample<'a> {
 /// The programme with its solver.
 pub(super) struct ConeProblem {
     structure: Structure,
-    solver: DefaultSolver<f64>,
-    /// Values of ½ xᵀP x in the solver's order, and without the costs of the two ends.
-    cost: Vec<f64>,
+    programme: Programme,
+    /// The quadratic cost without that of the two ends.
     inner_cost: Vec<f64>,
     /// Positions of angle², angle·rate and rate² per axis at the first and the last stage.
     end_costs: [[[usize; 3]; 3]; 2],
-    linear_cost: Vec<f64>,
-    /// Values of A in the solver's order.
-    matrix: Vec<f64>,
-    right_side: Vec<f64>,
-    /// Where each stage's ball coefficients stand in `matrix`, and its rows in `right_side`.
+    /// Where each stage's ball coefficients stand in the matrix, and its rows in the right side.
     state_slots: Vec<Slots>,
     input_slots: Vec<Slots>,
     initial_row: usize,
@@ -118,39 +112,6 @@ struct Slots {
     here: [[usize; 5]; 3],
     /// Positions of the 3×3 block on E_ω of the next stage (input balls).
     next: Option<[[usize; 3]; 3]>,
-}
-
-/// Collects a sparse matrix entry by entry, remembering where each entry ends up in compressed columns.
-#[derive(Default)]
-struct Triplets {
-    entries: Vec<(usize, usize, f64)>,
-}
-
-impl Triplets {
-    fn push(&mut self, row: usize, column: usize, value: f64) -> usize {
-        self.entries.push((row, column, value));
-        self.entries.len() - 1
-    }
-
-    /// The matrix, and for each pushed entry its position among the values.
-    fn compress(&self, rows: usize, columns: usize) -> (CscMatrix<f64>, Vec<usize>) {
-        let mut order: Vec<usize> = (0..self.entries.len()).collect();
-        order.sort_by_key(|&i| (self.entries[i].1, self.entries[i].0));
-        let mut position = vec![0; order.len()];
-        let mut starts = vec![0; columns + 1];
-        let (mut row_indices, mut values) = (Vec::new(), Vec::new());
-        for (place, &i) in order.iter().enumerate() {
-            let (row, column, value) = self.entries[i];
-            position[i] = place;
-            starts[column + 1] += 1;
-            row_indices.push(row);
-            values.push(value);
-        }
-        for column in 0..columns {
-            starts[column + 1] += starts[column];
-        }
-        (CscMatrix::new(rows, columns, starts, row_indices, values), position)
-    }
 }
 
 impl ConeProblem {
@@ -236,24 +197,17 @@ impl ConeProblem {
                 *i = position[*i];
             }
         }
-        let linear_cost = vec![0.0; columns];
         let mut right_side = vec![0.0; row];
         // A strictly feasible placeholder, so that the solver's setup sees finite data.
         for slots in state_slots.iter().chain(&input_slots) {
             right_side[slots.row] = 1.0;
         }
-        let settings = solver_settings(structure.max_iterations);
-        let solver = DefaultSolver::new(&cost, &linear_cost, &matrix, &right_side, &cones, settings)
-            .map_err(|error| error.to_string())?;
+        let programme = Programme::new(cost, matrix, right_side, &cones, structure.max_iterations)?;
         Ok(Self {
             structure,
-            solver,
-            inner_cost: cost.nzval.clone(),
-            cost: cost.nzval,
+            inner_cost: programme.cost.clone(),
+            programme,
             end_costs,
-            linear_cost,
-            matrix: matrix.nzval,
-            right_side,
             state_slots,
             input_slots,
             initial_row,
@@ -265,44 +219,33 @@ impl ConeProblem {
     /// iterations.
     pub(super) fn solve(&mut self, sample: &Sample, errors: &mut [Vector6<f64>]) -> (bool, u32) {
         self.update(sample);
-        let accepted = self.solver.update_P(&self.cost).is_ok()
-            && self.solver.update_q(&self.linear_cost).is_ok()
-            && self.solver.update_A(&self.matrix).is_ok()
-            && self.solver.update_b(&self.right_side).is_ok();
-        if !accepted {
-            return (false, 0);
+        let (sa, sw) = (self.structure.angle_scale, self.structure.rate_scale);
+        let (solution, iterations) = self.programme.solve();
+        for (error, x) in errors.iter_mut().zip(solution.unwrap_or_default().chunks_exact(6)) {
+            *error = Vector6::new(x[0] * sa, x[1] * sa, x[2] * sa, x[3] * sw, x[4] * sw, x[5] * sw);
         }
-        self.solver.solve();
-        let solution = &self.solver.solution;
-        let solved = matches!(solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
-        if solved {
-            let (sa, sw) = (self.structure.angle_scale, self.structure.rate_scale);
-            for (error, x) in errors.iter_mut().zip(solution.x.chunks_exact(6)) {
-                *error = Vector6::new(x[0] * sa, x[1] * sa, x[2] * sa, x[3] * sw, x[4] * sw, x[5] * sw);
-            }
-        }
-        (solved, solution.iterations)
+        (solution.is_some(), iterations)
     }
 
     fn update(&mut self, sample: &Sample) {
         let Structure { stages: n, step: h, q, angle_scale: sa, rate_scale: sw, .. } = self.structure;
-        self.linear_cost.fill(0.0);
+        self.programme.linear_cost.fill(0.0);
         for (k, d) in sample.affine.iter().enumerate() {
             for i in 0..3 {
                 // (Q/h)(E_ω,k+1 − E_ω,k − d_ω)²
                 let slope = 2.0 * q[i] / h * d[3 + i] * sw;
-                self.linear_cost[6 * k + 3 + i] += slope;
-                self.linear_cost[6 * (k + 1) + 3 + i] -= slope;
-                self.right_side[3 * k + i] = (d[i] - 0.5 * h * d[3 + i]) / sa;
+                self.programme.linear_cost[6 * k + 3 + i] += slope;
+                self.programme.linear_cost[6 * (k + 1) + 3 + i] -= slope;
+                self.programme.right_side[3 * k + i] = (d[i] - 0.5 * h * d[3 + i]) / sa;
             }
         }
-        self.cost.copy_from_slice(&self.inner_cost);
+        self.programme.cost.copy_from_slice(&self.inner_cost);
         self.add_cost(1, sample.to_go);
         let given = &sample.start;
         match &self.structure.start {
             Start::Fixed => {
                 for i in 0..6 {
-                    self.right_side[self.initial_row + i] = given[i] / if i < 3 { sa } else { sw };
+                    self.programme.right_side[self.initial_row + i] = given[i] / if i < 3 { sa } else { sw };
                 }
             }
             Start::Within(normals) => {
@@ -310,8 +253,8 @@ impl ConeProblem {
                 for (i, normals) in normals.iter().enumerate() {
                     let given = Vector2::new(given[i], given[3 + i]);
                     for normal in normals {
-                        self.right_side[row] = 1.0 - normal.dot(&given);
-                        self.right_side[row + 1] = 1.0 + normal.dot(&given);
+                        self.programme.right_side[row] = 1.0 - normal.dot(&given);
+                        self.programme.right_side[row + 1] = 1.0 + normal.dot(&given);
                         row += 2;
                     }
                 }
@@ -320,8 +263,8 @@ impl ConeProblem {
         }
         for (slots, ball) in self.state_slots.iter().zip(sample.state_balls) {
             write_ball(
-                &mut self.matrix,
-                &mut self.right_side,
+                &mut self.programme.matrix,
+                &mut self.programme.right_side,
                 slots,
                 ball,
                 &ball.by_rates,
@@ -335,15 +278,24 @@ impl ConeProblem {
             let by_difference = ball.by_acceleration / h;
             let by_rates = ball.by_rates - by_difference;
             let offset = ball.offset - by_difference * sample.affine[k].fixed_rows::<3>(3);
-            write_ball(&mut self.matrix, &mut self.right_side, slots, ball, &by_rates, &offset, sa, sw);
+            write_ball(
+                &mut self.programme.matrix,
+                &mut self.programme.right_side,
+                slots,
+                ball,
+                &by_rates,
+                &offset,
+                sa,
+                sw,
+            );
             for (i, places) in slots.next.iter().flatten().enumerate() {
                 for (j, &place) in places.iter().enumerate() {
-                    self.matrix[place] = -by_difference[(i, j)] * sw / ball.bound;
+                    self.programme.matrix[place] = -by_difference[(i, j)] * sw / ball.bound;
                 }
             }
         }
         if let Some(row) = self.terminal_row {
-            self.right_side[row] = sample.terminal_radius / sa;
+            self.programme.right_side[row] = sample.terminal_radius / sa;
         }
         debug_assert_eq!(sample.affine.len(), n);
     }
@@ -354,11 +306,11 @@ impl ConeProblem {
         let stage = 6 * self.structure.stages * end;
         for (i, (weight, slope)) in costs.iter().enumerate() {
             let [angle, mixed, rate] = self.end_costs[end][i];
-            self.cost[angle] += 2.0 * weight.m11 * sa * sa;
-            self.cost[mixed] += 2.0 * weight.m12 * sa * sw;
-            self.cost[rate] += 2.0 * weight.m22 * sw * sw;
-            self.linear_cost[stage + i] += 2.0 * slope.x * sa;
-            self.linear_cost[stage + 3 + i] += 2.0 * slope.y * sw;
+            self.programme.cost[angle] += 2.0 * weight.m11 * sa * sa;
+            self.programme.cost[mixed] += 2.0 * weight.m12 * sa * sw;
+            self.programme.cost[rate] += 2.0 * weight.m22 * sw * sw;
+            self.programme.linear_cost[stage + i] += 2.0 * slope.x * sa;
+            self.programme.linear_cost[stage + 3 + i] += 2.0 * slope.y * sw;
         }
     }
 }
@@ -385,31 +337,6 @@ fn write_ball(
         right_side[slots.row + 1 + i] = offset[i] * scale;
     }
     right_side[slots.row] = 1.0;
-}
-
-/// Gap and residuals of a solution that is accepted.
-const ACCEPTED: f64 = 1e-6;
-
-/// Data are updated in place, which forbids presolve, and scaled by hand.
-fn solver_settings(max_iter: u32) -> DefaultSettings<f64> {
-    DefaultSettings {
-        verbose: false,
-        max_iter,
-        presolve_enable: false,
-        equilibrate_enable: false,
-        input_sparse_dropzeros: false,
-        iterative_refinement_enable: true,
-        // Steps to a relative 1e-8 need no more, and every refinement costs a solve.
-        iterative_refinement_reltol: 1e-9,
-        iterative_refinement_abstol: 1e-9,
-        // Where rounding stops it short of its 1e-8, this is still an optimum; anything coarser is none.
-        reduced_tol_gap_abs: ACCEPTED,
-        reduced_tol_gap_rel: ACCEPTED,
-        reduced_tol_feas: ACCEPTED,
-        direct_solve_method: "qdldl".into(),
-        max_threads: 1,
-        ..DefaultSettings::default()
-    }
 }
 
 /// ½ xᵀ P x with the cost Σ h EᵀPE + (Q/h)(ΔE_ω)² over the intervals, upper triangle, scaled; and where the costs of

@@ -7,6 +7,7 @@ mod cone;
 mod design;
 mod plan;
 
+pub use crate::report::{Report, Status};
 pub use design::{
     Constraints, Design, InitialState, PaperConstants, Settings, Tightening, step_response_peak,
     terminal_weight,
@@ -25,37 +26,6 @@ use std::ops::Range;
 use std::time::Instant;
 use vehicle::kinematics;
 use vehicle::reference::Reference;
-
-/// How the last plan came about.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Status {
-    /// No optimisation yet.
-    #[default]
-    None,
-    /// The unconstrained optimum satisfies every constraint exactly, so it is the optimum.
-    Unconstrained,
-    /// The cone solver's optimum.
-    Constrained,
-    /// The cone solver did not succeed: the shifted previous plan with the terminal law, (31).
-    Fallback,
-}
-
-/// What the optimisation reports.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Report {
-    /// Origin of the plan in force.
-    pub status: Status,
-    /// Optimal cost; of the shifted plan in a fallback.
-    pub cost: f64,
-    /// Iterations of the cone solver, summed over its passes.
-    pub iterations: u32,
-    /// Wall-clock time of the last optimisation, s. Not reproducible.
-    pub time: f64,
-    /// Optimisations so far.
-    pub solves: u32,
-    /// Fallbacks so far.
-    pub fallbacks: u32,
-}
 
 /// What CRMPC carries from tick to tick.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
