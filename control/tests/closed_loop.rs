@@ -7,7 +7,7 @@ use control::Controller;
 use control::crmpc::{Constraints, InitialState, Settings, Status};
 use control::{Crmpc, crmpc::Memory};
 use harness::{Case, adversaries, constant, disturbance, in_parallel, settings, simulate, square, white};
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3, Vector6};
 use vehicle::disturbance::{Disturbance, Kind};
 use vehicle::scenario::Scenario;
 
@@ -113,6 +113,86 @@ fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_se
     });
     assert_eq!(memory.report.fallbacks, 0);
     assert!(largest > 0.9, "the freedom is not used: {largest}");
+}
+
+/// The nominal motion at every tick, bit for bit, and the deviation O_e = x − x̃ there, with `initialState = nominal`.
+fn around_the_nominal_motion(
+    constraints: Constraints,
+    inertia_scale: f64,
+    disturbance: Disturbance,
+) -> (Vec<[u64; 6]>, Vec<Vector6<f64>>) {
+    let settings = Settings { initial_state: InitialState::Nominal, ..settings(constraints) };
+    let mut controller = Crmpc::new(settings).unwrap();
+    let mut memory = Memory::default();
+    let (mut nominal, mut deviations) = (Vec::new(), Vec::new());
+    simulate(&mut controller, &mut memory, inertia_scale, disturbance, |memory, _, measured| {
+        let angle_rates = vehicle::kinematics::r(&measured.angles) * measured.rates;
+        let state = Vector6::from_fn(|i, _| if i < 3 { measured.angles[i] } else { angle_rates[i - 3] });
+        nominal.push(memory.nominal.map(f64::to_bits).into());
+        deviations.push(state - memory.nominal);
+    });
+    assert_eq!(memory.report.fallbacks, 0);
+    (nominal, deviations)
+}
+
+#[test]
+fn a_nominal_motion_that_starts_from_its_own_plan_knows_no_disturbance() {
+    for constraints in [Constraints::Robust, Constraints::Paper] {
+        let (undisturbed, _) = around_the_nominal_motion(constraints, 1.0, Disturbance::default());
+        for case in white(1..=1, 0.04).into_iter().chain(adversaries(0.04)) {
+            let (nominal, deviations) =
+                around_the_nominal_motion(constraints, case.inertia_scale, case.disturbance);
+            assert!(nominal == undisturbed, "{}", case.name);
+            assert!(deviations.iter().any(|o| o.amax() > 1e-3), "{}: nothing disturbed it", case.name);
+        }
+    }
+}
+
+#[test]
+fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
+    // Chai 2022, (22): O_e under a constant Δ settles at Δ/|k1|, and never leaves the reach of the sampled dynamics. A square wave
+    // drives its rate to twice what (26) allows.
+    for constraints in [Constraints::Robust, Constraints::Paper] {
+        let design = Crmpc::new(settings(constraints)).unwrap().design().clone();
+        let (reach, paper) = (design.reach, design.paper.unwrap());
+        let Settings { feedback, disturbance_bound: bound, .. } = settings(constraints);
+        let deviations = |disturbance| around_the_nominal_motion(constraints, 1.0, disturbance).1;
+        let largest = |deviations: &[Vector6<f64>], components: [usize; 3]| {
+            deviations.iter().flat_map(|o| components.map(|i| o[i].abs())).fold(0.0, f64::max)
+        };
+        // What f does between two ticks, at which alone it is cancelled.
+        let slack = largest(&deviations(Disturbance::default()), [0, 1, 2]);
+        let rate_slack = largest(&deviations(Disturbance::default()), [3, 4, 5]);
+        assert!(slack < 0.01 * reach.angle * bound && rate_slack < 0.01 * reach.rate * bound);
+
+        for kind in [Kind::Constant, Kind::Square, Kind::AlongRate] {
+            let direction = Vector3::new(1.0, -1.0, 1.0);
+            let deviations = deviations(Disturbance { direction, square_period: 10.0, ..disturbance(kind) });
+            let (angle, rate) = (largest(&deviations, [0, 1, 2]), largest(&deviations, [3, 4, 5]));
+            assert!(angle <= reach.angle * bound + slack, "{constraints:?}, {kind:?}: {angle}");
+            assert!(rate <= reach.rate * bound + rate_slack, "{constraints:?}, {kind:?}: {rate}");
+            if kind == Kind::Square {
+                assert!(rate > 1.9 * paper.rate_tube, "{constraints:?}: {rate}");
+            }
+            if kind == Kind::Constant {
+                let last = deviations.last().unwrap() / bound;
+                for i in 0..3 {
+                    let settled = direction[i] / feedback.k1.abs();
+                    assert!((last[i] - settled).abs() < 1e-4 * settled.abs(), "{constraints:?}: {last}");
+                    assert!(last[3 + i].abs() < 1e-4, "{constraints:?}: {last}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn robust_around_a_nominal_motion_of_its_own_keeps_both_limits() {
+    let settings = Settings { initial_state: InitialState::Nominal, ..settings(Constraints::Robust) };
+    let mut cases = white(1..=2, 0.04);
+    cases.extend(adversaries(0.04));
+    cases.extend(square(&[2.5]));
+    assert_keeps_limits(&settings, &cases);
 }
 
 #[test]

@@ -46,9 +46,14 @@ const CONSTRAINTS: [(Constraints, &str, &str); 2] = [
     (Constraints::Robust, "robust", "the limits themselves, tightened by what the error dynamics can reach"),
     (Constraints::Paper, "paper", "the sets as printed, which do not imply the limits"),
 ];
-const INITIAL_STATES: [(InitialState, &str, &str); 2] = [
+const INITIAL_STATES: [(InitialState, &str, &str); 3] = [
     (InitialState::Measured, "measured", "the nominal motion starts at the measured state"),
     (InitialState::Tube, "tube", "it starts anywhere in an invariant set around the measured state"),
+    (
+        InitialState::Nominal,
+        "nominal",
+        "it starts where the previous plan put it, the first at the measured state",
+    ),
 ];
 
 impl Default for CrmpcLaw {

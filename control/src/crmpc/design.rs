@@ -25,6 +25,9 @@ pub enum InitialState {
     Measured,
     /// Anywhere with the measured state inside an invariant set around it.
     Tube,
+    /// Where the previous plan put it; the first at the measured state. The nominal motion never sees a disturbance, and the
+    /// deviation obeys the error dynamics (22) alone.
+    Nominal,
 }
 
 /// Everything CRMPC is built from. Units SI, angles rad.
@@ -192,6 +195,7 @@ impl Design {
             InitialState::Tube => {
                 constant(s, invariant.as_ref().ok_or(DesignError::NotReal { name: "feedback" })?)
             }
+            InitialState::Nominal => full(s, reach, smallest_inertia),
         };
 
         Ok(Self {
@@ -215,12 +219,21 @@ fn moment_error(s: &Settings) -> f64 {
 /// Tightening by what k steps can do from a deviation of zero.
 fn growing(s: &Settings, error: &SampledError, ratio: usize, smallest_inertia: f64) -> Tightening {
     let reach = error.reach(ratio * s.horizon);
+    Tightening {
+        at_stage: reach.iter().step_by(ratio).copied().collect(),
+        within_stage: reach.iter().skip(ratio - 1).step_by(ratio).copied().collect(),
+        ..full(s, Reach::default(), smallest_inertia)
+    }
+}
+
+/// Tightening by `reach` at every step: a deviation that the plan does not reset may have its full size from the start.
+fn full(s: &Settings, reach: Reach, smallest_inertia: f64) -> Tightening {
     let inertia = moment_error(s);
     // ‖R‖ = sec β, Chai 2022, Lemma 1.
     let input_of_moment = 1.0 / (s.sideslip_bound.cos() * smallest_inertia);
     Tightening {
-        at_stage: reach.iter().step_by(ratio).copied().collect(),
-        within_stage: reach.iter().skip(ratio - 1).step_by(ratio).copied().collect(),
+        at_stage: vec![reach; s.horizon + 1],
+        within_stage: vec![reach; s.horizon],
         disturbance: Vector3::repeat(s.disturbance_bound),
         inertia,
         norm: 3.0_f64.sqrt() * s.disturbance_bound + inertia * s.limit_moment * input_of_moment,

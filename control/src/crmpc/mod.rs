@@ -153,7 +153,7 @@ impl Crmpc {
                 });
                 (problem(n, Start::Within(start), Some(terminal_root))?, None)
             }
-            InitialState::Measured => {
+            InitialState::Measured | InitialState::Nominal => {
                 let windows = Windows {
                     head: problem(HEAD, Start::Fixed, None)?,
                     middle: problem(MIDDLE, Start::Arrival, None)?,
@@ -211,23 +211,28 @@ impl Crmpc {
             self.shift(&mut memory.plan);
         }
 
-        self.unconstrained(measured);
+        let start = match self.settings.initial_state {
+            InitialState::Nominal if !first => memory.plan.states[0],
+            _ => measured,
+        };
+
+        self.unconstrained(start);
         let (mut status, mut iterations) = (Status::Unconstrained, 0);
         let violated = match self.settings.initial_state {
-            InitialState::Measured if self.exits => self.violated(0..0),
+            InitialState::Measured | InitialState::Nominal if self.exits => self.violated(0..0),
             _ => Some(0..self.settings.horizon),
         };
         if let Some(violated) = violated {
             let solved = if first {
-                self.constrained_first(measured, &violated, &mut iterations)
+                self.constrained_first(start, &violated, &mut iterations)
             } else {
-                self.constrained(&memory.plan, measured, &violated, &mut iterations)
+                self.constrained(&memory.plan, start, &violated, &mut iterations)
             };
             status = if solved { Status::Constrained } else { Status::Fallback };
         }
         if status == Status::Fallback {
             if first {
-                self.follow_terminal_law(&mut memory.plan, measured);
+                self.follow_terminal_law(&mut memory.plan, start);
             }
             memory.report.fallbacks += 1;
             for (k, error) in self.errors.iter_mut().enumerate() {
@@ -279,8 +284,8 @@ impl Crmpc {
         angles * gain.k1 + rates * gain.k2 + reference.accelerations
     }
 
-    fn follow_terminal_law(&self, plan: &mut Plan, measured: Vector6<f64>) {
-        plan.states[0] = measured;
+    fn follow_terminal_law(&self, plan: &mut Plan, start: Vector6<f64>) {
+        plan.states[0] = start;
         for k in 0..self.settings.horizon {
             plan.accelerations[k] = self.terminal_acceleration(&plan.states[k], &self.references[k]);
             plan.states[k + 1] =
@@ -289,12 +294,12 @@ impl Crmpc {
     }
 
     /// The optimum without constraints into `candidate` and `errors`.
-    fn unconstrained(&mut self, measured: Vector6<f64>) {
+    fn unconstrained(&mut self, start: Vector6<f64>) {
         let Self { lq, references, affine, errors, candidate, settings, .. } = self;
-        let start = measured - state(&references[0]);
+        let first = start - state(&references[0]);
         for (i, lq) in lq.iter_mut().enumerate() {
             let last = lq.solve(
-                axis(&start, i),
+                axis(&first, i),
                 |k| axis(&affine[k], i),
                 |k, error, v| {
                     errors[k][i] = error.x;
@@ -308,7 +313,7 @@ impl Crmpc {
         for (k, error) in errors.iter().enumerate() {
             candidate.states[k] = error + state(&references[k]);
         }
-        candidate.states[0] = measured;
+        candidate.states[0] = start;
     }
 
     /// The intervals, from the first to the last, in which `candidate` violates a constraint (exactly evaluated), where the
@@ -376,7 +381,7 @@ impl Crmpc {
     /// The first optimisation: linearised again about its own solution until that stands still.
     fn constrained_first(
         &mut self,
-        measured: Vector6<f64>,
+        start: Vector6<f64>,
         violated: &Range<usize>,
         iterations: &mut u32,
     ) -> bool {
@@ -384,7 +389,7 @@ impl Crmpc {
         let mut solved = true;
         for _ in 0..FIRST_PASSES {
             about.clone_from(&self.candidate);
-            solved = self.constrained(&about, measured, violated, iterations);
+            solved = self.constrained(&about, start, violated, iterations);
             if !solved || about.distance(&self.candidate) < FIRST_TOLERANCE {
                 break;
             }
@@ -397,17 +402,17 @@ impl Crmpc {
     fn constrained(
         &mut self,
         about: &Plan,
-        measured: Vector6<f64>,
+        start: Vector6<f64>,
         violated: &Range<usize>,
         iterations: &mut u32,
     ) -> bool {
-        self.linearise_balls(about, &measured);
-        self.in_window(measured, violated, iterations) || self.over_whole_horizon(measured, iterations)
+        self.linearise_balls(about, &start);
+        self.in_window(start, violated, iterations) || self.over_whole_horizon(start, iterations)
     }
 
     /// Solves only a window around the violated intervals, with arrival cost and cost-to-go for the rest of the horizon. If
     /// the rest then satisfies its constraints exactly, this is the optimum of the whole, as it is that of a relaxation.
-    fn in_window(&mut self, measured: Vector6<f64>, violated: &Range<usize>, iterations: &mut u32) -> bool {
+    fn in_window(&mut self, start: Vector6<f64>, violated: &Range<usize>, iterations: &mut u32) -> bool {
         let n = self.settings.horizon;
         let terminal_radius = self.terminal_radius();
         let Some(Windows { head, middle, tail }) = &mut self.windows else { return false };
@@ -424,7 +429,7 @@ impl Crmpc {
             return false;
         }
 
-        let start = measured - state(&self.references[0]);
+        let first = start - state(&self.references[0]);
         let affine = &self.affine;
         let mut arrival = AxisCosts::default();
         let mut to_go = AxisCosts::default();
@@ -432,12 +437,12 @@ impl Crmpc {
             to_go[i] = lq.cost_to_go(window.end);
             if window.start > 0 {
                 let (weight, centre) =
-                    lq.arrival_cost(window.start, axis(&start, i), |k| axis(&affine[k], i));
+                    lq.arrival_cost(window.start, axis(&first, i), |k| axis(&affine[k], i));
                 arrival[i] = (weight, -(weight * centre));
             }
         }
         let sample = Sample {
-            start,
+            start: first,
             arrival: &arrival,
             to_go: &to_go,
             affine: &affine[window.clone()],
@@ -462,14 +467,14 @@ impl Crmpc {
                 lq.follow(window.end, axis(&end, i), |k| axis(&affine[k], i), |k, error, _| set(k, error));
             set(n, last);
         }
-        self.plan_from_errors(measured);
+        self.plan_from_errors(start);
         let solved_for = window.start..window.end + usize::from(window.end == n);
         self.violated(solved_for).is_none()
     }
 
-    fn over_whole_horizon(&mut self, measured: Vector6<f64>, iterations: &mut u32) -> bool {
+    fn over_whole_horizon(&mut self, start: Vector6<f64>, iterations: &mut u32) -> bool {
         let sample = Sample {
-            start: measured - state(&self.references[0]),
+            start: start - state(&self.references[0]),
             arrival: &AxisCosts::default(),
             to_go: &self.design.g.map(|g| (g, Vector2::zeros())),
             affine: &self.affine,
@@ -480,17 +485,17 @@ impl Crmpc {
         let (solved, spent) = self.whole.solve(&sample, &mut self.errors);
         *iterations += spent;
         if solved {
-            self.plan_from_errors(measured);
+            self.plan_from_errors(start);
         }
         solved
     }
 
     /// `candidate` from `errors`, rolled out so that it is an exact motion of the nominal model.
-    fn plan_from_errors(&mut self, measured: Vector6<f64>) {
+    fn plan_from_errors(&mut self, start: Vector6<f64>) {
         let h = self.settings.period_optimisation;
         let plan = &mut self.candidate;
         plan.states[0] = match self.settings.initial_state {
-            InitialState::Measured => measured,
+            InitialState::Measured | InitialState::Nominal => start,
             InitialState::Tube => self.errors[0] + state(&self.references[0]),
         };
         for k in 0..self.settings.horizon {
@@ -501,11 +506,11 @@ impl Crmpc {
         }
     }
 
-    /// State and input balls of every stage, linearised about `about` with the measured state as its start.
-    fn linearise_balls(&mut self, about: &Plan, measured: &Vector6<f64>) {
+    /// State and input balls of every stage, linearised about `about` with `start` as its first state.
+    fn linearise_balls(&mut self, about: &Plan, start: &Vector6<f64>) {
         let n = self.settings.horizon;
         for k in 0..n {
-            let here_state = if k == 0 { measured } else { &about.states[k] };
+            let here_state = if k == 0 { start } else { &about.states[k] };
             let next_state = &about.states[k + 1];
             let a = &about.accelerations[k];
             let (angles, rates) = split(here_state);
