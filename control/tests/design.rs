@@ -49,6 +49,17 @@ fn published_terminal_weight_satisfies_15_with_equality() {
 }
 
 #[test]
+fn oracle_terminal_law_never_leaves_a_ball_in_the_norm_of_g_but_a_euclidean_one() {
+    // (12) and (14): d/dt ‖E‖²_G = Eᵀ (AᵀG + GA) E is never positive; d/dt ‖E‖² = Eᵀ (Aᵀ + A) E can be.
+    let settings = settings();
+    let a = Matrix2::new(0.0, 1.0, settings.terminal.k1, settings.terminal.k2);
+    for g in Design::new(&settings).unwrap().g {
+        assert!((a.transpose() * g + g * a).symmetric_eigenvalues().max() < 0.0);
+    }
+    assert!((a.transpose() + a).symmetric_eigenvalues().max() > 0.0);
+}
+
+#[test]
 fn published_bounds_of_lemma_1() {
     let (ours, printed) = (constants(&settings()), Published::crmpc2022());
     assert_eq!([printed.r0, printed.r1, printed.omega, printed.condition], [1.0846, 0.0873, 0.1511, 2.6094]);

@@ -107,6 +107,51 @@ fn exits_lead_to_the_optimum_of_the_whole_horizon() {
 }
 
 #[test]
+fn oracle_terminal_constraint_is_a_ball_in_the_norm_of_g() {
+    // Chai 2022, (12); the print has the index R, which is 3×3, where E has six components.
+    let mut controller = controller(Constraints::Paper);
+    let (g, paper) = (controller.design().g, controller.design().paper.unwrap());
+    let epsilon = paper.epsilon1.min(paper.epsilon2);
+    let Settings { horizon, period_optimisation, period_feedback, .. } = settings(Constraints::Paper);
+    let mut active = 0;
+    for sample in recorded(Constraints::Paper) {
+        let (memory, _) = sample.update(&mut controller);
+        let end = reference()(sample.tick as f64 * period_feedback + horizon as f64 * period_optimisation);
+        let state = memory.plan.states[horizon];
+        let axis = |i: usize| Vector2::new(state[i] - end.angles[i], state[3 + i] - end.rates[i]);
+        let norm = (0..3).map(|i| (g[i] * axis(i)).dot(&axis(i))).sum::<f64>().sqrt();
+        assert!(norm <= epsilon * (1.0 + 1e-6), "tick {}: {norm}", sample.tick);
+        active += usize::from(norm >= epsilon * (1.0 - 1e-6));
+    }
+    // While the jump is at the end of the horizon.
+    assert!(active >= 3, "{active}");
+}
+
+#[test]
+fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
+    // Chai 2022, (28): û = u + f(x), and (29): û^m = û* + K O_e; the print has B O_e, which has six components.
+    let mut controller = controller(Constraints::Robust);
+    let Settings { body, feedback, .. } = settings(Constraints::Robust);
+    for sample in recorded(Constraints::Robust).iter().step_by(10) {
+        let (mut memory, _) = sample.update(&mut controller);
+        let tick = sample.tick + 1;
+        let angles = sample.measured.angles + Vector3::new(0.01, -0.02, 0.03);
+        let rates = sample.measured.rates + Vector3::new(-0.02, 0.01, 0.005);
+        let time = tick as f64 * controller.period();
+        let moment = controller.update(&mut memory, tick, time, &Measurement { angles, rates }, &reference());
+
+        let r = kinematics::r(&angles);
+        let angle_rates = r * rates;
+        let input = r * body.inverse * moment + body.drift(&angles, &angle_rates);
+        let nominal = memory.nominal;
+        let (angle, rate) = (angles - nominal.fixed_rows::<3>(0), angle_rates - nominal.fixed_rows::<3>(3));
+        let expected = memory.plan.accelerations[0] + angle * feedback.k1 + rate * feedback.k2;
+        assert!((input - expected).norm() < 1e-13, "tick {tick}: {input} {expected}");
+        assert!(angle.norm() > 0.03, "tick {tick}: no deviation");
+    }
+}
+
+#[test]
 fn exits_change_nothing_along_a_run() {
     for constraints in [Constraints::Robust, Constraints::Paper] {
         let (mut with, mut without) = (controller(constraints), controller(constraints).without_exits());
