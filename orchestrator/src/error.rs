@@ -31,6 +31,14 @@ pub enum Error {
         /// The call and the unit's own words.
         failure: UnitFailure,
     },
+    /// A run of a study failed.
+    #[error("run {run}: {source}")]
+    Run {
+        /// Its id.
+        run: String,
+        /// What went wrong.
+        source: Box<Error>,
+    },
     /// A file or folder could not be read or written.
     #[error("{}: {source}", path.display())]
     File {
@@ -60,6 +68,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Experiment { .. } | Self::Fmu { .. } => 2,
+            Self::Run { source, .. } => source.exit_code(),
             Self::Unit { .. } | Self::File { .. } | Self::Output(_) => 1,
         }
     }

@@ -40,6 +40,7 @@
 
 use crate::error::Error;
 use crate::names;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -199,6 +200,17 @@ impl Source {
         }
         Error::Experiment { at, message: message.into() }
     }
+
+    /// Reads the text as TOML.
+    ///
+    /// # Errors
+    /// If it is none, or holds an unknown key.
+    pub fn read<T: DeserializeOwned>(&self) -> Result<T, Error> {
+        toml::from_str(&self.text).map_err(|error| {
+            let message = error.message().replace('\n', " ");
+            self.error(&error.span().map_or(0..0, |s| s.start..s.end.max(s.start + 1)), message)
+        })
+    }
 }
 
 impl Experiment {
@@ -218,10 +230,7 @@ impl Experiment {
     /// If it is no TOML, or holds an unknown key.
     pub fn parse(path: &Path, text: String) -> Result<Self, Error> {
         let source = Source { path: path.to_path_buf(), text };
-        let mut experiment: Self = toml::from_str(&source.text).map_err(|error| {
-            let message = error.message().replace('\n', " ");
-            source.error(&error.span().map_or(0..0, |s| s.start..s.end.max(s.start + 1)), message)
-        })?;
+        let mut experiment: Self = source.read()?;
         experiment.source = source;
         Ok(experiment)
     }
@@ -241,11 +250,7 @@ impl Experiment {
                 ))
             };
             let (target, value) = assignment.split_once('=').ok_or_else(malformed)?;
-            let (name, parameter) = names::split(target.trim()).ok_or_else(malformed)?;
-            let hint = names::hint(name, self.components.keys().map(String::as_str));
-            let component = self.components.get_mut(name).ok_or_else(|| {
-                Error::experiment(format!("--set {assignment}: there is no component \"{name}\"{hint}"))
-            })?;
+            names::split(target.trim()).ok_or_else(malformed)?;
             // What is no TOML value is text: an enumeration's item needs no quotes within quotes.
             let value = value.trim();
             let value = toml::from_str::<BTreeMap<String, Value>>(&format!("x = {value}"))
@@ -253,8 +258,23 @@ impl Experiment {
                 .filter(|table| table.len() == 1)
                 .and_then(|mut table| table.remove("x"))
                 .unwrap_or_else(|| Value::String(value.to_string()));
-            component.parameters.insert(parameter.to_string(), Spanned::new(0..0, value));
+            self.set(target.trim(), value)
+                .map_err(|message| Error::experiment(format!("--set {assignment}: {message}")))?;
         }
+        Ok(())
+    }
+
+    /// Sets `component.parameter`.
+    ///
+    /// # Errors
+    /// If there is no such component.
+    pub fn set(&mut self, target: &str, value: Value) -> Result<(), String> {
+        let (name, parameter) =
+            names::split(target).ok_or_else(|| format!("\"{target}\" is no component.parameter"))?;
+        let hint = names::hint(name, self.components.keys().map(String::as_str));
+        let component =
+            self.components.get_mut(name).ok_or_else(|| format!("there is no component \"{name}\"{hint}"))?;
+        component.parameters.insert(parameter.to_string(), Spanned::new(0..0, value));
         Ok(())
     }
 }

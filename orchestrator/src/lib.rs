@@ -5,6 +5,8 @@
 //! ([`fmu`], [`archive`], [`description`], [`quantity`]), [`master`] steps the units ([`unit`]) on integer ticks
 //! ([`clock`]), and observers look on: [`recorder`], [`metrics`], [`plot`], [`progress`]. [`report`] and [`sidecar`] tell
 //! what came of it.
+//!
+//! A [`study`] runs many experiments, draws [`figure`]s of them, and holds them against what a paper prints.
 
 pub mod archive;
 pub mod clock;
@@ -12,6 +14,7 @@ pub mod delay;
 pub mod description;
 pub mod error;
 pub mod experiment;
+pub mod figure;
 pub mod fmu;
 pub mod inspect;
 pub mod list;
@@ -26,5 +29,6 @@ pub mod report;
 pub mod run;
 pub mod settings;
 pub mod sidecar;
+pub mod study;
 pub mod unit;
 pub mod wiring;

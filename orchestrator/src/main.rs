@@ -4,6 +4,7 @@ use clap::{Parser, Subcommand};
 use orchestrator::error::Error;
 use orchestrator::experiment::{Experiment, Overrides};
 use orchestrator::run::{Options, Plan};
+use orchestrator::study::{Study, reproduce};
 use orchestrator::{inspect, list, report};
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::path::PathBuf;
@@ -35,6 +36,31 @@ enum Command {
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
         overrides: Overrides,
+        /// No progress and no summary.
+        #[arg(long)]
+        quiet: bool,
+    },
+    /// Run a paper's comparison and write report.html, with figures, tables and a verdict on each claim.
+    ///
+    /// What is finished is kept: after an interruption the same command goes on where it stopped.
+    Reproduce {
+        /// Study: a folder below orchestrator/experiments, a folder with a study.toml, or such a file.
+        study: PathBuf,
+        /// Folder for the results [default: out/<folder of the study>].
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// A further folder with FMUs, besides the study's own and target/fmu. May be given several times.
+        #[arg(long, value_name = "DIR")]
+        fmu_dir: Vec<PathBuf>,
+        /// Threads [default: one for each core].
+        #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+        jobs: usize,
+        /// At most so many values of the parameter that a run varies, for a quick look.
+        #[arg(long, value_name = "N")]
+        members: Option<u32>,
+        /// Run everything again, even what is finished.
+        #[arg(long)]
+        fresh: bool,
         /// No progress and no summary.
         #[arg(long)]
         quiet: bool,
@@ -87,6 +113,15 @@ fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
             let report = Plan::new(experiment, &fmu_dir)?.run(&Options { out: folder, quiet })?;
             if !quiet {
                 report::summary(&report, out)?;
+            }
+            Ok(())
+        }
+        Command::Reproduce { study, out: folder, fmu_dir, jobs, members, fresh, quiet } => {
+            let study = Study::load(&reproduce::find(&study)?)?;
+            let options = reproduce::Options { out: folder, fmu_dirs: fmu_dir, jobs, members, fresh, quiet };
+            let report = reproduce::reproduce(study, &options)?;
+            if !quiet {
+                report::reproduction(&report, out)?;
             }
             Ok(())
         }

@@ -5,7 +5,7 @@ use crate::experiment::Roles;
 use crate::master::{Observer, Sample};
 use crate::names;
 use crate::wiring::{Part, Port, find};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Variables that observers look at, each read once.
 #[derive(Default)]
@@ -113,7 +113,7 @@ fn unknown(role: &str, path: &str, parts: &[Part]) -> Error {
 }
 
 /// The figures of merit, as `metrics.json` has them; `None` (null) where the experiment has no such quantity.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
     /// √(mean of ‖Θ − Θ_r‖²) over the communication points before each step, deg.
     pub ems_deg: Option<f64>,
@@ -186,6 +186,11 @@ impl Merit {
         }
     }
 
+    /// Duration of each solution, s, in the order of time.
+    pub fn solver_seconds(&self) -> &[f64] {
+        &self.solver_seconds
+    }
+
     /// The figures of merit of what was seen. `wall` is the elapsed, `simulated` the simulated time, both s.
     pub fn metrics(&self, wall: f64, simulated: f64, loop_delay: Option<f64>) -> Metrics {
         let Places { attitude, reference, rate, moment, .. } = self.places;
@@ -218,7 +223,7 @@ impl Merit {
 }
 
 /// The larger value. Unlike `f64::max` it does not hide a value that is not a number.
-fn larger(a: f64, b: f64) -> f64 {
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::experiment::Coupling;
 use crate::run::Report;
+use crate::study::reproduce;
 use std::io::{self, Write};
 
 /// Prints the summary of a run.
@@ -89,6 +90,27 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
         line("real-time factor", format!("{factor:.1} ({:.3} s elapsed)", metrics.wall_s))?;
     }
     line("results", format!("{}: {}", report.out.display(), report.files.join(", ")))
+}
+
+/// Prints what a reproduction came to.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn reproduction(report: &reproduce::Report, out: &mut impl Write) -> io::Result<()> {
+    let (run, kept) = report.parts;
+    writeln!(out, "{}", report.title)?;
+    writeln!(
+        out,
+        "  {} runs in {} parts: {run} run now, {kept} kept from before; {:.1} s elapsed",
+        report.runs,
+        run + kept,
+        report.elapsed
+    )?;
+    for (claim, verdict) in &report.verdicts {
+        writeln!(out, "  {:<14} {claim}", verdict.text())?;
+    }
+    writeln!(out, "  report: {}", report.page.display())?;
+    writeln!(out, "  beside it: {}", report.files[1..].join("; "))
 }
 
 /// How a value stands against its limit.

@@ -52,6 +52,9 @@ pub struct Report {
     pub files: Vec<&'static str>,
 }
 
+/// Archives that are open, by path. Plans that share them unpack each only once.
+pub type Opened = BTreeMap<PathBuf, Rc<Fmu>>;
+
 /// An experiment with all names resolved: nothing of it can be wrong any more, except in the units themselves.
 pub struct Plan {
     /// The experiment.
@@ -81,12 +84,19 @@ impl Plan {
     /// # Errors
     /// Everything that is wrong with the experiment or with an FMU's archive.
     pub fn new(experiment: Experiment, fmu_dirs: &[PathBuf]) -> Result<Self, Error> {
+        Self::with(experiment, fmu_dirs, &mut Opened::default())
+    }
+
+    /// Resolves an experiment; archives that are in `opened` are not opened again.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with(experiment: Experiment, fmu_dirs: &[PathBuf], opened: &mut Opened) -> Result<Self, Error> {
         let simulation = &experiment.simulation;
         let clock = Clock::new(simulation.start, simulation.stop, simulation.step)
             .map_err(|message| experiment.source.error(&(0..0), format!("[simulation] {message}")))?;
         let order = order(&experiment)?;
 
-        let mut opened: BTreeMap<PathBuf, Rc<Fmu>> = BTreeMap::new();
         let mut fmus = Vec::new();
         for name in &order {
             let path = find_fmu(&experiment, name, fmu_dirs)?;
@@ -137,26 +147,17 @@ impl Plan {
         let stem = experiment.source.path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy());
         let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(stem.as_ref()));
 
-        let mut master = self.master()?;
-        master.initialize()?;
-        let limit = |port: Option<Port>, master: &mut Master| {
-            port.map(|port| master.read(&[port]).map(|values| values[0])).transpose()
-        };
-        let limits =
-            Limits { rate: limit(self.limits[0], &mut master)?, moment: limit(self.limits[1], &mut master)? };
+        let (mut master, limits) = self.initialized()?;
         let parameters = self.parameters(&mut master)?;
 
         fs::create_dir_all(&out).map_err(Error::file(&out))?;
         let columns: Vec<_> = self
             .columns
             .iter()
-            .filter_map(|column| {
-                let place = self.probes.ports.iter().position(|port| *port == column.port)?;
-                Some((column.name.as_str(), place, column.port.carrier))
-            })
+            .filter_map(|column| Some((column.name.as_str(), self.place(column.port)?, column.port.carrier)))
             .collect();
         let mut recorder = Recorder::create(&out.join("results.csv"), &columns, experiment.record.every)?;
-        let mut merit = Merit::new(self.places, limits, self.clock.ticks() + 1);
+        let mut merit = self.merit(limits);
         let mut curves = Curves::new(self.places, limits, self.clock.ticks());
         let mut progress = Progress::new(&experiment.title, self.clock.ticks(), options.quiet);
 
@@ -192,6 +193,31 @@ impl Plan {
             out,
             files,
         })
+    }
+
+    /// The units, initialized, and the limits that the experiment states.
+    ///
+    /// # Errors
+    /// What a unit said.
+    pub fn initialized(&self) -> Result<(Master, Limits), Error> {
+        let mut master = self.master()?;
+        master.initialize()?;
+        let limit = |port: Option<Port>, master: &mut Master| {
+            port.map(|port| master.read(&[port]).map(|values| values[0])).transpose()
+        };
+        let limits =
+            Limits { rate: limit(self.limits[0], &mut master)?, moment: limit(self.limits[1], &mut master)? };
+        Ok((master, limits))
+    }
+
+    /// Where a recorded variable stands among a sample's values.
+    pub fn place(&self, port: Port) -> Option<usize> {
+        self.probes.ports.iter().position(|known| *known == port)
+    }
+
+    /// An empty sum of the figures of merit.
+    pub fn merit(&self, limits: Limits) -> Merit {
+        Merit::new(self.places, limits, self.clock.ticks() + 1)
     }
 
     /// Instantiates the units and sets their parameters.

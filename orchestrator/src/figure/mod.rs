@@ -1,0 +1,202 @@
+//! A figure: panels of curves. Drawn as SVG ([`svg`]) and PNG ([`png`]) for papers, and to look around in ([`interactive`]).
+
+pub mod interactive;
+pub mod png;
+pub mod svg;
+
+use serde::Deserialize;
+
+/// Red, green, blue; written `#rrggbb`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub struct Color(pub u8, pub u8, pub u8);
+
+impl Color {
+    /// Of references, norms and the like.
+    pub const GREY: Self = Self(110, 110, 110);
+    /// Of limits.
+    pub const LIMIT: Self = Self(200, 0, 0);
+}
+
+impl TryFrom<String> for Color {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.is_ascii());
+        let part = |at: usize| digits.and_then(|digits| u8::from_str_radix(&digits[at..at + 2], 16).ok());
+        match (part(0), part(2), part(4)) {
+            (Some(r), Some(g), Some(b)) => Ok(Self(r, g, b)),
+            _ => Err(format!("\"{text}\" is no colour: write it as #rrggbb")),
+        }
+    }
+}
+
+impl std::fmt::Display for Color {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "#{:02x}{:02x}{:02x}", self.0, self.1, self.2)
+    }
+}
+
+/// Where the legend stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Legend {
+    /// One for all panels, above them.
+    Above,
+    /// One for each panel, to its right.
+    Beside,
+}
+
+/// Panels in rows.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// One line above everything.
+    pub title: String,
+    /// Panels side by side.
+    pub columns: usize,
+    /// Where the legend stands.
+    pub legend: Legend,
+    /// The panels, row by row.
+    pub panels: Vec<Panel>,
+}
+
+/// One pair of axes.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// A heading, or nothing.
+    pub title: String,
+    /// Label of the horizontal axis.
+    pub x_label: String,
+    /// Label of the vertical axis.
+    pub y_label: String,
+    /// Whether the horizontal axis is logarithmic.
+    pub log_x: bool,
+    /// The part of the horizontal axis to show at first.
+    pub x_range: Option<[f64; 2]>,
+    /// What is drawn, the first lowest.
+    pub curves: Vec<Curve>,
+}
+
+/// Points with the way they are drawn. Points that are not finite are gaps.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Name in the legend. Curves of one name are shown and hidden together.
+    pub name: String,
+    /// Its colour.
+    pub color: Color,
+    /// How it is drawn.
+    pub shape: Shape,
+    /// Along the horizontal axis.
+    pub x: Vec<f64>,
+    /// Along the vertical axis.
+    pub y: Vec<f64>,
+}
+
+/// How points are drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// A line.
+    Line,
+    /// A thin, pale line.
+    Pale,
+    /// A dashed line.
+    Dashed,
+    /// The area down to these values.
+    Band(Vec<f64>),
+    /// Columns: the value at x holds up to the next x.
+    Steps,
+    /// Dots.
+    Dots,
+    /// Large crosses.
+    Crosses,
+    /// A dashed line across the panel at the first y.
+    Horizontal,
+    /// A dashed line across the panel at the first x.
+    Vertical,
+}
+
+impl Panel {
+    /// Smallest and largest value along one axis, lines across the panel included; `None` without any finite value.
+    fn extent(&self, along_x: bool) -> Option<(f64, f64)> {
+        let across = if along_x { Shape::Horizontal } else { Shape::Vertical };
+        let within = |x: f64| self.x_range.is_none_or(|[low, high]| along_x || (low..=high).contains(&x));
+        let mut values = self
+            .curves
+            .iter()
+            .filter(|curve| curve.shape != across)
+            .flat_map(|curve| {
+                let lower = if let Shape::Band(lower) = &curve.shape { lower.as_slice() } else { &[] };
+                let inside = move |(x, v): (&f64, &f64)| {
+                    (curve.shape == Shape::Horizontal || within(*x)).then_some(*v)
+                };
+                let axis = if along_x { &curve.x } else { &curve.y };
+                let xs = if curve.shape == Shape::Horizontal { &curve.y } else { &curve.x };
+                let lower = if along_x { &[] } else { lower };
+                xs.iter().zip(axis).filter_map(inside).chain(lower.iter().copied())
+            })
+            .filter(|value| value.is_finite());
+        let first = values.next()?;
+        Some(values.fold((first, first), |(low, high), value| (low.min(value), high.max(value))))
+    }
+
+    /// The same with a margin, for drawing.
+    pub fn range(&self, along_x: bool) -> (f64, f64) {
+        if along_x && let Some([low, high]) = self.x_range {
+            return (low, high);
+        }
+        let Some((low, high)) = self.extent(along_x) else { return (0.0, 1.0) };
+        if along_x && self.log_x {
+            return (low / 1.3, high * 1.3);
+        }
+        // Time needs none.
+        let is_time = along_x && self.curves.iter().any(|c| matches!(c.shape, Shape::Line | Shape::Band(_)));
+        let margin = if is_time { 0.0 } else { 0.06 * (high - low).max(1e-9 * high.abs()).max(1e-12) };
+        let is_count = !along_x && self.curves.iter().any(|curve| curve.shape == Shape::Steps);
+        (if is_count { 0.0 } else { low - margin }, high + margin)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(shape: Shape, x: &[f64], y: &[f64]) -> Curve {
+        Curve { name: "c".into(), color: Color::GREY, shape, x: x.to_vec(), y: y.to_vec() }
+    }
+
+    fn panel(curves: Vec<Curve>) -> Panel {
+        Panel {
+            title: String::new(),
+            x_label: String::new(),
+            y_label: String::new(),
+            log_x: false,
+            x_range: None,
+            curves,
+        }
+    }
+
+    #[test]
+    fn a_colour_is_six_digits() {
+        assert_eq!(Color::try_from("#0a10ff".to_string()), Ok(Color(10, 16, 255)));
+        assert_eq!(Color(10, 16, 255).to_string(), "#0a10ff");
+        for text in ["0a10ff", "#0a10f", "#0a10fg", "#éé0"] {
+            assert!(Color::try_from(text.to_string()).unwrap_err().contains(text));
+        }
+    }
+
+    #[test]
+    fn lines_across_the_panel_widen_the_axis_they_cut_only() {
+        let panel = panel(vec![
+            curve(Shape::Line, &[0.0, 1.0], &[2.0, f64::NAN]),
+            curve(Shape::Band(vec![-1.0, 0.0]), &[0.0, 1.0], &[3.0, 4.0]),
+            curve(Shape::Horizontal, &[f64::NAN], &[9.0]),
+            curve(Shape::Vertical, &[5.0], &[f64::NAN]),
+        ]);
+        assert_eq!(panel.extent(true), Some((0.0, 5.0)));
+        assert_eq!(panel.extent(false), Some((-1.0, 9.0)));
+    }
+
+    #[test]
+    fn a_panel_without_values_has_a_range_all_the_same() {
+        assert_eq!(panel(Vec::new()).range(false), (0.0, 1.0));
+    }
+}

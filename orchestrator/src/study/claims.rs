@@ -1,0 +1,154 @@
+//! Whether a paper's claims hold in our runs.
+
+use super::results::{Numbers, Results, is_reference, resolve};
+use super::values::Quantity;
+use super::{Check, Claim, Relation, Study};
+use serde::Serialize;
+
+/// What becomes of a claim.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Every check holds for every member.
+    Holds,
+    /// Some do.
+    HoldsPartly,
+    /// None does.
+    DoesNotHold,
+}
+
+impl Verdict {
+    /// In words.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Holds => "holds",
+            Self::HoldsPartly => "holds partly",
+            Self::DoesNotHold => "does not hold",
+        }
+    }
+
+    fn of(held: usize, all: usize) -> Self {
+        match held {
+            0 => Self::DoesNotHold,
+            _ if held == all => Self::Holds,
+            _ => Self::HoldsPartly,
+        }
+    }
+}
+
+/// Outcome of a check.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checked {
+    /// Left numbers.
+    pub left: Numbers,
+    /// Right numbers.
+    pub right: Numbers,
+    /// (left − right)/right for each pair.
+    pub difference: Numbers,
+    /// What the paper's margin asks for, as a fraction.
+    pub by: Option<f64>,
+    /// Pairs for which the relation holds.
+    pub held: usize,
+}
+
+impl Checked {
+    /// The verdict of this check alone.
+    pub fn verdict(&self) -> Verdict {
+        Verdict::of(self.held, self.difference.0.len())
+    }
+}
+
+/// Outcome of a claim.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judged {
+    /// Over all checks.
+    pub verdict: Verdict,
+    /// Each check.
+    pub checks: Vec<Checked>,
+}
+
+/// Refuses checks that name what is not there, or compare runs that cannot be paired.
+///
+/// # Errors
+/// Says what is wrong.
+pub fn check(study: &Study) -> Result<(), String> {
+    for check in study.claims.iter().flat_map(|claim| &claim.checks) {
+        let members = |place: usize| study.runs[place].vary.as_ref().map_or(1, |vary| vary.count);
+        let (left, _) = resolve(study, &check.left)?;
+        if let Quantity::Named(name) = &check.right
+            && is_reference(study, &check.right)
+        {
+            let (right, _) = resolve(study, name)?;
+            if members(left) != members(right) && members(left) != 1 && members(right) != 1 {
+                return Err(format!(
+                    "check \"{}\": {} has {} members, {name} has {}: they cannot be paired",
+                    check.label,
+                    check.left,
+                    members(left),
+                    members(right)
+                ));
+            }
+        } else {
+            study.values.number(&check.right)?;
+        }
+        if let Some(by) = &check.by {
+            study.values.number(by)?;
+        }
+    }
+    Ok(())
+}
+
+/// Judges a claim.
+///
+/// # Errors
+/// If a check names what is not there, or a run has no such quantity.
+pub fn judge(claim: &Claim, results: &Results) -> Result<Judged, String> {
+    let checks = claim.checks.iter().map(|check| compare(check, results)).collect::<Result<Vec<_>, _>>()?;
+    let all = |verdict| checks.iter().all(|check| check.verdict() == verdict);
+    let verdict = if all(Verdict::Holds) {
+        Verdict::Holds
+    } else if all(Verdict::DoesNotHold) {
+        Verdict::DoesNotHold
+    } else {
+        Verdict::HoldsPartly
+    };
+    Ok(Judged { verdict, checks })
+}
+
+fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
+    let left = results.numbers(&check.left)?;
+    let right = results.quantity(&check.right)?;
+    let by = check.by.as_ref().map(|by| results.study.values.number(by)).transpose()?;
+    for (numbers, name) in [(&left, &check.left), (&right, &check.label)] {
+        if numbers.0.is_empty() {
+            return Err(format!("check \"{}\": {name} has no value", check.label));
+        }
+    }
+    let pairs = left.0.len().max(right.0.len());
+    let at = |numbers: &Numbers, k: usize| numbers.0[k % numbers.0.len()];
+    let difference: Vec<f64> = (0..pairs).map(|k| at(&left, k) / at(&right, k) - 1.0).collect();
+    let margin = by.unwrap_or(0.0);
+    let holds = |difference: &&f64| match check.relation {
+        Relation::Below => **difference <= -margin,
+        Relation::Above => **difference >= margin,
+    };
+    let held = difference.iter().filter(holds).count();
+    Ok(Checked { left, right, difference: Numbers(difference), by, held })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checked(held: usize, all: usize) -> Checked {
+        let one = Numbers(vec![1.0]);
+        Checked { left: one.clone(), right: one, difference: Numbers(vec![0.0; all]), by: None, held }
+    }
+
+    #[test]
+    fn a_check_holds_if_it_does_for_all_pairs() {
+        assert_eq!(checked(3, 3).verdict(), Verdict::Holds);
+        assert_eq!(checked(2, 3).verdict(), Verdict::HoldsPartly);
+        assert_eq!(checked(0, 3).verdict(), Verdict::DoesNotHold);
+    }
+}

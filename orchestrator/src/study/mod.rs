@@ -1,0 +1,597 @@
+//! A paper's comparison as data: which experiments are run, over which seeds; what is drawn and tabulated of them; what the
+//! paper prints; and what it claims. `orchestrator reproduce` runs it and writes the report.
+//!
+//! ```toml
+//! title = "…"
+//! paper = "…"                          # how to cite it
+//! summary = "…"                        # paragraphs, separated by an empty line
+//! values = ["published.toml"]          # files of [[value]], see [`values`]
+//!
+//! [[scenario]]
+//! what = "inertia"
+//! value = "…"
+//! source = "section 5.1"               # optional
+//!
+//! [[assumption]]
+//! silent = "what the paper leaves open"
+//! taken = "what is done here"
+//!
+//! [[run]]
+//! id = "lqr"
+//! label = "LQR"
+//! color = "#7f7f7f"
+//! experiment = "lqr.toml"              # beside this file
+//! set = { "plant.disturbance.kind" = "none" }
+//! vary = { parameter = "plant.disturbance.seed", first = 1, count = 20 }   # optional: one run for each value
+//! timed = true                         # its first run has the machine for itself
+//! within = ["tube"]                    # bounds that it is held against
+//!
+//! [signals]                            # lists of signals, see [`signal`]
+//! deviation = ["plant.attitude.alpha - controller.nominal.alpha"]
+//!
+//! [[within]]                           # how often, and by how much, signals are within a bound
+//! id = "tube"
+//! signals = "deviation"
+//! bound = "tube.printed"               # a value, or a number
+//!
+//! [[figure]]
+//! id = "fig-4"                         # name of its files
+//! title = "…"
+//! caption = "…"
+//! columns = 2
+//! runs = ["lqr"]
+//!
+//! [[figure.panel]]
+//! label = "roll rate p, deg/s"
+//! signal = "plant.rate.p"              # one curve for each run; or: signals = [{ of = "…", label = "…", color = "…" }]
+//! reference = "controller.reference.p" # drawn once, of the first run
+//! spread = true                        # the band of all values of `vary`, not the first run alone
+//! bounds = [{ at = 5.0, label = "limit", symmetric = true }]    # horizontal lines
+//! marks = [{ at = "time.printed", label = "printed mean" }]     # vertical lines
+//! unit = { name = "kN m", factor = 1e-3 }                       # instead of the FMU's display unit
+//! # instead of signal: histogram = "solver_ms"  or  scatter = { x = "ems_deg", y = "cms" } with points = […]
+//!
+//! [[table]]
+//! id = "table-1"
+//! title = "…"
+//!
+//! [[table.row]]
+//! label = "EMS of LQR, deg"
+//! paper = "ems.lqr"                    # optional
+//! ours = "lqr.ems_deg"                 # run.metric
+//!
+//! [[overview]]                         # all runs against metrics
+//! title = "…"
+//! runs = ["lqr"]
+//! metrics = [{ of = "ems_deg", label = "EMS, deg" }]
+//!
+//! [[claim]]
+//! says = "in our words, what the paper claims"
+//! source = "section 5.2"
+//!
+//! [[claim.check]]
+//! label = "with noise"
+//! left = "crmpc.cms"                   # run.metric
+//! relation = "below"                   # or "above"
+//! right = "dlmpc.cms"                  # run.metric, a value, or a number
+//! by = 0.34                            # optional: by at least this fraction
+//! ```
+
+pub mod claims;
+pub mod figures;
+pub mod page;
+pub mod part;
+pub mod reproduce;
+pub mod results;
+pub mod signal;
+pub mod values;
+
+use crate::error::Error;
+use crate::experiment::{Experiment, Source};
+use crate::figure::Color;
+use crate::names;
+use serde::{Deserialize, Serialize};
+use signal::Signal;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use toml::{Spanned, Value};
+use values::{Quantity, Values};
+
+/// A study as it is written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Study {
+    /// One line.
+    pub title: String,
+    /// How to cite the paper.
+    pub paper: String,
+    /// Paragraphs, separated by an empty line.
+    pub summary: String,
+    /// Files of published and computed values, beside the study.
+    #[serde(rename = "values")]
+    pub value_files: Vec<PathBuf>,
+    /// The scenario.
+    #[serde(default, rename = "scenario")]
+    pub scenario: Vec<Fact>,
+    /// What the paper leaves open.
+    #[serde(default, rename = "assumption")]
+    pub assumptions: Vec<Assumption>,
+    /// What is run.
+    #[serde(rename = "run")]
+    pub runs: Vec<Run>,
+    /// Lists of signals, by name.
+    #[serde(default)]
+    pub signals: BTreeMap<String, Vec<Signal>>,
+    /// Bounds that runs are held against.
+    #[serde(default)]
+    pub within: Vec<Within>,
+    /// What is drawn.
+    #[serde(default, rename = "figure")]
+    pub figures: Vec<Figure>,
+    /// Paper against ours.
+    #[serde(default, rename = "table")]
+    pub tables: Vec<Table>,
+    /// Runs against metrics.
+    #[serde(default, rename = "overview")]
+    pub overviews: Vec<Overview>,
+    /// What the paper claims.
+    #[serde(default, rename = "claim")]
+    pub claims: Vec<Claim>,
+    /// The values of the files.
+    #[serde(skip)]
+    pub values: Values,
+    /// The file and its text.
+    #[serde(skip)]
+    pub source: Source,
+}
+
+/// One line of the scenario.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fact {
+    /// What it is.
+    pub what: String,
+    /// Its value, with unit.
+    pub value: String,
+    /// Where it comes from.
+    #[serde(default)]
+    pub source: String,
+}
+
+/// A gap in the paper, and what fills it here.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Assumption {
+    /// What the paper does not say.
+    pub silent: String,
+    /// What is taken instead.
+    pub taken: String,
+}
+
+/// An experiment that is run, once or for several values of a parameter.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// Short name.
+    pub id: Spanned<String>,
+    /// Name in legends and tables.
+    pub label: String,
+    /// Colour of its curves.
+    pub color: Color,
+    /// Experiment file, beside the study.
+    pub experiment: PathBuf,
+    /// Parameters that differ from the experiment's.
+    #[serde(default)]
+    pub set: BTreeMap<String, Value>,
+    /// A parameter that takes several values.
+    pub vary: Option<Vary>,
+    /// Whether its first run has the machine for itself.
+    #[serde(default)]
+    pub timed: bool,
+    /// Bounds that it is held against, by id.
+    #[serde(default)]
+    pub within: Vec<Spanned<String>>,
+}
+
+/// Values `first`, `first` + 1, … of a parameter.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Vary {
+    /// `component.parameter`.
+    pub parameter: String,
+    /// The first value.
+    pub first: i32,
+    /// How many.
+    pub count: u32,
+}
+
+/// A bound on the magnitude of signals.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Within {
+    /// Short name.
+    pub id: String,
+    /// A list of signals: all of them must be within the bound for a sample to count.
+    pub signals: Spanned<String>,
+    /// The bound.
+    pub bound: Quantity,
+}
+
+/// A figure with its panels.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Figure {
+    /// Name of its files.
+    pub id: String,
+    /// One line.
+    pub title: String,
+    /// What there is to see.
+    #[serde(default)]
+    pub caption: String,
+    /// Panels side by side.
+    #[serde(default = "one")]
+    pub columns: usize,
+    /// Whose curves are drawn.
+    #[serde(default)]
+    pub runs: Vec<Spanned<String>>,
+    /// The panels, row by row.
+    #[serde(rename = "panel")]
+    pub panels: Vec<Panel>,
+}
+
+fn one() -> usize {
+    1
+}
+
+/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram` and `scatter` says what is drawn.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Panel {
+    /// Label of the vertical axis.
+    pub label: String,
+    /// A heading above it.
+    #[serde(default)]
+    pub title: String,
+    /// Instead of the figure's.
+    pub runs: Option<Vec<Spanned<String>>>,
+    /// One curve for each run.
+    pub signal: Option<Signal>,
+    /// Several curves for each run.
+    #[serde(default)]
+    pub signals: Vec<Curve>,
+    /// Drawn once, of the first run.
+    pub reference: Option<Signal>,
+    /// Whether the band of all values of `vary` is drawn.
+    #[serde(default)]
+    pub spread: bool,
+    /// Whether the panel shows a histogram of the durations of the solver's solutions, over a logarithmic axis.
+    pub histogram: Option<Histogram>,
+    /// One dot for each value of `vary`.
+    pub scatter: Option<Scatter>,
+    /// Horizontal lines.
+    #[serde(default)]
+    pub bounds: Vec<Line>,
+    /// Vertical lines.
+    #[serde(default)]
+    pub marks: Vec<Line>,
+    /// Single points of a scatter.
+    #[serde(default)]
+    pub points: Vec<Point>,
+    /// Instead of the FMU's display unit.
+    pub unit: Option<Scaled>,
+    /// Part of the time axis, s.
+    pub time: Option<[f64; 2]>,
+}
+
+/// A curve of its own name and colour.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Curve {
+    /// What is drawn.
+    pub of: Signal,
+    /// Name in the legend.
+    pub label: String,
+    /// Its colour.
+    pub color: Color,
+}
+
+/// What is counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+pub enum Histogram {
+    /// Duration of each solution, ms.
+    #[serde(rename = "solver_ms")]
+    SolverMs,
+}
+
+/// Metrics against each other.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scatter {
+    /// Metric along the horizontal axis.
+    pub x: String,
+    /// Its label.
+    pub x_label: String,
+    /// Metric along the vertical axis.
+    pub y: String,
+}
+
+/// A straight line across a panel.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Line {
+    /// Where.
+    pub at: Quantity,
+    /// Name in the legend.
+    pub label: String,
+    /// Its colour.
+    #[serde(default)]
+    pub color: Option<Color>,
+    /// Whether it is drawn at the negative value too.
+    #[serde(default)]
+    pub symmetric: bool,
+}
+
+/// A single point.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Point {
+    /// Along the horizontal axis.
+    pub x: Quantity,
+    /// Along the vertical axis.
+    pub y: Quantity,
+    /// Name in the legend.
+    pub label: String,
+    /// Its colour.
+    pub color: Color,
+}
+
+/// A unit made of another.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scaled {
+    /// Its name.
+    pub name: String,
+    /// Its value for a value of 1.
+    pub factor: f64,
+}
+
+/// Paper against ours.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Table {
+    /// One line.
+    pub title: String,
+    /// What there is to know.
+    #[serde(default)]
+    pub note: String,
+    /// The rows.
+    #[serde(rename = "row")]
+    pub rows: Vec<Row>,
+}
+
+/// One quantity.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    /// What it is, with unit.
+    pub label: String,
+    /// The value to compare with.
+    pub paper: Option<Quantity>,
+    /// `run.metric`.
+    pub ours: String,
+    /// Beside the numbers.
+    #[serde(default)]
+    pub note: String,
+}
+
+/// Runs against metrics.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Overview {
+    /// One line.
+    pub title: String,
+    /// What there is to know.
+    #[serde(default)]
+    pub note: String,
+    /// The rows.
+    pub runs: Vec<Spanned<String>>,
+    /// The columns.
+    pub metrics: Vec<Column>,
+}
+
+/// A column of an overview.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Column {
+    /// The metric.
+    pub of: String,
+    /// Its heading, with unit.
+    pub label: String,
+}
+
+/// A claim of the paper with the checks that decide on it.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Claim {
+    /// What the paper claims, in our words.
+    pub says: String,
+    /// Where it does.
+    pub source: String,
+    /// Why it comes out as it does.
+    #[serde(default)]
+    pub remark: String,
+    /// What decides.
+    #[serde(rename = "check")]
+    pub checks: Vec<Check>,
+}
+
+/// A comparison of two numbers, for each value of `vary`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Check {
+    /// Under which circumstances.
+    pub label: String,
+    /// `run.metric`.
+    pub left: String,
+    /// How the left stands to the right.
+    pub relation: Relation,
+    /// `run.metric`, a value, or a number.
+    pub right: Quantity,
+    /// By at least this fraction of the right.
+    pub by: Option<Quantity>,
+}
+
+/// How the left of a check stands to its right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Relation {
+    /// Not above it.
+    Below,
+    /// Not below it.
+    Above,
+}
+
+impl Study {
+    /// Reads a study and its files of values.
+    ///
+    /// # Errors
+    /// If a file cannot be read, is no TOML, or names what is not there.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| Error::experiment(format!("{}: {source}", path.display())))?;
+        let source = Source { path: path.to_path_buf(), text };
+        let mut study: Self = source.read()?;
+        study.source = source;
+        for file in &study.value_files {
+            study.values.load(&study.beside(file))?;
+        }
+        study.check()?;
+        Ok(study)
+    }
+
+    /// A file beside the study.
+    pub fn beside(&self, file: &Path) -> PathBuf {
+        self.source.path.parent().unwrap_or_else(|| Path::new(".")).join(file)
+    }
+
+    /// The run with this id.
+    pub fn run(&self, id: &str) -> Option<&Run> {
+        self.runs.iter().find(|run| run.id.get_ref() == id)
+    }
+
+    /// The runs whose curves a panel shows.
+    pub fn runs_of<'a>(&'a self, figure: &'a Figure, panel: &'a Panel) -> impl Iterator<Item = &'a Run> {
+        let ids = panel.runs.as_ref().unwrap_or(&figure.runs);
+        ids.iter().filter_map(|id| self.run(id.get_ref()))
+    }
+
+    /// The bounds that a run is held against, each with its signals.
+    pub fn bounds_of<'a>(&'a self, run: &'a Run) -> impl Iterator<Item = (&'a Within, &'a [Signal])> {
+        let named = |id: &Spanned<String>| self.within.iter().find(|within| within.id == *id.get_ref());
+        run.within.iter().filter_map(named).map(|within| {
+            (within, self.signals.get(within.signals.get_ref()).map(Vec::as_slice).unwrap_or_default())
+        })
+    }
+
+    /// A number as it is written, or the value it names.
+    ///
+    /// # Errors
+    /// If there is no such value.
+    pub fn number(&self, quantity: &Quantity) -> Result<f64, Error> {
+        self.values.number(quantity).map_err(|message| self.source.error(&(0..0), message))
+    }
+
+    /// The experiment of a run, with what the run sets, and recording exactly `paths`.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn experiment(&self, run: &Run, paths: &[&str]) -> Result<Experiment, Error> {
+        let mut experiment = Experiment::load(&self.beside(&run.experiment))?;
+        for (target, value) in &run.set {
+            experiment.set(target, value.clone()).map_err(|message| {
+                self.source.error(&run.id.span(), format!("[[run]] {}: {message}", run.id.get_ref()))
+            })?;
+        }
+        experiment.record.every = 1;
+        experiment.record.variables =
+            paths.iter().map(|path| Spanned::new(0..0, (*path).to_string())).collect();
+        Ok(experiment)
+    }
+
+    /// Everything that can be wrong without running anything.
+    fn check(&self) -> Result<(), Error> {
+        let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
+        for (place, run) in self.runs.iter().enumerate() {
+            let id = run.id.get_ref();
+            let fault = |message: &str| {
+                Err(self.source.error(&run.id.span(), format!("[[run]] id = \"{id}\": {message}")))
+            };
+            if id.is_empty() || !id.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
+                return fault("letters, digits and - only");
+            }
+            if ids[..place].contains(&id.as_str()) {
+                return fault("there is another run of that id");
+            }
+            if run.vary.as_ref().is_some_and(|vary| vary.count == 0) {
+                return fault("vary.count = 0: at least 1");
+            }
+            for within in &run.within {
+                if !self.within.iter().any(|known| known.id == *within.get_ref()) {
+                    let hint = names::hint(within.get_ref(), self.within.iter().map(|w| w.id.as_str()));
+                    let message = format!("there is no [[within]] \"{}\"{hint}", within.get_ref());
+                    return Err(self.source.error(&within.span(), message));
+                }
+            }
+        }
+        for within in &self.within {
+            self.number(&within.bound)?;
+            let list = within.signals.get_ref();
+            if !self.signals.contains_key(list) {
+                let hint = names::hint(list, self.signals.keys().map(String::as_str));
+                let message = format!("[signals] has no \"{list}\"{hint}");
+                return Err(self.source.error(&within.signals.span(), message));
+            }
+        }
+        let known = |id: &Spanned<String>| {
+            if ids.contains(&id.get_ref().as_str()) {
+                return Ok(());
+            }
+            let hint = names::hint(id.get_ref(), ids.iter().copied());
+            Err(self.source.error(&id.span(), format!("there is no run \"{}\"{hint}", id.get_ref())))
+        };
+        for figure in &self.figures {
+            figure.runs.iter().try_for_each(known)?;
+            for panel in &figure.panels {
+                panel.runs.iter().flatten().try_for_each(known)?;
+                let drawn = [
+                    panel.signal.is_some(),
+                    !panel.signals.is_empty(),
+                    panel.histogram.is_some(),
+                    panel.scatter.is_some(),
+                ];
+                if drawn.iter().filter(|is| **is).count() != 1 {
+                    return Err(self.source.error(
+                        &(0..0),
+                        format!(
+                            "[[figure]] id = \"{}\", panel \"{}\": exactly one of signal, signals, histogram, scatter",
+                            figure.id, panel.label
+                        ),
+                    ));
+                }
+                let lines = panel.bounds.iter().chain(&panel.marks).map(|line| &line.at);
+                let points = panel.points.iter().flat_map(|point| [&point.x, &point.y]);
+                for quantity in lines.chain(points) {
+                    self.number(quantity)?;
+                }
+            }
+        }
+        for overview in &self.overviews {
+            overview.runs.iter().try_for_each(known)?;
+        }
+        for quantity in self.tables.iter().flat_map(|table| &table.rows).filter_map(|row| row.paper.as_ref())
+        {
+            self.number(quantity)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,391 @@
+//! The report as one HTML page that needs nothing but itself.
+
+use super::claims::{Checked, Judged, Verdict};
+use super::results::{Numbers, Results};
+use super::values::{Quantity, ValueKind};
+use super::{Check, Claim, Overview, Relation, Row, Table};
+use crate::figure::{self, interactive};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// Writes the page. `judged` belongs to the study's claims, `drawn` to its figures.
+///
+/// # Errors
+/// If the study names what is not there.
+pub fn page(results: &Results, judged: &[Judged], drawn: &[figure::Figure]) -> Result<String, String> {
+    let study = results.study;
+    let runs: usize = results.runs.iter().map(|run| run.members.len()).sum();
+    let claims = study.claims.iter().zip(judged).map(|(c, j)| claim(c, j)).collect::<Vec<_>>();
+    let tables = study.tables.iter().map(|t| table(t, results)).collect::<Result<Vec<_>, _>>()?;
+    let overviews = study.overviews.iter().map(|o| overview(o, results)).collect::<Result<Vec<_>, _>>()?;
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (study.title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                header {
+                    h1 { (study.title) }
+                    p.paper { (study.paper) }
+                    nav {
+                        a href="#claims" { "Claims" } " "
+                        a href="#tables" { "Tables" } " "
+                        a href="#figures" { "Figures" } " "
+                        a href="#scenario" { "Scenario" } " "
+                        a href="#assumptions" { "Assumptions" } " "
+                        a href="#origin" { "Origin" }
+                    }
+                }
+                main {
+                    @for paragraph in paragraphs(&study.summary) { p { (paragraph) } }
+                    section id="claims" {
+                        h2 { "What the paper claims, and what came out" }
+                        table.claims {
+                            thead { tr { th { "Claim" } th { "Verdict" } th { "Because" } } }
+                            tbody { @for row in &claims { (row) } }
+                        }
+                        p.note {
+                            "A number with a range in brackets is a mean over several runs, with the smallest and the "
+                            "largest. Differences are taken run by run, between runs with the same disturbance."
+                        }
+                    }
+                    section id="tables" {
+                        h2 { "Numbers" }
+                        @for table in &tables { (table) }
+                        @for overview in &overviews { (overview) }
+                    }
+                    (plots(results, drawn))
+                    (scenario(results))
+                    section id="origin" {
+                        h2 { "Origin of the numbers" }
+                        p {
+                            (runs) " runs of FMUs, by orchestrator " (env!("CARGO_PKG_VERSION")) ". All numbers of this page are in "
+                            code { "results.json" } ", signals of each first run in " code { "runs" }
+                            ". Everything but the times repeats bit for bit."
+                        }
+                        (all_runs(results))
+                        h3 { "Values that are compared with" }
+                        (all_values(results))
+                    }
+                }
+                script { (PreEscaped(interactive::library())) }
+                @for (figure, picture) in study.figures.iter().zip(drawn) {
+                    (plot(&figure.id, picture))
+                }
+                script { (PreEscaped(SCRIPT)) }
+            }
+        }
+    };
+    Ok(markup.into_string())
+}
+
+/// The figures' places on the page.
+fn plots(results: &Results, drawn: &[figure::Figure]) -> Markup {
+    html! {
+        section id="figures" {
+            h2 { "Figures" }
+            p.note {
+                "Drag to zoom, double-click to see everything again. A click on a name in a legend hides the curve, a double-click "
+                "hides all others. Each figure stands as SVG and PNG in the folder " code { "figures" } " beside this page."
+            }
+            @for (figure, picture) in results.study.figures.iter().zip(drawn) {
+                figure id=(figure.id) {
+                    h3 { (figure.title) }
+                    div.plot id=(format!("plot-{}", figure.id)) style=(format!("height:{}px", interactive::height(picture))) {}
+                    figcaption {
+                        (figure.caption) " "
+                        a href=(format!("figures/{}.svg", figure.id)) { "SVG" } ", "
+                        a href=(format!("figures/{}.png", figure.id)) { "PNG" }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The scenario, and what the paper leaves open.
+fn scenario(results: &Results) -> Markup {
+    html! {
+        section id="scenario" {
+            h2 { "Scenario" }
+            table {
+                thead { tr { th { "What" } th { "Value" } th { "Source" } } }
+                tbody {
+                    @for fact in &results.study.scenario {
+                        tr { td { (fact.what) } td { (fact.value) } td { (fact.source) } }
+                    }
+                }
+            }
+        }
+        section id="assumptions" {
+            h2 { "Where the paper is silent, or cannot be meant as it stands" }
+            table {
+                thead { tr { th { "Open in the paper" } th { "Taken here" } } }
+                tbody {
+                    @for assumption in &results.study.assumptions {
+                        tr { td { (assumption.silent) } td { (assumption.taken) } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn paragraphs(text: &str) -> impl Iterator<Item = &str> {
+    text.split("\n\n").map(str::trim).filter(|paragraph| !paragraph.is_empty())
+}
+
+/// The data of a plot, for the page's script.
+fn plot(id: &str, picture: &figure::Figure) -> Markup {
+    let (data, layout) = interactive::plot(picture);
+    // In JSON a slash may be escaped; so no text of a figure can end the element.
+    let text = serde_json::json!({ "data": data, "layout": layout }).to_string().replace("</", "<\\/");
+    html! { script type="application/json" class="figure" data-plot=(format!("plot-{id}")) { (PreEscaped(text)) } }
+}
+
+fn claim(claim: &Claim, judged: &Judged) -> Markup {
+    html! {
+        tr {
+            td { (claim.says) " " span.source { "(" (claim.source) ")" } }
+            td { span class=(class(judged.verdict)) { (judged.verdict.text()) } }
+            td {
+                ul { @for (check, checked) in claim.checks.iter().zip(&judged.checks) { li { (because(check, checked)) } } }
+                @if !claim.remark.is_empty() { p.remark { (claim.remark) } }
+            }
+        }
+    }
+}
+
+fn class(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Holds => "verdict holds",
+        Verdict::HoldsPartly => "verdict partly",
+        Verdict::DoesNotHold => "verdict not",
+    }
+}
+
+fn because(check: &Check, checked: &Checked) -> Markup {
+    let (held, all) = (checked.held, checked.difference.0.len());
+    let asked = match (check.relation, checked.by) {
+        (Relation::Below, None) => "not above".to_string(),
+        (Relation::Above, None) => "not below".to_string(),
+        (Relation::Below, Some(by)) => format!("at least {} % below", shown(100.0 * by)),
+        (Relation::Above, Some(by)) => format!("at least {} % above", shown(100.0 * by)),
+    };
+    let count = if all > 1 { format!(", in {held} of {all} runs") } else { String::new() };
+    html! {
+        span class=(class(checked.verdict())) { (checked.verdict().text()) } " "
+        (check.label) ": " (several(&checked.left)) " against " (several(&checked.right))
+        " (" (percent(&checked.difference)) "; asked: " (asked) (count) ")"
+    }
+}
+
+fn table(table: &Table, results: &Results) -> Result<Markup, String> {
+    let rows = table.rows.iter().map(|r| row(r, results)).collect::<Result<Vec<_>, _>>()?;
+    Ok(html! {
+        h3 { (table.title) }
+        table.numbers {
+            thead { tr { th { "Quantity" } th { "Paper" } th { "Ours" } th { "Difference" } th { "" } } }
+            tbody { @for row in rows { (row) } }
+        }
+        @if !table.note.is_empty() { p.note { (table.note) } }
+    })
+}
+
+fn row(row: &Row, results: &Results) -> Result<Markup, String> {
+    let ours = results.numbers(&row.ours)?;
+    let paper = row.paper.as_ref().map(|paper| results.study.values.number(paper)).transpose()?;
+    let origin = match &row.paper {
+        Some(Quantity::Named(id)) => results.study.values.find(id).map(|value| value.source.as_str()),
+        _ => None,
+    };
+    let difference = paper.map(|paper| {
+        let absolute = ours.mean() - paper;
+        format!("{} ({})", signed(absolute), percent(&Numbers(vec![ours.mean() / paper - 1.0])))
+    });
+    Ok(html! {
+        tr {
+            td { (row.label) }
+            td title=[origin] { @match paper { Some(paper) => (shown(paper)), None => "–" } }
+            td { (several(&ours)) }
+            td { (difference.as_deref().unwrap_or("–")) }
+            td.remark { (row.note) }
+        }
+    })
+}
+
+fn overview(overview: &Overview, results: &Results) -> Result<Markup, String> {
+    let mut rows = Vec::new();
+    for id in &overview.runs {
+        let Some(run) = results.study.run(id.get_ref()) else { continue };
+        let numbers = overview
+            .metrics
+            .iter()
+            .map(|column| results.numbers(&format!("{}.{}", id.get_ref(), column.of)))
+            .collect::<Result<Vec<_>, _>>()?;
+        rows.push((run, numbers));
+    }
+    Ok(html! {
+        h3 { (overview.title) }
+        table.numbers {
+            thead { tr { th { "" } @for column in &overview.metrics { th { (column.label) } } } }
+            tbody {
+                @for (run, numbers) in rows {
+                    tr {
+                        td { span.swatch style=(format!("background:{}", run.color)) {} " " (run.label) }
+                        @for numbers in numbers { td { (several(&numbers)) } }
+                    }
+                }
+            }
+        }
+        @if !overview.note.is_empty() { p.note { (overview.note) } }
+    })
+}
+
+fn all_runs(results: &Results) -> Markup {
+    html! {
+        table {
+            thead { tr { th { "Run" } th { "Experiment" } th { "With" } th { "Runs" } } }
+            tbody {
+                @for (run, result) in results.study.runs.iter().zip(&results.runs) {
+                    tr {
+                        td { span.swatch style=(format!("background:{}", run.color)) {} " " (run.label) }
+                        td { code { (run.experiment.display()) } }
+                        td {
+                            @for (name, value) in &run.set { code { (name) " = " (value) } " " }
+                            @if let Some(vary) = &run.vary {
+                                code { (vary.parameter) " = " (vary.first) "…" (i64::from(vary.first) + i64::from(vary.count) - 1) }
+                            }
+                        }
+                        td { (result.members.len()) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn all_values(results: &Results) -> Markup {
+    let kind = |kind| match kind {
+        ValueKind::Table => "table",
+        ValueKind::Text => "text",
+        ValueKind::Figure => "read off a figure",
+        ValueKind::Computed => "computed",
+    };
+    html! {
+        table {
+            thead { tr { th { "Value" } th { "" } th { "Kind" } th { "Source" } } }
+            tbody {
+                @for value in &results.study.values.0 {
+                    tr {
+                        td { code { (value.id) } }
+                        td { (shown(value.value)) " " (value.unit) }
+                        td { (kind(value.kind)) }
+                        td { (value.source) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A number in as many digits as papers print.
+fn shown(value: f64) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 {
+        "0".into()
+    } else if !value.is_finite() {
+        value.to_string()
+    } else if !(1e-3..1e5).contains(&magnitude) {
+        format!("{value:.3e}")
+    } else {
+        let digits = (4 - magnitude.log10().floor() as i32).clamp(0, 6) as usize;
+        let text = format!("{value:.digits$}");
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+    }
+}
+
+fn signed(value: f64) -> String {
+    let sign = if value < 0.0 { "−" } else { "+" };
+    format!("{sign}{}", shown(value.abs()))
+}
+
+fn several(numbers: &Numbers) -> String {
+    if numbers.0.is_empty() {
+        return "–".into();
+    }
+    let mean = shown(numbers.mean());
+    if !numbers.vary() {
+        return mean;
+    }
+    let (low, high) = numbers.extent();
+    format!("{mean} [{}, {}]", shown(low), shown(high))
+}
+
+/// Fractions as differences in per cent.
+fn percent(fractions: &Numbers) -> String {
+    let one = |fraction: f64| {
+        let percent = 100.0 * fraction;
+        let sign = if percent < 0.0 { "−" } else { "+" };
+        format!("{sign}{:.1}", percent.abs())
+    };
+    if fractions.vary() {
+        let (low, high) = fractions.extent();
+        format!("{} % [{}, {}]", one(fractions.mean()), one(low), one(high))
+    } else {
+        format!("{} %", one(fractions.mean()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_shown_as_papers_print_them() {
+        for (value, text) in [
+            (1.6055, "1.6055"),
+            (0.3552, "0.3552"),
+            (116.8, "116.8"),
+            (12_345.6, "12346"),
+            (2e-5, "2.000e-5"),
+            (-0.0123, "-0.0123"),
+            (100.0, "100"),
+        ] {
+            assert_eq!(shown(value), text);
+        }
+    }
+
+    #[test]
+    fn several_numbers_show_their_mean_and_extent() {
+        assert_eq!(several(&Numbers(vec![1.0, 1.0])), "1");
+        assert_eq!(several(&Numbers(vec![1.0, 2.0])), "1.5 [1, 2]");
+        assert_eq!(several(&Numbers(Vec::new())), "–");
+        assert_eq!(percent(&Numbers(vec![-0.342])), "−34.2 %");
+    }
+
+    #[test]
+    fn text_of_a_figure_cannot_end_the_script_element() {
+        let picture = figure::Figure {
+            title: String::new(),
+            columns: 1,
+            legend: figure::Legend::Above,
+            panels: vec![figure::Panel {
+                title: "</script><b>".into(),
+                x_label: String::new(),
+                y_label: String::new(),
+                log_x: false,
+                x_range: None,
+                curves: Vec::new(),
+            }],
+        };
+        let text = plot("x", &picture).into_string();
+        assert_eq!(text.matches("</").count(), 1, "{text}");
+    }
+}

@@ -1,0 +1,320 @@
+//! One part of the work of a study: a run for some values of its parameter, from the experiment to what is kept of it.
+
+use super::signal::{Resolved, Signal};
+use super::{Run, Study};
+use crate::error::Error;
+use crate::master::{Observer, Sample};
+use crate::metrics::{Metrics, larger};
+use crate::run::{Opened, Plan};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::path::PathBuf;
+use toml::Value;
+
+/// What a part is to do: members `range` of the run, counted from 0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Position of the run in the study.
+    pub run: usize,
+    /// Which of its values.
+    pub range: Range<u32>,
+}
+
+/// What is kept of a part.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// One for each value of the parameter.
+    pub members: Vec<Member>,
+    /// Signals of the run's first member, if this is the part with it.
+    pub series: Option<Series>,
+    /// Smallest and largest value of each signal over the members, at each communication point.
+    pub spread: BTreeMap<Signal, Spread>,
+}
+
+/// What is kept of one run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Member {
+    /// Value of the parameter, if one is varied.
+    pub value: Option<i32>,
+    /// The figures of merit.
+    pub metrics: Metrics,
+    /// Signals against bounds, by id.
+    pub within: BTreeMap<String, Inside>,
+}
+
+/// How signals stood to a bound.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Inside {
+    /// Samples in which all signals were within the bound.
+    pub inside: u64,
+    /// All samples.
+    pub samples: u64,
+    /// Largest magnitude of any signal.
+    pub largest: f64,
+    /// The same as a multiple of the bound.
+    pub ratio: f64,
+}
+
+/// Signals over time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Series {
+    /// Communication points, s.
+    pub time: Vec<f64>,
+    /// Values at these, in the unit they are shown in.
+    pub signals: BTreeMap<Signal, Vec<f64>>,
+    /// That unit.
+    pub units: BTreeMap<Signal, String>,
+    /// Duration of each of the solver's solutions, ms.
+    pub solver_ms: Vec<f64>,
+}
+
+/// Smallest and largest value at each communication point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// The smallest.
+    pub low: Vec<f64>,
+    /// The largest.
+    pub high: Vec<f64>,
+}
+
+/// Bounds are met up to rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// The signals that a study wants of a run: as time series, and as bands.
+#[derive(Clone, Debug, Default)]
+pub struct Wanted {
+    /// Drawn as they are.
+    pub series: BTreeSet<Signal>,
+    /// Drawn as bands.
+    pub spread: BTreeSet<Signal>,
+}
+
+impl Wanted {
+    /// What the study's figures draw of a run.
+    pub fn of(study: &Study, run: &Run) -> Self {
+        let mut wanted = Self::default();
+        for figure in &study.figures {
+            for panel in &figure.panels {
+                if !study.runs_of(figure, panel).any(|drawn| drawn.id == run.id) {
+                    continue;
+                }
+                let drawn = panel.signal.iter().chain(panel.signals.iter().map(|curve| &curve.of));
+                let drawn: Vec<Signal> = drawn.cloned().collect();
+                if panel.spread {
+                    wanted.spread.extend(drawn.iter().cloned());
+                }
+                wanted.series.extend(drawn);
+                wanted.series.extend(panel.reference.clone());
+            }
+        }
+        wanted
+    }
+}
+
+/// A run of a study, ready to be made for any value of its parameter.
+pub struct Preparation<'a> {
+    study: &'a Study,
+    run: &'a Run,
+    wanted: Wanted,
+    paths: Vec<String>,
+    fmu_dirs: &'a [PathBuf],
+}
+
+impl<'a> Preparation<'a> {
+    /// Collects what is wanted of a run.
+    pub fn new(study: &'a Study, run: &'a Run, fmu_dirs: &'a [PathBuf]) -> Self {
+        let wanted = Wanted::of(study, run);
+        let bounded = study.bounds_of(run).flat_map(|(_, signals)| signals);
+        let paths: BTreeSet<String> = wanted
+            .series
+            .iter()
+            .chain(bounded)
+            .flat_map(|signal| signal.paths().into_iter().map(String::from).collect::<Vec<_>>())
+            .collect();
+        Self { study, run, wanted, paths: paths.into_iter().collect(), fmu_dirs }
+    }
+
+    /// The experiment with all names resolved, for the member with this number.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the experiment, the FMUs, or the signals.
+    pub fn plan(&self, member: u32, opened: &mut Opened) -> Result<Plan, Error> {
+        let paths: Vec<&str> = self.paths.iter().map(String::as_str).collect();
+        let mut experiment = self.study.experiment(self.run, &paths)?;
+        if let Some(vary) = &self.run.vary {
+            let value = Value::Integer(i64::from(vary.first) + i64::from(member));
+            experiment.set(&vary.parameter, value).map_err(|message| self.fault(&message))?;
+        }
+        Plan::with(experiment, self.fmu_dirs, opened)
+    }
+
+    fn fault(&self, message: &str) -> Error {
+        let id = &self.run.id;
+        self.study.source.error(&id.span(), format!("[[run]] {}: {message}", id.get_ref()))
+    }
+
+    fn resolve(&self, signal: &Signal, plan: &Plan) -> Result<Resolved, Error> {
+        signal.resolve(plan).map_err(|message| self.fault(&message))
+    }
+
+    /// Checks that everything is there that will be asked for.
+    ///
+    /// # Errors
+    /// Names what is not.
+    pub fn check(&self, opened: &mut Opened) -> Result<(), Error> {
+        let plan = self.plan(0, opened)?;
+        let bounded = self.study.bounds_of(self.run).flat_map(|(_, signals)| signals);
+        self.wanted.series.iter().chain(bounded).try_for_each(|signal| self.resolve(signal, &plan).map(drop))
+    }
+
+    /// Runs the members with these numbers.
+    ///
+    /// # Errors
+    /// What a unit said.
+    pub fn execute(&self, range: Range<u32>, opened: &mut Opened) -> Result<Outcome, Error> {
+        let mut outcome = Outcome { members: Vec::new(), series: None, spread: BTreeMap::new() };
+        for number in range {
+            let plan = self.plan(number, opened)?;
+            let mut series = Watch::new(&self.wanted.series, self, &plan)?;
+            let mut bounds = Vec::new();
+            for (within, signals) in self.study.bounds_of(self.run) {
+                let signals = signals
+                    .iter()
+                    .map(|signal| self.resolve(signal, &plan))
+                    .collect::<Result<Vec<_>, _>>()?;
+                let bound = self.study.number(&within.bound)?;
+                bounds.push(Bounded { id: &within.id, signals, bound, inside: Inside::default() });
+            }
+            let (mut master, limits) = plan.initialized()?;
+            let mut merit = plan.merit(limits);
+            let mut observers: Vec<&mut dyn Observer> = vec![&mut merit, &mut series];
+            observers.extend(bounds.iter_mut().map(|bound| bound as &mut dyn Observer));
+            master.run(&mut observers)?;
+
+            let value = self.run.vary.as_ref().map(|vary| vary.first + number.cast_signed());
+            // Wall-clock times of a run that shares the machine mean nothing.
+            let metrics = merit.metrics(0.0, 0.0, None);
+            let within = bounds.into_iter().map(|bound| (bound.id.to_string(), bound.inside)).collect();
+            outcome.members.push(Member { value, metrics, within });
+            for (signal, values) in &series.signals {
+                if self.wanted.spread.contains(signal) {
+                    widen(&mut outcome.spread, signal, values);
+                }
+            }
+            if number == 0 {
+                outcome.series = Some(Series {
+                    time: series.time,
+                    signals: series.signals,
+                    units: series.resolved.iter().map(|(s, r)| (s.clone(), r.unit.clone())).collect(),
+                    solver_ms: merit.solver_seconds().iter().map(|s| s * 1e3).collect(),
+                });
+            }
+        }
+        Ok(outcome)
+    }
+}
+
+fn widen(spread: &mut BTreeMap<Signal, Spread>, signal: &Signal, values: &[f64]) {
+    let own = spread
+        .entry(signal.clone())
+        .or_insert_with(|| Spread { low: values.to_vec(), high: values.to_vec() });
+    own.widen(values, values);
+}
+
+impl Spread {
+    /// Makes room for more values.
+    pub fn widen(&mut self, low: &[f64], high: &[f64]) {
+        for (own, value) in self.low.iter_mut().zip(low) {
+            *own = own.min(*value);
+        }
+        for (own, value) in self.high.iter_mut().zip(high) {
+            *own = own.max(*value);
+        }
+    }
+}
+
+impl Inside {
+    fn see(&mut self, magnitude: f64, bound: f64) {
+        self.samples += 1;
+        self.inside += u64::from(magnitude <= bound * (1.0 + ROUNDING));
+        self.largest = larger(self.largest, magnitude);
+        self.ratio = self.largest / bound;
+    }
+}
+
+/// Holds signals against a bound.
+struct Bounded<'a> {
+    id: &'a str,
+    signals: Vec<Resolved>,
+    bound: f64,
+    inside: Inside,
+}
+
+impl Observer for Bounded<'_> {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        let magnitudes = self.signals.iter().map(|signal| signal.value(sample.values).abs());
+        let largest = magnitudes.fold(0.0, larger);
+        self.inside.see(largest, self.bound);
+        Ok(())
+    }
+}
+
+/// Collects signals.
+struct Watch {
+    resolved: Vec<(Signal, Resolved)>,
+    time: Vec<f64>,
+    signals: BTreeMap<Signal, Vec<f64>>,
+}
+
+impl Watch {
+    fn new(signals: &BTreeSet<Signal>, preparation: &Preparation, plan: &Plan) -> Result<Self, Error> {
+        let resolved = signals
+            .iter()
+            .map(|signal| Ok((signal.clone(), preparation.resolve(signal, plan)?)))
+            .collect::<Result<Vec<_>, Error>>()?;
+        let room = plan.clock.ticks() as usize + 1;
+        let signals = signals.iter().map(|signal| (signal.clone(), Vec::with_capacity(room))).collect();
+        Ok(Self { resolved, time: Vec::with_capacity(room), signals })
+    }
+}
+
+impl Observer for Watch {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        self.time.push(sample.time);
+        for ((_, resolved), values) in self.resolved.iter().zip(self.signals.values_mut()) {
+            values.push(resolved.value(sample.values));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oracle_shares_and_ratios_by_hand() {
+        let mut inside = Inside::default();
+        for magnitude in [0.5, 2.0, 3.0, 2.0] {
+            inside.see(magnitude, 2.0);
+        }
+        assert_eq!(inside, Inside { inside: 3, samples: 4, largest: 3.0, ratio: 1.5 });
+    }
+
+    #[test]
+    fn a_magnitude_that_is_not_a_number_is_outside_and_seen() {
+        let mut inside = Inside::default();
+        inside.see(f64::NAN, 2.0);
+        assert!(inside.inside == 0 && inside.largest.is_nan());
+    }
+
+    #[test]
+    fn a_band_holds_all_values() {
+        let mut spread = BTreeMap::new();
+        let signal = Signal::try_from("a.b".to_string()).unwrap();
+        widen(&mut spread, &signal, &[1.0, 5.0]);
+        widen(&mut spread, &signal, &[2.0, 3.0]);
+        assert_eq!(spread[&signal], Spread { low: vec![1.0, 3.0], high: vec![2.0, 5.0] });
+    }
+}

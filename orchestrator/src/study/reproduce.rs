@@ -1,0 +1,407 @@
+//! Runs a study on all cores, keeps what is finished, and writes the report.
+//!
+//! The work is cut into parts. What a finished part leaves is written to a file at once, together with a hash of all that
+//! it depends on; a part whose file is there, with the same hash, is not run again. So an interruption costs the parts that
+//! were being worked on, and nothing else.
+
+use super::part::{Outcome, Part, Preparation};
+use super::results::{Results, RunResult, resolve};
+use super::{Study, claims, figures, page};
+use crate::error::Error;
+use crate::figure::{png, svg};
+use crate::progress::Parts;
+use crate::run::Opened;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use std::collections::{BTreeMap, VecDeque};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// Members of a run that make up one part.
+const MEMBERS_PER_PART: u32 = 25;
+/// To be raised when what a part leaves is no longer what it was.
+const FORMAT: u32 = 1;
+
+/// How a study is reproduced.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Folder for the results; `out/<folder of the study>` if there is none.
+    pub out: Option<PathBuf>,
+    /// Further folders with FMUs.
+    pub fmu_dirs: Vec<PathBuf>,
+    /// Threads; one for each core if 0.
+    pub jobs: usize,
+    /// At most so many members of each run.
+    pub members: Option<u32>,
+    /// Run everything again.
+    pub fresh: bool,
+    /// Show no progress.
+    pub quiet: bool,
+}
+
+/// A claim, in our words, and what becomes of it.
+pub type Judgement = (String, claims::Verdict);
+
+/// What was done.
+#[derive(Debug)]
+pub struct Report {
+    /// Title of the study.
+    pub title: String,
+    /// The page.
+    pub page: PathBuf,
+    /// Parts that were run, and parts that were there already.
+    pub parts: (usize, usize),
+    /// Runs of an experiment among all parts.
+    pub runs: usize,
+    /// Elapsed time, s.
+    pub elapsed: f64,
+    /// Each claim with its verdict.
+    pub verdicts: Vec<Judgement>,
+    /// All files, relative to the folder.
+    pub files: Vec<String>,
+}
+
+/// The study of this name: a file, a folder with a `study.toml`, or such a folder below `orchestrator/experiments`.
+///
+/// # Errors
+/// If there is none.
+pub fn find(name: &Path) -> Result<PathBuf, Error> {
+    let below = Path::new("orchestrator/experiments");
+    let candidates =
+        [name.to_path_buf(), name.join("study.toml"), below.join(name), below.join(name).join("study.toml")];
+    candidates.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {
+        let there: Vec<String> = fs::read_dir(below)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .filter(|entry| entry.path().join("study.toml").is_file())
+            .map(|entry| entry.file_name().to_string_lossy().into_owned())
+            .collect();
+        let hint = crate::names::hint(&name.to_string_lossy(), there.iter().map(String::as_str));
+        Error::experiment(format!(
+            "there is no study \"{}\", neither as a file nor as a folder with a study.toml, here or in {}{hint}",
+            name.display(),
+            below.display()
+        ))
+    })
+}
+
+/// Runs what is not there yet of a study, and writes its report.
+///
+/// # Errors
+/// Everything that is wrong with the study, before anything is run; what a unit said; files that cannot be written. What is
+/// finished by then is kept.
+pub fn reproduce(mut study: Study, options: &Options) -> Result<Report, Error> {
+    let begin = Instant::now();
+    if let Some(limit) = options.members {
+        for vary in study.runs.iter_mut().filter_map(|run| run.vary.as_mut()) {
+            vary.count = vary.count.min(limit.max(1));
+        }
+    }
+    let study = &study;
+    let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(name(study)));
+    let preparations: Vec<Preparation> =
+        study.runs.iter().map(|run| Preparation::new(study, run, &options.fmu_dirs)).collect();
+    check(study, &preparations)?;
+
+    let keys = keys(study, &preparations)?;
+    let all = parts(study);
+    let file = |part: &Part| {
+        let id = study.runs[part.run].id.get_ref();
+        out.join("runs").join(id).join(format!("{:04}.json", part.range.start))
+    };
+    let mut done: BTreeMap<(usize, u32), Outcome> = BTreeMap::new();
+    if !options.fresh {
+        for part in &all {
+            if let Some(outcome) = kept(&file(part), &keys[part.run], part) {
+                done.insert((part.run, part.range.start), outcome);
+            }
+        }
+    }
+    let missing: Vec<Part> =
+        all.iter().filter(|part| !done.contains_key(&(part.run, part.range.start))).cloned().collect();
+    let progress = Parts::new(&study.title, all.len() as u64, done.len() as u64, options.quiet);
+
+    let work = Work { study, preparations: &preparations, keys: &keys, file: &file, progress: &progress };
+    let is_timed = |part: &Part| study.runs[part.run].timed && part.range.start == 0;
+    let (timed, others): (Vec<Part>, Vec<Part>) = missing.iter().cloned().partition(is_timed);
+    let threads = match options.jobs {
+        0 => std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        jobs => jobs,
+    };
+    let computed = (timed.len() + others.len(), done.len());
+    // What is timed has the machine for itself.
+    for (parts, threads) in [(timed, 1), (others, threads)] {
+        done.extend(work.run(parts, threads)?);
+    }
+    progress.finish();
+
+    let mut runs = vec![RunResult::default(); study.runs.len()];
+    for ((run, _), outcome) in done {
+        runs[run].push(outcome);
+    }
+    let results = Results { study, runs };
+    let (verdicts, files) = write(&results, &out)?;
+    Ok(Report {
+        title: study.title.clone(),
+        page: out.join("report.html"),
+        parts: computed,
+        runs: results.runs.iter().map(|run| run.members.len()).sum(),
+        elapsed: begin.elapsed().as_secs_f64(),
+        verdicts,
+        files,
+    })
+}
+
+/// Name of a study: of its folder.
+fn name(study: &Study) -> String {
+    let path = &study.source.path;
+    let folder = path.parent().and_then(Path::file_name);
+    folder.or(path.file_stem()).map_or("study".into(), |name| name.to_string_lossy().into_owned())
+}
+
+/// Everything that can be checked before anything is run.
+fn check(study: &Study, preparations: &[Preparation]) -> Result<(), Error> {
+    let fault = |message: String| study.source.error(&(0..0), message);
+    claims::check(study).map_err(fault)?;
+    for row in study.tables.iter().flat_map(|table| &table.rows) {
+        resolve(study, &row.ours).map_err(fault)?;
+    }
+    for overview in &study.overviews {
+        for run in &overview.runs {
+            for column in &overview.metrics {
+                resolve(study, &format!("{}.{}", run.get_ref(), column.of)).map_err(fault)?;
+            }
+        }
+    }
+    let mut opened = Opened::default();
+    preparations.iter().try_for_each(|preparation| preparation.check(&mut opened))
+}
+
+/// The parts of all runs, in order. Where a run is timed, its first member is a part of its own.
+fn parts(study: &Study) -> Vec<Part> {
+    let mut parts = Vec::new();
+    for (run, description) in study.runs.iter().enumerate() {
+        let count = description.vary.as_ref().map_or(1, |vary| vary.count);
+        let mut start = 0;
+        while start < count {
+            let length = if start == 0 && description.timed { 1 } else { MEMBERS_PER_PART };
+            let end = count.min(start + length);
+            parts.push(Part { run, range: start..end });
+            start = end;
+        }
+    }
+    parts
+}
+
+/// For each run, a hash of all that its parts depend on: the experiment, what the study changes in it and wants of it, the
+/// FMUs, and this program.
+fn keys(study: &Study, preparations: &[Preparation]) -> Result<Vec<String>, Error> {
+    let mut archives: BTreeMap<PathBuf, String> = BTreeMap::new();
+    let mut opened = Opened::default();
+    let mut keys = Vec::new();
+    for (run, preparation) in study.runs.iter().zip(preparations) {
+        let plan = preparation.plan(0, &mut opened)?;
+        let mut fmus = BTreeMap::new();
+        for (name, fmu) in plan.order.iter().zip(&plan.fmus) {
+            if !archives.contains_key(&fmu.path) {
+                let bytes = fs::read(&fmu.path).map_err(Error::file(&fmu.path))?;
+                archives.insert(fmu.path.clone(), hex(&Sha256::digest(bytes)));
+            }
+            fmus.insert(name, archives[&fmu.path].clone());
+        }
+        let within = study
+            .bounds_of(run)
+            .map(|(within, signals)| Ok(json!([within.id, signals, study.number(&within.bound)?])))
+            .collect::<Result<Vec<_>, Error>>()?;
+        let wanted = super::part::Wanted::of(study, run);
+        let all = json!({
+            "format": FORMAT,
+            "version": env!("CARGO_PKG_VERSION"),
+            "experiment": plan.experiment.source.text,
+            "set": run.set,
+            "vary": run.vary.as_ref().map(|vary| (&vary.parameter, vary.first)),
+            "within": within,
+            "series": wanted.series,
+            "spread": wanted.spread,
+            "timed": run.timed,
+            "fmus": fmus,
+        });
+        keys.push(hex(&Sha256::digest(all.to_string())));
+    }
+    Ok(keys)
+}
+
+fn hex(bytes: &[u8]) -> String {
+    use std::fmt::Write as _;
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// The file of a finished part.
+#[derive(Serialize, Deserialize)]
+struct Kept<T> {
+    key: String,
+    members: std::ops::Range<u32>,
+    outcome: T,
+}
+
+/// What a part left earlier, if it is still good.
+fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
+    let text = fs::read_to_string(path).ok()?;
+    let kept: Kept<Outcome> = serde_json::from_str(&text).ok()?;
+    (kept.key == key && kept.members == part.range).then_some(kept.outcome)
+}
+
+/// Writes a file such that it is there wholly or not at all.
+fn write_whole(path: &Path, content: &[u8]) -> Result<(), Error> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(Error::file(folder))?;
+    }
+    let unfinished = path.with_extension("unfinished");
+    fs::write(&unfinished, content).map_err(Error::file(&unfinished))?;
+    fs::rename(&unfinished, path).map_err(Error::file(path))
+}
+
+/// Parts being worked on by several threads.
+struct Work<'a> {
+    study: &'a Study,
+    preparations: &'a [Preparation<'a>],
+    keys: &'a [String],
+    file: &'a (dyn Fn(&Part) -> PathBuf + Sync),
+    progress: &'a Parts,
+}
+
+/// Outcomes by run and first member.
+type Done = BTreeMap<(usize, u32), Outcome>;
+
+/// A panic of another thread leaves a queue that is as good as before.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Work<'_> {
+    fn run(&self, parts: Vec<Part>, threads: usize) -> Result<Done, Error> {
+        let queue = Mutex::new(VecDeque::from(parts));
+        let done = Mutex::new(Done::new());
+        let failure: Mutex<Option<Error>> = Mutex::new(None);
+        std::thread::scope(|scope| {
+            for _ in 0..threads.max(1) {
+                scope.spawn(|| {
+                    // Units stay in the thread that opened their archive.
+                    let mut opened = Opened::default();
+                    loop {
+                        let Some(part) = lock(&queue).pop_front() else { break };
+                        match self.part(&part, &mut opened) {
+                            Ok(outcome) => {
+                                lock(&done).insert((part.run, part.range.start), outcome);
+                            }
+                            Err(error) => {
+                                lock(&queue).clear();
+                                lock(&failure).get_or_insert(error);
+                            }
+                        }
+                    }
+                });
+            }
+        });
+        match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            Some(error) => Err(error),
+            None => Ok(done.into_inner().unwrap_or_else(PoisonError::into_inner)),
+        }
+    }
+
+    fn part(&self, part: &Part, opened: &mut Opened) -> Result<Outcome, Error> {
+        let run = &self.study.runs[part.run];
+        let outcome = self.preparations[part.run]
+            .execute(part.range.clone(), opened)
+            .map_err(|error| Error::Run { run: run.id.get_ref().clone(), source: Box::new(error) })?;
+        let path = (self.file)(part);
+        let kept = Kept { key: self.keys[part.run].clone(), members: part.range.clone(), outcome };
+        let text = serde_json::to_vec(&kept).map_err(|error| Error::file(&path)(error.into()))?;
+        write_whole(&path, &text)?;
+        self.progress.finished(&run.label);
+        Ok(kept.outcome)
+    }
+}
+
+/// Writes figures, numbers and page. Returns the verdicts and the files.
+fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Vec<String>), Error> {
+    let study = results.study;
+    let fault = |message: String| study.source.error(&(0..0), message);
+    let mut files = vec!["report.html".to_string(), "results.json".to_string()];
+    let mut drawn = Vec::new();
+    for figure in &study.figures {
+        let picture = figures::figure(figure, results).map_err(fault)?;
+        let path = out.join("figures").join(format!("{}.svg", figure.id));
+        let text = svg::text(&picture).map_err(Error::file(&path))?;
+        write_whole(&path, text.as_bytes())?;
+        png::write(&text, &path.with_extension("png"))?;
+        files.push(format!("figures/{}.svg, .png", figure.id));
+        drawn.push(picture);
+    }
+    let judged = study
+        .claims
+        .iter()
+        .map(|claim| claims::judge(claim, results))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(fault)?;
+    write_whole(&out.join("results.json"), numbers(results, &judged).as_bytes())?;
+    let page = page::page(results, &judged, &drawn).map_err(fault)?;
+    write_whole(&out.join("report.html"), page.as_bytes())?;
+    let verdicts = study.claims.iter().zip(&judged).map(|(c, j)| (c.says.clone(), j.verdict)).collect();
+    Ok((verdicts, files))
+}
+
+/// All numbers, for other programs.
+fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
+    let study = results.study;
+    let runs: serde_json::Map<String, Value> = study
+        .runs
+        .iter()
+        .zip(&results.runs)
+        .map(|(run, result)| {
+            let own = json!({
+                "label": run.label,
+                "experiment": run.experiment,
+                "set": run.set,
+                "members": result.members,
+                "solver_ms": result.series.solver_ms,
+            });
+            (run.id.get_ref().clone(), own)
+        })
+        .collect();
+    let claims: Vec<Value> = study
+        .claims
+        .iter()
+        .zip(judged)
+        .map(|(claim, judged)| {
+            let checks: Vec<Value> = claim
+                .checks
+                .iter()
+                .zip(&judged.checks)
+                .map(|(check, checked)| {
+                    json!({
+                        "label": check.label,
+                        "left": checked.left.0,
+                        "right": checked.right.0,
+                        "difference": checked.difference.0,
+                        "held": checked.held,
+                        "of": checked.difference.0.len(),
+                    })
+                })
+                .collect();
+            json!({ "says": claim.says, "verdict": judged.verdict, "checks": checks })
+        })
+        .collect();
+    let all = json!({ "title": study.title, "values": study.values.0, "runs": runs, "claims": claims });
+    let mut text = serde_json::to_string_pretty(&all).unwrap_or_default();
+    text.push('\n');
+    text
+}

@@ -1,0 +1,179 @@
+//! What came of a study's runs, and how it is referred to: `run.metric`.
+
+use super::part::{Member, Outcome, Series, Spread};
+use super::signal::Signal;
+use super::values::Quantity;
+use super::{Run, Study};
+use crate::metrics::Metrics;
+use crate::names;
+use std::collections::BTreeMap;
+
+/// All that is kept of one run of the study.
+#[derive(Clone, Debug, Default)]
+pub struct RunResult {
+    /// One for each value of its parameter, in that order.
+    pub members: Vec<Member>,
+    /// Signals of the first member.
+    pub series: Series,
+    /// Bands over all members.
+    pub spread: BTreeMap<Signal, Spread>,
+}
+
+impl RunResult {
+    /// Adds the next part.
+    pub fn push(&mut self, part: Outcome) {
+        self.members.extend(part.members);
+        if let Some(series) = part.series {
+            self.series = series;
+        }
+        for (signal, spread) in part.spread {
+            match self.spread.get_mut(&signal) {
+                Some(own) => own.widen(&spread.low, &spread.high),
+                None => {
+                    self.spread.insert(signal, spread);
+                }
+            }
+        }
+    }
+}
+
+/// A number that every member of a run has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Metric {
+    /// A figure of merit, by its name in `metrics.json`.
+    Merit(String),
+    /// Share of samples within a bound: `within.ID.share`.
+    Share(String),
+    /// Largest magnitude, `within.ID.largest`.
+    Largest(String),
+    /// The same as a multiple of the bound, `within.ID.ratio`.
+    Ratio(String),
+}
+
+impl Metric {
+    /// Reads the name of a metric of a run.
+    ///
+    /// # Errors
+    /// If there is no such metric.
+    pub fn parse(text: &str, run: &Run) -> Result<Self, String> {
+        if let Some((id, what)) = text.strip_prefix("within.").and_then(|rest| rest.rsplit_once('.')) {
+            let ids: Vec<&str> = run.within.iter().map(|within| within.get_ref().as_str()).collect();
+            if !ids.contains(&id) {
+                let hint = names::hint(id, ids.iter().copied());
+                return Err(format!("the run \"{}\" has no within \"{id}\"{hint}", run.id.get_ref()));
+            }
+            return match what {
+                "share" => Ok(Self::Share(id.into())),
+                "largest" => Ok(Self::Largest(id.into())),
+                "ratio" => Ok(Self::Ratio(id.into())),
+                _ => Err(format!("\"{text}\": within.{id} has share, largest, ratio")),
+            };
+        }
+        let all = serde_json::to_value(Metrics::default()).unwrap_or_default();
+        let known: Vec<&str> =
+            all.as_object().map(|all| all.keys().map(String::as_str).collect()).unwrap_or_default();
+        if known.contains(&text) {
+            return Ok(Self::Merit(text.into()));
+        }
+        Err(format!("there is no metric \"{text}\"{}", names::hint(text, known.iter().copied())))
+    }
+
+    /// Whether it is a duration, which differs from run to run and is measured with the first member only.
+    fn is_time(&self) -> bool {
+        matches!(self, Self::Merit(name) if name.starts_with("solver_ms"))
+    }
+
+    fn of(&self, member: &Member) -> Option<f64> {
+        let within = |id: &String| member.within.get(id);
+        match self {
+            Self::Merit(name) => {
+                serde_json::to_value(&member.metrics).ok().and_then(|all| all.get(name)?.as_f64())
+            }
+            Self::Share(id) => within(id).map(|w| w.inside as f64 / w.samples as f64),
+            Self::Largest(id) => within(id).map(|w| w.largest),
+            Self::Ratio(id) => within(id).map(|w| w.ratio),
+        }
+    }
+}
+
+/// A number of each member of a run, or a single one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Numbers(pub Vec<f64>);
+
+impl Numbers {
+    /// Arithmetic mean; not a number if there is none.
+    pub fn mean(&self) -> f64 {
+        self.0.iter().sum::<f64>() / self.0.len() as f64
+    }
+
+    /// The smallest and the largest.
+    pub fn extent(&self) -> (f64, f64) {
+        self.0.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+    }
+
+    /// Whether there are several that differ.
+    pub fn vary(&self) -> bool {
+        self.0.iter().any(|value| *value != self.0[0])
+    }
+}
+
+/// The results of all runs, in the order of the study.
+pub struct Results<'a> {
+    /// What was asked.
+    pub study: &'a Study,
+    /// What came of it.
+    pub runs: Vec<RunResult>,
+}
+
+/// Finds the run and the metric that `run.metric` refers to.
+///
+/// # Errors
+/// Says what is not there.
+pub fn resolve(study: &Study, reference: &str) -> Result<(usize, Metric), String> {
+    let (id, metric) = names::split(reference).ok_or_else(|| format!("\"{reference}\" is no run.metric"))?;
+    let place = study.runs.iter().position(|run| run.id.get_ref() == id).ok_or_else(|| {
+        let hint = names::hint(id, study.runs.iter().map(|run| run.id.get_ref().as_str()));
+        format!("\"{reference}\": there is no run \"{id}\"{hint}")
+    })?;
+    Ok((place, Metric::parse(metric, &study.runs[place])?))
+}
+
+/// Whether a quantity refers to `run.metric` rather than to a value.
+pub fn is_reference(study: &Study, quantity: &Quantity) -> bool {
+    match quantity {
+        Quantity::Number(_) => false,
+        Quantity::Named(name) => {
+            study.values.find(name).is_none()
+                && names::split(name).is_some_and(|(id, _)| study.run(id).is_some())
+        }
+    }
+}
+
+impl Results<'_> {
+    /// What came of the run with this id.
+    pub fn run(&self, id: &str) -> Option<&RunResult> {
+        self.study.runs.iter().position(|run| run.id.get_ref() == id).map(|place| &self.runs[place])
+    }
+
+    /// The numbers that `run.metric` refers to; empty if the run has no such quantity.
+    ///
+    /// # Errors
+    /// If there is no such run or metric.
+    pub fn numbers(&self, reference: &str) -> Result<Numbers, String> {
+        let (place, metric) = resolve(self.study, reference)?;
+        let members = &self.runs[place].members;
+        let counted = if metric.is_time() { &members[..members.len().min(1)] } else { members };
+        Ok(Numbers(counted.iter().filter_map(|member| metric.of(member)).collect()))
+    }
+
+    /// The numbers of a reference, or the one of a value.
+    ///
+    /// # Errors
+    /// If it names nothing that there is.
+    pub fn quantity(&self, quantity: &Quantity) -> Result<Numbers, String> {
+        match quantity {
+            Quantity::Named(name) if is_reference(self.study, quantity) => self.numbers(name),
+            _ => self.study.values.number(quantity).map(|number| Numbers(vec![number])),
+        }
+    }
+}
