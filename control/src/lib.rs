@@ -3,6 +3,7 @@
 mod cone;
 pub mod controller;
 pub mod crmpc;
+pub mod dlmpc;
 pub mod error;
 pub mod linearise;
 pub mod lq;
@@ -14,5 +15,6 @@ pub mod settings;
 
 pub use controller::{Controller, Measurement};
 pub use crmpc::Crmpc;
+pub use dlmpc::Dlmpc;
 pub use error::DesignError;
 pub use lqr::Lqr;

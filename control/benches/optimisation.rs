@@ -1,13 +1,16 @@
-//! Time of one optimisation of CRMPC on the scenario of Chai 2022 (white noise, inertia + 5 %).
+//! Time of one optimisation of CRMPC and of DLMPC's outer layer on the scenario of Chai 2022 (white noise, inertia + 5 %).
 //!
-//! First the distribution over every sample of 50 s is printed. Each sample is repeated from the same memory, and the
-//! smallest time counts: what else the machine does can only add to it. Then Criterion takes single samples apart.
+//! First the distribution over every sample of 50 s is printed, with the exits that come before the cone programme of the whole
+//! horizon, and without. Each sample is repeated from the same memory, and the smallest time counts: what else the machine
+//! does can only add to it. Then Criterion takes single samples of CRMPC apart.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
 
-use control::crmpc::{Constraints, Memory, Status};
-use control::{Controller, Crmpc, Measurement};
+use control::crmpc::{self, Constraints};
+use control::dlmpc;
+use control::report::{Report, Status};
+use control::{Controller, Crmpc, Dlmpc, Measurement};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use harness::{disturbance, settings, simulate};
 use std::hint::black_box;
@@ -17,40 +20,64 @@ use vehicle::scenario::Scenario;
 /// Repetitions of each sample.
 const REPETITIONS: usize = 20;
 
+/// A controller that optimises at some of its ticks.
+trait Optimising: Controller {
+    fn report(memory: &Self::Memory) -> Report;
+    /// Ticks per optimisation.
+    fn ratio(&self) -> u64;
+}
+
+impl Optimising for Crmpc {
+    fn report(memory: &crmpc::Memory) -> Report {
+        memory.report
+    }
+    fn ratio(&self) -> u64 {
+        self.design().ratio as u64
+    }
+}
+
+impl Optimising for Dlmpc {
+    fn report(memory: &dlmpc::Memory) -> Report {
+        memory.report
+    }
+    fn ratio(&self) -> u64 {
+        self.ratio()
+    }
+}
+
 /// What goes into one tick of the run, and how its optimisation came out.
-struct Tick {
+struct Tick<Memory> {
     number: u64,
     before: Memory,
     measured: Measurement,
     status: Status,
 }
 
-fn run(constraints: Constraints) -> (Crmpc, Vec<Tick>) {
-    let mut controller = Crmpc::new(settings(constraints)).unwrap();
-    let mut before = Memory::default();
+fn run<C: Optimising>(controller: &mut C) -> Vec<Tick<C::Memory>> {
+    let mut before = controller.memory();
+    let mut memory = controller.memory();
     let mut ticks = Vec::new();
-    simulate(
-        &mut controller,
-        &mut Memory::default(),
-        1.05,
-        disturbance(Kind::White),
-        |after, number, &measured| {
-            ticks.push(Tick { number, before: before.clone(), measured, status: after.report.status });
-            before.clone_from(after);
-        },
-    );
-    (controller, ticks)
+    simulate(controller, &mut memory, 1.05, disturbance(Kind::White), |after, number, &measured| {
+        ticks.push(Tick { number, before: before.clone(), measured, status: C::report(after).status });
+        before.clone_from(after);
+    });
+    ticks
 }
 
-fn update(controller: &mut Crmpc, tick: &Tick, scenario: &Scenario, memory: &mut Memory) {
+fn update<C: Optimising>(
+    controller: &mut C,
+    tick: &Tick<C::Memory>,
+    scenario: &Scenario,
+    memory: &mut C::Memory,
+) {
     let time = tick.number as f64 * controller.period();
     let reference = |time| scenario.reference.at(time);
     black_box(controller.update(memory, tick.number, time, black_box(&tick.measured), &reference));
 }
 
-fn print_distribution(name: &str, controller: &mut Crmpc, ticks: &[Tick]) {
+fn print_distribution<C: Optimising>(name: &str, controller: &mut C, ticks: &[Tick<C::Memory>]) {
     let scenario = Scenario::crmpc2022();
-    let ratio = controller.design().ratio as u64;
+    let ratio = controller.ratio();
     let mut times_ms: Vec<f64> = ticks
         .iter()
         .filter(|tick| tick.number % ratio == 0)
@@ -58,7 +85,7 @@ fn print_distribution(name: &str, controller: &mut Crmpc, ticks: &[Tick]) {
             let time = |_| {
                 let mut memory = tick.before.clone();
                 update(controller, tick, &scenario, &mut memory);
-                memory.report.time * 1e3
+                C::report(&memory).time * 1e3
             };
             (0..REPETITIONS).map(time).fold(f64::INFINITY, f64::min)
         })
@@ -77,13 +104,32 @@ fn print_distribution(name: &str, controller: &mut Crmpc, ticks: &[Tick]) {
     );
 }
 
+/// Both distributions of one controller, over the samples of a run with exits.
+fn print_both<C: Optimising>(name: &str, mut with: C, mut without: C) {
+    let ticks = run(&mut with);
+    print_distribution(name, &mut with, &ticks);
+    print_distribution(&format!("{name}, without exits"), &mut without, &ticks);
+}
+
+fn distributions() {
+    for (name, constraints) in [("CRMPC robust", Constraints::Robust), ("CRMPC paper", Constraints::Paper)] {
+        let new = || Crmpc::new(settings(constraints)).unwrap();
+        print_both(name, new(), new().without_exits());
+    }
+    let (published, tuned) = (dlmpc::Settings::published(), dlmpc::Settings::tuned());
+    for (name, settings) in [("DLMPC published", published), ("DLMPC tuned", tuned)] {
+        let new = || Dlmpc::new(settings).unwrap();
+        print_both(name, new(), new().without_exits());
+    }
+}
+
 fn optimisations(criterion: &mut Criterion) {
+    distributions();
     let scenario = Scenario::crmpc2022();
     for (name, constraints) in [("robust", Constraints::Robust), ("paper", Constraints::Paper)] {
-        let (mut controller, ticks) = run(constraints);
-        print_distribution(name, &mut controller, &ticks);
-
-        let ratio = controller.design().ratio as u64;
+        let mut controller = Crmpc::new(settings(constraints)).unwrap();
+        let ticks = run(&mut controller);
+        let ratio = controller.ratio();
         let mut group = criterion.benchmark_group(name);
         let period = controller.period();
         let after = |time: f64, status: Status| {

@@ -1,0 +1,203 @@
+//! Searches the gains q, p, Γ, ρ of DLMPC's inner layer on the scenario of Chai 2022 (white noise, inertia + 5 %, 50 s); the
+//! outer layer stays as printed:
+//!
+//! ```text
+//! cargo run --release -p control --example tune_dlmpc -- [SEEDS]
+//! ```
+//!
+//! A coarse grid over three seeds, then steps from the best of it over SEEDS (10) seeds, halved until none leads further.
+//! Two criteria, both of means over the seeds and of the largest rate in any of them (‖m‖ keeps its limit by construction):
+//!
+//! - `tuned`: the least CMS of all gains that are no worse than the published ones in EMS and in the largest ‖ω‖;
+//! - `within limits`: the least EMS of all gains that keep ‖ω‖ ≤ 5°/s, which the published ones do not.
+//!
+//! Printed are the Pareto front of EMS against CMS of all that was tried, and the gains found, with seeds that the search has
+//! not seen too.
+
+#[path = "../tests/harness/mod.rs"]
+mod harness;
+
+use control::Dlmpc;
+use control::dlmpc::{Memory, Settings, SlidingMode};
+use harness::{disturbance, in_parallel, simulate};
+use std::ops::RangeInclusive;
+use vehicle::disturbance::{Disturbance, Kind};
+
+/// Sets of the grid that are looked at again, and steps taken from how many of those.
+const STARTS: usize = 40;
+const DESCENTS: usize = 4;
+
+/// Means and maxima over some seeds.
+#[derive(Clone, Copy, Debug)]
+struct Score {
+    gains: SlidingMode,
+    ems_deg: f64,
+    cms: f64,
+    rate: f64,
+    moment: f64,
+}
+
+impl Score {
+    fn dominates(&self, other: &Self) -> bool {
+        self.ems_deg <= other.ems_deg
+            && self.cms <= other.cms
+            && (self.ems_deg < other.ems_deg || self.cms < other.cms)
+    }
+
+    fn print(&self, name: &str) {
+        let SlidingMode { q, p, gamma, rho } = self.gains;
+        println!(
+            "{name:13} q {q:8.4}  p {p:7.4}  gamma {gamma:7.4}  rho {rho:6.4}  EMS {:.4} deg  CMS {:.4}  rate {:.4}  moment {:.4}",
+            self.ems_deg, self.cms, self.rate, self.moment
+        );
+    }
+}
+
+fn score(gains: SlidingMode, seeds: RangeInclusive<u64>) -> Score {
+    let mut score = Score { gains, ems_deg: 0.0, cms: 0.0, rate: 0.0, moment: 0.0 };
+    let runs = seeds.clone().count() as f64;
+    for seed in seeds {
+        let mut controller = Dlmpc::new(Settings { sliding_mode: gains, ..Settings::published() })
+            .unwrap_or_else(|error| panic!("{error}"));
+        let noise = Disturbance { seed, ..disturbance(Kind::White) };
+        let outcome = simulate(&mut controller, &mut Memory::default(), 1.05, noise, |_, _, _| {});
+        score.ems_deg += outcome.ems_deg / runs;
+        score.cms += outcome.cms / runs;
+        score.rate = score.rate.max(outcome.rate);
+        score.moment = score.moment.max(outcome.moment);
+    }
+    score
+}
+
+fn front(scores: &[Score]) -> Vec<Score> {
+    let mut front: Vec<Score> =
+        scores.iter().filter(|own| !scores.iter().any(|other| other.dominates(own))).copied().collect();
+    front.sort_by(|a, b| a.ems_deg.total_cmp(&b.ems_deg));
+    front.dedup_by(|a, b| a.ems_deg == b.ems_deg && a.cms == b.cms);
+    front
+}
+
+/// What is looked for: whether a set is allowed, beside the published one, and what is to be small.
+#[derive(Clone, Copy)]
+struct Criterion {
+    name: &'static str,
+    allows: fn(&Score, &Score) -> bool,
+    objective: fn(&Score) -> f64,
+}
+
+const CRITERIA: [Criterion; 2] = [
+    Criterion {
+        name: "tuned",
+        allows: |own, published| own.ems_deg <= published.ems_deg && own.rate <= published.rate,
+        objective: |own| own.cms,
+    },
+    Criterion { name: "within limits", allows: |own, _| own.rate <= 1.0, objective: |own| own.ems_deg },
+];
+
+impl Criterion {
+    /// The allowed ones among `scores`, best first.
+    fn sorted(&self, scores: &[Score], published: &Score) -> Vec<Score> {
+        let mut allowed: Vec<Score> =
+            scores.iter().filter(|own| (self.allows)(own, published)).copied().collect();
+        allowed.sort_by(|a, b| (self.objective)(a).total_cmp(&(self.objective)(b)));
+        allowed
+    }
+
+    /// Steps from `start` until none leads further; adds what it tries to `tried`.
+    fn search(&self, start: Score, published: &Score, seeds: u64, tried: &mut Vec<Score>) -> Score {
+        let mut chosen = start;
+        let mut share = 0.4;
+        while share > 0.02 {
+            let more = in_parallel(&neighbours(&chosen.gains, share), |&gains| score(gains, 1..=seeds));
+            let better = self.sorted(&more, published).into_iter().next();
+            tried.extend(more);
+            match better.filter(|own| (self.objective)(own) < (self.objective)(&chosen)) {
+                Some(better) => chosen = better,
+                None => share *= 0.5,
+            }
+        }
+        chosen
+    }
+}
+
+fn grid() -> Vec<SlidingMode> {
+    let mut all = Vec::new();
+    for q in [0.0, 0.5, 1.0, 2.0, 3.5, 5.0, 8.0] {
+        for p in [0.0, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0] {
+            for gamma in [0.0, 0.05, 0.15, 0.5] {
+                for rho in [0.3, 0.5, 0.6, 0.7, 0.8, 0.9] {
+                    all.push(SlidingMode { q, p, gamma, rho });
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Gains changed by this share, one or two at a time, within what the controller accepts. A gain of zero starts from `share`.
+fn neighbours(of: &SlidingMode, share: f64) -> Vec<SlidingMode> {
+    let moved = |value: f64, direction: i32| match direction {
+        0 => value,
+        _ if value == 0.0 => 0.1 * share * f64::from(direction.max(0)),
+        1 => value * (1.0 + share),
+        _ => value / (1.0 + share),
+    };
+    let mut all = Vec::new();
+    for code in 0..81 {
+        let directions = [code % 3 - 1, code / 3 % 3 - 1, code / 9 % 3 - 1, code / 27 - 1];
+        let changes = directions.iter().filter(|&&direction| direction != 0).count();
+        if changes == 1 || changes == 2 {
+            all.push(SlidingMode {
+                q: moved(of.q, directions[0]).min(40.0),
+                p: moved(of.p, directions[1]),
+                gamma: moved(of.gamma, directions[2]),
+                rho: moved(of.rho, directions[3]).clamp(0.1, 0.98),
+            });
+        }
+    }
+    all
+}
+
+fn main() {
+    let seeds = std::env::args().nth(1).map_or(Ok(10), |seeds| seeds.parse());
+    let Ok(seeds) = seeds else {
+        eprintln!("SEEDS must be a whole number");
+        std::process::exit(2);
+    };
+    let published_gains = Settings::published().sliding_mode;
+    let published = score(published_gains, 1..=seeds);
+    published.print("published");
+
+    let coarse = in_parallel(&grid(), |&gains| score(gains, 1..=3));
+    let coarse_published = score(published_gains, 1..=3);
+    let mut tried = vec![published];
+    let mut found = Vec::new();
+    for criterion in CRITERIA {
+        // The coarse ones again with all seeds, as the largest rate of three is a weak bound.
+        let starts: Vec<SlidingMode> =
+            criterion.sorted(&coarse, &coarse_published).iter().take(STARTS).map(|own| own.gains).collect();
+        tried.extend(in_parallel(&starts, |&gains| score(gains, 1..=seeds)));
+        let mut best: Option<Score> = None;
+        for start in criterion.sorted(&tried, &published).into_iter().take(DESCENTS) {
+            let end = criterion.search(start, &published, seeds, &mut tried);
+            if best.is_none_or(|best| (criterion.objective)(&end) < (criterion.objective)(&best)) {
+                best = Some(end);
+            }
+        }
+        found.extend(best.map(|best| (criterion.name, best)));
+    }
+
+    println!("Pareto front of {} sets with {seeds} seeds:", tried.len());
+    for score in front(&tried) {
+        score.print("");
+    }
+    println!("found:");
+    for (name, score) in &found {
+        score.print(name);
+    }
+    println!("with {seeds} seeds that the search has not seen:");
+    score(published_gains, 1001..=1000 + seeds).print("published");
+    for (name, found) in found {
+        score(found.gains, 1001..=1000 + seeds).print(name);
+    }
+}

@@ -1,0 +1,157 @@
+//! Settings of DLMPC, and the published and the tuned ones from `data/dlmpc-2022.toml`.
+
+use crate::error::DesignError;
+use serde::{Deserialize, Serialize};
+use vehicle::dynamics::RigidBody;
+use vehicle::scenario::Scenario;
+
+/// Gains of the inner layer's terminal sliding mode. Units with rad and s.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SlidingMode {
+    /// Linear reaching gain, 1/s.
+    pub q: f64,
+    /// Reaching gain of the power ρ.
+    pub p: f64,
+    /// Γ, gain of the manifold.
+    pub gamma: f64,
+    /// ρ, power of the manifold and of the reaching law, between 0 and 1.
+    pub rho: f64,
+}
+
+/// Settings of the controller. Units SI, angles rad.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// The vehicle as the controller believes it to be.
+    pub body: RigidBody,
+    /// Limit on ‖ω‖, rad/s.
+    pub limit_rate: f64,
+    /// Limit on ‖m‖, N m.
+    pub limit_moment: f64,
+    /// Prediction steps of the outer layer.
+    pub horizon: usize,
+    /// Period of the outer layer and its prediction step, s.
+    pub period_optimisation: f64,
+    /// Period of the inner layer, s.
+    pub period_feedback: f64,
+    /// P, diagonal: angles.
+    pub p: [f64; 3],
+    /// Q, diagonal: rates.
+    pub q: [f64; 3],
+    /// Gains of the inner layer.
+    pub sliding_mode: SlidingMode,
+    /// Iteration limit of the cone solver.
+    pub max_iterations: u32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    outer: Outer,
+    inner: Inner,
+    solver: Solver,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Outer {
+    horizon: usize,
+    period: f64,
+    p: [f64; 3],
+    q: [f64; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Inner {
+    period: f64,
+    #[serde(rename = "prediction_horizon")]
+    _prediction_horizon: f64,
+    published: SlidingMode,
+    tuned: SlidingMode,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Solver {
+    max_iterations: u32,
+}
+
+impl Settings {
+    /// Chai 2022, section 5.1, with its vehicle at the nominal inertia.
+    #[allow(clippy::missing_panics_doc)]
+    pub fn published() -> Self {
+        let scenario = Scenario::crmpc2022();
+        // Cannot fail, as the tests that use it show: the files are embedded.
+        let body = scenario.inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
+        let File { outer, inner, solver } = embedded();
+        Self {
+            body,
+            limit_rate: scenario.limit_rate,
+            limit_moment: scenario.limit_moment,
+            horizon: outer.horizon,
+            period_optimisation: outer.period,
+            period_feedback: inner.period,
+            p: outer.p,
+            q: outer.q,
+            sliding_mode: inner.published,
+            max_iterations: solver.max_iterations,
+        }
+    }
+
+    /// The same with the gains that `examples/tune_dlmpc.rs` found.
+    pub fn tuned() -> Self {
+        Self { sliding_mode: embedded().inner.tuned, ..Self::published() }
+    }
+
+    /// Inner ticks per optimisation, once all settings are known to work.
+    ///
+    /// # Errors
+    /// Names the setting at fault.
+    pub(super) fn ratio(&self) -> Result<u64, DesignError> {
+        let SlidingMode { q, p, gamma, rho } = self.sliding_mode;
+        let positive = [
+            ("limit.rate", self.limit_rate),
+            ("limit.moment", self.limit_moment),
+            ("period.optimisation", self.period_optimisation),
+            ("period.feedback", self.period_feedback),
+            ("horizon", self.horizon as f64),
+            ("slidingMode.rho", rho),
+        ];
+        for (name, value) in positive {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(DesignError::NotPositive { name, value });
+            }
+        }
+        for (name, weights) in [("P", self.p), ("Q", self.q)] {
+            for (i, value) in weights.into_iter().enumerate() {
+                if !(value.is_finite() && (value > 0.0 || (name == "P" && value == 0.0))) {
+                    return Err(DesignError::Weight { name, index: i + 1, value });
+                }
+            }
+        }
+        // s⁺ = (1 − q T) s far from the manifold.
+        let ranges = [
+            ("slidingMode.q", q, 2.0 / self.period_feedback),
+            ("slidingMode.p", p, f64::INFINITY),
+            ("slidingMode.gamma", gamma, f64::INFINITY),
+            ("slidingMode.rho", rho, 1.0),
+        ];
+        for (name, value, high) in ranges {
+            if !(0.0..high).contains(&value) {
+                return Err(DesignError::OutOfRange { name, value, low: 0.0, high });
+            }
+        }
+        let (optimisation, feedback) = (self.period_optimisation, self.period_feedback);
+        let ratio = (optimisation / feedback).round();
+        if ratio < 1.0 || (ratio * feedback - optimisation).abs() > 1e-9 * optimisation {
+            return Err(DesignError::Periods { optimisation, feedback });
+        }
+        Ok(ratio as u64)
+    }
+}
+
+fn embedded() -> File {
+    // Cannot fail: every test that uses the published settings reads it.
+    toml::from_str(include_str!("../../data/dlmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
+}

@@ -1,0 +1,65 @@
+//! Beside what the cone solver does inside, no tick of DLMPC allocates.
+#![allow(unsafe_code)]
+
+mod harness;
+
+use control::dlmpc::{Memory, Settings, Status};
+use control::{Controller, Dlmpc, Measurement};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use vehicle::disturbance::Kind;
+use vehicle::scenario::Scenario;
+
+thread_local! {
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+/// The system's allocator, counting per thread.
+struct Counting;
+
+// SAFETY: everything is passed on to the system's allocator.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.set(COUNT.get() + 1);
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn ticks_without_the_cone_solver_allocate_nothing() {
+    let scenario = Scenario::crmpc2022();
+    let mut truth: Vec<Measurement> = Vec::new();
+    let mut controller = Dlmpc::new(Settings::published()).unwrap();
+    let noise = harness::disturbance(Kind::White);
+    harness::simulate(&mut controller, &mut Memory::default(), 1.05, noise, |_, _, &measured| {
+        truth.push(measured);
+    });
+
+    let reference = |time: f64| scenario.reference.at(time);
+    let mut memory = controller.memory();
+    let mut before = controller.memory();
+    let (mut unconstrained, mut solved) = (0, 0);
+    for (tick, measured) in (0..).zip(&truth) {
+        let counted = COUNT.get();
+        before.clone_from(&memory);
+        controller.update(&mut memory, tick, tick as f64 * controller.period(), measured, &reference);
+        let allocated = COUNT.get() - counted;
+        let optimised = tick % controller.ratio() == 0;
+        if optimised && memory.report.status == Status::Constrained {
+            // The counter counts: the solver is known to allocate.
+            solved += allocated;
+        } else {
+            unconstrained += usize::from(optimised);
+            assert_eq!(allocated, 0, "tick {tick}");
+        }
+    }
+    assert!(unconstrained > 50 && solved > 0, "{unconstrained} {solved}");
+}
