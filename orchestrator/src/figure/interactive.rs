@@ -3,9 +3,10 @@
 use super::{Curve, Figure, Panel, Shape};
 use serde_json::{Value, json};
 
-/// Height of a row of panels and of what stands above them, px.
+/// Height of a row of panels, and of what stands above and below them all, px.
 const ROW: usize = 270;
-const ABOVE: usize = 60;
+const ABOVE: usize = 70;
+const BELOW: usize = 44;
 /// Share of the width, and of a row's height, that is left between panels.
 const GAP: f64 = 0.075;
 const ROW_GAP: f64 = 60.0;
@@ -34,14 +35,17 @@ pub fn plot(figure: &Figure) -> (Value, Value) {
     let (rows, columns, height) = (rows(figure), figure.columns.max(1), height(figure));
     let mut layout = json!({
         "height": height,
-        "margin": { "l": 64, "r": 16, "t": ABOVE, "b": 44 },
-        "legend": { "orientation": "h", "x": 0, "y": 1, "yanchor": "bottom", "yref": "container", "groupclick": "togglegroup" },
+        "margin": { "l": 64, "r": 16, "t": ABOVE, "b": BELOW },
+        // Above the panels and their headings.
+        "legend": {
+            "orientation": "h", "x": 0, "y": 1.0 + 26.0 / (height - ABOVE - BELOW) as f64, "yanchor": "bottom",
+            "groupclick": "togglegroup",
+        },
         "hovermode": "closest",
         "paper_bgcolor": "rgba(0,0,0,0)",
+        "modebar": { "bgcolor": "rgba(0,0,0,0)", "color": "#9aa5b0", "activecolor": "#16324f" },
         "annotations": [],
     });
-    layout["legend"]["yref"] = "paper".into();
-    layout["legend"]["y"] = (1.0 + 26.0 / (height - ABOVE - 44) as f64).into();
     let mut data = Vec::new();
     let mut named: Vec<&str> = Vec::new();
     let gap = ROW_GAP / height as f64;

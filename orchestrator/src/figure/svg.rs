@@ -19,7 +19,7 @@ const HEIGHT: u32 = 260;
 const TITLE_HEIGHT: u32 = 40;
 const LEGEND_HEIGHT: u32 = 20;
 /// Width of a letter in the legend, px, at most.
-const LETTER: u32 = 8;
+const LETTER: u32 = 7;
 
 impl From<Color> for RGBColor {
     fn from(Color(r, g, b): Color) -> Self {
@@ -172,23 +172,20 @@ fn draw_panel(panel: &Panel, area: &Area, lowest: bool) -> Result<(), DrawError>
     }
     let mut chart = builder.build_cartesian_2d(left..right, bottom..top)?;
     let decade = |x: &f64| {
-        let value = 10_f64.powf(*x);
-        if value < 0.1 {
-            format!("{value:.3}")
-        } else {
-            format!("{value:.3}").trim_end_matches('0').trim_end_matches('.').to_string()
-        }
+        let whole = (x - x.round()).abs() < 1e-9;
+        if whole { plain(10_f64.powf(x.round()), 3) } else { String::new() }
     };
+    let label_x = |x: &f64| if panel.log_x { decade(x) } else { plain(*x, decimals(right - left)) };
+    let label_y = |y: &f64| plain(*y, decimals(top - bottom));
     let mut mesh = chart.configure_mesh();
     mesh.y_desc(&panel.y_label)
         .label_style((FONT, 13))
         .axis_desc_style((FONT, 14))
         .light_line_style(TRANSPARENT)
         .x_labels(11)
-        .y_labels(7);
-    if panel.log_x {
-        mesh.x_label_formatter(&decade);
-    }
+        .y_labels(7)
+        .x_label_formatter(&label_x)
+        .y_label_formatter(&label_y);
     if lowest {
         mesh.x_desc(&panel.x_label);
     }
@@ -201,7 +198,7 @@ fn draw_panel(panel: &Panel, area: &Area, lowest: bool) -> Result<(), DrawError>
             .iter()
             .zip(&curve.y)
             .map(|(&x, &y)| (place(x), y))
-            .filter(|(x, y)| x.is_finite() && y.is_finite())
+            .filter(|(x, y)| (left..=right).contains(x) && y.is_finite())
             .collect();
         match &curve.shape {
             Shape::Line | Shape::Pale => {
@@ -220,17 +217,15 @@ fn draw_panel(panel: &Panel, area: &Area, lowest: bool) -> Result<(), DrawError>
             }
             Shape::Band(lower) => {
                 let lower = curve.x.iter().zip(lower).rev().map(|(&x, &y)| (place(x), y));
-                let outline: Vec<(f64, f64)> =
-                    points.into_iter().chain(lower).filter(|(_, y)| y.is_finite()).collect();
+                let lower = lower.filter(|(x, y)| (left..=right).contains(x) && y.is_finite());
+                let outline: Vec<(f64, f64)> = points.into_iter().chain(lower).collect();
                 chart.draw_series([Polygon::new(outline, color.mix(fill(&curve.shape)))])?;
             }
             Shape::Steps => {
-                chart.draw_series(points.windows(2).filter(|pair| pair[0].1 > 0.0).map(|pair| {
-                    Rectangle::new(
-                        [(pair[0].0, 0.0), (pair[1].0, pair[0].1)],
-                        color.mix(fill(&curve.shape)).filled(),
-                    )
-                }))?;
+                let corners = points.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
+                let base = [points.last(), points.first()].into_iter().flatten().map(|(x, _)| (*x, 0.0));
+                let outline: Vec<(f64, f64)> = corners.chain(base).collect();
+                chart.draw_series([Polygon::new(outline, color.mix(fill(&curve.shape)))])?;
             }
             Shape::Dots => {
                 chart
@@ -242,4 +237,52 @@ fn draw_panel(panel: &Panel, area: &Area, lowest: bool) -> Result<(), DrawError>
         }
     }
     Ok(())
+}
+
+/// Digits after the point that tell the labels of an axis apart.
+fn decimals(range: f64) -> usize {
+    // An axis has about six labels.
+    (-(range / 6.0).log10().floor()).clamp(0.0, 12.0) as usize
+}
+
+/// A number with at most so many digits after the point, and neither `-0` nor trailing zeros.
+fn plain(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_are_as_short_as_they_can_be() {
+        assert_eq!((decimals(50.0), decimals(6.0), decimals(0.4)), (0, 0, 2));
+        let labels = [(10.0, 0), (0.5, 1), (-0.0, 2), (1e-9, 2), (2.50, 2)].map(|(v, d)| plain(v, d));
+        assert_eq!(labels, ["10", "0.5", "0", "0", "2.5"]);
+    }
+
+    #[test]
+    fn what_lies_outside_the_range_is_not_drawn() {
+        let panel = Panel {
+            title: String::new(),
+            x_label: String::new(),
+            y_label: String::new(),
+            log_x: false,
+            x_range: Some([0.0, 1.0]),
+            curves: vec![Curve {
+                name: "c".into(),
+                color: Color(1, 2, 3),
+                shape: Shape::Line,
+                x: vec![0.0, 1.0, 2.0],
+                y: vec![0.0, 1.0, 0.5],
+            }],
+        };
+        let figure = Figure { title: String::new(), columns: 1, legend: Legend::Above, panels: vec![panel] };
+        let text = text(&figure).unwrap();
+        let curve = text.lines().find(|line| line.contains("polyline") && line.contains("#010203")).unwrap();
+        let points = curve.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
+        assert_eq!(points.split_whitespace().count(), 2, "{curve}");
+    }
 }

@@ -28,7 +28,6 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
         x_label = "time of one optimisation, ms".into();
         curves.extend(runs.iter().map(|(run, result)| histogram(run, &result.series.solver_ms)));
     } else if let Some(scatter) = &panel.scatter {
-        x_label.clone_from(&scatter.x_label);
         for (run, result) in &runs {
             let numbers = |metric: &str| {
                 Metric::parse(metric, run)?;
@@ -91,7 +90,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
     }
     Ok(figure::Panel {
         title: panel.title.clone(),
-        x_label,
+        x_label: panel.x_label.clone().unwrap_or(x_label),
         y_label: panel.label.clone(),
         log_x: panel.histogram.is_some(),
         x_range: panel.time,

@@ -49,11 +49,13 @@
 //! bounds = [{ at = 5.0, label = "limit", symmetric = true }]    # horizontal lines
 //! marks = [{ at = "time.printed", label = "printed mean" }]     # vertical lines
 //! unit = { name = "kN m", factor = 1e-3 }                       # instead of the FMU's display unit
-//! # instead of signal: histogram = "solver_ms"  or  scatter = { x = "ems_deg", y = "cms" } with points = […]
+//! # instead of signal: histogram = "solver_ms"  or  scatter = { x = "ems_deg", y = "cms" }  or nothing but points
+//! points = [{ x = 50.0, y = "ems.lqr", label = "printed", color = "#000000" }]
 //!
 //! [[table]]
 //! id = "table-1"
 //! title = "…"
+//! against = "Paper"                    # heading of what is compared with; this is the default
 //!
 //! [[table.row]]
 //! label = "EMS of LQR, deg"
@@ -243,12 +245,18 @@ fn one() -> usize {
     1
 }
 
-/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram` and `scatter` says what is drawn.
+fn paper() -> String {
+    "Paper".into()
+}
+
+/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram` and `scatter` says what is drawn, or `points` alone.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
     /// Label of the vertical axis.
     pub label: String,
+    /// Label of the horizontal axis, if it is not time.
+    pub x_label: Option<String>,
     /// A heading above it.
     #[serde(default)]
     pub title: String,
@@ -274,7 +282,7 @@ pub struct Panel {
     /// Vertical lines.
     #[serde(default)]
     pub marks: Vec<Line>,
-    /// Single points of a scatter.
+    /// Single points.
     #[serde(default)]
     pub points: Vec<Point>,
     /// Instead of the FMU's display unit.
@@ -309,8 +317,6 @@ pub enum Histogram {
 pub struct Scatter {
     /// Metric along the horizontal axis.
     pub x: String,
-    /// Its label.
-    pub x_label: String,
     /// Metric along the vertical axis.
     pub y: String,
 }
@@ -364,6 +370,9 @@ pub struct Table {
     /// What there is to know.
     #[serde(default)]
     pub note: String,
+    /// Heading of what is compared with.
+    #[serde(default = "paper")]
+    pub against: String,
     /// The rows.
     #[serde(rename = "row")]
     pub rows: Vec<Row>,
@@ -569,11 +578,12 @@ impl Study {
                     panel.histogram.is_some(),
                     panel.scatter.is_some(),
                 ];
-                if drawn.iter().filter(|is| **is).count() != 1 {
+                let count = drawn.iter().filter(|is| **is).count();
+                if count != 1 && (count > 1 || panel.points.is_empty()) {
                     return Err(self.source.error(
                         &(0..0),
                         format!(
-                            "[[figure]] id = \"{}\", panel \"{}\": exactly one of signal, signals, histogram, scatter",
+                            "[[figure]] id = \"{}\", panel \"{}\": exactly one of signal, signals, histogram, scatter, or points alone",
                             figure.id, panel.label
                         ),
                     ));

@@ -191,7 +191,7 @@ fn table(table: &Table, results: &Results) -> Result<Markup, String> {
     Ok(html! {
         h3 { (table.title) }
         table.numbers {
-            thead { tr { th { "Quantity" } th { "Paper" } th { "Ours" } th { "Difference" } th { "" } } }
+            thead { tr { th { "Quantity" } th { (table.against) } th { "Ours" } th { "Difference" } th { "" } } }
             tbody { @for row in rows { (row) } }
         }
         @if !table.note.is_empty() { p.note { (table.note) } }
@@ -305,7 +305,9 @@ fn shown(value: f64) -> String {
     } else if !(1e-3..1e5).contains(&magnitude) {
         format!("{value:.3e}")
     } else {
-        let digits = (4 - magnitude.log10().floor() as i32).clamp(0, 6) as usize;
+        // Four places, as the paper's tables; more only to keep three significant digits.
+        let digits = (4 - magnitude.log10().floor() as i32).clamp(0, if magnitude < 0.1 { 6 } else { 4 });
+        let digits = if magnitude < 0.1 { digits - 2 } else { digits } as usize;
         let text = format!("{value:.digits$}");
         if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
     }
@@ -354,6 +356,8 @@ mod tests {
             (0.3552, "0.3552"),
             (116.8, "116.8"),
             (12_345.6, "12346"),
+            (0.08511, "0.0851"),
+            (0.23413, "0.2341"),
             (2e-5, "2.000e-5"),
             (-0.0123, "-0.0123"),
             (100.0, "100"),
