@@ -10,7 +10,7 @@ from conftest import NAMES
 from fmi import ANGLES, RATES, Unit
 
 STEP = 0.04
-INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "LQR": "attitude.beta"}
+INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "DLMPC": "rate.q", "LQR": "attitude.beta"}
 
 
 def drive(unit: Unit, ticks: int = 12) -> list:
@@ -82,6 +82,7 @@ def test_value_references_that_do_not_exist(unit):
         ("CRMPC", "feedback.k1", 5.0),
         ("CRMPC", "disturbance.bound", -1.0),
         ("CRMPC", "limit.rate", math.nan),
+        ("DLMPC", "slidingMode.rho", 1.5),
         ("LQR", "limit.moment", -1.0),
         ("LQR", "reference.profile", 77),
     ],
@@ -102,6 +103,8 @@ def test_parameters_out_of_range_are_refused_when_set(fmu, name, variable, value
         ("CRMPC", {"feedback.k1": -60.0, "feedback.k2": -60.0}, ["spectral radius", "-60"]),
         ("CRMPC", {"period.optimisation": 0.21}, ["period.optimisation", "period.feedback"]),
         ("CRMPC", {"limit.rate": 1e-4, "constraints": "paper"}, ["x_tube"]),
+        ("DLMPC", {"slidingMode.q": 50.0}, ["slidingMode.q", "50"]),
+        ("DLMPC", {"period.feedback": 0.03}, ["period.optimisation", "period.feedback"]),
         ("LQR", {"weight.P[1]": 1e7, "weight.P[4]": 1e7}, ["spectral radius"]),
         ("LQR", {"reference.profile": "table", "reference.file": "nowhere.csv"}, ["nowhere.csv"]),
         ("CRMPC", {"inertia.Ixz": 1e6}, ["inertia.Ixz"]),

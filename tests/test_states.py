@@ -12,7 +12,7 @@ from fmi import ANGLES, MOMENT, RATES, Loop, Unit
 
 STEP = 0.04
 PLANT = {"inertia.scale": 1.05, "disturbance.kind": "white", "disturbance.seed": 3}
-SETTINGS = {"ReentryPlant": PLANT, "CRMPC": {"constraints": "robust"}, "LQR": {}}
+SETTINGS = {"ReentryPlant": PLANT, "CRMPC": {"constraints": "robust"}, "DLMPC": {}, "LQR": {}}
 
 
 def course(tick: int) -> dict:
@@ -89,6 +89,7 @@ def test_interleaved_instances_do_not_disturb_each_other(fmu, name):
     other_settings = {
         "ReentryPlant": {"disturbance.kind": "white", "disturbance.seed": 4},
         "CRMPC": {"constraints": "paper"},
+        "DLMPC": {"slidingMode.p": 1.0},
         "LQR": {"weight.P[1]": 20.0},
     }[name]
     alone = []

@@ -2,6 +2,7 @@
 //! same inputs and outputs, so that one can take another's place without rewiring.
 
 mod crmpc;
+mod dlmpc;
 mod law;
 mod lqr;
 mod reference;
@@ -15,7 +16,9 @@ pub use unit::Unit;
 
 /// `CRMPC`: centralised robust model predictive control.
 pub type Crmpc = Unit<crmpc::CrmpcLaw>;
+/// `DLMPC`: double-layered model predictive and sliding-mode control.
+pub type Dlmpc = Unit<dlmpc::DlmpcLaw>;
 /// `LQR`: linear-quadratic regulator.
 pub type Lqr = Unit<lqr::LqrLaw>;
 
-fmi2_export::export_fmus!(Crmpc, Lqr);
+fmi2_export::export_fmus!(Crmpc, Dlmpc, Lqr);

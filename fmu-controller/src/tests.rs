@@ -1,6 +1,9 @@
 //! Tests of the units through the trait the FMI shell works with.
 
-use crate::{Crmpc, Lqr};
+use crate::crmpc::CrmpcLaw;
+use crate::dlmpc::DlmpcLaw;
+use crate::law::Law;
+use crate::{Crmpc, Dlmpc, Lqr, Unit};
 use fmi2_export::{Context, Failure, Inputs, Model, describe};
 use model_description::ModelDescription;
 use model_description::variable::Causality;
@@ -44,13 +47,16 @@ fn descriptions_are_consistent_and_interchangeable() {
         let wanted = description.variables.iter().filter(|v| v.causality == causality);
         wanted.map(|v| v.name.clone()).collect()
     };
-    let (crmpc, lqr) = (describe::<Crmpc>(), describe::<Lqr>());
-    crmpc.check().unwrap();
-    lqr.check().unwrap();
-    assert_ne!(crmpc.guid(), lqr.guid());
-    assert_eq!(names(&crmpc, Causality::Input), names(&lqr, Causality::Input));
-    let outputs = names(&crmpc, Causality::Output);
-    assert!(names(&lqr, Causality::Output).iter().all(|name| outputs.contains(name)));
+    let (crmpc, dlmpc, lqr) = (describe::<Crmpc>(), describe::<Dlmpc>(), describe::<Lqr>());
+    for other in [&crmpc, &dlmpc] {
+        other.check().unwrap();
+        lqr.check().unwrap();
+        assert_ne!(other.guid(), lqr.guid());
+        assert_eq!(names(other, Causality::Input), names(&lqr, Causality::Input));
+        let outputs = names(other, Causality::Output);
+        assert!(names(&lqr, Causality::Output).iter().all(|name| outputs.contains(name)));
+    }
+    assert_ne!(crmpc.guid(), dlmpc.guid());
 }
 
 #[test]
@@ -70,9 +76,8 @@ fn a_tick_evaluated_with_other_inputs_leaves_no_trace() {
     assert_eq!(once.output.moment, twice.output.moment);
 }
 
-#[test]
-fn any_communication_steps_give_the_same_moments() {
-    let mut reference: Crmpc = ready(|_| ());
+fn assert_any_communication_steps_give_the_same_moments<L: Law>() {
+    let mut reference: Unit<L> = ready(|_| ());
     let expected: Vec<_> = (0..10_u32)
         .map(|k| {
             step(&mut reference, f64::from(k) * 0.2, f64::from(k + 1) * 0.2);
@@ -80,7 +85,7 @@ fn any_communication_steps_give_the_same_moments() {
         })
         .collect();
     for parts in [1, 3, 5, 10] {
-        let mut unit: Crmpc = ready(|_| ());
+        let mut unit: Unit<L> = ready(|_| ());
         for (k, expected) in (0..10_u32).zip(&expected) {
             let at = |part: u32| (f64::from(k) + f64::from(part) / f64::from(parts)) * 0.2;
             for part in 0..parts {
@@ -89,6 +94,12 @@ fn any_communication_steps_give_the_same_moments() {
             assert_eq!(unit.output.moment, *expected, "{parts} steps of an optimisation period, period {k}");
         }
     }
+}
+
+#[test]
+fn any_communication_steps_give_the_same_moments() {
+    assert_any_communication_steps_give_the_same_moments::<CrmpcLaw>();
+    assert_any_communication_steps_give_the_same_moments::<DlmpcLaw>();
 }
 
 #[test]

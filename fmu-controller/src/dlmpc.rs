@@ -1,0 +1,159 @@
+//! `DLMPC`: its own parameters and outputs.
+
+use crate::law::{Law, Vehicle};
+use crate::solver::{self, SolverOutputs};
+use crate::table::{ANGLES, RATES, sampled_inputs, vector};
+use crate::unit::Unit;
+use control::dlmpc::{Dlmpc, Memory, Settings, SlidingMode};
+use fmi2_export::table::{discrete_output, parameter};
+use fmi2_export::{Failure, Table};
+use model_description::unit;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Parameters and outputs of DLMPC.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct DlmpcLaw {
+    horizon: i32,
+    period_optimisation: f64,
+    period_feedback: f64,
+    p: [f64; 3],
+    q: [f64; 3],
+    sliding_mode: SlidingMode,
+    max_iterations: i32,
+    shown: Shown,
+}
+
+/// What the outputs show.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct Shown {
+    rate_command: Vector3<f64>,
+    sliding: Vector3<f64>,
+    solver: SolverOutputs,
+    inner_time: f64,
+}
+
+impl Default for DlmpcLaw {
+    fn default() -> Self {
+        let s = Settings::published();
+        Self {
+            horizon: i32::try_from(s.horizon).unwrap_or(i32::MAX),
+            period_optimisation: s.period_optimisation,
+            period_feedback: s.period_feedback,
+            p: s.p,
+            q: s.q,
+            sliding_mode: s.sliding_mode,
+            max_iterations: s.max_iterations.cast_signed(),
+            shown: Shown::default(),
+        }
+    }
+}
+
+impl Law for DlmpcLaw {
+    type Controller = Dlmpc;
+
+    const NAME: &'static str = "DLMPC";
+    const DESCRIPTION: &'static str = "Double-layered model predictive and sliding-mode attitude controller, the comparison of Chai et al. (2022)";
+    const DOCUMENTATION: &'static str = include_str!("dlmpc.html");
+
+    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
+        outputs(sliding_mode(weights(schedule(table))))
+    }
+
+    #[allow(private_interfaces)]
+    fn design(&self, vehicle: &Vehicle) -> Result<Dlmpc, Failure> {
+        let settings = Settings {
+            body: vehicle.body,
+            limit_rate: vehicle.limit_rate,
+            limit_moment: vehicle.limit_moment,
+            horizon: self.horizon.max(0).cast_unsigned() as usize,
+            period_optimisation: self.period_optimisation,
+            period_feedback: self.period_feedback,
+            p: self.p,
+            q: self.q,
+            sliding_mode: self.sliding_mode,
+            max_iterations: self.max_iterations.max(0).cast_unsigned(),
+        };
+        Dlmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    fn show(&mut self, memory: &Memory) {
+        self.shown = Shown {
+            rate_command: memory.rate_command,
+            sliding: memory.sliding,
+            solver: SolverOutputs::from(&memory.report),
+            inner_time: memory.inner_time,
+        };
+    }
+
+    fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
+        solver::warning(&before.report, &after.report)
+    }
+}
+
+type Controller = Table<Unit<DlmpcLaw>>;
+
+fn schedule(table: Controller) -> Controller {
+    let horizon = parameter("horizon", "Number of prediction steps of the outer layer");
+    let optimisation = parameter(
+        "period.optimisation",
+        "Period of the outer layer and its prediction step; a whole multiple of period.feedback",
+    );
+    let feedback = parameter("period.feedback", "Period of the inner layer");
+    let table = table
+        .integer(horizon, (Some(2), Some(1000)), |m| &mut m.law.horizon)
+        .real(optimisation.real().unit(unit::time()).min(1e-3).max(10.0).nominal(0.2), |m| {
+            &mut m.law.period_optimisation
+        })
+        .real(feedback.real().unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| {
+            &mut m.law.period_feedback
+        });
+    solver::max_iterations(table, |law| &mut law.max_iterations)
+}
+
+fn weights(mut table: Controller) -> Controller {
+    for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
+        let text = format!("Diagonal entry {} of P: weight on the error of the {meaning}", i + 1);
+        let p = parameter(&format!("weight.P[{}]", i + 1), &text).real().min(0.0).nominal(50.0);
+        table = table.real(p, move |m| &mut m.law.p[i]);
+    }
+    for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
+        let text = format!("Diagonal entry {} of Q: weight on the error rate of the {meaning}", i + 1);
+        let q = parameter(&format!("weight.Q[{}]", i + 1), &text).real().min(0.0).nominal(10.0);
+        table = table.real(q, move |m| &mut m.law.q[i]);
+    }
+    table
+}
+
+fn sliding_mode(table: Controller) -> Controller {
+    let q = parameter("slidingMode.q", "Linear reaching gain of the inner layer, below 2/period.feedback");
+    let p = parameter("slidingMode.p", "Reaching gain of the power rho");
+    let gamma =
+        parameter("slidingMode.gamma", "Gain of the sliding manifold, on the integral of the power rho");
+    let rho = parameter("slidingMode.rho", "Power of manifold and reaching law, above 0 and below 1");
+    table
+        .real(q.real().unit(unit::gain_rate()).min(0.0).nominal(5.0), |m| &mut m.law.sliding_mode.q)
+        .real(p.real().min(0.0).nominal(5.0), |m| &mut m.law.sliding_mode.p)
+        .real(gamma.real().min(0.0).nominal(0.1), |m| &mut m.law.sliding_mode.gamma)
+        .real(rho.real().min(0.0).max(1.0), |m| &mut m.law.sliding_mode.rho)
+}
+
+fn outputs(table: Controller) -> Controller {
+    let sampled = |name: &str, text: &str| discrete_output(name, text).depends_on(sampled_inputs());
+    let command = |axis: &str, meaning: &str| {
+        let text = format!("Body {meaning} rate that the outer layer commands, held for period.optimisation");
+        sampled(&format!("rateCommand.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
+    };
+    let sliding = |axis: &str, meaning: &str| {
+        let text = format!("Sliding variable of the {meaning} rate at the last tick");
+        sampled(&format!("slidingVariable.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.01)
+    };
+    let time = sampled(
+        "innerLaw.time",
+        "Wall-clock time of the last evaluation of the inner law; differs from run to run",
+    );
+    let table = vector(table, RATES, command, |m| &mut m.law.shown.rate_command);
+    let table = vector(table, RATES, sliding, |m| &mut m.law.shown.sliding);
+    solver::outputs(table, |law| &mut law.shown.solver)
+        .real(time.real().unit(unit::time()).nominal(1e-6), |m| &mut m.law.shown.inner_time)
+}
