@@ -1,0 +1,130 @@
+"""docs/errata.md names a test for everything it claims, docs/symbols.md only variables that exist."""
+
+import re
+import xml.etree.ElementTree as ET
+
+import pytest
+
+from conftest import ROOT
+
+CRATES = ["vehicle", "control", "modelDescription", "fmi2-export", "fmu-plant", "fmu-controller", "orchestrator"]
+
+
+def tables(page: str) -> list[tuple[list[str], list[list[str]]]]:
+    """Every table of a page: its header and its rows, cell by cell."""
+    found: list[tuple[list[str], list[list[str]]]] = []
+    inside = False
+    for line in (ROOT / "docs" / page).read_text(encoding="utf-8").splitlines():
+        if not line.startswith("|"):
+            inside = False
+            continue
+        cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+        if not inside:
+            found.append((cells, []))
+        elif not all(re.fullmatch(r":?-+:?", cell) for cell in cells):
+            found[-1][1].append(cells)
+        inside = True
+    return found
+
+
+def quoted(cell: str) -> list[str]:
+    """What stands between backticks."""
+    return re.findall(r"`([^`]+)`", cell)
+
+
+# errata.md
+
+ROWS = [(header, cells) for header, rows in tables("errata.md") for cells in rows]
+
+
+@pytest.fixture(scope="module")
+def names() -> set[str]:
+    """Names of all tests of the repository."""
+    found: set[str] = set()
+    for crate in CRATES:
+        for path in (ROOT / crate).rglob("*.rs"):
+            found.update(re.findall(r"#\[test\]\s*(?:#\[[^\n]*\]\s*)*fn (\w+)", path.read_text(encoding="utf-8")))
+    for path in (ROOT / "tests").glob("test_*.py"):
+        found.update(re.findall(r"^def (test_\w+)", path.read_text(encoding="utf-8"), re.MULTILINE))
+    return found
+
+
+def test_there_are_errata():
+    assert len(ROWS) > 30
+    assert all(len(header) == len(cells) and header[-1] == "test" for header, cells in ROWS)
+
+
+@pytest.mark.parametrize("cells", [cells for _, cells in ROWS], ids=[cells[0] for _, cells in ROWS])
+def test_every_erratum_has_a_test_that_exists(cells, names):
+    tests = quoted(cells[-1])
+    assert tests or cells[-1] == "the same", "no test"
+    for test in tests:
+        if test.endswith("…"):
+            assert any(name.startswith(test[:-1]) for name in names), f"no test begins with {test[:-1]}"
+        else:
+            assert test in names, f"there is no test {test}"
+
+
+def test_the_same_test_is_one_of_the_row_above():
+    for (_, above), (_, cells) in zip(ROWS, ROWS[1:]):
+        if "the same" in cells[-1]:
+            assert quoted(above[-1]) or above[-1] == "the same", cells
+    assert "the same" not in ROWS[0][1][-1]
+
+
+def test_tests_quoted_elsewhere_on_the_page_exist(names):
+    text = (ROOT / "docs" / "errata.md").read_text(encoding="utf-8")
+    prose = "\n".join(line for line in text.splitlines() if not line.startswith("|"))
+    for name in re.findall(r"`((?:test_|oracle_|published_|regress_)\w+)`", prose):
+        assert name in names, name
+
+
+# symbols.md
+
+
+@pytest.fixture(scope="module")
+def variables() -> set[str]:
+    """Names of the variables of all FMUs."""
+    found: set[str] = set()
+    for path in (ROOT / "modelDescription" / "generated").glob("*.xml"):
+        found.update(variable.get("name") for variable in ET.parse(path).iter("ScalarVariable"))
+    return found
+
+
+def spelled_out(names: list[str]) -> list[str]:
+    """`a.x/y` as a.x, a.y, and an index alone as that index of the name before it."""
+    result: list[str] = []
+    for name in names:
+        if re.fullmatch(r"\[\d+\]", name):
+            result.append(re.sub(r"\[\d+\]$", name, result[-1]))
+            continue
+        stem, dot, last = name.rpartition(".")
+        result += [stem + dot + part for part in last.split("/")]
+    return result
+
+
+def test_shorthand_is_spelled_out():
+    names = ["a.b.x/y", "weight.P[1]", "[6]", "solver.*", "horizon"]
+    expected = ["a.b.x", "a.b.y", "weight.P[1]", "weight.P[6]", "solver.*", "horizon"]
+    assert spelled_out(names) == expected
+
+
+FMI_NAMES = [
+    name
+    for header, rows in tables("symbols.md")
+    if "FMI" in header
+    for cells in rows
+    for name in spelled_out(quoted(cells[header.index("FMI")]))
+]
+
+
+def test_there_are_fmi_names():
+    assert len(FMI_NAMES) > 80
+
+
+@pytest.mark.parametrize("name", FMI_NAMES)
+def test_every_fmi_name_of_the_symbols_exists(name, variables):
+    if name.endswith(".*"):
+        assert any(variable.startswith(name[:-1]) for variable in variables)
+    else:
+        assert name in variables
