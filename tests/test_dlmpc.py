@@ -166,6 +166,6 @@ def test_the_experiments_run(orchestrate, name):
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     moments = np.array([[float(row[key]) for key in row if "plant.appliedMoment" in key] for row in rows])
     assert moments.shape == (1251, 3)
-    assert np.linalg.norm(moments, axis=1).max() <= nlp.MOMENT_LIMIT * (1 + 1e-12)
+    assert np.linalg.norm(moments, axis=1).max() <= nlp.MOMENT_LIMIT
     fallbacks = next(key for key in rows[0] if "solver.fallbacks" in key)
     assert float(rows[-1][fallbacks]) == 0

@@ -482,9 +482,9 @@ impl Controller for Dlmpc {
     }
 }
 
-/// The factor that scales a vector of this norm into `limit`: at most 1.
+/// The factor that scales a vector of this norm into `limit`: at most 1. Rounding does not lift the result above it.
 fn within(norm: f64, limit: f64) -> f64 {
-    if norm > limit { limit / norm } else { 1.0 }
+    if norm > limit { limit / norm * (1.0 - 8.0 * f64::EPSILON) } else { 1.0 }
 }
 
 /// sig^ρ(x) = |x|^ρ sgn x, by component.
