@@ -1,7 +1,7 @@
 //! `CRMPC`: its own parameters and outputs.
 
 use crate::law::{Law, Vehicle};
-use crate::solver::{self, SolverOutputs};
+use crate::solver::{self, SolverOutputs, SolverParameters};
 use crate::table::{self, ANGLES, enumeration, item, number, sampled_inputs, vector};
 use crate::unit::Unit;
 use control::crmpc::{Constraints, Crmpc, InitialState, Memory, Settings};
@@ -30,7 +30,7 @@ pub struct CrmpcLaw {
     sideslip_bound: f64,
     reference_rate: f64,
     reference_acceleration: f64,
-    max_iterations: i32,
+    solver: SolverParameters,
     shown: Shown,
 }
 
@@ -75,7 +75,7 @@ impl Default for CrmpcLaw {
             sideslip_bound: s.sideslip_bound,
             reference_rate: s.reference_rate,
             reference_acceleration: s.reference_acceleration,
-            max_iterations: s.max_iterations.cast_signed(),
+            solver: SolverParameters::new(s.max_iterations),
             shown: Shown::default(),
         }
     }
@@ -114,9 +114,10 @@ impl Law for CrmpcLaw {
             sideslip_bound: self.sideslip_bound,
             reference_rate: self.reference_rate,
             reference_acceleration: self.reference_acceleration,
-            max_iterations: self.max_iterations.max(0).cast_unsigned(),
+            max_iterations: self.solver.max_iterations(),
         };
-        Crmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        let controller = Crmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))?;
+        Ok(if self.solver.exits { controller } else { controller.without_exits() })
     }
 
     fn show(&mut self, memory: &Memory) {
@@ -174,7 +175,7 @@ fn schedule(table: Controller) -> Controller {
         .real(feedback.real().unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| {
             &mut m.law.period_feedback
         });
-    solver::max_iterations(table, |law| &mut law.max_iterations)
+    solver::parameters(table, |law| &mut law.solver)
 }
 
 fn gains(table: Controller) -> Controller {

@@ -1,7 +1,7 @@
 //! `DLMPC`: its own parameters and outputs.
 
 use crate::law::{Law, Vehicle};
-use crate::solver::{self, SolverOutputs};
+use crate::solver::{self, SolverOutputs, SolverParameters};
 use crate::table::{ANGLES, RATES, sampled_inputs, vector};
 use crate::unit::Unit;
 use control::dlmpc::{Dlmpc, Memory, Settings, SlidingMode};
@@ -20,7 +20,7 @@ pub struct DlmpcLaw {
     p: [f64; 3],
     q: [f64; 3],
     sliding_mode: SlidingMode,
-    max_iterations: i32,
+    solver: SolverParameters,
     shown: Shown,
 }
 
@@ -43,7 +43,7 @@ impl Default for DlmpcLaw {
             p: s.p,
             q: s.q,
             sliding_mode: s.sliding_mode,
-            max_iterations: s.max_iterations.cast_signed(),
+            solver: SolverParameters::new(s.max_iterations),
             shown: Shown::default(),
         }
     }
@@ -72,9 +72,10 @@ impl Law for DlmpcLaw {
             p: self.p,
             q: self.q,
             sliding_mode: self.sliding_mode,
-            max_iterations: self.max_iterations.max(0).cast_unsigned(),
+            max_iterations: self.solver.max_iterations(),
         };
-        Dlmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        let controller = Dlmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))?;
+        Ok(if self.solver.exits { controller } else { controller.without_exits() })
     }
 
     fn show(&mut self, memory: &Memory) {
@@ -108,7 +109,7 @@ fn schedule(table: Controller) -> Controller {
         .real(feedback.real().unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| {
             &mut m.law.period_feedback
         });
-    solver::max_iterations(table, |law| &mut law.max_iterations)
+    solver::parameters(table, |law| &mut law.solver)
 }
 
 fn weights(mut table: Controller) -> Controller {

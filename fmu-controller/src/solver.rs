@@ -72,13 +72,38 @@ pub(crate) fn outputs<L: Law>(
         .integer(fallbacks, (None, None), move |m| &mut solver(&mut m.law).fallbacks)
 }
 
-/// Adds the parameter that limits the solver's iterations.
-pub(crate) fn max_iterations<L: Law>(
+/// How an optimisation is solved.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct SolverParameters {
+    max_iterations: i32,
+    pub(crate) exits: bool,
+}
+
+impl SolverParameters {
+    /// With the exits, and at most so many iterations.
+    pub(crate) fn new(max_iterations: u32) -> Self {
+        Self { max_iterations: max_iterations.cast_signed(), exits: true }
+    }
+
+    pub(crate) fn max_iterations(self) -> u32 {
+        self.max_iterations.max(0).cast_unsigned()
+    }
+}
+
+/// Adds the parameters.
+pub(crate) fn parameters<L: Law>(
     table: Table<Unit<L>>,
-    field: impl Fn(&mut L) -> &mut i32 + Copy + Send + Sync + 'static,
+    solver: impl Fn(&mut L) -> &mut SolverParameters + Copy + Send + Sync + 'static,
 ) -> Table<Unit<L>> {
     let iterations = parameter("solver.maxIterations", "Iteration limit of the cone solver");
-    table.integer(iterations, (Some(1), Some(1000)), move |m| field(&mut m.law))
+    let exits = parameter(
+        "solver.exits",
+        "Whether cheaper ways to the same optimum are tried first: the optimum without constraints, then parts of the horizon; \
+         otherwise the cone programme of the whole horizon is solved each time",
+    );
+    table
+        .integer(iterations, (Some(1), Some(1000)), move |m| &mut solver(&mut m.law).max_iterations)
+        .boolean(exits, move |m| &mut solver(&mut m.law).exits)
 }
 
 /// A warning if an optimisation failed between the two reports.

@@ -1,13 +1,14 @@
-//! Lists the experiments and FMUs there are.
+//! Lists the experiments, studies and FMUs there are.
 
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fmu::Fmu;
+use crate::study::Study;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
-/// Prints the experiments below a folder with their titles, and the FMUs below it and in `target/fmu`.
+/// Prints the experiments and studies below a folder with their titles, and the FMUs below it and in `target/fmu`.
 ///
 /// # Errors
 /// If the folder is not there, or the text cannot be written.
@@ -26,6 +27,16 @@ pub fn list(folder: &Path, out: &mut impl Write) -> Result<(), Error> {
         }
     }
     print("experiments", &rows, out)?;
+
+    let studies: Vec<(PathBuf, String)> = files(folder, "toml")
+        .into_iter()
+        .filter(|path| path.file_name().is_some_and(|name| name == "study.toml"))
+        .map(|path| {
+            let title = Study::load(&path).map_or_else(|error| format!("FAULT {error}"), |study| study.title);
+            (path, title)
+        })
+        .collect();
+    print("studies", &studies, out)?;
 
     let mut fmus = files(folder, "fmu");
     fmus.extend(files(Path::new("target/fmu"), "fmu"));

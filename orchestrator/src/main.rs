@@ -70,7 +70,7 @@ enum Command {
         /// The archive.
         fmu: PathBuf,
     },
-    /// List experiments and FMUs.
+    /// List experiments, studies and FMUs.
     List {
         /// Folder to look in.
         #[arg(default_value = ".")]

@@ -93,7 +93,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
         x_label: panel.x_label.clone().unwrap_or(x_label),
         y_label: panel.label.clone(),
         log_x: panel.histogram.is_some(),
-        x_range: panel.time,
+        x_range: panel.x_range,
         curves,
     })
 }

@@ -48,6 +48,7 @@
 //! spread = true                        # the band of all values of `vary`, not the first run alone
 //! bounds = [{ at = 5.0, label = "limit", symmetric = true }]    # horizontal lines
 //! marks = [{ at = "time.printed", label = "printed mean" }]     # vertical lines
+//! x_range = [0.0, 25.0]                # part of the horizontal axis
 //! unit = { name = "kN m", factor = 1e-3 }                       # instead of the FMU's display unit
 //! # instead of signal: histogram = "solver_ms"  or  scatter = { x = "ems_deg", y = "cms" }  or nothing but points
 //! points = [{ x = 50.0, y = "ems.lqr", label = "printed", color = "#000000" }]
@@ -287,8 +288,8 @@ pub struct Panel {
     pub points: Vec<Point>,
     /// Instead of the FMU's display unit.
     pub unit: Option<Scaled>,
-    /// Part of the time axis, s.
-    pub time: Option<[f64; 2]>,
+    /// Part of the horizontal axis to show.
+    pub x_range: Option<[f64; 2]>,
 }
 
 /// A curve of its own name and colour.
