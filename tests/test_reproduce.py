@@ -178,9 +178,9 @@ def test_a_changed_experiment_is_run_again(report, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "culprit"),
     [
-        ('experiment = "lqr.toml"', 'experiment = "lqq.toml"', "lqq.toml"),
+        ('experiment = "lqr.toml"', 'experiment = "lqq.toml"', "run lqr"),
         ('runs = ["lqr", "dlmpc"', 'runs = ["lqq", "dlmpc"', 'did you mean "lqr"'),
-        ('signal = "plant.rate.p"', 'signal = "plant.rate.pp"', "plant.rate.pp"),
+        ('signal = "plant.rate.p"', 'signal = "plant.rate.pp"', 'did you mean "rate.p"'),
         ('paper = "ems.dlmpc"', 'paper = "ems.dlmp"', 'did you mean "ems.dlmpc"'),
         ('ours = "dlmpc.cms"', 'ours = "dlmpc.cmss"', 'did you mean "cms"'),
         ('left = "crmpc-paper.cms"', 'left = "crmpc-papr.cms"', 'did you mean "crmpc-paper"'),

@@ -163,7 +163,9 @@ impl<'a> Preparation<'a> {
     /// # Errors
     /// Names what is not.
     pub fn check(&self, opened: &mut Opened) -> Result<(), Error> {
-        let plan = self.plan(0, opened)?;
+        let plan = self
+            .plan(0, opened)
+            .map_err(|error| Error::Run { run: self.run.id.get_ref().clone(), source: Box::new(error) })?;
         let bounded = self.study.bounds_of(self.run).flat_map(|(_, signals)| signals);
         self.wanted.series.iter().chain(bounded).try_for_each(|signal| self.resolve(signal, &plan).map(drop))
     }
