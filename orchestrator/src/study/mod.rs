@@ -25,6 +25,7 @@
 //! vary = { parameter = "plant.disturbance.seed", first = 1, count = 20 }   # optional: one run for each value
 //! timed = true                         # its first run has the machine for itself
 //! within = ["tube"]                    # bounds that it is held against
+//! measures = ["settling"]              # further numbers that are taken of it
 //!
 //! [signals]                            # lists of signals, see [`signal`]
 //! deviation = ["plant.attitude.alpha - controller.nominal.alpha"]
@@ -33,6 +34,13 @@
 //! id = "tube"
 //! signals = "deviation"
 //! bound = "tube.printed"               # a value, or a number
+//!
+//! [[measure]]                          # further numbers of a run: run.measure.ID
+//! id = "settling"
+//! kind = "settling"                    # rms, largest, settling, pulses: see [`measure`]
+//! signals = "deviation"
+//! band = 0.02
+//! over = [0.0, 20.0]                   # optional
 //!
 //! [[figure]]
 //! id = "fig-4"                         # name of its files
@@ -82,6 +90,7 @@
 
 pub mod claims;
 pub mod figures;
+pub mod measure;
 pub mod page;
 pub mod part;
 pub mod reproduce;
@@ -93,6 +102,7 @@ use crate::error::Error;
 use crate::experiment::{Experiment, Source};
 use crate::figure::Color;
 use crate::names;
+use measure::Measure;
 use serde::{Deserialize, Serialize};
 use signal::Signal;
 use std::collections::BTreeMap;
@@ -128,6 +138,9 @@ pub struct Study {
     /// Bounds that runs are held against.
     #[serde(default)]
     pub within: Vec<Within>,
+    /// Numbers that are taken of runs.
+    #[serde(default, rename = "measure")]
+    pub measures: Vec<Measure>,
     /// What is drawn.
     #[serde(default, rename = "figure")]
     pub figures: Vec<Figure>,
@@ -194,6 +207,9 @@ pub struct Run {
     /// Bounds that it is held against, by id.
     #[serde(default)]
     pub within: Vec<Spanned<String>>,
+    /// Further numbers that are taken of it, by id.
+    #[serde(default)]
+    pub measures: Vec<Spanned<String>>,
 }
 
 /// Values `first`, `first` + 1, … of a parameter.
@@ -495,12 +511,20 @@ impl Study {
         ids.iter().filter_map(|id| self.run(id.get_ref()))
     }
 
+    fn list(&self, name: &Spanned<String>) -> &[Signal] {
+        self.signals.get(name.get_ref()).map(Vec::as_slice).unwrap_or_default()
+    }
+
     /// The bounds that a run is held against, each with its signals.
     pub fn bounds_of<'a>(&'a self, run: &'a Run) -> impl Iterator<Item = (&'a Within, &'a [Signal])> {
         let named = |id: &Spanned<String>| self.within.iter().find(|within| within.id == *id.get_ref());
-        run.within.iter().filter_map(named).map(|within| {
-            (within, self.signals.get(within.signals.get_ref()).map(Vec::as_slice).unwrap_or_default())
-        })
+        run.within.iter().filter_map(named).map(|within| (within, self.list(&within.signals)))
+    }
+
+    /// The numbers that are taken of a run, each with its signals.
+    pub fn measures_of<'a>(&'a self, run: &'a Run) -> impl Iterator<Item = (&'a Measure, &'a [Signal])> {
+        let named = |id: &Spanned<String>| self.measures.iter().find(|measure| measure.id == *id.get_ref());
+        run.measures.iter().filter_map(named).map(|measure| (measure, self.list(&measure.signals)))
     }
 
     /// A number as it is written, or the value it names.
@@ -528,6 +552,24 @@ impl Study {
         Ok(experiment)
     }
 
+    /// Refuses a name that is not among `there`; `what` they are.
+    fn known<'a>(
+        &self,
+        names: impl IntoIterator<Item = &'a Spanned<String>>,
+        what: &str,
+        there: impl Iterator<Item = &'a str> + Clone,
+    ) -> Result<(), Error> {
+        match names.into_iter().find(|name| there.clone().all(|other| other != name.get_ref())) {
+            None => Ok(()),
+            Some(name) => {
+                let hint = names::hint(name.get_ref(), there);
+                Err(self
+                    .source
+                    .error(&name.span(), format!("there is no {what} \"{}\"{hint}", name.get_ref())))
+            }
+        }
+    }
+
     /// Everything that can be wrong without running anything.
     fn check(&self) -> Result<(), Error> {
         let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
@@ -545,34 +587,27 @@ impl Study {
             if run.vary.as_ref().is_some_and(|vary| vary.count == 0) {
                 return fault("vary.count = 0: at least 1");
             }
-            for within in &run.within {
-                if !self.within.iter().any(|known| known.id == *within.get_ref()) {
-                    let hint = names::hint(within.get_ref(), self.within.iter().map(|w| w.id.as_str()));
-                    let message = format!("there is no [[within]] \"{}\"{hint}", within.get_ref());
-                    return Err(self.source.error(&within.span(), message));
-                }
-            }
+            self.known(&run.within, "[[within]]", self.within.iter().map(|within| within.id.as_str()))?;
+            self.known(
+                &run.measures,
+                "[[measure]]",
+                self.measures.iter().map(|measure| measure.id.as_str()),
+            )?;
         }
         for within in &self.within {
             self.number(&within.bound)?;
-            let list = within.signals.get_ref();
-            if !self.signals.contains_key(list) {
-                let hint = names::hint(list, self.signals.keys().map(String::as_str));
-                let message = format!("[signals] has no \"{list}\"{hint}");
-                return Err(self.source.error(&within.signals.span(), message));
-            }
         }
-        let known = |id: &Spanned<String>| {
-            if ids.contains(&id.get_ref().as_str()) {
-                return Ok(());
-            }
-            let hint = names::hint(id.get_ref(), ids.iter().copied());
-            Err(self.source.error(&id.span(), format!("there is no run \"{}\"{hint}", id.get_ref())))
-        };
+        if let Some(fault) = self.measures.iter().find_map(Measure::fault) {
+            return Err(self.source.error(&(0..0), fault));
+        }
+        let bounded = self.within.iter().map(|within| &within.signals);
+        for list in bounded.chain(self.measures.iter().map(|measure| &measure.signals)) {
+            self.known([list], "[signals]", self.signals.keys().map(String::as_str))?;
+        }
         for figure in &self.figures {
-            figure.runs.iter().try_for_each(known)?;
+            self.known(&figure.runs, "[[run]]", ids.iter().copied())?;
             for panel in &figure.panels {
-                panel.runs.iter().flatten().try_for_each(known)?;
+                self.known(panel.runs.iter().flatten(), "[[run]]", ids.iter().copied())?;
                 let drawn = [
                     panel.signal.is_some(),
                     !panel.signals.is_empty(),
@@ -597,7 +632,7 @@ impl Study {
             }
         }
         for overview in &self.overviews {
-            overview.runs.iter().try_for_each(known)?;
+            self.known(&overview.runs, "[[run]]", ids.iter().copied())?;
         }
         for quantity in self.tables.iter().flat_map(|table| &table.rows).filter_map(|row| row.paper.as_ref())
         {

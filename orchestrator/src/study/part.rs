@@ -1,5 +1,6 @@
 //! One part of the work of a study: a run for some values of its parameter, from the experiment to what is kept of it.
 
+use super::measure::Gauge;
 use super::signal::{Resolved, Signal};
 use super::{Run, Study};
 use crate::error::Error;
@@ -41,6 +42,8 @@ pub struct Member {
     pub metrics: Metrics,
     /// Signals against bounds, by id.
     pub within: BTreeMap<String, Inside>,
+    /// The study's own numbers, by id; null where there is none.
+    pub measures: BTreeMap<String, Option<f64>>,
 }
 
 /// How signals stood to a bound.
@@ -126,10 +129,12 @@ impl<'a> Preparation<'a> {
     pub fn new(study: &'a Study, run: &'a Run, fmu_dirs: &'a [PathBuf]) -> Self {
         let wanted = Wanted::of(study, run);
         let bounded = study.bounds_of(run).flat_map(|(_, signals)| signals);
+        let measured = study.measures_of(run).flat_map(|(_, signals)| signals);
         let paths: BTreeSet<String> = wanted
             .series
             .iter()
             .chain(bounded)
+            .chain(measured)
             .flat_map(|signal| signal.paths().into_iter().map(String::from).collect::<Vec<_>>())
             .collect();
         Self { study, run, wanted, paths: paths.into_iter().collect(), fmu_dirs }
@@ -167,7 +172,9 @@ impl<'a> Preparation<'a> {
             .plan(0, opened)
             .map_err(|error| Error::Run { run: self.run.id.get_ref().clone(), source: Box::new(error) })?;
         let bounded = self.study.bounds_of(self.run).flat_map(|(_, signals)| signals);
-        self.wanted.series.iter().chain(bounded).try_for_each(|signal| self.resolve(signal, &plan).map(drop))
+        let measured = self.study.measures_of(self.run).flat_map(|(_, signals)| signals);
+        let mut all = self.wanted.series.iter().chain(bounded).chain(measured);
+        all.try_for_each(|signal| self.resolve(signal, &plan).map(drop))
     }
 
     /// Runs the members with these numbers.
@@ -179,26 +186,32 @@ impl<'a> Preparation<'a> {
         for number in range {
             let plan = self.plan(number, opened)?;
             let mut series = Watch::new(&self.wanted.series, self, &plan)?;
+            let resolve = |signals: &[Signal]| {
+                signals.iter().map(|signal| self.resolve(signal, &plan)).collect::<Result<Vec<_>, _>>()
+            };
             let mut bounds = Vec::new();
             for (within, signals) in self.study.bounds_of(self.run) {
-                let signals = signals
-                    .iter()
-                    .map(|signal| self.resolve(signal, &plan))
-                    .collect::<Result<Vec<_>, _>>()?;
+                let signals = resolve(signals)?;
                 let bound = self.study.number(&within.bound)?;
                 bounds.push(Bounded { id: &within.id, signals, bound, inside: Inside::default() });
+            }
+            let mut gauges = Vec::new();
+            for (measure, signals) in self.study.measures_of(self.run) {
+                gauges.push(Gauge::new(measure, resolve(signals)?));
             }
             let (mut master, limits) = plan.initialized()?;
             let mut merit = plan.merit(limits);
             let mut observers: Vec<&mut dyn Observer> = vec![&mut merit, &mut series];
             observers.extend(bounds.iter_mut().map(|bound| bound as &mut dyn Observer));
+            observers.extend(gauges.iter_mut().map(|gauge| gauge as &mut dyn Observer));
             master.run(&mut observers)?;
 
             let value = self.run.vary.as_ref().map(|vary| vary.first + number.cast_signed());
             // Wall-clock times of a run that shares the machine mean nothing.
             let metrics = merit.metrics(0.0, 0.0, None);
             let within = bounds.into_iter().map(|bound| (bound.id.to_string(), bound.inside)).collect();
-            outcome.members.push(Member { value, metrics, within });
+            let measures = gauges.iter().map(|gauge| (gauge.measure.id.clone(), gauge.value())).collect();
+            outcome.members.push(Member { value, metrics, within, measures });
             for (signal, values) in &series.signals {
                 if self.wanted.spread.contains(signal) {
                     widen(&mut outcome.spread, signal, values);

@@ -23,7 +23,7 @@ use std::time::Instant;
 /// Members of a run that make up one part.
 const MEMBERS_PER_PART: u32 = 25;
 /// To be raised when what a part leaves is no longer what it was.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// How a study is reproduced.
 #[derive(Clone, Debug, Default)]
@@ -217,6 +217,12 @@ fn keys(study: &Study, preparations: &[Preparation]) -> Result<Vec<String>, Erro
             .bounds_of(run)
             .map(|(within, signals)| Ok(json!([within.id, signals, study.number(&within.bound)?])))
             .collect::<Result<Vec<_>, Error>>()?;
+        let measures: Vec<Value> = study
+            .measures_of(run)
+            .map(|(measure, signals)| {
+                json!([measure.id, format!("{:?}", measure.kind), signals, measure.over, measure.band])
+            })
+            .collect();
         let wanted = super::part::Wanted::of(study, run);
         let all = json!({
             "format": FORMAT,
@@ -225,6 +231,7 @@ fn keys(study: &Study, preparations: &[Preparation]) -> Result<Vec<String>, Erro
             "set": run.set,
             "vary": run.vary.as_ref().map(|vary| (&vary.parameter, vary.first)),
             "within": within,
+            "measures": measures,
             "series": wanted.series,
             "spread": wanted.spread,
             "timed": run.timed,

@@ -48,6 +48,8 @@ pub enum Metric {
     Largest(String),
     /// The same as a multiple of the bound, `within.ID.ratio`.
     Ratio(String),
+    /// A number that the study defines: `measure.ID`.
+    Measure(String),
 }
 
 impl Metric {
@@ -68,6 +70,14 @@ impl Metric {
                 "ratio" => Ok(Self::Ratio(id.into())),
                 _ => Err(format!("\"{text}\": within.{id} has share, largest, ratio")),
             };
+        }
+        if let Some(id) = text.strip_prefix("measure.") {
+            let ids: Vec<&str> = run.measures.iter().map(|measure| measure.get_ref().as_str()).collect();
+            if ids.contains(&id) {
+                return Ok(Self::Measure(id.into()));
+            }
+            let hint = names::hint(id, ids.iter().copied());
+            return Err(format!("the run \"{}\" has no measure \"{id}\"{hint}", run.id.get_ref()));
         }
         let all = serde_json::to_value(Metrics::default()).unwrap_or_default();
         let known: Vec<&str> =
@@ -92,6 +102,7 @@ impl Metric {
             Self::Share(id) => within(id).map(|w| w.inside as f64 / w.samples as f64),
             Self::Largest(id) => within(id).map(|w| w.largest),
             Self::Ratio(id) => within(id).map(|w| w.ratio),
+            Self::Measure(id) => member.measures.get(id).copied().flatten(),
         }
     }
 }
