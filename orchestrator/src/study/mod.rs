@@ -21,6 +21,7 @@
 //! label = "LQR"
 //! color = "#7f7f7f"
 //! experiment = "lqr.toml"              # beside this file
+//! fmu = { controller = "FBL.fmu" }     # optional: another FMU for a component
 //! set = { "plant.disturbance.kind" = "none" }
 //! vary = { parameter = "plant.disturbance.seed", first = 1, count = 20 }   # optional: one run for each value
 //! timed = true                         # its first run has the machine for itself
@@ -196,6 +197,9 @@ pub struct Run {
     pub color: Color,
     /// Experiment file, beside the study.
     pub experiment: PathBuf,
+    /// Components that are other FMUs than in the experiment.
+    #[serde(default)]
+    pub fmu: BTreeMap<String, String>,
     /// Parameters that differ from the experiment's.
     #[serde(default)]
     pub set: BTreeMap<String, Value>,
@@ -541,10 +545,18 @@ impl Study {
     /// If it cannot be read.
     pub fn experiment(&self, run: &Run, paths: &[&str]) -> Result<Experiment, Error> {
         let mut experiment = Experiment::load(&self.beside(&run.experiment))?;
+        let fault = |message: String| {
+            self.source.error(&run.id.span(), format!("[[run]] {}: {message}", run.id.get_ref()))
+        };
+        for (name, fmu) in &run.fmu {
+            let hint = names::hint(name, experiment.components.keys().map(String::as_str));
+            match experiment.components.get_mut(name) {
+                Some(component) => component.fmu = Spanned::new(0..0, fmu.clone()),
+                None => return Err(fault(format!("fmu: there is no component \"{name}\"{hint}"))),
+            }
+        }
         for (target, value) in &run.set {
-            experiment.set(target, value.clone()).map_err(|message| {
-                self.source.error(&run.id.span(), format!("[[run]] {}: {message}", run.id.get_ref()))
-            })?;
+            experiment.set(target, value.clone()).map_err(fault)?;
         }
         experiment.record.every = 1;
         experiment.record.variables =

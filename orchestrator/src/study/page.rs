@@ -258,6 +258,7 @@ fn all_runs(results: &Results) -> Markup {
                         td { span.swatch style=(format!("background:{}", run.color)) {} " " (run.label) }
                         td { code { (run.experiment.display()) } }
                         td {
+                            @for (name, fmu) in &run.fmu { code { (name) " = " (fmu) } " " }
                             @for (name, value) in &run.set { code { (name) " = " (value) } " " }
                             @if let Some(vary) = &run.vary {
                                 code { (vary.parameter) " = " (vary.first) "…" (i64::from(vary.first) + i64::from(vary.count) - 1) }

@@ -377,6 +377,7 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
             let own = json!({
                 "label": run.label,
                 "experiment": run.experiment,
+                "fmu": run.fmu,
                 "set": run.set,
                 "members": result.members,
                 "solver_ms": result.series.solver_ms,
