@@ -11,6 +11,14 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
+    /// A file of surfaces and jets that cannot be read or understood.
+    #[error("effectors {file}: {problem}")]
+    Effectors {
+        /// File or embedded name.
+        file: String,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// A reference table that cannot be read or understood.
     #[error("reference table {file}{}: {problem}", place(*line, column.as_deref()))]
     Table {

@@ -1,8 +1,9 @@
-//! The vehicle: attitude kinematics and dynamics, inertia, reference profiles, disturbances and integrators.
+//! The vehicle: attitude kinematics and dynamics, inertia, effectors, reference profiles, disturbances and integrators.
 //! Knows neither control nor FMI. SI units and radians throughout.
 
 pub mod disturbance;
 pub mod dynamics;
+pub mod effectors;
 pub mod error;
 pub mod integrator;
 pub mod kinematics;
