@@ -34,16 +34,12 @@ pub fn page(results: &Results, judged: &[Judged], drawn: &[figure::Figure]) -> R
                     h1 { (study.title) }
                     p.paper { (study.paper) }
                     nav {
-                        a href="#claims" { "Claims" } " "
-                        a href="#tables" { "Tables" } " "
-                        a href="#figures" { "Figures" } " "
-                        a href="#scenario" { "Scenario" } " "
-                        a href="#assumptions" { "Assumptions" } " "
-                        a href="#origin" { "Origin" }
+                        @for (id, name) in sections(results) { a href=(format!("#{id}")) { (name) } " " }
                     }
                 }
                 main {
                     @for paragraph in paragraphs(&study.summary) { p { (paragraph) } }
+                    @if !claims.is_empty() {
                     section id="claims" {
                         h2 { "What the paper claims, and what came out" }
                         table.claims {
@@ -54,6 +50,7 @@ pub fn page(results: &Results, judged: &[Judged], drawn: &[figure::Figure]) -> R
                             "A number with a range in brackets is a mean over several runs, with the smallest and the "
                             "largest. Differences are taken run by run, between runs with the same disturbance."
                         }
+                    }
                     }
                     section id="tables" {
                         h2 { "Numbers" }
@@ -70,8 +67,10 @@ pub fn page(results: &Results, judged: &[Judged], drawn: &[figure::Figure]) -> R
                             ". Everything but the times repeats bit for bit."
                         }
                         (all_runs(results))
-                        h3 { "Values that are compared with" }
-                        (all_values(results))
+                        @if !study.values.0.is_empty() {
+                            h3 { "Values that are compared with" }
+                            (all_values(results))
+                        }
                     }
                 }
                 script { (PreEscaped(interactive::library())) }
@@ -112,7 +111,7 @@ fn plots(results: &Results, drawn: &[figure::Figure]) -> Markup {
 /// The scenario, and what the paper leaves open.
 fn scenario(results: &Results) -> Markup {
     html! {
-        section id="scenario" {
+        @if !results.study.scenario.is_empty() { section id="scenario" {
             h2 { "Scenario" }
             table {
                 thead { tr { th { "What" } th { "Value" } th { "Source" } } }
@@ -122,8 +121,8 @@ fn scenario(results: &Results) -> Markup {
                     }
                 }
             }
-        }
-        section id="assumptions" {
+        } }
+        @if !results.study.assumptions.is_empty() { section id="assumptions" {
             h2 { "Where the paper is silent, or cannot be meant as it stands" }
             table {
                 thead { tr { th { "Open in the paper" } th { "Taken here" } } }
@@ -133,8 +132,22 @@ fn scenario(results: &Results) -> Markup {
                     }
                 }
             }
-        }
+        } }
     }
+}
+
+/// Ids and names of the sections that there are.
+fn sections(results: &Results) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let study = results.study;
+    let all = [
+        ("claims", "Claims", study.claims.is_empty()),
+        ("tables", "Numbers", study.tables.is_empty() && study.overviews.is_empty()),
+        ("figures", "Figures", study.figures.is_empty()),
+        ("scenario", "Scenario", study.scenario.is_empty()),
+        ("assumptions", "Assumptions", study.assumptions.is_empty()),
+        ("origin", "Origin", false),
+    ];
+    all.into_iter().filter(|(.., empty)| !empty).map(|(id, name, _)| (id, name))
 }
 
 fn paragraphs(text: &str) -> impl Iterator<Item = &str> {
