@@ -1,6 +1,7 @@
-//! The vehicle: attitude kinematics and dynamics, inertia, effectors, reference profiles, disturbances and integrators.
+//! The vehicle: attitude kinematics and dynamics, inertia, atmosphere, effectors, reference profiles, disturbances and integrators.
 //! Knows neither control nor FMI. SI units and radians throughout.
 
+pub mod atmosphere;
 pub mod disturbance;
 pub mod dynamics;
 pub mod effectors;

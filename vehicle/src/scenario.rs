@@ -1,5 +1,6 @@
 //! Scenarios: vehicle, start, limits, disturbance and reference as data, the papers' ones embedded.
 
+use crate::atmosphere::Flight;
 use crate::disturbance::{Disturbance, Kind, SineMoment};
 use crate::dynamics::Inertia;
 use crate::error::Error;
@@ -21,6 +22,8 @@ pub struct Scenario {
     pub inertia: Inertia,
     /// Factor from the nominal to the vehicle's inertia.
     pub inertia_scale: f64,
+    /// Flight condition, if one is stated.
+    pub flight: Option<Flight>,
     /// Θ at the start, rad.
     pub initial_angles: Vector3<f64>,
     /// ω at the start, rad/s.
@@ -67,6 +70,9 @@ impl Scenario {
                 ));
             }
         }
+        if let Some(flight) = scenario.flight {
+            flight.dynamic_pressure().map_err(|error| refuse(error.to_string()))?;
+        }
         plant::Plant::new(&scenario.config(1.0), 0.0).map_err(|error| refuse(error.to_string()))?;
         Ok(scenario)
     }
@@ -96,6 +102,7 @@ struct File {
     duration: f64,
     inertia: FileInertia,
     initial: FileInitial,
+    flight: Option<Flight>,
     #[serde(default)]
     limit: FileLimit,
     disturbance: FileDisturbance,
@@ -184,6 +191,7 @@ impl File {
             duration: self.duration,
             inertia: Inertia { Ixx, Iyy, Izz, Ixz },
             inertia_scale: scale,
+            flight: self.flight,
             initial_angles: self.initial.angles_deg.map(f64::to_radians),
             initial_rates: self.initial.rates_deg_s.map(f64::to_radians),
             limit_rate: self.limit.rate_deg_s.map_or(f64::INFINITY, f64::to_radians),
@@ -295,6 +303,12 @@ mod tests {
             assert!((scenario.disturbance.moment(time) - Vector3::repeat(printed)).amax() < 1e-9);
             assert!((degrees(&scenario.reference, time) - Vector3::new(30.0, 0.0, 60.0)).amax() < 1e-13);
         }
+    }
+
+    #[test]
+    fn published_flight_condition_of_tvsmc2015() {
+        assert_eq!(Scenario::tvsmc2015().flight, Some(Flight { altitude: 55e3, mach: 9.8 }));
+        assert_eq!(Scenario::crmpc2022().flight, None);
     }
 
     #[test]

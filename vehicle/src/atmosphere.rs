@@ -1,0 +1,166 @@
+//! US Standard Atmosphere 1976 from sea level to 86 km.
+
+use crate::error::Error;
+use serde::{Deserialize, Serialize};
+
+// U.S. Standard Atmosphere, 1976 (NOAA, NASA, USAF), tables 1 to 4.
+const GRAVITY: f64 = 9.80665; // m/s²
+const MOLAR_MASS: f64 = 0.028_964_4; // kg/mol, at sea level
+const GAS_CONSTANT: f64 = 8.314_32; // J/(mol K), the standard's own value
+const HEAT_RATIO: f64 = 1.4;
+const EARTH_RADIUS: f64 = 6_356_766.0; // m
+const SEA_LEVEL: (f64, f64) = (288.15, 101_325.0); // K, Pa
+/// Base (geopotential m) and temperature gradient (K/m) of each layer.
+const LAYERS: [(f64, f64); 7] =
+    [(0.0, -6.5e-3), (11e3, 0.0), (20e3, 1e-3), (32e3, 2.8e-3), (47e3, 0.0), (51e3, -2.8e-3), (71e3, -2e-3)];
+
+/// Largest geometric altitude, m.
+pub const TOP: f64 = 86e3;
+
+/// The air at one altitude.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Air {
+    /// Molecular-scale temperature, K: up to 80 km the temperature itself, at 86 km 0.04 % above it.
+    pub temperature: f64,
+    /// Pressure, Pa.
+    pub pressure: f64,
+    /// Density, kg/m³.
+    pub density: f64,
+    /// Speed of sound, m/s.
+    pub sound_speed: f64,
+}
+
+/// The air at a geometric altitude (m) from 0 to [`TOP`].
+///
+/// # Errors
+/// If the altitude lies outside.
+pub fn air(altitude: f64) -> Result<Air, Error> {
+    if !(0.0..=TOP).contains(&altitude) {
+        let problem = format!("= {altitude} m must lie between 0 and {TOP} m");
+        return Err(Error::Parameter { name: "flight.altitude", problem });
+    }
+    let height = EARTH_RADIUS * altitude / (EARTH_RADIUS + altitude); // geopotential
+    let weight = GRAVITY * MOLAR_MASS / GAS_CONSTANT;
+    let (mut temperature, mut pressure) = SEA_LEVEL;
+    for (i, &(base, gradient)) in LAYERS.iter().enumerate().take_while(|(_, layer)| layer.0 <= height) {
+        let top = LAYERS.get(i + 1).map_or(height, |next| next.0.min(height));
+        let above = temperature + gradient * (top - base);
+        pressure *= if gradient == 0.0 {
+            (-weight * (top - base) / temperature).exp()
+        } else {
+            (temperature / above).powf(weight / gradient)
+        };
+        temperature = above;
+    }
+    let specific = GAS_CONSTANT / MOLAR_MASS * temperature;
+    let density = pressure / specific;
+    Ok(Air { temperature, pressure, density, sound_speed: (HEAT_RATIO * specific).sqrt() })
+}
+
+/// Where and how fast the vehicle flies.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Flight {
+    /// Geometric altitude, m.
+    pub altitude: f64,
+    /// Mach number.
+    pub mach: f64,
+}
+
+impl Flight {
+    /// ½ ρ V², Pa.
+    ///
+    /// # Errors
+    /// Names the value that is out of range.
+    pub fn dynamic_pressure(&self) -> Result<f64, Error> {
+        if !(self.mach >= 0.0 && self.mach.is_finite()) {
+            let problem = format!("= {} must not be negative", self.mach);
+            return Err(Error::Parameter { name: "flight.mach", problem });
+        }
+        let air = air(self.altitude)?;
+        Ok(0.5 * air.density * (self.mach * air.sound_speed).powi(2))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(value: f64, expected: f64, relative: f64) {
+        assert!((value / expected - 1.0).abs() < relative, "{value}, not {expected}");
+    }
+
+    /// Geometric altitude (m) of a geopotential one.
+    fn geometric(height: f64) -> f64 {
+        EARTH_RADIUS * height / (EARTH_RADIUS - height)
+    }
+
+    #[test]
+    fn oracle_pressures_at_the_layers_bases() {
+        // Table of the base pressures as derived from the standard's definition
+        for (height, pressure) in [
+            (0.0, 101_325.0),
+            (11e3, 22_632.06),
+            (20e3, 5474.889),
+            (32e3, 868.0187),
+            (47e3, 110.9063),
+            (51e3, 66.93887),
+            (71e3, 3.956_420),
+        ] {
+            close(air(geometric(height)).unwrap().pressure, pressure, 2e-7);
+        }
+        // The top of the last layer is 86 km geometric, 84.852 km geopotential
+        close(air(TOP).unwrap().pressure, 0.373_38, 2e-5);
+        close(air(TOP).unwrap().temperature, 186.946, 2e-6);
+    }
+
+    #[test]
+    fn oracle_tabulated_air_at_geometric_altitudes() {
+        for (altitude, temperature, pressure, density) in [
+            (0.0, 288.150, 1.01325e5, 1.2250),
+            (10e3, 223.252, 2.64999e4, 0.413_51),
+            (20e3, 216.650, 5.52930e3, 8.8910e-2),
+            (30e3, 226.509, 1.19703e3, 1.8410e-2),
+            (50e3, 270.650, 7.9779e1, 1.0269e-3),
+        ] {
+            let air = air(altitude).unwrap();
+            close(air.temperature, temperature, 5e-6);
+            close(air.pressure, pressure, 1e-5);
+            close(air.density, density, 3e-5);
+        }
+        close(air(0.0).unwrap().sound_speed, 340.294, 2e-6);
+    }
+
+    #[test]
+    fn oracle_the_published_flight_condition() {
+        // 55 km and Mach 9.8 of Wu 2015, section 6
+        let at = air(55e3).unwrap();
+        close(at.temperature, 260.77, 2e-5);
+        close(at.pressure, 42.525, 2e-5);
+        close(at.density, 5.681e-4, 2e-5);
+        close(at.sound_speed, 323.72, 2e-5);
+        close(Flight { altitude: 55e3, mach: 9.8 }.dynamic_pressure().unwrap(), 2858.9, 2e-5);
+    }
+
+    #[test]
+    fn the_air_is_continuous_at_the_layers_and_thins_with_altitude() {
+        for (base, _) in &LAYERS[1..] {
+            let [below, above] = [-1e-6, 1e-6].map(|by| air(geometric(*base) + by).unwrap());
+            close(below.pressure, above.pressure, 1e-9);
+            close(below.temperature, above.temperature, 1e-9);
+        }
+        let densities: Vec<f64> = (0..=86).map(|km| air(f64::from(km) * 1e3).unwrap().density).collect();
+        assert!(densities.windows(2).all(|pair| pair[0] > pair[1]));
+    }
+
+    #[test]
+    fn what_lies_outside_is_refused_by_name() {
+        for altitude in [-1.0, TOP + 1.0, f64::NAN] {
+            assert!(air(altitude).unwrap_err().to_string().contains("flight.altitude"));
+        }
+        for mach in [-0.1, f64::NAN, f64::INFINITY] {
+            let refusal = Flight { altitude: 0.0, mach }.dynamic_pressure().unwrap_err();
+            assert!(refusal.to_string().contains("flight.mach"));
+        }
+    }
+}
