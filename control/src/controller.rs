@@ -11,6 +11,8 @@ pub struct Measurement {
     pub angles: Vector3<f64>,
     /// ω = [p, q, r], rad/s.
     pub rates: Vector3<f64>,
+    /// The moment that acted since the last tick, N m, if it is measured; else a controller takes its own command for it.
+    pub achieved_moment: Option<Vector3<f64>>,
 }
 
 /// The reference as a function of time (s): a controller with preview asks for the future too.

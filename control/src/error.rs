@@ -75,6 +75,34 @@ pub enum DesignError {
         /// Its value.
         value: f64,
     },
+    /// A gain, given by its name, must be positive and finite.
+    #[error("{name} must be positive and finite throughout, not {value}")]
+    Setting {
+        /// Which setting.
+        name: String,
+        /// The value at fault.
+        value: f64,
+    },
+    /// A quantity must exceed a bound.
+    #[error("{name} = {value} must be finite and above {bound}")]
+    NotAbove {
+        /// Which setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must exceed.
+        bound: f64,
+    },
+    /// Condition (46) of Wu 2015 does not hold.
+    #[error(
+        "reaching.k1, k2, k3, k4 and m violate condition (46) of Wu 2015 on axis {index}: m² k3 k4 − (m³/(m−1) k3 + (4 m² − 4 m + 1) k1²) k2² = {value:.4} is not positive; use a smaller k2 or larger k3, k4"
+    )]
+    Condition46 {
+        /// Axis, from 1: angle of attack, sideslip, bank.
+        index: usize,
+        /// Left-hand side of the condition.
+        value: f64,
+    },
     /// The solver refuses the problem.
     #[error("the cone solver refuses the problem: {0}")]
     Solver(String),

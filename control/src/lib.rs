@@ -12,9 +12,11 @@ pub mod report;
 pub mod sampled;
 pub mod schedule;
 pub mod settings;
+pub mod sliding;
 
 pub use controller::{Controller, Measurement};
 pub use crmpc::Crmpc;
 pub use dlmpc::Dlmpc;
 pub use error::DesignError;
 pub use lqr::Lqr;
+pub use sliding::{Btvsmc, Fbl, SotvsmcDo};

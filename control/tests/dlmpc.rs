@@ -116,7 +116,7 @@ fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
     for (time, start) in
         [(0.0, Scenario::crmpc2022().initial_angles), (15.0, reference()(15.0).angles + offset)]
     {
-        let measured = Measurement { angles: start, rates: Vector3::zeros() };
+        let measured = Measurement { angles: start, rates: Vector3::zeros(), ..Measurement::default() };
         let mut memory = Memory::default();
         dlmpc().update(&mut memory, 0, time, &measured, &reference());
         assert_eq!(memory.report.status, Status::Constrained);
@@ -258,7 +258,7 @@ fn inner_law(sliding_mode: SlidingMode, rates: Vector3<f64>, ticks: u64) -> Vec<
     let mut controller = Dlmpc::new(settings).unwrap();
     let still = Reference { angles: Vector3::new(0.2, 0.1, -0.5), ..Reference::default() };
     let mut memory = controller.memory();
-    let mut measured = Measurement { angles: still.angles, rates };
+    let mut measured = Measurement { angles: still.angles, rates, ..Measurement::default() };
     (0..ticks)
         .map(|tick| {
             let moment = controller.update(&mut memory, tick, 0.0, &measured, &|_| still);
@@ -389,10 +389,26 @@ fn tuned_gains_spend_less_moment_at_no_larger_error() {
 fn another_evaluation_of_a_tick_leaves_no_trace() {
     let reference = reference();
     let garbage = [
-        Measurement { angles: Vector3::new(0.5, -0.4, 1.0), rates: Vector3::new(0.2, -0.3, 0.1) },
-        Measurement { angles: Vector3::repeat(f64::NAN), rates: Vector3::repeat(f64::NAN) },
-        Measurement { angles: Vector3::repeat(1.0), rates: Vector3::repeat(f64::INFINITY) },
-        Measurement { angles: Vector3::repeat(1e300), rates: Vector3::repeat(-1e300) },
+        Measurement {
+            angles: Vector3::new(0.5, -0.4, 1.0),
+            rates: Vector3::new(0.2, -0.3, 0.1),
+            ..Measurement::default()
+        },
+        Measurement {
+            angles: Vector3::repeat(f64::NAN),
+            rates: Vector3::repeat(f64::NAN),
+            ..Measurement::default()
+        },
+        Measurement {
+            angles: Vector3::repeat(1.0),
+            rates: Vector3::repeat(f64::INFINITY),
+            ..Measurement::default()
+        },
+        Measurement {
+            angles: Vector3::repeat(1e300),
+            rates: Vector3::repeat(-1e300),
+            ..Measurement::default()
+        },
     ];
     let (mut disturbed_controller, mut calm_controller) = (dlmpc(), dlmpc());
     let (mut disturbed, mut calm) =

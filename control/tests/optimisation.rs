@@ -83,7 +83,8 @@ fn exits_lead_to_the_optimum_of_the_whole_horizon() {
         let property = |(size, offset, rates, sample): (f64, [f64; 3], [f64; 3], u64)| {
             let time = sample as f64 * 0.2;
             let angles = reference()(time).angles + Vector3::from(offset) * size;
-            let measured = Measurement { angles, rates: Vector3::from(rates) * size };
+            let measured =
+                Measurement { angles, rates: Vector3::from(rates) * size, ..Measurement::default() };
             let [(status, cost, moment), (status_whole, cost_whole, moment_whole)] =
                 [&with, &without].map(|controller| {
                     let mut memory = Memory::default();
@@ -138,7 +139,13 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
         let angles = sample.measured.angles + Vector3::new(0.01, -0.02, 0.03);
         let rates = sample.measured.rates + Vector3::new(-0.02, 0.01, 0.005);
         let time = tick as f64 * controller.period();
-        let moment = controller.update(&mut memory, tick, time, &Measurement { angles, rates }, &reference());
+        let moment = controller.update(
+            &mut memory,
+            tick,
+            time,
+            &Measurement { angles, rates, ..Measurement::default() },
+            &reference(),
+        );
 
         let r = kinematics::r(&angles);
         let angle_rates = r * rates;
@@ -230,7 +237,7 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
         assert!((after.report.cost - cost).abs() < 1e-9 * cost, "{} {cost}", after.report.cost);
 
         // (20) about the shifted plan: R I⁻¹ m = u = K O_e + ũ, ũ = a − f(x).
-        let Measurement { angles, rates } = sample.measured;
+        let Measurement { angles, rates, .. } = sample.measured;
         let angle_rates = kinematics::r(&angles) * rates;
         let u = kinematics::r(&angles) * (settings.body.inverse * moment);
         let nominal = &after.plan.states[0];
@@ -316,10 +323,26 @@ fn a_solver_that_fails_from_the_start_is_outlived() {
 fn another_evaluation_of_a_tick_leaves_no_trace() {
     let reference = reference();
     let garbage = [
-        Measurement { angles: Vector3::new(0.5, -0.4, 1.0), rates: Vector3::new(0.2, -0.3, 0.1) },
-        Measurement { angles: Vector3::repeat(f64::NAN), rates: Vector3::repeat(f64::NAN) },
-        Measurement { angles: Vector3::repeat(1.0), rates: Vector3::repeat(f64::INFINITY) },
-        Measurement { angles: Vector3::repeat(1e300), rates: Vector3::repeat(-1e300) },
+        Measurement {
+            angles: Vector3::new(0.5, -0.4, 1.0),
+            rates: Vector3::new(0.2, -0.3, 0.1),
+            ..Measurement::default()
+        },
+        Measurement {
+            angles: Vector3::repeat(f64::NAN),
+            rates: Vector3::repeat(f64::NAN),
+            ..Measurement::default()
+        },
+        Measurement {
+            angles: Vector3::repeat(1.0),
+            rates: Vector3::repeat(f64::INFINITY),
+            ..Measurement::default()
+        },
+        Measurement {
+            angles: Vector3::repeat(1e300),
+            rates: Vector3::repeat(-1e300),
+            ..Measurement::default()
+        },
     ];
     let mut truth = Vec::new();
     simulate(

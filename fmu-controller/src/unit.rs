@@ -118,7 +118,11 @@ impl<L: Law> Model for Unit<L> {
                 saturation: false,
             },
             input: Input {
-                measured: Measurement { angles: scenario.initial_angles, rates: scenario.initial_rates },
+                measured: Measurement {
+                    angles: scenario.initial_angles,
+                    rates: scenario.initial_rates,
+                    ..Measurement::default()
+                },
                 reference: scenario.reference.at(0.0),
                 ..Input::default()
             },

@@ -64,7 +64,7 @@ pub fn simulate<C: Controller>(
     let (mut largest_rate, mut largest_moment) = (0.0f64, 0.0f64);
     for tick in 0..ticks {
         let time = tick as f64 * period;
-        let measured = Measurement { angles: plant.angles(), rates: plant.rates() };
+        let measured = Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
         let moment = controller.update(memory, tick, time, &measured, &reference);
         observe(memory, tick, &measured);
         error += (measured.angles - reference(time).angles).norm_squared();

@@ -1,0 +1,122 @@
+//! Reaching laws that are continuous within a boundary layer: Wu 2015, (34), and the finite-time one of Jia et al., (7).
+
+use crate::error::DesignError;
+use crate::sliding::Reaching;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// sat(s) of Wu 2015, (35): s/h within the layer |s| ≤ h, sgn(s) outside.
+pub fn saturated(s: f64, h: f64) -> f64 {
+    (s / h).clamp(-1.0, 1.0)
+}
+
+/// ṡ = −η sat(s), Wu 2015, (34) and (35).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoundaryLayer {
+    /// η, diagonal, rad/s².
+    pub eta: [f64; 3],
+    /// h, thickness of the layer, rad/s.
+    pub h: [f64; 3],
+}
+
+impl Reaching for BoundaryLayer {
+    type Memory = ();
+
+    fn check(&self, period: f64) -> Result<(), DesignError> {
+        super::all_positive("reaching.eta", &self.eta)?;
+        super::all_positive("boundaryLayer.h", &self.h)?;
+        let steepest = self.eta.iter().zip(&self.h).map(|(eta, h)| eta / h).fold(0.0, f64::max);
+        super::sampled_decay("reaching.eta / boundaryLayer.h", steepest, period)
+    }
+
+    fn sliding_rate(&self, (): &(), s: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| -self.eta[i] * saturated(s[i], self.h[i]))
+    }
+
+    fn advance(&self, (): &mut (), _s: &Vector3<f64>, _period: f64) {}
+}
+
+/// The continuous finite-time replacement of ρ SIGN(s) by Jia et al., (7): ρ f(|s/ε|) SAT(s/ε) with
+/// f = 2^(−(b+1)/2) |s/ε|^b.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FiniteTimeLayer {
+    /// ρ per axis.
+    pub rho: [f64; 3],
+    /// ε, thickness of the layer, per axis.
+    pub epsilon: [f64; 3],
+    /// b, between 0 and 1, per axis.
+    pub b: [f64; 3],
+}
+
+impl FiniteTimeLayer {
+    /// ρ f SAT of each component of s.
+    pub fn value(&self, s: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| {
+            let (factor, x, b) = self.scaled(i, s[i]);
+            factor * x.abs().powf(b) * saturated(x, 1.0)
+        })
+    }
+
+    /// Its derivative by s; inside the layer at |s| = ε.
+    pub fn slope(&self, s: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| {
+            let (factor, x, b) = self.scaled(i, s[i]);
+            let x = x.abs();
+            let slope = if x <= 1.0 { (b + 1.0) * x.powf(b) } else { b * x.powf(b - 1.0) };
+            factor * slope / self.epsilon[i]
+        })
+    }
+
+    /// ρ 2^(−(b+1)/2), s/ε and b of one axis.
+    fn scaled(&self, i: usize, s: f64) -> (f64, f64, f64) {
+        let b = self.b[i];
+        (self.rho[i] * (-(b + 1.0) / 2.0).exp2(), s / self.epsilon[i], b)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAYER: FiniteTimeLayer =
+        FiniteTimeLayer { rho: [0.8, 0.5, 1.0], epsilon: [0.02, 0.01, 1.0], b: [0.5, 0.3, 0.9] };
+
+    #[test]
+    fn oracle_slope_against_differences() {
+        for s in [-0.5, -0.015, -0.003, 0.0004, 0.007, 0.03, 2.0] {
+            let s = Vector3::repeat(s);
+            let step = Vector3::repeat(1e-7 * s.amax());
+            let difference =
+                (LAYER.value(&(s + step)) - LAYER.value(&(s - step))).component_div(&(2.0 * step));
+            assert!((difference - LAYER.slope(&s)).amax() < 1e-6 * LAYER.slope(&s).amax(), "{s}");
+        }
+    }
+
+    #[test]
+    fn oracle_layer_is_odd_continuous_and_at_its_edge_below_rho() {
+        let edge = Vector3::from(LAYER.epsilon);
+        let value = LAYER.value(&edge);
+        assert!((value - LAYER.value(&(edge * (1.0 + 1e-12)))).amax() < 1e-11);
+        assert_eq!(LAYER.value(&-edge), -value);
+        for i in 0..3 {
+            assert!((value[i] - LAYER.rho[i] * 2f64.powf(-f64::midpoint(LAYER.b[i], 1.0))).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn oracle_outside_the_layer_the_reaching_time_is_finite() {
+        // ds/dt = −k s^b reaches ε from s₀ after (s₀^(1−b) − ε^(1−b))/(k (1−b)).
+        let (mut s, step) = (Vector3::repeat(0.3), 1e-5);
+        let (rho, epsilon, b) = (0.8, 0.02_f64, 0.5);
+        let k = rho * 2f64.powf(-0.75) / epsilon.powf(b);
+        let expected = (0.3_f64.sqrt() - epsilon.sqrt()) / (k * 0.5);
+        let mut time = 0.0;
+        while s.x > epsilon {
+            s -= LAYER.value(&s) * step;
+            time += step;
+        }
+        assert!((time - expected).abs() < 1e-3 * expected, "{time} {expected}");
+    }
+}

@@ -1,0 +1,71 @@
+//! Feedback linearisation (FBL), Wu 2015, (61): the comparison without sliding mode.
+
+use crate::controller::{Controller, Measurement, ReferenceAt};
+use crate::error::DesignError;
+use crate::linearise;
+use crate::sampled::{Gain, SampledError};
+use crate::sliding::{all_positive, tracking_error};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::dynamics::RigidBody;
+
+/// Settings of the controller. Units SI, angles rad.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FblSettings {
+    /// The vehicle as the controller believes it to be.
+    pub body: RigidBody,
+    /// Time between ticks, s.
+    pub period: f64,
+    /// k_p, 1/s².
+    pub kp: f64,
+    /// k_d, 1/s.
+    pub kd: f64,
+}
+
+/// M = K⁻¹ (v − B) with v = Θ̈_r − k_p e − k_d ė, (15) and (61).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fbl {
+    settings: FblSettings,
+}
+
+impl Fbl {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// Names the setting at fault; refuses gains that the sampling makes unstable.
+    pub fn new(settings: FblSettings) -> Result<Self, DesignError> {
+        let FblSettings { period, kp, kd, .. } = settings;
+        for (name, value) in [("period.feedback", period), ("gain.p", kp), ("gain.d", kd)] {
+            all_positive(name, &[value])?;
+        }
+        let (k1, k2) = (-kp, -kd);
+        let radius = SampledError::new(Gain { k1, k2 }, period).spectral_radius();
+        if radius >= 1.0 {
+            return Err(DesignError::Unstable { k1, k2, period, radius });
+        }
+        Ok(Self { settings })
+    }
+}
+
+impl Controller for Fbl {
+    type Memory = ();
+
+    fn period(&self) -> f64 {
+        self.settings.period
+    }
+
+    fn update(
+        &mut self,
+        _memory: &mut (),
+        _tick: u64,
+        time: f64,
+        measured: &Measurement,
+        reference: ReferenceAt,
+    ) -> Vector3<f64> {
+        let FblSettings { body, kp, kd, .. } = &self.settings;
+        let reference = reference(time);
+        let (error, angle_rates) = tracking_error(measured, &reference);
+        let v = reference.accelerations - error.angles * *kp - error.rates * *kd;
+        linearise::moment(body, &measured.angles, &angle_rates, &v)
+    }
+}

@@ -1,0 +1,217 @@
+//! Time-varying sliding-mode control (TVSMC) of Wu et al. (2015): BTVSMC (62), BTVSMC/DO (36) and SOTVSMC/DO (45), and the
+//! feedback linearisation (61) they are compared with.
+//!
+//! All of them linearise Θ̈ = K M + B + Δv by M = K⁻¹ (v − B), (15), with K = R I⁻¹ and B = Ṙ ω − R I⁻¹ (ω × I ω), and choose
+//! v. The printed Δv leaves out a derivative and has R I⁻¹ where R belongs, (12); it is estimated as a whole, so nothing here
+//! depends on that.
+
+mod boundary_layer;
+mod fbl;
+mod observer;
+mod second_order;
+mod settings;
+mod surface;
+
+pub use boundary_layer::{BoundaryLayer, FiniteTimeLayer, saturated};
+pub use fbl::{Fbl, FblSettings};
+pub use observer::{Estimate, Observer};
+pub use second_order::SecondOrder;
+pub use settings::Settings;
+pub use surface::{Anchor, Surface, TrackingError};
+
+use crate::controller::{Controller, Measurement, ReferenceAt};
+use crate::error::DesignError;
+use crate::linearise;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use vehicle::dynamics::RigidBody;
+use vehicle::kinematics;
+use vehicle::reference::Reference;
+
+/// How the sliding variable is driven to zero.
+pub trait Reaching: Copy {
+    /// What the law integrates.
+    type Memory: Copy + Default + Serialize + DeserializeOwned + Send;
+
+    /// Refuses, by name, what cannot work at this period (s).
+    ///
+    /// # Errors
+    /// Names the setting at fault.
+    fn check(&self, period: f64) -> Result<(), DesignError>;
+
+    /// ṡ at s (rad/s), rad/s².
+    fn sliding_rate(&self, memory: &Self::Memory, s: &Vector3<f64>) -> Vector3<f64>;
+
+    /// Integrates over `period` (s), in which s (rad/s) is held.
+    fn advance(&self, memory: &mut Self::Memory, s: &Vector3<f64>, period: f64);
+}
+
+/// BTVSMC and BTVSMC/DO, (62) and (36).
+pub type Btvsmc = Tvsmc<BoundaryLayer>;
+/// SOTVSMC/DO, (45).
+pub type SotvsmcDo = Tvsmc<SecondOrder>;
+
+/// A moment that was commanded, and what is needed to tell how far the actuators fell short of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Commanded {
+    /// M, N m.
+    pub moment: Vector3<f64>,
+    /// Θ at that tick, rad.
+    pub angles: Vector3<f64>,
+    /// K M − (v − B): what a limit on M cost, rad/s².
+    pub cut: Vector3<f64>,
+}
+
+impl Commanded {
+    /// The moment behind `v` (rad/s²), scaled into ‖M‖ ≤ `limit` (N m).
+    pub(crate) fn new(body: &RigidBody, measured: &Measurement, wanted: Vector3<f64>, limit: f64) -> Self {
+        let excess = wanted.norm() / limit;
+        let moment = if excess > 1.0 { wanted / excess } else { wanted };
+        let angles = measured.angles;
+        Self { moment, angles, cut: gain(body, &angles, moment - wanted) }
+    }
+
+    /// v_achieved − v = K (M_achieved − M_wanted), rad/s², with the moment that was measured at the next tick, or with the
+    /// commanded one.
+    pub(crate) fn shortfall(&self, body: &RigidBody, achieved: Option<Vector3<f64>>) -> Vector3<f64> {
+        self.cut + achieved.map_or_else(Vector3::zeros, |m| gain(body, &self.angles, m - self.moment))
+    }
+}
+
+/// K M = R I⁻¹ M, rad/s².
+fn gain(body: &RigidBody, angles: &Vector3<f64>, moment: Vector3<f64>) -> Vector3<f64> {
+    kinematics::r(angles) * (body.inverse * moment)
+}
+
+/// What a time-varying sliding mode carries from tick to tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Memory<Integral> {
+    /// Whether there was a tick.
+    pub started: bool,
+    /// The surface in force.
+    pub anchor: Anchor,
+    /// s at the last tick, rad/s.
+    pub sliding: Vector3<f64>,
+    /// v − b at the last tick, rad/s².
+    pub drive: Vector3<f64>,
+    /// The moment of the last tick.
+    pub commanded: Commanded,
+    /// Whether the actuators fell short in the interval before the last tick.
+    pub saturated: bool,
+    /// State of the reaching law.
+    pub integral: Integral,
+    /// State of the observer; rests at zero without one.
+    pub estimate: Estimate,
+}
+
+/// v = b − z₁ + ṡ, (27), with one of the reaching laws; without observer z₁ = 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tvsmc<R> {
+    settings: Settings<R>,
+}
+
+impl<R: Reaching> Tvsmc<R> {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// Names the setting at fault.
+    pub fn new(settings: Settings<R>) -> Result<Self, DesignError> {
+        let Settings { period, surface, reaching, observer, threshold, .. } = &settings;
+        all_positive("period.feedback", &[*period])?;
+        all_positive("antiWindupThreshold", &[*threshold])?;
+        surface.check()?;
+        reaching.check(*period)?;
+        observer.as_ref().map_or(Ok(()), Observer::check)?;
+        Ok(Self { settings })
+    }
+
+    /// Brings observer and reaching law from the last tick to this one, given what the actuators achieved since.
+    fn integrate(&self, memory: &mut Memory<R::Memory>, achieved: Option<Vector3<f64>>) {
+        let Settings { body, period, reaching, observer, threshold, .. } = &self.settings;
+        let shortfall = memory.commanded.shortfall(body, achieved);
+        if let Some(observer) = observer {
+            // The observer must know the v that acted: else it takes the shortfall for a disturbance.
+            let drive = memory.drive + shortfall;
+            memory.estimate = observer.advance(&memory.estimate, &memory.sliding, &drive, *period);
+        }
+        reaching.advance(&mut memory.integral, &memory.sliding, *period);
+        memory.saturated = shortfall.norm() > *threshold;
+    }
+}
+
+impl<R: Reaching> Controller for Tvsmc<R> {
+    type Memory = Memory<R::Memory>;
+
+    fn period(&self) -> f64 {
+        self.settings.period
+    }
+
+    /// The moment at a tick does not depend on the moment achieved before it: that acts from the next tick on. So there is no
+    /// algebraic loop with actuators that answer at once.
+    fn update(
+        &mut self,
+        memory: &mut Self::Memory,
+        _tick: u64,
+        time: f64,
+        measured: &Measurement,
+        reference: ReferenceAt,
+    ) -> Vector3<f64> {
+        let Settings { body, limit_moment, surface, reaching, anti_windup, .. } = &self.settings;
+        let reference = reference(time);
+        let (error, angle_rates) = tracking_error(measured, &reference);
+        let re_anchor = *anti_windup && memory.saturated;
+        if memory.started {
+            self.integrate(memory, measured.achieved_moment);
+        }
+        if !memory.started || re_anchor {
+            if memory.started {
+                // s jumps to zero, and its estimate by as much.
+                memory.estimate.sliding -= surface.sliding(&memory.anchor, time, &error);
+            }
+            memory.anchor = surface.anchor(time, &error);
+            memory.integral = R::Memory::default();
+            memory.started = true;
+        }
+        let s = surface.sliding(&memory.anchor, time, &error);
+        let b = surface.equivalent(&memory.anchor, time, &error, &reference.accelerations);
+        // Wu 2015, (27), and (15)
+        let v = b - memory.estimate.disturbance + reaching.sliding_rate(&memory.integral, &s);
+        let wanted = linearise::moment(body, &measured.angles, &angle_rates, &v);
+        memory.sliding = s;
+        memory.drive = v - b;
+        memory.commanded = Commanded::new(body, measured, wanted, *limit_moment);
+        memory.commanded.moment
+    }
+}
+
+/// e = Θ − Θ_r and ė, and Θ̇ (rad/s).
+pub(crate) fn tracking_error(measured: &Measurement, reference: &Reference) -> (TrackingError, Vector3<f64>) {
+    let angle_rates = kinematics::r(&measured.angles) * measured.rates;
+    let error =
+        TrackingError { angles: measured.angles - reference.angles, rates: angle_rates - reference.rates };
+    (error, angle_rates)
+}
+
+/// sgn(x), 0 at 0.
+fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
+}
+
+/// sig^a(x) = |x|^a sgn(x).
+fn power(x: f64, a: f64) -> f64 {
+    x.abs().powf(a) * sign(x)
+}
+
+/// Refuses a value that is not positive and finite.
+pub(crate) fn all_positive(name: &str, values: &[f64]) -> Result<(), DesignError> {
+    match values.iter().find(|value| !(**value > 0.0 && value.is_finite())) {
+        Some(&value) => Err(DesignError::Setting { name: name.into(), value }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a rate of decay (1/s) that ticks of `period` (s) turn into growth: 1 − rate·period must exceed −1.
+pub(crate) fn sampled_decay(name: &'static str, rate: f64, period: f64) -> Result<(), DesignError> {
+    let high = 2.0 / period;
+    if rate < high { Ok(()) } else { Err(DesignError::OutOfRange { name, value: rate, low: 0.0, high }) }
+}

@@ -1,0 +1,121 @@
+//! The second-order reaching law of Wu 2015, (43).
+
+use crate::error::DesignError;
+use crate::sliding::Reaching;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// ṡ = −k₁ sig^((m−1)/m)(s) − k₂ s + τ, τ̇ = −k₃ sig^((m−2)/m)(s) − k₄ s, with sig^a(s) = |s|^a sgn(s). Printed with + k₃ and
+/// a second sgn, which diverges.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SecondOrder {
+    /// k₁ per axis.
+    pub k1: [f64; 3],
+    /// k₂ per axis, 1/s.
+    pub k2: [f64; 3],
+    /// k₃ per axis.
+    pub k3: [f64; 3],
+    /// k₄ per axis, 1/s².
+    pub k4: [f64; 3],
+    /// m > 2.
+    pub m: f64,
+}
+
+impl SecondOrder {
+    /// Left-hand side of condition (46) for one axis (from 0); the proof of stability needs it positive.
+    pub fn condition_46(&self, axis: usize) -> f64 {
+        let Self { k1, k2, k3, k4, m } = self;
+        let (k1, k2, k3, k4) = (k1[axis], k2[axis], k3[axis], k4[axis]);
+        m * m * k3 * k4 - (m.powi(3) / (m - 1.0) * k3 + (4.0 * m * m - 4.0 * m + 1.0) * k1 * k1) * k2 * k2
+    }
+}
+
+impl Reaching for SecondOrder {
+    /// τ, rad/s².
+    type Memory = Vector3<f64>;
+
+    fn check(&self, period: f64) -> Result<(), DesignError> {
+        let Self { k1, k2, k3, k4, m } = self;
+        let gains = [("k1", k1), ("k2", k2), ("k3", k3), ("k4", k4)];
+        for (name, gain) in gains.map(|(name, gain)| (["reaching.", name].concat(), gain)) {
+            super::all_positive(&name, gain)?;
+        }
+        if !(*m > 2.0 && m.is_finite()) {
+            return Err(DesignError::NotAbove { name: "reaching.m", value: *m, bound: 2.0 });
+        }
+        for axis in 0..3 {
+            let value = self.condition_46(axis);
+            if value.is_nan() || value <= 0.0 {
+                return Err(DesignError::Condition46 { index: axis + 1, value });
+            }
+        }
+        super::sampled_decay("reaching.k2", k2.iter().copied().fold(0.0, f64::max), period)
+    }
+
+    fn sliding_rate(&self, tau: &Vector3<f64>, s: &Vector3<f64>) -> Vector3<f64> {
+        let exponent = (self.m - 1.0) / self.m;
+        Vector3::from_fn(|i, _| tau[i] - self.k1[i] * super::power(s[i], exponent) - self.k2[i] * s[i])
+    }
+
+    fn advance(&self, tau: &mut Vector3<f64>, s: &Vector3<f64>, period: f64) {
+        let exponent = (self.m - 2.0) / self.m;
+        for i in 0..3 {
+            tau[i] -= period * (self.k3[i] * super::power(s[i], exponent) + self.k4[i] * s[i]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAW: SecondOrder = SecondOrder { k1: [0.1; 3], k2: [0.2; 3], k3: [0.1; 3], k4: [0.1; 3], m: 3.0 };
+
+    /// |s| after 60 s of ds/dt = `rate`, from 0.1 rad/s.
+    fn left(law: &SecondOrder, rate: impl Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>) -> f64 {
+        let (period, mut s, mut tau) = (0.001, Vector3::repeat(0.1), Vector3::zeros());
+        for _ in 0..60_000 {
+            let change = rate(&tau, &s);
+            law.advance(&mut tau, &s, period);
+            s += change * period;
+        }
+        s.amax()
+    }
+
+    #[test]
+    fn published_gains_satisfy_condition_46() {
+        assert!((LAW.condition_46(0) - 0.026).abs() < 1e-12, "{}", LAW.condition_46(0));
+        LAW.check(0.01).unwrap();
+    }
+
+    #[test]
+    fn gains_against_condition_46_are_refused_by_axis() {
+        let law = SecondOrder { k2: [0.2, 0.5, 0.2], ..LAW };
+        let text = law.check(0.01).unwrap_err().to_string();
+        assert!(text.contains("(46)") && text.contains("axis 2"), "{text}");
+        let text = SecondOrder { m: 2.0, ..LAW }.check(0.01).unwrap_err().to_string();
+        assert!(text.contains("reaching.m = 2"), "{text}");
+    }
+
+    #[test]
+    fn published_sign_of_k3_does_not_converge() {
+        let right = left(&LAW, |tau, s| LAW.sliding_rate(tau, s));
+        assert!(right < 1e-4, "{right}");
+        // Printed: + k₃, and sgn twice, which makes the powers of |s| even.
+        let period = 0.001;
+        for twice in [false, true] {
+            let power = |s: f64, a: f64| if twice { s.abs().powf(a) } else { crate::sliding::power(s, a) };
+            let (mut s, mut tau, mut largest) = (0.1_f64, 0.0, 0.0_f64);
+            for k in 0..60_000 {
+                let rate = -0.1 * power(s, 2.0 / 3.0) - 0.2 * s + tau;
+                tau += period * (0.1 * power(s, 1.0 / 3.0) - 0.1 * s);
+                s += rate * period;
+                if k > 50_000 {
+                    largest = largest.max(s.abs());
+                }
+            }
+            assert!(largest > 0.5, "sgn twice: {twice}: {largest}");
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Settings of the sliding-mode controllers, and the published ones from `data/tvsmc-2015.toml`.
+
+use crate::sliding::{BoundaryLayer, FblSettings, Observer, SecondOrder, Surface};
+use serde::{Deserialize, Serialize};
+use vehicle::dynamics::RigidBody;
+use vehicle::scenario::Scenario;
+
+/// Settings of a time-varying sliding mode. Units SI, angles rad.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings<R> {
+    /// The vehicle as the controller believes it to be.
+    pub body: RigidBody,
+    /// Time between ticks, s.
+    pub period: f64,
+    /// Limit on ‖M‖ into which the command is scaled, N m; infinite for none.
+    pub limit_moment: f64,
+    /// The surface.
+    pub surface: Surface,
+    /// The reaching law.
+    pub reaching: R,
+    /// The disturbance observer, if there is one.
+    pub observer: Option<Observer>,
+    /// Whether the surface is laid anew through the state, and the reaching law's integral cleared, while the actuators
+    /// saturate.
+    pub anti_windup: bool,
+    /// ‖v_achieved − v‖ from which on they do, rad/s².
+    pub threshold: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    period: f64,
+    feedback_linearisation: FeedbackLinearisation,
+    surface: Surface,
+    boundary_layer: BoundaryLayer,
+    second_order: SecondOrder,
+    observer: Observer,
+    anti_windup: AntiWindup,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FeedbackLinearisation {
+    kp: f64,
+    kd: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AntiWindup {
+    threshold: f64,
+}
+
+// Neither of the two can fail, as the tests that use them show: the files are embedded.
+fn embedded() -> File {
+    toml::from_str(include_str!("../../data/tvsmc-2015.toml")).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn body() -> RigidBody {
+    Scenario::tvsmc2015().inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"))
+}
+
+impl FblSettings {
+    /// Wu 2015, section 6, with its vehicle at the nominal inertia.
+    pub fn published() -> Self {
+        let File { period, feedback_linearisation: FeedbackLinearisation { kp, kd }, .. } = embedded();
+        Self { body: body(), period, kp, kd }
+    }
+}
+
+impl<R> Settings<R> {
+    fn published(file: &File, reaching: R, observer: Option<Observer>) -> Self {
+        Self {
+            body: body(),
+            period: file.period,
+            limit_moment: f64::INFINITY,
+            surface: file.surface,
+            reaching,
+            observer,
+            anti_windup: true,
+            threshold: file.anti_windup.threshold,
+        }
+    }
+}
+
+impl Settings<BoundaryLayer> {
+    /// BTVSMC of Wu 2015, Table 1.
+    pub fn btvsmc() -> Self {
+        let file = embedded();
+        Self::published(&file, file.boundary_layer, None)
+    }
+
+    /// BTVSMC/DO of Wu 2015, Table 1.
+    pub fn btvsmc_do() -> Self {
+        let file = embedded();
+        Self::published(&file, file.boundary_layer, Some(file.observer))
+    }
+}
+
+impl Settings<SecondOrder> {
+    /// SOTVSMC/DO of Wu 2015, Table 1.
+    pub fn sotvsmc_do() -> Self {
+        let file = embedded();
+        Self::published(&file, file.second_order, Some(file.observer))
+    }
+}

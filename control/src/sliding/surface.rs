@@ -1,0 +1,96 @@
+//! The time-varying sliding surface of Wu 2015, (17) and (18).
+
+use crate::error::DesignError;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Gains of s = ė + c e + a exp(−λ(t − t₀)).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Surface {
+    /// c, diagonal, 1/s.
+    pub c: [f64; 3],
+    /// λ, 1/s.
+    pub lambda: f64,
+}
+
+/// Tracking error e = Θ − Θ_r (rad) and ė (rad/s).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TrackingError {
+    /// e, rad.
+    pub angles: Vector3<f64>,
+    /// ė, rad/s.
+    pub rates: Vector3<f64>,
+}
+
+/// Where the surface was laid through the state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Anchor {
+    /// t₀, s.
+    pub time: f64,
+    /// a, rad/s.
+    pub a: Vector3<f64>,
+}
+
+impl Surface {
+    /// Refuses gains that are not positive.
+    pub(super) fn check(&self) -> Result<(), DesignError> {
+        super::all_positive("surface.c", &self.c)?;
+        super::all_positive("surface.lambda", &[self.lambda])
+    }
+
+    /// a = −ė − c e at `time` (s), (18): the state is then on the surface.
+    pub fn anchor(&self, time: f64, error: &TrackingError) -> Anchor {
+        Anchor { time, a: -error.rates - self.c().component_mul(&error.angles) }
+    }
+
+    /// s at `time`, (17), rad/s.
+    pub fn sliding(&self, anchor: &Anchor, time: f64, error: &TrackingError) -> Vector3<f64> {
+        error.rates + self.c().component_mul(&error.angles) + anchor.a * self.decay(anchor, time)
+    }
+
+    /// b = Θ̈_r − c ė + λ a exp(−λ(t − t₀)), (22): v = b keeps s constant without uncertainty; rad/s².
+    pub fn equivalent(
+        &self,
+        anchor: &Anchor,
+        time: f64,
+        error: &TrackingError,
+        acceleration: &Vector3<f64>,
+    ) -> Vector3<f64> {
+        acceleration - self.c().component_mul(&error.rates)
+            + anchor.a * (self.lambda * self.decay(anchor, time))
+    }
+
+    fn c(&self) -> Vector3<f64> {
+        Vector3::from(self.c)
+    }
+
+    fn decay(&self, anchor: &Anchor, time: f64) -> f64 {
+        (-self.lambda * (time - anchor.time)).exp()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn published_error_on_the_surface_is_21() {
+        // c = λ: e = (1 + c t) exp(−c t) e(0), from rest.
+        let surface = Surface { c: [2.0; 3], lambda: 2.0 };
+        let start = Vector3::new(0.1, -0.2, 0.3);
+        let anchor = surface.anchor(0.0, &TrackingError { angles: start, rates: Vector3::zeros() });
+        for k in 0..50 {
+            let t = f64::from(k) * 0.1;
+            let decay = (-2.0 * t).exp();
+            let error = TrackingError {
+                angles: start * ((1.0 + 2.0 * t) * decay),
+                rates: start * (-4.0 * t * decay),
+            };
+            assert!(surface.sliding(&anchor, t, &error).norm() < 1e-15, "t = {t}");
+            // ë along (21) is what b asks for.
+            let second = start * ((8.0 * t - 4.0) * decay);
+            assert!((surface.equivalent(&anchor, t, &error, &Vector3::zeros()) - second).norm() < 1e-14);
+        }
+    }
+}

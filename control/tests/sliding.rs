@@ -1,0 +1,260 @@
+//! The sliding-mode controllers of Wu et al. (2015) on the paper's scenario.
+
+use control::sliding::{BoundaryLayer, FblSettings, Observer, Settings, Surface, Tvsmc};
+use control::{Btvsmc, Controller, Fbl, Measurement, SotvsmcDo};
+use nalgebra::Vector3;
+use vehicle::kinematics;
+use vehicle::plant::Plant;
+use vehicle::scenario::Scenario;
+
+/// What one run shows.
+struct Outcome {
+    /// RMS of the angle errors between 10 and 20 s, deg.
+    rms: Vector3<f64>,
+    /// When each error stays within 2 % of its first value, s; infinite if never.
+    settling: Vector3<f64>,
+    /// Largest ‖M‖ commanded, N m.
+    moment: f64,
+}
+
+/// The loop over the scenario; `actuate` turns a command into the achieved moment, which is measured if `fed`.
+fn simulate<C: Controller>(
+    controller: &mut C,
+    scenario: &Scenario,
+    fed: bool,
+    mut actuate: impl FnMut(Vector3<f64>) -> Vector3<f64>,
+    mut observe: impl FnMut(f64, &C::Memory),
+) -> Outcome {
+    let period = controller.period();
+    let mut plant = Plant::new(&scenario.config(period), 0.0).unwrap();
+    let mut memory = controller.memory();
+    let reference = |time: f64| scenario.reference.at(time);
+    let ticks = (scenario.duration / period).round() as u64;
+    let (mut squares, mut count) = (Vector3::zeros(), 0.0);
+    let mut settling = Vector3::zeros();
+    let (mut largest, mut achieved) = (0.0_f64, None);
+    let first = (plant.angles() - reference(0.0).angles).abs();
+    for tick in 0..=ticks {
+        let time = tick as f64 * period;
+        let measured =
+            Measurement { angles: plant.angles(), rates: plant.rates(), achieved_moment: achieved };
+        let error = measured.angles - reference(time).angles;
+        for i in 0..3 {
+            if error[i].abs() > 0.02 * first[i] {
+                settling[i] = if tick == ticks { f64::INFINITY } else { time + period };
+            }
+        }
+        if time >= 10.0 {
+            squares += error.component_mul(&error);
+            count += 1.0;
+        }
+        let command = controller.update(&mut memory, tick, time, &measured, &reference);
+        observe(time, &memory);
+        largest = largest.max(command.norm());
+        let moment = actuate(command);
+        achieved = fed.then_some(moment);
+        plant.advance(time, (tick + 1) as f64 * period, moment).unwrap();
+    }
+    Outcome { rms: (squares / count).map(|x| x.sqrt().to_degrees()), settling, moment: largest }
+}
+
+/// Moments applied as commanded.
+fn direct<C: Controller>(mut controller: C) -> Outcome {
+    simulate(&mut controller, &Scenario::tvsmc2015(), false, |moment| moment, |_, _| ())
+}
+
+fn btvsmc_do() -> Btvsmc {
+    Tvsmc::new(Settings::btvsmc_do()).unwrap()
+}
+
+fn sotvsmc_do() -> SotvsmcDo {
+    Tvsmc::new(Settings::sotvsmc_do()).unwrap()
+}
+
+/// Angles in deg, to 2 % or half a unit of the last digit given.
+fn assert_rms(outcome: &Outcome, expected: [f64; 3], digit: f64) {
+    for (found, expected) in outcome.rms.iter().zip(expected) {
+        assert!((found - expected).abs() <= (0.02 * expected).max(0.5 * digit), "{:?}", outcome.rms);
+    }
+}
+
+// Direct torque: what the paper's Figs 3 and 4 show, in figures.
+
+#[test]
+fn regress_fbl_keeps_an_error() {
+    let outcome = direct(Fbl::new(FblSettings::published()).unwrap());
+    assert_rms(&outcome, [0.205, 0.076, 0.493], 1e-3);
+    assert!(outcome.settling.iter().all(|time| time.is_infinite()), "{:?}", outcome.settling);
+}
+
+#[test]
+fn regress_btvsmc_keeps_a_smaller_error() {
+    let outcome = direct(Tvsmc::new(Settings::btvsmc()).unwrap());
+    assert_rms(&outcome, [0.047, 0.017, 0.112], 1e-3);
+    assert!(outcome.settling.x.is_infinite() && outcome.settling.z.is_infinite());
+}
+
+#[test]
+fn published_laws_with_observer_settle_within_4_s() {
+    let (boundary, second) = (direct(btvsmc_do()), direct(sotvsmc_do()));
+    assert!(boundary.settling.max() < 4.0 && second.settling.max() < 4.0);
+    // "the tracking errors under SOTVSMC/DO are much smaller"
+    assert!(boundary.rms.max() <= 5e-4, "{:?}", boundary.rms);
+    for i in 0..3 {
+        assert!(second.rms[i] <= 0.1 * boundary.rms[i], "{:?} {:?}", second.rms, boundary.rms);
+    }
+}
+
+#[test]
+fn regress_laws_with_observer() {
+    let boundary = direct(btvsmc_do());
+    assert_rms(&boundary, [7.2e-5, 6.7e-5, 1.46e-4], 1e-6);
+    assert!((boundary.settling.max() - 2.92).abs() < 0.015, "{:?}", boundary.settling);
+    let second = direct(sotvsmc_do());
+    assert_rms(&second, [2.8e-6, 2.1e-6, 5.2e-6], 1e-7);
+    assert!((second.settling.max() - 2.95).abs() < 0.015, "{:?}", second.settling);
+}
+
+#[test]
+fn published_sliding_variable_starts_at_zero_and_the_observer_finds_the_uncertainty() {
+    // Figs 5 and 7.
+    let scenario = Scenario::tvsmc2015();
+    let (mut last, mut peak) = (Vector3::zeros(), 0.0_f64);
+    simulate(
+        &mut sotvsmc_do(),
+        &scenario,
+        false,
+        |moment| moment,
+        |time, memory| {
+            if time == 0.0 {
+                assert_eq!(memory.sliding, Vector3::zeros());
+            }
+            // "move back to zero around 4 seconds later": to a tenth of the peak then, further on to what remains.
+            peak = peak.max(memory.sliding.amax());
+            let bound = if time < 4.0 { f64::INFINITY } else { 0.1 * peak };
+            assert!(memory.sliding.amax() < bound, "{time}: {:?}", memory.sliding);
+            assert!(time < 7.0 || memory.sliding.amax() < 5e-6, "{time}: {:?}", memory.sliding);
+            last = memory.estimate.disturbance;
+        },
+    );
+    // At 20 s: K_true M + B + R I_true⁻¹ ΔM = v + Δv. The attitude rests at the reference, so M cancels ΔM, v = −Δv = K M.
+    let nominal = scenario.inertia.body(1.0).unwrap();
+    let time = 20.0_f64;
+    let disturbance = Vector3::repeat(1e4 * (0.5 + (0.1 * time).sin() + time.sin()));
+    let angles = scenario.reference.at(time).angles;
+    let expected = kinematics::r(&angles) * (nominal.inverse * disturbance);
+    assert!((last - expected).norm() < 0.03 * expected.norm(), "{last} {expected}");
+}
+
+#[test]
+fn oracle_determinant_of_k() {
+    // Wu 2015, (14), leaves out cos β and I_y.
+    let inertia = Scenario::tvsmc2015().inertia;
+    let body = inertia.body(1.0).unwrap();
+    let angles = Vector3::new(0.5, 0.3, 1.0);
+    let k = kinematics::r(&angles) * body.inverse;
+    let expected =
+        1.0 / (angles.y.cos() * inertia.Iyy * (inertia.Ixx * inertia.Izz - inertia.Ixz * inertia.Ixz));
+    assert!((k.determinant() - expected).abs() < 1e-12 * expected);
+}
+
+#[test]
+fn oracle_cross_product_is_skew() {
+    // ω^× of Wu 2015, (5), with −q in its third row: power ω · (ω × I ω) is zero. As printed it is not.
+    let body = Scenario::tvsmc2015().inertia.body(1.0).unwrap();
+    let rates = Vector3::new(0.1, -0.2, 0.3);
+    let momentum = body.inertia * rates;
+    let free = body.angular_acceleration(&rates, &Vector3::zeros());
+    assert!((momentum.dot(&(body.inertia * free))).abs() < 1e-12 * momentum.norm_squared());
+    let printed = Vector3::new(0.0, 0.0, 2.0 * rates.y * momentum.x);
+    assert!(momentum.dot(&(body.inertia * free - printed)).abs() > 1e-3 * momentum.norm_squared());
+}
+
+// Actuators that fall short
+
+/// Actuators that follow a command with a limited rate per axis, N m/s.
+fn rate_limited(rate: f64, period: f64) -> impl FnMut(Vector3<f64>) -> Vector3<f64> {
+    let mut moment = Vector3::zeros();
+    let step = rate * period;
+    move |command: Vector3<f64>| {
+        let change: Vector3<f64> = command - moment;
+        moment += change.map(|change| change.clamp(-step, step));
+        moment
+    }
+}
+
+/// SOTVSMC/DO with actuators of 1.5e5 N m/s.
+fn with_slow_actuators(anti_windup: bool, fed: bool) -> Outcome {
+    let mut controller = Tvsmc::new(Settings { anti_windup, ..Settings::sotvsmc_do() }).unwrap();
+    simulate(&mut controller, &Scenario::tvsmc2015(), fed, rate_limited(1.5e5, 0.01), |_, _| ())
+}
+
+#[test]
+fn regress_re_anchoring_halves_the_settling_time_of_slow_actuators() {
+    let (with, without) = (with_slow_actuators(true, true), with_slow_actuators(false, true));
+    assert!((with.settling.max() - 3.16).abs() < 0.05, "{:?}", with.settling);
+    assert!((without.settling.max() - 7.08).abs() < 0.05, "{:?}", without.settling);
+    assert!(with.rms.max() < 1e-5, "{:?}", with.rms);
+}
+
+#[test]
+fn the_observer_must_know_what_was_achieved() {
+    let run = |fed| {
+        let scenario = Scenario::tvsmc2015();
+        simulate(&mut btvsmc_do(), &scenario, fed, rate_limited(1.5e5, 0.01), |_, _| ())
+    };
+    let (fed, unfed) = (run(true), run(false));
+    assert!(fed.rms.max() < 5e-4, "{:?}", fed.rms);
+    assert!(unfed.rms.max() > 10.0, "{:?}", unfed.rms);
+}
+
+#[test]
+fn a_known_limit_needs_no_measured_moment() {
+    // The controller's own limit counts as a shortfall: as good as actuators that are measured.
+    let scenario = Scenario::tvsmc2015();
+    let limit_moment = 1.5e5;
+    let mut limited = Tvsmc::new(Settings { limit_moment, ..Settings::sotvsmc_do() }).unwrap();
+    let known = simulate(&mut limited, &scenario, false, |moment| moment, |_, _| ());
+    assert!(known.moment <= limit_moment * (1.0 + 1e-12));
+    let within = |moment: Vector3<f64>| moment / (moment.norm() / limit_moment).max(1.0);
+    let measured = simulate(&mut sotvsmc_do(), &scenario, true, within, |_, _| ());
+    assert!((known.rms - measured.rms).norm() < 1e-3 * measured.rms.norm());
+    assert!(known.settling.max() < 4.0, "{:?}", known.settling);
+}
+
+#[test]
+fn the_moment_of_a_tick_does_not_depend_on_the_moment_achieved_before_it() {
+    let scenario = Scenario::tvsmc2015();
+    let reference = |time: f64| scenario.reference.at(time);
+    let mut controller = sotvsmc_do();
+    let mut memory = controller.memory();
+    let mut measured = Measurement { angles: scenario.initial_angles, ..Measurement::default() };
+    controller.update(&mut memory, 0, 0.0, &measured, &reference);
+    let mut other = memory;
+    let [one, two] = [&mut memory, &mut other].map(|memory| {
+        let first = controller.update(memory, 1, 0.01, &measured, &reference);
+        measured.achieved_moment = Some(Vector3::repeat(-1e5));
+        first
+    });
+    assert_eq!(one, two);
+    assert_ne!(memory, other, "but what follows does");
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused_by_name() {
+    let refusal = |settings: Settings<BoundaryLayer>| Tvsmc::new(settings).unwrap_err().to_string();
+    let good = Settings::btvsmc_do();
+    let text = refusal(Settings { period: 0.0, ..good });
+    assert!(text.contains("period.feedback"), "{text}");
+    let text = refusal(Settings { period: 0.5, ..good });
+    assert!(text.contains("boundaryLayer.h"), "{text}");
+    let text = refusal(Settings { surface: Surface { lambda: -1.0, ..good.surface }, ..good });
+    assert!(text.contains("surface.lambda") && text.contains("-1"), "{text}");
+    let observer = good.observer.map(|observer| Observer { l: [0.005, f64::NAN, 0.01], ..observer });
+    let text = refusal(Settings { observer, ..good });
+    assert!(text.contains("observer.L"), "{text}");
+    let text = Fbl::new(FblSettings { kd: -3.0, ..FblSettings::published() }).unwrap_err().to_string();
+    assert!(text.contains("gain.d"), "{text}");
+    let text = Fbl::new(FblSettings { period: 1.0, ..FblSettings::published() }).unwrap_err().to_string();
+    assert!(text.contains("spectral radius"), "{text}");
+}
