@@ -100,6 +100,7 @@ impl Parameters {
                 start: self.start,
                 end: self.end,
             },
+            actuators: None,
             step: self.step,
         }
     }

@@ -36,10 +36,10 @@ impl ReentryPlant {
         self.plant.as_ref().ok_or_else(|| Failure::Error("the plant is not initialized".into()))
     }
 
-    /// The disturbance in force at `time` (s).
-    fn disturbance(&self, plant: &Plant, time: f64) -> Held {
+    /// What is in force at `time` (s).
+    fn held(&self, plant: &Plant, time: f64) -> Held {
         let held = if self.event_driven { plant.held() } else { None };
-        held.unwrap_or_else(|| plant.disturbance_at(time, &self.input))
+        held.unwrap_or_else(|| plant.in_force(time, &self.input))
     }
 
     /// Refuses a state at which the equations do not hold. In model exchange it may be an integrator's trial, which the
@@ -75,7 +75,7 @@ impl Model for ReentryPlant {
     fn calculate(&mut self, time: f64) -> Result<(), Failure> {
         let plant = self.ready()?;
         self.check(&plant.state, time)?;
-        let held = self.disturbance(plant, time);
+        let held = self.held(plant, time);
         let derivative = plant.derivative(time, &self.input, &held);
         if !derivative.iter().all(|value| value.is_finite()) {
             return Err(Failure::Error(format!("an input moment is not a finite number at t = {time} s")));
@@ -85,7 +85,7 @@ impl Model for ReentryPlant {
             rates: plant.rates(),
             angle_rates: derivative.fixed_rows::<3>(0).into(),
             angular_acceleration: derivative.fixed_rows::<3>(3).into(),
-            applied_moment: self.input.moment,
+            applied_moment: plant.applied_moment(time, &self.input, &held),
             delta: held.delta(),
             disturbance_moment: plant.disturbance_moment(time, &self.input, &held),
         };
@@ -125,14 +125,14 @@ impl Model for ReentryPlant {
         self.ready()?;
         self.event_driven = true;
         let Some(plant) = &mut self.plant else { return Ok(EventInfo::default()) };
-        plant.hold_disturbance(time, &self.input);
-        Ok(EventInfo { next_event_time: plant.next_change(time), states_changed: false })
+        let held = plant.hold(time, &self.input);
+        Ok(EventInfo { next_event_time: plant.next_change(time, &held), states_changed: false })
     }
 
     fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure> {
         let plant = self.ready()?;
         self.check(&plant.state, time)?;
-        let delta = self.disturbance(plant, time).delta();
+        let delta = self.held(plant, time).delta();
         let (by_state, by_moment) = partial_derivatives(plant.body(), &plant.state, &delta);
         Ok(match (Unknown::of(unknown), Known::of(known)) {
             (Some(Unknown::Derivative(i)), Some(Known::State(j))) => by_state[(i, j)],

@@ -1,6 +1,7 @@
-//! The vehicle: attitude kinematics and dynamics, inertia, atmosphere, effectors, reference profiles, disturbances and integrators.
+//! The vehicle: attitude kinematics and dynamics, inertia, atmosphere, effectors and actuators, reference profiles, disturbances and integrators.
 //! Knows neither control nor FMI. SI units and radians throughout.
 
+pub mod actuators;
 pub mod atmosphere;
 pub mod disturbance;
 pub mod dynamics;

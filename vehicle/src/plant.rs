@@ -1,12 +1,14 @@
 //! The vehicle in motion: Θ̇ = R ω, ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ, integrated from one communication point to the next.
 
+use crate::actuators::{self, Actuators, Command, Drive};
 use crate::disturbance::{Disturbance, View};
 use crate::dynamics::{Inertia, RigidBody};
+use crate::effectors::{JETS, Surfaces};
 use crate::error::Error;
 use crate::integrator::{equal_steps, rk4};
 use crate::kinematics;
 use crate::time::tolerance;
-use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, Matrix6x3, SMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// `[alpha, beta, sigma, p, q, r]` in rad and rad/s.
@@ -67,22 +69,30 @@ pub fn partial_derivatives(
 /// What acts on the vehicle from outside.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Input {
-    /// Control moment about the body axes, N m.
+    /// Control moment about the body axes, N m. Acts as it comes, unless there are actuators.
     pub moment: Vector3<f64>,
     /// Further moment about the body axes, N m.
     pub disturbance_moment: Vector3<f64>,
+    /// What the actuators are to do, if there are any.
+    pub command: Command,
 }
 
 impl Input {
-    fn is_finite(&self) -> bool {
-        self.moment.iter().chain(&self.disturbance_moment).all(|value| value.is_finite())
+    /// What holds a value that is not finite.
+    fn fault(&self) -> Option<&'static str> {
+        let broken = |values: &[f64]| values.iter().any(|value| !value.is_finite());
+        if broken(self.moment.as_slice()) || broken(self.disturbance_moment.as_slice()) {
+            return Some("moment");
+        }
+        let Command { surfaces, jets } = &self.command;
+        (broken(surfaces.as_slice()) || broken(jets.as_slice())).then_some("actuator command")
     }
 }
 
 impl From<Vector3<f64>> for Input {
     /// A control moment (N m) alone.
     fn from(moment: Vector3<f64>) -> Self {
-        Self { moment, disturbance_moment: Vector3::zeros() }
+        Self { moment, ..Self::default() }
     }
 }
 
@@ -97,11 +107,14 @@ pub struct Config {
     pub initial: State,
     /// The disturbance.
     pub disturbance: Disturbance,
+    /// Surfaces and jets that make the control moment; without them it is an input.
+    pub actuators: Option<actuators::Config>,
     /// Longest integration step, s.
     pub step: f64,
 }
 
-/// The disturbance as it is held from a tick or a change of its course to the next.
+/// What is held for a while: the disturbance from a tick or a change of its course to the next, and what the actuators do
+/// since commands were taken last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Held {
     /// Number of the interval.
@@ -112,6 +125,8 @@ pub struct Held {
     sample: Vector3<f64>,
     /// Whether the disturbance acts.
     acts: bool,
+    /// The actuators' motion.
+    drive: Drive,
 }
 
 impl Held {
@@ -126,6 +141,7 @@ impl Held {
 pub struct Plant {
     body: RigidBody,
     disturbance: Disturbance,
+    actuators: Option<Actuators>,
     step: f64,
     start_time: f64,
     held: Option<Held>,
@@ -157,8 +173,15 @@ impl Plant {
             return refuse("integrator.step", format!("= {} s must be positive", config.step));
         }
         config.disturbance.check()?;
-        let disturbance = config.disturbance.clone();
-        Ok(Self { body, disturbance, step: config.step, start_time, held: None, state: config.initial })
+        Ok(Self {
+            body,
+            disturbance: config.disturbance.clone(),
+            actuators: config.actuators.as_ref().map(Actuators::new).transpose()?,
+            step: config.step,
+            start_time,
+            held: None,
+            state: config.initial,
+        })
     }
 
     /// The vehicle's rigid body.
@@ -176,32 +199,49 @@ impl Plant {
         rates(&self.state)
     }
 
-    /// The next time (s) after `time` at which the disturbance may jump.
-    pub fn next_change(&self, time: f64) -> Option<f64> {
-        self.disturbance.next_change(self.start_time, time)
+    /// The next time (s) after `time` at which the right side may not be smooth: the disturbance jumps, a deflection comes
+    /// to rest.
+    pub fn next_change(&self, time: f64, held: &Held) -> Option<f64> {
+        let jump = self.disturbance.next_change(self.start_time, time);
+        let rest = self.actuators.as_ref().and_then(|actuators| actuators.next_change(time, &held.drive));
+        jump.into_iter().chain(rest).min_by(f64::total_cmp)
     }
 
-    /// The disturbance that holds from `time` (s) on: drawn from the present state and `input` if a tick has come (again,
-    /// if asked again at the tick), the one already held otherwise.
-    pub fn disturbance_at(&self, time: f64, input: &Input) -> Held {
+    /// What holds from `time` (s) on if commands are taken then: the disturbance is drawn from the present state and `input`
+    /// if a tick has come (again, if asked again at the tick), and is the one already held otherwise.
+    pub fn in_force(&self, time: f64, input: &Input) -> Held {
+        let before = self.drive();
+        let drive =
+            self.actuators.as_ref().map_or(before, |all| all.commanded(time, &input.command, &before));
+        self.drawn(time, input, drive)
+    }
+
+    fn drawn(&self, time: f64, input: &Input, drive: Drive) -> Held {
         let tick = self.disturbance.tick(self.start_time, time);
         let acts = self.disturbance.acts(time);
         match self.held {
-            Some(held) if held.tick == tick && time > held.since + tolerance(time) => Held { acts, ..held },
+            Some(held) if held.tick == tick && time > held.since + tolerance(time) => {
+                Held { acts, drive, ..held }
+            }
             _ => {
                 let (angles, rates) = (self.angles(), self.rates());
-                let view = View { body: &self.body, angles, rates, moment: input.moment };
-                Held { tick, since: time, sample: self.disturbance.sample(tick, &view), acts }
+                let moment = self.control_moment(time, input, &drive);
+                let view = View { body: &self.body, angles, rates, moment };
+                Held { tick, since: time, sample: self.disturbance.sample(tick, &view), acts, drive }
             }
         }
     }
 
-    /// Takes over what [`Plant::disturbance_at`] says; it then holds until the next tick.
-    pub fn hold_disturbance(&mut self, time: f64, input: &Input) -> Held {
-        *self.held.insert(self.disturbance_at(time, input))
+    /// Takes over what [`Plant::in_force`] says: commands hold until they are taken again, the disturbance until the next tick.
+    pub fn hold(&mut self, time: f64, input: &Input) -> Held {
+        *self.held.insert(self.in_force(time, input))
     }
 
-    /// The disturbance held now, if one was drawn yet.
+    fn drive(&self) -> Drive {
+        self.held.map_or_else(Drive::default, |held| held.drive)
+    }
+
+    /// What is held now, if anything was yet.
     pub fn held(&self) -> Option<Held> {
         self.held
     }
@@ -212,9 +252,30 @@ impl Plant {
         input.disturbance_moment + own
     }
 
+    fn control_moment(&self, time: f64, input: &Input, drive: &Drive) -> Vector3<f64> {
+        self.actuators.as_ref().map_or(input.moment, |all| all.moment(time, &input.command, drive))
+    }
+
+    /// The control moment (N m) that acts at `time` (s).
+    pub fn applied_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
+        self.control_moment(time, input, &held.drive)
+    }
+
+    /// Deflections of the surfaces (rad) at `time` (s); zero without actuators.
+    pub fn deflections(&self, time: f64, held: &Held) -> Surfaces {
+        self.actuators.as_ref().map_or_else(Surfaces::zeros, |all| all.deflections(time, &held.drive))
+    }
+
+    /// Partial derivatives of [`Plant::applied_moment`]: by the input moment (3 × 3) and by the commands to the jets (3 × 10).
+    pub fn applied_moment_by_inputs(&self, input: &Input) -> (Matrix3<f64>, SMatrix<f64, 3, JETS>) {
+        self.actuators.as_ref().map_or((Matrix3::identity(), SMatrix::zeros()), |all| {
+            (Matrix3::zeros(), all.moment_by_jets(&input.command))
+        })
+    }
+
     /// All moments together (N m) at `time` (s).
     pub fn total_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
-        input.moment + self.disturbance_moment(time, input, held)
+        self.applied_moment(time, input, held) + self.disturbance_moment(time, input, held)
     }
 
     /// State derivative at `time` (s), at the present state.
@@ -230,8 +291,9 @@ impl Plant {
         self.advance_with(from, to, |_| moment.into())
     }
 
-    /// From `from` to `to` (s) under an input that is a function of time. The interval is cut where the disturbance jumps,
-    /// and every piece is integrated in equal steps, so the end is met exactly.
+    /// From `from` to `to` (s) under an input that is a function of time. Commands are taken at `from`; only a duty cycle of
+    /// the jets follows the input on the way. The interval is cut where the disturbance jumps and where a deflection comes to
+    /// rest, and every piece is integrated in equal steps, so the end is met exactly.
     ///
     /// # Errors
     /// If the attitude becomes singular or a value is not finite; the state is then the last good one.
@@ -243,8 +305,12 @@ impl Plant {
     ) -> Result<(), Error> {
         let mut time = from;
         while time < to {
-            let held = self.hold_disturbance(time, &input(time));
-            let cut = self.next_change(time).filter(|&change| change + tolerance(to) < to);
+            let held = if time == from {
+                self.hold(time, &input(time))
+            } else {
+                *self.held.insert(self.drawn(time, &input(time), self.drive()))
+            };
+            let cut = self.next_change(time, &held).filter(|&change| change + tolerance(to) < to);
             let end = cut.unwrap_or(to);
             let steps = equal_steps(end - time, self.step);
             let h = (end - time) / steps as f64;
@@ -255,8 +321,8 @@ impl Plant {
                 };
                 let next = rk4(&mut f, begin, &self.state, h);
                 check(&next, begin + h).map_err(|error| {
-                    let fed = input(begin).is_finite() && input(begin + h).is_finite();
-                    if fed { error } else { Error::NotFinite { time: begin, what: "moment" } }
+                    let fault = input(begin).fault().or_else(|| input(begin + h).fault());
+                    fault.map_or(error, |what| Error::NotFinite { time: begin, what })
                 })?;
                 self.state = next;
             }

@@ -77,13 +77,14 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The plant of this scenario, integrated in steps no longer than `step` (s).
+    /// The plant of this scenario under a control moment, integrated in steps no longer than `step` (s).
     pub fn config(&self, step: f64) -> Config {
         Config {
             inertia: self.inertia,
             inertia_scale: self.inertia_scale,
             initial: plant::state(&self.initial_angles, &self.initial_rates),
             disturbance: self.disturbance.clone(),
+            actuators: None,
             step,
         }
     }

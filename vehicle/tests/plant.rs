@@ -2,7 +2,9 @@
 
 use nalgebra::{Vector3, Vector6};
 use proptest::prelude::*;
+use vehicle::actuators::{self, Command, JetMode};
 use vehicle::disturbance::{Disturbance, Kind, MomentWave, SineMoment};
+use vehicle::effectors::Effectors;
 use vehicle::plant::{Config, Input, Plant, State, derivative, partial_derivatives};
 use vehicle::{Error, Scenario};
 
@@ -286,4 +288,101 @@ proptest! {
             prop_assert!((numeric - by_moment.column(i)).amax() < 1e-16);
         }
     }
+}
+
+/// The undisturbed vehicle with actuators at the published flight condition.
+fn actuated(initial: State, jet_mode: JetMode) -> Config {
+    let dynamic_pressure = Effectors::published().reference_pressure;
+    let actuators = actuators::Config {
+        effectors: Effectors::published(),
+        jet_mode,
+        dynamic_pressure,
+        aerodynamics_scale: 1.0,
+    };
+    Config { actuators: Some(actuators), ..undisturbed(initial, 0.05) }
+}
+
+fn flaps(deflection_deg: f64) -> Command {
+    let mut command = Command::default();
+    command.surfaces[4] = deflection_deg.to_radians();
+    command.surfaces[5] = deflection_deg.to_radians();
+    command
+}
+
+#[test]
+fn oracle_flaps_turn_the_nose_at_their_rate_and_then_stay() {
+    // At beta = 0 both flaps pitch alone: M = -2 · 5100 N m/deg · 10 deg/s · t up to -2 deg at 0.2 s, then constant
+    let config = actuated(State::new(0.1, 0.0, 0.2, 0.0, 0.0, 0.0), JetMode::OnOff);
+    let inertia = config.inertia.Iyy * config.inertia_scale;
+    let mut plant = Plant::new(&config, 0.0).unwrap();
+    let input = Input { command: flaps(-2.0), ..Input::default() };
+    plant.advance_with(0.0, 1.0, |_| input).unwrap();
+    let (slope, full) = (2.0 * 5100.0 * 10.0 / inertia, 2.0 * 5100.0 * 2.0 / inertia);
+    let q = slope * 0.2 * 0.2 / 2.0 + full * 0.8;
+    let alpha = 0.1 + slope * 0.2f64.powi(3) / 6.0 + slope * 0.02 * 0.8 + full * 0.8 * 0.8 / 2.0;
+    assert!((plant.rates() - Vector3::new(0.0, q, 0.0)).amax() < 1e-16, "{}", plant.rates().y - q);
+    assert!((plant.angles().x - alpha).abs() < 1e-15, "{}", plant.angles().x - alpha);
+    let held = plant.held().unwrap();
+    assert_eq!(plant.deflections(1.0, &held), input.command.surfaces);
+}
+
+#[test]
+fn with_actuators_the_input_moment_does_not_act_and_without_them_commands_do_not() {
+    let start = State::new(0.1, 0.05, 0.2, 0.01, 0.02, -0.01);
+    let moment = Vector3::new(1e4, -2e4, 3e4);
+    let end = |config: &Config, input: Input| {
+        let mut plant = Plant::new(config, 0.0).unwrap();
+        plant.advance_with(0.0, 1.0, |_| input).unwrap();
+        plant.state
+    };
+    let mut command = flaps(5.0);
+    command.jets[0] = 1.0;
+    let [with, without] = [actuated(start, JetMode::OnOff), undisturbed(start, 0.05)];
+    let [neither, both] = [Input::default(), Input { moment, command, ..Input::default() }];
+    assert_eq!(end(&with, both), end(&with, Input { command, ..neither }));
+    assert_eq!(end(&without, both), end(&without, Input { moment, ..neither }));
+    assert_ne!(end(&with, both), end(&with, neither));
+    assert_ne!(end(&without, both), end(&without, neither));
+}
+
+#[test]
+fn one_long_step_equals_short_ones_with_actuators() {
+    let start = State::new(0.1, 0.05, 0.2, 0.01, 0.02, -0.01);
+    for jet_mode in [JetMode::OnOff, JetMode::Duty] {
+        let config = Config { step: 1e-3, ..actuated(start, jet_mode) };
+        let mut command = flaps(6.0);
+        command.surfaces[0] = -0.05;
+        (command.jets[2], command.jets[5]) = (0.7, 0.3);
+        let input = Input { command, ..Input::default() };
+        let [mut long, mut short] = [0, 1].map(|_| Plant::new(&config, 0.0).unwrap());
+        long.advance_with(0.0, 2.0, |_| input).unwrap();
+        for k in 0..50 {
+            short.advance_with(0.04 * f64::from(k), 0.04 * f64::from(k + 1), |_| input).unwrap();
+        }
+        assert!((long.state - short.state).amax() < 1e-13, "{jet_mode:?}: {}", long.state - short.state);
+    }
+}
+
+#[test]
+fn a_command_that_is_no_number_is_an_error() {
+    let mut plant = Plant::new(&actuated(State::zeros(), JetMode::OnOff), 0.0).unwrap();
+    let input = Input { command: flaps(f64::NAN), ..Input::default() };
+    let refusal = plant.advance_with(0.0, 1.0, |_| input).unwrap_err().to_string();
+    assert!(refusal.contains("command"), "{refusal}");
+    assert_eq!(plant.state, State::zeros());
+}
+
+#[test]
+fn noise_does_not_depend_on_actuators() {
+    let disturbance = config().disturbance;
+    let [with, without] = [true, false].map(|with| {
+        let config = Config { disturbance: disturbance.clone(), ..actuated(State::zeros(), JetMode::OnOff) };
+        let config = if with { config } else { Config { actuators: None, ..config } };
+        let mut plant = Plant::new(&config, 0.0).unwrap();
+        let input = Input { command: flaps(0.15), ..Input::default() };
+        plant.advance_with(0.0, 0.1, |_| input).unwrap();
+        plant.held().unwrap().delta()
+    });
+    assert_eq!(with, without);
+    assert!(with.amax() > 0.0);
 }
