@@ -65,6 +65,28 @@ pub enum DesignError {
         /// Feedback period, s.
         feedback: f64,
     },
+    /// A control surface's limits do not fit.
+    #[error(
+        "surface {index}: the limits limit.surfaceMin = {min} and limit.surfaceMax = {max} must be finite and hold zero, and limit.surfaceRate = {rate} must be finite and not negative"
+    )]
+    Surface {
+        /// Which surface, from 1.
+        index: usize,
+        /// Least deflection, rad.
+        min: f64,
+        /// Greatest deflection, rad.
+        max: f64,
+        /// Greatest deflection rate, rad/s.
+        rate: f64,
+    },
+    /// The modulator does not fit into the allocator's period.
+    #[error("period = {period} s must be a whole multiple of pwpf.period = {pwpf} s")]
+    Modulation {
+        /// Period of the allocation, s.
+        period: f64,
+        /// Period of the modulator, s.
+        pwpf: f64,
+    },
     /// Nothing is left of one of the paper's sets after tightening.
     #[error(
         "nothing is left of the paper's set: {name} = {value:.4}; lower disturbance.bound or the reference bounds, or raise the limits"

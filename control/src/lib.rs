@@ -1,5 +1,6 @@
 //! Attitude controllers of the papers. Knows the vehicle, not FMI. SI units and radians throughout.
 
+pub mod allocation;
 mod cone;
 pub mod controller;
 pub mod crmpc;
@@ -14,6 +15,7 @@ pub mod schedule;
 pub mod settings;
 pub mod sliding;
 
+pub use allocation::Allocator;
 pub use controller::{Controller, Measurement};
 pub use crmpc::Crmpc;
 pub use dlmpc::Dlmpc;

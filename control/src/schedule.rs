@@ -5,30 +5,36 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::time::{tick_time, tolerance};
 
-/// Memory of a controller and where it stands in time. At a tick the output is a function of the committed memory and of
-/// the measurement now given: it may be evaluated any number of times, and is committed when time leaves the tick.
+/// Memory of a sampled unit and where it stands in time. At a tick the output is a function of the committed memory and of
+/// the input now given: it may be evaluated any number of times, and is committed when time leaves the tick. Attitude
+/// controllers have the default input and output.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Sampled<Memory> {
+pub struct Sampled<Memory, Input = ControllerInput, Output = Vector3<f64>> {
     start: f64,
     /// The first tick that is not committed.
     next: u64,
     committed: Memory,
-    held: Vector3<f64>,
+    held: Output,
     /// Outcome of `next`, if it was evaluated, and what it was evaluated for.
     pending: Memory,
-    pending_moment: Vector3<f64>,
-    evaluated: Option<Evaluated>,
+    pending_output: Output,
+    evaluated: Option<Input>,
 }
 
-/// What an evaluation depends on beside the committed memory.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Evaluated {
+/// What a controller's evaluation depends on beside the committed memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ControllerInput {
     measured: Measurement,
     /// Mark of the caller's further inputs (an external reference).
     mark: [f64; 9],
 }
 
-impl<Memory: Clone + Default> Sampled<Memory> {
+impl<Memory, Input, Output> Sampled<Memory, Input, Output>
+where
+    Memory: Clone + Default,
+    Input: PartialEq + Default,
+    Output: Copy + Default,
+{
     /// At tick 0, which is due at `start` (s), with the memory that a controller starts with.
     pub fn new(start: f64, memory: Memory) -> Self {
         Self { start, committed: memory.clone(), pending: memory, ..Self::default() }
@@ -49,30 +55,22 @@ impl<Memory: Clone + Default> Sampled<Memory> {
         self.next_time(period) < time - tolerance(time)
     }
 
-    /// Evaluates the first uncommitted tick. `mark` must change whenever `reference` does; nothing is computed again if
-    /// both inputs are the same.
-    pub fn evaluate<C: Controller<Memory = Memory>>(
-        &mut self,
-        controller: &mut C,
-        measured: &Measurement,
-        mark: [f64; 9],
-        reference: ReferenceAt,
-    ) {
-        let evaluated = Some(Evaluated { measured: *measured, mark });
-        if self.evaluated == evaluated {
+    /// Evaluates the first uncommitted tick: `update` gets memory and number of the tick. It must be a function of these and
+    /// of `input`; nothing is computed again if `input` is the same.
+    pub fn evaluate_with(&mut self, input: Input, update: impl FnOnce(&mut Memory, u64) -> Output) {
+        if self.evaluated.as_ref() == Some(&input) {
             return;
         }
         self.pending.clone_from(&self.committed);
-        let time = self.next_time(controller.period());
-        self.pending_moment = controller.update(&mut self.pending, self.next, time, measured, reference);
-        self.evaluated = evaluated;
+        self.pending_output = update(&mut self.pending, self.next);
+        self.evaluated = Some(input);
     }
 
     /// Commits the evaluated tick: its outcome is held from now on.
     pub fn commit(&mut self) {
         if self.evaluated.take().is_some() {
             std::mem::swap(&mut self.committed, &mut self.pending);
-            self.held = self.pending_moment;
+            self.held = self.pending_output;
             self.next += 1;
         }
     }
@@ -83,13 +81,31 @@ impl<Memory: Clone + Default> Sampled<Memory> {
         look(&self.pending, &self.committed)
     }
 
-    /// The moment in force (N m) and the memory behind it: of the evaluated tick, else of the last committed one.
-    pub fn in_force(&self) -> (Vector3<f64>, &Memory) {
+    /// The output in force (a controller's moment, N m) and the memory behind it: of the evaluated tick, else of the last
+    /// committed one.
+    pub fn in_force(&self) -> (Output, &Memory) {
         if self.evaluated.is_some() {
-            (self.pending_moment, &self.pending)
+            (self.pending_output, &self.pending)
         } else {
             (self.held, &self.committed)
         }
+    }
+}
+
+impl<Memory: Clone + Default> Sampled<Memory> {
+    /// Evaluates the first uncommitted tick of a controller. `mark` must change whenever `reference` does; nothing is
+    /// computed again if both inputs are the same.
+    pub fn evaluate<C: Controller<Memory = Memory>>(
+        &mut self,
+        controller: &mut C,
+        measured: &Measurement,
+        mark: [f64; 9],
+        reference: ReferenceAt,
+    ) {
+        let time = self.next_time(controller.period());
+        self.evaluate_with(ControllerInput { measured: *measured, mark }, |memory, tick| {
+            controller.update(memory, tick, time, measured, reference)
+        });
     }
 }
 

@@ -1,0 +1,115 @@
+//! (60) of Wu 2015 subject to (59), (63), (65) as a second-order cone programme.
+//!
+//! Unknowns are t, x and u: t bounds the norm, δ_A = middle + half ∘ x with −1 ≤ x ≤ 1, and δ_RCS = u. Between the two bounds that
+//! range and rate leave to a surface lies middle ± half; a surface that may not move has half = 0, so that the programme always
+//! has an interior.
+
+use super::SurfaceMatrix;
+use crate::cone::{Programme, Triplets};
+use clarabel::solver::SupportedConeT::{NonnegativeConeT, SecondOrderConeT};
+use nalgebra::{SMatrix, Vector3};
+use vehicle::effectors::{JETS, Jets, SURFACES, Surfaces};
+
+/// Typical moment, by which the cone is scaled, N m.
+const MOMENT_SCALE: f64 = 1e4;
+const COLUMNS: usize = 1 + SURFACES + JETS;
+/// Rows of x ≤ 1, −x ≤ 1, u ≤ 1, −u ≤ 0.
+const BOX_ROWS: usize = 2 * (SURFACES + JETS);
+
+/// The weights of (60).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weights {
+    /// W₁, 1/(N m).
+    pub moment: Vector3<f64>,
+    /// W₂.
+    pub jet: Jets,
+    /// Ours, on ½ (deflection/range)², per surface in 1/rad².
+    pub surface: Surfaces,
+}
+
+/// The programme with its solver.
+pub(super) struct ConeProblem {
+    programme: Programme,
+    weights: Weights,
+    /// Where the numbers of D_A stand.
+    surface_slots: [[usize; 3]; SURFACES],
+}
+
+impl ConeProblem {
+    /// Sets the programme up.
+    ///
+    /// # Errors
+    /// The solver's own message if it refuses the data.
+    pub(super) fn new(
+        weights: Weights,
+        jets: &SMatrix<f64, 3, JETS>,
+        max_iterations: u32,
+    ) -> Result<Self, String> {
+        let mut cost = Triplets::default();
+        for j in 0..SURFACES {
+            cost.push(1 + j, 1 + j, 0.0);
+        }
+        let mut matrix = Triplets::default();
+        let mut right_side = vec![1.0; BOX_ROWS + 4];
+        for j in 1..COLUMNS {
+            let row = 2 * (j - 1);
+            matrix.push(row, j, 1.0);
+            matrix.push(row + 1, j, -1.0);
+            if j > SURFACES {
+                right_side[row + 1] = 0.0;
+            }
+        }
+        matrix.push(BOX_ROWS, 0, -1.0);
+        right_side[BOX_ROWS] = 0.0;
+        let mut surface_slots = [[0; 3]; SURFACES];
+        for i in 0..3 {
+            let row = BOX_ROWS + 1 + i;
+            for (j, slots) in surface_slots.iter_mut().enumerate() {
+                slots[i] = matrix.push(row, 1 + j, 0.0);
+            }
+            for j in 0..JETS {
+                matrix.push(row, 1 + SURFACES + j, weights.moment[i] * jets[(i, j)] / MOMENT_SCALE);
+            }
+        }
+        let (matrix, position) = matrix.compress(BOX_ROWS + 4, COLUMNS);
+        for slot in surface_slots.iter_mut().flatten() {
+            *slot = position[*slot];
+        }
+        let cones = [NonnegativeConeT(BOX_ROWS), SecondOrderConeT(4)];
+        let cost = cost.compress(COLUMNS, COLUMNS).0;
+        let mut programme = Programme::new(cost, matrix, right_side, &cones, max_iterations)?;
+        programme.linear_cost[0] = MOMENT_SCALE;
+        programme.linear_cost[1 + SURFACES..].copy_from_slice(weights.jet.as_slice());
+        Ok(Self { programme, weights, surface_slots })
+    }
+
+    /// The optimum for the moment `moment` (N m), if it is found, and the iterations. `matrix` is D_A in N m/rad.
+    pub(super) fn solve(
+        &mut self,
+        moment: &Vector3<f64>,
+        matrix: &SurfaceMatrix,
+        middle: &Surfaces,
+        half: &Surfaces,
+    ) -> (Option<(Surfaces, Jets)>, u32) {
+        let rest = moment - matrix * middle;
+        let weight = self.weights.moment / MOMENT_SCALE;
+        for (j, slots) in self.surface_slots.iter().enumerate() {
+            let square = self.weights.surface[j] * half[j];
+            self.programme.cost[j] = square * half[j];
+            self.programme.linear_cost[1 + j] = square * middle[j];
+            for (i, &slot) in slots.iter().enumerate() {
+                self.programme.matrix[slot] = weight[i] * matrix[(i, j)] * half[j];
+            }
+        }
+        for i in 0..3 {
+            self.programme.right_side[BOX_ROWS + 1 + i] = weight[i] * rest[i];
+        }
+        let (solution, iterations) = self.programme.solve();
+        let found = solution.map(|solution| {
+            let x = Surfaces::from_column_slice(&solution[1..=SURFACES]);
+            let u = Jets::from_column_slice(&solution[1 + SURFACES..]);
+            (middle + half.component_mul(&x), u)
+        });
+        (found, iterations)
+    }
+}

@@ -1,0 +1,203 @@
+//! Control allocation: which deflections and which jets give the commanded moment. Wu et al. (2015), section 5, and the selector
+//! of Jia et al., section IV.
+
+mod cone;
+pub mod pwpf;
+mod settings;
+
+pub use settings::{JetCommand, Method, Settings};
+
+use crate::error::DesignError;
+use cone::{ConeProblem, Weights};
+use nalgebra::{Matrix3, SMatrix, Vector3};
+use pwpf::Modulator;
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+use vehicle::effectors::{Effectors, JETS, Jets, SURFACES, Surfaces};
+
+/// D_A of Wu 2015 (58), N m/rad.
+type SurfaceMatrix = SMatrix<f64, 3, SURFACES>;
+
+/// What is to be allocated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Command {
+    /// M_c, N m.
+    pub moment: Vector3<f64>,
+    /// Dynamic pressure, Pa.
+    pub dynamic_pressure: f64,
+}
+
+/// How an allocation came about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Status {
+    /// No allocation yet.
+    #[default]
+    None,
+    /// The optimum.
+    Optimal,
+    /// The solver did not succeed: the previous allocation, within the limits.
+    Fallback,
+}
+
+/// What the allocation reports.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// Origin of the allocation in force.
+    pub status: Status,
+    /// Iterations of the cone solver.
+    pub iterations: u32,
+    /// Wall-clock time of the last allocation, s. Not reproducible.
+    pub time: f64,
+    /// Allocations so far that did not succeed.
+    pub fallbacks: u32,
+}
+
+/// What the allocator carries from tick to tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Memory {
+    /// δ_A, rad.
+    pub surfaces: Surfaces,
+    /// δ_RCS of (60), before modulation: duty cycles.
+    pub duty: Jets,
+    /// Modulators of the jets.
+    pub modulators: [Modulator; JETS],
+    /// What goes to the jets: 0 or 1, or the duty cycle.
+    pub jets: Jets,
+    /// D δ of the last allocation, with the duty cycles of the jets, N m.
+    pub achieved: Vector3<f64>,
+    /// M_c − D δ, likewise.
+    pub residual: Vector3<f64>,
+    /// D δ with the jets as they are now, N m.
+    pub modulated: Vector3<f64>,
+    /// Outcome of the last allocation.
+    pub report: Report,
+    /// Moment of the surfaces of the last allocation, N m.
+    by_surfaces: Vector3<f64>,
+}
+
+/// The allocator: settings and solver. Everything that matters later is in [`Memory`].
+pub struct Allocator {
+    settings: Settings,
+    /// Least and greatest deflections, rad.
+    limits: (Surfaces, Surfaces),
+    /// Ticks per allocation.
+    ratio: u64,
+    problem: ConeProblem,
+    /// T of Jia et al. at the reference pressure, rad/(N m), if the surfaces can give any moment.
+    conversion: Option<SMatrix<f64, SURFACES, 3>>,
+}
+
+impl Allocator {
+    /// Checks the settings and sets the solver up.
+    ///
+    /// # Errors
+    /// Names the setting at fault.
+    pub fn new(settings: Settings) -> Result<Self, DesignError> {
+        let ratio = settings.ratio()?;
+        let limits = settings.limits();
+        let range = limits.1 - limits.0;
+        let weight = |range: f64| if range > 0.0 { settings.weight_surface / (range * range) } else { 0.0 };
+        let weights = Weights {
+            moment: settings.weight_moment,
+            jet: Jets::repeat(settings.weight_jet),
+            surface: range.map(weight),
+        };
+        let problem = ConeProblem::new(weights, &settings.effectors.jet_moments, settings.max_iterations)
+            .map_err(DesignError::Solver)?;
+        let conversion = conversion(&settings.effectors.effectiveness, &range);
+        Ok(Self { settings, limits, ratio, problem, conversion })
+    }
+
+    /// Time between ticks, s: the modulator's period, or that of the allocation if nothing is modulated.
+    pub fn period(&self) -> f64 {
+        match self.settings.jets {
+            JetCommand::Pwpf => self.settings.pwpf.period,
+            JetCommand::Duty => self.settings.period,
+        }
+    }
+
+    /// Ticks per allocation.
+    pub fn ratio(&self) -> u64 {
+        self.ratio
+    }
+
+    /// The tick with number `tick`. Every n-th one allocates; the jets switch at each.
+    pub fn update(&mut self, memory: &mut Memory, tick: u64, command: &Command) {
+        let modulated = self.settings.jets == JetCommand::Pwpf;
+        if modulated && tick > 0 {
+            for (state, &duty) in memory.modulators.iter_mut().zip(&memory.duty) {
+                *state = self.settings.pwpf.advance(*state, duty);
+            }
+        }
+        if tick.is_multiple_of(self.ratio) {
+            self.allocate(memory, command);
+        }
+        memory.jets = if modulated {
+            Jets::from_iterator(memory.modulators.iter().map(|state| f64::from(u8::from(state.on))))
+        } else {
+            memory.duty
+        };
+        memory.modulated = memory.by_surfaces + self.settings.effectors.moment_of_jets(&memory.jets);
+    }
+
+    fn allocate(&mut self, memory: &mut Memory, command: &Command) {
+        let begin = Instant::now();
+        let Command { moment, dynamic_pressure } = *command;
+        let matrix = self.settings.effectors.effectiveness_at(dynamic_pressure);
+        // Wu 2015, (59) for one period: the range, and what the rate leaves of it.
+        let (min, max) = &self.limits;
+        let change = self.settings.effectors.rate * self.settings.period;
+        let before = clamp(&memory.surfaces, min, max);
+        let mut low = (before - change).sup(min);
+        let mut high = (before + change).inf(max);
+        if self.settings.method == Method::Blending {
+            let wanted = self.select(command).unwrap_or(before);
+            low = clamp(&wanted, &low, &high);
+            high = low;
+        }
+        let finite = moment.iter().all(|value| value.is_finite()) && dynamic_pressure.is_finite();
+        let (found, iterations) = if finite {
+            self.problem.solve(&moment, &matrix, &((low + high) / 2.0), &((high - low) / 2.0))
+        } else {
+            (None, 0)
+        };
+        let (surfaces, duty) = found.unwrap_or((before, memory.duty));
+        memory.surfaces = clamp(&surfaces, &low, &high);
+        memory.duty = duty.map(|duty| duty.clamp(0.0, 1.0));
+        memory.by_surfaces = matrix * memory.surfaces;
+        memory.achieved = memory.by_surfaces + self.settings.effectors.moment_of_jets(&memory.duty);
+        memory.residual = moment - memory.achieved;
+        memory.report = Report {
+            status: if found.is_some() { Status::Optimal } else { Status::Fallback },
+            iterations,
+            time: begin.elapsed().as_secs_f64(),
+            fallbacks: memory.report.fallbacks + u32::from(found.is_none()),
+        };
+    }
+
+    /// Jia et al., section IV: the deflections asked of the surfaces, before their limits. Below the threshold, and where they
+    /// give no moment, they return to zero.
+    fn select(&self, command: &Command) -> Option<Surfaces> {
+        let Effectors { effectiveness, reference_pressure, .. } = &self.settings.effectors;
+        let above = command.dynamic_pressure >= self.settings.threshold && command.dynamic_pressure > 0.0;
+        let (Some(conversion), true) = (&self.conversion, above) else {
+            return Some(Surfaces::zeros());
+        };
+        // From the middle of the ranges, as the elevons' end at 0: the least departure from there that gives the moment.
+        let middle = (self.limits.0 + self.limits.1) / 2.0;
+        let rest = command.moment * (reference_pressure / command.dynamic_pressure) - effectiveness * middle;
+        let wanted = middle + conversion * rest;
+        wanted.iter().all(|value| value.is_finite()).then_some(wanted)
+    }
+}
+
+/// The least departure of the surfaces, each measured by its range, that gives a moment: W Dᵀ (D W Dᵀ)⁻¹ with W = range².
+fn conversion(matrix: &SurfaceMatrix, range: &Surfaces) -> Option<SMatrix<f64, SURFACES, 3>> {
+    let weighted = SMatrix::from_diagonal(&range.component_mul(range)) * matrix.transpose();
+    let inverse: Matrix3<f64> = (matrix * weighted).try_inverse()?;
+    Some(weighted * inverse)
+}
+
+fn clamp(values: &Surfaces, low: &Surfaces, high: &Surfaces) -> Surfaces {
+    values.sup(low).inf(high)
+}

@@ -1,0 +1,162 @@
+//! Settings of the allocator, and the published ones from `data/allocation.toml`.
+
+use super::pwpf::Pwpf;
+use crate::error::DesignError;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::effectors::{Effectors, SURFACES, Surfaces};
+
+/// How the moment is divided among the effectors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Method {
+    /// (60) of Wu 2015 over surfaces and jets together.
+    Optimal,
+    /// Jia et al., section IV: surfaces first, the remainder to the jets.
+    Blending,
+}
+
+/// What goes to the jets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum JetCommand {
+    /// On and off, by pulse-width pulse-frequency modulation.
+    Pwpf,
+    /// The duty cycle.
+    Duty,
+}
+
+/// Settings of the allocator. Units SI, angles rad.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// What surfaces and jets do and may do, as the allocator believes it.
+    pub effectors: Effectors,
+    /// Division among the effectors.
+    pub method: Method,
+    /// What goes to the jets.
+    pub jets: JetCommand,
+    /// Time between allocations, s.
+    pub period: f64,
+    /// W₁ of (60), 1/(N m).
+    pub weight_moment: Vector3<f64>,
+    /// Each entry of W₂.
+    pub weight_jet: f64,
+    /// Weight of ½ (deflection/range)², which (60) does not have.
+    pub weight_surface: f64,
+    /// Dynamic pressure from which blending uses the surfaces, Pa.
+    pub threshold: f64,
+    /// The modulator of the jets.
+    pub pwpf: Pwpf,
+    /// Iteration limit of the cone solver.
+    pub max_iterations: u32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    period: f64,
+    weight: Weight,
+    pwpf: Pwpf,
+    blending: Blending,
+    solver: Solver,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Weight {
+    moment: Vector3<f64>,
+    jet: f64,
+    surface: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Blending {
+    threshold: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Solver {
+    max_iterations: u32,
+}
+
+impl Settings {
+    /// Wu 2015, sections 5 and 6; blending and everything else that is ours as in `data/allocation.toml`.
+    pub fn published() -> Self {
+        let File { period, weight, pwpf, blending, solver } = embedded();
+        Self {
+            effectors: Effectors::published(),
+            method: Method::Optimal,
+            jets: JetCommand::Pwpf,
+            period,
+            weight_moment: weight.moment,
+            weight_jet: weight.jet,
+            weight_surface: weight.surface,
+            threshold: blending.threshold,
+            pwpf,
+            max_iterations: solver.max_iterations,
+        }
+    }
+
+    /// Least and greatest deflections, rad: (63) and (65).
+    pub(super) fn limits(&self) -> (Surfaces, Surfaces) {
+        let Effectors { min, max, allowed, .. } = &self.effectors;
+        let within = |limits: &Surfaces| Surfaces::from_fn(|i, _| if allowed[i] { limits[i] } else { 0.0 });
+        (within(min), within(max))
+    }
+
+    /// Ticks per allocation, once all settings are known to work.
+    ///
+    /// # Errors
+    /// Names the setting at fault.
+    pub(super) fn ratio(&self) -> Result<u64, DesignError> {
+        let positive = [
+            ("period", self.period),
+            ("dynamicPressure.reference", self.effectors.reference_pressure),
+            ("weight.moment[1]", self.weight_moment.x),
+            ("weight.moment[2]", self.weight_moment.y),
+            ("weight.moment[3]", self.weight_moment.z),
+        ];
+        for (name, value) in positive {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(DesignError::NotPositive { name, value });
+            }
+        }
+        let not_negative = [
+            ("weight.jet", self.weight_jet),
+            ("weight.surface", self.weight_surface),
+            ("threshold.dynamicPressure", self.threshold),
+        ];
+        for (name, value) in not_negative {
+            if !(0.0..f64::INFINITY).contains(&value) {
+                return Err(DesignError::OutOfRange { name, value, low: 0.0, high: f64::INFINITY });
+            }
+        }
+        let Effectors { effectiveness, jet_moments, min, max, rate, .. } = &self.effectors;
+        if let Some(&value) = effectiveness.iter().chain(jet_moments).find(|value| !value.is_finite()) {
+            let (name, low, high) = ("effectiveness", f64::NEG_INFINITY, f64::INFINITY);
+            return Err(DesignError::OutOfRange { name, value, low, high });
+        }
+        for i in 0..SURFACES {
+            let (min, max, rate) = (min[i], max[i], rate[i]);
+            let holds_zero = min <= 0.0 && 0.0 <= max && min.is_finite() && max.is_finite();
+            if !(holds_zero && (0.0..f64::INFINITY).contains(&rate)) {
+                return Err(DesignError::Surface { index: i + 1, min, max, rate });
+            }
+        }
+        if self.jets == JetCommand::Duty {
+            return Ok(1);
+        }
+        self.pwpf.check()?;
+        let (period, pwpf) = (self.period, self.pwpf.period);
+        let ratio = (period / pwpf).round();
+        if ratio < 1.0 || (ratio * pwpf - period).abs() > 1e-9 * period {
+            return Err(DesignError::Modulation { period, pwpf });
+        }
+        Ok(ratio as u64)
+    }
+}
+
+fn embedded() -> File {
+    // Cannot fail: every test that uses the published settings reads it.
+    toml::from_str(include_str!("../../data/allocation.toml")).unwrap_or_else(|error| panic!("{error}"))
+}

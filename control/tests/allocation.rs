@@ -1,0 +1,241 @@
+//! Control allocation against the limits and the optimum of Wu et al. (2015) and the selector of Jia et al.
+
+use control::allocation::pwpf::Modulator;
+use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Settings, Status};
+use control::error::DesignError;
+use nalgebra::Vector3;
+use vehicle::effectors::{Effectors, SURFACES};
+
+/// At this pressure the effectiveness is as printed, Pa.
+const PRESSURE: f64 = 2859.0;
+const METHODS: [Method; 2] = [Method::Optimal, Method::Blending];
+
+fn settings(method: Method, jets: JetCommand) -> Settings {
+    Settings { method, jets, ..Settings::published() }
+}
+
+fn allocator(method: Method) -> Allocator {
+    Allocator::new(settings(method, JetCommand::Duty)).unwrap()
+}
+
+fn command(moment: [f64; 3], dynamic_pressure: f64) -> Command {
+    Command { moment: Vector3::from(moment), dynamic_pressure }
+}
+
+/// The memory after so many samples of a constant command.
+fn settled(allocator: &mut Allocator, samples: u64, command: &Command) -> Memory {
+    let mut memory = Memory::default();
+    for tick in 0..samples {
+        allocator.update(&mut memory, tick, command);
+        assert_eq!(memory.report.status, Status::Optimal, "{tick}");
+    }
+    memory
+}
+
+/// Uniform in 0..1, the same in every run (splitmix64).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// (59) with the numbers of (63), and (65), in degrees.
+fn assert_within_limits(before: &Memory, after: &Memory, what: &str) {
+    let min = [-25.0, -25.0, -25.0, -25.0, -10.0, -10.0, 0.0, 0.0];
+    let max = [0.0, 0.0, 0.0, 0.0, 30.0, 30.0, 0.0, 0.0];
+    for i in 0..SURFACES {
+        let (old, new) = (before.surfaces[i].to_degrees(), after.surfaces[i].to_degrees());
+        // Rounding of degrees alone.
+        assert!(new >= min[i] - 1e-13 && new <= max[i] + 1e-13, "{what}: surface {i} at {new} deg");
+        assert!((new - old).abs() <= 10.0 * 0.01 + 1e-13, "{what}: surface {i} from {old} to {new} deg");
+    }
+    assert!(after.duty.iter().all(|duty| (0.0..=1.0).contains(duty)), "{what}");
+    assert_eq!(after.surfaces.rows(6, 2).amax(), 0.0, "{what}: rudders");
+}
+
+#[test]
+fn published_limits_hold_at_every_sample_of_200_random_cases() {
+    let mut random = Random(1);
+    let mut symmetric = |size: f64| size * (2.0 * random.next() - 1.0);
+    for case in 0..200 {
+        for method in METHODS {
+            let mut allocator = allocator(method);
+            let mut memory = Memory::default();
+            let size = 10f64.powf(5.0 + symmetric(1.5));
+            let mut command = command([0.0; 3], 1500.0 + symmetric(1500.0));
+            for tick in 0..50 {
+                if tick % 10 == 0 {
+                    command.moment = Vector3::from_fn(|_, _| symmetric(size));
+                }
+                let before = memory;
+                allocator.update(&mut memory, tick, &command);
+                let what = format!("case {case}, {method:?}, sample {tick}");
+                assert_eq!(memory.report.status, Status::Optimal, "{what}");
+                assert_within_limits(&before, &memory, &what);
+                let matrix = Effectors::published();
+                let achieved = matrix.moment_of_surfaces(&memory.surfaces, command.dynamic_pressure)
+                    + matrix.moment_of_jets(&memory.duty);
+                assert!((achieved - memory.achieved).norm() <= 1e-9 * size, "{what}");
+                assert!((command.moment - achieved - memory.residual).norm() <= 1e-9 * size, "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn oracle_duty_cycles_of_the_modulator() {
+    // T_on = T_m ln[(u_on + K_m (1 − r))/(u_off + K_m (1 − r))], T_off = T_m ln[(K_m r − u_off)/(K_m r − u_on)]
+    let pwpf = Settings::published().pwpf;
+    let duty_cycle = |duty: f64| {
+        let mut state = Modulator::default();
+        let mut fired = 0;
+        // A whole number of seconds after the first pulse.
+        for step in 0..101_000 {
+            state = pwpf.advance(state, duty);
+            fired += i32::from(state.on && step >= 1000);
+        }
+        f64::from(fired) / 1e5
+    };
+    let [gain, time, on, off] = [pwpf.gain, pwpf.time_constant, pwpf.on, pwpf.off];
+    for (duty, rounded) in [(0.2, 0.13), (0.5, 0.43), (0.8, 0.73), (1.0, 0.94)] {
+        let pulse = time * ((on + gain * (1.0 - duty)) / (off + gain * (1.0 - duty))).ln();
+        let pause = time * ((gain * duty - off) / (gain * duty - on)).ln();
+        let exact = pulse / (pulse + pause);
+        assert!((exact - rounded).abs() <= 0.005, "{duty}: {exact}");
+        // Pulse and pause each end up to one look of 1 ms late.
+        let found = duty_cycle(duty);
+        let slack = pwpf.period / (pulse + pause);
+        assert!((found - exact).abs() <= slack, "{duty}: {found} instead of {exact}");
+        assert!((found - rounded).abs() <= 0.006, "{duty}: {found} instead of {rounded}");
+    }
+    // The dead band u_on/K_m
+    assert_eq!(duty_cycle(0.0999), 0.0);
+    assert!(duty_cycle(0.1001) > 0.0);
+}
+
+#[test]
+fn surfaces_alone_give_what_they_can_once_the_rate_let_them() {
+    let wanted = command([1e4, -1e4, -3e3], PRESSURE);
+    let mut optimal = allocator(Method::Optimal);
+    let memory = settled(&mut optimal, 1, &wanted);
+    assert!(memory.duty.sum() > 0.1, "the rate leaves most to the jets at first");
+    assert!(memory.residual.norm() < 1e-3 && memory.surfaces.amax() <= 0.1f64.to_radians());
+    let memory = settled(&mut optimal, 300, &wanted);
+    assert!(memory.duty.sum() < 1e-6 && memory.residual.norm() < 1e-3, "{memory:?}");
+}
+
+#[test]
+fn blending_uses_surfaces_first_and_above_the_threshold_only() {
+    let mut blending = allocator(Method::Blending);
+    let threshold = Settings::published().threshold;
+    let wanted = [1e4, -1e4, -3e3];
+    let memory = settled(&mut blending, 300, &command(wanted, threshold - 1.0));
+    assert_eq!(memory.surfaces.amax(), 0.0);
+    assert!(memory.duty.sum() > 0.5 && memory.residual.norm() < 1e-3);
+
+    let memory = settled(&mut blending, 300, &command(wanted, PRESSURE));
+    assert!(memory.duty.sum() < 1e-6 && memory.residual.norm() < 1e-3, "{memory:?}");
+
+    // More than the position limits allow: the remainder goes to the jets.
+    let wanted = command([0.0, -3e5, 0.0], PRESSURE);
+    let memory = settled(&mut blending, 600, &wanted);
+    let effectors = Effectors::published();
+    assert!((memory.surfaces[4] - effectors.max[4]).abs() < 1e-12);
+    let rest = wanted.moment - effectors.moment_of_surfaces(&memory.surfaces, PRESSURE);
+    assert!((effectors.moment_of_jets(&memory.duty) - (rest - memory.residual)).norm() < 1e-6);
+    assert!(memory.duty.sum() > 1.0);
+}
+
+#[test]
+fn without_an_optimum_the_previous_allocation_is_kept_within_the_limits() {
+    for method in METHODS {
+        let mut memory = settled(&mut allocator(method), 40, &command([8e4, -1e5, -2e4], PRESSURE));
+        let before = memory;
+        let mut stopped =
+            Allocator::new(Settings { max_iterations: 1, ..settings(method, JetCommand::Duty) }).unwrap();
+        let wanted = command([-8e4, 1e5, 2e4], PRESSURE);
+        stopped.update(&mut memory, 0, &wanted);
+        assert_eq!(memory.report.status, Status::Fallback);
+        assert_eq!((memory.report.fallbacks, memory.duty), (1, before.duty));
+        assert_within_limits(&before, &memory, "stopped");
+        if method == Method::Optimal {
+            assert_eq!(memory.surfaces, before.surfaces);
+        }
+        for bad in [[f64::NAN, 0.0, 0.0], [f64::INFINITY, 0.0, 0.0], [0.0, 1e300, 0.0]] {
+            let before = memory;
+            allocator(method).update(&mut memory, 0, &command(bad, PRESSURE));
+            assert_within_limits(&before, &memory, "bad");
+        }
+        let before = memory;
+        allocator(method).update(&mut memory, 0, &command([0.0; 3], f64::NAN));
+        assert_within_limits(&before, &memory, "bad");
+        allocator(method).update(&mut memory, 1, &wanted);
+        assert_eq!(memory.report.status, Status::Optimal, "it recovers");
+    }
+}
+
+#[test]
+fn jets_switch_between_allocations() {
+    let mut allocator = Allocator::new(settings(Method::Optimal, JetCommand::Pwpf)).unwrap();
+    assert_eq!((allocator.period(), allocator.ratio()), (0.001, 10));
+    let mut memory = Memory::default();
+    let wanted = command([0.0, 0.0, 2e4], 0.0);
+    let mut mean = Vector3::zeros();
+    let mut switched_between = 0;
+    for tick in 0..20_000 {
+        let before = memory;
+        allocator.update(&mut memory, tick, &wanted);
+        assert!(memory.jets.iter().all(|&jet| jet == 0.0 || jet == 1.0));
+        switched_between += u32::from(memory.jets != before.jets && tick % 10 != 0);
+        mean += memory.modulated / 20_000.0;
+    }
+    assert!(switched_between > 100);
+    // What the dead band of the modulator takes away: it fires less than the duty cycle that is asked of it.
+    assert!(mean.z > 0.5 * wanted.moment.z && mean.z < wanted.moment.z, "{mean}");
+}
+
+#[test]
+fn runs_repeat_bit_for_bit() {
+    let run = || {
+        let mut allocator = Allocator::new(Settings::published()).unwrap();
+        let mut memory = Memory::default();
+        for tick in 0..500 {
+            let t = tick as f64 * 1e-3;
+            allocator.update(&mut memory, tick, &command([1e5 * t.sin(), 2e5 * t.cos(), -3e4 * t], PRESSURE));
+        }
+        memory.report.time = 0.0;
+        memory
+    };
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused_by_name() {
+    type Change<'a> = &'a dyn Fn(&mut Settings);
+    let refusal = |change: Change| {
+        let mut settings = Settings::published();
+        change(&mut settings);
+        Allocator::new(settings).err().map_or_else(String::new, |error: DesignError| error.to_string())
+    };
+    let cases: [(Change, &str); 9] = [
+        (&|s| s.period = 0.0, "period"),
+        (&|s| s.period = 0.0105, "pwpf.period"),
+        (&|s| s.weight_moment.y = 0.0, "weight.moment[2]"),
+        (&|s| s.weight_jet = -1.0, "weight.jet"),
+        (&|s| s.weight_surface = f64::NAN, "weight.surface"),
+        (&|s| s.pwpf.off = 0.45, "pwpf.off"),
+        (&|s| s.pwpf.on = 4.5, "pwpf.on"),
+        (&|s| s.effectors.min[2] = 0.1, "surface 3"),
+        (&|s| s.effectors.jet_moments[(0, 0)] = f64::NAN, "effectiveness"),
+    ];
+    for (change, name) in cases {
+        let text = refusal(change);
+        assert!(text.contains(name), "{name}: {text}");
+    }
+}
