@@ -13,7 +13,7 @@ from fmi import Fmu
 ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
 EXPERIMENTS = ROOT / "orchestrator" / "experiments" / "crmpc-2022"
-NAMES = ["ReentryPlant", "CRMPC", "DLMPC", "LQR"]
+NAMES = ["ReentryPlant", "CRMPC", "DLMPC", "LQR", "ControlAllocator"]
 
 
 def program(name: str) -> Path:

@@ -10,7 +10,7 @@ from conftest import NAMES
 from fmi import ANGLES, RATES, Unit
 
 STEP = 0.04
-INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "DLMPC": "rate.q", "LQR": "attitude.beta"}
+INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "DLMPC": "rate.q", "LQR": "attitude.beta", "ControlAllocator": "moment.y"}
 
 
 def drive(unit: Unit, ticks: int = 12) -> list:
@@ -84,6 +84,8 @@ def test_value_references_that_do_not_exist(unit):
         ("CRMPC", "limit.rate", math.nan),
         ("DLMPC", "slidingMode.rho", 1.5),
         ("LQR", "limit.moment", -1.0),
+        ("ControlAllocator", "limit.surfaceMax[3]", -0.1),
+        ("ControlAllocator", "dynamicPressure", -1.0),
         ("LQR", "reference.profile", 77),
     ],
 )
@@ -109,6 +111,9 @@ def test_parameters_out_of_range_are_refused_when_set(fmu, name, variable, value
         ("LQR", {"reference.profile": "table", "reference.file": "nowhere.csv"}, ["nowhere.csv"]),
         ("CRMPC", {"inertia.Ixz": 1e6}, ["inertia.Ixz"]),
         ("ReentryPlant", {"inertia.Iyy": 1e3}, ["inertia.Iyy"]),
+        ("ControlAllocator", {"period": 0.0105}, ["period", "pwpf.period"]),
+        ("ControlAllocator", {"pwpf.on": 5.0}, ["pwpf.on"]),
+        ("ControlAllocator", {"weight.moment[2]": 0.0}, ["weight.moment[2]"]),
     ],
 )
 def test_designs_that_cannot_work_are_refused_at_initialization(fmu, name, settings, words):
@@ -165,9 +170,10 @@ def test_calls_in_the_wrong_state(unit):
 
 
 def test_parameters_are_fixed_once_the_simulation_runs(unit):
+    name = "weight.jet" if unit.fmu.name == "ControlAllocator" else "inertia.Ixx"
     unit.start()
-    with refuses(unit, "inertia.Ixx"):
-        unit.set({"inertia.Ixx": 6e5})
+    with refuses(unit, name):
+        unit.set({name: 6e5})
 
 
 @pytest.mark.parametrize("time, step", [(1.0, STEP), (0.0, -STEP), (0.0, math.nan), (math.nan, STEP), (0.0, math.inf)])

@@ -12,7 +12,7 @@ from fmi import ANGLES, MOMENT, RATES, Loop, Unit
 
 STEP = 0.04
 PLANT = {"inertia.scale": 1.05, "disturbance.kind": "white", "disturbance.seed": 3}
-SETTINGS = {"ReentryPlant": PLANT, "CRMPC": {"constraints": "robust"}, "DLMPC": {}, "LQR": {}}
+SETTINGS = {"ReentryPlant": PLANT, "CRMPC": {"constraints": "robust"}, "DLMPC": {}, "LQR": {}, "ControlAllocator": {}}
 
 
 def course(tick: int) -> dict:
@@ -22,7 +22,7 @@ def course(tick: int) -> dict:
 
 
 def inputs(name: str, tick: int) -> dict:
-    if name != "ReentryPlant":
+    if name not in ("ReentryPlant", "ControlAllocator"):
         return course(tick)
     return dict(zip(MOMENT, [1e4 * (-1) ** (tick // 10), 2e3 * tick, -3e4 + 1e3 * tick]))
 
@@ -91,6 +91,7 @@ def test_interleaved_instances_do_not_disturb_each_other(fmu, name):
         "CRMPC": {"constraints": "paper"},
         "DLMPC": {"slidingMode.p": 1.0},
         "LQR": {"weight.P[1]": 20.0},
+        "ControlAllocator": {"method": "blending"},
     }[name]
     alone = []
     for settings in (SETTINGS[name], other_settings):

@@ -1,6 +1,7 @@
 //! The FMI 2.0 units of the controllers, for co-simulation: the crate `control` behind tables of variables. All units have the
 //! same inputs and outputs, so that one can take another's place without rewiring.
 
+mod allocator;
 mod crmpc;
 mod dlmpc;
 mod law;
@@ -12,6 +13,7 @@ mod table;
 mod tests;
 mod unit;
 
+pub use allocator::ControlAllocator;
 pub use unit::Unit;
 
 /// `CRMPC`: centralised robust model predictive control.
@@ -21,4 +23,4 @@ pub type Dlmpc = Unit<dlmpc::DlmpcLaw>;
 /// `LQR`: linear-quadratic regulator.
 pub type Lqr = Unit<lqr::LqrLaw>;
 
-fmi2_export::export_fmus!(Crmpc, Dlmpc, Lqr);
+fmi2_export::export_fmus!(Crmpc, Dlmpc, Lqr, ControlAllocator);

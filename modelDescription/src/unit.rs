@@ -71,3 +71,11 @@ pub fn gain_angle() -> Unit {
 pub fn gain_rate() -> Unit {
     unit("1/s", [0, 0, -1, 0, 0], None)
 }
+/// Pressure.
+pub fn pressure() -> Unit {
+    unit("Pa", [1, -1, -2, 0, 0], None)
+}
+/// Moment of force by angle.
+pub fn moment_by_angle() -> Unit {
+    unit("N.m/rad", [1, 2, -2, 0, -1], None)
+}
