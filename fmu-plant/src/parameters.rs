@@ -3,8 +3,12 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::Scenario;
+use vehicle::actuators::{self, JetMode};
+use vehicle::atmosphere::Flight;
 use vehicle::disturbance::{Disturbance, Kind, MomentWave, SineMoment};
 use vehicle::dynamics::Inertia;
+use vehicle::effectors::Effectors;
+use vehicle::error::Error;
 use vehicle::plant::{Config, state};
 
 /// Longest integration step by default, s.
@@ -31,6 +35,12 @@ pub(crate) const KINDS: [(Kind, &str, &str); 7] = [
     ),
 ];
 
+/// How the control moment comes about: the items in the order of their enumeration values 1, 2, with name and description.
+pub(crate) const ACTUATIONS: [(&str, &str); 2] = [
+    ("moment", "the input moment acts as it comes"),
+    ("surfacesAndJets", "the inputs surface and jet command eight aerodynamic surfaces and ten jets"),
+];
+
 /// What a user sets before the simulation, named as in the table.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Parameters {
@@ -50,12 +60,20 @@ pub(crate) struct Parameters {
     pub(crate) start: f64,
     pub(crate) end: f64,
     pub(crate) step: f64,
+    /// Number of the item of [`ACTUATIONS`], from 1.
+    pub(crate) actuation: i32,
+    pub(crate) flight: Flight,
+    pub(crate) density_scale: f64,
+    pub(crate) aerodynamics_scale: f64,
+    pub(crate) jet_duty: bool,
+    pub(crate) jet_symmetric: bool,
 }
 
 impl Default for Parameters {
     fn default() -> Self {
         let scenario = Scenario::crmpc2022();
-        let sine = Scenario::tvsmc2015().disturbance.sine;
+        let tvsmc = Scenario::tvsmc2015();
+        let sine = tvsmc.disturbance.sine;
         let Disturbance { kind, bound, period, seed, direction, square_period, start, end, .. } =
             scenario.disturbance;
         let number = (1..).zip(KINDS).find(|(_, item)| item.0 == kind).map_or(1, |(number, _)| number);
@@ -76,16 +94,47 @@ impl Default for Parameters {
             start,
             end: end.min(NEVER),
             step: STEP,
+            actuation: 1,
+            flight: tvsmc.flight.unwrap_or(Flight { altitude: 0.0, mach: 0.0 }),
+            density_scale: 1.0,
+            aerodynamics_scale: 1.0,
+            jet_duty: false,
+            jet_symmetric: false,
         }
     }
 }
 
 impl Parameters {
+    /// The dynamic pressure of the flight, Pa.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of range.
+    pub(crate) fn dynamic_pressure(&self) -> Result<f64, Error> {
+        Ok(self.flight.dynamic_pressure()? * self.density_scale)
+    }
+
+    /// The actuators, if the control moment is not an input.
+    fn actuators(&self) -> Result<Option<actuators::Config>, Error> {
+        if self.actuation == 1 {
+            return Ok(None);
+        }
+        let effectors = Effectors::published();
+        Ok(Some(actuators::Config {
+            effectors: if self.jet_symmetric { effectors.symmetric() } else { effectors },
+            jet_mode: if self.jet_duty { JetMode::Duty } else { JetMode::OnOff },
+            dynamic_pressure: self.dynamic_pressure()?,
+            aerodynamics_scale: self.aerodynamics_scale,
+        }))
+    }
+
     /// The plant they describe.
-    pub(crate) fn config(&self) -> Config {
+    ///
+    /// # Errors
+    /// Names the parameter that is out of range.
+    pub(crate) fn config(&self) -> Result<Config, Error> {
         let kind =
             usize::try_from(self.kind - 1).ok().and_then(|i| KINDS.get(i)).map_or(Kind::None, |item| item.0);
-        Config {
+        Ok(Config {
             inertia: self.inertia,
             inertia_scale: self.inertia_scale,
             initial: state(&self.initial_angles, &self.initial_rates),
@@ -100,8 +149,8 @@ impl Parameters {
                 start: self.start,
                 end: self.end,
             },
-            actuators: None,
+            actuators: self.actuators()?,
             step: self.step,
-        }
+        })
     }
 }

@@ -5,6 +5,7 @@ use crate::table::{self, Known, Unknown};
 use fmi2_export::{Context, Description, EventInfo, Failure, Inputs, Model};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use vehicle::effectors::Surfaces;
 use vehicle::plant::{Held, Input, Plant, State, check, partial_derivatives};
 
 /// The re-entry vehicle.
@@ -15,7 +16,9 @@ pub struct ReentryPlant {
     pub(crate) output: Output,
     /// From initialization on.
     plant: Option<Plant>,
-    /// Model exchange: the disturbance changes at events only, not when time passes a tick.
+    /// Of the flight, Pa.
+    dynamic_pressure: f64,
+    /// Model exchange: what is held changes at events only, not when time passes a tick or an input is set.
     event_driven: bool,
 }
 
@@ -29,6 +32,8 @@ pub(crate) struct Output {
     pub(crate) applied_moment: Vector3<f64>,
     pub(crate) delta: Vector3<f64>,
     pub(crate) disturbance_moment: Vector3<f64>,
+    pub(crate) deflections: Surfaces,
+    pub(crate) dynamic_pressure: f64,
 }
 
 impl ReentryPlant {
@@ -36,7 +41,7 @@ impl ReentryPlant {
         self.plant.as_ref().ok_or_else(|| Failure::Error("the plant is not initialized".into()))
     }
 
-    /// What is in force at `time` (s).
+    /// What is in force at `time` (s): disturbance and commands.
     fn held(&self, plant: &Plant, time: f64) -> Held {
         let held = if self.event_driven { plant.held() } else { None };
         held.unwrap_or_else(|| plant.in_force(time, &self.input))
@@ -61,13 +66,16 @@ impl Model for ReentryPlant {
             input: Input::default(),
             output: Output::default(),
             plant: None,
+            dynamic_pressure: 0.0,
             event_driven: false,
         }
     }
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
-        let plant = Plant::new(&self.parameters.config(), context.start_time);
-        self.plant = Some(plant.map_err(|error| Failure::Error(error.to_string()))?);
+        let failed = |error: vehicle::Error| Failure::Error(error.to_string());
+        self.dynamic_pressure = self.parameters.dynamic_pressure().map_err(failed)?;
+        let config = self.parameters.config().map_err(failed)?;
+        self.plant = Some(Plant::new(&config, context.start_time).map_err(failed)?);
         self.event_driven = false;
         Ok(())
     }
@@ -78,7 +86,9 @@ impl Model for ReentryPlant {
         let held = self.held(plant, time);
         let derivative = plant.derivative(time, &self.input, &held);
         if !derivative.iter().all(|value| value.is_finite()) {
-            return Err(Failure::Error(format!("an input moment is not a finite number at t = {time} s")));
+            return Err(Failure::Error(format!(
+                "an input moment or command is not a finite number at t = {time} s"
+            )));
         }
         self.output = Output {
             angles: plant.angles(),
@@ -88,6 +98,8 @@ impl Model for ReentryPlant {
             applied_moment: plant.applied_moment(time, &self.input, &held),
             delta: held.delta(),
             disturbance_moment: plant.disturbance_moment(time, &self.input, &held),
+            deflections: plant.deflections(time, &held),
+            dynamic_pressure: self.dynamic_pressure,
         };
         Ok(())
     }
@@ -134,13 +146,17 @@ impl Model for ReentryPlant {
         self.check(&plant.state, time)?;
         let delta = self.held(plant, time).delta();
         let (by_state, by_moment) = partial_derivatives(plant.body(), &plant.state, &delta);
+        let (applied_by_moment, applied_by_jet) = plant.applied_moment_by_inputs(&self.input);
         Ok(match (Unknown::of(unknown), Known::of(known)) {
             (Some(Unknown::Derivative(i)), Some(Known::State(j))) => by_state[(i, j)],
-            (Some(Unknown::Derivative(i)), Some(Known::Moment(j) | Known::DisturbanceMoment(j))) => {
-                by_moment[(i, j)]
+            (Some(Unknown::Derivative(i)), Some(Known::DisturbanceMoment(j))) => by_moment[(i, j)],
+            (Some(Unknown::Derivative(i)), Some(Known::Moment(j))) => (by_moment * applied_by_moment)[(i, j)],
+            (Some(Unknown::Derivative(i)), Some(Known::Jet(j))) => {
+                by_moment.row(i).dot(&applied_by_jet.column(j).transpose())
             }
+            (Some(Unknown::AppliedMoment(i)), Some(Known::Moment(j))) => applied_by_moment[(i, j)],
+            (Some(Unknown::AppliedMoment(i)), Some(Known::Jet(j))) => applied_by_jet[(i, j)],
             (Some(Unknown::State(i)), Some(Known::State(j)))
-            | (Some(Unknown::AppliedMoment(i)), Some(Known::Moment(j)))
             | (Some(Unknown::DisturbanceMoment(i)), Some(Known::DisturbanceMoment(j)))
                 if i == j =>
             {

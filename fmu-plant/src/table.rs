@@ -1,14 +1,16 @@
-//! The one table of the unit's variables. The first 27 positions are those of outputs and inputs, see [`Unknown`] and
+//! The one table of the unit's variables. The first 54 positions are those of outputs and inputs, see [`Unknown`] and
 //! [`Known`]; the parameters follow.
 
-use crate::parameters::KINDS;
+use crate::parameters::{ACTUATIONS, KINDS};
 use crate::plant::ReentryPlant;
 use fmi2_export::table::{Description, Real, Table, discrete_output, input, output, parameter};
 use model_description::DefaultExperiment;
-use model_description::unit;
+use model_description::unit::{self, Unit};
 use model_description::variable::EnumerationType;
 use nalgebra::Vector3;
 use vehicle::Scenario;
+use vehicle::atmosphere;
+use vehicle::effectors::{Effectors, JETS};
 use vehicle::plant::BETA_LIMIT;
 
 const ANGLES: [(&str, &str); 3] =
@@ -24,6 +26,8 @@ pub(crate) enum Unknown {
     AppliedMoment(usize),
     Delta,
     DisturbanceMoment(usize),
+    Deflection,
+    DynamicPressure,
 }
 
 impl Unknown {
@@ -34,6 +38,8 @@ impl Unknown {
             12..15 => Self::AppliedMoment(position - 12),
             15..18 => Self::Delta,
             18..21 => Self::DisturbanceMoment(position - 18),
+            27..35 => Self::Deflection,
+            35 => Self::DynamicPressure,
             _ => return None,
         })
     }
@@ -45,6 +51,8 @@ pub(crate) enum Known {
     State(usize),
     Moment(usize),
     DisturbanceMoment(usize),
+    Surface,
+    Jet(usize),
 }
 
 impl Known {
@@ -53,6 +61,8 @@ impl Known {
             0..6 => Self::State(position),
             21..24 => Self::Moment(position - 21),
             24..27 => Self::DisturbanceMoment(position - 24),
+            36..44 => Self::Surface,
+            44..54 => Self::Jet(position - 44),
             _ => return None,
         })
     }
@@ -61,10 +71,11 @@ impl Known {
 /// The unit as FMI sees it.
 pub(crate) fn description() -> Description<ReentryPlant> {
     let scenario = Scenario::crmpc2022();
-    let table = disturbance(initial(inertia(inputs(outputs(Table::new())))));
+    let table = disturbance(initial(inertia(commands(actuated(inputs(outputs(Table::new())))))));
     let step = parameter("integrator.step", "Longest step of the Runge-Kutta integration in co-simulation");
     let table = table
         .real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| &mut m.parameters.step);
+    let table = actuation(table);
     Description {
         name: "ReentryPlant",
         description: "Attitude motion of a re-entry vehicle under moments and bounded disturbances",
@@ -101,6 +112,8 @@ fn outputs(table: Plant) -> Plant {
     let motion = ["attitude.alpha", "attitude.beta", "rate.p", "rate.q", "rate.r"];
     let moment = ["moment.x", "moment.y", "moment.z"];
     let external = ["disturbanceMoment.x", "disturbanceMoment.y", "disturbanceMoment.z"];
+    let jets: Vec<String> = (1..=JETS).map(|j| format!("jet[{j}]")).collect();
+    let jets: Vec<&str> = jets.iter().map(String::as_str).collect();
     let angle = |axis: &str, meaning: &str| {
         output(&format!("attitude.{axis}"), &sentence(meaning)).real().unit(unit::angle()).nominal(0.1)
     };
@@ -118,7 +131,8 @@ fn outputs(table: Plant) -> Plant {
     };
     let acceleration = |axis: &str, meaning: &str| {
         let common = output(&format!("angularAcceleration.{axis}"), &format!("Body {meaning} acceleration"));
-        let real = common.depends_on(motion).depends_on(moment).depends_on(external).real();
+        let real =
+            common.depends_on(motion).depends_on(moment).depends_on(external).depends_on(jets.clone()).real();
         real.unit(unit::angular_acceleration()).nominal(0.05).derivative_of(&format!("rate.{axis}"))
     };
     let applied = |axis: &str, meaning: &str| {
@@ -126,13 +140,15 @@ fn outputs(table: Plant) -> Plant {
             &format!("appliedMoment.{axis}"),
             &format!("Control {meaning} moment that acts on the vehicle"),
         );
-        common.depends_on([format!("moment.{axis}").as_str()]).real().unit(unit::moment()).nominal(1e5)
+        let common = common.depends_on([format!("moment.{axis}").as_str()]).depends_on(jets.clone());
+        common.real().unit(unit::moment()).nominal(1e5)
     };
     let delta = |axis: &str, meaning: &str| {
         let text = format!("Disturbance in force on the second derivative of the {meaning}");
         let common = discrete_output(&format!("disturbance.delta.{axis}"), &text)
             .depends_on(motion)
-            .depends_on(moment);
+            .depends_on(moment)
+            .depends_on(jets.clone());
         common.real().unit(unit::angular_acceleration()).nominal(0.03)
     };
     let disturbing = |axis: &str, meaning: &str| {
@@ -164,6 +180,69 @@ fn inputs(table: Plant) -> Plant {
     };
     let table = vector(table, AXES, control, |m| &mut m.input.moment);
     vector(table, AXES, external, |m| &mut m.input.disturbance_moment)
+}
+
+/// What the surfaces do, and the flight condition.
+fn actuated(mut table: Plant) -> Plant {
+    for (i, name) in Effectors::published().names.iter().enumerate() {
+        // At an instant a deflection is a function of time alone: commands change only where it goes.
+        let common = output(&format!("deflection[{}]", i + 1), &format!("Deflection of the {name}"));
+        let real = common.real().unit(unit::angle()).nominal(0.1);
+        table = table.real(real, move |m| &mut m.output.deflections[i]);
+    }
+    let pressure = output("flight.dynamicPressure", "Dynamic pressure of the flight, with density.scale");
+    table.real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| &mut m.output.dynamic_pressure)
+}
+
+fn commands(mut table: Plant) -> Plant {
+    for (i, name) in Effectors::published().names.iter().enumerate() {
+        let text = format!("Commanded deflection of the {name}, trailing edge down positive");
+        let real = input(&format!("surface[{}]", i + 1), &text).real().unit(unit::angle()).nominal(0.1);
+        table = table.real(real, move |m| &mut m.input.command.surfaces[i]);
+    }
+    for j in 0..JETS {
+        let text = format!("Command to jet {}: 0 off, 1 full thrust", j + 1);
+        let real = input(&format!("jet[{}]", j + 1), &text).real().nominal(1.0);
+        table = table.real(real, move |m| &mut m.input.command.jets[j]);
+    }
+    table
+}
+
+fn actuation(table: Plant) -> Plant {
+    let items = EnumerationType {
+        name: "Actuation".into(),
+        description: "How the control moment comes about".into(),
+        items: ACTUATIONS.iter().map(|(name, text)| ((*name).into(), (*text).into())).collect(),
+    };
+    let altitude = parameter("flight.altitude", "Geometric altitude; gives air density and speed of sound");
+    let mach = parameter("flight.mach", "Mach number");
+    let density =
+        parameter("density.scale", "Factor from the standard atmosphere's density: 0.9 is 10 % less");
+    let aerodynamics = parameter(
+        "aerodynamics.scale",
+        "Factor from the nominal to the vehicle's surface effectiveness: 0.9 is 10 % less",
+    );
+    let duty = parameter("jets.duty", "Jets give any thrust between 0 and 1 instead of switching on at 0.5");
+    let symmetric = parameter(
+        "jets.symmetric",
+        "Jet 4 as the mirror image of jet 8 instead of the printed column, which breaks the symmetry",
+    );
+    table
+        .enumeration(parameter("actuation", "How the control moment comes about"), items, |m| {
+            &mut m.parameters.actuation
+        })
+        .real(altitude.real().unit(metre()).min(0.0).max(atmosphere::TOP).nominal(1e4), |m| {
+            &mut m.parameters.flight.altitude
+        })
+        .real(mach.real().min(0.0).max(100.0).nominal(10.0), |m| &mut m.parameters.flight.mach)
+        .real(density.real().min(0.0).max(10.0).nominal(1.0), |m| &mut m.parameters.density_scale)
+        .real(aerodynamics.real().min(0.0).max(10.0).nominal(1.0), |m| &mut m.parameters.aerodynamics_scale)
+        .boolean(duty, |m| &mut m.parameters.jet_duty)
+        .boolean(symmetric, |m| &mut m.parameters.jet_symmetric)
+}
+
+fn metre() -> Unit {
+    Unit { name: "m".into(), kg: 0, m: 1, s: 0, kelvin: 0, rad: 0, display: None }
 }
 
 fn inertia(table: Plant) -> Plant {

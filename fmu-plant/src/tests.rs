@@ -6,6 +6,7 @@ use fmi2_export::{Context, Failure, Inputs, Model, describe};
 use model_description::variable::{Causality, Kind};
 use nalgebra::Vector3;
 use vehicle::Scenario;
+use vehicle::effectors::{Jets, Surfaces};
 
 const CONTEXT: Context = Context { start_time: 0.0, stop_time: None, resources: None };
 
@@ -41,8 +42,8 @@ fn outputs(unit: &mut ReentryPlant, time: f64) -> Output {
     unit.output
 }
 
-/// The calculated variables in the order of the table.
-fn calculated(unit: &mut ReentryPlant, time: f64) -> Vec<f64> {
+/// The calculated variables with their position in the table.
+fn calculated(unit: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {
     let o = outputs(unit, time);
     let all = [
         o.angles,
@@ -53,7 +54,8 @@ fn calculated(unit: &mut ReentryPlant, time: f64) -> Vec<f64> {
         o.delta,
         o.disturbance_moment,
     ];
-    all.iter().flatten().copied().collect()
+    let rest = o.deflections.iter().copied().chain([o.dynamic_pressure]);
+    (0..21).zip(all.iter().flatten().copied()).chain((27..36).zip(rest)).collect()
 }
 
 #[test]
@@ -61,7 +63,7 @@ fn positions_and_names_agree() {
     let names: Vec<String> =
         describe::<ReentryPlant>().variables.into_iter().map(|variable| variable.name).collect();
     for (position, name) in names.iter().enumerate() {
-        let group = name.split('.').next().unwrap();
+        let group = name.split(['.', '[']).next().unwrap();
         let unknown = match Unknown::of(position) {
             Some(Unknown::State(0..3)) => "attitude",
             Some(Unknown::State(_)) => "rate",
@@ -69,9 +71,13 @@ fn positions_and_names_agree() {
             Some(Unknown::Derivative(_)) => "angularAcceleration",
             Some(Unknown::AppliedMoment(_)) => "appliedMoment",
             Some(Unknown::Delta | Unknown::DisturbanceMoment(_)) => "disturbance",
+            Some(Unknown::Deflection) => "deflection",
+            Some(Unknown::DynamicPressure) => "flight",
             None => match Known::of(position) {
                 Some(Known::Moment(_)) => "moment",
                 Some(Known::DisturbanceMoment(_)) => "disturbanceMoment",
+                Some(Known::Surface) => "surface",
+                Some(Known::Jet(_)) => "jet",
                 _ => continue,
             },
         };
@@ -82,6 +88,9 @@ fn positions_and_names_agree() {
         ["attitude.alpha", "attitude.beta", "attitude.sigma", "rate.p", "rate.q", "rate.r"]
     );
     assert_eq!((names[22].as_str(), names[25].as_str()), ("moment.y", "disturbanceMoment.y"));
+    assert_eq!((names[27].as_str(), names[34].as_str()), ("deflection[1]", "deflection[8]"));
+    assert_eq!((names[36].as_str(), names[43].as_str()), ("surface[1]", "surface[8]"));
+    assert_eq!((names[44].as_str(), names[53].as_str()), ("jet[1]", "jet[10]"));
 }
 
 #[test]
@@ -105,6 +114,10 @@ fn the_description_holds() {
         ("disturbance.kind", 2.0),
         ("moment.x", 0.0),
         ("integrator.step", 0.01),
+        ("actuation", 1.0),
+        ("flight.altitude", 55e3),
+        ("flight.mach", 9.8),
+        ("aerodynamics.scale", 1.0),
     ] {
         assert_eq!(start(name), value, "{name}");
     }
@@ -124,8 +137,26 @@ fn in_model_exchange(kind: i32) -> ReentryPlant {
     unit
 }
 
+/// Asks for surfaces and jets instead of a moment.
+fn actuate(unit: &mut ReentryPlant) {
+    unit.parameters.actuation = 2;
+    unit.input.command.surfaces = Surfaces::from([-5.0, -2.0, -1.0, -4.0, 3.0, -6.0, 1.0, 2.0]) * 0.02;
+    unit.input.command.jets = Jets::repeat(0.5);
+}
+
+/// The same with actuators; the jets take a duty cycle or switch.
+fn actuated_in_model_exchange(duty: bool) -> ReentryPlant {
+    let mut unit = in_model_exchange(1);
+    unit.parameters.jet_duty = duty;
+    actuate(&mut unit);
+    unit.initialize(&CONTEXT).unwrap();
+    unit.set_continuous_states(&[0.3, 0.2, -0.5, 0.08, -0.05, 0.06]);
+    unit.new_discrete_states(0.0).unwrap();
+    unit
+}
+
 fn known_positions() -> impl Iterator<Item = usize> {
-    (0..27).filter(|&position| Known::of(position).is_some())
+    (0..54).filter(|&position| Known::of(position).is_some())
 }
 
 /// Adds to a state or input by its position in the table.
@@ -139,32 +170,38 @@ fn nudge(unit: &mut ReentryPlant, known: usize, by: f64) {
         }
         Known::Moment(i) => unit.input.moment[i] += by,
         Known::DisturbanceMoment(i) => unit.input.disturbance_moment[i] += by,
+        Known::Surface => unit.input.command.surfaces[known - 36] += by,
+        Known::Jet(j) => unit.input.command.jets[j] += by,
     }
 }
 
 #[test]
 fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
     let description = describe::<ReentryPlant>();
-    for kind in 1..=7 {
+    let units = (1..=7).map(in_model_exchange).chain([false, true].map(actuated_in_model_exchange));
+    for (case, mut unit) in units.enumerate() {
         for known in known_positions() {
-            let by = if known < 6 { 1e-5 } else { 1e3 };
-            let mut unit = in_model_exchange(kind);
+            let by = match known {
+                0..6 => 1e-5,
+                6..36 => 1e3,
+                _ => 0.1,
+            };
             nudge(&mut unit, known, by);
             let above = calculated(&mut unit, 0.02);
             nudge(&mut unit, known, -2.0 * by);
             let below = calculated(&mut unit, 0.02);
             nudge(&mut unit, known, by);
             let known_name = &description.variables[known].name;
-            for (unknown, (above, below)) in above.iter().zip(&below).enumerate() {
-                let exact = unit.partial_derivative(0.02, unknown, known).unwrap();
+            for ((unknown, above), (_, below)) in above.iter().zip(&below) {
+                let exact = unit.partial_derivative(0.02, *unknown, known).unwrap();
                 let numeric = (above - below) / (2.0 * by);
-                let variable = &description.variables[unknown];
+                let variable = &description.variables[*unknown];
                 assert!(
-                    (numeric - exact).abs() < 1e-9,
-                    "{} by {known_name}: {exact}, not {numeric}",
+                    (numeric - exact).abs() < 1e-9 * exact.abs().max(1.0),
+                    "{case}: {} by {known_name}: {exact}, not {numeric}",
                     variable.name
                 );
-                if exact != 0.0 && unknown != known {
+                if exact != 0.0 && *unknown != known {
                     assert!(
                         variable.dependencies.contains(known_name),
                         "{} depends on {known_name}",
@@ -174,12 +211,14 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
             }
         }
     }
+    let mut duty = actuated_in_model_exchange(true);
+    assert!((duty.partial_derivative(0.0, 14, 44).unwrap() - 19897.0).abs() < 1e-9, "yaw by jet 1");
 }
 
 #[test]
 fn derivatives_by_parameters_are_refused() {
     let mut unit = in_model_exchange(1);
-    for (unknown, known) in [(6, 27), (6, 6), (27, 0), (21, 21)] {
+    for (unknown, known) in [(6, 54), (6, 6), (6, 27), (54, 0), (21, 21), (36, 36)] {
         assert!(unit.partial_derivative(0.0, unknown, known).is_err(), "{unknown} by {known}");
     }
 }
@@ -225,7 +264,36 @@ fn looking_changes_nothing() {
     assert_eq!(outputs(&mut looked_at, 2.0), outputs(&mut left_alone, 2.0));
 }
 
-/// Model exchange with an accurate integrator between the events, against co-simulation.
+/// Model exchange to `end` with an accurate integrator between the events; returns their number.
+fn exchange(unit: &mut ReentryPlant, begin: f64, end: f64) -> u32 {
+    let mut time = begin;
+    let mut events = 0;
+    while time < end {
+        let next = unit.new_discrete_states(time).unwrap().next_event_time.unwrap_or(end).min(end);
+        events += 1;
+        let mut y = nalgebra::Vector6::zeros();
+        unit.continuous_states(y.as_mut_slice());
+        let steps = vehicle::integrator::equal_steps(next - time, 0.001);
+        let h = (next - time) / steps as f64;
+        for i in 0..steps {
+            let mut f = |t: f64, y: &nalgebra::Vector6<f64>| {
+                unit.set_continuous_states(y.as_slice());
+                let o = outputs(unit, t);
+                vehicle::plant::state(&o.angle_rates, &o.angular_acceleration)
+            };
+            y = vehicle::integrator::rk4(&mut f, time + i as f64 * h, &y, h);
+        }
+        unit.set_continuous_states(y.as_slice());
+        time = next;
+    }
+    events
+}
+
+fn assert_same_motion(cs: &Output, me: &Output, case: &str) {
+    assert!((cs.angles - me.angles).amax() < 1e-11, "{case}: {}", cs.angles - me.angles);
+    assert!((cs.rates - me.rates).amax() < 1e-11, "{case}: {}", cs.rates - me.rates);
+}
+
 #[test]
 fn oracle_model_exchange_agrees_with_co_simulation() {
     for kind in 1..=7 {
@@ -240,31 +308,120 @@ fn oracle_model_exchange_agrees_with_co_simulation() {
         for k in 0..50 {
             step(&mut cs, 0.04 * f64::from(k), 0.04 * f64::from(k + 1)).unwrap();
         }
-        let mut time = 0.0;
-        let mut events = 0;
-        while time < 2.0 {
-            let next = me.new_discrete_states(time).unwrap().next_event_time.unwrap_or(2.0).min(2.0);
-            events += 1;
-            let mut y = nalgebra::Vector6::zeros();
-            me.continuous_states(y.as_mut_slice());
-            let steps = vehicle::integrator::equal_steps(next - time, 0.001);
-            let h = (next - time) / steps as f64;
-            for i in 0..steps {
-                let mut f = |t: f64, y: &nalgebra::Vector6<f64>| {
-                    me.set_continuous_states(y.as_slice());
-                    nalgebra::Vector6::from_column_slice(&calculated(&mut me, t)[6..12])
-                };
-                y = vehicle::integrator::rk4(&mut f, time + i as f64 * h, &y, h);
-            }
-            me.set_continuous_states(y.as_slice());
-            time = next;
-        }
-        let (cs, me) = (outputs(&mut cs, 2.0), outputs(&mut me, 2.0));
-        assert!((cs.angles - me.angles).amax() < 1e-11, "kind {kind}: {}", cs.angles - me.angles);
-        assert!((cs.rates - me.rates).amax() < 1e-11, "kind {kind}: {}", cs.rates - me.rates);
+        let events = exchange(&mut me, 0.0, 2.0);
+        assert_same_motion(&outputs(&mut cs, 2.0), &outputs(&mut me, 2.0), &format!("kind {kind}"));
         let expected = [1, 38, 3, 3, 6, 38, 38][kind as usize - 1];
         assert_eq!(events, expected, "kind {kind}");
     }
+}
+
+#[test]
+fn oracle_model_exchange_agrees_with_co_simulation_under_surfaces_and_jets() {
+    for (kind, duty) in [(1, false), (1, true), (7, false), (7, true)] {
+        let set = |unit: &mut ReentryPlant| {
+            unit.parameters.kind = kind;
+            unit.parameters.jet_duty = duty;
+            actuate(unit);
+        };
+        let [mut cs, mut me] = [0, 1].map(|_| started(set));
+        for k in 0..10 {
+            let [begin, end] = [0.2 * f64::from(k), 0.2 * f64::from(k + 1)];
+            for unit in [&mut cs, &mut me] {
+                unit.input.command.jets[k as usize] = 0.9;
+                unit.input.command.jets[9 - k as usize] = 0.2;
+                unit.input.command.surfaces[4] = 0.1 * begin.sin();
+            }
+            step(&mut cs, begin, end).unwrap();
+            exchange(&mut me, begin, end);
+            let [cs, me] = [&mut cs, &mut me].map(|unit| outputs(unit, end));
+            assert_same_motion(&cs, &me, &format!("kind {kind}, duty {duty}, tick {k}"));
+            assert!((cs.deflections - me.deflections).amax() < 1e-14);
+            assert!((cs.applied_moment - me.applied_moment).amax() < 1e-8 || duty || kind == 7);
+        }
+    }
+}
+
+#[test]
+fn published_rate_limit_and_time_events_where_surfaces_stop() {
+    // Wu 2015, (63): 10 deg/s; commands beyond the limits of -25, 0 and 30 deg stop there
+    let mut unit = started(|unit| {
+        unit.parameters.kind = 1;
+        actuate(unit);
+    });
+    unit.input.command.surfaces =
+        Surfaces::from([-90.0, 4.0, -3.0, 0.0, 90.0, 0.0, 0.0, 0.0]).map(f64::to_radians);
+    let mut time = 0.0;
+    for expected in [0.3, 2.5, 3.0] {
+        time = unit.new_discrete_states(time).unwrap().next_event_time.unwrap();
+        assert!((time - expected).abs() < 1e-12, "{time}");
+    }
+    assert_eq!(unit.new_discrete_states(time).unwrap().next_event_time, None);
+    let degrees = outputs(&mut unit, time).deflections.map(f64::to_degrees);
+    let expected = Surfaces::from([-25.0, 0.0, -3.0, 0.0, 30.0, 0.0, 0.0, 0.0]);
+    assert!((degrees - expected).amax() < 1e-12, "{degrees}");
+}
+
+#[test]
+fn published_moments_of_jets_act_from_the_communication_point_on() {
+    // Wu 2015, (64), column 4 as printed and as the mirror image of column 8
+    for (symmetric, pitch) in [(false, 10944.0), (true, 11798.0)] {
+        let mut unit = started(|unit| {
+            unit.parameters.actuation = 2;
+            unit.parameters.jet_symmetric = symmetric;
+        });
+        assert_eq!(outputs(&mut unit, 0.0).applied_moment, Vector3::zeros());
+        unit.input.command.jets[3] = 1.0;
+        assert_eq!(outputs(&mut unit, 0.0).applied_moment, Vector3::new(-6912.0, pitch, -11798.0));
+    }
+}
+
+#[test]
+fn in_model_exchange_jets_switch_and_surfaces_turn_at_events_only() {
+    let mut unit = started(|unit| unit.parameters.actuation = 2);
+    unit.new_discrete_states(0.0).unwrap();
+    unit.input.command.jets[0] = 1.0;
+    unit.input.command.surfaces[4] = 0.1;
+    let before = outputs(&mut unit, 0.01);
+    assert_eq!((before.applied_moment, before.deflections), (Vector3::zeros(), Surfaces::zeros()));
+    unit.new_discrete_states(0.01).unwrap();
+    assert_eq!(outputs(&mut unit, 0.01).applied_moment, Vector3::new(0.0, -498.0, 19897.0));
+    assert!((outputs(&mut unit, 0.02).deflections[4].to_degrees() - 0.1).abs() < 1e-12);
+}
+
+#[test]
+fn oracle_dynamic_pressure_and_biases_of_aerodynamics_and_density() {
+    let flaps = |scale: f64| {
+        let mut unit = started(|unit| {
+            unit.parameters.actuation = 2;
+            unit.parameters.density_scale = scale;
+            unit.parameters.aerodynamics_scale = scale;
+            unit.input.command.surfaces[4] = 0.1;
+            unit.input.command.surfaces[5] = 0.1;
+        });
+        step(&mut unit, 0.0, 1.0).unwrap();
+        outputs(&mut unit, 1.0)
+    };
+    let [nominal, biased] = [1.0, 0.9].map(flaps);
+    // 55 km, Mach 9.8 in the US Standard Atmosphere 1976
+    assert!((nominal.dynamic_pressure - 2858.9).abs() < 0.05, "{}", nominal.dynamic_pressure);
+    assert!((biased.dynamic_pressure / nominal.dynamic_pressure - 0.9).abs() < 1e-14);
+    let pitch = -2.0 * 5100.0 * 0.1f64.to_degrees() * 2858.9 / 2859.0;
+    assert!((nominal.applied_moment - Vector3::new(0.0, pitch, 0.0)).amax() < 2e-5 * pitch.abs());
+    assert!((biased.applied_moment - nominal.applied_moment * 0.81).amax() < 1e-9);
+}
+
+#[test]
+fn with_a_moment_actuators_stay_at_rest_and_commands_do_nothing() {
+    let [mut plain, mut commanded] = [0, 1].map(|_| started(|_| {}));
+    commanded.input.command.surfaces = Surfaces::repeat(-0.1);
+    commanded.input.command.jets = Jets::repeat(1.0);
+    for unit in [&mut plain, &mut commanded] {
+        unit.input.moment = Vector3::new(1e4, -2e4, 3e4);
+        step(unit, 0.0, 0.5).unwrap();
+    }
+    let output = outputs(&mut commanded, 0.5);
+    assert_eq!(output, outputs(&mut plain, 0.5));
+    assert_eq!((output.applied_moment, output.deflections), (plain.input.moment, Surfaces::zeros()));
 }
 
 #[test]
@@ -315,6 +472,7 @@ fn impossible_parameters_are_refused_by_name() {
         (refusal(|unit| unit.parameters.inertia.Ixz = 2e6), "inertia.Ixz"),
         (refusal(|unit| unit.parameters.inertia.Iyy = 1e7), "inertia.Iyy"),
         (refusal(|unit| unit.parameters.end = -1.0), "disturbance.end"),
+        (refusal(|unit| unit.parameters.flight.altitude = 1e5), "flight.altitude"),
     ] {
         assert!(message.contains(name), "{message}");
     }
@@ -367,7 +525,11 @@ fn outputs_need_no_start_and_inputs_have_one() {
             "disturbance.direction.alpha",
             "disturbance.direction.beta",
             "disturbance.direction.sigma",
+            "flight.mach",
+            "density.scale",
+            "aerodynamics.scale",
         ];
-        assert_eq!(unit.is_none(), plain.contains(&variable.name.as_str()), "{}", variable.name);
+        let jet = variable.name.starts_with("jet[");
+        assert_eq!(unit.is_none(), jet || plain.contains(&variable.name.as_str()), "{}", variable.name);
     }
 }
