@@ -13,7 +13,7 @@ from fmi import Fmu
 ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
 EXPERIMENTS = ROOT / "orchestrator" / "experiments" / "crmpc-2022"
-NAMES = ["ReentryPlant", "CRMPC", "DLMPC", "LQR", "ControlAllocator"]
+NAMES = ["ReentryPlant", "CRMPC", "DLMPC", "LQR", "ControlAllocator", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO"]
 
 
 def program(name: str) -> Path:

@@ -11,6 +11,7 @@ from fmi import ANGLES, RATES, Unit
 
 STEP = 0.04
 INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "DLMPC": "rate.q", "LQR": "attitude.beta", "ControlAllocator": "moment.y"}
+INPUT |= {name: "rate.p" for name in NAMES if name not in INPUT}
 
 
 def drive(unit: Unit, ticks: int = 12) -> list:

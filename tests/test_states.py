@@ -13,6 +13,7 @@ from fmi import ANGLES, MOMENT, RATES, Loop, Unit
 STEP = 0.04
 PLANT = {"inertia.scale": 1.05, "disturbance.kind": "white", "disturbance.seed": 3}
 SETTINGS = {"ReentryPlant": PLANT, "CRMPC": {"constraints": "robust"}, "DLMPC": {}, "LQR": {}, "ControlAllocator": {}}
+SETTINGS |= {name: {} for name in NAMES if name not in SETTINGS}
 
 
 def course(tick: int) -> dict:
@@ -92,7 +93,8 @@ def test_interleaved_instances_do_not_disturb_each_other(fmu, name):
         "DLMPC": {"slidingMode.p": 1.0},
         "LQR": {"weight.P[1]": 20.0},
         "ControlAllocator": {"method": "blending"},
-    }[name]
+        "FBL": {"gain.p": 4.0},
+    }.get(name, {"surface.lambda": 1.5})
     alone = []
     for settings in (SETTINGS[name], other_settings):
         with Unit(fmu(name), settings).start(inputs=inputs(name, 0)) as unit:

@@ -15,6 +15,15 @@ pub(crate) struct Vehicle {
     pub(crate) limit_rate: f64,
     /// Limit on ‖m‖, N m.
     pub(crate) limit_moment: f64,
+    /// Whether the commanded moment is scaled into its limit.
+    pub(crate) saturation: bool,
+}
+
+impl Vehicle {
+    /// The limit that a command is scaled into, N m; infinite for none. For laws that must know what is left of a command.
+    pub(crate) fn saturates_at(&self) -> f64 {
+        if self.saturation { self.limit_moment } else { f64::INFINITY }
+    }
 }
 
 /// A control law with the variables only it has. The value holds those variables.

@@ -4,6 +4,7 @@
 mod allocator;
 mod crmpc;
 mod dlmpc;
+mod fbl;
 mod law;
 mod lqr;
 mod reference;
@@ -11,6 +12,7 @@ mod solver;
 mod table;
 #[cfg(test)]
 mod tests;
+mod tvsmc;
 mod unit;
 
 pub use allocator::ControlAllocator;
@@ -20,7 +22,15 @@ pub use unit::Unit;
 pub type Crmpc = Unit<crmpc::CrmpcLaw>;
 /// `DLMPC`: double-layered model predictive and sliding-mode control.
 pub type Dlmpc = Unit<dlmpc::DlmpcLaw>;
+/// `FBL`: feedback linearisation.
+pub type Fbl = Unit<fbl::FblLaw>;
+/// `BTVSMC`: time-varying sliding mode with a boundary layer.
+pub type Btvsmc = Unit<tvsmc::TvsmcLaw<tvsmc::Btvsmc>>;
+/// `BTVSMC_DO`: the same with a disturbance observer.
+pub type BtvsmcDo = Unit<tvsmc::TvsmcLaw<tvsmc::BtvsmcDo>>;
+/// `SOTVSMC_DO`: second-order time-varying sliding mode with a disturbance observer.
+pub type SotvsmcDo = Unit<tvsmc::TvsmcLaw<tvsmc::SotvsmcDo>>;
 /// `LQR`: linear-quadratic regulator.
 pub type Lqr = Unit<lqr::LqrLaw>;
 
-fmi2_export::export_fmus!(Crmpc, Dlmpc, Lqr, ControlAllocator);
+fmi2_export::export_fmus!(Crmpc, Dlmpc, Lqr, ControlAllocator, Fbl, Btvsmc, BtvsmcDo, SotvsmcDo);

@@ -5,9 +5,7 @@ use crate::table;
 use crate::unit::Unit;
 use control::crmpc::Settings;
 use control::lqr::{Lqr, LqrSettings};
-use fmi2_export::table::parameter;
 use fmi2_export::{Failure, Table};
-use model_description::unit;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the regulator.
@@ -34,9 +32,7 @@ impl Law for LqrLaw {
     const DOCUMENTATION: &'static str = include_str!("lqr.html");
 
     fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
-        let period = parameter("period.feedback", "Time between two evaluations of the law").real();
-        let table =
-            table.real(period.unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| &mut m.law.period);
+        let table = table::period(table, 0.04, |law| &mut law.period);
         table::weights(table, |law| &mut law.p, |law| &mut law.q)
     }
 

@@ -191,6 +191,43 @@ fn vehicle<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
         .boolean(saturation, |m| &mut m.parameters.saturation)
 }
 
+/// The parameter of laws that use the moment that the actuators give.
+pub(crate) fn achieved_moment<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
+    let used = parameter(
+        "achievedMoment.used",
+        "Whether the inputs achievedMoment are fed; if not, the commanded moment is taken to act",
+    );
+    table.boolean(used, |m| &mut m.parameters.achieved_moment_used)
+}
+
+/// The parameter period.feedback of a law with one rate.
+pub(crate) fn period<L: Law>(
+    table: Table<Unit<L>>,
+    nominal: f64,
+    field: impl Fn(&mut L) -> &mut f64 + Copy + Send + Sync + 'static,
+) -> Table<Unit<L>> {
+    let period = parameter("period.feedback", "Time between two evaluations of the law").real();
+    table.real(period.unit(unit::time()).min(1e-4).max(10.0).nominal(nominal), move |m| field(&mut m.law))
+}
+
+/// Gains of the three angles, `name[1]` to `name[3]`, in the order of [`ANGLES`].
+pub(crate) fn gains<L: Law>(
+    mut table: Table<Unit<L>>,
+    (name, text): (&str, &str),
+    unit: Option<&unit::Unit>,
+    field: impl Fn(&mut L) -> &mut [f64; 3] + Copy + Send + Sync + 'static,
+) -> Table<Unit<L>> {
+    for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
+        let real = parameter(&format!("{name}[{}]", i + 1), &format!("{text}: {meaning}")).real().min(0.0);
+        let real = match unit {
+            Some(unit) => real.unit(unit.clone()),
+            None => real,
+        };
+        table = table.real(real, move |m| &mut field(&mut m.law)[i]);
+    }
+    table
+}
+
 /// The weights P and Q on the tracking error and the input.
 pub(crate) fn weights<L: Law>(
     mut table: Table<Unit<L>>,

@@ -3,7 +3,8 @@
 use crate::crmpc::CrmpcLaw;
 use crate::dlmpc::DlmpcLaw;
 use crate::law::Law;
-use crate::{Crmpc, Dlmpc, Lqr, Unit};
+use crate::tvsmc::{self, TvsmcLaw};
+use crate::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo, Unit};
 use fmi2_export::{Context, Failure, Inputs, Model, describe};
 use model_description::ModelDescription;
 use model_description::variable::Causality;
@@ -48,7 +49,8 @@ fn descriptions_are_consistent_and_interchangeable() {
         wanted.map(|v| v.name.clone()).collect()
     };
     let (crmpc, dlmpc, lqr) = (describe::<Crmpc>(), describe::<Dlmpc>(), describe::<Lqr>());
-    for other in [&crmpc, &dlmpc] {
+    let sliding = [describe::<Fbl>(), describe::<Btvsmc>(), describe::<BtvsmcDo>(), describe::<SotvsmcDo>()];
+    for other in [&crmpc, &dlmpc].into_iter().chain(&sliding) {
         other.check().unwrap();
         lqr.check().unwrap();
         assert_ne!(other.guid(), lqr.guid());
@@ -100,6 +102,7 @@ fn assert_any_communication_steps_give_the_same_moments<L: Law>() {
 fn any_communication_steps_give_the_same_moments() {
     assert_any_communication_steps_give_the_same_moments::<CrmpcLaw>();
     assert_any_communication_steps_give_the_same_moments::<DlmpcLaw>();
+    assert_any_communication_steps_give_the_same_moments::<TvsmcLaw<tvsmc::SotvsmcDo>>();
 }
 
 #[test]
@@ -161,4 +164,30 @@ fn a_singular_attitude_is_an_error_not_a_number() {
     unit.input.measured.angles.y = f64::NAN;
     let Err(Failure::Error(text)) = unit.calculate(0.0) else { panic!("accepted") };
     assert!(text.contains("not finite"), "{text}");
+}
+
+#[test]
+fn the_achieved_moment_counts_only_if_it_is_used() {
+    let after = |used: bool, achieved: f64| {
+        let mut unit: BtvsmcDo = ready(|unit: &mut BtvsmcDo| {
+            unit.parameters.achieved_moment_used = used;
+            unit.input.achieved_moment = Vector3::repeat(achieved);
+        });
+        unit.calculate(0.0).unwrap();
+        step(&mut unit, 0.0, 0.1);
+        unit.output.moment
+    };
+    assert_eq!(after(false, 0.0), after(false, 1e5));
+    assert_ne!(after(true, 0.0), after(true, 1e5));
+    assert_ne!(after(true, 0.0), after(false, 0.0));
+}
+
+#[test]
+fn sliding_modes_scale_into_the_limit_themselves() {
+    let mut unit: SotvsmcDo = ready(|unit: &mut SotvsmcDo| {
+        unit.parameters.saturation = true;
+        unit.parameters.limit_moment = 1e4;
+    });
+    unit.calculate(0.0).unwrap();
+    assert!((unit.output.moment.norm() - 1e4).abs() < 1e-6);
 }

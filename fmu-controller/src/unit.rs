@@ -38,6 +38,8 @@ pub(crate) struct Parameters {
     pub(crate) limit_rate: f64,
     pub(crate) limit_moment: f64,
     pub(crate) saturation: bool,
+    /// Whether the input `achieved_moment` is fed; declared by laws that use it.
+    pub(crate) achieved_moment_used: bool,
 }
 
 /// Inputs of every controller.
@@ -76,7 +78,10 @@ impl<L: Law> Unit<L> {
 
     /// Brings the first uncommitted tick up to date with the inputs.
     fn evaluate(&mut self) -> Result<(), Failure> {
+        let used = self.parameters.achieved_moment_used;
         let Parts { controller, sampled, input, source } = self.parts()?;
+        let measured =
+            Measurement { achieved_moment: used.then_some(input.achieved_moment), ..input.measured };
         let now = sampled.next_time(controller.period());
         let external = match source {
             Source::External => input.reference,
@@ -86,7 +91,7 @@ impl<L: Law> Unit<L> {
         for (i, part) in [external.angles, external.rates, external.accelerations].iter().enumerate() {
             mark[3 * i..3 * i + 3].copy_from_slice(part.as_slice());
         }
-        sampled.evaluate(controller, &input.measured, mark, &|time| source.at(time, now, &external));
+        sampled.evaluate(controller, &measured, mark, &|time| source.at(time, now, &external));
         if sampled.in_force().0.iter().all(|value| value.is_finite()) {
             return Ok(());
         }
@@ -96,9 +101,9 @@ impl<L: Law> Unit<L> {
     }
 
     fn design(&self) -> Result<L::Controller, Failure> {
-        let Parameters { inertia, limit_rate, limit_moment, .. } = self.parameters;
+        let Parameters { inertia, limit_rate, limit_moment, saturation, .. } = self.parameters;
         let body = inertia.body(1.0).map_err(|error| Failure::Error(error.to_string()))?;
-        self.law.design(&Vehicle { body, limit_rate, limit_moment })
+        self.law.design(&Vehicle { body, limit_rate, limit_moment, saturation })
     }
 }
 
@@ -116,6 +121,7 @@ impl<L: Law> Model for Unit<L> {
                 limit_rate: scenario.limit_rate,
                 limit_moment: scenario.limit_moment,
                 saturation: false,
+                achieved_moment_used: false,
             },
             input: Input {
                 measured: Measurement {

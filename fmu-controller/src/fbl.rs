@@ -1,0 +1,47 @@
+//! `FBL`: its own parameters.
+
+use crate::law::{Law, Vehicle};
+use crate::table;
+use crate::unit::Unit;
+use control::sliding::{Fbl, FblSettings};
+use fmi2_export::table::parameter;
+use fmi2_export::{Failure, Table};
+use model_description::unit;
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the feedback linearisation.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FblLaw {
+    settings: FblSettings,
+}
+
+impl Default for FblLaw {
+    fn default() -> Self {
+        Self { settings: FblSettings::published() }
+    }
+}
+
+impl Law for FblLaw {
+    type Controller = Fbl;
+
+    const NAME: &'static str = "FBL";
+    const DESCRIPTION: &'static str =
+        "Feedback linearisation of the attitude, a comparison of Wu et al. (2015)";
+    const DOCUMENTATION: &'static str = include_str!("fbl.html");
+
+    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
+        let p = parameter("gain.p", "Gain on the error of the angles").real().min(0.0);
+        let d = parameter("gain.d", "Gain on the error of their rates").real().min(0.0);
+        table::period(table, 0.01, |law| &mut law.settings.period)
+            .real(p.unit(unit::gain_angle()), |m| &mut m.law.settings.kp)
+            .real(d.unit(unit::gain_rate()), |m| &mut m.law.settings.kd)
+    }
+
+    #[allow(private_interfaces)]
+    fn design(&self, vehicle: &Vehicle) -> Result<Fbl, Failure> {
+        let settings = FblSettings { body: vehicle.body, ..self.settings };
+        Fbl::new(settings).map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    fn show(&mut self, (): &()) {}
+}

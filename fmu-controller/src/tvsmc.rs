@@ -1,0 +1,207 @@
+//! `BTVSMC`, `BTVSMC_DO`, `SOTVSMC_DO`: parameters and outputs of the time-varying sliding modes.
+
+use crate::law::{Law, Vehicle};
+use crate::table::{self, ANGLES, sampled_inputs, vector};
+use crate::unit::Unit;
+use control::sliding::{BoundaryLayer, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc};
+use fmi2_export::table::{discrete_output, parameter};
+use fmi2_export::{Failure, Table};
+use model_description::unit;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+/// What one of the laws has of its own.
+pub trait Variant: Sized + Send + Sync + 'static {
+    /// Its reaching law.
+    type Reaching: Reaching + Serialize + DeserializeOwned + Send + 'static;
+    /// Name of the unit.
+    const NAME: &'static str;
+    /// One line: what the unit is.
+    const DESCRIPTION: &'static str;
+    /// The published settings.
+    fn published() -> Settings<Self::Reaching>;
+    /// Adds the reaching law's parameters.
+    fn reaching(table: Table<Unit<TvsmcLaw<Self>>>) -> Table<Unit<TvsmcLaw<Self>>>;
+}
+
+/// Parameters and outputs of a time-varying sliding mode.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct TvsmcLaw<V: Variant> {
+    settings: Settings<V::Reaching>,
+    /// Gains of the observer; used if the law has one.
+    observer: Observer,
+    sliding: Vector3<f64>,
+    disturbance: Vector3<f64>,
+}
+
+impl<V: Variant> Default for TvsmcLaw<V> {
+    fn default() -> Self {
+        let settings = V::published();
+        let observer = settings.observer.unwrap_or(Observer { lambda: [1.0; 3], l: [1.0; 3] });
+        Self { settings, observer, sliding: Vector3::zeros(), disturbance: Vector3::zeros() }
+    }
+}
+
+impl<V: Variant> TvsmcLaw<V> {
+    fn has_observer() -> bool {
+        V::published().observer.is_some()
+    }
+}
+
+impl<V: Variant> Law for TvsmcLaw<V> {
+    type Controller = Tvsmc<V::Reaching>;
+
+    const NAME: &'static str = V::NAME;
+    const DESCRIPTION: &'static str = V::DESCRIPTION;
+    const DOCUMENTATION: &'static str = include_str!("tvsmc.html");
+
+    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
+        let table = table::period(table, 0.01, |law| &mut law.settings.period);
+        let table = anti_windup(V::reaching(surface(table)));
+        let table = if Self::has_observer() { observer(table) } else { table };
+        outputs(table)
+    }
+
+    #[allow(private_interfaces)]
+    fn design(&self, vehicle: &Vehicle) -> Result<Self::Controller, Failure> {
+        let settings = Settings {
+            body: vehicle.body,
+            limit_moment: vehicle.saturates_at(),
+            observer: Self::has_observer().then_some(self.observer),
+            ..self.settings
+        };
+        Tvsmc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    fn show(&mut self, memory: &Memory<<V::Reaching as Reaching>::Memory>) {
+        self.sliding = memory.sliding;
+        self.disturbance = memory.estimate.disturbance;
+    }
+}
+
+fn surface<V: Variant>(table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V>>> {
+    let c = ("surface.c", "Gain c of the sliding surface on the error");
+    let lambda = parameter("surface.lambda", "Rate at which the surface's offset decays").real().min(0.0);
+    table::gains(table, c, Some(&unit::gain_rate()), |law| &mut law.settings.surface.c)
+        .real(lambda.unit(unit::gain_rate()), |m| &mut m.law.settings.surface.lambda)
+}
+
+fn anti_windup<V: Variant>(table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V>>> {
+    let on = parameter(
+        "antiWindup",
+        "Whether the surface is laid anew through the state while the actuators saturate; false as in the paper",
+    );
+    let threshold = parameter(
+        "antiWindupThreshold",
+        "Norm of the acceleration that the actuators fail to give, from which on they count as saturated",
+    );
+    table::achieved_moment(table)
+        .boolean(on, |m| &mut m.law.settings.anti_windup)
+        .real(threshold.real().unit(unit::angular_acceleration()).min(0.0).nominal(0.01), |m| {
+            &mut m.law.settings.threshold
+        })
+}
+
+fn observer<V: Variant>(mut table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V>>> {
+    for i in 0..3 {
+        let text = format!("Gain lambda{i} of the disturbance observer");
+        let gain = parameter(&format!("observer.lambda{i}"), &text).real().min(0.0);
+        table = table.real(gain, move |m| &mut m.law.observer.lambda[i]);
+    }
+    let l = ("observer.L", "Bound L on the second derivative of the uncertainty, rad/s4");
+    table::gains(table, l, None, |law| &mut law.observer.l)
+}
+
+fn outputs<V: Variant>(table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V>>> {
+    let sampled = |name: String, text: String| discrete_output(&name, &text).depends_on(sampled_inputs());
+    let sliding = |axis: &str, meaning: &str| {
+        let text = format!("Sliding variable of the {meaning} at the last tick");
+        sampled(format!("slidingVariable.{axis}"), text).real().unit(unit::angular_rate()).nominal(1e-3)
+    };
+    let estimate = |axis: &str, meaning: &str| {
+        let text =
+            format!("Observer's estimate of the uncertainty in the second derivative of the {meaning}");
+        let common = sampled(format!("disturbanceEstimate.{axis}"), text);
+        common.real().unit(unit::angular_acceleration()).nominal(0.01)
+    };
+    let table = vector(table, ANGLES, sliding, |m| &mut m.law.sliding);
+    if TvsmcLaw::<V>::has_observer() {
+        vector(table, ANGLES, estimate, |m| &mut m.law.disturbance)
+    } else {
+        table
+    }
+}
+
+fn boundary_layer<V: Variant<Reaching = BoundaryLayer>>(
+    table: Table<Unit<TvsmcLaw<V>>>,
+) -> Table<Unit<TvsmcLaw<V>>> {
+    let eta = ("reaching.eta", "Reaching gain eta");
+    let h = ("boundaryLayer.h", "Thickness h of the boundary layer");
+    let table =
+        table::gains(table, eta, Some(&unit::angular_acceleration()), |law| &mut law.settings.reaching.eta);
+    table::gains(table, h, Some(&unit::angular_rate()), |law| &mut law.settings.reaching.h)
+}
+
+/// BTVSMC, (62).
+#[derive(Clone, Copy, Debug)]
+pub struct Btvsmc;
+
+impl Variant for Btvsmc {
+    type Reaching = BoundaryLayer;
+    const NAME: &'static str = "BTVSMC";
+    const DESCRIPTION: &'static str = "Time-varying sliding-mode attitude controller with a boundary layer, a comparison of Wu et al. (2015)";
+
+    fn published() -> Settings<BoundaryLayer> {
+        Settings::btvsmc()
+    }
+
+    fn reaching(table: Table<Unit<TvsmcLaw<Self>>>) -> Table<Unit<TvsmcLaw<Self>>> {
+        boundary_layer(table)
+    }
+}
+
+/// BTVSMC/DO, (36).
+#[derive(Clone, Copy, Debug)]
+pub struct BtvsmcDo;
+
+impl Variant for BtvsmcDo {
+    type Reaching = BoundaryLayer;
+    const NAME: &'static str = "BTVSMC_DO";
+    const DESCRIPTION: &'static str = "Time-varying sliding-mode attitude controller with a boundary layer and a disturbance observer, of Wu et al. (2015)";
+
+    fn published() -> Settings<BoundaryLayer> {
+        Settings::btvsmc_do()
+    }
+
+    fn reaching(table: Table<Unit<TvsmcLaw<Self>>>) -> Table<Unit<TvsmcLaw<Self>>> {
+        boundary_layer(table)
+    }
+}
+
+/// SOTVSMC/DO, (45).
+#[derive(Clone, Copy, Debug)]
+pub struct SotvsmcDo;
+
+impl Variant for SotvsmcDo {
+    type Reaching = SecondOrder;
+    const NAME: &'static str = "SOTVSMC_DO";
+    const DESCRIPTION: &'static str = "Second-order time-varying sliding-mode attitude controller with a disturbance observer, of Wu et al. (2015)";
+
+    fn published() -> Settings<SecondOrder> {
+        Settings::sotvsmc_do()
+    }
+
+    fn reaching(table: Table<Unit<TvsmcLaw<Self>>>) -> Table<Unit<TvsmcLaw<Self>>> {
+        let text = |what| ("reaching.".to_owned() + what, "Reaching gain ".to_owned() + what);
+        let [(n1, t1), (n2, t2), (n3, t3), (n4, t4)] = ["k1", "k2", "k3", "k4"].map(text);
+        let table = table::gains(table, (&n1, &t1), None, |law| &mut law.settings.reaching.k1);
+        let rate = unit::gain_rate();
+        let table = table::gains(table, (&n2, &t2), Some(&rate), |law| &mut law.settings.reaching.k2);
+        let table = table::gains(table, (&n3, &t3), None, |law| &mut law.settings.reaching.k3);
+        let angle = unit::gain_angle();
+        let table = table::gains(table, (&n4, &t4), Some(&angle), |law| &mut law.settings.reaching.k4);
+        let m = parameter("reaching.m", "Exponent m of the reaching law, above 2").real().min(2.0);
+        table.real(m, |m| &mut m.law.settings.reaching.m)
+    }
+}

@@ -1,0 +1,111 @@
+"""The sliding-mode controllers as units: the scenario of Wu 2015 run by the orchestrator, and their laws at the first tick."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from conftest import ROOT
+from fmi import ANGLES, MOMENT, RATES, Unit
+
+TVSMC = ROOT / "orchestrator" / "experiments" / "tvsmc-2015"
+DEG = np.pi / 180.0
+INERTIA = np.array([[588791.0, 0.0, -24242.0], [0.0, 1303212.0, 0.0], [-24242.0, 0.0, 1534164.0]])
+BODY = {"inertia.Ixx": 588791.0, "inertia.Iyy": 1303212.0, "inertia.Izz": 1534164.0, "inertia.Ixz": 24242.0}
+START = dict(zip(ANGLES + RATES, [32 * DEG, 2 * DEG, 58 * DEG, 0.0, 0.0, 0.0]))
+
+
+def results(out, *names: str) -> np.ndarray:
+    """Time and these variables, whose column titles may carry a unit, row by row."""
+    with open(out / "results.csv") as file:
+        rows = list(csv.reader(line for line in file if not line.startswith("#")))
+    header, rows = rows[0], np.array(rows[1:], dtype=float)
+    columns = [next(i for i, title in enumerate(header) if title.split(" ")[0].startswith(name)) for name in names]
+    return np.column_stack([rows[:, 0], rows[:, columns]])
+
+
+@pytest.fixture(scope="module")
+def errors(orchestrate):
+    """Time (s) and the errors of the angles (deg) of one of the experiments."""
+    done = {}
+
+    def run(name: str) -> tuple[np.ndarray, np.ndarray]:
+        if name not in done:
+            finished, out = orchestrate(TVSMC / f"{name}.toml")
+            assert finished.returncode == 0, finished.stderr
+            axes = ("alpha", "beta", "sigma")
+            table = results(out, *(f"plant.attitude.{a}" for a in axes), *(f"controller.reference.{a}" for a in axes))
+            done[name] = table[:, 0], (table[:, 1:4] - table[:, 4:7]) / DEG
+        return done[name]
+
+    return run
+
+
+def rms(run) -> np.ndarray:
+    """Over 10 to 20 s, deg."""
+    time, error = run
+    return np.sqrt(np.mean(error[time >= 10.0 - 1e-9] ** 2, axis=0))
+
+
+def settled(run) -> float:
+    """When all errors stay within 2 % of the first, s."""
+    time, error = run
+    outside = (np.abs(error) > 0.02 * np.abs(error[0])).any(axis=1)
+    return time[np.flatnonzero(outside)[-1] + 1]
+
+
+def test_regress_laws_without_observer_keep_an_error(errors):
+    np.testing.assert_allclose(rms(errors("fbl")), [0.205, 0.076, 0.493], rtol=0.01)
+    np.testing.assert_allclose(rms(errors("btvsmc")), [0.0468, 0.0169, 0.1121], rtol=0.01)
+
+
+def test_published_laws_with_observer_settle_within_4_s(errors):
+    boundary, second = errors("btvsmc-do"), errors("sotvsmc-do")
+    assert settled(boundary) < 4.0 and settled(second) < 4.0
+    assert (rms(boundary) <= 5e-4).all()
+    assert (rms(second) <= 0.1 * rms(boundary)).all()
+
+
+@pytest.mark.parametrize("name", ["FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO"])
+def test_oracle_first_moment(fmu, name):
+    """At rest at t = 0 s is 0, B is 0 and the observer rests: v = b = lambda a = -lambda c e, or -kp e."""
+    parameters = BODY | {"reference.profile": "tvsmc2015"}
+    with Unit(fmu(name), parameters).start(inputs=START) as unit:
+        moment = np.array(unit.get(MOMENT))
+    error = np.array([2.0, 2.0, -2.0]) * DEG
+    v = -(3.0 if name == "FBL" else 4.0) * error
+    alpha, beta = 32 * DEG, 2 * DEG
+    sa, ca, sb, cb, tb = np.sin(alpha), np.cos(alpha), np.sin(beta), np.cos(beta), np.tan(beta)
+    r = np.array([[-ca * tb, 1.0, -sa * tb], [sa, 0.0, -ca], [-ca * cb, -sb, -sa * cb]])
+    np.testing.assert_allclose(moment, INERTIA @ np.linalg.solve(r, v), rtol=1e-10)
+
+
+@pytest.mark.parametrize("name", ["BTVSMC", "BTVSMC_DO", "SOTVSMC_DO"])
+def test_the_moment_does_not_depend_on_the_achieved_one_at_the_same_instant(fmu, name):
+    """No algebraic loop with actuators that answer at once, and none is declared."""
+    unit = fmu(name)
+    outputs = {variable.name: variable for variable in unit.description.modelVariables}
+    dependencies = {
+        unknown.variable.name: [dependency.name for dependency in unknown.dependencies or []]
+        for unknown in unit.description.outputs
+    }
+    assert not any("achievedMoment" in other for name in MOMENT for other in dependencies[name])
+    assert "achievedMoment.used" in outputs
+    with Unit(unit, BODY | {"reference.profile": "tvsmc2015", "achievedMoment.used": True}) as driven:
+        driven.start(inputs=START)
+        driven.get(MOMENT)
+        driven.step(0.0, 0.01)
+        first = driven.get(MOMENT)
+        driven.set({f"achievedMoment.{axis}": 1e5 for axis in "xyz"})
+        assert driven.get(MOMENT) == first
+        driven.step(0.01, 0.01)
+        later = driven.get(MOMENT)
+    assert later != first
+
+
+def test_gains_against_condition_46_are_refused(fmu):
+    with Unit(fmu("SOTVSMC_DO"), {"reaching.k2[2]": 0.5}) as unit:
+        unit.enter()
+        with pytest.raises(Exception):
+            unit.exit()
+        assert "(46)" in unit.messages() and "axis 2" in unit.messages()
