@@ -125,6 +125,18 @@ pub enum DesignError {
         /// Left-hand side of the condition.
         value: f64,
     },
+    /// The reaching law of Jia et al. is weaker than the disturbance.
+    #[error(
+        "inner.rho[{index}] = {rho} must exceed |I⁻¹ M_d| = {needed:.4} rad/s²; raise it or lower disturbanceMoment.bound"
+    )]
+    WeakReaching {
+        /// Axis, from 1: roll, pitch, yaw.
+        index: usize,
+        /// ρ_n, rad/s².
+        rho: f64,
+        /// What it must exceed, rad/s².
+        needed: f64,
+    },
     /// The solver refuses the problem.
     #[error("the cone solver refuses the problem: {0}")]
     Solver(String),

@@ -14,6 +14,7 @@ pub mod sampled;
 pub mod schedule;
 pub mod settings;
 pub mod sliding;
+pub mod two_loop;
 
 pub use allocation::Allocator;
 pub use controller::{Controller, Measurement};
@@ -22,3 +23,4 @@ pub use dlmpc::Dlmpc;
 pub use error::DesignError;
 pub use lqr::Lqr;
 pub use sliding::{Btvsmc, Fbl, SotvsmcDo};
+pub use two_loop::TwoLoopSmc;

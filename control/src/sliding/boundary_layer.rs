@@ -69,6 +69,11 @@ impl FiniteTimeLayer {
         })
     }
 
+    /// The largest slope of an axis, at the edge of the layer, 1/s.
+    pub(crate) fn steepest(&self) -> f64 {
+        self.slope(&Vector3::from(self.epsilon)).max()
+    }
+
     /// ρ 2^(−(b+1)/2), s/ε and b of one axis.
     fn scaled(&self, i: usize, s: f64) -> (f64, f64, f64) {
         let b = self.b[i];

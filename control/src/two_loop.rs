@@ -1,0 +1,299 @@
+//! Two-loop sliding-mode control of Jia, Zhou and Zhou, "Re-entry attitude two-loop SMC of the spacecraft and its logic
+//! selection": an outer sliding mode commands body rates that steer the attitude, an inner one the moment that follows them.
+//!
+//! The paper orders its angles φ = [γ, β, α], bank first, and its γ grows with the roll rate; ours are Θ = [α, β, σ] with
+//! σ̇ = −p cos α − … So φ = P Θ with P = [[0, 0, −1], [0, 1, 0], [1, 0, 0]], and its R is P R(Θ). Both loops act per angle and
+//! are odd, so they commute with P: the law stands here in our order, and gains are those of α, β, σ.
+
+use crate::controller::{Controller, Measurement, ReferenceAt};
+use crate::error::DesignError;
+use crate::sliding::{Commanded, FiniteTimeLayer, all_positive, sampled_decay};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::dynamics::RigidBody;
+use vehicle::kinematics;
+use vehicle::reference::Reference;
+use vehicle::scenario::Scenario;
+
+/// One loop: s = e + K ∫e dt and the reaching law ṡ = −ρ f SAT(s/ε).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Loop {
+    /// K, diagonal, 1/s.
+    pub k: [f64; 3],
+    /// The reaching law; ρ in rad/s (outer) or rad/s² (inner).
+    pub layer: FiniteTimeLayer,
+}
+
+/// Settings of the controller. Units SI, angles rad.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TwoLoopSettings {
+    /// The vehicle as the controller believes it to be.
+    pub body: RigidBody,
+    /// Time between ticks, s.
+    pub period: f64,
+    /// Limit on ‖M‖ into which the command is scaled, N m; infinite for none.
+    pub limit_moment: f64,
+    /// Frequency of the critically damped filter of the command, rad/s; 0 for none.
+    pub filter: f64,
+    /// Loop of the angles, α, β, σ.
+    pub outer: Loop,
+    /// Loop of the body rates, p, q, r.
+    pub inner: Loop,
+    /// Bound on each component of M_d, N m.
+    pub disturbance: [f64; 3],
+    /// Whether the integrals rest while the actuators saturate.
+    pub anti_windup: bool,
+    /// ‖R I⁻¹ (M_achieved − M)‖ from which on they do, rad/s².
+    pub threshold: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    period: f64,
+    command_filter: CommandFilter,
+    outer: Loop,
+    inner: Loop,
+    disturbance: DisturbanceBound,
+    anti_windup: AntiWindup,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CommandFilter {
+    frequency: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DisturbanceBound {
+    moment: [f64; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AntiWindup {
+    threshold: f64,
+}
+
+impl TwoLoopSettings {
+    /// Ours for the scenario of section V; the paper prints no gains.
+    #[allow(clippy::missing_panics_doc)]
+    pub fn ours() -> Self {
+        // Neither can fail, as the tests that use it show: the files are embedded.
+        let file: File = toml::from_str(include_str!("../data/two-loop-smc.toml"))
+            .unwrap_or_else(|error| panic!("{error}"));
+        let body = Scenario::two_loop().inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
+        Self {
+            body,
+            period: file.period,
+            limit_moment: f64::INFINITY,
+            filter: file.command_filter.frequency,
+            outer: file.outer,
+            inner: file.inner,
+            disturbance: file.disturbance.moment,
+            anti_windup: true,
+            threshold: file.anti_windup.threshold,
+        }
+    }
+
+    /// Bound on each component of |I⁻¹ M_d|, rad/s².
+    pub fn disturbance_acceleration(&self) -> Vector3<f64> {
+        self.body.inverse.abs() * Vector3::from(self.disturbance)
+    }
+
+    fn check(&self) -> Result<(), DesignError> {
+        let Self { period, filter, outer, inner, disturbance, threshold, .. } = self;
+        all_positive("period.feedback", &[*period])?;
+        all_positive("antiWindupThreshold", &[*threshold])?;
+        if !(0.0..1.0 / period).contains(filter) {
+            let high = 1.0 / period;
+            return Err(DesignError::OutOfRange {
+                name: "commandFilter.frequency",
+                value: *filter,
+                low: 0.0,
+                high,
+            });
+        }
+        if let Some(&value) = disturbance.iter().find(|value| !(0.0..f64::INFINITY).contains(*value)) {
+            return Err(DesignError::OutOfRange {
+                name: "disturbanceMoment.bound",
+                value,
+                low: 0.0,
+                high: f64::INFINITY,
+            });
+        }
+        outer.check(["outer.k", "outer.rho", "outer.epsilon", "outer.b"], *period)?;
+        inner.check(["inner.k", "inner.rho", "inner.epsilon", "inner.b"], *period)?;
+        let acceleration = self.disturbance_acceleration();
+        for (axis, (&rho, &needed)) in inner.layer.rho.iter().zip(&acceleration).enumerate() {
+            if rho <= needed {
+                return Err(DesignError::WeakReaching { index: axis + 1, rho, needed });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Loop {
+    fn check(&self, names: [&'static str; 4], period: f64) -> Result<(), DesignError> {
+        let FiniteTimeLayer { rho, epsilon, b } = &self.layer;
+        for (name, values) in names.iter().zip([&self.k, rho, epsilon, b]) {
+            all_positive(name, values)?;
+        }
+        if let Some(&value) = b.iter().find(|b| **b >= 1.0) {
+            return Err(DesignError::OutOfRange { name: names[3], value, low: 0.0, high: 1.0 });
+        }
+        let k = self.k.iter().copied().fold(0.0, f64::max);
+        sampled_decay(names[0], k, period)?;
+        sampled_decay(names[1], self.layer.steepest(), period)
+    }
+
+    /// s, of the loop's units.
+    fn sliding(&self, error: &Vector3<f64>, integral: &Vector3<f64>) -> Vector3<f64> {
+        error + self.k().component_mul(integral)
+    }
+
+    fn k(&self) -> Vector3<f64> {
+        Vector3::from(self.k)
+    }
+}
+
+/// What the controller carries from tick to tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TwoLoopMemory {
+    /// Whether there was a tick.
+    pub started: bool,
+    /// The filtered command at the last tick, and the reference it was filtered from.
+    command: Reference,
+    reference: Reference,
+    /// ∫e_w dt, rad s, up to the last tick.
+    pub outer_integral: Vector3<f64>,
+    /// ∫ω_e dt, rad, likewise.
+    pub inner_integral: Vector3<f64>,
+    /// e_w at the last tick, rad.
+    pub angle_error: Vector3<f64>,
+    /// ω_e at the last tick, rad/s.
+    pub rate_error: Vector3<f64>,
+    /// s_w at the last tick, rad.
+    pub outer_sliding: Vector3<f64>,
+    /// s_n at the last tick, rad/s.
+    pub inner_sliding: Vector3<f64>,
+    /// ω_c at the last tick, rad/s.
+    pub rate_command: Vector3<f64>,
+    /// The moment of the last tick.
+    pub commanded: Commanded,
+    /// Whether the actuators fell short in the interval before the last tick.
+    pub saturated: bool,
+}
+
+/// The controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TwoLoopSmc {
+    settings: TwoLoopSettings,
+}
+
+impl TwoLoopSmc {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// Names the setting at fault, ρ_n ≤ |I⁻¹ M_d| among others.
+    pub fn new(settings: TwoLoopSettings) -> Result<Self, DesignError> {
+        settings.check()?;
+        Ok(Self { settings })
+    }
+
+    /// The filtered command: it starts at the measured motion and follows a smooth reference without lag.
+    fn filter(&self, memory: &TwoLoopMemory, measured: &Measurement, reference: &Reference) -> Reference {
+        let TwoLoopSettings { filter: w, period, .. } = self.settings;
+        if w == 0.0 {
+            return *reference;
+        }
+        let (angles, rates) = if memory.started {
+            // x = r + d, d̈ + 2 w ḋ + w² d = 0, over the interval before this tick. Where r went is told by its derivatives, so that
+            // its jumps are filtered.
+            let TwoLoopMemory { command, reference: before, .. } = memory;
+            let (d, d_rate) = (command.angles - before.angles, command.rates - before.rates);
+            let (slope, decay) = (d_rate + d * w, (-w * period).exp());
+            let (a, b) = (before.accelerations, reference.accelerations);
+            let moved = before.angles + before.rates * period + (a * 2.0 + b) * (period * period / 6.0);
+            let angles = moved + (d + slope * period) * decay;
+            let rates = before.rates + (a + b) * (0.5 * period) + (d_rate - slope * (w * period)) * decay;
+            (angles, rates)
+        } else {
+            (measured.angles, kinematics::r(&measured.angles) * measured.rates)
+        };
+        let (d, d_rate) = (angles - reference.angles, rates - reference.rates);
+        let accelerations = reference.accelerations - d_rate * (2.0 * w) - d * (w * w);
+        Reference { angles, rates, accelerations }
+    }
+}
+
+impl Controller for TwoLoopSmc {
+    type Memory = TwoLoopMemory;
+
+    fn period(&self) -> f64 {
+        self.settings.period
+    }
+
+    /// As with [`crate::sliding::Tvsmc`], the moment achieved before a tick acts from the next one on.
+    fn update(
+        &mut self,
+        memory: &mut TwoLoopMemory,
+        _tick: u64,
+        time: f64,
+        measured: &Measurement,
+        reference: ReferenceAt,
+    ) -> Vector3<f64> {
+        let TwoLoopSettings { body, period, limit_moment, outer, inner, anti_windup, threshold, .. } =
+            &self.settings;
+        let reference = reference(time);
+        let command = self.filter(memory, measured, &reference);
+        let rests = *anti_windup && memory.saturated;
+        if memory.started {
+            if !rests {
+                memory.outer_integral += memory.angle_error * *period;
+                memory.inner_integral += memory.rate_error * *period;
+            }
+            memory.saturated = memory.commanded.shortfall(body, measured.achieved_moment).norm() > *threshold;
+        }
+        let Measurement { angles, rates, .. } = measured;
+        let inverse = kinematics::r_inverse(angles);
+        let angle_rates = kinematics::r(angles) * rates;
+
+        // Jia, (4), (7)
+        let e_w = command.angles - angles;
+        let e_w_dot = command.rates - angle_rates;
+        let s_w = outer.sliding(&e_w, &memory.outer_integral);
+        let x = command.rates + outer.k().component_mul(&e_w) + outer.layer.value(&s_w);
+        let omega_c = inverse * x;
+        // ω̇_c, from ω_c = R⁻¹ x
+        let integrand = if rests { Vector3::zeros() } else { outer.k().component_mul(&e_w) };
+        let s_w_dot = e_w_dot + integrand;
+        let x_dot = command.accelerations
+            + outer.k().component_mul(&e_w_dot)
+            + outer.layer.slope(&s_w).component_mul(&s_w_dot);
+        let omega_c_dot = inverse * (x_dot - kinematics::r_dot(angles, &angle_rates) * omega_c);
+
+        // Jia, (8), (11) without M_d, which is not known, and with + I ρ SIGN(s_n)
+        let omega_e = omega_c - rates;
+        let s_n = inner.sliding(&omega_e, &memory.inner_integral);
+        let acceleration = omega_c_dot + inner.k().component_mul(&omega_e) + inner.layer.value(&s_n);
+        let wanted = body.inertia * acceleration + rates.cross(&(body.inertia * rates));
+
+        *memory = TwoLoopMemory {
+            started: true,
+            command,
+            reference,
+            angle_error: e_w,
+            rate_error: omega_e,
+            outer_sliding: s_w,
+            inner_sliding: s_n,
+            rate_command: omega_c,
+            commanded: Commanded::new(body, measured, wanted, *limit_moment),
+            ..*memory
+        };
+        memory.commanded.moment
+    }
+}

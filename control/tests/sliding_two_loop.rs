@@ -1,0 +1,214 @@
+//! The two-loop sliding-mode controller on the scenario of Jia et al.
+
+use control::sliding::FiniteTimeLayer;
+use control::two_loop::{Loop, TwoLoopMemory, TwoLoopSettings};
+use control::{Controller, Measurement, TwoLoopSmc};
+use nalgebra::{Matrix3, Vector3};
+use vehicle::kinematics;
+use vehicle::plant::{self, Plant};
+use vehicle::reference::{Profile, Reference};
+use vehicle::scenario::Scenario;
+
+/// What one run shows.
+#[derive(Debug)]
+struct Outcome {
+    /// Largest error of any angle after 12 s, deg.
+    rest: f64,
+    /// When all errors stay within 0.5 deg, s.
+    settling: f64,
+    /// Largest ‖M‖, N m.
+    moment: f64,
+    /// Largest component of either integral.
+    integrals: (f64, f64),
+}
+
+fn run(
+    settings: &TwoLoopSettings,
+    fed: bool,
+    mut actuate: impl FnMut(Vector3<f64>) -> Vector3<f64>,
+) -> Outcome {
+    let scenario = Scenario::two_loop();
+    let mut controller = TwoLoopSmc::new(*settings).unwrap();
+    let period = controller.period();
+    let mut memory = TwoLoopMemory::default();
+    let mut plant = Plant::new(&scenario.config(period), 0.0).unwrap();
+    let reference = |time: f64| scenario.reference.at(time);
+    let mut outcome = Outcome { rest: 0.0, settling: 0.0, moment: 0.0, integrals: (0.0, 0.0) };
+    let mut achieved_moment = None;
+    for tick in 0..(scenario.duration / period).round() as u64 {
+        let time = tick as f64 * period;
+        let measured = Measurement { angles: plant.angles(), rates: plant.rates(), achieved_moment };
+        let error = (measured.angles - reference(time).angles).amax().to_degrees();
+        if error > 0.5 {
+            outcome.settling = time + period;
+        }
+        if time > 12.0 {
+            outcome.rest = outcome.rest.max(error);
+        }
+        let command = controller.update(&mut memory, tick, time, &measured, &reference);
+        let moment = actuate(command);
+        achieved_moment = fed.then_some(moment);
+        outcome.moment = outcome.moment.max(moment.norm());
+        let (outer, inner) = &mut outcome.integrals;
+        *outer = outer.max(memory.outer_integral.amax());
+        *inner = inner.max(memory.inner_integral.amax());
+        plant.advance(time, (tick + 1) as f64 * period, moment).unwrap();
+    }
+    outcome
+}
+
+fn direct(settings: &TwoLoopSettings) -> Outcome {
+    run(settings, false, |moment| moment)
+}
+
+#[test]
+fn regress_steps_settle_with_a_bounded_moment() {
+    let outcome = direct(&TwoLoopSettings::ours());
+    // The disturbance itself has a norm of 1.73e5 N m.
+    assert!((outcome.moment - 1.778e5).abs() < 1e3, "{outcome:?}");
+    assert!((outcome.settling - 7.64).abs() < 0.05 && (outcome.rest - 0.262).abs() < 0.005, "{outcome:?}");
+    assert!(outcome.integrals.0 < 5e-3 && outcome.integrals.1 < 5e-3, "{outcome:?}");
+}
+
+#[test]
+fn regress_steps_without_filter_ask_for_millions_of_newton_metres() {
+    let ours = TwoLoopSettings::ours();
+    let layer = |rho, epsilon| FiniteTimeLayer { rho: [rho; 3], epsilon: [epsilon; 3], b: [0.5; 3] };
+    let outer = Loop { k: [1.0; 3], layer: layer(0.06, 0.01) };
+    let inner = Loop { k: [4.0; 3], layer: layer(0.5, 0.01) };
+    let outcome = direct(&TwoLoopSettings { filter: 0.0, outer, inner, ..ours });
+    assert!(outcome.settling < 3.0 && outcome.rest < 0.1, "{outcome:?}");
+    assert!((outcome.moment - 3.93e6).abs() < 0.05e6, "{outcome:?}");
+}
+
+#[test]
+fn regress_integrals_that_rest_in_saturation_do_not_wind_up() {
+    let limited = |anti_windup| TwoLoopSettings {
+        filter: 0.0,
+        limit_moment: 1.9e5,
+        anti_windup,
+        ..TwoLoopSettings::ours()
+    };
+    let (with, without) = (direct(&limited(true)), direct(&limited(false)));
+    assert!(with.settling < 6.0 && with.rest < 0.3, "{with:?}");
+    assert!(with.integrals.0 < 0.06 && with.integrals.1 < 0.01, "{with:?}");
+    assert!(without.rest > 90.0, "the attitude is lost: {without:?}");
+    // The same limit in actuators whose moment is measured.
+    let free = TwoLoopSettings { limit_moment: f64::INFINITY, ..limited(true) };
+    let measured = run(&free, true, |moment| moment / (moment.norm() / 1.9e5).max(1.0));
+    assert!((measured.settling - with.settling).abs() < 0.011 && measured.rest < 0.3, "{measured:?}");
+}
+
+/// P of φ = P Θ.
+fn papers_order() -> Matrix3<f64> {
+    Matrix3::new(0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0)
+}
+
+#[test]
+fn oracle_papers_matrix_in_consistent_order_and_axes() {
+    // [bank, sideslip, angle of attack] by [p, q, r] at β = 0. Printed: [[0, 0, 1], [sin α, cos α, 0], [cos α, −sin α, 0]].
+    let alpha = 0.3_f64;
+    let ours = papers_order() * kinematics::r(&Vector3::new(alpha, 0.0, 1.0));
+    let (sa, ca) = alpha.sin_cos();
+    assert!((ours - Matrix3::new(ca, 0.0, sa, sa, 0.0, -ca, 0.0, 1.0, 0.0)).amax() < 1e-15);
+}
+
+#[test]
+fn oracle_rate_command_is_the_same_in_the_papers_order() {
+    // (7) with φ = P Θ at the first tick, without filter; gains differ per axis.
+    let mut settings = TwoLoopSettings { filter: 0.0, ..TwoLoopSettings::ours() };
+    settings.outer.k = [0.5, 0.6, 0.7];
+    settings.outer.layer.rho = [0.02, 0.03, 0.04];
+    let angles = Vector3::new(0.3, 0.05, -0.4);
+    let measured = Measurement { angles, rates: Vector3::new(0.01, -0.02, 0.03), ..Measurement::default() };
+    let reference = Reference {
+        angles: Vector3::new(0.31, 0.0, -0.3),
+        rates: Vector3::new(0.01, 0.02, -0.03),
+        ..Reference::default()
+    };
+    let mut memory = TwoLoopMemory::default();
+    TwoLoopSmc::new(settings).unwrap().update(&mut memory, 0, 0.0, &measured, &|_| reference);
+
+    let p = papers_order();
+    let e = p * (reference.angles - angles);
+    let (k, rho) = (Vector3::new(0.7, 0.6, 0.5), [0.04, 0.03, 0.02]);
+    let smooth = Vector3::from_fn(|i, _| {
+        let x = e[i] / settings.outer.layer.epsilon[0];
+        rho[i] * 2f64.powf(-0.75) * x.abs().sqrt() * x.clamp(-1.0, 1.0)
+    });
+    let r = p * kinematics::r(&angles);
+    let expected = r.try_inverse().unwrap() * (p * reference.rates + k.component_mul(&e) + smooth);
+    assert!((memory.rate_command - expected).norm() < 1e-14);
+}
+
+#[test]
+fn oracle_reaching_law_of_the_inner_loop() {
+    // With M as commanded and no disturbance, ds_n/dt = −ρ f SAT(s_n/ε): the sign of the last term of (10) is +.
+    let settings = TwoLoopSettings { filter: 0.0, ..TwoLoopSettings::ours() };
+    let reference = Reference { angles: Vector3::new(0.02, 0.013, -0.007), ..Reference::default() };
+    let measured = Measurement { rates: Vector3::new(0.01, -0.02, 0.03), ..Measurement::default() };
+    let mut controller = TwoLoopSmc::new(settings).unwrap();
+    let mut memory = TwoLoopMemory::default();
+    let moment = controller.update(&mut memory, 0, 0.0, &measured, &|_| reference);
+    let s = memory.inner_sliding;
+
+    // Short enough for a difference: the plant under that moment, then both loops' errors from its state.
+    let step = 1e-6;
+    let body = settings.body;
+    let state = plant::state(&measured.angles, &measured.rates)
+        + plant::derivative(
+            &body,
+            &plant::state(&measured.angles, &measured.rates),
+            &moment,
+            &Vector3::zeros(),
+        ) * step;
+    let later = Measurement { angles: plant::angles(&state), rates: plant::rates(&state), ..measured };
+    let mut short = TwoLoopSmc::new(TwoLoopSettings { period: step, ..settings }).unwrap();
+    short.update(&mut memory, 1, step, &later, &|_| reference);
+    let expected = -settings.inner.layer.value(&s);
+    assert!(((memory.inner_sliding - s) / step - expected).norm() < 1e-4 * expected.norm());
+}
+
+#[test]
+fn published_disturbance_needs_this_much_reaching() {
+    let needed = TwoLoopSettings::ours().disturbance_acceleration();
+    assert!((needed - Vector3::new(0.183, 0.088, 0.076)).amax() < 6e-4, "{needed}");
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused_by_name() {
+    let ours = TwoLoopSettings::ours();
+    let refusal = |settings: TwoLoopSettings| TwoLoopSmc::new(settings).unwrap_err().to_string();
+    let mut weak = ours;
+    weak.inner.layer.rho[0] = 0.18;
+    let text = refusal(weak);
+    assert!(text.contains("inner.rho[1] = 0.18") && text.contains("0.183"), "{text}");
+    let mut flat = ours;
+    flat.outer.layer.b[1] = 1.0;
+    let text = refusal(flat);
+    assert!(text.contains("outer.b = 1"), "{text}");
+    let text = refusal(TwoLoopSettings { period: 0.1, ..ours });
+    assert!(text.contains("inner.rho"), "{text}");
+    let text = refusal(TwoLoopSettings { filter: -1.0, ..ours });
+    assert!(text.contains("commandFilter.frequency"), "{text}");
+    let text = refusal(TwoLoopSettings { disturbance: [1e5, f64::NAN, 1e5], ..ours });
+    assert!(text.contains("disturbanceMoment.bound"), "{text}");
+}
+
+#[test]
+fn the_filter_follows_a_smooth_reference_without_lag() {
+    let settings = TwoLoopSettings::ours();
+    let mut controller = TwoLoopSmc::new(settings).unwrap();
+    let mut memory = TwoLoopMemory::default();
+    let profile = Profile::sine(Vector3::zeros(), Vector3::repeat(0.1), 0.5, 0.0);
+    let reference = |time: f64| profile.at(time);
+    for tick in 0..1000_u32 {
+        let time = f64::from(tick) * 0.01;
+        let now = reference(time);
+        // A vehicle that is where the reference is.
+        let rates = kinematics::r_inverse(&now.angles) * now.rates;
+        let measured = Measurement { angles: now.angles, rates, ..Measurement::default() };
+        controller.update(&mut memory, tick.into(), time, &measured, &reference);
+        assert!(memory.angle_error.amax() < 1e-6, "{time}: {}", memory.angle_error);
+    }
+}
