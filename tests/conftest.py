@@ -13,7 +13,18 @@ from fmi import Fmu
 ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
 EXPERIMENTS = ROOT / "orchestrator" / "experiments" / "crmpc-2022"
-NAMES = ["ReentryPlant", "CRMPC", "DLMPC", "LQR", "ControlAllocator", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO"]
+NAMES = [
+    "ReentryPlant",
+    "CRMPC",
+    "DLMPC",
+    "LQR",
+    "ControlAllocator",
+    "FBL",
+    "BTVSMC",
+    "BTVSMC_DO",
+    "SOTVSMC_DO",
+    "TwoLoopSMC",
+]
 
 
 def program(name: str) -> Path:

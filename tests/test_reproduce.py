@@ -204,3 +204,37 @@ def test_a_study_with_a_mistake_is_refused_before_anything_runs(tmp_path, old, n
 def test_an_unknown_study_is_refused(tmp_path):
     finished = reproduce(tmp_path / "nothing", tmp_path / "out")
     assert finished.returncode == 2 and "there is no study" in finished.stderr
+
+
+def reproduced(name: str, folder) -> dict:
+    finished = reproduce(EXPERIMENTS.parent / name, folder / "out")
+    assert finished.returncode == 0, finished.stderr
+    return json.loads((folder / "out" / "results.json").read_text())
+
+
+def test_the_claims_of_wu_2015_hold_with_moments_acting_directly(tmp_path):
+    results = reproduced("tvsmc-2015", tmp_path)
+    assert [claim["verdict"] for claim in results["claims"]] == ["holds"] * 4
+    measures = {run: results["runs"][run]["members"][0]["measures"] for run in results["runs"]}
+    # docs/errata.md: RMS of alpha, beta, sigma over 10 to 20 s, deg.
+    for run, expected in [("fbl", (0.205, 0.076, 0.493)), ("btvsmc", (0.047, 0.017, 0.112))]:
+        ours = [measures[run][f"rms-{axis}"] for axis in ("alpha", "beta", "sigma")]
+        assert ours == pytest.approx(expected, abs=5.1e-4)
+        assert measures[run]["settling"] is None
+    for run in ["btvsmc-do", "sotvsmc-do"]:
+        assert measures[run]["settling"] <= 4.0
+    assert max(measures["btvsmc-do"][f"rms-{axis}"] for axis in ("alpha", "beta", "sigma")) <= 5e-4
+
+
+def test_every_controller_flies_every_scenario(tmp_path):
+    results = reproduced("exchange", tmp_path)
+    assert len(results["runs"]) == 27
+    for name, run in results["runs"].items():
+        (member,) = run["members"]
+        assert member["metrics"]["completed"], name
+        # None was designed for the others' scenarios; none loses the attitude all the same.
+        assert member["metrics"]["ems_deg"] < 10.0, name
+    late = {name: run["members"][0]["measures"] for name, run in results["runs"].items()}
+    # In its own scenario the two-loop law leaves the smallest error.
+    errors = {name: m["rms-late-jia"] for name, m in late.items() if name.startswith("jia-")}
+    assert min(errors, key=errors.get) == "jia-two-loop" and errors["jia-two-loop"] < 0.3

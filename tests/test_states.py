@@ -91,6 +91,7 @@ def test_interleaved_instances_do_not_disturb_each_other(fmu, name):
         "ReentryPlant": {"disturbance.kind": "white", "disturbance.seed": 4},
         "CRMPC": {"constraints": "paper"},
         "DLMPC": {"slidingMode.p": 1.0},
+        "TwoLoopSMC": {"commandFilter.frequency": 0.3},
         "LQR": {"weight.P[1]": 20.0},
         "ControlAllocator": {"method": "blending"},
         "FBL": {"gain.p": 4.0},

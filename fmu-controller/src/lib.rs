@@ -13,6 +13,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod tvsmc;
+mod two_loop;
 mod unit;
 
 pub use allocator::ControlAllocator;
@@ -30,7 +31,9 @@ pub type Btvsmc = Unit<tvsmc::TvsmcLaw<tvsmc::Btvsmc>>;
 pub type BtvsmcDo = Unit<tvsmc::TvsmcLaw<tvsmc::BtvsmcDo>>;
 /// `SOTVSMC_DO`: second-order time-varying sliding mode with a disturbance observer.
 pub type SotvsmcDo = Unit<tvsmc::TvsmcLaw<tvsmc::SotvsmcDo>>;
+/// `TwoLoopSMC`: two-loop sliding-mode control.
+pub type TwoLoopSmc = Unit<two_loop::TwoLoopLaw>;
 /// `LQR`: linear-quadratic regulator.
 pub type Lqr = Unit<lqr::LqrLaw>;
 
-fmi2_export::export_fmus!(Crmpc, Dlmpc, Lqr, ControlAllocator, Fbl, Btvsmc, BtvsmcDo, SotvsmcDo);
+fmi2_export::export_fmus!(Crmpc, Dlmpc, Lqr, ControlAllocator, Fbl, Btvsmc, BtvsmcDo, SotvsmcDo, TwoLoopSmc);

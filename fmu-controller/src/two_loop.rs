@@ -1,0 +1,138 @@
+//! `TwoLoopSMC`: its own parameters and outputs.
+
+use crate::law::{Law, Vehicle};
+use crate::table::{self, ANGLES, RATES, sampled_inputs, vector};
+use crate::unit::Unit;
+use control::two_loop::{Loop, TwoLoopMemory, TwoLoopSettings, TwoLoopSmc};
+use fmi2_export::table::{discrete_output, parameter};
+use fmi2_export::{Failure, Table};
+use model_description::unit;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Parameters and outputs of the two-loop sliding mode.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct TwoLoopLaw {
+    settings: TwoLoopSettings,
+    outer_sliding: Vector3<f64>,
+    inner_sliding: Vector3<f64>,
+    rate_command: Vector3<f64>,
+}
+
+impl Default for TwoLoopLaw {
+    fn default() -> Self {
+        let zero = Vector3::zeros();
+        let settings = TwoLoopSettings::ours();
+        Self { settings, outer_sliding: zero, inner_sliding: zero, rate_command: zero }
+    }
+}
+
+impl Law for TwoLoopLaw {
+    type Controller = TwoLoopSmc;
+
+    const NAME: &'static str = "TwoLoopSMC";
+    const DESCRIPTION: &'static str = "Two-loop sliding-mode attitude controller of Jia, Zhou and Zhou";
+    const DOCUMENTATION: &'static str = include_str!("two_loop.html");
+
+    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
+        let table = table::period(table, 0.01, |law| &mut law.settings.period);
+        let outer = ["outer", "outer loop"];
+        let table = reaching(table, outer, ANGLES, &unit::angular_rate(), &unit::angle(), |law| {
+            &mut law.settings.outer
+        });
+        let inner = ["inner", "inner loop"];
+        let (rho, epsilon) = (unit::angular_acceleration(), unit::angular_rate());
+        let table = reaching(table, inner, RATES, &rho, &epsilon, |law| &mut law.settings.inner);
+        outputs(actuators(table))
+    }
+
+    #[allow(private_interfaces)]
+    fn design(&self, vehicle: &Vehicle) -> Result<TwoLoopSmc, Failure> {
+        let settings =
+            TwoLoopSettings { body: vehicle.body, limit_moment: vehicle.saturates_at(), ..self.settings };
+        TwoLoopSmc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    fn show(&mut self, memory: &TwoLoopMemory) {
+        self.outer_sliding = memory.outer_sliding;
+        self.inner_sliding = memory.inner_sliding;
+        self.rate_command = memory.rate_command;
+    }
+}
+
+type Controller = Table<Unit<TwoLoopLaw>>;
+type Field = fn(&mut Loop) -> &mut [f64; 3];
+
+/// The parameters of one loop, per axis.
+fn reaching(
+    mut table: Controller,
+    [name, of]: [&str; 2],
+    axes: [(&str, &str); 3],
+    rho: &unit::Unit,
+    epsilon: &unit::Unit,
+    settings: fn(&mut TwoLoopLaw) -> &mut Loop,
+) -> Controller {
+    let gain = unit::gain_rate();
+    let parameters: [(&str, &str, Option<&unit::Unit>, Field); 4] = [
+        ("k", "Gain K on the integral of the error", Some(&gain), |l| &mut l.k),
+        ("rho", "Reaching gain rho", Some(rho), |l| &mut l.layer.rho),
+        ("epsilon", "Thickness epsilon of the boundary layer", Some(epsilon), |l| &mut l.layer.epsilon),
+        ("b", "Power b of the finite-time factor, below 1", None, |l| &mut l.layer.b),
+    ];
+    for (symbol, text, unit, field) in parameters {
+        for (i, (_, meaning)) in axes.into_iter().enumerate() {
+            let text = format!("{text}, {of}: {meaning}");
+            let real = parameter(&format!("{name}.{symbol}[{}]", i + 1), &text).real().min(0.0);
+            let real = match unit {
+                Some(unit) => real.unit(unit.clone()),
+                None => real.max(1.0),
+            };
+            table = table.real(real, move |m| &mut field(settings(&mut m.law))[i]);
+        }
+    }
+    table
+}
+
+fn actuators(mut table: Controller) -> Controller {
+    for (i, axis) in ["x", "y", "z"].into_iter().enumerate() {
+        let text = format!("Bound on the disturbance moment about {axis} that the inner loop must overcome");
+        let bound = parameter(&format!("disturbanceMoment.bound[{}]", i + 1), &text).real();
+        table = table.real(bound.unit(unit::moment()).min(0.0).nominal(1e5), move |m| {
+            &mut m.law.settings.disturbance[i]
+        });
+    }
+    let filter = parameter(
+        "commandFilter.frequency",
+        "Frequency of the critically damped filter of the command; 0 for none",
+    );
+    let on = parameter("antiWindup", "Whether the integrals rest while the actuators saturate");
+    let threshold = parameter(
+        "antiWindupThreshold",
+        "Norm of the acceleration that the actuators fail to give, from which on they count as saturated",
+    );
+    table::achieved_moment(table)
+        .real(filter.real().unit(unit::gain_rate()).min(0.0), |m| &mut m.law.settings.filter)
+        .boolean(on, |m| &mut m.law.settings.anti_windup)
+        .real(threshold.real().unit(unit::angular_acceleration()).min(0.0).nominal(0.01), |m| {
+            &mut m.law.settings.threshold
+        })
+}
+
+fn outputs(table: Controller) -> Controller {
+    let sampled = |name: String, text: String| discrete_output(&name, &text).depends_on(sampled_inputs());
+    let outer = |axis: &str, meaning: &str| {
+        let text = format!("Sliding variable of the {meaning} at the last tick");
+        sampled(format!("slidingVariable.{axis}"), text).real().unit(unit::angle()).nominal(1e-2)
+    };
+    let inner = |axis: &str, meaning: &str| {
+        let text = format!("Sliding variable of the {meaning} rate at the last tick");
+        sampled(format!("innerSlidingVariable.{axis}"), text).real().unit(unit::angular_rate()).nominal(1e-2)
+    };
+    let command = |axis: &str, meaning: &str| {
+        let text = format!("Body {meaning} rate that the outer loop commands");
+        sampled(format!("rateCommand.{axis}"), text).real().unit(unit::angular_rate()).nominal(0.05)
+    };
+    let table = vector(table, ANGLES, outer, |m| &mut m.law.outer_sliding);
+    let table = vector(table, RATES, inner, |m| &mut m.law.inner_sliding);
+    vector(table, RATES, command, |m| &mut m.law.rate_command)
+}
