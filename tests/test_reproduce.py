@@ -224,6 +224,12 @@ def test_the_claims_of_wu_2015_hold_with_moments_acting_directly(tmp_path):
     for run in ["btvsmc-do", "sotvsmc-do"]:
         assert measures[run]["settling"] <= 4.0
     assert max(measures["btvsmc-do"][f"rms-{axis}"] for axis in ("alpha", "beta", "sigma")) <= 5e-4
+    # With surfaces at 10 deg/s, jets switched by PWPF and all biases.
+    for run in ["btvsmc-do-allocated", "sotvsmc-do-allocated"]:
+        assert measures[run]["settling"] <= 4.5 and measures[run]["largest-error"] <= 0.05
+        assert measures[run]["pulses"] > 0
+        rudders = results["runs"][run]["members"][0]["within"]["rudders"]
+        assert rudders["inside"] == rudders["samples"]
 
 
 def test_every_controller_flies_every_scenario(tmp_path):

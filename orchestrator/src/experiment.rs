@@ -269,13 +269,31 @@ impl Experiment {
     /// # Errors
     /// If there is no such component.
     pub fn set(&mut self, target: &str, value: Value) -> Result<(), String> {
+        let (component, parameter) = self.target(target)?;
+        component.parameters.insert(parameter.to_string(), Spanned::new(0..0, value));
+        Ok(())
+    }
+
+    /// Leaves `component.parameter` at the FMU's own value.
+    ///
+    /// # Errors
+    /// If there is no such component, or the experiment does not set it.
+    pub fn unset(&mut self, target: &str) -> Result<(), String> {
+        let (component, parameter) = self.target(target)?;
+        let hint = names::hint(parameter, component.parameters.keys().map(String::as_str));
+        match component.parameters.remove(parameter) {
+            Some(_) => Ok(()),
+            None => Err(format!("the experiment does not set \"{target}\"{hint}")),
+        }
+    }
+
+    fn target<'a>(&mut self, target: &'a str) -> Result<(&mut Component, &'a str), String> {
         let (name, parameter) =
             names::split(target).ok_or_else(|| format!("\"{target}\" is no component.parameter"))?;
         let hint = names::hint(name, self.components.keys().map(String::as_str));
         let component =
             self.components.get_mut(name).ok_or_else(|| format!("there is no component \"{name}\"{hint}"))?;
-        component.parameters.insert(parameter.to_string(), Spanned::new(0..0, value));
-        Ok(())
+        Ok((component, parameter))
     }
 }
 

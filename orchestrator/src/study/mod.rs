@@ -23,6 +23,7 @@
 //! experiment = "lqr.toml"              # beside this file
 //! fmu = { controller = "FBL.fmu" }     # optional: another FMU for a component
 //! set = { "plant.disturbance.kind" = "none" }
+//! unset = ["controller.weight.P[1]"]   # optional: parameters that the experiment sets, and this FMU has not
 //! vary = { parameter = "plant.disturbance.seed", first = 1, count = 20 }   # optional: one run for each value
 //! timed = true                         # its first run has the machine for itself
 //! within = ["tube"]                    # bounds that it is held against
@@ -203,6 +204,9 @@ pub struct Run {
     /// Parameters that differ from the experiment's.
     #[serde(default)]
     pub set: BTreeMap<String, Value>,
+    /// Parameters of the experiment that are left at the FMU's own value.
+    #[serde(default)]
+    pub unset: Vec<String>,
     /// A parameter that takes several values.
     pub vary: Option<Vary>,
     /// Whether its first run has the machine for itself.
@@ -554,6 +558,9 @@ impl Study {
                 Some(component) => component.fmu = Spanned::new(0..0, fmu.clone()),
                 None => return Err(fault(format!("fmu: there is no component \"{name}\"{hint}"))),
             }
+        }
+        for target in &run.unset {
+            experiment.unset(target).map_err(fault)?;
         }
         for (target, value) in &run.set {
             experiment.set(target, value.clone()).map_err(fault)?;

@@ -275,8 +275,12 @@ impl Observer for Bounded<'_> {
     }
 }
 
-/// Collects signals.
+/// A series holds about this many points at most.
+const POINTS: u64 = 4000;
+
+/// Collects signals, at every so many communication points.
 struct Watch {
+    stride: u64,
     resolved: Vec<(Signal, Resolved)>,
     time: Vec<f64>,
     signals: BTreeMap<Signal, Vec<f64>>,
@@ -288,14 +292,18 @@ impl Watch {
             .iter()
             .map(|signal| Ok((signal.clone(), preparation.resolve(signal, plan)?)))
             .collect::<Result<Vec<_>, Error>>()?;
-        let room = plan.clock.ticks() as usize + 1;
+        let stride = plan.clock.ticks().div_ceil(POINTS).max(1);
+        let room = (plan.clock.ticks() / stride) as usize + 2;
         let signals = signals.iter().map(|signal| (signal.clone(), Vec::with_capacity(room))).collect();
-        Ok(Self { resolved, time: Vec::with_capacity(room), signals })
+        Ok(Self { stride, resolved, time: Vec::with_capacity(room), signals })
     }
 }
 
 impl Observer for Watch {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        if !sample.tick.is_multiple_of(self.stride) && !sample.last {
+            return Ok(());
+        }
         self.time.push(sample.time);
         for ((_, resolved), values) in self.resolved.iter().zip(self.signals.values_mut()) {
             values.push(resolved.value(sample.values));

@@ -23,7 +23,7 @@ use std::time::Instant;
 /// Members of a run that make up one part.
 const MEMBERS_PER_PART: u32 = 25;
 /// To be raised when what a part leaves is no longer what it was.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// How a study is reproduced.
 #[derive(Clone, Debug, Default)]
@@ -229,6 +229,7 @@ fn keys(study: &Study, preparations: &[Preparation]) -> Result<Vec<String>, Erro
             "version": env!("CARGO_PKG_VERSION"),
             "experiment": plan.experiment.source.text,
             "set": run.set,
+            "unset": run.unset,
             "vary": run.vary.as_ref().map(|vary| (&vary.parameter, vary.first)),
             "within": within,
             "measures": measures,
@@ -379,6 +380,7 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
                 "experiment": run.experiment,
                 "fmu": run.fmu,
                 "set": run.set,
+                "unset": run.unset,
                 "members": result.members,
                 "solver_ms": result.series.solver_ms,
             });
