@@ -388,28 +388,7 @@ fn tuned_gains_spend_less_moment_at_no_larger_error() {
 #[test]
 fn another_evaluation_of_a_tick_leaves_no_trace() {
     let reference = reference();
-    let garbage = [
-        Measurement {
-            angles: Vector3::new(0.5, -0.4, 1.0),
-            rates: Vector3::new(0.2, -0.3, 0.1),
-            ..Measurement::default()
-        },
-        Measurement {
-            angles: Vector3::repeat(f64::NAN),
-            rates: Vector3::repeat(f64::NAN),
-            ..Measurement::default()
-        },
-        Measurement {
-            angles: Vector3::repeat(1.0),
-            rates: Vector3::repeat(f64::INFINITY),
-            ..Measurement::default()
-        },
-        Measurement {
-            angles: Vector3::repeat(1e300),
-            rates: Vector3::repeat(-1e300),
-            ..Measurement::default()
-        },
-    ];
+    let garbage = harness::garbage();
     let (mut disturbed_controller, mut calm_controller) = (dlmpc(), dlmpc());
     let (mut disturbed, mut calm) =
         (Sampled::new(0.0, Memory::default()), Sampled::new(0.0, Memory::default()));

@@ -168,3 +168,15 @@ pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync)
         handles.into_iter().flat_map(|handle| handle.join().unwrap()).collect()
     })
 }
+
+/// Measurements that no controller may remember once the tick is evaluated again.
+pub fn garbage() -> [Measurement; 4] {
+    let measured = |angles, rates| Measurement { angles, rates, ..Measurement::default() };
+    let all = Vector3::repeat;
+    [
+        measured(Vector3::new(0.5, -0.4, 1.0), Vector3::new(0.2, -0.3, 0.1)),
+        measured(all(f64::NAN), all(f64::NAN)),
+        measured(all(1.0), all(f64::INFINITY)),
+        measured(all(1e300), all(-1e300)),
+    ]
+}

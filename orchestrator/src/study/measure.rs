@@ -58,7 +58,8 @@ pub struct Gauge<'a> {
     /// What is measured.
     pub measure: &'a Measure,
     signals: Vec<Resolved>,
-    /// Of each signal: the value before, and the first one.
+    /// Of each signal: the value now, the one before, and the first one.
+    now: Vec<f64>,
     before: Vec<f64>,
     first: Vec<f64>,
     sum: f64,
@@ -72,8 +73,19 @@ pub struct Gauge<'a> {
 impl<'a> Gauge<'a> {
     /// Nothing measured yet.
     pub fn new(measure: &'a Measure, signals: Vec<Resolved>) -> Self {
-        let (before, first) = (Vec::new(), Vec::new());
-        Self { measure, signals, before, first, sum: 0.0, count: 0, largest: 0.0, pulses: 0, settled: None }
+        let (now, before, first) = (Vec::new(), Vec::new(), Vec::new());
+        Self {
+            measure,
+            signals,
+            now,
+            before,
+            first,
+            sum: 0.0,
+            count: 0,
+            largest: 0.0,
+            pulses: 0,
+            settled: None,
+        }
     }
 
     /// The number, if there is one.
@@ -110,8 +122,11 @@ impl<'a> Gauge<'a> {
 
 impl Observer for Gauge<'_> {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
-        let values: Vec<f64> = self.signals.iter().map(|signal| signal.value(sample.values)).collect();
-        self.see(sample.time, &values);
+        let mut now = std::mem::take(&mut self.now);
+        now.clear();
+        now.extend(self.signals.iter().map(|signal| signal.value(sample.values)));
+        self.see(sample.time, &now);
+        self.now = now;
         Ok(())
     }
 }

@@ -4,6 +4,7 @@ use super::measure::Gauge;
 use super::signal::{Resolved, Signal};
 use super::{Run, Study};
 use crate::error::Error;
+use crate::experiment::Experiment;
 use crate::master::{Observer, Sample};
 use crate::metrics::{Metrics, larger};
 use crate::run::{Opened, Plan};
@@ -119,14 +120,19 @@ impl Wanted {
 pub struct Preparation<'a> {
     study: &'a Study,
     run: &'a Run,
-    wanted: Wanted,
-    paths: Vec<String>,
+    /// What the figures draw of it.
+    pub wanted: Wanted,
+    /// Read once, so that all members are of the same text.
+    experiment: Experiment,
     fmu_dirs: &'a [PathBuf],
 }
 
 impl<'a> Preparation<'a> {
-    /// Collects what is wanted of a run.
-    pub fn new(study: &'a Study, run: &'a Run, fmu_dirs: &'a [PathBuf]) -> Self {
+    /// Collects what is wanted of a run, and reads its experiment.
+    ///
+    /// # Errors
+    /// If the experiment cannot be read, or has not what the run changes in it.
+    pub fn new(study: &'a Study, run: &'a Run, fmu_dirs: &'a [PathBuf]) -> Result<Self, Error> {
         let wanted = Wanted::of(study, run);
         let bounded = study.bounds_of(run).flat_map(|(_, signals)| signals);
         let measured = study.measures_of(run).flat_map(|(_, signals)| signals);
@@ -137,7 +143,11 @@ impl<'a> Preparation<'a> {
             .chain(measured)
             .flat_map(|signal| signal.paths().into_iter().map(String::from).collect::<Vec<_>>())
             .collect();
-        Self { study, run, wanted, paths: paths.into_iter().collect(), fmu_dirs }
+        let paths: Vec<&str> = paths.iter().map(String::as_str).collect();
+        let experiment = study
+            .experiment(run, &paths)
+            .map_err(|error| Error::Run { run: run.id.get_ref().clone(), source: Box::new(error) })?;
+        Ok(Self { study, run, wanted, experiment, fmu_dirs })
     }
 
     /// The experiment with all names resolved, for the member with this number.
@@ -145,8 +155,7 @@ impl<'a> Preparation<'a> {
     /// # Errors
     /// Everything that is wrong with the experiment, the FMUs, or the signals.
     pub fn plan(&self, member: u32, opened: &mut Opened) -> Result<Plan, Error> {
-        let paths: Vec<&str> = self.paths.iter().map(String::as_str).collect();
-        let mut experiment = self.study.experiment(self.run, &paths)?;
+        let mut experiment = self.experiment.clone();
         if let Some(vary) = &self.run.vary {
             let value = Value::Integer(i64::from(vary.first) + i64::from(member));
             experiment.set(&vary.parameter, value).map_err(|message| self.fault(&message))?;

@@ -103,11 +103,14 @@ pub fn reproduce(mut study: Study, options: &Options) -> Result<Report, Error> {
     }
     let study = &study;
     let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(name(study)));
-    let preparations: Vec<Preparation> =
-        study.runs.iter().map(|run| Preparation::new(study, run, &options.fmu_dirs)).collect();
-    check(study, &preparations)?;
-
-    let keys = keys(study, &preparations)?;
+    let preparations = study
+        .runs
+        .iter()
+        .map(|run| Preparation::new(study, run, &options.fmu_dirs))
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut opened = Opened::default();
+    check(study, &preparations, &mut opened)?;
+    let keys = keys(study, &preparations, &mut opened)?;
     let all = parts(study);
     let file = |part: &Part| {
         let id = study.runs[part.run].id.get_ref();
@@ -164,7 +167,7 @@ fn name(study: &Study) -> String {
 }
 
 /// Everything that can be checked before anything is run.
-fn check(study: &Study, preparations: &[Preparation]) -> Result<(), Error> {
+fn check(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Result<(), Error> {
     let fault = |message: String| study.source.error(&(0..0), message);
     claims::check(study).map_err(fault)?;
     for row in study.tables.iter().flat_map(|table| &table.rows) {
@@ -177,8 +180,7 @@ fn check(study: &Study, preparations: &[Preparation]) -> Result<(), Error> {
             }
         }
     }
-    let mut opened = Opened::default();
-    preparations.iter().try_for_each(|preparation| preparation.check(&mut opened))
+    preparations.iter().try_for_each(|preparation| preparation.check(opened))
 }
 
 /// The parts of all runs, in order. Where a run is timed, its first member is a part of its own.
@@ -199,12 +201,11 @@ fn parts(study: &Study) -> Vec<Part> {
 
 /// For each run, a hash of all that its parts depend on: the experiment, what the study changes in it and wants of it, the
 /// FMUs, and this program.
-fn keys(study: &Study, preparations: &[Preparation]) -> Result<Vec<String>, Error> {
+fn keys(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Result<Vec<String>, Error> {
     let mut archives: BTreeMap<PathBuf, String> = BTreeMap::new();
-    let mut opened = Opened::default();
     let mut keys = Vec::new();
     for (run, preparation) in study.runs.iter().zip(preparations) {
-        let plan = preparation.plan(0, &mut opened)?;
+        let plan = preparation.plan(0, opened)?;
         let mut fmus = BTreeMap::new();
         for (name, fmu) in plan.order.iter().zip(&plan.fmus) {
             if !archives.contains_key(&fmu.path) {
@@ -223,7 +224,6 @@ fn keys(study: &Study, preparations: &[Preparation]) -> Result<Vec<String>, Erro
                 json!([measure.id, format!("{:?}", measure.kind), signals, measure.over, measure.band])
             })
             .collect();
-        let wanted = super::part::Wanted::of(study, run);
         let all = json!({
             "format": FORMAT,
             "version": env!("CARGO_PKG_VERSION"),
@@ -233,8 +233,8 @@ fn keys(study: &Study, preparations: &[Preparation]) -> Result<Vec<String>, Erro
             "vary": run.vary.as_ref().map(|vary| (&vary.parameter, vary.first)),
             "within": within,
             "measures": measures,
-            "series": wanted.series,
-            "spread": wanted.spread,
+            "series": preparation.wanted.series,
+            "spread": preparation.wanted.spread,
             "timed": run.timed,
             "fmus": fmus,
         });
