@@ -287,6 +287,13 @@ impl Experiment {
         }
     }
 
+    /// Whether it sets the parameter `component.parameter`.
+    pub fn sets(&self, target: &str) -> bool {
+        names::split(target).is_some_and(|(name, parameter)| {
+            self.components.get(name).is_some_and(|component| component.parameters.contains_key(parameter))
+        })
+    }
+
     fn target<'a>(&mut self, target: &'a str) -> Result<(&mut Component, &'a str), String> {
         let (name, parameter) =
             names::split(target).ok_or_else(|| format!("\"{target}\" is no component.parameter"))?;

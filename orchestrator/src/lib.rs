@@ -29,6 +29,7 @@ pub mod report;
 pub mod run;
 pub mod settings;
 pub mod sidecar;
+pub mod stopwatch;
 pub mod study;
 pub mod unit;
 pub mod wiring;

@@ -7,9 +7,11 @@
 use crate::clock::Clock;
 use crate::error::{Error, UnitFailure};
 use crate::experiment::Coupling;
+use crate::stopwatch::{Spent, Stopwatch};
 use crate::unit::{CoSimulationUnit, Outcome};
 use crate::wiring::{Carrier, Port, Wire};
 use std::ops::Range;
+use std::rc::Rc;
 
 /// What the master steps, in the order in which inputs are set.
 pub struct Member {
@@ -49,6 +51,8 @@ pub struct Master {
     members: Vec<Member>,
     inputs: Vec<Inputs>,
     probe: Probe,
+    /// The time spent in each unit, if it is measured.
+    spent: Vec<Rc<Spent>>,
 }
 
 /// Values of one type on their way to one unit: one get per source, one set.
@@ -202,7 +206,24 @@ impl Master {
         probes: &[Port],
     ) -> Self {
         let inputs = (0..members.len()).map(|target| Inputs::new(wires, target)).collect();
-        Self { clock, coupling, members, inputs, probe: Probe::new(probes) }
+        Self { clock, coupling, members, inputs, probe: Probe::new(probes), spent: Vec::new() }
+    }
+
+    /// From now on the time spent in each unit is measured.
+    pub fn measure_time(&mut self) {
+        let members = std::mem::take(&mut self.members).into_iter();
+        (self.members, self.spent) = members
+            .map(|Member { name, every, unit }| {
+                let (unit, spent) = Stopwatch::new(unit);
+                (Member { name, every, unit: Box::new(unit) }, spent)
+            })
+            .unzip();
+    }
+
+    /// Mean wall-clock time (s) spent in each unit per step, by name; empty if it is not measured.
+    pub fn step_seconds(&self) -> impl Iterator<Item = (&str, f64)> {
+        let spent = self.members.iter().zip(&self.spent);
+        spent.filter_map(|(member, spent)| Some((member.name.as_str(), spent.seconds_per_step()?)))
     }
 
     /// Initializes all units: their inputs are passed on in initialization mode, in order.

@@ -6,6 +6,7 @@ use crate::master::{Observer, Sample};
 use crate::names;
 use crate::wiring::{Part, Port, find};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Variables that observers look at, each read once.
 #[derive(Default)]
@@ -127,6 +128,8 @@ pub struct Metrics {
     pub max_moment_ratio: Option<f64>,
     /// M̄, N m.
     pub moment_limit: Option<f64>,
+    /// The larger of largest ‖ω‖ and largest ‖m‖, each over its bound.
+    pub worst_limit_ratio: Option<f64>,
     /// Mean duration of a solution, ms.
     pub solver_ms_mean: Option<f64>,
     /// Duration that 99 % of the solutions do not exceed, ms.
@@ -147,6 +150,9 @@ pub struct Metrics {
     pub samples: u64,
     /// Whether the run got to its stop time.
     pub completed: bool,
+    /// Mean time spent in each component per step of its own, µs, where it was measured.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub step_us: BTreeMap<String, f64>,
 }
 
 /// Sums up the figures of merit.
@@ -201,13 +207,17 @@ impl Merit {
         // Nearest rank.
         let p99 = (times.len() * 99).div_ceil(100).checked_sub(1).and_then(|rank| times.get(rank));
         let mean = times.iter().sum::<f64>() / times.len() as f64;
+        let max_rate = rate.map(|_| self.largest[0].sqrt());
+        let max_moment_ratio = moment.and(self.limits.moment).map(|limit| self.largest[1].sqrt() / limit);
+        let max_rate_ratio = max_rate.zip(self.limits.rate).map(|(rate, limit)| rate / limit);
         Metrics {
             ems_deg: attitude.and(reference).and_then(|_| root_mean(self.sums[0])).map(f64::to_degrees),
             cms: moment.and(self.limits.moment).and_then(|limit| root_mean(self.sums[1]).map(|m| m / limit)),
-            max_rate_deg_s: rate.map(|_| self.largest[0].sqrt().to_degrees()),
+            max_rate_deg_s: max_rate.map(f64::to_degrees),
             rate_limit_deg_s: self.limits.rate.map(f64::to_degrees),
-            max_moment_ratio: moment.and(self.limits.moment).map(|limit| self.largest[1].sqrt() / limit),
+            max_moment_ratio,
             moment_limit: self.limits.moment,
+            worst_limit_ratio: max_rate_ratio.into_iter().chain(max_moment_ratio).reduce(larger),
             solver_ms_mean: milliseconds(times.first().map(|_| &mean)),
             solver_ms_p99: milliseconds(p99),
             solver_ms_max: milliseconds(times.last()),
@@ -218,6 +228,7 @@ impl Merit {
             loop_delay_s: loop_delay,
             samples: self.samples,
             completed: self.completed,
+            step_us: BTreeMap::new(),
         }
     }
 }

@@ -238,7 +238,10 @@ impl Plan {
     }
 
     /// All parameters as the units have them after initialization, except texts.
-    fn parameters(&self, master: &mut Master) -> Result<sidecar::Parameters, Error> {
+    ///
+    /// # Errors
+    /// What a unit said.
+    pub fn parameters(&self, master: &mut Master) -> Result<sidecar::Parameters, Error> {
         let parts = self.parts();
         let mut all = sidecar::Parameters::new();
         for part in &parts {

@@ -21,6 +21,9 @@ pub struct Measure {
     pub over: Option<[f64; 2]>,
     /// For `settling`: fraction of a signal's first magnitude.
     pub band: Option<f64>,
+    /// For `settling`: for how long (s) the signals must have been seen within the band; 0 if it is left out.
+    #[serde(default)]
+    pub hold: f64,
 }
 
 /// What is done with the signals.
@@ -45,9 +48,12 @@ impl Measure {
             return Some(format!("{name}: over must be [from, to] with from below to"));
         }
         match (self.kind, self.band) {
-            (Kind::Settling, Some(band)) if band > 0.0 => None,
-            (Kind::Settling, _) => Some(format!("{name}: settling wants a band above 0")),
+            (Kind::Settling, Some(band)) if band > 0.0 && self.hold >= 0.0 => None,
+            (Kind::Settling, _) => {
+                Some(format!("{name}: settling wants a band above 0, and a hold not below"))
+            }
             (_, Some(_)) => Some(format!("{name}: band is for settling only")),
+            (_, None) if self.hold != 0.0 => Some(format!("{name}: hold is for settling only")),
             _ => None,
         }
     }
@@ -68,6 +74,8 @@ pub struct Gauge<'a> {
     pulses: u64,
     /// Time of the first sample after which all signals have stayed within the band.
     settled: Option<f64>,
+    /// Time of the last sample.
+    last: f64,
 }
 
 impl<'a> Gauge<'a> {
@@ -85,6 +93,7 @@ impl<'a> Gauge<'a> {
             largest: 0.0,
             pulses: 0,
             settled: None,
+            last: 0.0,
         }
     }
 
@@ -94,7 +103,7 @@ impl<'a> Gauge<'a> {
         match self.measure.kind {
             Kind::Rms => Some((self.sum / self.count as f64).sqrt()),
             Kind::Largest => Some(self.largest),
-            Kind::Settling => self.settled,
+            Kind::Settling => self.settled.filter(|settled| self.last - settled >= self.measure.hold),
             Kind::Pulses => Some(self.pulses as f64),
         }
     }
@@ -108,6 +117,7 @@ impl<'a> Gauge<'a> {
             self.before = vec![0.0; values.len()];
         }
         self.count += 1;
+        self.last = time;
         self.sum += values.iter().map(|value| value * value).sum::<f64>();
         self.largest = values.iter().map(|value| value.abs()).fold(self.largest, larger);
         let band = self.measure.band.unwrap_or(0.0);
@@ -136,8 +146,18 @@ mod tests {
     use super::*;
 
     fn measured(kind: Kind, over: Option<[f64; 2]>, band: Option<f64>, rows: &[[f64; 2]]) -> Option<f64> {
+        held(kind, over, band, 0.0, rows)
+    }
+
+    fn held(
+        kind: Kind,
+        over: Option<[f64; 2]>,
+        band: Option<f64>,
+        hold: f64,
+        rows: &[[f64; 2]],
+    ) -> Option<f64> {
         let signals = Spanned::new(0..0, "x".to_string());
-        let measure = Measure { id: "m".into(), kind, signals, over, band };
+        let measure = Measure { id: "m".into(), kind, signals, over, band, hold };
         let mut gauge = Gauge::new(&measure, Vec::new());
         for (time, row) in rows.iter().enumerate() {
             gauge.see(time as f64, row);
@@ -155,6 +175,9 @@ mod tests {
         // The first signal is within 0.2 from 4 s on, the second within 0.02 from 3 s on.
         assert_eq!(measured(Kind::Settling, None, Some(0.02), &rows), Some(4.0));
         assert_eq!(measured(Kind::Settling, None, Some(0.001), &rows), None);
+        // Seen for 1 s, until 5 s.
+        assert_eq!(held(Kind::Settling, None, Some(0.02), 1.0, &rows), Some(4.0));
+        assert_eq!(held(Kind::Settling, None, Some(0.02), 1.1, &rows), None);
         assert_eq!(measured(Kind::Rms, Some([7.0, 8.0]), None, &rows), None);
     }
 
@@ -166,6 +189,7 @@ mod tests {
             signals: Spanned::new(0..0, String::new()),
             over,
             band,
+            hold: 0.0,
         };
         assert!(measure(Kind::Rms, Some([2.0, 1.0]), None).fault().unwrap().contains("over"));
         assert!(measure(Kind::Settling, None, None).fault().unwrap().contains("band"));

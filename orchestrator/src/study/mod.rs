@@ -28,6 +28,16 @@
 //! timed = true                         # its first run has the machine for itself
 //! within = ["tube"]                    # bounds that it is held against
 //! measures = ["settling"]              # further numbers that are taken of it
+//! group = "…"                          # optional: heading of its rows in an overview
+//!
+//! [[grid]]                             # or: every candidate on every scenario, the runs SCENARIO-CANDIDATE
+//! [[grid.candidate]]                   # id, label, color, fmu and set as in [[run]]
+//! id = "lqr"
+//! without = ["controller.horizon"]     # parameters that it has not, left out where an experiment sets them
+//! [[grid.scenario]]                    # id, experiment, set, timed, within and measures as in [[run]]
+//! id = "calm"
+//! label = "Calm air"                   # the group
+//! set_for.lqr = { "controller.limit.rate" = "2 deg/s" }         # for single candidates
 //!
 //! [signals]                            # lists of signals, see [`signal`]
 //! deviation = ["plant.attitude.alpha - controller.nominal.alpha"]
@@ -43,13 +53,14 @@
 //! signals = "deviation"
 //! band = 0.02
 //! over = [0.0, 20.0]                   # optional
+//! hold = 1.0                           # s, optional: settled only if it was seen for so long
 //!
 //! [[figure]]
 //! id = "fig-4"                         # name of its files
 //! title = "…"
 //! caption = "…"
 //! columns = 2
-//! runs = ["lqr"]
+//! runs = ["lqr", "calm-*"]             # a final * stands for all that fit
 //!
 //! [[figure.panel]]
 //! label = "roll rate p, deg/s"
@@ -71,7 +82,7 @@
 //! [[table.row]]
 //! label = "EMS of LQR, deg"
 //! paper = "ems.lqr"                    # optional
-//! ours = "lqr.ems_deg"                 # run.metric
+//! ours = "lqr.ems_deg"                 # run.metric, or run.parameter.COMPONENT.NAME
 //!
 //! [[overview]]                         # all runs against metrics
 //! title = "…"
@@ -92,6 +103,7 @@
 
 pub mod claims;
 pub mod figures;
+pub mod grid;
 pub mod measure;
 pub mod page;
 pub mod part;
@@ -104,6 +116,7 @@ use crate::error::Error;
 use crate::experiment::{Experiment, Source};
 use crate::figure::Color;
 use crate::names;
+use grid::Grid;
 use measure::Measure;
 use serde::{Deserialize, Serialize};
 use signal::Signal;
@@ -132,8 +145,11 @@ pub struct Study {
     #[serde(default, rename = "assumption")]
     pub assumptions: Vec<Assumption>,
     /// What is run.
-    #[serde(rename = "run")]
+    #[serde(default, rename = "run")]
     pub runs: Vec<Run>,
+    /// Further runs, added to `runs` when the study is read.
+    #[serde(default, rename = "grid")]
+    grids: Vec<Grid>,
     /// Lists of signals, by name.
     #[serde(default)]
     pub signals: BTreeMap<String, Vec<Signal>>,
@@ -196,6 +212,9 @@ pub struct Run {
     pub label: String,
     /// Colour of its curves.
     pub color: Color,
+    /// Heading of its rows in an overview; none if it is empty.
+    #[serde(default)]
+    pub group: String,
     /// Experiment file, beside the study.
     pub experiment: PathBuf,
     /// Components that are other FMUs than in the experiment.
@@ -496,11 +515,31 @@ impl Study {
         let source = Source { path: path.to_path_buf(), text };
         let mut study: Self = source.read()?;
         study.source = source;
+        for grid in std::mem::take(&mut study.grids) {
+            let runs = grid.runs(&study)?;
+            study.runs.extend(runs);
+        }
+        study.expand()?;
         for file in &study.value_files {
             study.values.load(&study.beside(file))?;
         }
         study.check()?;
         Ok(study)
+    }
+
+    /// Puts the ids of runs in the place of patterns.
+    fn expand(&mut self) -> Result<(), Error> {
+        let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
+        let panels = self.figures.iter_mut().flat_map(|figure| {
+            let own = figure.panels.iter_mut().filter_map(|panel| panel.runs.as_mut());
+            own.chain([&mut figure.runs])
+        });
+        for names in panels.chain(self.overviews.iter_mut().map(|overview| &mut overview.runs)) {
+            *names = grid::expand(names, &ids).map_err(|name| {
+                self.source.error(&name.span(), format!("no [[run]] fits \"{}\"", name.get_ref()))
+            })?;
+        }
+        Ok(())
     }
 
     /// A file beside the study.

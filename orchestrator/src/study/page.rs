@@ -3,7 +3,7 @@
 use super::claims::{Checked, Judged, Verdict};
 use super::results::{Numbers, Results};
 use super::values::{Quantity, ValueKind};
-use super::{Check, Claim, Overview, Relation, Row, Table};
+use super::{Check, Claim, Column, Overview, Relation, Row, Table};
 use crate::figure::{self, interactive};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -19,7 +19,7 @@ pub fn page(results: &Results, judged: &[Judged], drawn: &[figure::Figure]) -> R
     let runs: usize = results.runs.iter().map(|run| run.members.len()).sum();
     let claims = study.claims.iter().zip(judged).map(|(c, j)| claim(c, j)).collect::<Vec<_>>();
     let tables = study.tables.iter().map(|t| table(t, results)).collect::<Result<Vec<_>, _>>()?;
-    let overviews = study.overviews.iter().map(|o| overview(o, results)).collect::<Result<Vec<_>, _>>()?;
+    let overviews = study.overviews.iter().map(|o| overview(o, results)).collect::<Vec<_>>();
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -220,6 +220,10 @@ fn row(row: &Row, results: &Results) -> Result<Markup, String> {
     };
     let difference = paper.map(|paper| {
         let absolute = ours.mean() - paper;
+        // Rounding of a mean is no difference.
+        if absolute.abs() <= 1e-12 * paper.abs() {
+            return "0".to_string();
+        }
         format!("{} ({})", signed(absolute), percent(&Numbers(vec![ours.mean() / paper - 1.0])))
     });
     Ok(html! {
@@ -233,32 +237,35 @@ fn row(row: &Row, results: &Results) -> Result<Markup, String> {
     })
 }
 
-fn overview(overview: &Overview, results: &Results) -> Result<Markup, String> {
+fn overview(overview: &Overview, results: &Results) -> Markup {
     let mut rows = Vec::new();
     for id in &overview.runs {
         let Some(run) = results.study.run(id.get_ref()) else { continue };
-        let numbers = overview
-            .metrics
-            .iter()
-            .map(|column| results.numbers(&format!("{}.{}", id.get_ref(), column.of)))
-            .collect::<Result<Vec<_>, _>>()?;
+        let number = |column: &Column| {
+            let reference = format!("{}.{}", id.get_ref(), column.of);
+            results.numbers(&reference).unwrap_or_else(|_| Numbers(Vec::new()))
+        };
+        let numbers: Vec<Numbers> = overview.metrics.iter().map(number).collect();
         rows.push((run, numbers));
     }
-    Ok(html! {
+    html! {
         h3 { (overview.title) }
-        table.numbers {
+        table.numbers.overview {
             thead { tr { th { "" } @for column in &overview.metrics { th { (column.label) } } } }
             tbody {
-                @for (run, numbers) in rows {
+                @for (place, (run, numbers)) in rows.iter().enumerate() {
+                    @if !run.group.is_empty() && (place == 0 || rows[place - 1].0.group != run.group) {
+                        tr.group { th colspan=(overview.metrics.len() + 1) { (run.group) } }
+                    }
                     tr {
                         td { span.swatch style=(format!("background:{}", run.color)) {} " " (run.label) }
-                        @for numbers in numbers { td { (several(&numbers)) } }
+                        @for numbers in numbers { td { (several(numbers)) } }
                     }
                 }
             }
         }
         @if !overview.note.is_empty() { p.note { (overview.note) } }
-    })
+    }
 }
 
 fn all_runs(results: &Results) -> Markup {
@@ -268,7 +275,10 @@ fn all_runs(results: &Results) -> Markup {
             tbody {
                 @for (run, result) in results.study.runs.iter().zip(&results.runs) {
                     tr {
-                        td { span.swatch style=(format!("background:{}", run.color)) {} " " (run.label) }
+                        td {
+                            span.swatch style=(format!("background:{}", run.color)) {} " " (run.label)
+                            @if !run.group.is_empty() { ", " (run.group) }
+                        }
                         td { code { (run.experiment.display()) } }
                         td {
                             @for (name, fmu) in &run.fmu { code { (name) " = " (fmu) } " " }

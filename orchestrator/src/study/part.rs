@@ -8,6 +8,7 @@ use crate::experiment::Experiment;
 use crate::master::{Observer, Sample};
 use crate::metrics::{Metrics, larger};
 use crate::run::{Opened, Plan};
+use crate::sidecar::Parameters;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -24,12 +25,15 @@ pub struct Part {
 }
 
 /// What is kept of a part.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// One for each value of the parameter.
     pub members: Vec<Member>,
     /// Signals of the run's first member, if this is the part with it.
     pub series: Option<Series>,
+    /// Parameters of all components in the first member, likewise.
+    #[serde(default)]
+    pub parameters: Parameters,
     /// Smallest and largest value of each signal over the members, at each communication point.
     pub spread: BTreeMap<Signal, Spread>,
 }
@@ -191,7 +195,7 @@ impl<'a> Preparation<'a> {
     /// # Errors
     /// What a unit said.
     pub fn execute(&self, range: Range<u32>, opened: &mut Opened) -> Result<Outcome, Error> {
-        let mut outcome = Outcome { members: Vec::new(), series: None, spread: BTreeMap::new() };
+        let mut outcome = Outcome::default();
         for number in range {
             let plan = self.plan(number, opened)?;
             let mut series = Watch::new(&self.wanted.series, self, &plan)?;
@@ -209,15 +213,22 @@ impl<'a> Preparation<'a> {
                 gauges.push(Gauge::new(measure, resolve(signals)?));
             }
             let (mut master, limits) = plan.initialized()?;
+            if number == 0 {
+                outcome.parameters = plan.parameters(&mut master)?;
+            }
             let mut merit = plan.merit(limits);
+            // Of a run that shares the machine the times mean nothing.
+            if self.run.timed && number == 0 {
+                master.measure_time();
+            }
             let mut observers: Vec<&mut dyn Observer> = vec![&mut merit, &mut series];
             observers.extend(bounds.iter_mut().map(|bound| bound as &mut dyn Observer));
             observers.extend(gauges.iter_mut().map(|gauge| gauge as &mut dyn Observer));
             master.run(&mut observers)?;
 
             let value = self.run.vary.as_ref().map(|vary| vary.first + number.cast_signed());
-            // Wall-clock times of a run that shares the machine mean nothing.
-            let metrics = merit.metrics(0.0, 0.0, None);
+            let step_us = master.step_seconds().map(|(name, seconds)| (name.into(), seconds * 1e6)).collect();
+            let metrics = Metrics { step_us, ..merit.metrics(0.0, 0.0, None) };
             let within = bounds.into_iter().map(|bound| (bound.id.to_string(), bound.inside)).collect();
             let measures = gauges.iter().map(|gauge| (gauge.measure.id.clone(), gauge.value())).collect();
             outcome.members.push(Member { value, metrics, within, measures });

@@ -23,7 +23,7 @@ use std::time::Instant;
 /// Members of a run that make up one part.
 const MEMBERS_PER_PART: u32 = 25;
 /// To be raised when what a part leaves is no longer what it was.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 
 /// How a study is reproduced.
 #[derive(Clone, Debug, Default)]
@@ -174,9 +174,15 @@ fn check(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Re
         resolve(study, &row.ours).map_err(fault)?;
     }
     for overview in &study.overviews {
-        for run in &overview.runs {
-            for column in &overview.metrics {
-                resolve(study, &format!("{}.{}", run.get_ref(), column.of)).map_err(fault)?;
+        for column in &overview.metrics {
+            // It is enough if one run has it; the others show nothing.
+            let mut tried = overview
+                .runs
+                .iter()
+                .map(|run| resolve(study, &format!("{}.{}", run.get_ref(), column.of)).map(drop))
+                .collect::<Vec<_>>();
+            if let Some(Err(message)) = tried.iter().all(Result::is_err).then(|| tried.pop()).flatten() {
+                return Err(fault(message));
             }
         }
     }
@@ -221,7 +227,8 @@ fn keys(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Res
         let measures: Vec<Value> = study
             .measures_of(run)
             .map(|(measure, signals)| {
-                json!([measure.id, format!("{:?}", measure.kind), signals, measure.over, measure.band])
+                let kind = format!("{:?}", measure.kind);
+                json!([measure.id, kind, signals, measure.over, measure.band, measure.hold])
             })
             .collect();
         let all = json!({

@@ -6,6 +6,7 @@ use super::values::Quantity;
 use super::{Run, Study};
 use crate::metrics::Metrics;
 use crate::names;
+use crate::sidecar::Parameters;
 use std::collections::BTreeMap;
 
 /// All that is kept of one run of the study.
@@ -15,6 +16,8 @@ pub struct RunResult {
     pub members: Vec<Member>,
     /// Signals of the first member.
     pub series: Series,
+    /// Parameters of its components.
+    pub parameters: Parameters,
     /// Bands over all members.
     pub spread: BTreeMap<Signal, Spread>,
 }
@@ -25,6 +28,7 @@ impl RunResult {
         self.members.extend(part.members);
         if let Some(series) = part.series {
             self.series = series;
+            self.parameters = part.parameters;
         }
         for (signal, spread) in part.spread {
             match self.spread.get_mut(&signal) {
@@ -42,6 +46,10 @@ impl RunResult {
 pub enum Metric {
     /// A figure of merit, by its name in `metrics.json`.
     Merit(String),
+    /// Mean time spent in a component per step, µs: `step_us.COMPONENT`.
+    StepTime(String),
+    /// Parameters of a component, in SI units: `parameter.COMPONENT.NAME`; a final `*` stands for all that fit.
+    Parameter(String, String),
     /// Share of samples within a bound: `within.ID.share`.
     Share(String),
     /// Largest magnitude, `within.ID.largest`.
@@ -79,6 +87,16 @@ impl Metric {
             let hint = names::hint(id, ids.iter().copied());
             return Err(format!("the run \"{}\" has no measure \"{id}\"{hint}", run.id.get_ref()));
         }
+        if let Some((component, name)) = text.strip_prefix("parameter.").and_then(names::split) {
+            return Ok(Self::Parameter(component.into(), name.into()));
+        }
+        if let Some(component) = text.strip_prefix("step_us.") {
+            return if run.timed {
+                Ok(Self::StepTime(component.into()))
+            } else {
+                Err(format!("\"{text}\": the run \"{}\" is not timed", run.id.get_ref()))
+            };
+        }
         let all = serde_json::to_value(Metrics::default()).unwrap_or_default();
         let known: Vec<&str> =
             all.as_object().map(|all| all.keys().map(String::as_str).collect()).unwrap_or_default();
@@ -90,7 +108,11 @@ impl Metric {
 
     /// Whether it is a duration, which differs from run to run and is measured with the first member only.
     fn is_time(&self) -> bool {
-        matches!(self, Self::Merit(name) if name.starts_with("solver_ms"))
+        match self {
+            Self::Merit(name) => name.starts_with("solver_ms"),
+            Self::StepTime(_) => true,
+            _ => false,
+        }
     }
 
     fn of(&self, member: &Member) -> Option<f64> {
@@ -99,6 +121,9 @@ impl Metric {
             Self::Merit(name) => {
                 serde_json::to_value(&member.metrics).ok().and_then(|all| all.get(name)?.as_f64())
             }
+            // Of the run, not of its members.
+            Self::Parameter(..) => None,
+            Self::StepTime(component) => member.metrics.step_us.get(component).copied(),
             Self::Share(id) => within(id).map(|w| w.inside as f64 / w.samples as f64),
             Self::Largest(id) => within(id).map(|w| w.largest),
             Self::Ratio(id) => within(id).map(|w| w.ratio),
@@ -172,7 +197,18 @@ impl Results<'_> {
     /// If there is no such run or metric.
     pub fn numbers(&self, reference: &str) -> Result<Numbers, String> {
         let (place, metric) = resolve(self.study, reference)?;
-        let members = &self.runs[place].members;
+        let RunResult { members, parameters, .. } = &self.runs[place];
+        if let Metric::Parameter(component, pattern) = &metric {
+            let own = parameters.get(component).into_iter().flatten();
+            let fitting = own.filter(|(name, _)| names::matches(pattern, name));
+            let numbers: Vec<f64> = fitting.filter_map(|(_, value)| value.as_f64()).collect();
+            let there = parameters.get(component).into_iter().flatten().map(|(name, _)| name.as_str());
+            return if numbers.is_empty() {
+                Err(format!("\"{reference}\": there is no such parameter{}", names::hint(pattern, there)))
+            } else {
+                Ok(Numbers(numbers))
+            };
+        }
         let counted = if metric.is_time() { &members[..members.len().min(1)] } else { members };
         Ok(Numbers(counted.iter().filter_map(|member| metric.of(member)).collect()))
     }
