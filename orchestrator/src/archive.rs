@@ -1,4 +1,4 @@
-//! Unpacks an `.fmu` archive without trusting it.
+//! Unpacks an `.fmu` or `.ssp` archive without trusting it.
 
 use crate::error::Error;
 use std::fs::{self, File};
@@ -67,7 +67,7 @@ fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<Te
 }
 
 /// Why an entry of this name must not be written, if so.
-fn unsafe_name(name: &str) -> Option<&'static str> {
+pub fn unsafe_name(name: &str) -> Option<&'static str> {
     if name.is_empty() {
         Some("has no name")
     } else if name.starts_with('/') || name.contains(':') {

@@ -105,6 +105,31 @@ fn measure(
     FeedbackLoop { components: components.to_vec(), ticks, undeclared }
 }
 
+/// An order of the components in which Gauss–Seidel coupling has no delay, as far as there is one: a component whose outputs
+/// depend on its inputs at the same instant comes before those that read them. Else they stay in the order of `parts`.
+pub fn order(parts: &[Part], wires: &[Wire]) -> Vec<usize> {
+    let is_direct = |wire: &Wire| {
+        let component = wire.from.component;
+        let inputs = wires.iter().filter(|w| w.to.component == component);
+        inputs
+            .into_iter()
+            .any(|w| passage(parts, component, w.to.variable, wire.from.variable) != Passage::Delayed)
+    };
+    let direct: Vec<&Wire> = wires.iter().filter(|wire| is_direct(wire)).collect();
+    let mut left: Vec<usize> = (0..parts.len()).collect();
+    let mut order = Vec::new();
+    while !left.is_empty() {
+        let waits = |index: usize| {
+            direct.iter().any(|w| {
+                w.to.component == index && w.from.component != index && left.contains(&w.from.component)
+            })
+        };
+        let place = left.iter().position(|&index| !waits(index)).unwrap_or(0);
+        order.push(left.remove(place));
+    }
+    order
+}
+
 /// A loop of outputs that all are declared to depend on each other at the same instant, by the names of its inputs.
 pub fn algebraic_loop(parts: &[Part], wires: &[Wire]) -> Option<Vec<String>> {
     // Nodes are wires; one wire leads to another if it ends at an input on which the other's output depends.
@@ -157,6 +182,7 @@ fn follow(
 mod tests {
     use super::*;
     use crate::description::{Kind, ModelDescription, Variable};
+    use crate::experiment::Scaling;
     use crate::wiring::{Carrier, Port};
 
     /// Variable 0 is an input; outputs 1, 2, … depend on it directly, not at all, or by no declaration.
@@ -190,7 +216,7 @@ mod tests {
             reference: variable as u32,
             carrier: Carrier::Real,
         };
-        Wire { from: port(from, output), to: port(to, 0) }
+        Wire { from: port(from, output), to: port(to, 0), scaling: Scaling::default() }
     }
 
     fn ticks(units: &[ModelDescription], every: &[u32], wires: &[Wire], coupling: Coupling) -> Vec<u64> {

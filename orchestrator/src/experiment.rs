@@ -24,6 +24,7 @@
 //! [[connections]]
 //! from = "plant.attitude.*"         # a final * stands for every rest that both sides have
 //! to = "controller.attitude.*"
+//! convert_units = true              # optional: from one unit to the other, where they measure the same thing
 //!
 //! [record]
 //! variables = ["plant.attitude.*", "controller.moment.*"]
@@ -68,6 +69,9 @@ pub struct Experiment {
     /// Where the figures of merit find their variables.
     #[serde(default)]
     pub metrics: Roles,
+    /// Whether inputs may stay unconnected without being named; no key of an experiment file.
+    #[serde(skip)]
+    pub leaves_inputs_open: bool,
     /// The file and its text.
     #[serde(skip)]
     pub source: Source,
@@ -128,6 +132,41 @@ pub struct Connection {
     pub from: Spanned<String>,
     /// `component.input`, or `component.prefix.*`.
     pub to: Spanned<String>,
+    /// Whether values are converted if the units differ in scale only; else that is refused.
+    #[serde(default)]
+    pub convert_units: bool,
+    /// Applied to the values after that; no key of an experiment file.
+    #[serde(skip)]
+    pub scaling: Scaling,
+}
+
+/// value ↦ factor · value + offset
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scaling {
+    /// The factor.
+    pub factor: f64,
+    /// The offset.
+    pub offset: f64,
+}
+
+impl Default for Scaling {
+    /// Leaves every value as it is.
+    fn default() -> Self {
+        Self { factor: 1.0, offset: 0.0 }
+    }
+}
+
+impl Scaling {
+    /// The scaled value.
+    pub fn of(self, value: f64) -> f64 {
+        self.factor * value + self.offset
+    }
+
+    /// This one, and then `next`.
+    #[must_use]
+    pub fn then(self, next: Self) -> Self {
+        Self { factor: next.factor * self.factor, offset: next.of(self.offset) }
+    }
 }
 
 /// What goes into the results.

@@ -10,6 +10,7 @@ use crate::archive;
 use crate::description::ModelDescription;
 use crate::error::{Error, UnitFailure};
 use crate::unit::{CoSimulationUnit, Outcome};
+use crate::xml;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
 use fmi_rs::fmi2::PLATFORM;
 use fmi_rs::fmi2::types::{
@@ -53,9 +54,10 @@ impl Fmu {
     pub fn open(path: &Path) -> Result<Self, Error> {
         let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
         let folder = archive::unpack(path)?;
-        let text = std::fs::read_to_string(folder.path().join("modelDescription.xml"))
+        let bytes = std::fs::read(folder.path().join("modelDescription.xml"))
             .map_err(|source| refuse(format!("is no FMU, modelDescription.xml cannot be read: {source}")))?;
-        let description = ModelDescription::parse(&text)
+        let description = xml::decode(&bytes)
+            .and_then(|text| ModelDescription::parse(&text))
             .map_err(|reason| refuse(format!("modelDescription.xml: {reason}")))?;
         Ok(Self { path: path.to_path_buf(), description, folder: Rc::new(folder) })
     }

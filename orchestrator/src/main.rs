@@ -5,7 +5,7 @@ use orchestrator::error::Error;
 use orchestrator::experiment::{Experiment, Overrides};
 use orchestrator::run::{Options, Plan};
 use orchestrator::study::{Study, reproduce};
-use orchestrator::{inspect, list, report};
+use orchestrator::{inspect, list, report, ssp};
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -26,7 +26,7 @@ struct Arguments {
 enum Command {
     /// Run an experiment and write results.csv, results.json, metrics.json and plot.svg.
     Run {
-        /// Experiment file.
+        /// Experiment file, or SSP archive.
         experiment: PathBuf,
         /// Folder for the results [default: out/<name of the experiment>].
         #[arg(long, value_name = "DIR")]
@@ -64,6 +64,19 @@ enum Command {
         /// No progress and no summary.
         #[arg(long)]
         quiet: bool,
+    },
+    /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs included.
+    Pack {
+        /// Experiment file.
+        experiment: PathBuf,
+        /// The archive [default: <name of the experiment>.ssp].
+        #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = false)]
+        ssp: Option<Option<PathBuf>>,
+        /// A further folder with FMUs, besides the experiment's own and target/fmu. May be given several times.
+        #[arg(long, value_name = "DIR")]
+        fmu_dir: Vec<PathBuf>,
+        #[command(flatten)]
+        overrides: Overrides,
     },
     /// Show the variables and capabilities of an FMU.
     Inspect {
@@ -110,9 +123,15 @@ fn main() -> ExitCode {
 fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
     match command {
         Command::Run { experiment, out: folder, fmu_dir, overrides, quiet } => {
-            let mut experiment = Experiment::load(&experiment)?;
-            experiment.apply(&overrides)?;
-            let report = Plan::new(experiment, &fmu_dir)?.run(&Options { out: folder, quiet })?;
+            let plan = if experiment.extension().is_some_and(|extension| extension == "ssp") {
+                let mut loaded = ssp::load(&experiment, &overrides)?;
+                Plan::with(loaded.experiment, &fmu_dir, &mut loaded.opened)?
+            } else {
+                let mut experiment = Experiment::load(&experiment)?;
+                experiment.apply(&overrides)?;
+                Plan::new(experiment, &fmu_dir)?
+            };
+            let report = plan.run(&Options { out: folder, quiet })?;
             if !quiet {
                 report::summary(&report, out)?;
             }
@@ -126,6 +145,16 @@ fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
                 report::reproduction(&report, out)?;
             }
             Ok(())
+        }
+        Command::Pack { experiment: path, ssp, fmu_dir, overrides } => {
+            let mut experiment = Experiment::load(&path)?;
+            experiment.apply(&overrides)?;
+            let archive = ssp
+                .flatten()
+                .unwrap_or_else(|| PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("ssp"));
+            let plan = Plan::new(experiment, &fmu_dir)?;
+            ssp::pack(&plan, &archive)?;
+            report::packed(&plan, &archive, out).map_err(Error::from)
         }
         Command::Inspect { fmu } => inspect::inspect(&fmu, out),
         Command::List { folder } => list::list(&folder, out),

@@ -6,7 +6,7 @@
 
 use crate::clock::Clock;
 use crate::error::{Error, UnitFailure};
-use crate::experiment::Coupling;
+use crate::experiment::{Coupling, Scaling};
 use crate::stopwatch::{Spent, Stopwatch};
 use crate::unit::{CoSimulationUnit, Outcome};
 use crate::wiring::{Carrier, Port, Wire};
@@ -90,12 +90,22 @@ struct Inputs {
     real: Bundle<f64>,
     integer: Bundle<i32>,
     boolean: Bundle<i32>,
+    /// Places among the reals whose values change on the way.
+    scaled: Vec<(usize, Scaling)>,
 }
 
 impl Inputs {
     fn new(wires: &[Wire], target: usize) -> Self {
+        let real: Bundle<f64> = Bundle::new(wires, target, Carrier::Real);
+        let scaling = |reference: u32| {
+            let is_it = |w: &&Wire| w.to.component == target && w.to.reference == reference;
+            wires.iter().filter(|w| w.to.carrier == Carrier::Real).find(is_it).map(|wire| wire.scaling)
+        };
+        let scaled = real.references.iter().enumerate();
+        let scaled = scaled.filter_map(|(place, &reference)| Some((place, scaling(reference)?)));
         Self {
-            real: Bundle::new(wires, target, Carrier::Real),
+            scaled: scaled.filter(|(_, scaling)| *scaling != Scaling::default()).collect(),
+            real,
             integer: Bundle::new(wires, target, Carrier::Integer),
             boolean: Bundle::new(wires, target, Carrier::Boolean),
         }
@@ -106,6 +116,9 @@ impl Inputs {
         for (source, references, range) in &self.real.sources {
             let values = &mut self.real.values[range.clone()];
             members[*source].unit.get_real(references, values).map_err(|failure| (*source, failure))?;
+        }
+        for (place, scaling) in &self.scaled {
+            self.real.values[*place] = scaling.of(self.real.values[*place]);
         }
         for (source, references, range) in &self.integer.sources {
             let values = &mut self.integer.values[range.clone()];
@@ -418,7 +431,7 @@ mod tests {
     }
 
     fn wire(from: usize, to: usize) -> Wire {
-        Wire { from: port(from, 1), to: port(to, 0) }
+        Wire { from: port(from, 1), to: port(to, 0), scaling: Scaling::default() }
     }
 
     #[derive(Default)]

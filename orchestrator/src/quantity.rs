@@ -1,5 +1,6 @@
 //! Physical units by an FMU's own definitions: conversion of `"2 deg/s2"`, and whether two variables may be connected.
 
+use crate::experiment::Scaling;
 use crate::names;
 
 /// A unit: `base = factor · value + offset` in SI base units, and what it can be shown in.
@@ -69,20 +70,24 @@ pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Re
     Ok((unit.factor * in_unit + unit.offset - target.offset) / target.factor)
 }
 
-/// Whether a value in the one unit can be passed on unchanged as a value in the other.
+/// How values in the one unit become values in the other.
 ///
 /// # Errors
-/// Says how the units differ.
-pub fn same(
+/// Says how the units differ, if they do not measure the same thing.
+pub fn conversion(
     from: Option<&str>,
     from_units: &[UnitDefinition],
     to: Option<&str>,
     to_units: &[UnitDefinition],
-) -> Result<(), String> {
+) -> Result<Scaling, String> {
+    let unchanged = Ok(Scaling::default());
     let (Some(from), Some(to)) = (from, to) else {
-        return match (from, to) {
-            (None, None) => Ok(()),
-            _ => Err(format!("{} against {}", from.unwrap_or("no unit"), to.unwrap_or("no unit"))),
+        // An FMU that knows no units at all cannot be held to them.
+        let known = [(from, from_units), (to, to_units)];
+        return if from == to || known.iter().any(|(unit, units)| unit.is_none() && units.is_empty()) {
+            unchanged
+        } else {
+            Err(format!("{} against {}", from.unwrap_or("no unit"), to.unwrap_or("no unit")))
         };
     };
     let find = |name: &str, units: &[UnitDefinition]| units.iter().find(|unit| unit.name == name).cloned();
@@ -90,13 +95,13 @@ pub fn same(
         (Some(a), Some(b)) if a.exponents.is_some() && b.exponents.is_some() => {
             if a.exponents != b.exponents {
                 Err(format!("{from} against {to}"))
-            } else if a.factor != b.factor || a.offset != b.offset {
-                Err(format!("{from} against {to}: the same quantity in another scale"))
+            } else if a.factor == b.factor && a.offset == b.offset {
+                unchanged
             } else {
-                Ok(())
+                Ok(Scaling { factor: a.factor / b.factor, offset: (a.offset - b.offset) / b.factor })
             }
         }
-        _ if from == to => Ok(()),
+        _ if from == to => unchanged,
         _ => Err(format!("{from} against {to}")),
     }
 }
@@ -151,18 +156,37 @@ mod tests {
     }
 
     #[test]
-    fn connections_need_equal_dimension_and_scale() {
+    fn oracle_connections_need_equal_dimension_and_tell_the_scale() {
         let units = units();
-        let check = |a, b| same(a, &units, b, &units);
-        assert!(check(Some("rad"), Some("rad")).is_ok());
-        assert!(check(None, None).is_ok());
-        assert!(check(Some("rad"), None).is_err());
-        assert!(check(Some("rad"), Some("rad/s")).is_err());
-        assert!(check(Some("s"), Some("min")).unwrap_err().contains("another scale"));
-        // Another name for the same unit is no mismatch.
+        let scaling = |a, b| conversion(a, &units, b, &units);
+        assert_eq!(scaling(Some("rad"), Some("rad")), Ok(Scaling::default()));
+        assert_eq!(scaling(None, None), Ok(Scaling::default()));
+        assert!(scaling(Some("rad"), None).is_err());
+        assert!(scaling(Some("rad"), Some("rad/s")).is_err());
+        assert_eq!(scaling(Some("min"), Some("s")).unwrap().of(2.0), 120.0);
+        assert_eq!(scaling(Some("s"), Some("min")).unwrap().of(30.0), 0.5);
+        // Another name for the same unit is no mismatch, and what knows no units fits all.
         let mut renamed = units.clone();
         renamed[0].name = "radian".into();
-        assert!(same(Some("rad"), &units, Some("radian"), &renamed).is_ok());
+        assert_eq!(conversion(Some("rad"), &units, Some("radian"), &renamed), Ok(Scaling::default()));
+        assert_eq!(conversion(None, &[], Some("rad"), &units), Ok(Scaling::default()));
+    }
+
+    #[test]
+    fn oracle_scalings_with_offsets_one_after_the_other() {
+        let unit = |name: &str, factor, offset| UnitDefinition {
+            name: name.into(),
+            exponents: Some([0, 0, 0, 0, 1, 0, 0, 0]),
+            factor,
+            offset,
+            displays: Vec::new(),
+        };
+        let units =
+            [unit("K", 1.0, 0.0), unit("degC", 1.0, 273.15), unit("degF", 5.0 / 9.0, 273.15 - 160.0 / 9.0)];
+        let celsius = conversion(Some("degF"), &units, Some("degC"), &units).unwrap();
+        assert!((celsius.of(212.0) - 100.0).abs() < 1e-12 && celsius.of(32.0).abs() < 1e-12);
+        let doubled = celsius.then(Scaling { factor: 2.0, offset: 1.0 });
+        assert!((doubled.of(212.0) - 201.0).abs() < 1e-12);
     }
 
     proptest::proptest! {

@@ -1,9 +1,10 @@
 //! What a run says for itself on standard output.
 
 use crate::experiment::Coupling;
-use crate::run::Report;
+use crate::run::{Plan, Report};
 use crate::study::reproduce;
 use std::io::{self, Write};
+use std::path::Path;
 
 /// Prints the summary of a run.
 ///
@@ -90,6 +91,22 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
         line("real-time factor", format!("{factor:.1} ({:.3} s elapsed)", metrics.wall_s))?;
     }
     line("results", format!("{}: {}", report.out.display(), report.files.join(", ")))
+}
+
+/// Says what an archive holds, and what the standard has no place for.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn packed(plan: &Plan, archive: &Path, out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "{}: {}", archive.display(), plan.order.join(", "))?;
+    let simulation = &plan.experiment.simulation;
+    writeln!(out, "  an SSP archive says nothing of the step: use {} s", simulation.step)?;
+    let slower = plan.order.iter().filter(|name| plan.experiment.components[*name].every > 1);
+    for name in slower {
+        let every = plan.experiment.components[name].every;
+        writeln!(out, "  nor that {name} steps at every {every}th communication point here")?;
+    }
+    Ok(())
 }
 
 /// Prints what a reproduction came to.

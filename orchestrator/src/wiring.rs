@@ -3,7 +3,7 @@
 
 use crate::description::{Kind, ModelDescription, Variable};
 use crate::error::Error;
-use crate::experiment::{Experiment, Source};
+use crate::experiment::{Experiment, Scaling, Source};
 use crate::names;
 use crate::quantity;
 use std::collections::BTreeSet;
@@ -55,12 +55,14 @@ pub struct Port {
 }
 
 /// A connection of one output with one input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wire {
     /// The output.
     pub from: Port,
     /// The input.
     pub to: Port,
+    /// What becomes of real values on the way.
+    pub scaling: Scaling,
 }
 
 /// A variable in the results.
@@ -152,15 +154,30 @@ pub fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>, Error
             }
         };
         for (output, input) in pairs {
-            let wire = Wire { from: from.port(&output, "output")?, to: to.port(&input, "input")? };
-            check_match(&wire, &from, &output, &to, &input)?;
+            let (start, end) = (from.port(&output, "output")?, to.port(&input, "input")?);
+            let conversion = check_match(start, end, &from, &output, &to, &input)?;
+            if conversion != Scaling::default() && !connection.convert_units {
+                return Err(to.refuse(format!(
+                    "the units of \"{}.{output}\" and \"{}.{input}\" measure the same quantity in another scale: \
+                     write convert_units = true in this connection",
+                    from.part.name, to.part.name
+                )));
+            }
+            let wire = Wire { from: start, to: end, scaling: conversion.then(connection.scaling) };
+            if wire.scaling != Scaling::default() && start.carrier != Carrier::Real {
+                return Err(
+                    to.refuse(format!("\"{}.{input}\" is no real number: it cannot be scaled", to.part.name))
+                );
+            }
             if wires.iter().any(|other| other.to == wire.to) {
                 return Err(to.refuse(format!("the input \"{}.{input}\" is connected twice", to.part.name)));
             }
             wires.push(wire);
         }
     }
-    check_unconnected(experiment, parts, &wires)?;
+    if !experiment.leaves_inputs_open {
+        check_unconnected(experiment, parts, &wires)?;
+    }
     Ok(wires)
 }
 
@@ -191,20 +208,22 @@ fn expand(
     Ok(pairs)
 }
 
+/// How values of the output become values of the input, by their units.
 fn check_match(
-    wire: &Wire,
+    start: Port,
+    end: Port,
     from: &Reference,
     output: &str,
     to: &Reference,
     input: &str,
-) -> Result<(), Error> {
+) -> Result<Scaling, Error> {
     let names = format!("\"{}.{output}\" and \"{}.{input}\"", from.part.name, to.part.name);
     let (a, b) = (
-        &from.part.description.variables[wire.from.variable].kind,
-        &to.part.description.variables[wire.to.variable].kind,
+        &from.part.description.variables[start.variable].kind,
+        &to.part.description.variables[end.variable].kind,
     );
     match (a, b) {
-        (Kind::Real { unit: a, .. }, Kind::Real { unit: b, .. }) => quantity::same(
+        (Kind::Real { unit: a, .. }, Kind::Real { unit: b, .. }) => quantity::conversion(
             a.as_deref(),
             &from.part.description.units,
             b.as_deref(),
@@ -214,7 +233,7 @@ fn check_match(
         (Kind::Enumeration { items: a }, Kind::Enumeration { items: b }) if a != b => {
             Err(to.refuse(format!("{names} are enumerations of different items")))
         }
-        _ if a.name() == b.name() => Ok(()),
+        _ if a.name() == b.name() => Ok(Scaling::default()),
         _ => Err(to.refuse(format!("the types of {names} do not match: {} against {}", a.name(), b.name()))),
     }
 }

@@ -1,0 +1,13 @@
+//! Archives of the standard System Structure and Parameterization 1.0 (SSP): a system of FMUs, its wiring and its parameter
+//! values, for any tool that reads them.
+
+mod read;
+mod write;
+
+pub use read::{Loaded, load};
+pub use write::pack;
+
+/// Where the structure stands in an archive.
+const STRUCTURE: &str = "SystemStructure.ssd";
+/// What a component is, and what it is if it says nothing.
+const FMU: &str = "application/x-fmu-sharedlibrary";

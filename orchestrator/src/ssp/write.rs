@@ -1,0 +1,256 @@
+//! From an experiment to an archive.
+
+use super::{FMU, STRUCTURE};
+use crate::description::{Kind, Variable};
+use crate::error::Error;
+use crate::experiment::Scaling;
+use crate::run::Plan;
+use crate::settings::SettingValue;
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, Event};
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+const NAMESPACES: [(&str, &str); 3] = [
+    ("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription"),
+    ("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon"),
+    ("xmlns:ssv", "http://ssp-standard.org/SSP1/SystemStructureParameterValues"),
+];
+
+type Xml = Writer<Vec<u8>>;
+
+/// Writes an experiment as an archive. Its communication step has no place in the standard; a value that is the FMU's own is
+/// left out. The same experiment gives the same bytes.
+///
+/// # Errors
+/// If a file cannot be read or written.
+pub fn pack(plan: &Plan, path: &Path) -> Result<(), Error> {
+    let mut entries: BTreeMap<String, Vec<u8>> = BTreeMap::new();
+    for fmu in &plan.fmus {
+        entries.insert(resource(&fmu.path), fs::read(&fmu.path).map_err(Error::file(&fmu.path))?);
+    }
+    let structure = structure(plan).map_err(Error::file(path))?;
+    // Written under another name first: nobody ever opens half an archive.
+    let partial = path.with_extension("ssp.part");
+    let write = || -> zip::result::ZipResult<()> {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Deflated)
+            .last_modified_time(DateTime::default());
+        let mut archive = ZipWriter::new(BufWriter::new(File::create(&partial)?));
+        for (name, content) in
+            [(STRUCTURE, &structure)].into_iter().chain(entries.iter().map(|(n, c)| (n.as_str(), c)))
+        {
+            archive.start_file(name, options)?;
+            archive.write_all(content)?;
+        }
+        archive.finish()?.flush()?;
+        Ok(())
+    };
+    write().map_err(|error| Error::file(&partial)(error.into()))?;
+    fs::rename(&partial, path).map_err(Error::file(path))
+}
+
+fn resource(fmu: &Path) -> String {
+    format!("resources/{}", fmu.file_name().unwrap_or_default().to_string_lossy())
+}
+
+fn structure(plan: &Plan) -> io::Result<Vec<u8>> {
+    let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
+    xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
+    let mut attributes = NAMESPACES.map(|(name, value)| (name, value.to_string())).to_vec();
+    attributes.push(("name", plan.experiment.title.clone()));
+    attributes.push(("version", "1.0".into()));
+    if !plan.experiment.description.is_empty() {
+        attributes.push(("description", plan.experiment.description.trim().to_string()));
+    }
+    attributes.push(("generationTool", concat!("orchestrator ", env!("CARGO_PKG_VERSION")).into()));
+    element(&mut xml, "ssd:SystemStructureDescription", &attributes, |xml| {
+        element(xml, "ssd:System", &[("name", "system".into())], |xml| {
+            element(xml, "ssd:Elements", &[], |xml| {
+                (0..plan.order.len()).try_for_each(|i| component(xml, plan, i))
+            })?;
+            if plan.wires.is_empty() {
+                return Ok(());
+            }
+            element(xml, "ssd:Connections", &[], |xml| connections(xml, plan))
+        })?;
+        units(xml, plan)?;
+        let experiment = &plan.experiment.simulation;
+        let time = [("startTime", real(experiment.start)), ("stopTime", real(experiment.stop))];
+        leaf(xml, "ssd:DefaultExperiment", &time)
+    })?;
+    let mut bytes = xml.into_inner();
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+fn component(xml: &mut Xml, plan: &Plan, index: usize) -> io::Result<()> {
+    let attributes = [
+        ("name", plan.order[index].clone()),
+        ("type", FMU.into()),
+        ("source", resource(&plan.fmus[index].path)),
+        ("implementation", "CoSimulation".into()),
+    ];
+    element(xml, "ssd:Component", &attributes, |xml| {
+        element(xml, "ssd:Connectors", &[], |xml| {
+            connectors(plan, index).try_for_each(|variable| connector(xml, variable))
+        })?;
+        parameters(xml, plan, index)
+    })
+}
+
+/// Inputs that are connected, and all outputs that a connector can have the type of.
+fn connectors(plan: &Plan, index: usize) -> impl Iterator<Item = &Variable> {
+    let variables = &plan.fmus[index].description.variables;
+    let is_connected =
+        move |position| plan.wires.iter().any(|w| w.to.component == index && w.to.variable == position);
+    variables.iter().enumerate().filter_map(move |(position, variable)| match variable.causality.as_str() {
+        "input" if is_connected(position) => Some(variable),
+        "output" if matches!(variable.kind, Kind::Real { .. } | Kind::Integer { .. } | Kind::Boolean) => {
+            Some(variable)
+        }
+        _ => None,
+    })
+}
+
+fn connector(xml: &mut Xml, variable: &Variable) -> io::Result<()> {
+    let attributes = [("name", variable.name.clone()), ("kind", variable.causality.clone())];
+    element(xml, "ssd:Connector", &attributes, |xml| {
+        let unit = match &variable.kind {
+            Kind::Real { unit: Some(unit), .. } => vec![("unit", unit.clone())],
+            _ => Vec::new(),
+        };
+        leaf(xml, &format!("ssc:{}", variable.kind.name()), &unit)
+    })
+}
+
+fn parameters(xml: &mut Xml, plan: &Plan, index: usize) -> io::Result<()> {
+    let description = &plan.fmus[index].description;
+    let own = |name: &str| description.find(name).and_then(|(_, variable)| variable.start.as_deref());
+    let differs = |name: &str, value: &SettingValue| match value {
+        SettingValue::Real(value) => own(name).and_then(|start| start.parse().ok()) != Some(*value),
+        SettingValue::Integer(value) | SettingValue::Item(_, value) => {
+            own(name).and_then(|start| start.parse().ok()) != Some(*value)
+        }
+        SettingValue::Boolean(value) => own(name) != Some(if *value { "true" } else { "false" }),
+        SettingValue::Text(value) => own(name) != Some(value),
+    };
+    let set: Vec<_> = plan.settings[index].iter().filter(|s| differs(&s.name, &s.value)).collect();
+    if set.is_empty() {
+        return Ok(());
+    }
+    element(xml, "ssd:ParameterBindings", &[], |xml| {
+        element(xml, "ssd:ParameterBinding", &[], |xml| {
+            element(xml, "ssd:ParameterValues", &[], |xml| {
+                let name = format!("{} values", plan.order[index]);
+                element(xml, "ssv:ParameterSet", &[("version", "1.0".into()), ("name", name)], |xml| {
+                    element(xml, "ssv:Parameters", &[], |xml| {
+                        set.iter().try_for_each(|setting| {
+                            element(xml, "ssv:Parameter", &[("name", setting.name.clone())], |xml| {
+                                let (kind, value) = typed(&setting.value);
+                                leaf(xml, kind, &[("value", value)])
+                            })
+                        })
+                    })
+                })
+            })
+        })
+    })
+}
+
+fn typed(value: &SettingValue) -> (&'static str, String) {
+    match value {
+        SettingValue::Real(value) => ("ssv:Real", real(*value)),
+        SettingValue::Integer(value) => ("ssv:Integer", value.to_string()),
+        SettingValue::Item(name, _) => ("ssv:Enumeration", name.clone()),
+        SettingValue::Boolean(value) => ("ssv:Boolean", value.to_string()),
+        SettingValue::Text(text) => ("ssv:String", text.clone()),
+    }
+}
+
+fn connections(xml: &mut Xml, plan: &Plan) -> io::Result<()> {
+    let name =
+        |component: usize, variable: usize| plan.fmus[component].description.variables[variable].name.clone();
+    plan.wires.iter().try_for_each(|wire| {
+        let mut attributes = vec![
+            ("startElement", plan.order[wire.from.component].clone()),
+            ("startConnector", name(wire.from.component, wire.from.variable)),
+            ("endElement", plan.order[wire.to.component].clone()),
+            ("endConnector", name(wire.to.component, wire.to.variable)),
+        ];
+        if wire.scaling == Scaling::default() {
+            return leaf(xml, "ssd:Connection", &attributes);
+        }
+        // The conversion stands here, once and for all tools alike.
+        attributes.push(("suppressUnitConversion", "true".into()));
+        element(xml, "ssd:Connection", &attributes, |xml| {
+            let linear = [("factor", real(wire.scaling.factor)), ("offset", real(wire.scaling.offset))];
+            leaf(xml, "ssc:LinearTransformation", &linear)
+        })
+    })
+}
+
+/// The units that connectors have.
+fn units(xml: &mut Xml, plan: &Plan) -> io::Result<()> {
+    let mut units = BTreeMap::new();
+    for (index, fmu) in plan.fmus.iter().enumerate() {
+        for variable in connectors(plan, index) {
+            let Kind::Real { unit: Some(unit), .. } = &variable.kind else { continue };
+            if let Some(defined) = fmu.description.units.iter().find(|defined| defined.name == *unit) {
+                units.entry(unit.as_str()).or_insert(defined);
+            }
+        }
+    }
+    if units.is_empty() {
+        return Ok(());
+    }
+    element(xml, "ssd:Units", &[], |xml| {
+        units.values().try_for_each(|unit| {
+            element(xml, "ssc:Unit", &[("name", unit.name.clone())], |xml| {
+                let mut attributes = Vec::new();
+                for (base, exponent) in ["kg", "m", "s", "A", "K", "mol", "cd", "rad"]
+                    .into_iter()
+                    .zip(unit.exponents.unwrap_or_default())
+                {
+                    if exponent != 0 {
+                        attributes.push((base, exponent.to_string()));
+                    }
+                }
+                if unit.factor != 1.0 {
+                    attributes.push(("factor", real(unit.factor)));
+                }
+                if unit.offset != 0.0 {
+                    attributes.push(("offset", real(unit.offset)));
+                }
+                leaf(xml, "ssc:BaseUnit", &attributes)
+            })
+        })
+    })
+}
+
+/// The shortest text that reads back as the same number.
+fn real(value: f64) -> String {
+    format!("{value:?}")
+}
+
+/// An element with nothing in it.
+fn leaf(xml: &mut Xml, name: &str, attributes: &[(&str, String)]) -> io::Result<()> {
+    let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
+    xml.create_element(name).with_attributes(attributes).write_empty().map(drop)
+}
+
+/// An element with what `content` puts into it.
+fn element(
+    xml: &mut Xml,
+    name: &str,
+    attributes: &[(&str, String)],
+    content: impl FnOnce(&mut Xml) -> io::Result<()>,
+) -> io::Result<()> {
+    let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
+    let writer = xml.create_element(name).with_attributes(attributes);
+    writer.write_inner_content(content).map(drop)
+}

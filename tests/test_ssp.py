@@ -1,0 +1,196 @@
+"""SSP archives: written from experiments, valid by the standard's schema, run by FMPy and by the orchestrator; others' archives too."""
+
+import csv
+import math
+import shutil
+import subprocess
+import zipfile
+
+import numpy as np
+import pytest
+from fmpy.ssp.simulation import simulate_ssp
+from fmpy.ssp.ssd import read_ssd
+
+from conftest import EXPERIMENTS, TARGET, archive, program
+from fmi import ANGLES, MOMENT, RATES, Unit
+
+ALL = sorted(path for path in EXPERIMENTS.parent.rglob("*.toml") if "[simulation]" in path.read_text())
+# Wall-clock times differ from run to run.
+TIMES = ("solver.time", "innerLaw.time")
+
+
+def pack(experiment, path, *arguments):
+    command = [program("orchestrator"), "pack", experiment, "--ssp", path, "--fmu-dir", TARGET / "fmu", *arguments]
+    finished = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert finished.returncode == 0, finished.stderr
+    return finished.stdout
+
+
+def run(path, out, *arguments):
+    command = [program("orchestrator"), "run", path, "--out", out, "--quiet", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=out.parent)
+
+
+def columns(out) -> dict[str, np.ndarray]:
+    """Results by the name of the variable, without unit."""
+    with (out / "results.csv").open() as file:
+        rows = list(csv.reader(file))
+    names = [name.split(" ")[0] for name in rows[0]]
+    return {name: np.array([float(row[i]) for row in rows[1:]]) for i, name in enumerate(names)}
+
+
+@pytest.mark.parametrize("experiment", ALL, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_every_experiment_becomes_a_valid_archive(experiment, tmp_path):
+    path = tmp_path / "x.ssp"
+    said = pack(experiment, path)
+    assert "says nothing of the step" in said
+    # Against the schema of SSP 1.0.
+    structure = read_ssd(str(path), validate=True)
+    assert all(element.source.startswith("resources/") for element in structure.system.elements)
+    text = zipfile.ZipFile(path).read("SystemStructure.ssd").decode()
+    assert text.count('implementation="CoSimulation"') == len(structure.system.elements)
+    assert "Annotation" not in text
+    again = tmp_path / "again.ssp"
+    pack(experiment, again)
+    assert path.read_bytes() == again.read_bytes()
+
+
+@pytest.mark.parametrize("name", ["crmpc-2022/crmpc-paper", "crmpc-2022/lqr", "tvsmc-2015/sotvsmc-do"])
+def test_an_archive_runs_as_its_experiment_does(name, tmp_path):
+    experiment = EXPERIMENTS.parent / f"{name}.toml"
+    pack(experiment, tmp_path / "x.ssp", "--stop", "4")
+    finished = run(tmp_path / "x.ssp", tmp_path / "ssp", "--step", "0.04")
+    assert finished.returncode == 0, finished.stderr
+    arguments = ["--stop", "4", "--step", "0.04", "--fmu-dir", TARGET / "fmu"]
+    finished = run(experiment, tmp_path / "toml", *arguments)
+    assert finished.returncode == 0, finished.stderr
+    ssp, toml = columns(tmp_path / "ssp"), columns(tmp_path / "toml")
+    for column, values in toml.items():
+        if not column.endswith(TIMES):
+            assert np.array_equal(ssp[column], values), column
+
+
+def test_oracle_fmpy_runs_an_archive_with_its_own_delay(fmu, tmp_path):
+    """FMPy sets zeros at the first step, steps all components, and passes values on afterwards; rows bear the step's start."""
+    path = tmp_path / "x.ssp"
+    pack(EXPERIMENTS / "crmpc-robust.toml", path)
+    found = simulate_ssp(str(path), stop_time=2.0, step_size=0.04)
+    with Unit(fmu("CRMPC")) as controller, Unit(fmu("ReentryPlant")) as plant:
+        for unit in (controller, plant):
+            unit.start(0.0)
+        moment, measured = [0.0] * 3, [0.0] * 6
+        time = 0.0
+        for row in found:
+            controller.set(dict(zip(ANGLES + RATES, measured)))
+            controller.step(time, 0.04)
+            plant.set(dict(zip(MOMENT, moment)))
+            plant.step(time, 0.04)
+            moment, measured = controller.get(MOMENT), plant.get(ANGLES + RATES)
+            assert row["time"] == time
+            assert [row[f"plant.{name}"] for name in ANGLES + RATES] == list(measured)
+            time += 0.04
+    assert len(found) >= 50
+
+
+SSD = """<?xml version="1.0" encoding="ISO-8859-1"?>
+<SystemStructureDescription xmlns="http://ssp-standard.org/SSP1/SystemStructureDescription"
+    xmlns:c="http://ssp-standard.org/SSP1/SystemStructureCommon" name="Fl\xfcgel" version="1.0">
+  <System name="outer">
+    <ParameterBindings><ParameterBinding source="values%20of%20all.ssv"/></ParameterBindings>
+    <Elements>
+      <Component name="law" source="resources/LQR.fmu"><Annotations/></Component>
+      <System name="vehicle">
+        <Connectors><Connector name="roll" kind="input"><c:Real/></Connector></Connectors>
+        <Elements><Component name="body" source="resources/ReentryPlant.fmu" implementation="any"/></Elements>
+        <Connections>
+          <Connection startConnector="roll" endElement="body" endConnector="moment.x">
+            <c:LinearTransformation factor="0.5" offset="7"/></Connection>
+        </Connections>
+      </System>
+    </Elements>
+    <Connections>
+      <Connection startElement="law" startConnector="moment.x" endElement="vehicle" endConnector="roll">
+        <c:LinearTransformation factor="4"/></Connection>
+    </Connections>
+  </System>
+  <DefaultExperiment startTime="1" stopTime="3"/>
+</SystemStructureDescription>""".encode("latin-1")
+SSV = b"""<v:ParameterSet xmlns:v="x" version="1.0" name="all"><v:Parameters>
+  <v:Parameter name="vehicle.body.initial.alpha"><v:Real value="3" unit="deg"/></v:Parameter>
+  <v:Parameter name="vehicle.body.disturbance.kind"><v:Enumeration value="none"/></v:Parameter>
+  <v:Parameter name="vehicle.body.jets.duty"><v:Boolean value="1"/></v:Parameter>
+  <v:Parameter name="law.period.feedback"><v:Real value="0.02"/></v:Parameter>
+</v:Parameters></v:ParameterSet>"""
+
+
+def foreign(path, ssd=SSD, ssv=SSV):
+    """An archive as another tool could have made it."""
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("SystemStructure.ssd", ssd)
+        file.writestr("values of all.ssv", ssv)
+        for name in ("LQR", "ReentryPlant"):
+            file.write(archive(name), f"resources/{name}.fmu")
+    return path
+
+
+def test_oracle_an_archive_of_another_maker_with_subsystems_and_transformations(tmp_path):
+    finished = run(foreign(tmp_path / "x.ssp"), tmp_path / "out", "--step", "0.02")
+    assert finished.returncode == 0, finished.stderr
+    found = columns(tmp_path / "out")
+    assert found["time"][0] == 1.0 and found["time"][-1] == 3.0
+    assert found["vehicle/body.attitude.alpha"][0] == pytest.approx(math.radians(3.0), rel=1e-15)
+    assert not found["vehicle/body.disturbance.delta.alpha"].any()
+    # Four times, then half of it and seven more; and the law comes first, so that there is no delay.
+    law, roll = found["law.moment.x"], found["vehicle/body.moment.x"]
+    assert np.allclose(roll, 2.0 * law + 7.0, rtol=1e-15) and np.ptp(law) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "culprit"),
+    [
+        (b'source="resources/LQR.fmu"', b'source="../LQR.fmu"', "leads out"),
+        (b'source="resources/LQR.fmu"', b'source="resources/LQ.fmu"', "resources/LQ.fmu"),
+        (b'implementation="any"', b'implementation="ModelExchange"', "model exchange"),
+        (b'implementation="any"', b'type="application/x-ssp-package"', "application/x-ssp-package"),
+        (b'startConnector="moment.x"', b'startConnector="moment.w"', "moment.w"),
+        (b'endConnector="roll"', b'endConnector="yaw"', None),
+        (b'factor="4"', b'factor="four"', "four"),
+        (b'<c:LinearTransformation factor="4"/>', b"<c:BooleanMappingTransformation/>", "BooleanMappingTransformation"),
+        (b'encoding="ISO-8859-1"', b'encoding="UTF-8"', "UTF-8"),
+        (b"<System name", b"<!DOCTYPE a []><System name", "document type"),
+        (b"</SystemStructureDescription>", b"", "not closed"),
+        (b' stopTime="3"', b"", "--stop"),
+    ],
+)
+def test_archives_that_cannot_be_run_are_refused_in_one_line(old, new, culprit, tmp_path):
+    assert old in SSD
+    finished = run(foreign(tmp_path / "x.ssp", SSD.replace(old, new, 1)), tmp_path / "out")
+    if culprit is None:
+        # What comes from nowhere stays at its start value.
+        assert finished.returncode == 0
+        return
+    assert finished.returncode == 2 and culprit in finished.stderr, finished.stderr
+    assert finished.stderr.count("\n") == 1 and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "culprit"),
+    [
+        (b"law.period.feedback", b"law.period.feedbak", 'did you mean "period.feedback"'),
+        (b"law.period.feedback", b"low.period.feedback", "low.period.feedback"),
+        (b'value="none"', b'value="pink"', "pink"),
+        (b'unit="deg"', b'unit="deg/s"', "deg/s"),
+        (b'<v:Boolean value="1"', b'<v:Binary value="1"', "Binary"),
+    ],
+)
+def test_values_that_cannot_be_meant_are_refused_in_one_line(old, new, culprit, tmp_path):
+    assert old in SSV
+    finished = run(foreign(tmp_path / "x.ssp", ssv=SSV.replace(old, new, 1)), tmp_path / "out")
+    assert finished.returncode == 2 and culprit in finished.stderr, finished.stderr
+    assert finished.stderr.count("\n") == 1 and not (tmp_path / "out").exists()
+
+
+def test_what_is_no_archive_is_refused(tmp_path):
+    shutil.copy(archive("LQR"), tmp_path / "x.ssp")
+    finished = run(tmp_path / "x.ssp", tmp_path / "out")
+    assert finished.returncode == 2 and "no SSP archive" in finished.stderr
