@@ -1,9 +1,11 @@
-//! Attitude kinematics: the matrix R of Chai 2022 (2), its inverse and its derivatives.
+//! Attitude kinematics: the matrix R of Chai 2022 (2), its inverse and its derivatives; Wu 2015 (1) with the trajectory.
 //!
-//! Angles `[alpha, beta, sigma]` (angle of attack, sideslip, bank) in rad, body rates `[p, q, r]` in rad/s. The matrices
-//! do not depend on the bank angle. R is printed without the term α̇ sin β in its bank row; it stands here as printed.
+//! Angles `[alpha, beta, sigma]` (angle of attack, sideslip, bank) in rad, body rates `[p, q, r]` in rad/s. The matrices R
+//! do not depend on the bank angle. R is printed without the term α̇ sin β in its bank row; the functions have it as printed,
+//! [`Kinematics`] has both.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// R(Θ) of Chai 2022 (2): Θ̇ = R ω. Singular at β = ±π/2.
 pub fn r(angles: &Vector3<f64>) -> Matrix3<f64> {
@@ -65,4 +67,188 @@ pub fn r_beta_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
     let tb = sb / cb;
     let sec2 = 1.0 / (cb * cb);
     Matrix3::new(-2.0 * ca * sec2 * tb, 0.0, -2.0 * sa * sec2 * tb, 0.0, 0.0, 0.0, ca * cb, sb, cb * sa)
+}
+
+/// How the bank rate comes about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kinematics {
+    /// R of Chai 2022 (2) and Wu 2015 (4), which lacks α̇ sin β in the bank row.
+    #[default]
+    Printed,
+    /// With + α̇ sin β in the bank row, Wu 2015 (1).
+    Exact,
+}
+
+impl Kinematics {
+    /// + α̇ sin β in the bank row.
+    fn with_alpha_rate(mut matrix: Matrix3<f64>, factor: f64) -> Matrix3<f64> {
+        for j in 0..3 {
+            matrix[(2, j)] += factor * matrix[(0, j)];
+        }
+        matrix
+    }
+
+    /// The derivative of `matrix` with its alpha row times sin β added to its bank row, given the `slope` of `matrix` and
+    /// that of sin β.
+    fn complete(self, slope: Matrix3<f64>, matrix: &Matrix3<f64>, sb: f64, sb_slope: f64) -> Matrix3<f64> {
+        match self {
+            Self::Printed => slope,
+            Self::Exact => {
+                let mut complete = Self::with_alpha_rate(slope, sb);
+                for j in 0..3 {
+                    complete[(2, j)] += sb_slope * matrix[(0, j)];
+                }
+                complete
+            }
+        }
+    }
+
+    /// R in force: Θ̇ = R ω where the trajectory does not turn.
+    pub fn r(self, angles: &Vector3<f64>) -> Matrix3<f64> {
+        match self {
+            Self::Printed => r(angles),
+            Self::Exact => Self::with_alpha_rate(r(angles), angles.y.sin()),
+        }
+    }
+
+    /// R⁻¹ of the R in force.
+    pub fn r_inverse(self, angles: &Vector3<f64>) -> Matrix3<f64> {
+        let mut inverse = r_inverse(angles);
+        if self == Self::Exact {
+            // (E R)⁻¹ = R⁻¹ E⁻¹ with E = 1 + sin β e₃ e₁ᵀ
+            let bank = inverse.column(2) * angles.y.sin();
+            inverse.set_column(0, &(inverse.column(0) - bank));
+        }
+        inverse
+    }
+
+    /// ∂R/∂α of the R in force.
+    pub fn r_alpha(self, angles: &Vector3<f64>) -> Matrix3<f64> {
+        self.complete(r_alpha(angles), &Matrix3::zeros(), angles.y.sin(), 0.0)
+    }
+
+    /// ∂R/∂β of the R in force.
+    pub fn r_beta(self, angles: &Vector3<f64>) -> Matrix3<f64> {
+        let (sb, cb) = angles.y.sin_cos();
+        self.complete(r_beta(angles), &r(angles), sb, cb)
+    }
+
+    /// What a turning trajectory adds to Θ̇ = R ω, Wu 2015 (1): a matrix times [`Trajectory::turn_rate`].
+    pub fn turn(self, angles: &Vector3<f64>) -> Matrix3<f64> {
+        let matrix = turn(angles);
+        match self {
+            Self::Printed => matrix,
+            Self::Exact => Self::with_alpha_rate(matrix, angles.y.sin()),
+        }
+    }
+
+    /// ∂/∂β of [`Kinematics::turn`].
+    pub fn turn_beta(self, angles: &Vector3<f64>) -> Matrix3<f64> {
+        let (sb, cb) = angles.y.sin_cos();
+        let (ss, cs) = angles.z.sin_cos();
+        let slope = Matrix3::new(0.0, -cs * sb, ss * sb, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) / (cb * cb);
+        self.complete(slope, &turn(angles), sb, cb)
+    }
+
+    /// ∂/∂σ of [`Kinematics::turn`].
+    pub fn turn_sigma(self, angles: &Vector3<f64>) -> Matrix3<f64> {
+        let (sb, cb) = angles.y.sin_cos();
+        let (ss, cs) = angles.z.sin_cos();
+        let slope = Matrix3::new(0.0, ss / cb, cs / cb, 0.0, cs, -ss, 0.0, 0.0, 0.0);
+        self.complete(slope, &Matrix3::zeros(), sb, 0.0)
+    }
+}
+
+/// The trajectory's terms of Wu 2015 (1), without those of α̇ sin β.
+fn turn(angles: &Vector3<f64>) -> Matrix3<f64> {
+    let cb = angles.y.cos();
+    let (ss, cs) = angles.z.sin_cos();
+    Matrix3::new(0.0, -cs / cb, ss / cb, 0.0, ss, cs, 1.0, 0.0, 0.0)
+}
+
+/// Where the vehicle flies to and how that changes: the trajectory's angles and rates in Wu 2015 (1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Trajectory {
+    /// Flight path angle γ above the horizon, rad.
+    pub flight_path_angle: f64,
+    /// Heading ψ, from north to east, rad.
+    pub heading: f64,
+    /// Latitude φ, rad.
+    pub latitude: f64,
+    /// γ̇, rad/s.
+    pub flight_path_angle_rate: f64,
+    /// ψ̇, rad/s.
+    pub heading_rate: f64,
+    /// Longitude rate θ̇, east positive, rad/s.
+    pub longitude_rate: f64,
+    /// φ̇, rad/s.
+    pub latitude_rate: f64,
+}
+
+/// Number of the trajectory's angles and rates.
+pub const TRAJECTORY: usize = 7;
+
+impl Trajectory {
+    /// All values, in the order of the fields.
+    pub fn values(&self) -> [f64; TRAJECTORY] {
+        [
+            self.flight_path_angle,
+            self.heading,
+            self.latitude,
+            self.flight_path_angle_rate,
+            self.heading_rate,
+            self.longitude_rate,
+            self.latitude_rate,
+        ]
+    }
+
+    /// Angular velocity (rad/s) of the trajectory's axes over inertial space, about these axes: x along the velocity, y to
+    /// the right in the horizontal plane, z down. `earth_rate` is the Earth's, rad/s. Corrects the sign of sin φ sin γ in the
+    /// bank row of Wu 2015 (1), which is printed −.
+    pub fn turn_rate(&self, earth_rate: f64) -> Vector3<f64> {
+        let around = self.longitude_rate + earth_rate;
+        let (climb, turn, north) = (self.flight_path_angle_rate, self.heading_rate, self.latitude_rate);
+        if [around, climb, turn, north] == [0.0; 4] {
+            return Vector3::zeros();
+        }
+        let (sg, cg) = self.flight_path_angle.sin_cos();
+        let (sp, cp) = self.heading.sin_cos();
+        let (sl, cl) = self.latitude.sin_cos();
+        Vector3::new(
+            -turn * sg - north * sp * cg + around * (cl * cp * cg + sl * sg),
+            climb - north * cp - around * cl * sp,
+            turn * cg - north * sp * sg + around * (cl * cp * sg - sl * cg),
+        )
+    }
+
+    /// Partial derivatives of [`Trajectory::turn_rate`] by the fields in their order.
+    pub fn turn_rate_by_fields(&self, earth_rate: f64) -> SMatrix<f64, 3, TRAJECTORY> {
+        let around = self.longitude_rate + earth_rate;
+        let (turn, north) = (self.heading_rate, self.latitude_rate);
+        let (sg, cg) = self.flight_path_angle.sin_cos();
+        let (sp, cp) = self.heading.sin_cos();
+        let (sl, cl) = self.latitude.sin_cos();
+        SMatrix::from_columns(&[
+            Vector3::new(
+                -turn * cg + north * sp * sg + around * (sl * cg - cl * cp * sg),
+                0.0,
+                -turn * sg - north * sp * cg + around * (cl * cp * cg + sl * sg),
+            ),
+            Vector3::new(
+                -north * cp * cg - around * cl * sp * cg,
+                north * sp - around * cl * cp,
+                -north * cp * sg - around * cl * sp * sg,
+            ),
+            Vector3::new(
+                around * (cl * sg - sl * cp * cg),
+                around * sl * sp,
+                -around * (sl * cp * sg + cl * cg),
+            ),
+            Vector3::y(),
+            Vector3::new(-sg, 0.0, cg),
+            Vector3::new(cl * cp * cg + sl * sg, -cl * sp, cl * cp * sg - sl * cg),
+            Vector3::new(-sp * cg, -cp, -sp * sg),
+        ])
+    }
 }

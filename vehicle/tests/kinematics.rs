@@ -1,7 +1,9 @@
-//! R of Chai 2022 (2) against its properties and against numerical differentiation.
+//! R of Chai 2022 (2) against its properties and against numerical differentiation, Wu 2015 (1) against a composition of
+//! rotations.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
+use vehicle::kinematics::{Kinematics, TRAJECTORY, Trajectory};
 use vehicle::kinematics::{r, r_alpha, r_alpha_alpha, r_alpha_beta, r_beta, r_beta_beta, r_dot, r_inverse};
 
 fn attitude() -> impl Strategy<Value = Vector3<f64>> {
@@ -101,4 +103,192 @@ fn published_r_dot_is_wrong_in_two_entries() {
         let off = difference[(row, column)].abs();
         assert!(if misprint { off > 0.01 } else { off < 1e-11 }, "({row}, {column}): {off}");
     }
+}
+
+// Wu 2015, (1)
+
+/// Body axes to north, east, down at the meridian θ = 0, as a product of rotations. The bank angle grows against the right-hand
+/// rule about the velocity, which is what the signs of R say.
+fn attitude_in_space(trajectory: &Trajectory, longitude: f64, angles: &Vector3<f64>) -> Rotation3<f64> {
+    let [x, y, z] = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+    let about = Rotation3::from_axis_angle;
+    // Inertial axes: z to the north pole, x to the meridian θ = 0 on the equator.
+    let to_the_vehicle = about(&z, longitude) * about(&y, -trajectory.latitude);
+    let to_north_east_down = about(&y, -std::f64::consts::FRAC_PI_2);
+    let to_the_velocity = about(&z, trajectory.heading) * about(&y, trajectory.flight_path_angle);
+    let to_the_body = about(&x, -angles.z) * about(&z, -angles.y) * about(&y, angles.x);
+    to_the_vehicle * to_north_east_down * to_the_velocity * to_the_body
+}
+
+/// ω about the body axes from the attitude's change, by a central difference.
+fn body_rates(
+    trajectory: &Trajectory,
+    earth_rate: f64,
+    angles: &Vector3<f64>,
+    angle_rates: &Vector3<f64>,
+) -> Vector3<f64> {
+    let h = 1e-5;
+    let at = |t: f64| {
+        let moved = Trajectory {
+            flight_path_angle: trajectory.flight_path_angle + t * trajectory.flight_path_angle_rate,
+            heading: trajectory.heading + t * trajectory.heading_rate,
+            latitude: trajectory.latitude + t * trajectory.latitude_rate,
+            ..*trajectory
+        };
+        let longitude = t * (trajectory.longitude_rate + earth_rate);
+        attitude_in_space(&moved, longitude, &(angles + angle_rates * t))
+    };
+    // Cᵀ Ċ = ω^×
+    let turning = at(0.0).transpose().matrix() * (at(h).matrix() - at(-h).matrix()) / (2.0 * h);
+    Vector3::new(turning[(2, 1)], turning[(0, 2)], turning[(1, 0)])
+}
+
+fn trajectory() -> impl Strategy<Value = Trajectory> {
+    let rates = proptest::array::uniform4(-0.5..0.5);
+    (-1.5..1.5, -3.0..3.0, -1.5..1.5, rates).prop_map(|(gamma, psi, phi, rates)| Trajectory {
+        flight_path_angle: gamma,
+        heading: psi,
+        latitude: phi,
+        flight_path_angle_rate: rates[0],
+        heading_rate: rates[1],
+        longitude_rate: rates[2],
+        latitude_rate: rates[3],
+    })
+}
+
+/// (1) as printed, with `sign` before sin φ sin γ in the bank row.
+fn printed_1(
+    trajectory: &Trajectory,
+    earth_rate: f64,
+    angles: &Vector3<f64>,
+    rates: &Vector3<f64>,
+    sign: f64,
+) -> Vector3<f64> {
+    let (sa, ca) = angles.x.sin_cos();
+    let (sb, cb) = angles.y.sin_cos();
+    let (ss, cs) = angles.z.sin_cos();
+    let (sg, cg) = trajectory.flight_path_angle.sin_cos();
+    let (sp, cp) = trajectory.heading.sin_cos();
+    let (sl, cl) = trajectory.latitude.sin_cos();
+    let [gamma_rate, psi_rate, theta_rate, phi_rate] = [
+        trajectory.flight_path_angle_rate,
+        trajectory.heading_rate,
+        trajectory.longitude_rate + earth_rate,
+        trajectory.latitude_rate,
+    ];
+    let (p, q, r) = (rates.x, rates.y, rates.z);
+    let first = psi_rate * cg - phi_rate * sp * sg + theta_rate * (cl * cp * sg - sl * cg);
+    let second = gamma_rate - phi_rate * cp - theta_rate * cl * sp;
+    let alpha_rate = -p * ca * sb / cb + q - r * sa * sb / cb + ss / cb * first - cs / cb * second;
+    let beta_rate = p * sa - r * ca + ss * second + cs * first;
+    let sigma_rate = -p * ca * cb - q * sb - r * sa * cb + alpha_rate * sb
+        - psi_rate * sg
+        - phi_rate * sp * cg
+        + theta_rate * (cl * cp * cg + sign * sl * sg);
+    Vector3::new(alpha_rate, beta_rate, sigma_rate)
+}
+
+proptest! {
+    #[test]
+    fn oracle_kinematics_1_are_the_composition_of_rotations(
+        angles in attitude(),
+        angle_rates in proptest::array::uniform3(-0.5..0.5),
+        trajectory in trajectory(),
+        earth_rate in -0.5..0.5,
+    ) {
+        let angle_rates = Vector3::from(angle_rates);
+        let rates = body_rates(&trajectory, earth_rate, &angles, &angle_rates);
+        let exact = Kinematics::Exact;
+        let turn_rate = trajectory.turn_rate(earth_rate);
+        let found = exact.r(&angles) * rates + exact.turn(&angles) * turn_rate;
+        let scale = 1.0 / angles.y.cos();
+        prop_assert!((found - angle_rates).amax() < 1e-9 * scale, "{}", found - angle_rates);
+        // The other item lacks α̇ sin β and nothing else.
+        let printed = Kinematics::Printed;
+        let mut found = printed.r(&angles) * rates + printed.turn(&angles) * turn_rate;
+        found.z += angle_rates.x * angles.y.sin();
+        prop_assert!((found - angle_rates).amax() < 1e-9 * scale, "{}", found - angle_rates);
+    }
+
+    /// (1) as printed differs from that in one sign, that of sin φ sin γ in the bank row.
+    #[test]
+    fn published_kinematics_1_are_wrong_in_one_sign(
+        angles in attitude(),
+        rates in proptest::array::uniform3(-0.5..0.5),
+        trajectory in trajectory(),
+        earth_rate in -0.5..0.5,
+    ) {
+        let rates = Vector3::from(rates);
+        let exact = Kinematics::Exact;
+        let ours = exact.r(&angles) * rates + exact.turn(&angles) * trajectory.turn_rate(earth_rate);
+        let scale = 1.0 / angles.y.cos();
+        let printed = |sign| printed_1(&trajectory, earth_rate, &angles, &rates, sign);
+        prop_assert!((printed(1.0) - ours).amax() < 1e-14 * scale);
+        let misprint = Vector3::new(
+            0.0,
+            0.0,
+            -2.0 * (trajectory.longitude_rate + earth_rate)
+                * trajectory.latitude.sin() * trajectory.flight_path_angle.sin(),
+        );
+        prop_assert!((printed(-1.0) - ours - misprint).amax() < 1e-14 * scale);
+    }
+
+    #[test]
+    fn oracle_exact_r_its_inverse_and_slopes(angles in attitude(), turn_rate in proptest::array::uniform3(-0.5..0.5)) {
+        let scale = 1.0 / angles.y.cos().powi(4);
+        let turn_rate = Vector3::from(turn_rate);
+        for kinematics in [Kinematics::Printed, Kinematics::Exact] {
+            let product = kinematics.r(&angles) * kinematics.r_inverse(&angles);
+            prop_assert!((product - Matrix3::identity()).amax() < 1e-14 * scale);
+            let h = 1e-5;
+            let slope = |of: &dyn Fn(&Vector3<f64>) -> Matrix3<f64>, axis: usize| {
+                let mut shift = Vector3::zeros();
+                shift[axis] = h;
+                (of(&(angles + shift)) - of(&(angles - shift))) / (2.0 * h)
+            };
+            for (numeric, exact) in [
+                (slope(&|angles| kinematics.r(angles), 0), kinematics.r_alpha(&angles)),
+                (slope(&|angles| kinematics.r(angles), 1), kinematics.r_beta(&angles)),
+                (slope(&|angles| kinematics.turn(angles), 1), kinematics.turn_beta(&angles)),
+                (slope(&|angles| kinematics.turn(angles), 2), kinematics.turn_sigma(&angles)),
+            ] {
+                prop_assert!((numeric - exact).amax() < 1e-8 * scale, "{kinematics:?}: {}", numeric - exact);
+            }
+            prop_assert_eq!(kinematics.turn(&angles) * Vector3::zeros(), Vector3::zeros());
+            prop_assert!((kinematics.turn(&angles) * turn_rate).amax() > 0.0);
+        }
+    }
+
+    #[test]
+    fn oracle_turn_rate_by_the_trajectory_against_differences(trajectory in trajectory(), earth_rate in -0.5..0.5) {
+        let exact = trajectory.turn_rate_by_fields(earth_rate);
+        let h = 1e-5;
+        for i in 0..TRAJECTORY {
+            let shifted = |by: f64| {
+                let mut values = trajectory.values();
+                values[i] += by;
+                let [gamma, psi, phi, gamma_rate, psi_rate, theta_rate, phi_rate] = values;
+                Trajectory {
+                    flight_path_angle: gamma,
+                    heading: psi,
+                    latitude: phi,
+                    flight_path_angle_rate: gamma_rate,
+                    heading_rate: psi_rate,
+                    longitude_rate: theta_rate,
+                    latitude_rate: phi_rate,
+                }
+                .turn_rate(earth_rate)
+            };
+            let numeric = (shifted(h) - shifted(-h)) / (2.0 * h);
+            prop_assert!((numeric - exact.column(i)).amax() < 1e-9, "{i}: {}", numeric - exact.column(i));
+        }
+    }
+}
+
+/// Where R is the R of (3) and (4): level and straight, or at rest over an Earth that does not turn.
+#[test]
+fn a_trajectory_that_does_not_turn_leaves_r_alone() {
+    let still = Trajectory { flight_path_angle: -0.1, heading: 0.7, latitude: 0.5, ..Trajectory::default() };
+    assert_eq!(still.turn_rate(0.0), Vector3::zeros());
+    assert_ne!(still.turn_rate(7.2921e-5), Vector3::zeros());
 }
