@@ -374,6 +374,8 @@ impl Instance {
         Ok(())
     }
 
+    /// A discrete Real input is taken in continuous-time mode too, though the standard has it set in event mode: FMPy sets all
+    /// inputs whenever it asks for event indicators. It is without effect until the next event.
     fn settable(&self, variable: &Variable) -> Outcome {
         let name = &variable.name;
         let state = self.progress.state;
@@ -382,11 +384,6 @@ impl Instance {
                 error(format!(
                     "'{name}' is a fixed parameter: it can be set before and in initialization mode only"
                 ))
-            }
-            Causality::Input
-                if state == State::ContinuousTimeMode && variable.variability != Variability::Continuous =>
-            {
-                error(format!("'{name}' is a discrete input: it can be set in event mode only"))
             }
             Causality::Parameter | Causality::Input => Ok(()),
             _ => error(format!("'{name}' is calculated by the unit and cannot be set")),

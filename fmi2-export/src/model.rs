@@ -94,7 +94,8 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// Model exchange: sets the continuous states.
     fn set_continuous_states(&mut self, _states: &[f64]) {}
 
-    /// Model exchange: the event at `time`: takes what changes there and tells when the next one is due.
+    /// Model exchange: the event at `time`: takes discrete inputs and what else changes there, and tells when the next one is
+    /// due. Importers may call it where no event is, and more than once.
     ///
     /// # Errors
     /// Says what went wrong.
@@ -102,7 +103,7 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
         Ok(EventInfo::default())
     }
 
-    /// Model exchange: event indicators at the current state.
+    /// Model exchange: event indicators as of the last [`Model::calculate`], which the shell calls before if something changed.
     fn event_indicators(&self, _indicators: &mut [f64]) {}
 
     /// Partial derivative of the variable with value reference `unknown` by the one with value reference `known`, at

@@ -173,6 +173,11 @@ pub fn parameter(name: &str, description: &str) -> Common {
 pub fn input(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Input, Variability::Continuous)
 }
+/// An input that changes at events or communication points only. It has no input derivatives. In model exchange a model takes
+/// it in [`Model::new_discrete_states`](crate::Model::new_discrete_states) and nowhere else.
+pub fn discrete_input(name: &str, description: &str) -> Common {
+    Common::new(name, description, Causality::Input, Variability::Discrete)
+}
 /// A continuous output.
 pub fn output(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Output, Variability::Continuous)

@@ -1,6 +1,6 @@
-//! A first-order lag x' = (k u − x) / T whose gain changes at a time event. Every kind of variable occurs in it.
+//! A first-order lag x' = (k u − x) / T whose gain changes at a time event and which tells when x crosses 1. Every kind of variable occurs in it.
 
-use fmi2_export::table::{discrete_output, input, local, output, parameter};
+use fmi2_export::table::{discrete_input, discrete_output, input, local, output, parameter};
 use fmi2_export::{Context, Description, EventInfo, Failure, Inputs, Model, Table};
 use model_description::DefaultExperiment;
 use model_description::unit;
@@ -28,6 +28,9 @@ pub struct Lag {
     u: f64,
     x: f64,
     switched: bool,
+    offset: f64,
+    /// Model exchange: the offset as of the last event.
+    offset_held: Option<f64>,
 
     derivative: f64,
     y: f64,
@@ -104,19 +107,25 @@ impl Model for Lag {
                 |m| &mut m.derivative,
             )
             .real(
-                output("y", "State plus input, shaped").depends_on(["u", "x"]).real().unit(unit::angle()),
+                output("y", "State plus input and offset, shaped")
+                    .depends_on(["u", "x", "offset"])
+                    .real()
+                    .unit(unit::angle()),
                 |m| &mut m.y,
             )
             .real(discrete_output("gain.now", "Gain in force").real(), |m| &mut m.gain_now)
             .boolean(discrete_output("switched", "Whether the switch is behind"), |m| &mut m.switched)
-            .string(discrete_output("text", "The label"), |m| &mut m.description);
+            .string(discrete_output("text", "The label"), |m| &mut m.description)
+            .real(discrete_input("offset", "Added to the output").real().unit(unit::angle()), |m| {
+                &mut m.offset
+            });
         Description {
             name: "Lag",
             description: "First-order lag with a gain that changes at a time event",
-            documentation: "<p>x' = (k u − x) / T, y = x + u.</p>",
+            documentation: "<p>x' = (k u − x) / T, y = x + u + offset.</p>",
             version: env!("CARGO_PKG_VERSION"),
             model_exchange: true,
-            event_indicators: 0,
+            event_indicators: 1,
             default_experiment: DefaultExperiment { start: 0.0, stop: 2.0, tolerance: 1e-6, step: 0.1 },
             table,
         }
@@ -136,6 +145,8 @@ impl Model for Lag {
             u: 0.0,
             x: 0.0,
             switched: false,
+            offset: 0.0,
+            offset_held: None,
             derivative: 0.0,
             y: 0.0,
             gain_now: 0.0,
@@ -149,13 +160,14 @@ impl Model for Lag {
         }
         self.x = self.initial;
         self.switched = context.start_time >= self.switch_time;
+        self.offset_held = None;
         Ok(())
     }
 
     fn calculate(&mut self, time: f64) -> Result<(), Failure> {
         self.gain_now = self.gain(time);
         self.derivative = self.rate(self.x, self.gain_now);
-        self.y = self.x + self.u;
+        self.y = self.x + self.u + self.offset_held.unwrap_or(self.offset);
         if self.shape == SHAPE_SATURATED {
             self.y = self.y.clamp(-1.0, 1.0);
         }
@@ -195,8 +207,13 @@ impl Model for Lag {
 
     fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure> {
         self.switched = time >= self.switch_time;
+        self.offset_held = Some(self.offset);
         let next = (!self.switched).then_some(self.switch_time);
         Ok(EventInfo { next_event_time: next, states_changed: false })
+    }
+
+    fn event_indicators(&self, indicators: &mut [f64]) {
+        indicators[0] = self.x - 1.0;
     }
 
     fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure> {

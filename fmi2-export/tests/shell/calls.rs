@@ -104,7 +104,7 @@ const FUNCTIONS: &[(&str, Caller, &str, &str)] = &[
     ("fmi2SetTime", |c| c!(fmi2SetTime(c, 0.0)), "", "EC"),
     ("fmi2SetContinuousStates", |c| c!(fmi2SetContinuousStates(c, &UNIT, 1)), "", "C"),
     ("fmi2GetDerivatives", |c| c!(fmi2GetDerivatives(c, &mut 0.0, 1)), "", "NECTX"),
-    ("fmi2GetEventIndicators", |c| c!(fmi2GetEventIndicators(c, null_mut(), 0)), "", "NECTX"),
+    ("fmi2GetEventIndicators", |c| c!(fmi2GetEventIndicators(c, &mut 0.0, 1)), "", "NECTX"),
     ("fmi2GetContinuousStates", |c| c!(fmi2GetContinuousStates(c, &mut 0.0, 1)), "", "NECTX"),
     (
         "fmi2GetNominalsOfContinuousStates",

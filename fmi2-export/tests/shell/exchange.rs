@@ -57,8 +57,40 @@ fn states_have_nominal_values_and_lengths_are_checked() {
     assert_eq!(c!(fmi2GetContinuousStates(component, two.as_mut_ptr(), 2)), Status::Error);
     instance.said(&["room for 2 continuous states, but the unit has 1"]);
     let instance = Instance::in_event_mode();
-    assert_eq!(c!(fmi2GetEventIndicators(instance.component, two.as_mut_ptr(), 1)), Status::Error);
-    instance.said(&["room for 1 event indicators, but the unit has 0"]);
+    assert_eq!(c!(fmi2GetEventIndicators(instance.component, two.as_mut_ptr(), 2)), Status::Error);
+    instance.said(&["room for 2 event indicators, but the unit has 1"]);
+}
+
+#[test]
+fn event_indicators_follow_the_states() {
+    let instance = Instance::in_event_mode();
+    let component = instance.component;
+    assert_eq!(c!(fmi2EnterContinuousTimeMode(component)), Status::Ok);
+    for x in [0.25, 1.0, 3.0] {
+        let mut indicator = f64::NAN;
+        assert_eq!(c!(fmi2SetContinuousStates(component, &x, 1)), Status::Ok);
+        assert_eq!(c!(fmi2GetEventIndicators(component, &mut indicator, 1)), Status::Ok);
+        assert_eq!(indicator, x - 1.0);
+    }
+}
+
+#[test]
+fn a_discrete_input_is_taken_at_events() {
+    let instance = Instance::in_event_mode();
+    let component = instance.component;
+    assert_eq!(instance.set_real(OFFSET, 5.0), Status::Ok);
+    instance.event_info();
+    assert_eq!(instance.real(Y), 0.5 + 5.0);
+    assert_eq!(c!(fmi2EnterContinuousTimeMode(component)), Status::Ok);
+    // Not what the standard asks of importers, but what FMPy does.
+    assert_eq!(instance.set_real(OFFSET, 7.0), Status::Ok);
+    assert_eq!((instance.real(OFFSET), instance.real(Y)), (7.0, 0.5 + 5.0));
+    assert_eq!(c!(fmi2EnterEventMode(component)), Status::Ok);
+    instance.event_info();
+    assert_eq!(instance.real(Y), 0.5 + 7.0);
+    let stepping = Instance::stepping();
+    assert_eq!(stepping.set_real(OFFSET, 5.0), Status::Ok);
+    assert_eq!(stepping.real(Y), 0.5 + 5.0);
 }
 
 #[test]

@@ -114,6 +114,7 @@ fn senseless_input_derivatives_are_refused() {
         (U, 4, 1.0, "order 4"),
         (U, 1, f64::NAN, "NaN is not finite"),
         (X, 1, 1.0, "'x' is not a continuous input"),
+        (OFFSET, 1, 1.0, "'offset' is not a continuous input"),
         (LABEL, 1, 1.0, "not of type Real"),
         (99, 1, 1.0, "does not exist"),
     ] {

@@ -24,6 +24,7 @@ pub(crate) const DERIVATIVE: u32 = 11;
 pub(crate) const Y: u32 = 12;
 pub(crate) const SWITCHED: u32 = 14;
 pub(crate) const TEXT: u32 = 15;
+pub(crate) const OFFSET: u32 = 16;
 
 /// What the importer's logger was told.
 #[derive(Clone, Debug)]

@@ -19,7 +19,7 @@ fn a_refused_value_leaves_the_old_one_in_place() {
         (U, 100.5, "'u' = 100.5 is above the maximum 100"),
         (X, 1.0, "'x' is calculated by the unit"),
         (ORDER, 1.0, "'order' (value reference 5) is not of type Real"),
-        (16, 1.0, "value reference 16 does not exist"),
+        (17, 1.0, "value reference 17 does not exist"),
         (u32::MAX, 1.0, "does not exist"),
     ];
     for &(reference, value, part) in cases {
