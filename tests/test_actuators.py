@@ -1,13 +1,17 @@
-"""ReentryPlant with surfaces and jets: stepped by hand, and as model exchange under CVode. Numbers printed in Wu 2015 are
+"""ReentryPlant with surfaces and jets: stepped by hand, and as model exchange under CVode and Euler. Numbers printed in Wu 2015 are
 written here a second time."""
+
+from ctypes import c_double
 
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
+from fmpy.fmi2 import FMU2Model
 
 from fmi import ANGLES, RATES, Unit
 
 SURFACE = [f"surface[{i}]" for i in range(1, 9)]
+SURFACE_RATE = [f"deflectionRate[{i}]" for i in range(1, 9)]
 DEFLECTION = [f"deflection[{i}]" for i in range(1, 9)]
 JET = [f"jet[{j}]" for j in range(1, 11)]
 APPLIED = [f"appliedMoment.{axis}" for axis in "xyz"]
@@ -145,46 +149,127 @@ def commands(tick: int) -> dict:
     return surfaces(wanted) | {jet: float((tick * 7 + 3 * j) % 10 < 3) for j, jet in enumerate(JET)}
 
 
-@pytest.mark.parametrize("duty", [False, True])
-def test_oracle_cvode_agrees_with_co_simulation(fmu, duty):
-    unit = fmu("ReentryPlant")
-    names = SURFACE + JET
-    ticks = 25
-    scale = {jet: 0.7 for jet in JET} if duty else {}
-
-    def at(tick):
-        values = commands(tick)
-        return [values[name] * scale.get(name, 1.0) for name in names]
-
-    expected = []
-    with Unit(unit, {**ACTUATED, "jets.duty": duty}).start(inputs=dict(zip(names, at(0)))) as plant:
+def co_simulated(fmu, parameters: dict, at, ticks: int) -> np.ndarray:
+    """Angles, rates and deflections at every tick."""
+    rows = []
+    with Unit(fmu, parameters).start(inputs=at(0)) as plant:
         for tick in range(ticks + 1):
-            plant.set(dict(zip(names, at(tick))))
-            expected.append(plant.get(ANGLES + RATES + DEFLECTION))
+            plant.set(at(tick))
+            rows.append(plant.get(ANGLES + RATES + DEFLECTION))
             if tick < ticks:
                 plant.step(tick * 0.2, 0.2)
+    return np.array(rows)
+
+
+def simulated(fmu, start: dict, **options) -> np.ndarray:
+    """What FMPy's model exchange records."""
+    values = {name: fmu.item(name, value) if isinstance(value, str) else value for name, value in start.items()}
+    output = ANGLES + RATES + DEFLECTION
+    return simulate_fmu(str(fmu.path), fmi_type="ModelExchange", start_values=values, output=output, **options)
+
+
+def exchanged(fmu, parameters: dict, at, ticks: int, **options) -> np.ndarray:
+    """The same with a jump of the commands at every tick."""
+    names = list(at(0))
     rows = []
     for tick in range(ticks + 1):
         if tick > 0:
-            rows.append((tick * 0.2, *at(tick - 1)))
-        rows.append((tick * 0.2, *at(tick)))
-    values = {
-        name: unit.item(name, value) if isinstance(value, str) else value for name, value in ACTUATED.items()
-    }
-    result = simulate_fmu(
-        str(unit.path),
-        fmi_type="ModelExchange",
-        solver="CVode",
-        relative_tolerance=1e-10,
-        start_values={**values, "jets.duty": duty},
-        input=np.array(rows, dtype=[("time", float), *((name, float) for name in names)]),
-        stop_time=ticks * 0.2,
-        output_interval=0.2,
-        output=ANGLES + RATES + DEFLECTION,
-        record_events=False,
-    )
-    found = np.array([result[name] for name in ANGLES + RATES + DEFLECTION]).T
-    expected = np.array(expected)
+            rows.append((tick * 0.2, *at(tick - 1).values()))
+        rows.append((tick * 0.2, *at(tick).values()))
+    signal = np.array(rows, dtype=[("time", float), *((name, float) for name in names)])
+    return simulated(fmu, parameters, input=signal, stop_time=ticks * 0.2, **options)
+
+
+def columns(result) -> np.ndarray:
+    return np.array([result[name] for name in ANGLES + RATES + DEFLECTION]).T
+
+
+@pytest.mark.parametrize("duty", [False, True])
+@pytest.mark.parametrize("kind", ["none", "square", "againstMoment"])
+def test_oracle_cvode_agrees_with_co_simulation(fmu, duty, kind):
+    unit = fmu("ReentryPlant")
+    parameters = {**ACTUATED, "jets.duty": duty, "disturbance.kind": kind}
+
+    def at(tick):
+        scale = 0.7 if duty else 1.0
+        return {name: value * (scale if name in JET else 1.0) for name, value in commands(tick).items()}
+
+    expected = co_simulated(unit, parameters, at, 25)
     assert np.ptp(expected[:, :3], axis=0).min() > 0.02
+    options = dict(solver="CVode", relative_tolerance=1e-10, output_interval=0.2, record_events=False)
+    found = columns(exchanged(unit, parameters, at, 25, **options))
     assert np.abs(found[:, :6] - expected[:, :6]).max() < 3e-7
     assert np.abs(found[:, 6:] - expected[:, 6:]).max() < 1e-9
+
+
+def test_oracle_euler_comes_to_co_simulation_with_order_one(fmu):
+    unit = fmu("ReentryPlant")
+    expected = co_simulated(unit, ACTUATED, commands, 25)
+
+    def error(step: float) -> float:
+        # FMPy's Euler integrates in steps of the output interval and looks at the event indicators after each, so that a
+        # deflection goes on for up to a step.
+        result = exchanged(unit, ACTUATED, commands, 25, solver="Euler", step_size=step, output_interval=step)
+        at_ticks = np.isclose(result["time"] / 0.2, np.round(result["time"] / 0.2))
+        last = {round(row["time"] / 0.2): row for row in result[at_ticks]}
+        found = np.array([list(last[tick])[1:] for tick in range(26)])
+        return np.abs(found - expected).max()
+
+    errors = [error(0.02 / parts) for parts in (1, 4, 16)]
+    assert errors[0] < 5e-3
+    for coarse, fine in zip(errors, errors[1:]):
+        assert coarse / fine == pytest.approx(4.0, abs=0.2)
+
+
+def test_published_arrivals_are_located_by_cvode(fmu):
+    # Wu 2015, (63): commands beyond the limits, at a limit, within them; every surface that moves does so at 10 deg/s.
+    wanted = np.array([-90.0, 4, -3, -7.5, 90, -10, 0, 29])
+    stop = np.clip(wanted, LOWER, UPPER)
+    options = dict(solver="CVode", relative_tolerance=1e-8, stop_time=4.0, output_interval=4.0, record_events=True)
+    result = simulated(fmu("ReentryPlant"), ACTUATED | surfaces(wanted), **options)
+    times = result["time"]
+    events = times[1:][np.diff(times) == 0.0]
+    arrivals = np.unique(np.abs(stop)[stop != 0]) / RATE
+    np.testing.assert_allclose(events, arrivals, rtol=0, atol=1e-7)
+    for i, name in enumerate(DEFLECTION):
+        # To the last bit, from the event on.
+        rested = result[name][np.flatnonzero(times >= np.abs(stop[i]) / RATE - 1e-7)[1:]]
+        np.testing.assert_array_equal(rested, np.radians(stop[i]))
+
+
+def test_a_saved_state_continues_a_moving_surface_in_model_exchange(fmu):
+    unit = fmu("ReentryPlant")
+
+    def reference(names):
+        return [unit.variables[name].valueReference for name in names]
+
+    model = FMU2Model(instanceName="model", **unit.arguments("modelExchange"))
+    model.instantiate()
+    model.setupExperiment()
+    model.setInteger(reference(["actuation"]), [unit.item("actuation", "surfacesAndJets")])
+    model.enterInitializationMode()
+    model.setReal(reference(["surface[5]"]), [0.1])
+    model.exitInitializationMode()
+    model.newDiscreteStates()
+    model.enterContinuousTimeMode()
+
+    def seen():
+        indicators = (c_double * 8)()
+        model.getEventIndicators(indicators, 8)
+        return model.getReal(reference(DEFLECTION + SURFACE_RATE)), list(indicators)
+
+    saved = model.getFMUstate()
+    before = seen()
+    assert before[0][12] == np.radians(RATE) and before[1][4] == pytest.approx(0.1 / np.radians(RATE))
+    model.setTime(1.0)
+    model.setContinuousStates((c_double * 14)(*[0.0] * 10, 0.11, *[0.0] * 3), 14)
+    assert seen()[1][4] < 0.0
+    model.enterEventMode()
+    *_, changed, _, _ = model.newDiscreteStates()
+    assert changed
+    assert (seen()[0][4], seen()[0][12]) == (0.1, 0.0)
+    assert seen()[1] == [1.0] * 8
+    model.setFMUstate(saved)
+    assert seen() == before
+    model.freeFMUstate(saved)
+    model.freeInstance()

@@ -1,4 +1,4 @@
-"""ReentryPlant as model exchange under FMPy's CVode against its own co-simulation."""
+"""ReentryPlant as model exchange under FMPy's CVode against its own co-simulation. Surfaces and jets: test_actuators.py."""
 
 from ctypes import c_double
 
@@ -73,31 +73,40 @@ def test_oracle_cvode_agrees_with_co_simulation(fmu, settings):
     assert np.abs(found - expected).max() < 3e-7
 
 
-def test_oracle_directional_derivatives_are_central_differences(fmu):
+@pytest.mark.parametrize("kinematics", ["printed", "exact"])
+def test_oracle_directional_derivatives_are_central_differences(fmu, kinematics):
     plant = fmu("ReentryPlant")
     derivatives = [v for v in plant.variables.values() if v.derivative is not None]
     states = [v.derivative for v in derivatives]
-    assert [v.name for v in states] == ANGLES + RATES
-    inputs = [plant.variables[name] for name in MOMENT + [f"disturbanceMoment.{axis}" for axis in "xyz"]]
+    deflections = [f"deflection[{i}]" for i in range(1, 9)]
+    assert [v.name for v in states] == ANGLES + RATES + deflections
+    loads = MOMENT + [f"disturbanceMoment.{axis}" for axis in "xyz"]
+    trajectory = [name for name in plant.names("input") if name.startswith("trajectory.")]
+    assert len(trajectory) == 7
+    inputs = [plant.variables[name] for name in loads + trajectory]
     model = FMU2Model(instanceName="model", **plant.arguments("modelExchange"))
     model.instantiate()
     model.setupExperiment()
+    for name, value in (("kinematics", kinematics), ("actuation", "surfacesAndJets")):
+        model.setInteger([plant.variables[name].valueReference], [plant.item(name, value)])
+    model.setReal([plant.variables["trajectory.earthRate"].valueReference], [7.2921e-5])
     model.enterInitializationMode()
     model.exitInitializationMode()
     while model.newDiscreteStates()[0]:
         pass
     model.enterContinuousTimeMode()
-    point = np.array([0.3, -0.4, 0.5, 0.05, -0.08, 0.11])
-    load = np.array([2e4, -3e4, 5e4, 1e3, 2e3, -3e3])
+    point = np.array([0.3, -0.4, 0.5, 0.05, -0.08, 0.11, *0.01 * np.arange(-4, 4)])
+    load = np.array([2e4, -3e4, 5e4, 1e3, 2e3, -3e3, -0.1, 0.8, 0.4, 0.01, -0.02, 0.03, 0.01])
     references = [v.valueReference for v in derivatives]
 
-    def right_side(state, moments):
-        model.setContinuousStates((c_double * 6)(*state), 6)
-        model.setReal([v.valueReference for v in inputs], moments)
+    def right_side(state, values):
+        model.setContinuousStates((c_double * 14)(*state), 14)
+        model.setReal([v.valueReference for v in inputs], values)
         return np.array(model.getReal(references))
 
-    steps = [(1e-5, np.eye(6)[i], np.zeros(6), states[i]) for i in range(6)]
-    steps += [(10.0, np.zeros(6), np.eye(6)[i], inputs[i]) for i in range(6)]
+    none = np.zeros(13)
+    steps = [(1e-5, row, none, states[i]) for i, row in enumerate(np.eye(14))]
+    steps += [(10.0 if i < 6 else 1e-5, np.zeros(14), row, inputs[i]) for i, row in enumerate(np.eye(13))]
     for h, by_state, by_input, known in steps:
         ahead = right_side(point + h * by_state, load + h * by_input)
         behind = right_side(point - h * by_state, load - h * by_input)

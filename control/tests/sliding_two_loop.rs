@@ -5,7 +5,8 @@ use control::two_loop::{Loop, TwoLoopMemory, TwoLoopSettings};
 use control::{Controller, Measurement, TwoLoopSmc};
 use nalgebra::{Matrix3, Vector3};
 use vehicle::kinematics;
-use vehicle::plant::{self, Plant};
+use vehicle::kinematics::Kinematics;
+use vehicle::plant::{self, Load, Plant};
 use vehicle::reference::{Profile, Reference};
 use vehicle::scenario::Scenario;
 
@@ -158,9 +159,9 @@ fn oracle_reaching_law_of_the_inner_loop() {
     let state = plant::state(&measured.angles, &measured.rates)
         + plant::derivative(
             &body,
+            Kinematics::Printed,
             &plant::state(&measured.angles, &measured.rates),
-            &moment,
-            &Vector3::zeros(),
+            &Load { moment, ..Load::default() },
         ) * step;
     let later = Measurement { angles: plant::angles(&state), rates: plant::rates(&state), ..measured };
     let mut short = TwoLoopSmc::new(TwoLoopSettings { period: step, ..settings }).unwrap();

@@ -9,6 +9,7 @@ use vehicle::disturbance::{Disturbance, Kind, MomentWave, SineMoment};
 use vehicle::dynamics::Inertia;
 use vehicle::effectors::Effectors;
 use vehicle::error::Error;
+use vehicle::kinematics::Kinematics;
 use vehicle::plant::{Config, state};
 
 /// Longest integration step by default, s.
@@ -41,6 +42,16 @@ pub(crate) const ACTUATIONS: [(&str, &str); 2] = [
     ("surfacesAndJets", "the inputs surface and jet command eight aerodynamic surfaces and ten jets"),
 ];
 
+/// The attitude kinematics in the order of their enumeration values 1, 2, with name and description.
+pub(crate) const KINEMATICS: [(Kinematics, &str, &str); 2] = [
+    (Kinematics::Printed, "printed", "R as in (2) of Chai 2022 and (4) of Wu 2015"),
+    (
+        Kinematics::Exact,
+        "exact",
+        "with the derivative of alpha times sin beta in the bank row, (1) of Wu 2015",
+    ),
+];
+
 /// What a user sets before the simulation, named as in the table.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Parameters {
@@ -60,6 +71,9 @@ pub(crate) struct Parameters {
     pub(crate) start: f64,
     pub(crate) end: f64,
     pub(crate) step: f64,
+    /// Number of the item of [`KINEMATICS`], from 1.
+    pub(crate) kinematics: i32,
+    pub(crate) earth_rate: f64,
     /// Number of the item of [`ACTUATIONS`], from 1.
     pub(crate) actuation: i32,
     pub(crate) flight: Flight,
@@ -94,6 +108,8 @@ impl Default for Parameters {
             start,
             end: end.min(NEVER),
             step: STEP,
+            kinematics: 1,
+            earth_rate: 0.0,
             actuation: 1,
             flight: tvsmc.flight.unwrap_or(Flight { altitude: 0.0, mach: 0.0 }),
             density_scale: 1.0,
@@ -132,8 +148,7 @@ impl Parameters {
     /// # Errors
     /// Names the parameter that is out of range.
     pub(crate) fn config(&self) -> Result<Config, Error> {
-        let kind =
-            usize::try_from(self.kind - 1).ok().and_then(|i| KINDS.get(i)).map_or(Kind::None, |item| item.0);
+        let kind = item(self.kind, &KINDS).map_or(Kind::None, |item| item.0);
         Ok(Config {
             inertia: self.inertia,
             inertia_scale: self.inertia_scale,
@@ -149,8 +164,15 @@ impl Parameters {
                 start: self.start,
                 end: self.end,
             },
+            kinematics: item(self.kinematics, &KINEMATICS).map_or(Kinematics::Printed, |item| item.0),
+            earth_rate: self.earth_rate,
             actuators: self.actuators()?,
             step: self.step,
         })
     }
+}
+
+/// An enumeration's item by its number, from 1.
+fn item<T>(number: i32, items: &[T]) -> Option<&T> {
+    items.get(usize::try_from(number - 1).ok()?)
 }

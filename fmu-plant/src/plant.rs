@@ -3,16 +3,23 @@
 use crate::parameters::Parameters;
 use crate::table::{self, Known, Unknown};
 use fmi2_export::{Context, Description, EventInfo, Failure, Inputs, Model};
-use nalgebra::Vector3;
+use nalgebra::{SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
+use vehicle::actuators::Command;
 use vehicle::effectors::Surfaces;
-use vehicle::plant::{Held, Input, Plant, State, check, partial_derivatives};
+use vehicle::plant::{Held, Input, Plant, State, check};
+
+/// Number of states that describe the motion: attitude and rates. Behind them come the deflections.
+const MOTION: usize = 6;
+/// Event indicator (s) of a deflection at rest.
+const AT_REST: f64 = 1.0;
 
 /// The re-entry vehicle.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ReentryPlant {
     pub(crate) parameters: Parameters,
     pub(crate) input: Input,
+    pub(crate) command: Command,
     pub(crate) output: Output,
     /// From initialization on.
     plant: Option<Plant>,
@@ -33,6 +40,8 @@ pub(crate) struct Output {
     pub(crate) delta: Vector3<f64>,
     pub(crate) disturbance_moment: Vector3<f64>,
     pub(crate) deflections: Surfaces,
+    pub(crate) deflection_rates: Surfaces,
+    pub(crate) indicators: Surfaces,
     pub(crate) dynamic_pressure: f64,
 }
 
@@ -44,7 +53,7 @@ impl ReentryPlant {
     /// What is in force at `time` (s): disturbance and commands.
     fn held(&self, plant: &Plant, time: f64) -> Held {
         let held = if self.event_driven { plant.held() } else { None };
-        held.unwrap_or_else(|| plant.in_force(time, &self.input))
+        held.unwrap_or_else(|| plant.in_force(time, &self.input, &self.command))
     }
 
     /// Refuses a state at which the equations do not hold. In model exchange it may be an integrator's trial, which the
@@ -64,6 +73,7 @@ impl Model for ReentryPlant {
         Self {
             parameters: Parameters::default(),
             input: Input::default(),
+            command: Command::default(),
             output: Output::default(),
             plant: None,
             dynamic_pressure: 0.0,
@@ -87,7 +97,7 @@ impl Model for ReentryPlant {
         let derivative = plant.derivative(time, &self.input, &held);
         if !derivative.iter().all(|value| value.is_finite()) {
             return Err(Failure::Error(format!(
-                "an input moment or command is not a finite number at t = {time} s"
+                "an input moment, command or trajectory is not a finite number at t = {time} s"
             )));
         }
         self.output = Output {
@@ -95,10 +105,12 @@ impl Model for ReentryPlant {
             rates: plant.rates(),
             angle_rates: derivative.fixed_rows::<3>(0).into(),
             angular_acceleration: derivative.fixed_rows::<3>(3).into(),
-            applied_moment: plant.applied_moment(time, &self.input, &held),
+            applied_moment: plant.applied_moment(&self.input, &held),
             delta: held.delta(),
             disturbance_moment: plant.disturbance_moment(time, &self.input, &held),
-            deflections: plant.deflections(time, &held),
+            deflections: plant.deflections,
+            deflection_rates: plant.deflection_rates(&held),
+            indicators: plant.time_left(&held).map(|left| if left.is_finite() { left } else { AT_REST }),
             dynamic_pressure: self.dynamic_pressure,
         };
         Ok(())
@@ -113,7 +125,8 @@ impl Model for ReentryPlant {
     ) -> Result<(), Failure> {
         self.ready()?;
         let Some(mut plant) = self.plant.take() else { return Ok(()) };
-        let result = plant.advance_with(from, to, |time| {
+        let command = self.command;
+        let result = plant.advance_with(from, to, &command, |time| {
             inputs.advance(self, time);
             self.input
         });
@@ -123,39 +136,69 @@ impl Model for ReentryPlant {
 
     fn continuous_states(&self, states: &mut [f64]) {
         if let Some(plant) = &self.plant {
-            states.copy_from_slice(plant.state.as_slice());
+            let (motion, deflections) = states.split_at_mut(MOTION);
+            motion.copy_from_slice(plant.state.as_slice());
+            deflections.copy_from_slice(plant.deflections.as_slice());
         }
     }
 
     fn set_continuous_states(&mut self, states: &[f64]) {
         if let Some(plant) = &mut self.plant {
-            plant.state.copy_from_slice(states);
+            let (motion, deflections) = states.split_at(MOTION);
+            plant.state.copy_from_slice(motion);
+            plant.deflections.copy_from_slice(deflections);
         }
+    }
+
+    /// Of each deflection: the time until it comes to rest, or a second where it rests. So they are positive between events,
+    /// and fall through zero with slope −1.
+    fn event_indicators(&self, indicators: &mut [f64]) {
+        indicators.copy_from_slice(self.output.indicators.as_slice());
     }
 
     fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure> {
         self.ready()?;
         self.event_driven = true;
         let Some(plant) = &mut self.plant else { return Ok(EventInfo::default()) };
-        let held = plant.hold(time, &self.input);
-        Ok(EventInfo { next_event_time: plant.next_change(time, &held), states_changed: false })
+        let before = plant.deflections;
+        plant.hold(time, &self.input, &self.command);
+        Ok(EventInfo { next_event_time: plant.next_jump(time), states_changed: plant.deflections != before })
     }
 
     fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure> {
         let plant = self.ready()?;
         self.check(&plant.state, time)?;
-        let delta = self.held(plant, time).delta();
-        let (by_state, by_moment) = partial_derivatives(plant.body(), &plant.state, &delta);
-        let (applied_by_moment, applied_by_jet) = plant.applied_moment_by_inputs(&self.input);
+        let held = self.held(plant, time);
+        let (partials, turn_rate_by_trajectory) = plant.partial_derivatives(time, &self.input, &held);
+        let (applied_by_moment, applied_by_deflections) = plant.applied_moment_by_moment_and_deflections();
+        // In model exchange commands are taken at events.
+        let applied_by_jets =
+            if self.event_driven { SMatrix::zeros() } else { plant.applied_moment_by_jets(&self.command) };
+        let by_applied = |column: Vector3<f64>, i: usize| (partials.by_moment * column)[i];
         Ok(match (Unknown::of(unknown), Known::of(known)) {
-            (Some(Unknown::Derivative(i)), Some(Known::State(j))) => by_state[(i, j)],
-            (Some(Unknown::Derivative(i)), Some(Known::DisturbanceMoment(j))) => by_moment[(i, j)],
-            (Some(Unknown::Derivative(i)), Some(Known::Moment(j))) => (by_moment * applied_by_moment)[(i, j)],
-            (Some(Unknown::Derivative(i)), Some(Known::Jet(j))) => {
-                by_moment.row(i).dot(&applied_by_jet.column(j).transpose())
+            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::State(j @ 0..MOTION))) => {
+                partials.by_state[(i, j)]
+            }
+            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::State(j))) => {
+                by_applied(applied_by_deflections.column(j - MOTION).into(), i)
+            }
+            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::DisturbanceMoment(j))) => {
+                partials.by_moment[(i, j)]
+            }
+            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::Moment(j))) => {
+                by_applied(applied_by_moment.column(j).into(), i)
+            }
+            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::Jet(j))) => {
+                by_applied(applied_by_jets.column(j).into(), i)
+            }
+            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::Trajectory(j))) => {
+                (partials.by_turn_rate * turn_rate_by_trajectory.column(j))[i]
             }
             (Some(Unknown::AppliedMoment(i)), Some(Known::Moment(j))) => applied_by_moment[(i, j)],
-            (Some(Unknown::AppliedMoment(i)), Some(Known::Jet(j))) => applied_by_jet[(i, j)],
+            (Some(Unknown::AppliedMoment(i)), Some(Known::Jet(j))) => applied_by_jets[(i, j)],
+            (Some(Unknown::AppliedMoment(i)), Some(Known::State(j @ MOTION..))) => {
+                applied_by_deflections[(i, j - MOTION)]
+            }
             (Some(Unknown::State(i)), Some(Known::State(j)))
             | (Some(Unknown::DisturbanceMoment(i)), Some(Known::DisturbanceMoment(j)))
                 if i == j =>

@@ -1,16 +1,19 @@
-//! The one table of the unit's variables. The first 54 positions are those of outputs and inputs, see [`Unknown`] and
+//! The one table of the unit's variables. The first 69 positions are those of outputs and inputs, see [`Unknown`] and
 //! [`Known`]; the parameters follow.
 
-use crate::parameters::{ACTUATIONS, KINDS};
+use crate::parameters::{ACTUATIONS, KINDS, KINEMATICS};
 use crate::plant::ReentryPlant;
-use fmi2_export::table::{Description, Real, Table, discrete_output, input, output, parameter};
+use fmi2_export::table::{
+    Description, Real, Table, discrete_input, discrete_output, input, output, parameter,
+};
 use model_description::DefaultExperiment;
 use model_description::unit::{self, Unit};
 use model_description::variable::EnumerationType;
 use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::atmosphere;
-use vehicle::effectors::{Effectors, JETS};
+use vehicle::effectors::{Effectors, JETS, SURFACES};
+use vehicle::kinematics::Trajectory;
 use vehicle::plant::BETA_LIMIT;
 
 const ANGLES: [(&str, &str); 3] =
@@ -18,7 +21,7 @@ const ANGLES: [(&str, &str); 3] =
 const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
 const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
 
-/// A calculated variable, by position in the table.
+/// A calculated variable, by position in the table. States and derivatives count attitude, rates and deflections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Unknown {
     State(usize),
@@ -26,7 +29,6 @@ pub(crate) enum Unknown {
     AppliedMoment(usize),
     Delta,
     DisturbanceMoment(usize),
-    Deflection,
     DynamicPressure,
 }
 
@@ -38,8 +40,9 @@ impl Unknown {
             12..15 => Self::AppliedMoment(position - 12),
             15..18 => Self::Delta,
             18..21 => Self::DisturbanceMoment(position - 18),
-            27..35 => Self::Deflection,
+            27..35 => Self::State(position - 27 + 6),
             35 => Self::DynamicPressure,
+            54..62 => Self::Derivative(position - 54 + 6),
             _ => return None,
         })
     }
@@ -51,8 +54,9 @@ pub(crate) enum Known {
     State(usize),
     Moment(usize),
     DisturbanceMoment(usize),
-    Surface,
+    Surface(usize),
     Jet(usize),
+    Trajectory(usize),
 }
 
 impl Known {
@@ -61,8 +65,10 @@ impl Known {
             0..6 => Self::State(position),
             21..24 => Self::Moment(position - 21),
             24..27 => Self::DisturbanceMoment(position - 24),
-            36..44 => Self::Surface,
+            27..=34 => Self::State(position - 27 + 6),
+            36..44 => Self::Surface(position - 36),
             44..54 => Self::Jet(position - 44),
+            62..69 => Self::Trajectory(position - 62),
             _ => return None,
         })
     }
@@ -71,18 +77,19 @@ impl Known {
 /// The unit as FMI sees it.
 pub(crate) fn description() -> Description<ReentryPlant> {
     let scenario = Scenario::crmpc2022();
-    let table = disturbance(initial(inertia(commands(actuated(inputs(outputs(Table::new())))))));
+    let variables = trajectory(deflection_rates(commands(actuated(inputs(outputs(Table::new()))))));
+    let table = disturbance(initial(inertia(variables)));
     let step = parameter("integrator.step", "Longest step of the Runge-Kutta integration in co-simulation");
     let table = table
         .real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| &mut m.parameters.step);
-    let table = actuation(table);
+    let table = kinematics(actuation(table));
     Description {
         name: "ReentryPlant",
         description: "Attitude motion of a re-entry vehicle under moments and bounded disturbances",
         documentation: include_str!("plant.html"),
         version: env!("CARGO_PKG_VERSION"),
         model_exchange: true,
-        event_indicators: 0,
+        event_indicators: SURFACES,
         default_experiment: DefaultExperiment {
             start: 0.0,
             stop: scenario.duration,
@@ -113,7 +120,8 @@ fn outputs(table: Plant) -> Plant {
     let moment = ["moment.x", "moment.y", "moment.z"];
     let external = ["disturbanceMoment.x", "disturbanceMoment.y", "disturbanceMoment.z"];
     let jets: Vec<String> = (1..=JETS).map(|j| format!("jet[{j}]")).collect();
-    let jets: Vec<&str> = jets.iter().map(String::as_str).collect();
+    let deflections: Vec<String> = (1..=SURFACES).map(|i| format!("deflection[{i}]")).collect();
+    let actuators: Vec<&str> = jets.iter().chain(&deflections).map(String::as_str).collect();
     let angle = |axis: &str, meaning: &str| {
         output(&format!("attitude.{axis}"), &sentence(meaning)).real().unit(unit::angle()).nominal(0.1)
     };
@@ -122,17 +130,23 @@ fn outputs(table: Plant) -> Plant {
         output(&format!("rate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
     };
     let angle_rate = |axis: &str, meaning: &str| {
-        // The attitude kinematics of each angle: R has no roll-yaw terms beyond these (Chai 2022, (2)).
+        // The attitude kinematics of each angle, Wu 2015 (1); sigma through the trajectory.
         let depends =
             if axis == "beta" { vec!["attitude.alpha", "rate.p", "rate.r"] } else { motion.to_vec() };
-        let common = output(&format!("attitudeRate.{axis}"), &format!("Time derivative of the {meaning}"));
+        let common = output(&format!("attitudeRate.{axis}"), &format!("Time derivative of the {meaning}"))
+            .depends_on(["attitude.sigma"])
+            .depends_on(TRAJECTORY_INPUTS.map(|(name, ..)| name));
         let real = common.depends_on(depends).real().unit(unit::angular_rate()).nominal(0.05);
         real.derivative_of(&format!("attitude.{axis}"))
     };
     let acceleration = |axis: &str, meaning: &str| {
         let common = output(&format!("angularAcceleration.{axis}"), &format!("Body {meaning} acceleration"));
-        let real =
-            common.depends_on(motion).depends_on(moment).depends_on(external).depends_on(jets.clone()).real();
+        let real = common
+            .depends_on(motion)
+            .depends_on(moment)
+            .depends_on(external)
+            .depends_on(actuators.clone())
+            .real();
         real.unit(unit::angular_acceleration()).nominal(0.05).derivative_of(&format!("rate.{axis}"))
     };
     let applied = |axis: &str, meaning: &str| {
@@ -140,7 +154,7 @@ fn outputs(table: Plant) -> Plant {
             &format!("appliedMoment.{axis}"),
             &format!("Control {meaning} moment that acts on the vehicle"),
         );
-        let common = common.depends_on([format!("moment.{axis}").as_str()]).depends_on(jets.clone());
+        let common = common.depends_on([format!("moment.{axis}").as_str()]).depends_on(actuators.clone());
         common.real().unit(unit::moment()).nominal(1e5)
     };
     let delta = |axis: &str, meaning: &str| {
@@ -148,7 +162,7 @@ fn outputs(table: Plant) -> Plant {
         let common = discrete_output(&format!("disturbance.delta.{axis}"), &text)
             .depends_on(motion)
             .depends_on(moment)
-            .depends_on(jets.clone());
+            .depends_on(actuators.clone());
         common.real().unit(unit::angular_acceleration()).nominal(0.03)
     };
     let disturbing = |axis: &str, meaning: &str| {
@@ -182,10 +196,9 @@ fn inputs(table: Plant) -> Plant {
     vector(table, AXES, external, |m| &mut m.input.disturbance_moment)
 }
 
-/// What the surfaces do, and the flight condition.
+/// Where the surfaces are, and the flight condition.
 fn actuated(mut table: Plant) -> Plant {
     for (i, name) in Effectors::published().names.iter().enumerate() {
-        // At an instant a deflection is a function of time alone: commands change only where it goes.
         let common = output(&format!("deflection[{}]", i + 1), &format!("Deflection of the {name}"));
         let real = common.real().unit(unit::angle()).nominal(0.1);
         table = table.real(real, move |m| &mut m.output.deflections[i]);
@@ -197,15 +210,78 @@ fn actuated(mut table: Plant) -> Plant {
 fn commands(mut table: Plant) -> Plant {
     for (i, name) in Effectors::published().names.iter().enumerate() {
         let text = format!("Commanded deflection of the {name}, trailing edge down positive");
-        let real = input(&format!("surface[{}]", i + 1), &text).real().unit(unit::angle()).nominal(0.1);
-        table = table.real(real, move |m| &mut m.input.command.surfaces[i]);
+        let common = discrete_input(&format!("surface[{}]", i + 1), &text);
+        let real = common.real().unit(unit::angle()).nominal(0.1);
+        table = table.real(real, move |m| &mut m.command.surfaces[i]);
     }
     for j in 0..JETS {
         let text = format!("Command to jet {}: 0 off, 1 full thrust", j + 1);
-        let real = input(&format!("jet[{}]", j + 1), &text).real().nominal(1.0);
-        table = table.real(real, move |m| &mut m.input.command.jets[j]);
+        let real = discrete_input(&format!("jet[{}]", j + 1), &text).real().nominal(1.0);
+        table = table.real(real, move |m| &mut m.command.jets[j]);
     }
     table
+}
+
+fn deflection_rates(mut table: Plant) -> Plant {
+    for (i, name) in Effectors::published().names.iter().enumerate() {
+        let (command, deflection) = (format!("surface[{}]", i + 1), format!("deflection[{}]", i + 1));
+        let text = format!("Rate of the deflection of the {name}: its limit, or zero at rest");
+        let common = output(&format!("deflectionRate[{}]", i + 1), &text)
+            .depends_on([command.as_str(), deflection.as_str()]);
+        let real = common.real().unit(unit::angular_rate()).nominal(0.1).derivative_of(&deflection);
+        table = table.real(real, move |m| &mut m.output.deflection_rates[i]);
+    }
+    table
+}
+
+/// Inputs of the trajectory: name, meaning, whether it is a rate, field.
+type TrajectoryInput = (&'static str, &'static str, bool, fn(&mut Trajectory) -> &mut f64);
+const TRAJECTORY_INPUTS: [TrajectoryInput; 7] = [
+    ("trajectory.flightPathAngle", "Flight path angle above the horizon", false, |t| {
+        &mut t.flight_path_angle
+    }),
+    ("trajectory.heading", "Heading of the velocity, from north to east", false, |t| &mut t.heading),
+    ("trajectory.latitude", "Latitude, north positive", false, |t| &mut t.latitude),
+    ("trajectory.flightPathAngleRate", "Time derivative of the flight path angle", true, |t| {
+        &mut t.flight_path_angle_rate
+    }),
+    ("trajectory.headingRate", "Time derivative of the heading", true, |t| &mut t.heading_rate),
+    ("trajectory.longitudeRate", "Time derivative of the longitude, east positive", true, |t| {
+        &mut t.longitude_rate
+    }),
+    ("trajectory.latitudeRate", "Time derivative of the latitude", true, |t| &mut t.latitude_rate),
+];
+
+fn trajectory(mut table: Plant) -> Plant {
+    for (name, meaning, is_rate, field) in TRAJECTORY_INPUTS {
+        let real = input(name, meaning).real();
+        let real = if is_rate {
+            real.unit(unit::angular_rate()).nominal(1e-3)
+        } else {
+            real.unit(unit::angle()).nominal(0.1)
+        };
+        table = table.real(real, move |m| field(&mut m.input.trajectory));
+    }
+    table
+}
+
+fn kinematics(table: Plant) -> Plant {
+    let items = EnumerationType {
+        name: "Kinematics".into(),
+        description: "The matrix R of the attitude kinematics".into(),
+        items: KINEMATICS.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect(),
+    };
+    let earth = parameter(
+        "trajectory.earthRate",
+        "Angular rate of the Earth, really 7.2921e-5 rad/s; 0 leaves it out",
+    );
+    table
+        .enumeration(parameter("kinematics", "The matrix R of the attitude kinematics"), items, |m| {
+            &mut m.parameters.kinematics
+        })
+        .real(earth.real().unit(unit::angular_rate()).min(0.0).max(1.0).nominal(1e-4), |m| {
+            &mut m.parameters.earth_rate
+        })
 }
 
 fn actuation(table: Plant) -> Plant {

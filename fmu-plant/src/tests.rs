@@ -3,10 +3,11 @@
 use crate::plant::{Output, ReentryPlant};
 use crate::table::{Known, Unknown};
 use fmi2_export::{Context, Failure, Inputs, Model, describe};
-use model_description::variable::{Causality, Kind};
+use model_description::variable::{Causality, Kind, Variability};
 use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::effectors::{Jets, Surfaces};
+use vehicle::kinematics::Trajectory;
 
 const CONTEXT: Context = Context { start_time: 0.0, stop_time: None, resources: None };
 
@@ -55,7 +56,8 @@ fn calculated(unit: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {
         o.disturbance_moment,
     ];
     let rest = o.deflections.iter().copied().chain([o.dynamic_pressure]);
-    (0..21).zip(all.iter().flatten().copied()).chain((27..36).zip(rest)).collect()
+    let last = o.deflection_rates.iter().copied();
+    (0..21).zip(all.iter().flatten().copied()).chain((27..36).zip(rest)).chain((54..62).zip(last)).collect()
 }
 
 #[test]
@@ -66,18 +68,20 @@ fn positions_and_names_agree() {
         let group = name.split(['.', '[']).next().unwrap();
         let unknown = match Unknown::of(position) {
             Some(Unknown::State(0..3)) => "attitude",
-            Some(Unknown::State(_)) => "rate",
+            Some(Unknown::State(3..6)) => "rate",
+            Some(Unknown::State(_)) => "deflection",
             Some(Unknown::Derivative(0..3)) => "attitudeRate",
-            Some(Unknown::Derivative(_)) => "angularAcceleration",
+            Some(Unknown::Derivative(3..6)) => "angularAcceleration",
+            Some(Unknown::Derivative(_)) => "deflectionRate",
             Some(Unknown::AppliedMoment(_)) => "appliedMoment",
             Some(Unknown::Delta | Unknown::DisturbanceMoment(_)) => "disturbance",
-            Some(Unknown::Deflection) => "deflection",
             Some(Unknown::DynamicPressure) => "flight",
             None => match Known::of(position) {
                 Some(Known::Moment(_)) => "moment",
                 Some(Known::DisturbanceMoment(_)) => "disturbanceMoment",
-                Some(Known::Surface) => "surface",
+                Some(Known::Surface(_)) => "surface",
                 Some(Known::Jet(_)) => "jet",
+                Some(Known::Trajectory(_)) => "trajectory",
                 _ => continue,
             },
         };
@@ -91,13 +95,26 @@ fn positions_and_names_agree() {
     assert_eq!((names[27].as_str(), names[34].as_str()), ("deflection[1]", "deflection[8]"));
     assert_eq!((names[36].as_str(), names[43].as_str()), ("surface[1]", "surface[8]"));
     assert_eq!((names[44].as_str(), names[53].as_str()), ("jet[1]", "jet[10]"));
+    assert_eq!((names[54].as_str(), names[61].as_str()), ("deflectionRate[1]", "deflectionRate[8]"));
+    assert_eq!(
+        (names[62].as_str(), names[68].as_str()),
+        ("trajectory.flightPathAngle", "trajectory.latitudeRate")
+    );
 }
 
 #[test]
 fn the_description_holds() {
     let description = describe::<ReentryPlant>();
     description.check().unwrap();
-    assert_eq!(description.states(), [(0, 6), (1, 7), (2, 8), (3, 9), (4, 10), (5, 11)]);
+    let motion = (0..6).map(|i| (i, i + 6));
+    let deflections = (27..35).map(|i| (i, i + 27));
+    assert_eq!(description.states(), motion.chain(deflections).collect::<Vec<_>>());
+    assert_eq!(description.event_indicators, 8);
+    for variable in description.variables.iter().filter(|variable| variable.causality == Causality::Input) {
+        let discrete = ["surface[", "jet["].iter().any(|name| variable.name.starts_with(name));
+        let expected = if discrete { Variability::Discrete } else { Variability::Continuous };
+        assert_eq!(variable.variability, expected, "{}", variable.name);
+    }
     let scenario = Scenario::crmpc2022();
     let start = |name: &str| match &description.variables[description.position(name).unwrap()].kind {
         Kind::Real { start, .. } => start.unwrap(),
@@ -115,6 +132,9 @@ fn the_description_holds() {
         ("moment.x", 0.0),
         ("integrator.step", 0.01),
         ("actuation", 1.0),
+        ("kinematics", 1.0),
+        ("trajectory.earthRate", 0.0),
+        ("trajectory.latitude", 0.0),
         ("flight.altitude", 55e3),
         ("flight.mach", 9.8),
         ("aerodynamics.scale", 1.0),
@@ -127,12 +147,16 @@ fn the_description_holds() {
     }
 }
 
+/// A general attitude and rates, surfaces not quite at zero.
+const STATES: [f64; 14] =
+    [0.3, 0.2, -0.5, 0.08, -0.05, 0.06, -0.01, -0.02, -0.01, -0.01, 0.01, -0.01, 0.01, 0.01];
+
 /// A unit in model exchange, after the first event, in a general attitude, with all kinds in turn.
 fn in_model_exchange(kind: i32) -> ReentryPlant {
     let mut unit = started(|unit| unit.parameters.kind = kind);
     unit.input.moment = Vector3::new(3e4, -2e4, 1e4);
     unit.input.disturbance_moment = Vector3::new(1e3, 2e3, -3e3);
-    unit.set_continuous_states(&[0.3, 0.2, -0.5, 0.08, -0.05, 0.06]);
+    unit.set_continuous_states(&STATES);
     unit.new_discrete_states(0.0).unwrap();
     unit
 }
@@ -140,8 +164,8 @@ fn in_model_exchange(kind: i32) -> ReentryPlant {
 /// Asks for surfaces and jets instead of a moment.
 fn actuate(unit: &mut ReentryPlant) {
     unit.parameters.actuation = 2;
-    unit.input.command.surfaces = Surfaces::from([-5.0, -2.0, -1.0, -4.0, 3.0, -6.0, 1.0, 2.0]) * 0.02;
-    unit.input.command.jets = Jets::repeat(0.5);
+    unit.command.surfaces = Surfaces::from([-5.0, -2.0, -1.0, -4.0, 3.0, -6.0, 1.0, 2.0]) * 0.02;
+    unit.command.jets = Jets::repeat(0.5);
 }
 
 /// The same with actuators; the jets take a duty cycle or switch.
@@ -150,41 +174,89 @@ fn actuated_in_model_exchange(duty: bool) -> ReentryPlant {
     unit.parameters.jet_duty = duty;
     actuate(&mut unit);
     unit.initialize(&CONTEXT).unwrap();
-    unit.set_continuous_states(&[0.3, 0.2, -0.5, 0.08, -0.05, 0.06]);
+    unit.set_continuous_states(&STATES);
     unit.new_discrete_states(0.0).unwrap();
     unit
 }
 
+/// The exact kinematics along a trajectory that turns in every way.
+fn along_a_trajectory(kind: i32, kinematics: i32) -> ReentryPlant {
+    let mut unit = in_model_exchange(kind);
+    unit.parameters.kinematics = kinematics;
+    unit.parameters.earth_rate = 7.2921e-5;
+    unit.initialize(&CONTEXT).unwrap();
+    unit.set_continuous_states(&STATES);
+    unit.input.trajectory = Trajectory {
+        flight_path_angle: -0.1,
+        heading: 0.8,
+        latitude: 0.4,
+        flight_path_angle_rate: 0.01,
+        heading_rate: -0.02,
+        longitude_rate: 0.03,
+        latitude_rate: 0.01,
+    };
+    unit.new_discrete_states(0.0).unwrap();
+    unit
+}
+
+/// In co-simulation, at a communication point, with jets that take a duty cycle.
+fn at_a_communication_point() -> ReentryPlant {
+    let mut unit = started(|unit| {
+        unit.parameters.kind = 1;
+        unit.parameters.jet_duty = true;
+        actuate(unit);
+    });
+    unit.set_continuous_states(&STATES);
+    unit
+}
+
 fn known_positions() -> impl Iterator<Item = usize> {
-    (0..54).filter(|&position| Known::of(position).is_some())
+    (0..69).filter(|&position| Known::of(position).is_some())
 }
 
 /// Adds to a state or input by its position in the table.
 fn nudge(unit: &mut ReentryPlant, known: usize, by: f64) {
     match Known::of(known).unwrap() {
         Known::State(i) => {
-            let mut states = [0.0; 6];
+            let mut states = [0.0; 14];
             unit.continuous_states(&mut states);
             states[i] += by;
             unit.set_continuous_states(&states);
         }
         Known::Moment(i) => unit.input.moment[i] += by,
         Known::DisturbanceMoment(i) => unit.input.disturbance_moment[i] += by,
-        Known::Surface => unit.input.command.surfaces[known - 36] += by,
-        Known::Jet(j) => unit.input.command.jets[j] += by,
+        Known::Surface(i) => unit.command.surfaces[i] += by,
+        Known::Jet(j) => unit.command.jets[j] += by,
+        Known::Trajectory(i) => {
+            let t = &mut unit.input.trajectory;
+            *[
+                &mut t.flight_path_angle,
+                &mut t.heading,
+                &mut t.latitude,
+                &mut t.flight_path_angle_rate,
+                &mut t.heading_rate,
+                &mut t.longitude_rate,
+                &mut t.latitude_rate,
+            ][i] += by;
+        }
     }
 }
 
 #[test]
 fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
     let description = describe::<ReentryPlant>();
-    let units = (1..=7).map(in_model_exchange).chain([false, true].map(actuated_in_model_exchange));
+    let units = (1..=7)
+        .map(in_model_exchange)
+        .chain([false, true].map(actuated_in_model_exchange))
+        .chain([(1, 1), (3, 2), (7, 2)].map(|(kind, kinematics)| along_a_trajectory(kind, kinematics)))
+        .chain([at_a_communication_point()]);
     for (case, mut unit) in units.enumerate() {
         for known in known_positions() {
             let by = match known {
-                0..6 => 1e-5,
-                6..36 => 1e3,
-                _ => 0.1,
+                21..27 => 1e3,
+                36..44 => 1e-3,
+                44..54 => 0.1,
+                _ => 1e-5,
             };
             nudge(&mut unit, known, by);
             let above = calculated(&mut unit, 0.02);
@@ -211,14 +283,17 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
             }
         }
     }
-    let mut duty = actuated_in_model_exchange(true);
+    let mut duty = at_a_communication_point();
     assert!((duty.partial_derivative(0.0, 14, 44).unwrap() - 19897.0).abs() < 1e-9, "yaw by jet 1");
+    let mut exact = along_a_trajectory(1, 2);
+    assert!(exact.partial_derivative(0.0, 8, 63).unwrap() != 0.0, "bank rate by heading");
+    assert!((exact.partial_derivative(0.0, 6, 65).unwrap() + 0.5f64.cos() / 0.2f64.cos()).abs() < 1e-15);
 }
 
 #[test]
 fn derivatives_by_parameters_are_refused() {
     let mut unit = in_model_exchange(1);
-    for (unknown, known) in [(6, 54), (6, 6), (6, 27), (54, 0), (21, 21), (36, 36)] {
+    for (unknown, known) in [(6, 69), (6, 6), (6, 35), (69, 0), (21, 21), (36, 36), (62, 62)] {
         assert!(unit.partial_derivative(0.0, unknown, known).is_err(), "{unknown} by {known}");
     }
 }
@@ -264,29 +339,65 @@ fn looking_changes_nothing() {
     assert_eq!(outputs(&mut looked_at, 2.0), outputs(&mut left_alone, 2.0));
 }
 
-/// Model exchange to `end` with an accurate integrator between the events; returns their number.
-fn exchange(unit: &mut ReentryPlant, begin: f64, end: f64) -> u32 {
-    let mut time = begin;
-    let mut events = 0;
-    while time < end {
-        let next = unit.new_discrete_states(time).unwrap().next_event_time.unwrap_or(end).min(end);
-        events += 1;
-        let mut y = nalgebra::Vector6::zeros();
-        unit.continuous_states(y.as_mut_slice());
-        let steps = vehicle::integrator::equal_steps(next - time, 0.001);
-        let h = (next - time) / steps as f64;
-        for i in 0..steps {
-            let mut f = |t: f64, y: &nalgebra::Vector6<f64>| {
+type States = nalgebra::SVector<f64, 14>;
+
+fn states(unit: &ReentryPlant) -> States {
+    let mut states = States::zeros();
+    unit.continuous_states(states.as_mut_slice());
+    states
+}
+
+fn indicators(unit: &mut ReentryPlant, time: f64) -> [f64; 8] {
+    unit.calculate(time).unwrap();
+    let mut indicators = [f64::NAN; 8];
+    unit.event_indicators(&mut indicators);
+    indicators
+}
+
+/// An accurate integration to `end`, or to the state event before it, located by bisection. Returns the time.
+fn integrate(unit: &mut ReentryPlant, begin: f64, end: f64) -> f64 {
+    let crossed = |unit: &mut ReentryPlant, time| indicators(unit, time).iter().any(|z| *z <= 0.0);
+    assert!(!crossed(unit, begin), "an event is due at {begin} s");
+    let steps = vehicle::integrator::equal_steps(end - begin, 0.001);
+    let h = (end - begin) / steps as f64;
+    for i in 0..steps {
+        let (time, y) = (begin + i as f64 * h, states(unit));
+        let advance = |unit: &mut ReentryPlant, h: f64| {
+            let mut f = |t: f64, y: &States| {
                 unit.set_continuous_states(y.as_slice());
                 let o = outputs(unit, t);
-                vehicle::plant::state(&o.angle_rates, &o.angular_acceleration)
+                let motion = o.angle_rates.iter().chain(o.angular_acceleration.iter());
+                States::from_iterator(motion.chain(o.deflection_rates.iter()).copied())
             };
-            y = vehicle::integrator::rk4(&mut f, time + i as f64 * h, &y, h);
+            let y = vehicle::integrator::rk4(&mut f, time, &y, h);
+            unit.set_continuous_states(y.as_slice());
+            crossed(unit, time + h)
+        };
+        if advance(unit, h) {
+            let (mut before, mut after) = (0.0, h);
+            while after - before > 1e-15 {
+                let middle = 0.5 * (before + after);
+                if advance(unit, middle) { after = middle } else { before = middle }
+            }
+            advance(unit, after);
+            return time + after;
         }
-        unit.set_continuous_states(y.as_slice());
-        time = next;
     }
-    events
+    end
+}
+
+/// Model exchange to `end`; returns the times of the events.
+fn exchange(unit: &mut ReentryPlant, begin: f64, end: f64) -> Vec<f64> {
+    let mut times = vec![begin];
+    loop {
+        let time = times[times.len() - 1];
+        let next = unit.new_discrete_states(time).unwrap().next_event_time.unwrap_or(end).min(end);
+        let reached = integrate(unit, time, next);
+        if reached >= end {
+            return times;
+        }
+        times.push(reached);
+    }
 }
 
 fn assert_same_motion(cs: &Output, me: &Output, case: &str) {
@@ -311,7 +422,7 @@ fn oracle_model_exchange_agrees_with_co_simulation() {
         let events = exchange(&mut me, 0.0, 2.0);
         assert_same_motion(&outputs(&mut cs, 2.0), &outputs(&mut me, 2.0), &format!("kind {kind}"));
         let expected = [1, 38, 3, 3, 6, 38, 38][kind as usize - 1];
-        assert_eq!(events, expected, "kind {kind}");
+        assert_eq!(events.len(), expected, "kind {kind}");
     }
 }
 
@@ -327,38 +438,137 @@ fn oracle_model_exchange_agrees_with_co_simulation_under_surfaces_and_jets() {
         for k in 0..10 {
             let [begin, end] = [0.2 * f64::from(k), 0.2 * f64::from(k + 1)];
             for unit in [&mut cs, &mut me] {
-                unit.input.command.jets[k as usize] = 0.9;
-                unit.input.command.jets[9 - k as usize] = 0.2;
-                unit.input.command.surfaces[4] = 0.1 * begin.sin();
+                unit.command.jets[k as usize] = 0.9;
+                unit.command.jets[9 - k as usize] = 0.2;
+                unit.command.surfaces[4] = 0.1 * begin.sin();
             }
             step(&mut cs, begin, end).unwrap();
             exchange(&mut me, begin, end);
             let [cs, me] = [&mut cs, &mut me].map(|unit| outputs(unit, end));
             assert_same_motion(&cs, &me, &format!("kind {kind}, duty {duty}, tick {k}"));
-            assert!((cs.deflections - me.deflections).amax() < 1e-14);
-            assert!((cs.applied_moment - me.applied_moment).amax() < 1e-8 || duty || kind == 7);
+            assert!((cs.deflections - me.deflections).amax() < 1e-13, "{}", cs.deflections - me.deflections);
+            assert!((cs.applied_moment - me.applied_moment).amax() < 1e-7);
+        }
+    }
+}
+
+/// Beyond the limits, to them, to commands within them.
+const FAR: [f64; 8] = [-90.0, 4.0, -3.0, 0.0, 90.0, 0.0, 0.0, 0.0];
+
+fn commanded(degrees: [f64; 8]) -> ReentryPlant {
+    started(|unit| {
+        unit.parameters.kind = 1;
+        actuate(unit);
+        unit.command.surfaces = Surfaces::from(degrees).map(f64::to_radians);
+    })
+}
+
+#[test]
+fn published_rate_limit_and_state_events_where_surfaces_stop() {
+    // Wu 2015, (63): 10 deg/s; commands beyond the limits of -25, 0 and 30 deg stop there
+    let mut unit = commanded(FAR);
+    let events = exchange(&mut unit, 0.0, 4.0);
+    let expected = [0.0, 0.3, 2.5, 3.0];
+    assert_eq!(events.len(), expected.len(), "{events:?}");
+    assert!(events.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{events:?}");
+    let stop = [-25.0, 0.0, -3.0, 0.0, 30.0, 0.0, 0.0, 0.0].map(f64::to_radians);
+    assert_eq!(outputs(&mut unit, 4.0).deflections, Surfaces::from(stop), "to the last bit");
+    assert_eq!(indicators(&mut unit, 4.0), [1.0; 8]);
+}
+
+#[test]
+fn between_events_indicators_are_the_time_left_whatever_trial_states_are_set() {
+    let mut unit = commanded(FAR);
+    unit.new_discrete_states(0.0).unwrap();
+    let start = states(&unit);
+    let expected = [2.5, 1.0, 0.3, 1.0, 3.0, 1.0, 1.0, 1.0];
+    let near = |found: [f64; 8], shift: f64| {
+        let expected = [2.5 - shift, 1.0, 0.3 - shift, 1.0, 3.0 - shift, 1.0, 1.0, 1.0];
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{found:?}");
+    };
+    near(indicators(&mut unit, 0.0), 0.0);
+    let rates = outputs(&mut unit, 0.0).deflection_rates;
+    for reach in [0.1, 0.3 + 1e-9, 0.4, 7.0] {
+        let mut trial = start;
+        for i in 0..8 {
+            trial[6 + i] += rates[i] * reach;
+        }
+        unit.set_continuous_states(trial.as_slice());
+        near(indicators(&mut unit, reach), reach);
+        assert_eq!(outputs(&mut unit, reach).deflection_rates, rates);
+    }
+    unit.set_continuous_states(start.as_slice());
+    assert_eq!(indicators(&mut unit, 0.0).map(|z| (z * 1e12).round() / 1e12), expected);
+}
+
+#[test]
+fn an_event_puts_a_deflection_on_its_target_however_it_was_located() {
+    // The third surface is at -3 deg after 0.3 s. An importer stops before, at, or behind that.
+    for (late, arrives) in
+        [(-1e-3, false), (-1e-8, false), (-1e-12, true), (0.0, true), (1e-9, true), (0.04, true)]
+    {
+        let mut unit = commanded(FAR);
+        unit.new_discrete_states(0.0).unwrap();
+        let rates = outputs(&mut unit, 0.0).deflection_rates;
+        let mut y = states(&unit);
+        for i in 0..8 {
+            y[6 + i] += rates[i] * (0.3 + late);
+        }
+        unit.set_continuous_states(y.as_slice());
+        let before = states(&unit);
+        let info = unit.new_discrete_states(0.3 + late).unwrap();
+        let found = outputs(&mut unit, 0.3 + late);
+        assert_eq!(info.states_changed, states(&unit) != before, "{late}");
+        assert_eq!(found.deflection_rates[2] == 0.0, arrives, "{late}");
+        if arrives {
+            assert_eq!(found.deflections[2], (-3f64).to_radians(), "{late}");
+        }
+        assert!(indicators(&mut unit, 0.3 + late).iter().all(|z| *z > 0.0), "{late}");
+        // At the same time again, and without an event: nothing changes.
+        let after = (states(&unit), found);
+        for time in [0.3 + late, 0.3 + late + 1e-6] {
+            assert!(!unit.new_discrete_states(time).unwrap().states_changed);
+            assert_eq!((states(&unit), outputs(&mut unit, time)), after, "{late}");
         }
     }
 }
 
 #[test]
-fn published_rate_limit_and_time_events_where_surfaces_stop() {
-    // Wu 2015, (63): 10 deg/s; commands beyond the limits of -25, 0 and 30 deg stop there
-    let mut unit = started(|unit| {
-        unit.parameters.kind = 1;
-        actuate(unit);
-    });
-    unit.input.command.surfaces =
-        Surfaces::from([-90.0, 4.0, -3.0, 0.0, 90.0, 0.0, 0.0, 0.0]).map(f64::to_radians);
-    let mut time = 0.0;
-    for expected in [0.3, 2.5, 3.0] {
-        time = unit.new_discrete_states(time).unwrap().next_event_time.unwrap();
-        assert!((time - expected).abs() < 1e-12, "{time}");
-    }
-    assert_eq!(unit.new_discrete_states(time).unwrap().next_event_time, None);
-    let degrees = outputs(&mut unit, time).deflections.map(f64::to_degrees);
-    let expected = Surfaces::from([-25.0, 0.0, -3.0, 0.0, 30.0, 0.0, 0.0, 0.0]);
-    assert!((degrees - expected).amax() < 1e-12, "{degrees}");
+fn a_new_command_at_an_event_starts_from_the_old_target() {
+    let mut unit = commanded(FAR);
+    unit.new_discrete_states(0.0).unwrap();
+    let mut y = states(&unit);
+    y[6 + 2] = (-3.5f64).to_radians();
+    unit.set_continuous_states(y.as_slice());
+    unit.command.surfaces[2] = (-1f64).to_radians();
+    assert!(unit.new_discrete_states(0.35).unwrap().states_changed);
+    let found = outputs(&mut unit, 0.35);
+    assert_eq!(found.deflections[2], (-3f64).to_radians());
+    assert!((found.deflection_rates[2].to_degrees() - 10.0).abs() < 1e-12);
+}
+
+#[test]
+fn an_importer_may_restart_from_other_deflections() {
+    let mut unit = commanded([0.0; 8]);
+    unit.new_discrete_states(0.0).unwrap();
+    let mut y = states(&unit);
+    y[6 + 4] = 0.1;
+    unit.set_continuous_states(y.as_slice());
+    assert!(!unit.new_discrete_states(0.0).unwrap().states_changed);
+    let found = outputs(&mut unit, 0.0);
+    assert_eq!(found.deflections[4], 0.1);
+    assert!((found.deflection_rates[4].to_degrees() + 10.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_restored_unit_goes_on_with_moving_surfaces() {
+    let mut unit = commanded(FAR);
+    exchange(&mut unit, 0.0, 0.2);
+    let saved = serde_json::to_string(&unit).unwrap();
+    let mut restored: ReentryPlant = serde_json::from_str(&saved).unwrap();
+    let events = exchange(&mut unit, 0.2, 1.0);
+    assert_eq!(exchange(&mut restored, 0.2, 1.0), events);
+    assert_eq!(outputs(&mut restored, 1.0), outputs(&mut unit, 1.0));
 }
 
 #[test]
@@ -370,7 +580,7 @@ fn published_moments_of_jets_act_from_the_communication_point_on() {
             unit.parameters.jet_symmetric = symmetric;
         });
         assert_eq!(outputs(&mut unit, 0.0).applied_moment, Vector3::zeros());
-        unit.input.command.jets[3] = 1.0;
+        unit.command.jets[3] = 1.0;
         assert_eq!(outputs(&mut unit, 0.0).applied_moment, Vector3::new(-6912.0, pitch, -11798.0));
     }
 }
@@ -379,13 +589,15 @@ fn published_moments_of_jets_act_from_the_communication_point_on() {
 fn in_model_exchange_jets_switch_and_surfaces_turn_at_events_only() {
     let mut unit = started(|unit| unit.parameters.actuation = 2);
     unit.new_discrete_states(0.0).unwrap();
-    unit.input.command.jets[0] = 1.0;
-    unit.input.command.surfaces[4] = 0.1;
+    unit.command.jets[0] = 1.0;
+    unit.command.surfaces[4] = 0.1;
     let before = outputs(&mut unit, 0.01);
     assert_eq!((before.applied_moment, before.deflections), (Vector3::zeros(), Surfaces::zeros()));
+    assert_eq!(before.deflection_rates, Surfaces::zeros());
     unit.new_discrete_states(0.01).unwrap();
     assert_eq!(outputs(&mut unit, 0.01).applied_moment, Vector3::new(0.0, -498.0, 19897.0));
-    assert!((outputs(&mut unit, 0.02).deflections[4].to_degrees() - 0.1).abs() < 1e-12);
+    let reached = integrate(&mut unit, 0.01, 0.02);
+    assert!((outputs(&mut unit, reached).deflections[4].to_degrees() - 0.1).abs() < 1e-12);
 }
 
 #[test]
@@ -395,8 +607,8 @@ fn oracle_dynamic_pressure_and_biases_of_aerodynamics_and_density() {
             unit.parameters.actuation = 2;
             unit.parameters.density_scale = scale;
             unit.parameters.aerodynamics_scale = scale;
-            unit.input.command.surfaces[4] = 0.1;
-            unit.input.command.surfaces[5] = 0.1;
+            unit.command.surfaces[4] = 0.1;
+            unit.command.surfaces[5] = 0.1;
         });
         step(&mut unit, 0.0, 1.0).unwrap();
         outputs(&mut unit, 1.0)
@@ -413,8 +625,8 @@ fn oracle_dynamic_pressure_and_biases_of_aerodynamics_and_density() {
 #[test]
 fn with_a_moment_actuators_stay_at_rest_and_commands_do_nothing() {
     let [mut plain, mut commanded] = [0, 1].map(|_| started(|_| {}));
-    commanded.input.command.surfaces = Surfaces::repeat(-0.1);
-    commanded.input.command.jets = Jets::repeat(1.0);
+    commanded.command.surfaces = Surfaces::repeat(-0.1);
+    commanded.command.jets = Jets::repeat(1.0);
     for unit in [&mut plain, &mut commanded] {
         unit.input.moment = Vector3::new(1e4, -2e4, 3e4);
         step(unit, 0.0, 0.5).unwrap();
@@ -480,7 +692,8 @@ fn impossible_parameters_are_refused_by_name() {
 
 #[test]
 fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_exchange() {
-    let singular = [0.0, 1.6, 0.0, 0.0, 0.0, 0.0];
+    let mut singular = [0.0; 14];
+    singular[1] = 1.6;
     let mut unit = in_model_exchange(1);
     unit.set_continuous_states(&singular);
     assert!(matches!(unit.calculate(0.1), Err(Failure::Discard(text)) if text.contains("singular")));

@@ -14,7 +14,7 @@
 //! [components.plant]
 //! fmu = "ReentryPlant.fmu"          # searched beside the experiment, in each --fmu-dir and in target/fmu
 //! every = 1                         # steps at every n-th communication point, default 1
-//! unconnected = ["disturbanceMoment.*", "surface*", "jet*"]   # inputs that stay at their start value
+//! unconnected = ["disturbanceMoment.*", "surface*", "jet*", "trajectory.*"]   # inputs that stay at their start value
 //!
 //! [components.plant.parameters]     # parameters, and constant values for inputs without connection
 //! "inertia.scale" = 1.05            # a number is in the variable's own unit

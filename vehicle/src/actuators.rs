@@ -6,7 +6,8 @@
 //! 4. jet: on from a command of one half, or a duty cycle cut off at 0 and 1
 //! 5. jet: moment D_RCS δ_RCS, (57)
 //!
-//! Commands are taken at instants and held in between; so between two of them every deflection is a known function of time.
+//! Commands are taken at instants and held in between. Until a deflection comes to rest its rate is constant: right side of
+//! its differential equation and, from one instant to another, its exact solution.
 
 use crate::effectors::{Effectors, JETS, Jets, SURFACES, Surfaces};
 use crate::error::Error;
@@ -17,13 +18,13 @@ use serde::{Deserialize, Serialize};
 /// The command from which on a jet that only switches is on.
 pub const THRESHOLD: f64 = 0.5;
 
-/// What a jet makes of its command.
+/// What a jet makes of its command when commands are taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum JetMode {
-    /// On from [`THRESHOLD`], else off; switches when commands are taken.
+    /// On from [`THRESHOLD`], else off.
     #[default]
     OnOff,
-    /// The command is the mean thrust as a fraction of the full one, and acts at once.
+    /// The command is the mean thrust as a fraction of the full one.
     Duty,
 }
 
@@ -49,17 +50,23 @@ pub struct Command {
     pub jets: Jets,
 }
 
-/// The actuators since commands were taken last.
+impl Command {
+    /// What holds a value that is not finite.
+    pub(crate) fn fault(&self) -> Option<&'static str> {
+        let broken = self.surfaces.iter().chain(&self.jets).any(|value| !value.is_finite());
+        broken.then_some("actuator command")
+    }
+}
+
+/// What the actuators do since commands were taken or a deflection came to rest last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Drive {
-    /// When, s.
-    since: f64,
-    /// Deflections then, rad.
-    from: Surfaces,
     /// Deflections they move to, rad.
-    to: Surfaces,
-    /// Jets that only switch: 0 or 1.
-    on: Jets,
+    target: Surfaces,
+    /// 1 up, −1 down, 0 at rest.
+    direction: Surfaces,
+    /// Thrust of each jet, 0 to 1.
+    thrust: Jets,
 }
 
 /// Surfaces and jets at a flight condition.
@@ -96,43 +103,63 @@ impl Actuators {
         })
     }
 
-    /// The drive that a command taken at `time` (s) sets off, from the deflections that `drive` has reached.
-    pub fn commanded(&self, time: f64, command: &Command, drive: &Drive) -> Drive {
-        Drive {
-            since: time,
-            from: self.deflections(time, drive),
-            to: Surfaces::from_fn(|i, _| command.surfaces[i].clamp(self.min[i], self.max[i])),
-            on: command.jets.map(|jet| if jet >= THRESHOLD { 1.0 } else { 0.0 }),
-        }
+    /// What a command taken at `time` (s) sets off from given deflections (rad).
+    pub fn commanded(&self, time: f64, command: &Command, deflections: &Surfaces) -> Drive {
+        let target = Surfaces::from_fn(|i, _| command.surfaces[i].clamp(self.min[i], self.max[i]));
+        let thrust = command.jets.map(|jet| match self.jet_mode {
+            JetMode::OnOff if jet >= THRESHOLD => 1.0,
+            JetMode::OnOff => 0.0,
+            JetMode::Duty => jet.clamp(0.0, 1.0),
+        });
+        self.directed(time, Drive { target, thrust, ..Drive::default() }, deflections)
     }
 
-    /// Deflections at `time` (s), not before commands were taken; rad.
-    pub fn deflections(&self, time: f64, drive: &Drive) -> Surfaces {
-        let elapsed = (time - drive.since).max(0.0);
-        Surfaces::from_fn(|i, _| {
-            let way = drive.to[i] - drive.from[i];
-            let reach = self.rate[i] * elapsed;
-            if way.abs() > reach { drive.from[i] + reach.copysign(way) } else { drive.to[i] }
+    /// The drive with each direction as the way left at `time` (s) says.
+    pub fn directed(&self, time: f64, drive: Drive, deflections: &Surfaces) -> Drive {
+        let way = drive.target - deflections;
+        // A way that is gone at the same instant is none.
+        let least = self.rate * tolerance(time);
+        let direction =
+            Surfaces::from_fn(|i, _| if way[i].abs() <= least[i] { 0.0 } else { way[i].signum() });
+        Drive { direction, ..drive }
+    }
+
+    /// Rates of the deflections, rad/s.
+    pub fn rates(&self, drive: &Drive) -> Surfaces {
+        self.rate.component_mul(&drive.direction)
+    }
+
+    /// Time (s) until each deflection that moves comes to rest; negative behind its target, infinite at rest.
+    pub fn time_left(&self, drive: &Drive, deflections: &Surfaces) -> Surfaces {
+        let way = drive.target - deflections;
+        Surfaces::from_fn(|i, _| match drive.direction[i] {
+            0.0 => f64::INFINITY,
+            direction => direction * way[i] / self.rate[i],
         })
     }
 
-    /// The first time (s) after `time` at which a deflection comes to rest.
-    pub fn next_change(&self, time: f64, drive: &Drive) -> Option<f64> {
-        let arrivals =
-            (0..SURFACES).map(|i| drive.since + (drive.to[i] - drive.from[i]).abs() / self.rate[i]);
-        arrivals.filter(|&arrival| arrival > time + tolerance(time)).min_by(f64::total_cmp)
+    /// Puts every deflection that has come to its target by `time` (s), or has gone beyond it, on the target.
+    pub fn settle(&self, time: f64, drive: &Drive, deflections: &mut Surfaces) {
+        let way = drive.target - *deflections;
+        for i in 0..SURFACES {
+            let left = if drive.direction[i] == 0.0 { way[i].abs() } else { drive.direction[i] * way[i] };
+            if left <= self.rate[i] * tolerance(time) {
+                deflections[i] = drive.target[i];
+            }
+        }
     }
 
-    /// The moment (N m) of surfaces and jets at `time` (s).
-    pub fn moment(&self, time: f64, command: &Command, drive: &Drive) -> Vector3<f64> {
-        let jets = match self.jet_mode {
-            JetMode::OnOff => drive.on,
-            JetMode::Duty => command.jets.map(|duty| duty.clamp(0.0, 1.0)),
-        };
-        self.surface_moments * self.deflections(time, drive) + self.jet_moments * jets
+    /// The moment (N m) of surfaces and jets.
+    pub fn moment(&self, drive: &Drive, deflections: &Surfaces) -> Vector3<f64> {
+        self.surface_moments * deflections + self.jet_moments * drive.thrust
     }
 
-    /// Partial derivative of [`Actuators::moment`] by the commands to the jets, N m.
+    /// Partial derivative of [`Actuators::moment`] by the deflections, N m/rad.
+    pub fn moment_by_deflections(&self) -> &SMatrix<f64, 3, SURFACES> {
+        &self.surface_moments
+    }
+
+    /// Partial derivative of the moment (N m) by the commands to the jets when they are taken.
     pub fn moment_by_jets(&self, command: &Command) -> SMatrix<f64, 3, JETS> {
         let mut derivative = self.jet_moments;
         for (j, mut column) in derivative.column_iter_mut().enumerate() {
@@ -164,11 +191,28 @@ mod tests {
 
     const FAR: [f64; SURFACES] = [-90.0, -20.0, 5.0, -3.0, 90.0, -90.0, 90.0, -90.0];
 
+    /// The exact motion from rest at zero: from one arrival to the next, the last one being `end`.
+    fn moved(actuators: &Actuators, command: &Command, begin: f64, end: f64) -> (Surfaces, Vec<f64>) {
+        let mut deflections = Surfaces::zeros();
+        let (mut time, mut arrivals) = (begin, Vec::new());
+        loop {
+            let drive = actuators.commanded(time, command, &deflections);
+            let arrival = time + actuators.time_left(&drive, &deflections).min();
+            let next = arrival.min(end);
+            deflections += actuators.rates(&drive) * (next - time);
+            actuators.settle(next, &drive, &mut deflections);
+            if arrival > end {
+                return (deflections, arrivals);
+            }
+            arrivals.push(arrival);
+            time = next;
+        }
+    }
+
     #[test]
     fn published_rate_and_position_limits_are_met_exactly() {
         // Wu 2015, (63): 10 deg/s; -25 to 0 deg, -10 to 30 deg, -30 to 30 deg
         let actuators = actuators(JetMode::OnOff);
-        let drive = actuators.commanded(2.0, &surfaces(FAR), &Drive::default());
         for (time, expected) in [
             (2.0, [0.0; SURFACES]),
             (2.2, [-2.0, -2.0, 0.0, -2.0, 2.0, -2.0, 2.0, -2.0]),
@@ -176,11 +220,11 @@ mod tests {
             (3.5, [-15.0, -15.0, 0.0, -3.0, 15.0, -10.0, 15.0, -15.0]),
             (9.0, [-25.0, -20.0, 0.0, -3.0, 30.0, -10.0, 30.0, -30.0]),
         ] {
-            let found = degrees(&actuators.deflections(time, &drive));
+            let found = degrees(&moved(&actuators, &surfaces(FAR), 2.0, time).0);
             assert!((found - Surfaces::from(expected)).amax() < 1e-12, "{found} at {time}");
         }
         let effectors = Effectors::published();
-        let rest = actuators.deflections(9.0, &drive);
+        let rest = moved(&actuators, &surfaces(FAR), 2.0, 9.0).0;
         assert_eq!((rest[0], rest[4], rest[5]), (effectors.min[0], effectors.max[4], effectors.min[5]));
         assert_eq!(rest[3], (-3f64).to_radians(), "the command itself, without rounding");
     }
@@ -189,35 +233,54 @@ mod tests {
     fn the_position_limit_acts_before_the_rate_limit() {
         // A command far beyond the limit does not wind up: the way back begins at once
         let actuators = actuators(JetMode::OnOff);
-        let away = actuators.commanded(0.0, &surfaces([-90.0; SURFACES]), &Drive::default());
+        let away = moved(&actuators, &surfaces([-90.0; SURFACES]), 0.0, 10.0).0;
         let back = actuators.commanded(10.0, &surfaces([0.0; SURFACES]), &away);
-        let found = degrees(&actuators.deflections(10.1, &back));
+        let found = degrees(&(away + actuators.rates(&back) * 0.1));
         assert!((found[0] + 24.0).abs() < 1e-12 && (found[4] + 9.0).abs() < 1e-12, "{found}");
     }
 
     #[test]
-    fn changes_come_when_deflections_come_to_rest() {
+    fn arrivals_come_when_deflections_come_to_rest() {
         let actuators = actuators(JetMode::OnOff);
-        let drive = actuators.commanded(2.0, &surfaces(FAR), &Drive::default());
-        let mut time = 2.0;
-        for expected in [2.3, 3.0, 4.0, 4.5, 5.0] {
-            time = actuators.next_change(time, &drive).unwrap();
-            assert!((time - expected).abs() < 1e-12, "{time}, not {expected}");
+        let arrivals = moved(&actuators, &surfaces(FAR), 2.0, 9.0).1;
+        let expected = [2.3, 3.0, 4.0, 4.5, 5.0];
+        assert_eq!(arrivals.len(), expected.len(), "{arrivals:?}");
+        assert!(arrivals.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{arrivals:?}");
+    }
+
+    #[test]
+    fn a_deflection_behind_its_target_is_put_on_it_and_one_before_it_is_not() {
+        let actuators = actuators(JetMode::OnOff);
+        let drive = actuators.commanded(0.0, &surfaces(FAR), &Surfaces::zeros());
+        for (left, arrives) in [(1e-6, false), (1e-10, true), (0.0, true), (-0.01, true)] {
+            // The fourth surface moves down to -3 deg at 10 deg/s.
+            let mut deflections = surfaces(FAR).surfaces;
+            deflections[3] += left * 10f64.to_radians();
+            assert!((actuators.time_left(&drive, &deflections)[3] - left).abs() < 1e-15);
+            let before = deflections[3];
+            actuators.settle(0.3, &drive, &mut deflections);
+            let expected = if arrives { (-3f64).to_radians() } else { before };
+            assert_eq!(deflections[3], expected, "{left}");
+            let after = actuators.commanded(0.3, &surfaces(FAR), &deflections);
+            assert_eq!(actuators.rates(&after)[3] == 0.0, arrives, "{left}");
+            assert_eq!(actuators.time_left(&after, &deflections)[3] == f64::INFINITY, arrives, "{left}");
         }
-        assert_eq!(actuators.next_change(time, &drive), None);
     }
 
     #[test]
     fn taking_the_same_command_again_changes_nothing() {
         let actuators = actuators(JetMode::OnOff);
         let command = surfaces(FAR);
-        let once = actuators.commanded(0.0, &command, &Drive::default());
-        let mut often = once;
-        for k in 0..100 {
-            often = actuators.commanded(0.013 * f64::from(k), &command, &often);
-            let time = 0.013 * f64::from(k + 1);
-            let difference = actuators.deflections(time, &once) - actuators.deflections(time, &often);
-            assert!(difference.amax() < 1e-14);
+        let mut often = Surfaces::zeros();
+        for k in 0..400 {
+            let time = 0.013 * f64::from(k);
+            let drive = actuators.commanded(time, &command, &often);
+            for i in 0..SURFACES {
+                often[i] += actuators.rates(&drive)[i] * actuators.time_left(&drive, &often)[i].min(0.013);
+            }
+            actuators.settle(time + 0.013, &drive, &mut often);
+            let once = moved(&actuators, &command, 0.0, time + 0.013).0;
+            assert!((once - often).amax() < 1e-14);
         }
     }
 
@@ -227,11 +290,11 @@ mod tests {
         let mut command = surfaces([0.0, 0.0, 0.0, 0.0, 2.0, -1.0, 0.0, 0.0]);
         (command.jets[2], command.jets[6]) = (1.0, 1.0);
         let actuators = actuators(JetMode::OnOff);
-        let drive = actuators.commanded(0.0, &command, &Drive::default());
+        let drive = actuators.commanded(0.0, &command, &Surfaces::zeros());
         let jets = Vector3::new(11625.0 - 11623.0, -9466.0 - 9465.0, 0.0);
-        assert!((actuators.moment(0.0, &command, &drive) - jets).amax() < 1e-9);
+        assert!((actuators.moment(&drive, &Surfaces::zeros()) - jets).amax() < 1e-9);
         let flaps = Vector3::new(3.0 * 1375.0, -5100.0, -3000.0);
-        assert!((actuators.moment(1.0, &command, &drive) - jets - flaps).amax() < 1e-9);
+        assert!((actuators.moment(&drive, &command.surfaces) - jets - flaps).amax() < 1e-9);
     }
 
     #[test]
@@ -241,9 +304,8 @@ mod tests {
         let full = Vector3::new(0.0, -498.0, 19897.0);
         for (value, on) in [(0.0, 0.0), (0.4999, 0.0), (0.5, 1.0), (1.0, 1.0), (7.0, 1.0), (-7.0, 0.0)] {
             command.jets[0] = value;
-            let drive = actuators.commanded(0.0, &command, &Drive::default());
-            command.jets[0] = 0.5 - value;
-            assert_eq!(actuators.moment(0.0, &command, &drive), full * on, "{value}");
+            let drive = actuators.commanded(0.0, &command, &Surfaces::zeros());
+            assert_eq!(actuators.moment(&drive, &Surfaces::zeros()), full * on, "{value}");
         }
         assert!(actuators.moment_by_jets(&command).iter().all(|derivative| *derivative == 0.0));
     }
@@ -255,7 +317,8 @@ mod tests {
         let full = Vector3::new(0.0, -498.0, 19897.0);
         for (value, duty) in [(0.0, 0.0), (0.25, 0.25), (1.0, 1.0), (1.5, 1.0), (-0.5, 0.0)] {
             command.jets[0] = value;
-            let moment = actuators.moment(0.0, &command, &Drive::default());
+            let drive = actuators.commanded(0.0, &command, &Surfaces::zeros());
+            let moment = actuators.moment(&drive, &Surfaces::zeros());
             assert!((moment - full * duty).amax() < 1e-9, "{value}");
             let slope = if value == duty { full } else { Vector3::zeros() };
             assert!((actuators.moment_by_jets(&command).column(0) - slope).amax() < 1e-9);
@@ -275,8 +338,8 @@ mod tests {
                 aerodynamics_scale: scale,
             };
             let actuators = Actuators::new(&config).unwrap();
-            let drive = actuators.commanded(0.0, &command, &Drive::default());
-            actuators.moment(5.0, &command, &drive)
+            let drive = actuators.commanded(0.0, &command, &Surfaces::zeros());
+            actuators.moment(&drive, &command.surfaces)
         };
         let (nominal, biased) = (moment(1.0, 1.0), moment(0.9, 0.9));
         assert!(nominal.amin() > 500.0);

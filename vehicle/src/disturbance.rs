@@ -2,7 +2,7 @@
 
 use crate::dynamics::RigidBody;
 use crate::error::Error;
-use crate::kinematics;
+use crate::kinematics::Kinematics;
 use crate::time::{tick, tick_time, tolerance};
 use nalgebra::Vector3;
 use rand_pcg::Pcg64;
@@ -83,6 +83,8 @@ pub struct MomentWave {
 pub struct View<'a> {
     /// The vehicle.
     pub body: &'a RigidBody,
+    /// With the R in force.
+    pub kinematics: Kinematics,
     /// Θ, rad.
     pub angles: Vector3<f64>,
     /// ω, rad/s.
@@ -189,9 +191,11 @@ impl Disturbance {
             Kind::Constant => self.direction * self.bound,
             Kind::Square => self.direction * if tick.rem_euclid(2) == 0 { self.bound } else { -self.bound },
             // d‖ω‖²/dt contains 2 ωᵀ R⁻¹ Δ
-            Kind::AlongRate => signs(&kinematics::r_inverse(&view.angles).tr_mul(&view.rates)) * self.bound,
+            Kind::AlongRate => {
+                signs(&view.kinematics.r_inverse(&view.angles).tr_mul(&view.rates)) * self.bound
+            }
             Kind::AgainstMoment => {
-                signs(&(kinematics::r(&view.angles) * (view.body.inverse * view.moment))) * -self.bound
+                signs(&(view.kinematics.r(&view.angles) * (view.body.inverse * view.moment))) * -self.bound
             }
         }
     }

@@ -1,12 +1,13 @@
-//! The vehicle in motion: Θ̇ = R ω, ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ, integrated from one communication point to the next.
+//! The vehicle in motion: Θ̇ = R ω and what a turning trajectory adds, ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ; integrated from one
+//! communication point to the next.
 
 use crate::actuators::{self, Actuators, Command, Drive};
 use crate::disturbance::{Disturbance, View};
 use crate::dynamics::{Inertia, RigidBody};
-use crate::effectors::{JETS, Surfaces};
+use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::error::Error;
 use crate::integrator::{equal_steps, rk4};
-use crate::kinematics;
+use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
 use crate::time::tolerance;
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, SMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -32,49 +33,77 @@ pub fn state(angles: &Vector3<f64>, rates: &Vector3<f64>) -> State {
     Vector6::new(angles.x, angles.y, angles.z, rates.x, rates.y, rates.z)
 }
 
-/// Chai 2022 (1) with Δ = Δ_f-dot + R Δ_m of (4b) put into the rate equation: state derivative under the sum `moment`
-/// (N m) of all moments and the disturbance `delta` (rad/s²) on ẋ_ω.
-pub fn derivative(body: &RigidBody, state: &State, moment: &Vector3<f64>, delta: &Vector3<f64>) -> State {
-    let (angles, rates) = (angles(state), rates(state));
-    let acceleration = body.angular_acceleration(&rates, moment) + kinematics::r_inverse(&angles) * delta;
-    self::state(&(kinematics::r(&angles) * rates), &acceleration)
+/// What the right side needs to know besides the state, at an instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Load {
+    /// Sum of all moments, N m.
+    pub moment: Vector3<f64>,
+    /// Δ on ẋ_ω, rad/s².
+    pub delta: Vector3<f64>,
+    /// Turn rate of the trajectory's axes, [`Trajectory::turn_rate`], rad/s.
+    pub turn_rate: Vector3<f64>,
 }
 
-/// Partial derivatives of [`derivative`]: by the state (6 × 6) and by the moment (6 × 3).
-pub fn partial_derivatives(
-    body: &RigidBody,
-    state: &State,
-    delta: &Vector3<f64>,
-) -> (Matrix6<f64>, Matrix6x3<f64>) {
+/// State derivative. Angles: Wu 2015 (1). Rates: Chai 2022 (1) with Δ = Δ_f-dot + R Δ_m of (4b) put into the rate equation.
+pub fn derivative(body: &RigidBody, kinematics: Kinematics, state: &State, load: &Load) -> State {
     let (angles, rates) = (angles(state), rates(state));
-    let (r, r_inverse) = (kinematics::r(&angles), kinematics::r_inverse(&angles));
-    let (r_alpha, r_beta) = (kinematics::r_alpha(&angles), kinematics::r_beta(&angles));
+    let acceleration =
+        body.angular_acceleration(&rates, &load.moment) + kinematics.r_inverse(&angles) * load.delta;
+    let mut angle_rates = kinematics.r(&angles) * rates;
+    if load.turn_rate != Vector3::zeros() {
+        angle_rates += kinematics.turn(&angles) * load.turn_rate;
+    }
+    self::state(&angle_rates, &acceleration)
+}
+
+/// Partial derivatives of [`derivative`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Partials {
+    /// By the state.
+    pub by_state: Matrix6<f64>,
+    /// By the moment.
+    pub by_moment: Matrix6x3<f64>,
+    /// By the trajectory's turn rate.
+    pub by_turn_rate: Matrix6x3<f64>,
+}
+
+/// Partial derivatives of [`derivative`].
+pub fn partial_derivatives(body: &RigidBody, kinematics: Kinematics, state: &State, load: &Load) -> Partials {
+    let (angles, rates) = (angles(state), rates(state));
+    let (r, r_inverse) = (kinematics.r(&angles), kinematics.r_inverse(&angles));
+    let (r_alpha, r_beta) = (kinematics.r_alpha(&angles), kinematics.r_beta(&angles));
     let gyroscopic: Matrix3<f64> =
         (body.inertia * rates).cross_matrix() - rates.cross_matrix() * body.inertia;
+    let turned_by_beta = kinematics.turn_beta(&angles) * load.turn_rate;
+    let turned_by_sigma = kinematics.turn_sigma(&angles) * load.turn_rate;
+    let delta = r_inverse * load.delta;
 
     let mut by_state = Matrix6::zeros();
     by_state.fixed_view_mut::<3, 1>(0, 0).copy_from(&(r_alpha * rates));
-    by_state.fixed_view_mut::<3, 1>(0, 1).copy_from(&(r_beta * rates));
+    by_state.fixed_view_mut::<3, 1>(0, 1).copy_from(&(r_beta * rates + turned_by_beta));
+    by_state.fixed_view_mut::<3, 1>(0, 2).copy_from(&turned_by_sigma);
     by_state.fixed_view_mut::<3, 3>(0, 3).copy_from(&r);
     // ∂R⁻¹ = −R⁻¹ ∂R R⁻¹
-    by_state.fixed_view_mut::<3, 1>(3, 0).copy_from(&-(r_inverse * (r_alpha * (r_inverse * delta))));
-    by_state.fixed_view_mut::<3, 1>(3, 1).copy_from(&-(r_inverse * (r_beta * (r_inverse * delta))));
+    by_state.fixed_view_mut::<3, 1>(3, 0).copy_from(&-(r_inverse * (r_alpha * delta)));
+    by_state.fixed_view_mut::<3, 1>(3, 1).copy_from(&-(r_inverse * (r_beta * delta)));
     by_state.fixed_view_mut::<3, 3>(3, 3).copy_from(&(body.inverse * gyroscopic));
 
     let mut by_moment = Matrix6x3::zeros();
     by_moment.fixed_view_mut::<3, 3>(3, 0).copy_from(&body.inverse);
-    (by_state, by_moment)
+    let mut by_turn_rate = Matrix6x3::zeros();
+    by_turn_rate.fixed_view_mut::<3, 3>(0, 0).copy_from(&kinematics.turn(&angles));
+    Partials { by_state, by_moment, by_turn_rate }
 }
 
-/// What acts on the vehicle from outside.
+/// What acts on the vehicle from outside at any time. Commands to the actuators are taken at instants and stand apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Input {
     /// Control moment about the body axes, N m. Acts as it comes, unless there are actuators.
     pub moment: Vector3<f64>,
     /// Further moment about the body axes, N m.
     pub disturbance_moment: Vector3<f64>,
-    /// What the actuators are to do, if there are any.
-    pub command: Command,
+    /// The trajectory, which turns the axes that the angles are counted from.
+    pub trajectory: Trajectory,
 }
 
 impl Input {
@@ -84,8 +113,7 @@ impl Input {
         if broken(self.moment.as_slice()) || broken(self.disturbance_moment.as_slice()) {
             return Some("moment");
         }
-        let Command { surfaces, jets } = &self.command;
-        (broken(surfaces.as_slice()) || broken(jets.as_slice())).then_some("actuator command")
+        broken(&self.trajectory.values()).then_some("trajectory")
     }
 }
 
@@ -107,6 +135,10 @@ pub struct Config {
     pub initial: State,
     /// The disturbance.
     pub disturbance: Disturbance,
+    /// The R in force.
+    pub kinematics: Kinematics,
+    /// Angular rate ω_e of the Earth, rad/s.
+    pub earth_rate: f64,
     /// Surfaces and jets that make the control moment; without them it is an input.
     pub actuators: Option<actuators::Config>,
     /// Longest integration step, s.
@@ -114,7 +146,7 @@ pub struct Config {
 }
 
 /// What is held for a while: the disturbance from a tick or a change of its course to the next, and what the actuators do
-/// since commands were taken last.
+/// from one instant at which commands are taken or a deflection comes to rest to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Held {
     /// Number of the interval.
@@ -125,7 +157,7 @@ pub struct Held {
     sample: Vector3<f64>,
     /// Whether the disturbance acts.
     acts: bool,
-    /// The actuators' motion.
+    /// What the actuators do.
     drive: Drive,
 }
 
@@ -140,6 +172,8 @@ impl Held {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plant {
     body: RigidBody,
+    kinematics: Kinematics,
+    earth_rate: f64,
     disturbance: Disturbance,
     actuators: Option<Actuators>,
     step: f64,
@@ -147,6 +181,8 @@ pub struct Plant {
     held: Option<Held>,
     /// The state now.
     pub state: State,
+    /// Deflections of the surfaces now, rad; zero without actuators.
+    pub deflections: Surfaces,
 }
 
 impl Plant {
@@ -172,15 +208,21 @@ impl Plant {
         if !(config.step > 0.0 && config.step.is_finite()) {
             return refuse("integrator.step", format!("= {} s must be positive", config.step));
         }
+        if !config.earth_rate.is_finite() {
+            return refuse("trajectory.earthRate", "is not finite".into());
+        }
         config.disturbance.check()?;
         Ok(Self {
             body,
+            kinematics: config.kinematics,
+            earth_rate: config.earth_rate,
             disturbance: config.disturbance.clone(),
             actuators: config.actuators.as_ref().map(Actuators::new).transpose()?,
             step: config.step,
             start_time,
             held: None,
             state: config.initial,
+            deflections: Surfaces::zeros(),
         })
     }
 
@@ -199,21 +241,30 @@ impl Plant {
         rates(&self.state)
     }
 
-    /// The next time (s) after `time` at which the right side may not be smooth: the disturbance jumps, a deflection comes
-    /// to rest.
-    pub fn next_change(&self, time: f64, held: &Held) -> Option<f64> {
-        let jump = self.disturbance.next_change(self.start_time, time);
-        let rest = self.actuators.as_ref().and_then(|actuators| actuators.next_change(time, &held.drive));
+    /// The next time (s) after `time` at which the disturbance jumps.
+    pub fn next_jump(&self, time: f64) -> Option<f64> {
+        self.disturbance.next_change(self.start_time, time)
+    }
+
+    /// Time (s) until each deflection comes to rest; infinite where it rests.
+    pub fn time_left(&self, held: &Held) -> Surfaces {
+        self.actuators.as_ref().map_or(Surfaces::repeat(f64::INFINITY), |actuators| {
+            actuators.time_left(&held.drive, &self.deflections)
+        })
+    }
+
+    /// The next time (s) after `time` at which the right side may not be smooth.
+    fn next_change(&self, time: f64, held: &Held) -> Option<f64> {
+        let jump = self.next_jump(time);
+        let rest = self.actuators.is_some().then(|| time + self.time_left(held).min());
         jump.into_iter().chain(rest).min_by(f64::total_cmp)
     }
 
     /// What holds from `time` (s) on if commands are taken then: the disturbance is drawn from the present state and `input`
     /// if a tick has come (again, if asked again at the tick), and is the one already held otherwise.
-    pub fn in_force(&self, time: f64, input: &Input) -> Held {
-        let before = self.drive();
-        let drive =
-            self.actuators.as_ref().map_or(before, |all| all.commanded(time, &input.command, &before));
-        self.drawn(time, input, drive)
+    pub fn in_force(&self, time: f64, input: &Input, command: &Command) -> Held {
+        let commanded = |actuators: &Actuators| actuators.commanded(time, command, &self.deflections);
+        self.drawn(time, input, self.actuators.as_ref().map_or_else(Drive::default, commanded))
     }
 
     fn drawn(&self, time: f64, input: &Input, drive: Drive) -> Held {
@@ -225,20 +276,35 @@ impl Plant {
             }
             _ => {
                 let (angles, rates) = (self.angles(), self.rates());
-                let moment = self.control_moment(time, input, &drive);
-                let view = View { body: &self.body, angles, rates, moment };
+                let moment = self.control_moment(input, &drive, 0.0);
+                let view = View { body: &self.body, kinematics: self.kinematics, angles, rates, moment };
                 Held { tick, since: time, sample: self.disturbance.sample(tick, &view), acts, drive }
             }
         }
     }
 
     /// Takes over what [`Plant::in_force`] says: commands hold until they are taken again, the disturbance until the next tick.
-    pub fn hold(&mut self, time: f64, input: &Input) -> Held {
-        *self.held.insert(self.in_force(time, input))
+    /// Deflections that have come to their target, or a little beyond it, are put on it.
+    pub fn hold(&mut self, time: f64, input: &Input, command: &Command) -> Held {
+        if let Some(held) = self.held {
+            self.settle(time, &held);
+        }
+        let held = self.in_force(time, input, command);
+        self.settle(time, &held);
+        *self.held.insert(held)
     }
 
-    fn drive(&self) -> Drive {
-        self.held.map_or_else(Drive::default, |held| held.drive)
+    /// The same on the way from one communication point to the next, where no commands are taken.
+    fn hold_between(&mut self, time: f64, input: &Input, before: &Held) -> Held {
+        let directed = |actuators: &Actuators| actuators.directed(time, before.drive, &self.deflections);
+        let drive = self.actuators.as_ref().map_or_else(Drive::default, directed);
+        *self.held.insert(self.drawn(time, input, drive))
+    }
+
+    fn settle(&mut self, time: f64, held: &Held) {
+        if let Some(actuators) = &self.actuators {
+            actuators.settle(time, &held.drive, &mut self.deflections);
+        }
     }
 
     /// What is held now, if anything was yet.
@@ -252,35 +318,61 @@ impl Plant {
         input.disturbance_moment + own
     }
 
-    fn control_moment(&self, time: f64, input: &Input, drive: &Drive) -> Vector3<f64> {
-        self.actuators.as_ref().map_or(input.moment, |all| all.moment(time, &input.command, drive))
+    /// The control moment (N m) at the time `elapsed` (s) after the present one; until then the drive stays as it is.
+    fn control_moment(&self, input: &Input, drive: &Drive, elapsed: f64) -> Vector3<f64> {
+        self.actuators
+            .as_ref()
+            .map_or(input.moment, |all| all.moment(drive, &(self.deflections + all.rates(drive) * elapsed)))
     }
 
-    /// The control moment (N m) that acts at `time` (s).
-    pub fn applied_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
-        self.control_moment(time, input, &held.drive)
+    /// The control moment (N m) that acts now.
+    pub fn applied_moment(&self, input: &Input, held: &Held) -> Vector3<f64> {
+        self.control_moment(input, &held.drive, 0.0)
     }
 
-    /// Deflections of the surfaces (rad) at `time` (s); zero without actuators.
-    pub fn deflections(&self, time: f64, held: &Held) -> Surfaces {
-        self.actuators.as_ref().map_or_else(Surfaces::zeros, |all| all.deflections(time, &held.drive))
+    /// Rates of the deflections, rad/s: the rate limit either way, or zero.
+    pub fn deflection_rates(&self, held: &Held) -> Surfaces {
+        self.actuators.as_ref().map_or_else(Surfaces::zeros, |all| all.rates(&held.drive))
     }
 
-    /// Partial derivatives of [`Plant::applied_moment`]: by the input moment (3 × 3) and by the commands to the jets (3 × 10).
-    pub fn applied_moment_by_inputs(&self, input: &Input) -> (Matrix3<f64>, SMatrix<f64, 3, JETS>) {
+    /// Partial derivatives of [`Plant::applied_moment`]: by the input moment (3 × 3) and by the deflections (3 × 8).
+    pub fn applied_moment_by_moment_and_deflections(&self) -> (Matrix3<f64>, SMatrix<f64, 3, SURFACES>) {
         self.actuators.as_ref().map_or((Matrix3::identity(), SMatrix::zeros()), |all| {
-            (Matrix3::zeros(), all.moment_by_jets(&input.command))
+            (Matrix3::zeros(), *all.moment_by_deflections())
         })
     }
 
-    /// All moments together (N m) at `time` (s).
-    pub fn total_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
-        self.applied_moment(time, input, held) + self.disturbance_moment(time, input, held)
+    /// Partial derivative of the moment that acts by the commands to the jets, when they are taken (3 × 10).
+    pub fn applied_moment_by_jets(&self, command: &Command) -> SMatrix<f64, 3, JETS> {
+        self.actuators.as_ref().map_or_else(SMatrix::zeros, |all| all.moment_by_jets(command))
+    }
+
+    /// At `time`, which is `elapsed` after the time of the deflections.
+    fn load(&self, time: f64, input: &Input, held: &Held, elapsed: f64) -> Load {
+        Load {
+            moment: self.control_moment(input, &held.drive, elapsed)
+                + self.disturbance_moment(time, input, held),
+            delta: held.delta(),
+            turn_rate: input.trajectory.turn_rate(self.earth_rate),
+        }
     }
 
     /// State derivative at `time` (s), at the present state.
     pub fn derivative(&self, time: f64, input: &Input, held: &Held) -> State {
-        derivative(&self.body, &self.state, &self.total_moment(time, input, held), &held.delta())
+        let load = self.load(time, input, held, 0.0);
+        derivative(&self.body, self.kinematics, &self.state, &load)
+    }
+
+    /// Partial derivatives of [`Plant::derivative`], and of the turn rate by the trajectory (3 × 7).
+    pub fn partial_derivatives(
+        &self,
+        time: f64,
+        input: &Input,
+        held: &Held,
+    ) -> (Partials, SMatrix<f64, 3, TRAJECTORY>) {
+        let load = self.load(time, input, held, 0.0);
+        let partials = partial_derivatives(&self.body, self.kinematics, &self.state, &load);
+        (partials, input.trajectory.turn_rate_by_fields(self.earth_rate))
     }
 
     /// From `from` to `to` (s) under a constant control moment (N m).
@@ -288,12 +380,12 @@ impl Plant {
     /// # Errors
     /// If the attitude becomes singular or a value is not finite; the state is then the last good one.
     pub fn advance(&mut self, from: f64, to: f64, moment: Vector3<f64>) -> Result<(), Error> {
-        self.advance_with(from, to, |_| moment.into())
+        self.advance_with(from, to, &Command::default(), |_| moment.into())
     }
 
-    /// From `from` to `to` (s) under an input that is a function of time. Commands are taken at `from`; only a duty cycle of
-    /// the jets follows the input on the way. The interval is cut where the disturbance jumps and where a deflection comes to
-    /// rest, and every piece is integrated in equal steps, so the end is met exactly.
+    /// From `from` to `to` (s) under an input that is a function of time; `command` is taken at `from`. The interval is cut where
+    /// the disturbance jumps and where a deflection comes to rest, and every piece is integrated in equal steps, so the end is
+    /// met exactly. Deflections are linear in time within a piece.
     ///
     /// # Errors
     /// If the attitude becomes singular or a value is not finite; the state is then the last good one.
@@ -301,14 +393,15 @@ impl Plant {
         &mut self,
         from: f64,
         to: f64,
+        command: &Command,
         mut input: impl FnMut(f64) -> Input,
     ) -> Result<(), Error> {
         let mut time = from;
+        let mut before = None;
         while time < to {
-            let held = if time == from {
-                self.hold(time, &input(time))
-            } else {
-                *self.held.insert(self.drawn(time, &input(time), self.drive()))
+            let held = match before {
+                None => self.hold(time, &input(time), command),
+                Some(before) => self.hold_between(time, &input(time), &before),
             };
             let cut = self.next_change(time, &held).filter(|&change| change + tolerance(to) < to);
             let end = cut.unwrap_or(to);
@@ -317,15 +410,20 @@ impl Plant {
             for k in 0..steps {
                 let begin = time + k as f64 * h;
                 let mut f = |t: f64, state: &State| {
-                    derivative(&self.body, state, &self.total_moment(t, &input(t), &held), &held.delta())
+                    let load = self.load(t, &input(t), &held, t - time);
+                    derivative(&self.body, self.kinematics, state, &load)
                 };
                 let next = rk4(&mut f, begin, &self.state, h);
                 check(&next, begin + h).map_err(|error| {
                     let fault = input(begin).fault().or_else(|| input(begin + h).fault());
+                    let fault = fault.or_else(|| command.fault());
                     fault.map_or(error, |what| Error::NotFinite { time: begin, what })
                 })?;
                 self.state = next;
             }
+            self.deflections += self.deflection_rates(&held) * (end - time);
+            self.settle(end, &held);
+            before = Some(held);
             time = end;
         }
         Ok(())

@@ -4,6 +4,7 @@ use crate::atmosphere::Flight;
 use crate::disturbance::{Disturbance, Kind, SineMoment};
 use crate::dynamics::Inertia;
 use crate::error::Error;
+use crate::kinematics::Kinematics;
 use crate::plant::{self, Config};
 use crate::reference::{Course, Profile, Segment, Wave};
 use nalgebra::Vector3;
@@ -84,6 +85,8 @@ impl Scenario {
             inertia_scale: self.inertia_scale,
             initial: plant::state(&self.initial_angles, &self.initial_rates),
             disturbance: self.disturbance.clone(),
+            kinematics: Kinematics::Printed,
+            earth_rate: 0.0,
             actuators: None,
             step,
         }

@@ -181,10 +181,9 @@ fn printed_1(
     let second = gamma_rate - phi_rate * cp - theta_rate * cl * sp;
     let alpha_rate = -p * ca * sb / cb + q - r * sa * sb / cb + ss / cb * first - cs / cb * second;
     let beta_rate = p * sa - r * ca + ss * second + cs * first;
-    let sigma_rate = -p * ca * cb - q * sb - r * sa * cb + alpha_rate * sb
-        - psi_rate * sg
-        - phi_rate * sp * cg
-        + theta_rate * (cl * cp * cg + sign * sl * sg);
+    let sigma_rate =
+        -p * ca * cb - q * sb - r * sa * cb + alpha_rate * sb - psi_rate * sg - phi_rate * sp * cg
+            + theta_rate * (cl * cp * cg + sign * sl * sg);
     Vector3::new(alpha_rate, beta_rate, sigma_rate)
 }
 

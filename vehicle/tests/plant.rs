@@ -5,7 +5,8 @@ use proptest::prelude::*;
 use vehicle::actuators::{self, Command, JetMode};
 use vehicle::disturbance::{Disturbance, Kind, MomentWave, SineMoment};
 use vehicle::effectors::Effectors;
-use vehicle::plant::{Config, Input, Plant, State, derivative, partial_derivatives};
+use vehicle::kinematics::{Kinematics, Trajectory};
+use vehicle::plant::{Config, Input, Load, Partials, Plant, State, derivative, partial_derivatives};
 use vehicle::{Error, Scenario};
 
 fn config() -> Config {
@@ -56,7 +57,7 @@ fn oracle_integration_has_order_four() {
     let end = |step: f64| {
         let mut plant = Plant::new(&undisturbed(Vector6::from(TUMBLING) * 3.0, step), 0.0).unwrap();
         plant
-            .advance_with(0.0, 4.0, |t| {
+            .advance_with(0.0, 4.0, &Command::default(), |t| {
                 Vector3::new(1e5 * t.sin(), 2e5 * t.cos(), -1e5 * (2.0 * t).sin()).into()
             })
             .unwrap();
@@ -86,16 +87,17 @@ fn oracle_delta_is_an_acceleration_of_x_omega() {
     let body = *Plant::new(&config(), 0.0).unwrap().body();
     let (state, moment, delta) =
         (State::from(TUMBLING), Vector3::new(1e4, 2e4, 3e4), Vector3::new(0.03, -0.02, 0.01));
-    // d(Rω)/dt by differences along the motion, with and without Δ
-    let x_omega_rate = |delta: &Vector3<f64>| {
-        let h = 1e-5;
-        let f = derivative(&body, &state, &moment, delta);
-        let x_omega = |state: State| {
-            vehicle::kinematics::r(&vehicle::plant::angles(&state)) * vehicle::plant::rates(&state)
+    for kinematics in [Kinematics::Printed, Kinematics::Exact] {
+        // d(Rω)/dt by differences along the motion, with and without Δ
+        let x_omega_rate = |delta: Vector3<f64>| {
+            let h = 1e-5;
+            let f = derivative(&body, kinematics, &state, &Load { moment, delta, ..Load::default() });
+            let x_omega =
+                |state: State| kinematics.r(&vehicle::plant::angles(&state)) * vehicle::plant::rates(&state);
+            (x_omega(state + f * h) - x_omega(state - f * h)) / (2.0 * h)
         };
-        (x_omega(state + f * h) - x_omega(state - f * h)) / (2.0 * h)
-    };
-    assert!((x_omega_rate(&delta) - x_omega_rate(&Vector3::zeros()) - delta).amax() < 1e-9);
+        assert!((x_omega_rate(delta) - x_omega_rate(Vector3::zeros()) - delta).amax() < 1e-9);
+    }
 }
 
 fn long_and_short_steps(config: &Config) -> impl Iterator<Item = (State, State)> {
@@ -140,7 +142,7 @@ fn a_clock_that_is_accumulated_makes_no_slivers() {
             calls += 1;
             Input::default()
         };
-        accumulated.advance_with(time, time + 0.04, count).unwrap();
+        accumulated.advance_with(time, time + 0.04, &Command::default(), count).unwrap();
         assert_eq!(calls, 1 + 4 * 4, "step {k}");
         time += 0.04;
         if exact.angles().y.abs() > 1.2 {
@@ -240,6 +242,7 @@ fn impossible_configurations_are_refused_by_name() {
         (change(|c| c.initial[1] = 1.6), "initial.beta"),
         (change(|c| c.initial[3] = f64::NAN), "initial"),
         (change(|c| c.step = 0.0), "integrator.step"),
+        (change(|c| c.earth_rate = f64::NAN), "trajectory.earthRate"),
         (change(|c| c.disturbance.period = -1.0), "disturbance.period"),
     ] {
         assert!(message.contains(name), "{message}");
@@ -256,12 +259,12 @@ proptest! {
         config.disturbance.end = 1.5;
         let [mut whole, mut parts] = [0, 1].map(|_| Plant::new(&config, 0.0).unwrap());
         let push = |t: f64| Vector3::new(2e4 * t.sin(), -1e4, 1e4 * t).into();
-        whole.advance_with(0.0, 2.0, push).unwrap();
+        whole.advance_with(0.0, 2.0, &Command::default(), push).unwrap();
         points.push(2.0);
         points.sort_by(f64::total_cmp);
         let mut from = 0.0;
         for to in points {
-            parts.advance_with(from, to, push).unwrap();
+            parts.advance_with(from, to, &Command::default(), push).unwrap();
             from = to;
         }
         prop_assert!((whole.state - parts.state).amax() < 1e-11, "{}", whole.state - parts.state);
@@ -272,22 +275,74 @@ proptest! {
         values in proptest::array::uniform6(-1.0..1.0),
         pushes in proptest::array::uniform3(-1e5..1e5),
         deltas in proptest::array::uniform3(-0.04..0.04),
+        turns in proptest::array::uniform3(-0.1..0.1),
     ) {
         let body = *Plant::new(&config(), 0.0).unwrap().body();
-        let (state, moment, delta) = (State::from(values), Vector3::from(pushes), Vector3::from(deltas));
-        let (by_state, by_moment) = partial_derivatives(&body, &state, &delta);
-        let f = |state: &State, moment: &Vector3<f64>| derivative(&body, state, moment, &delta);
-        for i in 0..6 {
-            let h = State::from_fn(|j, _| if i == j { 1e-5 } else { 0.0 });
-            let numeric = (f(&(state + h), &moment) - f(&(state - h), &moment)) / 2e-5;
-            prop_assert!((numeric - by_state.column(i)).amax() < 1e-7, "state {}: {}", i, numeric - by_state.column(i));
-        }
-        for i in 0..3 {
-            let h = Vector3::from_fn(|j, _| if i == j { 1e4 } else { 0.0 });
-            let numeric = (f(&state, &(moment + h)) - f(&state, &(moment - h))) / 2e4;
-            prop_assert!((numeric - by_moment.column(i)).amax() < 1e-16);
+        let state = State::from(values);
+        let load = Load {
+            moment: Vector3::from(pushes),
+            delta: Vector3::from(deltas),
+            turn_rate: Vector3::from(turns),
+        };
+        for kinematics in [Kinematics::Printed, Kinematics::Exact] {
+            let Partials { by_state, by_moment, by_turn_rate } =
+                partial_derivatives(&body, kinematics, &state, &load);
+            let f = |state: &State, load: &Load| derivative(&body, kinematics, state, load);
+            for i in 0..6 {
+                let h = State::from_fn(|j, _| if i == j { 1e-5 } else { 0.0 });
+                let numeric = (f(&(state + h), &load) - f(&(state - h), &load)) / 2e-5;
+                prop_assert!((numeric - by_state.column(i)).amax() < 1e-7, "state {}: {}", i, numeric - by_state.column(i));
+            }
+            for i in 0..3 {
+                let h = Vector3::from_fn(|j, _| if i == j { 1e4 } else { 0.0 });
+                let pushed = |by: f64| f(&state, &Load { moment: load.moment + h * by, ..load });
+                let numeric = (pushed(1.0) - pushed(-1.0)) / 2e4;
+                prop_assert!((numeric - by_moment.column(i)).amax() < 1e-16);
+                let turned = |by: f64| f(&state, &Load { turn_rate: load.turn_rate + h * by, ..load });
+                let numeric = (turned(1e-5) - turned(-1e-5)) / 0.2;
+                prop_assert!((numeric - by_turn_rate.column(i)).amax() < 1e-12);
+            }
         }
     }
+}
+
+#[test]
+fn oracle_a_steady_climb_over_a_still_earth_shows_in_alpha_alone() {
+    // Without bank and sideslip, level and to the north: α̇ = q − γ̇. So under γ̇ the angle of attack falls.
+    let mut plant = Plant::new(&undisturbed(State::new(0.3, 0.0, 0.0, 0.0, 0.0, 0.0), 0.01), 0.0).unwrap();
+    let climb = Trajectory { flight_path_angle_rate: 0.02, ..Trajectory::default() };
+    plant
+        .advance_with(0.0, 5.0, &Command::default(), |_| Input { trajectory: climb, ..Input::default() })
+        .unwrap();
+    assert!((plant.state - State::new(0.2, 0.0, 0.0, 0.0, 0.0, 0.0)).amax() < 1e-14, "{}", plant.state);
+}
+
+#[test]
+fn a_trajectory_at_rest_changes_no_bit() {
+    let still = Trajectory { flight_path_angle: -0.1, heading: 0.7, latitude: 0.5, ..Trajectory::default() };
+    let [mut plain, mut along] = [0, 1].map(|_| Plant::new(&config(), 0.0).unwrap());
+    for k in 0..20 {
+        let (from, to) = (0.2 * f64::from(k), 0.2 * f64::from(k + 1));
+        plain.advance(from, to, moment(k)).unwrap();
+        along
+            .advance_with(from, to, &Command::default(), |_| Input { trajectory: still, ..moment(k).into() })
+            .unwrap();
+    }
+    assert_eq!(plain, along);
+}
+
+#[test]
+fn oracle_the_bank_angles_differ_by_the_integral_of_alpha_rate_times_sin_beta() {
+    let end = |kinematics| {
+        let config = Config { kinematics, ..undisturbed(State::new(0.1, 0.2, 0.3, 0.0, 0.02, 0.0), 0.01) };
+        let mut plant = Plant::new(&config, 0.0).unwrap();
+        plant.advance(0.0, 1.0, Vector3::zeros()).unwrap();
+        plant.angles()
+    };
+    let difference = end(Kinematics::Exact) - end(Kinematics::Printed);
+    // The torque-free rates are the same, and α, β do not depend on σ; σ differs by the integral of α̇ sin β.
+    assert_eq!((difference.x, difference.y), (0.0, 0.0));
+    assert!((difference.z - 0.02 * 0.2f64.sin()).abs() < 1e-4, "{}", difference.z);
 }
 
 /// The undisturbed vehicle with actuators at the published flight condition.
@@ -315,32 +370,30 @@ fn oracle_flaps_turn_the_nose_at_their_rate_and_then_stay() {
     let config = actuated(State::new(0.1, 0.0, 0.2, 0.0, 0.0, 0.0), JetMode::OnOff);
     let inertia = config.inertia.Iyy * config.inertia_scale;
     let mut plant = Plant::new(&config, 0.0).unwrap();
-    let input = Input { command: flaps(-2.0), ..Input::default() };
-    plant.advance_with(0.0, 1.0, |_| input).unwrap();
+    plant.advance_with(0.0, 1.0, &flaps(-2.0), |_| Input::default()).unwrap();
     let (slope, full) = (2.0 * 5100.0 * 10.0 / inertia, 2.0 * 5100.0 * 2.0 / inertia);
     let q = slope * 0.2 * 0.2 / 2.0 + full * 0.8;
     let alpha = 0.1 + slope * 0.2f64.powi(3) / 6.0 + slope * 0.02 * 0.8 + full * 0.8 * 0.8 / 2.0;
     assert!((plant.rates() - Vector3::new(0.0, q, 0.0)).amax() < 1e-16, "{}", plant.rates().y - q);
     assert!((plant.angles().x - alpha).abs() < 1e-15, "{}", plant.angles().x - alpha);
-    let held = plant.held().unwrap();
-    assert_eq!(plant.deflections(1.0, &held), input.command.surfaces);
+    assert_eq!(plant.deflections, flaps(-2.0).surfaces);
 }
 
 #[test]
 fn with_actuators_the_input_moment_does_not_act_and_without_them_commands_do_not() {
     let start = State::new(0.1, 0.05, 0.2, 0.01, 0.02, -0.01);
     let moment = Vector3::new(1e4, -2e4, 3e4);
-    let end = |config: &Config, input: Input| {
+    let end = |config: &Config, (moment, command): (Vector3<f64>, Command)| {
         let mut plant = Plant::new(config, 0.0).unwrap();
-        plant.advance_with(0.0, 1.0, |_| input).unwrap();
+        plant.advance_with(0.0, 1.0, &command, |_| moment.into()).unwrap();
         plant.state
     };
     let mut command = flaps(5.0);
     command.jets[0] = 1.0;
     let [with, without] = [actuated(start, JetMode::OnOff), undisturbed(start, 0.05)];
-    let [neither, both] = [Input::default(), Input { moment, command, ..Input::default() }];
-    assert_eq!(end(&with, both), end(&with, Input { command, ..neither }));
-    assert_eq!(end(&without, both), end(&without, Input { moment, ..neither }));
+    let (neither, both) = ((Vector3::zeros(), Command::default()), (moment, command));
+    assert_eq!(end(&with, both), end(&with, (neither.0, command)));
+    assert_eq!(end(&without, both), end(&without, (moment, neither.1)));
     assert_ne!(end(&with, both), end(&with, neither));
     assert_ne!(end(&without, both), end(&without, neither));
 }
@@ -353,11 +406,11 @@ fn one_long_step_equals_short_ones_with_actuators() {
         let mut command = flaps(6.0);
         command.surfaces[0] = -0.05;
         (command.jets[2], command.jets[5]) = (0.7, 0.3);
-        let input = Input { command, ..Input::default() };
+        let input = Input::default();
         let [mut long, mut short] = [0, 1].map(|_| Plant::new(&config, 0.0).unwrap());
-        long.advance_with(0.0, 2.0, |_| input).unwrap();
+        long.advance_with(0.0, 2.0, &command, |_| input).unwrap();
         for k in 0..50 {
-            short.advance_with(0.04 * f64::from(k), 0.04 * f64::from(k + 1), |_| input).unwrap();
+            short.advance_with(0.04 * f64::from(k), 0.04 * f64::from(k + 1), &command, |_| input).unwrap();
         }
         assert!((long.state - short.state).amax() < 1e-13, "{jet_mode:?}: {}", long.state - short.state);
     }
@@ -366,8 +419,8 @@ fn one_long_step_equals_short_ones_with_actuators() {
 #[test]
 fn a_command_that_is_no_number_is_an_error() {
     let mut plant = Plant::new(&actuated(State::zeros(), JetMode::OnOff), 0.0).unwrap();
-    let input = Input { command: flaps(f64::NAN), ..Input::default() };
-    let refusal = plant.advance_with(0.0, 1.0, |_| input).unwrap_err().to_string();
+    let refusal =
+        plant.advance_with(0.0, 1.0, &flaps(f64::NAN), |_| Input::default()).unwrap_err().to_string();
     assert!(refusal.contains("command"), "{refusal}");
     assert_eq!(plant.state, State::zeros());
 }
@@ -379,8 +432,7 @@ fn noise_does_not_depend_on_actuators() {
         let config = Config { disturbance: disturbance.clone(), ..actuated(State::zeros(), JetMode::OnOff) };
         let config = if with { config } else { Config { actuators: None, ..config } };
         let mut plant = Plant::new(&config, 0.0).unwrap();
-        let input = Input { command: flaps(0.15), ..Input::default() };
-        plant.advance_with(0.0, 0.1, |_| input).unwrap();
+        plant.advance_with(0.0, 0.1, &flaps(0.15), |_| Input::default()).unwrap();
         plant.held().unwrap().delta()
     });
     assert_eq!(with, without);
