@@ -69,9 +69,12 @@ enum Command {
     Pack {
         /// Experiment file.
         experiment: PathBuf,
+        /// As an SSP archive, which is what there is.
+        #[arg(long)]
+        ssp: bool,
         /// The archive [default: <name of the experiment>.ssp].
-        #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = false)]
-        ssp: Option<Option<PathBuf>>,
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
         /// A further folder with FMUs, besides the experiment's own and target/fmu. May be given several times.
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
@@ -146,11 +149,10 @@ fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
             }
             Ok(())
         }
-        Command::Pack { experiment: path, ssp, fmu_dir, overrides } => {
+        Command::Pack { experiment: path, ssp: _, out: archive, fmu_dir, overrides } => {
             let mut experiment = Experiment::load(&path)?;
             experiment.apply(&overrides)?;
-            let archive = ssp
-                .flatten()
+            let archive = archive
                 .unwrap_or_else(|| PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("ssp"));
             let plan = Plan::new(experiment, &fmu_dir)?;
             ssp::pack(&plan, &archive)?;
