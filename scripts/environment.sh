@@ -22,36 +22,53 @@ need_rust() {
         fail "no C compiler was found (cc, gcc or clang): Rust needs one for linking"
 }
 
-# Makes .venv from tests/requirements.txt unless it is up to date. Sets $python to its interpreter.
-need_python() {
-    local system venv="$root/.venv" stamp wanted
+# Makes the virtual environment $1 from the requirements file $2 unless it is up to date. Sets $python to its interpreter.
+need_venv() {
+    local system venv="$1" requirements="$2" stamp wanted
     system="$(command -v python3 || true)"
     [[ -n $system ]] || fail "python3 was not found: install Python 3.10 or later"
     "$system" -c 'import sys; sys.exit(sys.version_info < (3, 10))' ||
         fail "$("$system" --version) is too old: Python 3.10 or later is needed"
     python="$venv/bin/python"
     stamp="$venv/installed"
-    wanted="$("$system" --version) $(cksum <tests/requirements.txt)"
+    wanted="$("$system" --version) $(cksum <"$requirements")"
     if [[ ! -x $python || ! -f $stamp || $(<"$stamp") != "$wanted" ]]; then
-        say "Installing the Python packages of tests/requirements.txt into .venv"
+        say "Installing the Python packages of $requirements into ${venv#"$root/"}"
         "$system" -m venv --clear "$venv" ||
             fail "python3 -m venv failed: on Debian and Ubuntu install the package python3-venv"
-        "$python" -m pip install --quiet --disable-pip-version-check --requirement tests/requirements.txt ||
-            fail "pip could not install tests/requirements.txt: see its message above"
+        "$python" -m pip install --quiet --disable-pip-version-check --requirement "$requirements" ||
+            fail "pip could not install $requirements: see its message above"
         printf '%s' "$wanted" >"$stamp"
     fi
 }
 
-# The built library of a crate, whatever the platform calls it.
+# The Python of the tests.
+need_python() {
+    need_venv "$root/.venv" tests/requirements.txt
+}
+
+# The built library of a crate in a folder, whatever the platform calls it.
 library() {
     local name
     for name in "lib$1.so" "lib$1.dylib" "$1.dll"; do
-        if [[ -f $target/release/$name ]]; then
-            printf '%s' "$target/release/$name"
+        if [[ -f $2/$name ]]; then
+            printf '%s' "$2/$name"
             return
         fi
     done
-    fail "the library of $1 is not in $target/release"
+    fail "the library of $1 is not in $2"
+}
+
+# Packs every FMU of the libraries in the folder $1 into the folder $2. Further arguments go to fmu-pack.
+pack_fmus() {
+    say "Packing the FMUs"
+    local plant controller licence licences=()
+    plant="$(library fmu_plant "$1")"
+    controller="$(library fmu_controller "$1")"
+    for licence in LICENSE-*; do
+        if [[ -f $licence ]]; then licences+=(--license "$licence"); fi
+    done
+    "$target/release/fmu-pack" "$plant" "$controller" --output "$2" "${licences[@]+"${licences[@]}"}" "${@:3}"
 }
 
 # Builds the programs and the FMU libraries, and packs every FMU into $fmus. Arguments go to fmu-pack.
@@ -59,12 +76,18 @@ build_fmus() {
     need_rust
     say "Building in release"
     cargo build --release --locked --workspace
-    say "Packing the FMUs"
-    local plant controller licence licences=()
-    plant="$(library fmu_plant)"
-    controller="$(library fmu_controller)"
-    for licence in LICENSE-*; do
-        if [[ -f $licence ]]; then licences+=(--license "$licence"); fi
-    done
-    "$target/release/fmu-pack" "$plant" "$controller" --output "$fmus" "${licences[@]+"${licences[@]}"}" "$@"
+    pack_fmus "$target/release" "$fmus" "$@"
+}
+
+# Builds the FMU libraries for Linux systems as old as glibc 2.17 (2012) and packs every FMU into $packaged.
+packaged="$target/package"
+package_fmus() {
+    need_rust
+    need_venv "$target/zig" scripts/package-requirements.txt
+    say "Building the FMU libraries against glibc 2.17"
+    local triple=x86_64-unknown-linux-gnu
+    PATH="$target/zig/bin:$PATH" cargo zigbuild --release --locked --target "$triple.2.17" \
+        --package fmu-plant --package fmu-controller
+    cargo build --release --locked --package model-description
+    pack_fmus "$target/$triple/release" "$packaged" "$@"
 }
