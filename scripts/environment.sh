@@ -68,7 +68,7 @@ pack_fmus() {
     for licence in LICENSE-*; do
         if [[ -f $licence ]]; then licences+=(--license "$licence"); fi
     done
-    "$target/release/fmu-pack" "$plant" "$controller" --output "$2" "${licences[@]+"${licences[@]}"}" "${@:3}"
+    "$target/release/fmu-pack" "$plant" "$controller" --output "$2" --icons modelDescription/icons "${licences[@]+"${licences[@]}"}" "${@:3}"
 }
 
 # Builds the programs and the FMU libraries, and packs every FMU into $fmus. Arguments go to fmu-pack.

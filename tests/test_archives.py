@@ -37,6 +37,8 @@ def test_description_says_what_tools_rely_on(fmu, name):
         assert variable.description, f"{variable.name} has no description"
     with zipfile.ZipFile(archive(name)) as packed:
         files = packed.namelist()
+        icon = packed.read("model.png")
+    assert icon.startswith(b"\x89PNG") and icon == (ROOT / "modelDescription" / "icons" / f"{name}.png").read_bytes()
     assert "documentation/index.html" in files
     assert any(file.startswith("documentation/licenses/LICENSE-") for file in files)
 

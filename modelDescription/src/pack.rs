@@ -14,6 +14,8 @@ pub struct Extras {
     pub resources: Option<PathBuf>,
     /// Licence texts, for `documentation/licenses/`.
     pub licenses: Vec<PathBuf>,
+    /// Folder of icons, `NAME.png` for the unit of that name.
+    pub icons: Option<PathBuf>,
 }
 
 /// Some importers pass no resource location for a unit without the folder.
@@ -47,6 +49,9 @@ pub fn pack(
         (format!("binaries/{folder}/{name}.{suffix}"), read(library)?),
         ("documentation/index.html".to_string(), description.to_html().into_bytes()),
     ];
+    if let Some(icons) = &extras.icons {
+        entries.push(("model.png".into(), read(&icons.join(format!("{name}.png")))?));
+    }
     add_licenses(&mut entries, &extras.licenses)?;
     let before = entries.len();
     if let Some(resources) = &extras.resources {

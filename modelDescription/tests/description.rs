@@ -236,7 +236,8 @@ fn the_archive_is_complete_and_the_same_every_time() {
     fs::create_dir_all(at("data/deep")).unwrap();
     fs::write(at("data/z.csv"), "1").unwrap();
     fs::write(at("data/deep/a.csv"), "2").unwrap();
-    let extras = Extras { resources: Some(at("data")), licenses: vec![at("LICENSE-A"), at("LICENSE-B")] };
+    let extras =
+        Extras { resources: Some(at("data")), licenses: vec![at("LICENSE-A"), at("LICENSE-B")], icons: None };
     let path = pack(&unit(), &at("library"), folder.path(), &extras).unwrap();
     assert_eq!(path, at("Small.fmu"));
     let first = fs::read(&path).unwrap();

@@ -27,6 +27,9 @@ struct Arguments {
     /// Folder whose files go under resources/ in every archive
     #[arg(long, value_name = "DIR")]
     resources: Option<PathBuf>,
+    /// Folder with an icon NAME.png of each unit
+    #[arg(long, value_name = "DIR")]
+    icons: Option<PathBuf>,
     /// Licence text for documentation/licenses/; may be given several times
     #[arg(long = "license", value_name = "FILE")]
     licenses: Vec<PathBuf>,
@@ -51,7 +54,8 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     if let Some((_, twice)) = units.iter().find(|(_, unit)| !names.insert(&unit.name)) {
         return Err(Error::SameName(twice.name.clone()));
     }
-    let extras = Extras { resources: arguments.resources.clone(), licenses: arguments.licenses.clone() };
+    let Arguments { resources, licenses, icons, .. } = arguments;
+    let extras = Extras { resources: resources.clone(), licenses: licenses.clone(), icons: icons.clone() };
     make_folder(&arguments.output)?;
     for (library, unit) in &units {
         let archive = pack(unit, library, &arguments.output, &extras)?;
