@@ -76,6 +76,7 @@ struct Output {
     achieved: Vector3<f64>,
     residual: Vector3<f64>,
     modulated: Vector3<f64>,
+    by_surfaces: Vector3<f64>,
     status: i32,
     iterations: i32,
     fallbacks: i32,
@@ -91,6 +92,7 @@ impl From<&Memory> for Output {
             achieved: memory.achieved,
             residual: memory.residual,
             modulated: memory.modulated,
+            by_surfaces: memory.by_surfaces,
             status: number(&STATUSES, &memory.report.status),
             iterations: memory.report.iterations.cast_signed(),
             fallbacks: memory.report.fallbacks.cast_signed(),
@@ -257,6 +259,9 @@ fn outputs(mut table: Variables) -> Variables {
     );
     let table = moment(table, "modulatedMoment", "moment of surface and jet commands as they are now", |m| {
         &mut m.output.modulated
+    });
+    let table = moment(table, "momentBySurfaces", "moment of the surfaces of the last allocation", |m| {
+        &mut m.output.by_surfaces
     });
     let status = sampled("solver.status", "How the allocation in force came about");
     let iterations = sampled("solver.iterations", "Iterations of the last allocation");

@@ -9,14 +9,16 @@ pub use settings::{JetCommand, Method, Settings};
 
 use crate::error::DesignError;
 use cone::{ConeProblem, Weights};
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{SMatrix, Vector3};
 use pwpf::Modulator;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
-use vehicle::effectors::{Effectors, JETS, Jets, SURFACES, Surfaces};
+use vehicle::effectors::{JETS, Jets, SURFACES, Surfaces};
 
 /// D_A of Wu 2015 (58), N m/rad.
 type SurfaceMatrix = SMatrix<f64, 3, SURFACES>;
+/// D_RCS, N m at full thrust.
+type JetMatrix = SMatrix<f64, 3, JETS>;
 
 /// What is to be allocated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -72,7 +74,7 @@ pub struct Memory {
     /// Outcome of the last allocation.
     pub report: Report,
     /// Moment of the surfaces of the last allocation, N m.
-    by_surfaces: Vector3<f64>,
+    pub by_surfaces: Vector3<f64>,
 }
 
 /// The allocator: settings and solver. Everything that matters later is in [`Memory`].
@@ -83,8 +85,8 @@ pub struct Allocator {
     /// Ticks per allocation.
     ratio: u64,
     problem: ConeProblem,
-    /// T of Jia et al. at the reference pressure, rad/(N m), if the surfaces can give any moment.
-    conversion: Option<SMatrix<f64, SURFACES, 3>>,
+    /// The same without jets, for blending.
+    without_jets: ConeProblem,
 }
 
 impl Allocator {
@@ -102,10 +104,13 @@ impl Allocator {
             jet: Jets::repeat(settings.weight_jet),
             surface: range.map(weight),
         };
-        let problem = ConeProblem::new(weights, &settings.effectors.jet_moments, settings.max_iterations)
-            .map_err(DesignError::Solver)?;
-        let conversion = conversion(&settings.effectors.effectiveness, &range);
-        Ok(Self { settings, limits, ratio, problem, conversion })
+        let jets = &settings.effectors.jet_moments;
+        let problem = |weights, jets: &JetMatrix| {
+            ConeProblem::new(weights, jets, settings.max_iterations).map_err(DesignError::Solver)
+        };
+        let alone = Weights { moment: weights.moment.component_mul(&scarcity(jets)), ..weights };
+        let (problem, without_jets) = (problem(weights, jets)?, problem(alone, &JetMatrix::zeros())?);
+        Ok(Self { settings, limits, ratio, problem, without_jets })
     }
 
     /// Time between ticks, s: the modulator's period, or that of the allocation if nothing is modulated.
@@ -150,14 +155,22 @@ impl Allocator {
         let before = clamp(&memory.surfaces, min, max);
         let mut low = (before - change).sup(min);
         let mut high = (before + change).inf(max);
-        if self.settings.method == Method::Blending {
-            let wanted = self.select(command).unwrap_or(before);
+        let finite = moment.iter().all(|value| value.is_finite()) && dynamic_pressure.is_finite();
+        let mut first = 0;
+        if finite && self.settings.method == Method::Blending {
+            // Jia et al., section IV: the surfaces to the best of their abilities; below the threshold they return to zero.
+            let mut wanted = Surfaces::zeros();
+            if dynamic_pressure >= self.settings.threshold {
+                let (middle, half) = middle_and_half(&low, &high);
+                let (found, iterations) = self.without_jets.solve(&moment, &matrix, &middle, &half);
+                (wanted, first) = (found.map_or(before, |(surfaces, _)| surfaces), iterations);
+            }
             low = clamp(&wanted, &low, &high);
             high = low;
         }
-        let finite = moment.iter().all(|value| value.is_finite()) && dynamic_pressure.is_finite();
         let (found, iterations) = if finite {
-            self.problem.solve(&moment, &matrix, &((low + high) / 2.0), &((high - low) / 2.0))
+            let (middle, half) = middle_and_half(&low, &high);
+            self.problem.solve(&moment, &matrix, &middle, &half)
         } else {
             (None, 0)
         };
@@ -169,33 +182,27 @@ impl Allocator {
         memory.residual = moment - memory.achieved;
         memory.report = Report {
             status: if found.is_some() { Status::Optimal } else { Status::Fallback },
-            iterations,
+            iterations: first + iterations,
             time: begin.elapsed().as_secs_f64(),
             fallbacks: memory.report.fallbacks + u32::from(found.is_none()),
         };
     }
-
-    /// Jia et al., section IV: the deflections asked of the surfaces, before their limits. Below the threshold, and where they
-    /// give no moment, they return to zero.
-    fn select(&self, command: &Command) -> Option<Surfaces> {
-        let Effectors { effectiveness, reference_pressure, .. } = &self.settings.effectors;
-        let above = command.dynamic_pressure >= self.settings.threshold && command.dynamic_pressure > 0.0;
-        let (Some(conversion), true) = (&self.conversion, above) else {
-            return Some(Surfaces::zeros());
-        };
-        // From the middle of the ranges, as the elevons' end at 0: the least departure from there that gives the moment.
-        let middle = (self.limits.0 + self.limits.1) / 2.0;
-        let rest = command.moment * (reference_pressure / command.dynamic_pressure) - effectiveness * middle;
-        let wanted = middle + conversion * rest;
-        wanted.iter().all(|value| value.is_finite()).then_some(wanted)
-    }
 }
 
-/// The least departure of the surfaces, each measured by its range, that gives a moment: W Dᵀ (D W Dᵀ)⁻¹ with W = range².
-fn conversion(matrix: &SurfaceMatrix, range: &Surfaces) -> Option<SMatrix<f64, SURFACES, 3>> {
-    let weighted = SMatrix::from_diagonal(&range.component_mul(range)) * matrix.transpose();
-    let inverse: Matrix3<f64> = (matrix * weighted).try_inverse()?;
-    Some(weighted * inverse)
+/// How scarce the jets' moment is about each axis, against the axis where they give most: what surfaces leave undone there
+/// weighs more. 1 everywhere without jets.
+fn scarcity(jets: &JetMatrix) -> Vector3<f64> {
+    let authority = Vector3::from_fn(|i, _| {
+        let (up, down) =
+            jets.row(i).iter().fold((0.0, 0.0), |(up, down), &m: &f64| (up + m.max(0.0), down - m.min(0.0)));
+        f64::min(up, down)
+    });
+    authority.map(|own| if own > 0.0 { authority.max() / own } else { 1.0 })
+}
+
+/// The middle of an interval and half its width.
+fn middle_and_half(low: &Surfaces, high: &Surfaces) -> (Surfaces, Surfaces) {
+    ((low + high) / 2.0, (high - low) / 2.0)
 }
 
 fn clamp(values: &Surfaces, low: &Surfaces, high: &Surfaces) -> Surfaces {
