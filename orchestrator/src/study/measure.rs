@@ -24,6 +24,8 @@ pub struct Measure {
     /// For `settling`: for how long (s) the signals must have been seen within the band; 0 if it is left out.
     #[serde(default)]
     pub hold: f64,
+    /// For `leaving`: a magnitude.
+    pub bound: Option<f64>,
 }
 
 /// What is done with the signals.
@@ -38,6 +40,8 @@ pub enum Kind {
     Settling,
     /// How often any signal rises above one half.
     Pulses,
+    /// Time, s, at which any signal first exceeds `bound`; nothing if none ever does.
+    Leaving,
 }
 
 impl Measure {
@@ -46,6 +50,12 @@ impl Measure {
         let name = format!("[[measure]] id = \"{}\"", self.id);
         if self.over.is_some_and(|[from, to]| from >= to) {
             return Some(format!("{name}: over must be [from, to] with from below to"));
+        }
+        match (self.kind, self.bound) {
+            (Kind::Leaving, Some(bound)) if bound > 0.0 => {}
+            (Kind::Leaving, _) => return Some(format!("{name}: leaving wants a bound above 0")),
+            (_, Some(_)) => return Some(format!("{name}: bound is for leaving only")),
+            _ => {}
         }
         match (self.kind, self.band) {
             (Kind::Settling, Some(band)) if band > 0.0 && self.hold >= 0.0 => None,
@@ -76,6 +86,8 @@ pub struct Gauge<'a> {
     settled: Option<f64>,
     /// Time of the last sample.
     last: f64,
+    /// Time of the first sample at which a signal exceeds the bound.
+    left: Option<f64>,
 }
 
 impl<'a> Gauge<'a> {
@@ -94,6 +106,7 @@ impl<'a> Gauge<'a> {
             pulses: 0,
             settled: None,
             last: 0.0,
+            left: None,
         }
     }
 
@@ -105,6 +118,7 @@ impl<'a> Gauge<'a> {
             Kind::Largest => Some(self.largest),
             Kind::Settling => self.settled.filter(|settled| self.last - settled >= self.measure.hold),
             Kind::Pulses => Some(self.pulses as f64),
+            Kind::Leaving => self.left,
         }
     }
 
@@ -123,6 +137,9 @@ impl<'a> Gauge<'a> {
         let band = self.measure.band.unwrap_or(0.0);
         let inside = values.iter().zip(&self.first).all(|(value, first)| value.abs() <= band * first.abs());
         self.settled = if inside { self.settled.or(Some(time)) } else { None };
+        if self.measure.bound.is_some_and(|bound| values.iter().any(|value| value.abs() > bound)) {
+            self.left = self.left.or(Some(time));
+        }
         let rises =
             values.iter().zip(&self.before).filter(|(value, before)| **value > 0.5 && **before <= 0.5);
         self.pulses += rises.count() as u64;
@@ -145,19 +162,20 @@ impl Observer for Gauge<'_> {
 mod tests {
     use super::*;
 
-    fn measured(kind: Kind, over: Option<[f64; 2]>, band: Option<f64>, rows: &[[f64; 2]]) -> Option<f64> {
-        held(kind, over, band, 0.0, rows)
+    fn measured(kind: Kind, over: Option<[f64; 2]>, size: Option<f64>, rows: &[[f64; 2]]) -> Option<f64> {
+        held(kind, over, size, 0.0, rows)
     }
 
     fn held(
         kind: Kind,
         over: Option<[f64; 2]>,
-        band: Option<f64>,
+        size: Option<f64>,
         hold: f64,
         rows: &[[f64; 2]],
     ) -> Option<f64> {
         let signals = Spanned::new(0..0, "x".to_string());
-        let measure = Measure { id: "m".into(), kind, signals, over, band, hold };
+        let (band, bound) = if kind == Kind::Leaving { (None, size) } else { (size, None) };
+        let measure = Measure { id: "m".into(), kind, signals, over, band, hold, bound };
         let mut gauge = Gauge::new(&measure, Vec::new());
         for (time, row) in rows.iter().enumerate() {
             gauge.see(time as f64, row);
@@ -179,6 +197,8 @@ mod tests {
         assert_eq!(held(Kind::Settling, None, Some(0.02), 1.0, &rows), Some(4.0));
         assert_eq!(held(Kind::Settling, None, Some(0.02), 1.1, &rows), None);
         assert_eq!(measured(Kind::Rms, Some([7.0, 8.0]), None, &rows), None);
+        assert_eq!(measured(Kind::Leaving, Some([1.0, 5.0]), Some(0.5), &rows), Some(1.0));
+        assert_eq!(measured(Kind::Leaving, Some([2.0, 5.0]), Some(0.7), &rows), None);
     }
 
     #[test]
@@ -190,10 +210,15 @@ mod tests {
             over,
             band,
             hold: 0.0,
+            bound: None,
         };
         assert!(measure(Kind::Rms, Some([2.0, 1.0]), None).fault().unwrap().contains("over"));
         assert!(measure(Kind::Settling, None, None).fault().unwrap().contains("band"));
         assert!(measure(Kind::Rms, None, Some(0.1)).fault().unwrap().contains("band"));
         assert_eq!(measure(Kind::Settling, None, Some(0.1)).fault(), None);
+        assert!(measure(Kind::Leaving, None, None).fault().unwrap().contains("bound"));
+        let bounded = |kind| Measure { bound: Some(1.0), ..measure(kind, None, None) };
+        assert!(bounded(Kind::Largest).fault().unwrap().contains("bound"));
+        assert_eq!(bounded(Kind::Leaving).fault(), None);
     }
 }

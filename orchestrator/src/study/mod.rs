@@ -49,7 +49,7 @@
 //!
 //! [[measure]]                          # further numbers of a run: run.measure.ID
 //! id = "settling"
-//! kind = "settling"                    # rms, largest, settling, pulses: see [`measure`]
+//! kind = "settling"                    # rms, largest, settling, pulses, leaving: see [`measure`]
 //! signals = "deviation"
 //! band = 0.02
 //! over = [0.0, 20.0]                   # optional
