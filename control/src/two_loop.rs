@@ -8,7 +8,7 @@
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
 use crate::sliding::{Commanded, FiniteTimeLayer, all_positive, sampled_decay};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
@@ -25,9 +25,33 @@ pub struct Loop {
     pub layer: FiniteTimeLayer,
 }
 
+/// Signs of the reaching terms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Form {
+    /// + ρ f SAT in both loops, f > 0: ṡ = −ρ f SAT(s/ε).
+    Corrected,
+    /// − I ρ f SAT(s_n/ε) in the inner loop, the sign of (10): ṡ_n = +ρ f SAT(s_n/ε).
+    PrintedSign,
+    /// (7) and (11) with the minus sign that f is printed with: ṡ_w = +ρ f SAT(s_w/ε); in the inner loop two minus signs cancel.
+    PrintedFactor,
+}
+
+/// What the outer loop takes for R.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum OuterKinematics {
+    /// R (2) of Chai 2022.
+    Corrected,
+    /// (3) as it is printed: rows of α, β, γ against φ = [γ, β, α], for axes with y up.
+    Printed,
+}
+
 /// Settings of the controller. Units SI, angles rad.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TwoLoopSettings {
+    /// Signs of the reaching terms.
+    pub form: Form,
+    /// What stands for R.
+    pub kinematics: OuterKinematics,
     /// The vehicle as the controller believes it to be.
     pub body: RigidBody,
     /// Time between ticks, s.
@@ -86,6 +110,8 @@ impl TwoLoopSettings {
             .unwrap_or_else(|error| panic!("{error}"));
         let body = Scenario::two_loop().inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
         Self {
+            form: Form::Corrected,
+            kinematics: OuterKinematics::Corrected,
             body,
             period: file.period,
             limit_moment: f64::INFINITY,
@@ -133,6 +159,48 @@ impl TwoLoopSettings {
             }
         }
         Ok(())
+    }
+}
+
+impl Form {
+    /// Factors on ρ f SAT in the outer and in the inner loop.
+    fn signs(self) -> (f64, f64) {
+        match self {
+            Self::Corrected => (1.0, 1.0),
+            Self::PrintedSign => (1.0, -1.0),
+            Self::PrintedFactor => (-1.0, 1.0),
+        }
+    }
+}
+
+impl OuterKinematics {
+    /// R: Θ̇ = R ω.
+    pub fn r(self, angles: &Vector3<f64>) -> Matrix3<f64> {
+        match self {
+            Self::Corrected => kinematics::r(angles),
+            Self::Printed => {
+                // Jia, (3): φ̇ = R ω, and Θ = Pᵀ φ
+                let (sa, ca) = angles.x.sin_cos();
+                Matrix3::new(ca, -sa, 0.0, sa, ca, 0.0, 0.0, 0.0, -1.0)
+            }
+        }
+    }
+
+    fn r_inverse(self, angles: &Vector3<f64>) -> Matrix3<f64> {
+        match self {
+            Self::Corrected => kinematics::r_inverse(angles),
+            Self::Printed => self.r(angles).transpose(),
+        }
+    }
+
+    fn r_dot(self, angles: &Vector3<f64>, angle_rates: &Vector3<f64>) -> Matrix3<f64> {
+        match self {
+            Self::Corrected => kinematics::r_dot(angles, angle_rates),
+            Self::Printed => {
+                let (sa, ca) = angles.x.sin_cos();
+                Matrix3::new(-sa, -ca, 0.0, ca, -sa, 0.0, 0.0, 0.0, 0.0) * angle_rates.x
+            }
+        }
     }
 }
 
@@ -222,7 +290,7 @@ impl TwoLoopSmc {
             let rates = before.rates + (a + b) * (0.5 * period) + (d_rate - slope * (w * period)) * decay;
             (angles, rates)
         } else {
-            (measured.angles, kinematics::r(&measured.angles) * measured.rates)
+            (measured.angles, self.settings.kinematics.r(&measured.angles) * measured.rates)
         };
         let (d, d_rate) = (angles - reference.angles, rates - reference.rates);
         let accelerations = reference.accelerations - d_rate * (2.0 * w) - d * (w * w);
@@ -246,7 +314,7 @@ impl Controller for TwoLoopSmc {
         measured: &Measurement,
         reference: ReferenceAt,
     ) -> Vector3<f64> {
-        let TwoLoopSettings { body, period, limit_moment, outer, inner, anti_windup, threshold, .. } =
+        let TwoLoopSettings { form, kinematics, body, period, outer, inner, anti_windup, threshold, .. } =
             &self.settings;
         let reference = reference(time);
         let command = self.filter(memory, measured, &reference);
@@ -259,27 +327,29 @@ impl Controller for TwoLoopSmc {
             memory.saturated = memory.commanded.shortfall(body, measured.achieved_moment).norm() > *threshold;
         }
         let Measurement { angles, rates, .. } = measured;
-        let inverse = kinematics::r_inverse(angles);
-        let angle_rates = kinematics::r(angles) * rates;
+        let inverse = kinematics.r_inverse(angles);
+        let angle_rates = kinematics.r(angles) * rates;
+        let (outer_sign, inner_sign) = form.signs();
 
         // Jia, (4), (7)
         let e_w = command.angles - angles;
         let e_w_dot = command.rates - angle_rates;
         let s_w = outer.sliding(&e_w, &memory.outer_integral);
-        let x = command.rates + outer.k().component_mul(&e_w) + outer.layer.value(&s_w);
+        let x = command.rates + outer.k().component_mul(&e_w) + outer.layer.value(&s_w) * outer_sign;
         let omega_c = inverse * x;
         // ω̇_c, from ω_c = R⁻¹ x
         let integrand = if rests { Vector3::zeros() } else { outer.k().component_mul(&e_w) };
         let s_w_dot = e_w_dot + integrand;
         let x_dot = command.accelerations
             + outer.k().component_mul(&e_w_dot)
-            + outer.layer.slope(&s_w).component_mul(&s_w_dot);
-        let omega_c_dot = inverse * (x_dot - kinematics::r_dot(angles, &angle_rates) * omega_c);
+            + outer.layer.slope(&s_w).component_mul(&s_w_dot) * outer_sign;
+        let omega_c_dot = inverse * (x_dot - kinematics.r_dot(angles, &angle_rates) * omega_c);
 
-        // Jia, (8), (11) without M_d, which is not known, and with + I ρ SIGN(s_n)
+        // Jia, (8), (11) without M_d, which is not known
         let omega_e = omega_c - rates;
         let s_n = inner.sliding(&omega_e, &memory.inner_integral);
-        let acceleration = omega_c_dot + inner.k().component_mul(&omega_e) + inner.layer.value(&s_n);
+        let acceleration =
+            omega_c_dot + inner.k().component_mul(&omega_e) + inner.layer.value(&s_n) * inner_sign;
         let wanted = body.inertia * acceleration + rates.cross(&(body.inertia * rates));
 
         *memory = TwoLoopMemory {
@@ -291,7 +361,7 @@ impl Controller for TwoLoopSmc {
             outer_sliding: s_w,
             inner_sliding: s_n,
             rate_command: omega_c,
-            commanded: Commanded::new(body, measured, wanted, *limit_moment),
+            commanded: Commanded::new(body, measured, wanted, self.settings.limit_moment),
             ..*memory
         };
         memory.commanded.moment

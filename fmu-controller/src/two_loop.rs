@@ -1,29 +1,54 @@
 //! `TwoLoopSMC`: its own parameters and outputs.
 
 use crate::law::{Law, Vehicle};
-use crate::table::{self, ANGLES, RATES, sampled_inputs, vector};
+use crate::table::{self, ANGLES, RATES, enumeration, item, number, sampled_inputs, vector};
 use crate::unit::Unit;
-use control::two_loop::{Loop, TwoLoopMemory, TwoLoopSettings, TwoLoopSmc};
+use control::two_loop::{Form, Loop, OuterKinematics, TwoLoopMemory, TwoLoopSettings, TwoLoopSmc};
 use fmi2_export::table::{discrete_output, parameter};
 use fmi2_export::{Failure, Table};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+const FORMS: [(Form, &str, &str); 3] = [
+    (Form::Corrected, "corrected", "both loops come to their sliding surfaces"),
+    (Form::PrintedSign, "printedSign", "minus I rho SIGN(s_n) in the inner loop, as (10) is printed"),
+    (Form::PrintedFactor, "printedFactor", "f of (7) and (11) with the minus sign it is printed with"),
+];
+const KINEMATICS: [(OuterKinematics, &str, &str); 2] = [
+    (OuterKinematics::Corrected, "corrected", "consistent in order and axes"),
+    (OuterKinematics::Printed, "printed", "(3) as it is printed"),
+];
+
 /// Parameters and outputs of the two-loop sliding mode.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TwoLoopLaw {
     settings: TwoLoopSettings,
+    /// Number of the item of [`FORMS`], from 1.
+    form: i32,
+    /// Number of the item of [`KINEMATICS`], from 1.
+    kinematics: i32,
     outer_sliding: Vector3<f64>,
     inner_sliding: Vector3<f64>,
     rate_command: Vector3<f64>,
+    outer_integral: Vector3<f64>,
+    inner_integral: Vector3<f64>,
 }
 
 impl Default for TwoLoopLaw {
     fn default() -> Self {
         let zero = Vector3::zeros();
         let settings = TwoLoopSettings::ours();
-        Self { settings, outer_sliding: zero, inner_sliding: zero, rate_command: zero }
+        Self {
+            settings,
+            form: number(&FORMS, &settings.form),
+            kinematics: number(&KINEMATICS, &settings.kinematics),
+            outer_sliding: zero,
+            inner_sliding: zero,
+            rate_command: zero,
+            outer_integral: zero,
+            inner_integral: zero,
+        }
     }
 }
 
@@ -43,13 +68,18 @@ impl Law for TwoLoopLaw {
         let inner = ["inner", "inner loop"];
         let (rho, epsilon) = (unit::angular_acceleration(), unit::angular_rate());
         let table = reaching(table, inner, RATES, &rho, &epsilon, |law| &mut law.settings.inner);
-        outputs(actuators(table))
+        outputs(printed(actuators(table)))
     }
 
     #[allow(private_interfaces)]
     fn design(&self, vehicle: &Vehicle) -> Result<TwoLoopSmc, Failure> {
-        let settings =
-            TwoLoopSettings { body: vehicle.body, limit_moment: vehicle.saturates_at(), ..self.settings };
+        let settings = TwoLoopSettings {
+            form: item(&FORMS, self.form),
+            kinematics: item(&KINEMATICS, self.kinematics),
+            body: vehicle.body,
+            limit_moment: vehicle.saturates_at(),
+            ..self.settings
+        };
         TwoLoopSmc::new(settings).map_err(|error| Failure::Error(error.to_string()))
     }
 
@@ -57,6 +87,9 @@ impl Law for TwoLoopLaw {
         self.outer_sliding = memory.outer_sliding;
         self.inner_sliding = memory.inner_sliding;
         self.rate_command = memory.rate_command;
+        let gain = |of: &Loop| Vector3::from(of.k);
+        self.outer_integral = gain(&self.settings.outer).component_mul(&memory.outer_integral);
+        self.inner_integral = gain(&self.settings.inner).component_mul(&memory.inner_integral);
     }
 }
 
@@ -118,6 +151,18 @@ fn actuators(mut table: Controller) -> Controller {
         })
 }
 
+fn printed(table: Controller) -> Controller {
+    let form = parameter("form", "Signs of the reaching terms");
+    let kinematics = parameter("kinematics", "What the outer loop takes for R");
+    table
+        .enumeration(form, enumeration("ReachingForm", "Signs of the reaching terms", &FORMS), |m| {
+            &mut m.law.form
+        })
+        .enumeration(kinematics, enumeration("OuterKinematics", "What stands for R", &KINEMATICS), |m| {
+            &mut m.law.kinematics
+        })
+}
+
 fn outputs(table: Controller) -> Controller {
     let sampled = |name: String, text: String| discrete_output(&name, &text).depends_on(sampled_inputs());
     let outer = |axis: &str, meaning: &str| {
@@ -132,7 +177,17 @@ fn outputs(table: Controller) -> Controller {
         let text = format!("Body {meaning} rate that the outer loop commands");
         sampled(format!("rateCommand.{axis}"), text).real().unit(unit::angular_rate()).nominal(0.05)
     };
+    let outer_integral = |axis: &str, meaning: &str| {
+        let text = format!("Part of the sliding variable of the {meaning} that is its integral");
+        sampled(format!("integral.{axis}"), text).real().unit(unit::angle()).nominal(1e-2)
+    };
+    let inner_integral = |axis: &str, meaning: &str| {
+        let text = format!("Part of the sliding variable of the {meaning} rate that is its integral");
+        sampled(format!("innerIntegral.{axis}"), text).real().unit(unit::angular_rate()).nominal(1e-2)
+    };
     let table = vector(table, ANGLES, outer, |m| &mut m.law.outer_sliding);
     let table = vector(table, RATES, inner, |m| &mut m.law.inner_sliding);
-    vector(table, RATES, command, |m| &mut m.law.rate_command)
+    let table = vector(table, RATES, command, |m| &mut m.law.rate_command);
+    let table = vector(table, ANGLES, outer_integral, |m| &mut m.law.outer_integral);
+    vector(table, RATES, inner_integral, |m| &mut m.law.inner_integral)
 }
