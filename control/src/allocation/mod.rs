@@ -89,6 +89,9 @@ pub struct Allocator {
     without_jets: ConeProblem,
 }
 
+/// A rest of the moment that is rounding, as a fraction of the moment.
+const NEGLIGIBLE: f64 = 1e-7;
+
 impl Allocator {
     /// Checks the settings and sets the solver up.
     ///
@@ -168,11 +171,16 @@ impl Allocator {
             low = clamp(&wanted, &low, &high);
             high = low;
         }
-        let (found, iterations) = if finite {
+        let rest = (moment - matrix * low).component_mul(&self.settings.weight_moment).norm();
+        let all = moment.component_mul(&self.settings.weight_moment).norm();
+        let (found, iterations) = if !finite {
+            (None, 0)
+        } else if low == high && rest <= NEGLIGIBLE * all {
+            // Nothing is left for the jets.
+            (Some((low, Jets::zeros())), 0)
+        } else {
             let (middle, half) = middle_and_half(&low, &high);
             self.problem.solve(&moment, &matrix, &middle, &half)
-        } else {
-            (None, 0)
         };
         let (surfaces, duty) = found.unwrap_or((before, memory.duty));
         memory.surfaces = clamp(&surfaces, &low, &high);
