@@ -21,9 +21,12 @@ use fmi_rs::fmi2::types::{
     fmi2Status, fmi2StatusKind, fmi2String, fmi2TerminateTYPE, fmi2True, fmi2Type,
 };
 use libloading::Library;
+use object::{Object, ObjectSegment};
+use std::cell::Cell;
 use std::ffi::{CStr, CString, c_void};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use tempfile::TempDir;
 use url::Url;
@@ -44,6 +47,8 @@ pub struct Fmu {
     /// What it says of itself.
     pub description: ModelDescription,
     folder: Rc<TempDir>,
+    /// Whether the library for this platform was looked at.
+    is_sound: Cell<bool>,
 }
 
 impl Fmu {
@@ -59,7 +64,12 @@ impl Fmu {
         let description = xml::decode(&bytes)
             .and_then(|text| ModelDescription::parse(&text))
             .map_err(|reason| refuse(format!("modelDescription.xml: {reason}")))?;
-        Ok(Self { path: path.to_path_buf(), description, folder: Rc::new(folder) })
+        Ok(Self {
+            path: path.to_path_buf(),
+            description,
+            folder: Rc::new(folder),
+            is_sound: Cell::new(false),
+        })
     }
 
     /// The platforms there are binaries for, in FMI's names.
@@ -92,8 +102,23 @@ impl Fmu {
             let offered = if platforms.is_empty() { "none".into() } else { platforms.join(", ") };
             return Err(refuse(format!("has no binary for {PLATFORM}, only for: {offered}")));
         }
-        let file = format!("{}{SHARED_LIBRARY_EXTENSION}", interface.model_identifier);
+        let identifier = &interface.model_identifier;
+        // It becomes part of a path: FMI 2.0, section 2.2.7, wants a C identifier.
+        if identifier.is_empty() || !identifier.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+            return Err(refuse(format!(
+                "the model identifier \"{}\" is refused",
+                identifier.escape_default()
+            )));
+        }
+        let file = format!("{identifier}{SHARED_LIBRARY_EXTENSION}");
         let file = self.folder.path().join("binaries").join(PLATFORM).join(file);
+        if !self.is_sound.get() {
+            check_library(&file).map_err(|reason| {
+                let name = file.strip_prefix(self.folder.path()).unwrap_or(&file);
+                refuse(format!("{}: {reason}", name.display()))
+            })?;
+            self.is_sound.set(true);
+        }
         let functions = Functions::load(&file).map_err(|error| refuse(with_causes(&error)))?;
 
         let text =
@@ -103,7 +128,11 @@ impl Fmu {
         let (name_text, guid, resources) =
             (text(name)?, text(&self.description.guid)?, text(resources.as_str())?);
 
-        let log = Rc::new(Log { component: name.to_string(), last: Mutex::default() });
+        let log = Rc::new(Log {
+            component: name.to_string(),
+            last: Mutex::default(),
+            instantiates: AtomicBool::new(true),
+        });
         let memory = !interface.has("canNotUseMemoryManagementFunctions");
         let mut callbacks = fmi2CallbackFunctions {
             logger: receive_message,
@@ -132,9 +161,18 @@ impl Fmu {
             let message = log.take().unwrap_or_else(|| "fmi2Instantiate gave no instance".into());
             return Err(refuse(format!("the component \"{name}\" could not be made of it: {message}")));
         }
+        log.instantiates.store(false, Ordering::Relaxed);
         let instance = Rc::new(Instance { functions, _callbacks: callbacks, log });
         Ok(FmuUnit { component, instance, fatal: false, _folder: Rc::clone(&self.folder) })
     }
+}
+
+/// Whether everything is in a library file that will be mapped into memory: a program that touches what is missing is killed.
+fn check_library(file: &Path) -> Result<(), String> {
+    let bytes = std::fs::read(file).map_err(|error| error.to_string())?;
+    let fault = |error: object::Error| format!("is no sound library: {error}");
+    let library = object::File::parse(&*bytes).map_err(fault)?;
+    library.segments().try_for_each(|segment| segment.data().map(drop)).map_err(fault)
 }
 
 /// An error and what caused it, in one line.
@@ -195,6 +233,8 @@ impl Functions {
 struct Log {
     component: String,
     last: Mutex<Option<String>>,
+    /// Whether trouble is told by an error that is to come anyway.
+    instantiates: AtomicBool,
 }
 
 impl Log {
@@ -208,7 +248,9 @@ impl Log {
             fmi2Status::Ok | fmi2Status::Pending => tracing::info!("{component}: [{category}] {message}"),
             fmi2Status::Warning => tracing::warn!("{component}: [{category}] {message}"),
             fmi2Status::Discard | fmi2Status::Error | fmi2Status::Fatal => {
-                tracing::error!("{component}: [{category}] {message}");
+                if !self.instantiates.load(Ordering::Relaxed) {
+                    tracing::error!("{component}: [{category}] {message}");
+                }
                 *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
             }
         }
