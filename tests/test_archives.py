@@ -38,6 +38,9 @@ def test_description_says_what_tools_rely_on(fmu, name):
     with zipfile.ZipFile(archive(name)) as packed:
         files = packed.namelist()
         icon = packed.read("model.png")
+        page = packed.read("documentation/index.html").decode()
+    for part in ("Example wiring</h3>", "Limits</h3>", "Parameters", "Inputs", "Outputs", "Licence"):
+        assert part in page, part
     assert icon.startswith(b"\x89PNG") and icon == (ROOT / "modelDescription" / "icons" / f"{name}.png").read_bytes()
     assert "documentation/index.html" in files
     assert any(file.startswith("documentation/licenses/LICENSE-") for file in files)

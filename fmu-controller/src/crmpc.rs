@@ -87,7 +87,7 @@ impl Law for CrmpcLaw {
     const NAME: &'static str = "CRMPC";
     const DESCRIPTION: &'static str =
         "Centralised robust model predictive attitude controller of Chai et al. (2022)";
-    const DOCUMENTATION: &'static str = include_str!("crmpc.html");
+    const DOCUMENTATION: &'static str = concat!(include_str!("crmpc.html"), include_str!("wiring.html"));
 
     fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
         outputs(bounds(gains(schedule(table))))

@@ -54,7 +54,7 @@ impl Law for DlmpcLaw {
 
     const NAME: &'static str = "DLMPC";
     const DESCRIPTION: &'static str = "Double-layered model predictive and sliding-mode attitude controller, the comparison of Chai et al. (2022)";
-    const DOCUMENTATION: &'static str = include_str!("dlmpc.html");
+    const DOCUMENTATION: &'static str = concat!(include_str!("dlmpc.html"), include_str!("wiring.html"));
 
     fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
         outputs(sliding_mode(weights(schedule(table))))

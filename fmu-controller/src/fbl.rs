@@ -27,7 +27,7 @@ impl Law for FblLaw {
     const NAME: &'static str = "FBL";
     const DESCRIPTION: &'static str =
         "Feedback linearisation of the attitude, a comparison of Wu et al. (2015)";
-    const DOCUMENTATION: &'static str = include_str!("fbl.html");
+    const DOCUMENTATION: &'static str = concat!(include_str!("fbl.html"), include_str!("wiring.html"));
 
     fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
         let p = parameter("gain.p", "Gain on the error of the angles").real().min(0.0);

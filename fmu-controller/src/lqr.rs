@@ -29,7 +29,7 @@ impl Law for LqrLaw {
     const NAME: &'static str = "LQR";
     const DESCRIPTION: &'static str =
         "Linear-quadratic attitude regulator, the unconstrained comparison of Chai et al. (2022)";
-    const DOCUMENTATION: &'static str = include_str!("lqr.html");
+    const DOCUMENTATION: &'static str = concat!(include_str!("lqr.html"), include_str!("wiring.html"));
 
     fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
         let table = table::period(table, 0.04, |law| &mut law.period);

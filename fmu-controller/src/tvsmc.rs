@@ -54,7 +54,7 @@ impl<V: Variant> Law for TvsmcLaw<V> {
 
     const NAME: &'static str = V::NAME;
     const DESCRIPTION: &'static str = V::DESCRIPTION;
-    const DOCUMENTATION: &'static str = include_str!("tvsmc.html");
+    const DOCUMENTATION: &'static str = concat!(include_str!("tvsmc.html"), include_str!("wiring.html"));
 
     fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
         let table = table::period(table, 0.01, |law| &mut law.settings.period);

@@ -57,7 +57,7 @@ impl Law for TwoLoopLaw {
 
     const NAME: &'static str = "TwoLoopSMC";
     const DESCRIPTION: &'static str = "Two-loop sliding-mode attitude controller of Jia, Zhou and Zhou";
-    const DOCUMENTATION: &'static str = include_str!("two_loop.html");
+    const DOCUMENTATION: &'static str = concat!(include_str!("two_loop.html"), include_str!("wiring.html"));
 
     fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
         let table = table::period(table, 0.01, |law| &mut law.settings.period);
