@@ -1,0 +1,100 @@
+"""How fast importers step the same FMU and record all its outputs: the orchestrator, fmi-sim, libcosim, FMPy. No test: times differ
+from machine to machine, so only the ratios of one run count."""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+import fmpy
+import matplotlib.pyplot as plt
+from fmpy import simulate_fmu
+
+import cosim
+from conftest import ROOT, TARGET, archive, program
+
+STEP = 0.04
+
+
+def orchestrator(path: Path, outputs: list[str], steps: int, folder: Path) -> None:
+    experiment = folder / "x.toml"
+    recorded = ", ".join(f'"unit.{name}"' for name in outputs)
+    experiment.write_text(
+        f'title = "x"\n[simulation]\nstop = {steps * STEP!r}\nstep = {STEP}\n[components.unit]\nfmu = "{path}"\n'
+        f'unconnected = ["*"]\n[record]\nvariables = [{recorded}]\n'
+    )
+    command = [program("orchestrator"), "run", experiment, "--out", folder / "out", "--quiet"]
+    subprocess.run(command, check=True)
+
+
+def fmi_sim(path: Path, _outputs: list[str], steps: int, folder: Path) -> None:
+    command = [TARGET / "bench-tools" / "bin" / "fmi-sim", "--model", path, "-o", folder / "x.csv", "-q", "co-simulation"]
+    command += ["--step", str(STEP), "-n", "0", "-s", "0", "-f", repr(steps * STEP)]
+    subprocess.run(command, check=True, capture_output=True)
+
+
+def libcosim(path: Path, outputs: list[str], steps: int, _folder: Path) -> None:
+    cosim.alone(path, STEP, steps, outputs)
+
+
+def with_fmpy(path: Path, outputs: list[str], steps: int, _folder: Path) -> None:
+    simulate_fmu(str(path), output=outputs, step_size=STEP, output_interval=STEP, stop_time=steps * STEP)
+
+
+# With the steps that take each about as long.
+TOOLS = {
+    "orchestrator": (orchestrator, 500_000),
+    "fmi-sim": (fmi_sim, 250_000),
+    "FMPy": (with_fmpy, 100_000),
+    "libcosim": (libcosim, 20_000),
+}
+
+
+def rate(run, path: Path, outputs: list[str], steps: int) -> float:
+    """Steps per second, without what a run costs that hardly steps."""
+    with tempfile.TemporaryDirectory() as folder:
+        times = []
+        for count in (10, steps):
+            begin = time.perf_counter()
+            run(path, outputs, count, Path(folder))
+            times.append(time.perf_counter() - begin)
+    return (steps - 10) / (times[1] - times[0])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--repeat", type=int, default=5, help="runs of each, of which the median counts")
+    repeat = parser.parse_args().repeat
+    units = ["LQR", "ReentryPlant"]
+    found: dict[str, dict[str, float]] = {}
+    for unit in units:
+        description = fmpy.read_model_description(str(archive(unit)))
+        outputs = [v.name for v in description.modelVariables if v.causality == "output" and v.type == "Real"]
+        rates: dict[str, list[float]] = {name: [] for name in TOOLS}
+        # In turns, so that whatever else the machine does falls on all alike.
+        for _ in range(repeat):
+            for name, (run, steps) in TOOLS.items():
+                rates[name].append(rate(run, archive(unit), outputs, steps))
+        found[unit] = {name: statistics.median(values) for name, values in rates.items()}
+        print(f"\n{unit}, {len(outputs)} outputs recorded at every step of {STEP} s, median of {repeat}")
+        for name, value in found[unit].items():
+            print(f"  {name:<14}{value / 1e6:8.3f} million steps/s{found[unit]['orchestrator'] / value:10.1f} times slower than the orchestrator")
+
+    figure, axes = plt.subplots(1, len(units), figsize=(10, 3.2), layout="constrained")
+    for axis, unit in zip(axes, units):
+        bars = axis.barh(list(found[unit]), [value / 1e6 for value in found[unit].values()], color="#1f77b4")
+        axis.bar_label(bars, fmt="%.3g", padding=3)
+        axis.set(title=unit, xlabel="million steps per second, all outputs recorded", xscale="log")
+        axis.margins(x=0.25)
+        axis.invert_yaxis()
+    (ROOT / "out").mkdir(exist_ok=True)
+    figure.savefig(ROOT / "out" / "stepping.png", dpi=150)
+    print(f"\n{ROOT / 'out' / 'stepping.png'}")
+
+
+if __name__ == "__main__":
+    main()
