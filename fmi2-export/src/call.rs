@@ -74,8 +74,8 @@ const fn call(name: &'static str, interface: Option<Interface>, columns: &str) -
 const ME: Option<Interface> = Some(Interface::ModelExchange);
 const CS: Option<Interface> = Some(Interface::CoSimulation);
 
-/// The table. Where the standard allows a call for some variables only, [`crate::instance`] looks at the variable.
-/// fmi2GetDerivatives is allowed in initialization mode too, as derivatives are initial unknowns.
+/// The table. Where the standard allows setting some variables only, [`crate::instance`] looks at the variable; what may be
+/// got in initialization mode is not narrowed to outputs, states and derivatives.
 #[rustfmt::skip]
 pub(crate) mod table {
     use super::{CS, Call, ME, call};
@@ -118,7 +118,7 @@ pub(crate) mod table {
     pub(crate) const GET_DERIVATIVES:           Call = call("fmi2GetDerivatives",                 ME,   "-NEC--TX");
     pub(crate) const GET_EVENT_INDICATORS:      Call = call("fmi2GetEventIndicators",             ME,   "-NEC--TX");
     pub(crate) const GET_CONTINUOUS_STATES:     Call = call("fmi2GetContinuousStates",            ME,   "-NEC--TX");
-    pub(crate) const GET_NOMINALS:              Call = call("fmi2GetNominalsOfContinuousStates",  ME,   "INEC--TX");
+    pub(crate) const GET_NOMINALS:              Call = call("fmi2GetNominalsOfContinuousStates",  ME,   "I-EC--TX");
 
     pub(crate) const SET_INPUT_DERIVATIVES:     Call = call("fmi2SetRealInputDerivatives",        CS,   "IN--S---");
     pub(crate) const GET_OUTPUT_DERIVATIVES:    Call = call("fmi2GetRealOutputDerivatives",       CS,   "----SFTX");

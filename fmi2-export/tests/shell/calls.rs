@@ -110,7 +110,7 @@ const FUNCTIONS: &[(&str, Caller, &str, &str)] = &[
         "fmi2GetNominalsOfContinuousStates",
         |c| c!(fmi2GetNominalsOfContinuousStates(c, &mut 0.0, 1)),
         "",
-        "INECTX",
+        "IECTX",
     ),
     ("fmi2SetRealInputDerivatives", |c| c!(fmi2SetRealInputDerivatives(c, &U, 1, &ONE, &UNIT)), "INS", ""),
     (
