@@ -395,6 +395,7 @@ pub unsafe fn fmi2SerializedFMUstateSize(
     size: *mut usize,
 ) -> Status {
     let body = |instance: &mut Instance| {
+        check_room::<Saved>("FMUstate", state.is_null(), 1)?;
         let length = instance.serialized(state.cast())?.len();
         // SAFETY: see `put`.
         unsafe { put("size", size, length) }
@@ -410,6 +411,7 @@ pub unsafe fn fmi2SerializeFMUstate(
     size: usize,
 ) -> Status {
     let body = |instance: &mut Instance| {
+        check_room::<Saved>("FMUstate", state.is_null(), 1)?;
         let bytes = instance.serialized(state.cast())?;
         if size < bytes.len() {
             return error(format!("room for {size} bytes, but the state has {}", bytes.len()));

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 /// The folder `uri` points at, without a trailing separator.
 ///
-/// Takes `file:/p`, `file:///p`, `file:////p` and `file://localhost/p` with percent encoding, and a plain path.
+/// Takes `file:/p`, `file:///p`, `file:////p` and `file://localhost/p` with percent encoding, and a plain path. `file:p` and
+/// `p` are relative to the working directory.
 ///
 /// # Errors
 /// Says what is wrong with the URI.
@@ -24,12 +25,13 @@ pub(crate) fn folder(uri: &str) -> Result<PathBuf, String> {
         },
         _ => rest,
     };
+    let relative = !rest.starts_with('/');
     let path = path.trim_matches('/');
     let path = percent_decode_str(path)
         .decode_utf8()
         .map_err(|_| format!("resource location '{uri}' is not UTF-8 once its percent encoding is undone"))?;
     let drive = path.as_bytes().get(1) == Some(&b':');
-    Ok(PathBuf::from(if drive { path.into_owned() } else { format!("/{path}") }))
+    Ok(PathBuf::from(if drive || relative { path.into_owned() } else { format!("/{path}") }))
 }
 
 fn strip_scheme(uri: &str) -> Option<&str> {
@@ -64,6 +66,13 @@ mod tests {
             assert_eq!(folder(uri).as_deref(), Ok(expected), "{uri}");
         }
         assert_eq!(folder("file:///C:/fmu/resources").as_deref(), Ok(Path::new("C:/fmu/resources")));
+    }
+
+    #[test]
+    fn a_relative_location_stays_relative() {
+        for uri in ["file:a/resources/", "a/resources"] {
+            assert_eq!(folder(uri).as_deref(), Ok(Path::new("a/resources")), "{uri}");
+        }
     }
 
     #[test]
