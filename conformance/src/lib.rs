@@ -1,0 +1,422 @@
+//! An importer for testing: the FMU libraries that cargo has built, opened at run time and called through FMI 2.0's C interface.
+//!
+//! It knows of the units what their description says, and of the crates that make them nothing.
+#![allow(unsafe_code)]
+#![allow(clippy::borrow_as_ptr, reason = "calls read better as in C")]
+#![allow(clippy::missing_panics_doc, reason = "a test fails by panicking")]
+#![allow(clippy::not_unsafe_ptr_arg_deref, reason = "handles are the library's: they are not followed here")]
+
+pub mod interface;
+
+use interface::{CO_SIMULATION, Callbacks, Component, EventInfo, FATAL, Interface, Logger, OK, Status, Text};
+use model_description::ModelDescription;
+use model_description::variable::{Causality, Kind, Variability, Variable};
+use std::ffi::{CStr, CString, c_int, c_void};
+use std::path::PathBuf;
+use std::ptr::{null, null_mut};
+use std::sync::{Arc, Mutex};
+
+/// Calls a function of the library that an instance, or unit, belongs to: `c!(instance, fmi2Reset(component))`.
+#[macro_export]
+macro_rules! c {
+    ($on:expr, $function:ident($($argument:expr),* $(,)?)) => {{
+        let function = $on.interface.$function;
+        // SAFETY: every pointer that a test passes is null or valid for the call, as the standard wants it.
+        #[allow(unsafe_code, clippy::macro_metavars_in_unsafe)]
+        let result = unsafe { function($($argument),*) };
+        result
+    }};
+}
+
+/// The library of a crate, where cargo puts it for this program: beside it or in its folder `deps`.
+pub fn library(krate: &str) -> PathBuf {
+    let file = format!("{}{krate}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let program = std::env::current_exe().expect("the path of this program");
+    let folders = program.ancestors().skip(1).take(2);
+    let mut places = folders.flat_map(|folder| [folder.join("deps").join(&file), folder.join(&file)]);
+    places.find(|path| path.is_file()).unwrap_or_else(|| panic!("{file} is not near {}", program.display()))
+}
+
+/// One unit of a library.
+#[derive(Clone)]
+pub struct Unit {
+    /// The functions of its library.
+    pub interface: Arc<Interface>,
+    /// What it says of itself.
+    pub description: ModelDescription,
+    guid: CString,
+}
+
+/// Opens both libraries and lists their units, the plant first.
+pub fn units() -> Vec<Unit> {
+    let open = |krate| {
+        let path = library(krate);
+        let interface = Arc::new(Interface::open(&path).unwrap_or_else(|error| panic!("{error}")));
+        let descriptions =
+            model_description::library::descriptions(&path).unwrap_or_else(|error| panic!("{error}"));
+        descriptions.into_iter().map(move |description| Unit {
+            interface: interface.clone(),
+            guid: CString::new(description.guid()).expect("hexadecimal digits"),
+            description,
+        })
+    };
+    ["fmu_plant", "fmu_controller"].into_iter().flat_map(open).collect()
+}
+
+/// The unit with that name.
+pub fn unit(name: &str) -> Unit {
+    units().into_iter().find(|unit| unit.name() == name).unwrap_or_else(|| panic!("no unit {name}"))
+}
+
+impl Unit {
+    /// Model name.
+    pub fn name(&self) -> &str {
+        &self.description.name
+    }
+
+    /// GUID as C text.
+    pub fn guid(&self) -> &CStr {
+        &self.guid
+    }
+
+    /// The interfaces it offers.
+    pub fn interfaces(&self) -> &[c_int] {
+        if self.description.model_exchange {
+            &[interface::MODEL_EXCHANGE, CO_SIMULATION]
+        } else {
+            &[CO_SIMULATION]
+        }
+    }
+
+    /// Value references of the variables for which `wanted` holds.
+    pub fn references(&self, wanted: impl Fn(&Variable) -> bool) -> Vec<u32> {
+        let variables = self.description.variables.iter().zip(0..);
+        variables.filter(|(variable, _)| wanted(variable)).map(|(_, reference)| reference).collect()
+    }
+
+    /// Value reference of the variable with that name.
+    pub fn reference(&self, name: &str) -> u32 {
+        *self.references(|variable| variable.name == name).first().unwrap_or_else(|| panic!("no {name}"))
+    }
+
+    /// A continuous input: one whose change every unit notices.
+    pub fn input(&self) -> u32 {
+        self.reference(
+            if self.references(|v| v.name == "moment.y" && v.causality == Causality::Input).is_empty() {
+                "rate.q"
+            } else {
+                "moment.y"
+            },
+        )
+    }
+
+    /// Everything that is calculated but wall-clock times.
+    pub fn results(&self) -> Vec<u32> {
+        self.references(|variable| {
+            variable.is_calculated() && !variable.description.starts_with("Wall-clock time")
+        })
+    }
+
+    /// Instantiates with a folder of resources that is not there.
+    pub fn instance(&self, fmu_type: c_int) -> Instance {
+        let instance = self.instantiate(Some(c"it"), fmu_type, Some(&self.guid), Some(c"file:///nowhere"));
+        assert!(!instance.component.is_null(), "{}: {:?}", self.name(), instance.messages());
+        instance
+    }
+
+    /// As it says; the component is null if that was refused. The callbacks are freed as soon as the call returns, as
+    /// some importers do.
+    pub fn instantiate(
+        &self,
+        name: Option<&CStr>,
+        fmu_type: c_int,
+        guid: Option<&CStr>,
+        resources: Option<&CStr>,
+    ) -> Instance {
+        let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
+        let log: Box<Log> = Box::default();
+        let callbacks = Box::new(callbacks(&log));
+        let component = c!(
+            self,
+            fmi2Instantiate(
+                pointer(name),
+                fmu_type,
+                pointer(guid),
+                pointer(resources),
+                &raw const *callbacks,
+                0,
+                1
+            )
+        );
+        Instance { interface: self.interface.clone(), unit: self.clone(), component, log }
+    }
+}
+
+/// What the importer's logger was told.
+#[derive(Clone, Debug)]
+pub struct Message {
+    /// Status as passed.
+    pub status: Status,
+    /// Category as passed.
+    pub category: String,
+    /// The text.
+    pub text: String,
+}
+
+/// Where messages are collected.
+pub type Log = Mutex<Vec<Message>>;
+
+extern "C" fn log(environment: *mut c_void, _instance: Text, status: Status, category: Text, message: Text) {
+    // SAFETY: the environment is the log that `Instance` keeps alive, the texts are NUL-terminated.
+    let (log, [category, text]) = unsafe {
+        let texts = [category, message].map(|text| CStr::from_ptr(text).to_string_lossy().into_owned());
+        (&*environment.cast::<Log>(), texts)
+    };
+    log.lock().expect("no other thread panicked").push(Message { status, category, text });
+}
+
+/// Callbacks with a logger and nothing else.
+pub fn callbacks(log_to: &Log) -> Callbacks {
+    type Fixed = extern "C" fn(*mut c_void, Text, Status, Text, Text);
+    // SAFETY: a variadic call without variadic arguments passes the fixed ones like any other on the supported platforms.
+    let logger = unsafe { std::mem::transmute::<Fixed, Logger>(log) };
+    Callbacks {
+        logger: Some(logger),
+        allocate_memory: None,
+        free_memory: None,
+        step_finished: None,
+        component_environment: std::ptr::from_ref(log_to).cast_mut().cast(),
+    }
+}
+
+/// An instance with its log. Freed when dropped, in whatever state.
+pub struct Instance {
+    /// The functions of its library.
+    pub interface: Arc<Interface>,
+    /// What it is an instance of.
+    pub unit: Unit,
+    /// `fmi2Component`.
+    pub component: Component,
+    log: Box<Log>,
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        c!(self, fmi2FreeInstance(self.component));
+        if !std::thread::panicking() {
+            let fatal = self.messages().into_iter().find(|message| message.status == FATAL);
+            assert!(fatal.is_none(), "a panic reached the C interface: {fatal:?}");
+        }
+    }
+}
+
+/// What an instance says of its calculated variables: the bits of every value.
+pub type Bits = Vec<u64>;
+
+impl Instance {
+    /// Everything the logger was told.
+    pub fn messages(&self) -> Vec<Message> {
+        self.log.lock().expect("no other thread panicked").clone()
+    }
+
+    /// Forgets all messages.
+    pub fn forget(&self) {
+        self.log.lock().expect("no other thread panicked").clear();
+    }
+
+    /// The call must have succeeded.
+    #[track_caller]
+    pub fn ok(&self, status: Status) {
+        assert_eq!(status, OK, "{}: {:?}", self.unit.name(), self.messages().last());
+    }
+
+    /// The call must have been refused with `wanted`, and the last message hold all of `parts`.
+    #[track_caller]
+    pub fn refused(&self, status: Status, wanted: Status, parts: &[&str]) {
+        let messages = self.messages();
+        let last = messages.last().map_or("", |message| &message.text);
+        assert_eq!(status, wanted, "{}: {last}", self.unit.name());
+        for part in parts {
+            assert!(last.contains(part), "{}: no '{part}' in '{last}'", self.unit.name());
+        }
+    }
+
+    /// To initialization mode, from 0 s without an end.
+    pub fn enter_initialization(&self) {
+        self.ok(c!(self, fmi2SetupExperiment(self.component, 0, 0.0, 0.0, 0, 0.0)));
+        self.ok(c!(self, fmi2EnterInitializationMode(self.component)));
+    }
+
+    /// Through initialization mode.
+    #[must_use]
+    pub fn initialized(self) -> Self {
+        self.enter_initialization();
+        self.ok(c!(self, fmi2ExitInitializationMode(self.component)));
+        self
+    }
+
+    /// Sets a Real.
+    pub fn set_real(&self, reference: u32, value: f64) -> Status {
+        c!(self, fmi2SetReal(self.component, &reference, 1, &value))
+    }
+
+    /// A Real.
+    #[track_caller]
+    pub fn real(&self, reference: u32) -> f64 {
+        let mut value = f64::NAN;
+        self.ok(c!(self, fmi2GetReal(self.component, &reference, 1, &mut value)));
+        value
+    }
+
+    /// Sets an enumeration to the item with that name.
+    pub fn choose(&self, name: &str, item: &str) {
+        let reference = self.unit.reference(name);
+        let Kind::Enumeration { of, .. } = &self.unit.description.variables[reference as usize].kind else {
+            panic!("{name} is not an enumeration");
+        };
+        let numbered = of.items.iter().zip(1..);
+        let value: c_int =
+            numbered.filter(|((own, _), _)| own == item).map(|(_, i)| i).next().expect("an item");
+        self.ok(c!(self, fmi2SetInteger(self.component, &reference, 1, &value)));
+    }
+
+    /// Sets a String.
+    pub fn set_string(&self, name: &str, value: &CStr) -> Status {
+        let value = value.as_ptr();
+        c!(self, fmi2SetString(self.component, &self.unit.reference(name), 1, &value))
+    }
+
+    /// `fmi2DoStep`.
+    pub fn step(&self, point: f64, size: f64) -> Status {
+        c!(self, fmi2DoStep(self.component, point, size, 1))
+    }
+
+    /// The bits of the variables, asked for with one call per type.
+    pub fn bits(&self, references: &[u32]) -> Bits {
+        let variables = &self.unit.description.variables;
+        let mut bits = vec![0; references.len()];
+        let of = |wanted: fn(&Kind) -> bool| -> (Vec<usize>, Vec<u32>) {
+            let all = references.iter().copied().enumerate();
+            all.filter(|&(_, reference)| wanted(&variables[reference as usize].kind)).unzip()
+        };
+        let (places, list) = of(|kind| matches!(kind, Kind::Real { .. }));
+        let mut reals = vec![0.0; list.len()];
+        self.ok(c!(self, fmi2GetReal(self.component, list.as_ptr(), list.len(), reals.as_mut_ptr())));
+        for (&place, value) in places.iter().zip(reals) {
+            bits[place] = value.to_bits();
+        }
+        let (places, list) = of(|kind| matches!(kind, Kind::Integer { .. } | Kind::Enumeration { .. }));
+        let mut integers = vec![0; list.len()];
+        self.ok(c!(self, fmi2GetInteger(self.component, list.as_ptr(), list.len(), integers.as_mut_ptr())));
+        for (&place, value) in places.iter().zip(integers) {
+            bits[place] = value as u64;
+        }
+        let (places, list) = of(|kind| matches!(kind, Kind::Boolean { .. }));
+        let mut booleans = vec![0; list.len()];
+        self.ok(c!(self, fmi2GetBoolean(self.component, list.as_ptr(), list.len(), booleans.as_mut_ptr())));
+        for (&place, value) in places.iter().zip(booleans) {
+            bits[place] = value as u64;
+        }
+        let (places, list) = of(|kind| matches!(kind, Kind::String { .. }));
+        let mut texts = vec![null(); list.len()];
+        self.ok(c!(self, fmi2GetString(self.component, list.as_ptr(), list.len(), texts.as_mut_ptr())));
+        for (&place, text) in places.iter().zip(texts) {
+            // SAFETY: the call succeeded, so it is NUL-terminated until the next one.
+            bits[place] = unsafe { CStr::from_ptr(text) }
+                .to_bytes()
+                .iter()
+                .fold(7, |sum: u64, &byte| sum.wrapping_mul(257).wrapping_add(u64::from(byte)));
+        }
+        bits
+    }
+
+    /// The input at a tick of [`Instance::drive`]: small, and never the same twice.
+    pub fn course(&self, tick: u32) -> f64 {
+        let name = &self.unit.description.variables[self.unit.input() as usize].name;
+        let size = if name == "moment.y" { 1e3 } else { 1e-4 };
+        size * f64::from(tick)
+    }
+
+    /// Co-simulation by the proposed step over `ticks` with a moving input: the results at each tick, after the inputs of this
+    /// tick were set.
+    pub fn drive(&self, ticks: std::ops::Range<u32>) -> Vec<Bits> {
+        let h = self.unit.description.default_experiment.step;
+        let (input, results) = (self.unit.input(), self.unit.results());
+        let mut rows = vec![];
+        for tick in ticks {
+            self.ok(self.set_real(input, self.course(tick)));
+            rows.push(self.bits(&results));
+            self.ok(self.step(f64::from(tick) * h, h));
+        }
+        rows
+    }
+
+    /// Model exchange by Euler steps of the proposed length, from event mode to event mode: the results at each tick.
+    pub fn integrate(&self, ticks: std::ops::Range<u32>) -> Vec<Bits> {
+        let h = self.unit.description.default_experiment.step;
+        let n = self.unit.description.states().len();
+        let (mut x, mut derivatives) = (vec![0.0; n], vec![0.0; n]);
+        let mut indicators = vec![0.0; self.unit.description.event_indicators];
+        let (component, input, results) = (self.component, self.unit.input(), self.unit.results());
+        let mut rows = vec![];
+        for tick in ticks {
+            self.ok(self.set_real(input, self.course(tick)));
+            let mut info = EventInfo::default();
+            self.ok(c!(self, fmi2NewDiscreteStates(component, &mut info)));
+            assert_eq!((info.new_discrete_states_needed, info.terminate_simulation), (0, 0));
+            self.ok(c!(self, fmi2EnterContinuousTimeMode(component)));
+            self.ok(c!(self, fmi2GetContinuousStates(component, x.as_mut_ptr(), n)));
+            self.ok(c!(self, fmi2GetDerivatives(component, derivatives.as_mut_ptr(), n)));
+            for (x, derivative) in x.iter_mut().zip(&derivatives) {
+                *x += h * derivative;
+            }
+            self.ok(c!(self, fmi2SetTime(component, f64::from(tick + 1) * h)));
+            self.ok(c!(self, fmi2SetContinuousStates(component, x.as_ptr(), n)));
+            self.ok(c!(self, fmi2GetEventIndicators(component, indicators.as_mut_ptr(), indicators.len())));
+            let (mut event, mut end) = (-1, -1);
+            self.ok(c!(self, fmi2CompletedIntegratorStep(component, 1, &mut event, &mut end)));
+            self.ok(c!(self, fmi2EnterEventMode(component)));
+            let mut row = self.bits(&results);
+            row.extend(indicators.iter().map(|indicator| indicator.to_bits()));
+            rows.push(row);
+        }
+        rows
+    }
+
+    /// Saves the state; the handle is freed with the instance.
+    pub fn save(&self) -> interface::FmuState {
+        let mut state = null_mut();
+        self.ok(c!(self, fmi2GetFMUstate(self.component, &mut state)));
+        assert!(!state.is_null());
+        state
+    }
+
+    /// Goes back to a saved state.
+    #[track_caller]
+    pub fn restore(&self, state: interface::FmuState) {
+        self.ok(c!(self, fmi2SetFMUstate(self.component, state)));
+    }
+
+    /// The present state as bytes.
+    pub fn serialize(&self) -> Vec<u8> {
+        let mut state = self.save();
+        let mut size = 0;
+        self.ok(c!(self, fmi2SerializedFMUstateSize(self.component, state, &mut size)));
+        let mut bytes = vec![0u8; size];
+        self.ok(c!(self, fmi2SerializeFMUstate(self.component, state, bytes.as_mut_ptr().cast(), size)));
+        self.ok(c!(self, fmi2FreeFMUstate(self.component, &mut state)));
+        bytes
+    }
+
+    /// `fmi2DeSerializeFMUstate`.
+    pub fn deserialize(&self, bytes: &[u8]) -> (Status, interface::FmuState) {
+        let mut state = null_mut();
+        let (from, size) = (bytes.as_ptr().cast(), bytes.len());
+        (c!(self, fmi2DeSerializeFMUstate(self.component, from, size, &mut state)), state)
+    }
+}
+
+/// Whether a variable is a Real that may change at any time.
+pub fn is_continuous_real(variable: &Variable) -> bool {
+    matches!(variable.kind, Kind::Real { .. }) && variable.variability == Variability::Continuous
+}

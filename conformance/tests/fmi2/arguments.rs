@@ -1,0 +1,203 @@
+//! NULL for everything that is a pointer: an error that names the argument, or fine where the standard or importers have it so.
+
+use conformance::interface::{CO_SIMULATION, Callbacks, ERROR, MODEL_EXCHANGE, OK, Status};
+use conformance::{Instance, c, units};
+use model_description::variable::Kind;
+use std::ffi::{CStr, c_int};
+use std::ptr::{null, null_mut};
+
+type Call = fn(&Instance) -> Status;
+
+/// Calls of both interfaces with a NULL too many, and what the message must hold.
+#[rustfmt::skip]
+const NULLS: &[(Call, &str)] = &[
+    (|i| c!(i, fmi2SetDebugLogging(i.component, 1, 1, null())), "fmi2SetDebugLogging: argument 'categories' is NULL"),
+    (|i| c!(i, fmi2SetDebugLogging(i.component, 1, 1, &null())), "fmi2SetDebugLogging: argument 'categories' is NULL"),
+    (|i| c!(i, fmi2GetReal(i.component, null(), 1, &mut 0.0)), "fmi2GetReal: argument 'vr' is NULL"),
+    (|i| c!(i, fmi2GetReal(i.component, &0, 1, null_mut())), "fmi2GetReal: argument 'value' is NULL"),
+    (|i| c!(i, fmi2GetInteger(i.component, null(), 1, &mut 0)), "fmi2GetInteger: argument 'vr' is NULL"),
+    (|i| c!(i, fmi2GetInteger(i.component, &0, 1, null_mut())), "fmi2GetInteger: argument 'value' is NULL"),
+    (|i| c!(i, fmi2GetBoolean(i.component, null(), 1, &mut 0)), "fmi2GetBoolean: argument 'vr' is NULL"),
+    (|i| c!(i, fmi2GetBoolean(i.component, &0, 1, null_mut())), "fmi2GetBoolean: argument 'value' is NULL"),
+    (|i| c!(i, fmi2GetString(i.component, null(), 1, &mut null())), "fmi2GetString: argument 'vr' is NULL"),
+    (|i| c!(i, fmi2GetString(i.component, &0, 1, null_mut())), "fmi2GetString: argument 'value' is NULL"),
+    (|i| c!(i, fmi2SetReal(i.component, null(), 1, &0.0)), "fmi2SetReal: argument 'vr' is NULL"),
+    (|i| c!(i, fmi2SetReal(i.component, &0, 1, null())), "fmi2SetReal: argument 'value' is NULL"),
+    (|i| c!(i, fmi2SetInteger(i.component, null(), 1, &0)), "fmi2SetInteger: argument 'vr' is NULL"),
+    (|i| c!(i, fmi2SetInteger(i.component, &0, 1, null())), "fmi2SetInteger: argument 'value' is NULL"),
+    (|i| c!(i, fmi2SetBoolean(i.component, null(), 1, &0)), "fmi2SetBoolean: argument 'vr' is NULL"),
+    (|i| c!(i, fmi2SetBoolean(i.component, &0, 1, null())), "fmi2SetBoolean: argument 'value' is NULL"),
+    (|i| c!(i, fmi2SetString(i.component, null(), 1, &c"".as_ptr())), "fmi2SetString: argument 'vr' is NULL"),
+    (|i| c!(i, fmi2SetString(i.component, &0, 1, null())), "fmi2SetString: argument 'value' is NULL"),
+    (|i| c!(i, fmi2GetFMUstate(i.component, null_mut())), "fmi2GetFMUstate: argument 'FMUstate' is NULL"),
+    (|i| c!(i, fmi2SetFMUstate(i.component, null_mut())), "fmi2SetFMUstate: argument 'FMUstate' is NULL"),
+    (|i| c!(i, fmi2SerializedFMUstateSize(i.component, null_mut(), &mut 0)), "fmi2SerializedFMUstateSize: argument 'FMUstate' is NULL"),
+    (|i| c!(i, fmi2SerializedFMUstateSize(i.component, i.save(), null_mut())), "fmi2SerializedFMUstateSize: argument 'size' is NULL"),
+    (|i| c!(i, fmi2SerializeFMUstate(i.component, null_mut(), &mut 0, 1)), "fmi2SerializeFMUstate: argument 'FMUstate' is NULL"),
+    (|i| c!(i, fmi2SerializeFMUstate(i.component, i.save(), null_mut(), 1 << 30)), "fmi2SerializeFMUstate: argument 'serializedState' is NULL"),
+    (|i| c!(i, fmi2DeSerializeFMUstate(i.component, &0, 1, null_mut())), "fmi2DeSerializeFMUstate: argument 'FMUstate' is NULL"),
+    (|i| c!(i, fmi2DeSerializeFMUstate(i.component, null(), 1, &mut null_mut())), "fmi2DeSerializeFMUstate: argument 'serializedState' is NULL"),
+    (|i| c!(i, fmi2DeSerializeFMUstate(i.component, null(), 0, &mut null_mut())), "fmi2DeSerializeFMUstate: the saved state is truncated"),
+    (|i| c!(i, fmi2GetDirectionalDerivative(i.component, null(), 1, &0, 1, &1.0, &mut 0.0)), "fmi2GetDirectionalDerivative: argument 'vUnknown_ref' is NULL"),
+    (|i| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, null(), 1, &1.0, &mut 0.0)), "fmi2GetDirectionalDerivative: argument 'vKnown_ref' is NULL"),
+    (|i| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, &0, 1, null(), &mut 0.0)), "fmi2GetDirectionalDerivative: argument 'dvKnown' is NULL"),
+    (|i| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, &0, 1, &1.0, null_mut())), "fmi2GetDirectionalDerivative: argument 'dvUnknown' is NULL"),
+    // More than fits into the address space.
+    (|i| c!(i, fmi2GetReal(i.component, &0, usize::MAX, &mut 0.0)), "fmi2GetReal: argument 'vr' cannot have"),
+];
+
+/// The same in event mode.
+#[rustfmt::skip]
+const NULLS_OF_EXCHANGE: &[(Call, &str)] = &[
+    (|i| c!(i, fmi2NewDiscreteStates(i.component, null_mut())), "fmi2NewDiscreteStates: argument 'fmi2eventInfo' is NULL"),
+    (|i| c!(i, fmi2GetDerivatives(i.component, null_mut(), 1)), "fmi2GetDerivatives: argument 'derivatives' is NULL"),
+    (|i| c!(i, fmi2GetEventIndicators(i.component, null_mut(), 1)), "fmi2GetEventIndicators: argument 'eventIndicators' is NULL"),
+    (|i| c!(i, fmi2GetContinuousStates(i.component, null_mut(), 1)), "fmi2GetContinuousStates: argument 'x' is NULL"),
+    (|i| c!(i, fmi2GetNominalsOfContinuousStates(i.component, null_mut(), 1)), "fmi2GetNominalsOfContinuousStates: argument 'x_nominal' is NULL"),
+    // No values, but there are some.
+    (|i| c!(i, fmi2GetDerivatives(i.component, null_mut(), 0)), "fmi2GetDerivatives: room for 0"),
+    (|i| c!(i, fmi2GetEventIndicators(i.component, null_mut(), 0)), "fmi2GetEventIndicators: room for 0"),
+    (|i| c!(i, fmi2GetContinuousStates(i.component, null_mut(), 0)), "fmi2GetContinuousStates: room for 0"),
+    (|i| c!(i, fmi2GetNominalsOfContinuousStates(i.component, null_mut(), 0)), "fmi2GetNominalsOfContinuousStates: room for 0"),
+];
+
+/// The same in continuous-time mode.
+#[rustfmt::skip]
+const NULLS_OF_CONTINUOUS_TIME: &[(Call, &str)] = &[
+    (|i| c!(i, fmi2CompletedIntegratorStep(i.component, 1, null_mut(), &mut 0)), "fmi2CompletedIntegratorStep: argument 'enterEventMode' is NULL"),
+    (|i| c!(i, fmi2CompletedIntegratorStep(i.component, 1, &mut 0, null_mut())), "fmi2CompletedIntegratorStep: argument 'terminateSimulation' is NULL"),
+    (|i| c!(i, fmi2SetContinuousStates(i.component, null(), 1)), "fmi2SetContinuousStates: argument 'x' is NULL"),
+    (|i| c!(i, fmi2SetContinuousStates(i.component, null(), 0)), "fmi2SetContinuousStates: room for 0"),
+];
+
+/// The same between steps.
+#[rustfmt::skip]
+const NULLS_OF_SIMULATION: &[(Call, &str)] = &[
+    (|i| c!(i, fmi2SetRealInputDerivatives(i.component, null(), 1, &1, &0.0)), "fmi2SetRealInputDerivatives: argument 'vr' is NULL"),
+    (|i| c!(i, fmi2SetRealInputDerivatives(i.component, &0, 1, null(), &0.0)), "fmi2SetRealInputDerivatives: argument 'order' is NULL"),
+    (|i| c!(i, fmi2SetRealInputDerivatives(i.component, &0, 1, &1, null())), "fmi2SetRealInputDerivatives: argument 'value' is NULL"),
+    (|i| c!(i, fmi2GetRealOutputDerivatives(i.component, null(), 1, null(), null_mut())), "fmi2GetRealOutputDerivatives: "),
+    (|i| c!(i, fmi2GetStatus(i.component, 0, null_mut())), "fmi2GetStatus: argument 'value' is NULL"),
+    (|i| c!(i, fmi2GetRealStatus(i.component, 2, null_mut())), "fmi2GetRealStatus: argument 'value' is NULL"),
+    (|i| c!(i, fmi2GetBooleanStatus(i.component, 3, null_mut())), "fmi2GetBooleanStatus: argument 'value' is NULL"),
+    (|i| c!(i, fmi2GetStringStatus(i.component, 1, null_mut())), "fmi2GetStringStatus: argument 'value' is NULL"),
+];
+
+/// No values, so no pointers.
+const NOTHING: &[Call] = &[
+    |i| c!(i, fmi2SetDebugLogging(i.component, 1, 0, null())),
+    |i| c!(i, fmi2GetReal(i.component, null(), 0, null_mut())),
+    |i| c!(i, fmi2GetInteger(i.component, null(), 0, null_mut())),
+    |i| c!(i, fmi2GetBoolean(i.component, null(), 0, null_mut())),
+    |i| c!(i, fmi2GetString(i.component, null(), 0, null_mut())),
+    |i| c!(i, fmi2SetReal(i.component, null(), 0, null())),
+    |i| c!(i, fmi2SetInteger(i.component, null(), 0, null())),
+    |i| c!(i, fmi2SetBoolean(i.component, null(), 0, null())),
+    |i| c!(i, fmi2SetString(i.component, null(), 0, null())),
+    |i| c!(i, fmi2FreeFMUstate(i.component, null_mut())),
+    |i| c!(i, fmi2FreeFMUstate(i.component, &mut null_mut())),
+];
+
+fn check(instance: &Instance, calls: &[(Call, &str)]) {
+    let (here, before) = (instance.save(), instance.serialize());
+    for (call, message) in calls {
+        instance.forget();
+        let status = call(instance);
+        instance.refused(status, ERROR, &[message]);
+        assert_eq!(instance.messages().len(), 1, "{message}: said once");
+        instance.restore(here);
+        assert!(instance.serialize() == before, "{message}");
+    }
+}
+
+#[test]
+fn null_arguments_are_errors_that_name_them() {
+    for unit in units() {
+        for &fmu_type in unit.interfaces() {
+            let instance = unit.instance(fmu_type).initialized();
+            check(&instance, NULLS);
+            for call in NOTHING {
+                instance.ok(call(&instance));
+            }
+            let component = instance.component;
+            if fmu_type == CO_SIMULATION {
+                check(&instance, NULLS_OF_SIMULATION);
+                instance.ok(c!(instance, fmi2SetRealInputDerivatives(component, null(), 0, null(), null())));
+                let none = null_mut();
+                instance.ok(c!(instance, fmi2GetRealOutputDerivatives(component, null(), 0, null(), none)));
+            } else {
+                check(&instance, NULLS_OF_EXCHANGE);
+                instance.ok(c!(instance, fmi2EnterContinuousTimeMode(component)));
+                check(&instance, NULLS_OF_CONTINUOUS_TIME);
+            }
+        }
+    }
+}
+
+#[test]
+fn null_is_not_taken_for_a_text() {
+    for unit in units() {
+        for reference in unit.references(|variable| matches!(variable.kind, Kind::String { .. })) {
+            let instance = unit.instance(CO_SIMULATION);
+            let name = &unit.description.variables[reference as usize].name;
+            let status = c!(instance, fmi2SetString(instance.component, &reference, 1, &null()));
+            instance.refused(status, ERROR, &[&format!("'{name}'"), "NULL"]);
+        }
+    }
+}
+
+#[test]
+fn no_callbacks_or_none_of_their_functions_are_fine() {
+    let none = Callbacks {
+        logger: None,
+        allocate_memory: None,
+        free_memory: None,
+        step_finished: None,
+        component_environment: null_mut(),
+    };
+    for unit in units() {
+        for callbacks in [null(), &raw const none] {
+            let instantiate = |name| {
+                let guid = unit.guid().as_ptr();
+                c!(unit, fmi2Instantiate(name, CO_SIMULATION, guid, null(), callbacks, 0, 1))
+            };
+            let component = instantiate(c"it".as_ptr());
+            assert!(!component.is_null(), "{}", unit.name());
+            // A step too early has nobody to complain to.
+            assert_eq!(c!(unit, fmi2DoStep(component, 0.0, 0.1, 1)), ERROR);
+            assert_eq!(c!(unit, fmi2Reset(component)), OK);
+            assert_eq!(c!(unit, fmi2EnterInitializationMode(component)), OK);
+            assert_eq!(c!(unit, fmi2ExitInitializationMode(component)), OK);
+            assert_eq!(c!(unit, fmi2DoStep(component, 0.0, 0.01, 1)), OK);
+            c!(unit, fmi2FreeInstance(component));
+            // And neither has a refused instantiation.
+            assert!(instantiate(null()).is_null());
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_instantiated_is_refused_by_name() {
+    for unit in units() {
+        let own = Some(unit.guid());
+        let cases: [(Option<&CStr>, c_int, Option<&CStr>, &str); 8] = [
+            (None, CO_SIMULATION, own, "'instanceName' is NULL"),
+            (Some(c""), CO_SIMULATION, own, "instance name is empty"),
+            (Some(c"it"), CO_SIMULATION, None, "'fmuGUID' is NULL"),
+            (Some(c"it"), CO_SIMULATION, Some(c""), "no unit with GUID ''"),
+            (Some(c"it"), CO_SIMULATION, Some(c"{0}"), "no unit with GUID '{0}'"),
+            (Some(c"it"), -1, own, "fmuType -1"),
+            (Some(c"it"), 2, own, "fmuType 2"),
+            (Some(c"it"), MODEL_EXCHANGE, own, "is for co-simulation only"),
+        ];
+        for (name, fmu_type, guid, part) in cases {
+            if fmu_type == MODEL_EXCHANGE && unit.description.model_exchange {
+                continue;
+            }
+            let refused = unit.instantiate(name, fmu_type, guid, None);
+            assert!(refused.component.is_null(), "{}: {part}", unit.name());
+            assert_eq!(refused.messages().len(), 1, "{part}: said once");
+            refused.refused(refused.messages()[0].status, ERROR, &["fmi2Instantiate: ", part]);
+        }
+    }
+}
