@@ -1,1 +1,119 @@
+//! Derivatives of inputs and outputs by time in co-simulation, and where directional derivatives are offered.
 
+use conformance::interface::{CO_SIMULATION, ERROR, Status};
+use conformance::{Instance, c, is_continuous_real, units};
+use model_description::variable::{Causality, Variable};
+
+fn set(instance: &Instance, reference: u32, order: i32, value: f64) -> Status {
+    c!(instance, fmi2SetRealInputDerivatives(instance.component, &reference, 1, &order, &value))
+}
+
+fn takes_derivatives(variable: &Variable) -> bool {
+    variable.causality == Causality::Input && is_continuous_real(variable)
+}
+
+#[test]
+fn derivatives_of_continuous_inputs_are_taken_and_no_others() {
+    for unit in units() {
+        let instance = unit.instance(CO_SIMULATION).initialized();
+        let here = instance.save();
+        for (variable, reference) in unit.description.variables.iter().zip(0..) {
+            let named = format!("'{}'", variable.name);
+            let refused = |status, parts: &[&str]| {
+                instance.refused(status, ERROR, parts);
+                instance.restore(here);
+            };
+            if !takes_derivatives(variable) {
+                refused(set(&instance, reference, 1, 0.5), &["fmi2SetRealInputDerivatives", &named]);
+                continue;
+            }
+            for order in 1..=3 {
+                instance.ok(set(&instance, reference, order, 0.5));
+            }
+            for order in [0, -1, 4, i32::MIN, i32::MAX] {
+                let part = format!("{named}: order {order} is not between 1 and 3");
+                refused(set(&instance, reference, order, 0.5), &[&part]);
+            }
+            for value in [f64::NAN, f64::INFINITY] {
+                refused(set(&instance, reference, 1, value), &[&named, "not finite"]);
+            }
+        }
+    }
+}
+
+#[test]
+fn oracle_inputs_follow_their_derivatives_for_one_step() {
+    for unit in units() {
+        let h = unit.description.default_experiment.step;
+        for reference in unit.references(takes_derivatives) {
+            let instance = unit.instance(CO_SIMULATION).initialized();
+            let name = &unit.description.variables[reference as usize].name;
+            let start = instance.real(reference);
+            // Small, and not away from zero.
+            let [first, second, third] = [1e-4, 2e-4, -3e-4].map(|value: f64| -value * start.signum());
+            let (references, orders, values) = ([reference; 3], [3, 1, 2], [third, first, second]);
+            let (component, list) = (instance.component, references.as_ptr());
+            let (orders, values) = (orders.as_ptr(), values.as_ptr());
+            instance.ok(c!(instance, fmi2SetRealInputDerivatives(component, list, 3, orders, values)));
+            instance.ok(instance.step(0.0, h));
+            // 4.2.1: u + u' h + u'' h² / 2 + u''' h³ / 6
+            let expected = start + first * h + second * h * h / 2.0 + third * h * h * h / 6.0;
+            let end = instance.real(reference);
+            let near = (end - expected).abs() <= 2.0 * f64::EPSILON * expected.abs();
+            assert!(near, "{}: {name} = {end}, not {expected}", unit.name());
+            assert_ne!(end, start, "{}: {name}", unit.name());
+            instance.ok(instance.step(h, h));
+            assert_eq!(instance.real(reference), end, "{}: {name} in the next step", unit.name());
+        }
+    }
+}
+
+#[test]
+fn a_derivative_acts_within_the_step() {
+    for unit in units() {
+        // The end is no tick of any unit: what was sampled within the step is held there.
+        let (input, size) = (unit.input(), 4.33 * unit.description.default_experiment.step);
+        let after = |slope: f64| {
+            let instance = unit.instance(CO_SIMULATION).initialized();
+            instance.ok(set(&instance, input, 1, slope));
+            instance.ok(instance.step(0.0, size));
+            // So that only what happened on the way can make a difference.
+            instance.ok(instance.set_real(input, 0.0));
+            instance.bits(&unit.results())
+        };
+        let slope = unit.instance(CO_SIMULATION).course(100);
+        assert!(after(0.0) != after(slope), "{}", unit.name());
+        assert!(after(slope) == after(slope), "{}", unit.name());
+    }
+}
+
+#[test]
+fn no_unit_offers_derivatives_of_outputs() {
+    for unit in units() {
+        for reference in unit.references(|variable| variable.causality == Causality::Output) {
+            let instance = unit.instance(CO_SIMULATION).initialized();
+            let component = instance.component;
+            let status = c!(instance, fmi2GetRealOutputDerivatives(component, &reference, 1, &1, &mut 0.0));
+            instance.refused(
+                status,
+                ERROR,
+                &["fmi2GetRealOutputDerivatives", "maxOutputDerivativeOrder is 0"],
+            );
+        }
+    }
+}
+
+#[test]
+fn only_units_with_states_offer_directional_derivatives() {
+    for unit in units() {
+        let instance = unit.instance(CO_SIMULATION).initialized();
+        let (output, input, component) = (unit.results()[0], unit.input(), instance.component);
+        let status =
+            c!(instance, fmi2GetDirectionalDerivative(component, &output, 1, &input, 1, &1.0, &mut 0.0));
+        if unit.description.directional_derivatives() {
+            instance.ok(status);
+        } else {
+            instance.refused(status, ERROR, &["offers no directional derivatives"]);
+        }
+    }
+}

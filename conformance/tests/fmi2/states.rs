@@ -1,1 +1,129 @@
+//! Saved states of every unit: taken back bit for bit, and refused if anything is wrong with them. That they go on in another
+//! process is tested with the packed archives (tests/test_states.py).
 
+use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE};
+use conformance::{Bits, Instance, Unit, c, units};
+use std::ops::Range;
+
+fn driver(fmu_type: i32) -> fn(&Instance, Range<u32>) -> Vec<Bits> {
+    if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive }
+}
+
+/// In the midst of things.
+fn running(unit: &Unit, fmu_type: i32) -> Instance {
+    let instance = unit.instance(fmu_type).initialized();
+    driver(fmu_type)(&instance, 0..4);
+    instance.forget();
+    instance
+}
+
+#[test]
+fn handles_and_bytes_bring_back_the_same_future() {
+    for unit in units() {
+        for &fmu_type in unit.interfaces() {
+            let drive = driver(fmu_type);
+            let instance = running(&unit, fmu_type);
+            let (mut handle, bytes) = (instance.save(), instance.serialize());
+            let expected = drive(&instance, 4..12);
+            instance.restore(handle);
+            assert!(drive(&instance, 4..12) == expected, "{}", unit.name());
+            // The same handle, written over with the present state.
+            let (before, present) = (handle, instance.serialize());
+            instance.ok(c!(instance, fmi2GetFMUstate(instance.component, &mut handle)));
+            assert_eq!(handle, before);
+            instance.ok(c!(instance, fmi2Reset(instance.component)));
+            instance.restore(handle);
+            assert!(instance.serialize() == present, "{}", unit.name());
+            // From bytes, in an instance that was never initialized.
+            let other = unit.instance(fmu_type);
+            let (status, state) = other.deserialize(&bytes);
+            other.ok(status);
+            other.restore(state);
+            assert!(drive(&other, 4..12) == expected, "{}", unit.name());
+            // Freed, the handle is NULL, and freeing that is fine.
+            instance.ok(c!(instance, fmi2FreeFMUstate(instance.component, &mut handle)));
+            assert!(handle.is_null());
+            instance.ok(c!(instance, fmi2FreeFMUstate(instance.component, &mut handle)));
+            let status = c!(instance, fmi2SetFMUstate(instance.component, before));
+            instance.refused(status, ERROR, &["fmi2SetFMUstate", "was freed"]);
+        }
+    }
+}
+
+#[test]
+fn every_truncation_and_every_damaged_byte_is_refused() {
+    for unit in units() {
+        for &fmu_type in unit.interfaces() {
+            let instance = running(&unit, fmu_type);
+            let bytes = instance.serialize();
+            let refuse = |bytes: &[u8], what: &str| {
+                let (status, state) = instance.deserialize(bytes);
+                assert_eq!(status, ERROR, "{}: {what}", unit.name());
+                assert!(state.is_null(), "{}: {what}", unit.name());
+            };
+            for length in 0..bytes.len() {
+                refuse(&bytes[..length], &format!("cut to {length} bytes"));
+            }
+            let mut damaged = bytes.clone();
+            for i in 0..bytes.len() {
+                // One bit of each byte; that every bit counts is tested with the shell.
+                damaged[i] ^= 1 << (i % 8);
+                refuse(&damaged, &format!("byte {i} damaged"));
+                damaged[i] = bytes[i];
+            }
+            refuse(&[bytes.as_slice(), b"x"].concat(), "one byte more");
+            for message in instance.messages() {
+                assert!(message.text.starts_with("fmi2DeSerializeFMUstate: "), "{}", message.text);
+            }
+            // None of this left a trace.
+            assert!(instance.serialize() == bytes, "{}", unit.name());
+            driver(fmu_type)(&instance, 4..6);
+        }
+    }
+}
+
+#[test]
+fn states_of_other_units_and_interfaces_are_refused() {
+    let units = units();
+    let kinds = units.iter().flat_map(|unit| unit.interfaces().iter().map(move |&kind| (unit, kind)));
+    let all: Vec<_> = kinds.map(|(unit, kind)| running(unit, kind)).collect();
+    for (i, instance) in all.iter().enumerate() {
+        let (component, before) = (instance.component, instance.serialize());
+        for (_, other) in all.iter().enumerate().filter(|&(j, _)| j != i) {
+            let part =
+                if instance.unit.guid() == other.unit.guid() { "other interface" } else { "with GUID" };
+            instance.refused(instance.deserialize(&other.serialize()).0, ERROR, &[part]);
+            // Nor is a handle of another instance taken, whatever it is of.
+            let mut foreign = other.save();
+            let refused = |status| instance.refused(status, ERROR, &["not made by this instance"]);
+            refused(c!(instance, fmi2SetFMUstate(component, foreign)));
+            refused(c!(instance, fmi2FreeFMUstate(component, &mut { foreign })));
+            refused(c!(instance, fmi2GetFMUstate(component, &mut { foreign })));
+            refused(c!(instance, fmi2SerializedFMUstateSize(component, foreign, &mut 0)));
+            other.ok(c!(other, fmi2FreeFMUstate(other.component, &mut foreign)));
+        }
+        assert!(instance.serialize() == before, "{}", instance.unit.name());
+    }
+}
+
+#[test]
+fn bytes_fill_the_room_that_was_asked_for_and_no_more() {
+    for unit in units() {
+        let instance = running(&unit, CO_SIMULATION);
+        let (state, component, bytes) = (instance.save(), instance.component, instance.serialize());
+        let mut room = vec![0xaa_u8; bytes.len() + 16];
+        let mut serialize = |size| {
+            let status =
+                c!(instance, fmi2SerializeFMUstate(component, state, room.as_mut_ptr().cast(), size));
+            (status, room.clone())
+        };
+        for size in [0, 1, bytes.len() - 1] {
+            let (status, room) = serialize(size);
+            instance.refused(status, ERROR, &["fmi2SerializeFMUstate", &format!("room for {size} bytes")]);
+            assert!(room.iter().all(|&byte| byte == 0xaa));
+        }
+        let (status, room) = serialize(bytes.len() + 16);
+        instance.ok(status);
+        assert!(room == [bytes.as_slice(), &[0xaa; 16]].concat(), "{}", unit.name());
+    }
+}

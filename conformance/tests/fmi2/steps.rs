@@ -1,1 +1,200 @@
+//! The experiment, and the steps of co-simulation.
 
+use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE};
+use conformance::{Bits, Instance, Unit, c, units};
+use model_description::variable::Kind;
+use std::ffi::c_int;
+
+/// Tolerance, start time, stop time; NaN stands for what is not defined, and is passed.
+type Experiment = (Option<f64>, f64, Option<f64>);
+
+fn set_up(instance: &Instance, (tolerance, start, stop): Experiment) -> c_int {
+    let defined = |value: Option<f64>| (c_int::from(value.is_some()), value.unwrap_or(f64::NAN));
+    let ((with_tolerance, tolerance), (with_stop, stop)) = (defined(tolerance), defined(stop));
+    let component = instance.component;
+    c!(instance, fmi2SetupExperiment(component, with_tolerance, tolerance, start, with_stop, stop))
+}
+
+fn begun(unit: &Unit, experiment: Experiment) -> Instance {
+    let instance = unit.instance(CO_SIMULATION);
+    instance.ok(set_up(&instance, experiment));
+    through_initialization(&instance);
+    instance
+}
+
+fn through_initialization(instance: &Instance) {
+    instance.ok(c!(instance, fmi2EnterInitializationMode(instance.component)));
+    instance.ok(c!(instance, fmi2ExitInitializationMode(instance.component)));
+}
+
+#[test]
+fn neither_tolerance_nor_stop_time_changes_a_result() {
+    for unit in units() {
+        let without = begun(&unit, (None, 0.0, None)).drive(0..6);
+        for (tolerance, stop) in [
+            (Some(1e-4), None),
+            (Some(0.0), None),
+            (None, Some(100.0)),
+            (Some(1e-6), Some(100.0)),
+            (None, Some(f64::INFINITY)),
+        ] {
+            let with = begun(&unit, (tolerance, 0.0, stop)).drive(0..6);
+            assert!(with == without, "{}: {tolerance:?} {stop:?}", unit.name());
+        }
+        // Some importers leave the call out.
+        let instance = unit.instance(CO_SIMULATION);
+        through_initialization(&instance);
+        assert!(instance.drive(0..6) == without, "{}", unit.name());
+    }
+}
+
+#[test]
+fn an_experiment_without_sense_is_refused() {
+    for unit in units() {
+        for &fmu_type in unit.interfaces() {
+            for (experiment, part) in [
+                ((None, f64::NAN, None), "start time NaN"),
+                ((None, f64::INFINITY, None), "start time inf"),
+                ((None, 2.0, Some(1.0)), "stop time 1 is not after the start time 2"),
+                ((None, 0.0, Some(f64::NAN)), "stop time NaN"),
+                ((None, 0.0, Some(f64::NEG_INFINITY)), "stop time -inf"),
+                ((Some(f64::NAN), 0.0, None), "tolerance NaN"),
+                ((Some(-1e-4), 0.0, None), "tolerance -0.0001"),
+                ((Some(f64::INFINITY), 0.0, None), "tolerance inf"),
+            ] {
+                let instance = unit.instance(fmu_type);
+                instance.refused(set_up(&instance, experiment), ERROR, &["fmi2SetupExperiment", part]);
+                instance.ok(c!(instance, fmi2Reset(instance.component)));
+                instance.ok(set_up(&instance, (None, 0.0, Some(0.0))));
+            }
+        }
+    }
+}
+
+#[test]
+fn an_experiment_may_start_at_any_time() {
+    for unit in units() {
+        let h = unit.description.default_experiment.step;
+        for start in [-3.0, 1.0, 1e6] {
+            let instance = begun(&unit, (None, start, None));
+            for k in 0..3 {
+                instance.ok(instance.step(start + f64::from(k) * h, h));
+                instance.bits(&unit.results());
+            }
+            let mut time = f64::NAN;
+            instance.ok(c!(instance, fmi2GetRealStatus(instance.component, 2, &mut time)));
+            assert!((time - (start + 3.0 * h)).abs() < 1e-9 * start.abs().max(1.0), "{}", unit.name());
+        }
+    }
+}
+
+#[test]
+fn a_last_step_that_is_short_by_rounding_ends_in_the_same_place() {
+    for unit in units() {
+        let h = unit.description.default_experiment.step;
+        let mut reals = unit.results();
+        reals.retain(|&reference| {
+            matches!(unit.description.variables[reference as usize].kind, Kind::Real { .. })
+        });
+        let after = |last: f64| -> Bits {
+            let instance = begun(&unit, (None, 0.0, Some(10.0 * h)));
+            instance.drive(0..9);
+            instance.ok(instance.step(9.0 * h, last));
+            instance.bits(&reals)
+        };
+        let exact = after(h);
+        assert!(after(h - 1e-17) == exact, "{}", unit.name());
+        // 1e-17 is lost in the step's length. What is not: the difference of two instants, and a step next to it.
+        for near in [10.0 * h - 9.0 * h, h.next_down(), h.next_up()] {
+            for (&a, &b) in after(near).iter().zip(&exact) {
+                let (a, b) = (f64::from_bits(a), f64::from_bits(b));
+                assert!((a - b).abs() <= 1e-9 * a.abs().max(b.abs()).max(1e-9), "{}: {a} {b}", unit.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_master_that_adds_up_its_time_is_followed() {
+    for unit in units() {
+        let h = unit.description.default_experiment.step;
+        let instance = begun(&unit, (None, 0.0, None));
+        let mut time = 0.0;
+        for _ in 0..100 {
+            instance.ok(instance.step(time, h));
+            time += h;
+        }
+        assert_ne!(time, 100.0 * h, "the sum must differ for this test to mean anything");
+    }
+}
+
+#[test]
+fn a_step_of_no_length_changes_nothing() {
+    for unit in units() {
+        let instance = begun(&unit, (None, 0.0, None));
+        let h = unit.description.default_experiment.step;
+        instance.drive(0..3);
+        let before = instance.bits(&unit.results());
+        for _ in 0..3 {
+            instance.ok(instance.step(3.0 * h, 0.0));
+            assert!(instance.bits(&unit.results()) == before, "{}", unit.name());
+        }
+        instance.drive(3..6);
+        // The smallest length there is.
+        instance.ok(instance.step(6.0 * h, f64::from_bits(1)));
+    }
+}
+
+#[test]
+fn steps_without_sense_are_refused() {
+    for unit in units() {
+        let h = unit.description.default_experiment.step;
+        let instance = begun(&unit, (None, 0.0, Some(10.0 * h)));
+        instance.drive(0..5);
+        let (here, before, now) = (instance.save(), instance.serialize(), 5.0 * h);
+        for (point, size, part) in [
+            (now, -h, "cannot step"),
+            (now, f64::NAN, "cannot step"),
+            (now, f64::INFINITY, "cannot step"),
+            (now, f64::NEG_INFINITY, "cannot step"),
+            (f64::NAN, h, "cannot step"),
+            (f64::INFINITY, h, "cannot step"),
+            (now + h, h, "communication point"),
+            (now - h, h, "communication point"),
+            (now + 1e-6 * h, h, "communication point"),
+            (0.0, h, "communication point"),
+            (now, 5.01 * h, "beyond the stop time"),
+            (now, 1e300, "beyond the stop time"),
+        ] {
+            instance.refused(instance.step(point, size), ERROR, &["fmi2DoStep", part]);
+            // In state error, until the state is restored or the unit reset.
+            instance.refused(instance.step(now, h), ERROR, &["fmi2DoStep", "not allowed in state error"]);
+            instance.restore(here);
+            assert!(instance.serialize() == before, "{}: {point} {size}", unit.name());
+        }
+        instance.drive(5..10);
+        // At the stop time nothing is left but a step of no length.
+        instance.ok(instance.step(10.0 * h, 0.0));
+        instance.refused(instance.step(10.0 * h, h), ERROR, &["beyond the stop time"]);
+    }
+}
+
+#[test]
+fn a_defined_stop_time_may_be_the_start_time() {
+    for unit in units() {
+        let instance = begun(&unit, (None, 1.0, Some(1.0)));
+        instance.ok(instance.step(1.0, 0.0));
+        instance.refused(instance.step(1.0, 0.1), ERROR, &["beyond the stop time 1 s"]);
+    }
+}
+
+#[test]
+fn times_of_model_exchange_are_checked() {
+    for unit in units().iter().filter(|unit| unit.description.model_exchange) {
+        for time in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let instance = unit.instance(MODEL_EXCHANGE).initialized();
+            let status = c!(instance, fmi2SetTime(instance.component, time));
+            instance.refused(status, ERROR, &["fmi2SetTime", "not finite"]);
+        }
+    }
+}
