@@ -213,7 +213,8 @@ impl Disturbance {
 /// Three numbers uniform in [−1, 1): a pure function of seed and tick, by jumping ahead in the generator's sequence.
 fn white(seed: u64, tick: i64) -> Vector3<f64> {
     let mut generator = Pcg64::seed_from_u64(seed);
-    generator.advance(3 * i128::from(tick) as u128);
+    // Backwards before tick 0, modulo 2¹²⁸.
+    generator.advance((3 * i128::from(tick)) as u128);
     let mut uniform = || (generator.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0;
     let (x, y, z) = (uniform(), uniform(), uniform());
     Vector3::new(x, y, z)
@@ -222,4 +223,21 @@ fn white(seed: u64, tick: i64) -> Vector3<f64> {
 /// Sign of each component, + for 0.
 fn signs(vector: &Vector3<f64>) -> Vector3<f64> {
     vector.map(|component| if component < 0.0 { -1.0 } else { 1.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oracle_white_noise_is_one_sequence_before_and_after_the_start() {
+        let mut generator = Pcg64::seed_from_u64(7);
+        generator.advance(9u128.wrapping_neg());
+        for tick in -3..3 {
+            let next: [u64; 3] = std::array::from_fn(|_| generator.next_u64() >> 11);
+            let expected = next.map(|bits| bits as f64 / (1u64 << 52) as f64 - 1.0);
+            assert_eq!(white(7, tick), Vector3::from(expected), "tick {tick}");
+        }
+        assert!(white(7, i64::MIN).iter().all(|value| value.abs() <= 1.0));
+    }
 }
