@@ -131,17 +131,19 @@ pub unsafe fn fmi2Instantiate(
         let interface = Interface::from_c(fmu_type).ok_or_else(|| {
             format!("fmuType {fmu_type} is neither 0 (model exchange) nor 1 (co-simulation)")
         })?;
-        let described = exports.iter().map(|export| (export, (export.describe)()));
-        let known: Vec<_> =
-            described.map(|(export, description)| (description.guid(), export, description)).collect();
-        let list = known.iter().map(|(guid, _, unit)| format!("{} {guid}", unit.name)).collect::<Vec<_>>();
-        let (guid, export, description) =
-            known.into_iter().find(|(own, ..)| own == guid).ok_or_else(|| {
-                format!(
-                    "no unit with GUID '{guid}' in this library, which holds {}: pack it again",
-                    list.join(", ")
-                )
-            })?;
+        let described = || {
+            exports.iter().map(|export| {
+                let description = (export.describe)();
+                (description.guid(), export, description)
+            })
+        };
+        let (guid, export, description) = described().find(|(own, ..)| own == guid).ok_or_else(|| {
+            let list: Vec<_> = described().map(|(guid, _, unit)| format!("{} {guid}", unit.name)).collect();
+            format!(
+                "no unit with GUID '{guid}' in this library, which holds {}: pack it again",
+                list.join(", ")
+            )
+        })?;
         if interface == Interface::ModelExchange && !description.model_exchange {
             return Err(format!("{} is for co-simulation only", description.name));
         }
