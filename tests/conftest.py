@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 import subprocess
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import importers
 from fmi import Fmu
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -18,12 +21,12 @@ NAMES = [
     "CRMPC",
     "DLMPC",
     "LQR",
-    "ControlAllocator",
     "FBL",
     "BTVSMC",
     "BTVSMC_DO",
     "SOTVSMC_DO",
     "TwoLoopSMC",
+    "ControlAllocator",
 ]
 
 
@@ -47,6 +50,41 @@ def library(crate: str) -> Path:
     found = [path for path in candidates if path.is_file()]
     assert found, f"none of {candidates} exists: run scripts/build-fmus"
     return found[0]
+
+
+def example(name: str) -> Path:
+    """A built example of the orchestrator: `cargo test` builds them too."""
+    file = name + (".exe" if os.name == "nt" else "")
+    candidates = [TARGET / profile / "examples" / file for profile in ("release", "debug")]
+    found = [path for path in candidates if path.is_file()]
+    assert found, f"none of {candidates} exists: run cargo build -p orchestrator --example {name}"
+    return max(found, key=lambda path: path.stat().st_mtime)
+
+
+@pytest.fixture(scope="session")
+def tool():
+    """A program that came with a Python package."""
+
+    def path(name: str) -> Path:
+        found = Path(sys.executable).parent / (name + (".exe" if os.name == "nt" else ""))
+        assert found.is_file(), f"{found} does not exist: install tests/requirements.txt"
+        return found
+
+    return path
+
+
+@pytest.fixture
+def agree(request):
+    """Compares an importer's values with ours, in shares of each column's largest, by the bound of the test's mark."""
+    within = request.node.get_closest_marker("importer").kwargs["within"]
+
+    def compare(found: np.ndarray, expected: np.ndarray) -> None:
+        assert found.shape == expected.shape
+        largest = np.abs(expected).max(axis=0)
+        error = np.abs(found - expected).max(axis=0)
+        assert (error <= within * largest).all(), f"{np.max(error / np.where(largest > 0.0, largest, 1.0))} > {within}"
+
+    return compare
 
 
 @pytest.fixture(scope="session")
@@ -89,3 +127,39 @@ def experiment(orchestrate):
         return done[name]
 
     return run_once
+
+
+# The table of docs/importers.md: what the tests marked `importer` found.
+
+
+def pytest_addoption(parser):
+    parser.addoption("--write-importers", action="store_true", help="write the table of docs/importers.md anew")
+
+
+def pytest_configure(config):
+    config.addinivalue_line(
+        "markers",
+        "importer(tool, use, unit, plant, within, to): a row of docs/importers.md. The unit is that of the parameter `name`, unless "
+        "it is given, and with `plant` ReentryPlant too. Results are `within` a share of the largest value `to` a reference.",
+    )
+    config.addinivalue_line("markers", "whole_matrix: looks at the outcomes of all tests marked `importer`, so runs last")
+    config.stash[importers.FINDINGS] = importers.Findings(NAMES)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    config.stash[importers.FINDINGS].expect(items)
+    # It looks at what the others found.
+    items.sort(key=lambda item: "whole_matrix" in item.keywords)
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item, call):
+    report = (yield).get_result()
+    if report.when == "call" or not report.passed:
+        item.config.stash[importers.FINDINGS].note(item, report.outcome)
+
+
+def pytest_sessionfinish(session):
+    if session.config.getoption("--write-importers"):
+        session.config.stash[importers.FINDINGS].write()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -175,35 +176,39 @@ def number(written):
 class Loop:
     """Controller and plant stepped by hand.
 
-    At each communication point the plant's state goes to the controller, then its moment to the plant (Gauss-Seidel in the order controller, plant). Or else (Jacobi) both are read before either is set."""
+    At each communication point the plant's state goes to the controller, then its moment to the plant (Gauss-Seidel in the order controller, plant). Or else (Jacobi) both are read before either is set. What was read is returned. A clock gives time and length of each step, where importers compute them in ways that round differently."""
 
-    def __init__(self, controller: Unit, plant: Unit, step: float, jacobi: bool = False):
-        self.controller, self.plant, self.step, self.jacobi = controller, plant, step, jacobi
+    def __init__(self, controller: Unit, plant: Unit, step: float, jacobi: bool = False, clock: Callable | None = None):
+        self.controller, self.plant, self.jacobi = controller, plant, jacobi
+        self.clock = clock or (lambda tick: (tick * step, step))
         self.tick = 0
 
-    def pass_on(self) -> None:
-        names = ANGLES + RATES
-        self.controller.set(dict(zip(names, self.plant.get(names))))
-        self.plant.set(dict(zip(MOMENT, self.controller.get(MOMENT))))
+    def pass_on(self) -> list[float]:
+        state = self.plant.get(ANGLES + RATES)
+        self.controller.set(dict(zip(ANGLES + RATES, state)))
+        moment = self.controller.get(MOMENT)
+        self.plant.set(dict(zip(MOMENT, moment)))
+        return state + moment
 
-    def start(self) -> None:
+    def start(self) -> list[float]:
         self.controller.enter()
         self.plant.enter()
         self.pass_on()
         self.controller.exit()
         self.plant.exit()
-        self.couple()
+        return self.couple()
 
-    def couple(self) -> None:
+    def couple(self) -> list[float]:
         if not self.jacobi:
             return self.pass_on()
         state, moment = self.plant.get(ANGLES + RATES), self.controller.get(MOMENT)
         self.controller.set(dict(zip(ANGLES + RATES, state)))
         self.plant.set(dict(zip(MOMENT, moment)))
+        return state + moment
 
-    def advance(self) -> None:
-        time = self.tick * self.step
-        self.controller.step(time, self.step)
-        self.plant.step(time, self.step)
+    def advance(self) -> list[float]:
+        now = self.clock(self.tick)
+        self.controller.step(*now)
+        self.plant.step(*now)
         self.tick += 1
-        self.couple()
+        return self.couple()

@@ -17,6 +17,7 @@ def pack(folder, *arguments):
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.importer("FMPy", "`fmpy validate`")
 def test_fmpy_finds_no_problem(name):
     assert validate_fmu(str(archive(name))) == []
 

@@ -1,4 +1,4 @@
-"""SSP archives: written from experiments, valid by the standard's schema, run by FMPy and by the orchestrator; others' archives too."""
+"""SSP archives: written from experiments, valid by the standard's schema, run by the orchestrator; others' archives too. Run by others: test_importers.py."""
 
 import csv
 import math
@@ -8,11 +8,9 @@ import zipfile
 
 import numpy as np
 import pytest
-from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssd
 
 from conftest import EXPERIMENTS, TARGET, archive, program
-from fmi import ANGLES, MOMENT, RATES, Unit
 
 ALL = sorted(path for path in EXPERIMENTS.parent.rglob("*.toml") if "[simulation]" in path.read_text())
 # Wall-clock times differ from run to run.
@@ -68,28 +66,6 @@ def test_an_archive_runs_as_its_experiment_does(name, tmp_path):
     for column, values in toml.items():
         if not column.endswith(TIMES):
             assert np.array_equal(ssp[column], values), column
-
-
-def test_oracle_fmpy_runs_an_archive_with_its_own_delay(fmu, tmp_path):
-    """FMPy sets zeros at the first step, steps all components, and passes values on afterwards; rows bear the step's start."""
-    path = tmp_path / "x.ssp"
-    pack(EXPERIMENTS / "crmpc-robust.toml", path)
-    found = simulate_ssp(str(path), stop_time=2.0, step_size=0.04)
-    with Unit(fmu("CRMPC")) as controller, Unit(fmu("ReentryPlant")) as plant:
-        for unit in (controller, plant):
-            unit.start(0.0)
-        moment, measured = [0.0] * 3, [0.0] * 6
-        time = 0.0
-        for row in found:
-            controller.set(dict(zip(ANGLES + RATES, measured)))
-            controller.step(time, 0.04)
-            plant.set(dict(zip(MOMENT, moment)))
-            plant.step(time, 0.04)
-            moment, measured = controller.get(MOMENT), plant.get(ANGLES + RATES)
-            assert row["time"] == time
-            assert [row[f"plant.{name}"] for name in ANGLES + RATES] == list(measured)
-            time += 0.04
-    assert len(found) >= 50
 
 
 SSD = """<?xml version="1.0" encoding="ISO-8859-1"?>

@@ -1,0 +1,128 @@
+//! Runs FMUs by fmi-rs alone: its importer, its simulation of one unit, and two units wired by hand. Writes CSV.
+//!
+//! `fmi_rs cs|me FMU STEP STOP OUT`, `fmi_rs loop CONTROLLER PLANT STEP STOP OUT`
+
+use fmi_rs::fmi2::builder::FMU2Builder;
+use fmi_rs::fmi2::types::fmi2Status;
+use fmi_rs::fmi2::{CS, FMU2};
+use fmi_rs::model_description::fmi2::Causality;
+use fmi_rs::sim::fmi2::recorder::Recorder;
+use fmi_rs::sim::fmi2::{SimulationSettings, Trajectories, cs, csv, me};
+use fmi_rs::sim::solver::ForwardEulerFactory;
+use std::error::Error;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+/// What the plant gives to the controller, and the controller to the plant.
+const STATE: [&str; 6] = ["attitude.alpha", "attitude.beta", "attitude.sigma", "rate.p", "rate.q", "rate.r"];
+const MOMENT: [&str; 3] = ["moment.x", "moment.y", "moment.z"];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match arguments[..] {
+        [kind @ ("cs" | "me"), fmu, step, stop, out] => alone(kind, fmu, step.parse()?, stop.parse()?, out),
+        ["loop", controller, plant, step, stop, out] => {
+            closed_loop(controller, plant, step.parse()?, stop.parse()?, out)
+        }
+        _ => {
+            Err("usage: fmi_rs cs|me FMU STEP STOP OUT, or fmi_rs loop CONTROLLER PLANT STEP STOP OUT".into())
+        }
+    }
+}
+
+/// One unit with its start values, by the library's own simulation. In model exchange by its Euler method.
+fn alone(kind: &str, path: &str, step: f64, stop: f64, out: &str) -> Result<(), Box<dyn Error>> {
+    let opened = FMU2Builder::new(&path)?;
+    let description = Arc::new(opened.model_description);
+    let outputs = description.modelVariables.iter().enumerate();
+    let outputs = outputs.filter(|(_, variable)| variable.causality == Causality::Output);
+    let trajectories = Trajectories::new(description.clone(), outputs.map(|(index, _)| index).collect());
+    let recorder = Arc::new(Recorder::new(trajectories));
+    let settings = SimulationSettings {
+        unzipdir: opened.unzipdir.path().to_path_buf(),
+        model_description: description,
+        start_time: 0.0,
+        stop_time: stop,
+        logging_on: true,
+        set_stop_time: true,
+        output_interval: step,
+        log_time_scale: false,
+        tolerance: 1e-6,
+        set_tolerance: false,
+        start_values: Vec::new(),
+        log_fmi_calls: false,
+        input_file: None,
+        early_return_allowed: false,
+        event_mode_used: false,
+        log_file: None,
+        initial_fmu_state_file: None,
+        final_fmu_state_file: None,
+    };
+    if kind == "cs" {
+        cs::simulate(&settings, None, recorder.clone())?;
+    } else {
+        me::simulate(&settings, &ForwardEulerFactory { fixed_step_size: step }, None, recorder.clone())?;
+    }
+    csv::write_csv(&recorder.trajectories.borrow(), out)?;
+    Ok(())
+}
+
+/// A unit that is stepped by hand, and the value references of what it gives and takes.
+struct Unit {
+    fmu: Arc<FMU2<CS>>,
+    state: Vec<u32>,
+    moment: Vec<u32>,
+    _folder: tempfile::TempDir,
+}
+
+impl Unit {
+    fn new(path: &str) -> Result<Self, Box<dyn Error>> {
+        let opened = FMU2Builder::new(&Path::new(path))?;
+        let references = |names: &[&str]| -> Result<Vec<u32>, Box<dyn Error>> {
+            let reference = |name: &&str| Ok(opened.model_description.variable_by_name(name)?.valueReference);
+            names.iter().map(reference).collect()
+        };
+        let (state, moment) = (references(&STATE)?, references(&MOMENT)?);
+        Ok(Unit { fmu: opened.instantiate_cs("unit")?, state, moment, _folder: opened.unzipdir })
+    }
+}
+
+fn done(status: fmi2Status) -> Result<(), Box<dyn Error>> {
+    if status == fmi2Status::Ok { Ok(()) } else { Err(format!("{status:?}").into()) }
+}
+
+/// At each communication point the state goes to the controller, then its moment to the plant.
+fn closed_loop(controller: &str, plant: &str, step: f64, stop: f64, out: &str) -> Result<(), Box<dyn Error>> {
+    let (controller, plant) = (Unit::new(controller)?, Unit::new(plant)?);
+    let (mut state, mut moment) = ([0.0; 6], [0.0; 3]);
+    let mut pass_on = || -> Result<String, Box<dyn Error>> {
+        done(plant.fmu.getReal(&plant.state, &mut state))?;
+        done(controller.fmu.setReal(&controller.state, &state))?;
+        done(controller.fmu.getReal(&controller.moment, &mut moment))?;
+        done(plant.fmu.setReal(&plant.moment, &moment))?;
+        Ok(state.iter().chain(&moment).map(|value| format!(",{value}")).collect())
+    };
+    for unit in [&controller, &plant] {
+        done(unit.fmu.setupExperiment(None, 0.0, None))?;
+        done(unit.fmu.enterInitializationMode())?;
+    }
+    pass_on()?;
+    for unit in [&controller, &plant] {
+        done(unit.fmu.exitInitializationMode())?;
+    }
+    let mut file = BufWriter::new(File::create(out)?);
+    writeln!(file, "time,{},{}", STATE.join(","), MOMENT.join(","))?;
+    for tick in 0..=(stop / step).round() as u32 {
+        let time = f64::from(tick) * step;
+        if tick > 0 {
+            for unit in [&controller, &plant] {
+                done(unit.fmu.doStep(f64::from(tick - 1) * step, step, 0))?;
+            }
+        }
+        writeln!(file, "{time}{}", pass_on()?)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,100 @@
+"""The table of docs/importers.md, made from the outcomes of the tests that are marked `importer`."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "importers.md"
+BEGIN, END = "<!-- From here on: scripts/update-generated -->\n", "<!-- Up to here: scripts/update-generated -->\n"
+FINDINGS = pytest.StashKey()
+# In this order, by the name that the marks use: what it is called, and what its version is written in.
+TOOLS = {
+    "orchestrator": ("orchestrator", None),
+    "FMPy": ("FMPy", "fmpy"),
+    "libcosimpy": ("libcosim (libcosimpy)", "libcosimpy"),
+    "fmi-sim": ("fmi-sim", ROOT / "scripts" / "environment.sh"),
+    "fmi-rs": ("fmi-rs", ROOT / "Cargo.lock"),
+    "fmu-manipulation-toolbox": ("FMU Manipulation Toolbox", "fmu-manipulation-toolbox"),
+}
+VERSIONS = {"fmi-sim": r"^fmi_sim=(\S+)$", "fmi-rs": r'^name = "fmi-rs"\nversion = "(\S+)"$'}
+
+
+class Findings:
+    def __init__(self, units: list[str]):
+        self.units = units
+        # By the test's identifier: its mark, and the units that it is about.
+        self.expected: dict[str, tuple[pytest.Mark, list[str]]] = {}
+        self.outcomes: dict[str, str] = {}
+        self.files: set[Path] = set()
+
+    def expect(self, items) -> None:
+        for item in items:
+            self.files.add(item.path)
+            mark = item.get_closest_marker("importer")
+            if mark:
+                name = mark.kwargs.get("unit") or item.callspec.params["name"]
+                self.expected[item.nodeid] = mark, [name] + ["ReentryPlant"] * mark.kwargs.get("plant", False)
+
+    def note(self, item, outcome: str) -> None:
+        if item.nodeid in self.expected:
+            # What failed in setting up or tearing down has failed.
+            if self.outcomes.get(item.nodeid) != "failed":
+                self.outcomes[item.nodeid] = outcome
+
+    def missing(self) -> str | None:
+        """Why there can be no table."""
+        wanted = {path for path in Path(__file__).parent.glob("test_*.py") if "mark.importer(" in path.read_text()}
+        if wanted - self.files:
+            return f"{', '.join(sorted(path.name for path in wanted - self.files))} did not run"
+        not_run = [test for test in self.expected if self.outcomes.get(test, "skipped") == "skipped"]
+        return f"{len(not_run)} tests of importers did not run, as {not_run[0]}" if not_run else None
+
+    def table(self) -> str:
+        rows: dict[tuple[str, str], tuple[pytest.Mark, dict[str, bool]]] = {}
+        for test, (mark, units) in self.expected.items():
+            _, cells = rows.setdefault(mark.args, (mark, {}))
+            for unit in units:
+                cells[unit] = cells.get(unit, True) and self.outcomes[test] == "passed"
+        lines = ["| tool | use | " + " | ".join(f"`{unit}`" for unit in self.units) + " | found | compared with |", "|---" * (len(self.units) + 4) + "|"]
+        for tool in TOOLS:
+            for (_, use), (mark, cells) in ((key, row) for key, row in rows.items() if key[0] == tool):
+                marks = [{True: "✓", False: "**fails**"}.get(cells.get(unit), "–") for unit in self.units]
+                lines.append(f"| {title(tool)} | {use} | {' | '.join(marks)} | {found(mark)} |")
+        return "\n".join(lines) + "\n"
+
+    def write(self) -> None:
+        reason = self.missing()
+        if reason:
+            raise pytest.UsageError(f"docs/importers.md stays as it is: {reason}")
+        before, _, after = split()
+        PAGE.write_text(before + BEGIN + "\n" + self.table() + "\n" + END + after)
+
+
+def split() -> tuple[str, str, str]:
+    """The page before, in and after the table."""
+    before, rest = PAGE.read_text().split(BEGIN)
+    table, after = rest.split(END)
+    return before, table.strip() + "\n", after
+
+
+def title(tool: str) -> str:
+    name, source = TOOLS[tool]
+    if source is None:
+        return name
+    if isinstance(source, str):
+        return f"{name} {importlib.metadata.version(source)}"
+    return f"{name} {re.search(VERSIONS[tool], source.read_text(), re.MULTILINE)[1]}"
+
+
+def found(mark: pytest.Mark) -> str:
+    """Agreement and reference."""
+    within = mark.kwargs.get("within")
+    if within is None:
+        return "no problem | –"
+    agreement = within if isinstance(within, str) else "the same bits" if within == 0.0 else f"within {within:g}"
+    return f"{agreement} | {mark.kwargs.get('to', 'stepping by hand')}"

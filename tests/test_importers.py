@@ -1,0 +1,407 @@
+"""Every FMU in every importer at hand, alone and in the closed loop, against our own stepping with the importer's own coupling.
+
+What is marked `importer` makes the table of docs/importers.md (conftest.py). Each test gives two arrays to `agree`: the importer's and ours.
+"""
+
+import csv
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+from fmpy.ssp.simulation import simulate_ssp
+from fmpy.validation import validate_fmu
+
+from conftest import NAMES, ROOT, TARGET, archive, example, program
+from fmi import ANGLES, MOMENT, NOT_REPRODUCIBLE, RATES, Fmu, Loop, Unit
+
+STEP = 0.04
+STEPS = 250
+STOP = STEPS * STEP
+CONTROLLERS = [name for name in NAMES if name not in ("ReentryPlant", "ControlAllocator")]
+LINUX = sys.platform == "linux" and os.uname().machine == "x86_64"
+only_linux = pytest.mark.skipif(not LINUX, reason="this importer has binaries for Linux on x86-64 only")
+
+each_unit = pytest.mark.parametrize("name", NAMES)
+each_controller = pytest.mark.parametrize("name", CONTROLLERS)
+
+
+# Our own stepping. Time and length of step k, as importers compute them: they differ in the last bit
+
+
+def exact(tick):
+    return tick * STEP, STEP
+
+
+def differences(tick):
+    return tick * STEP, (tick + 1) * STEP - tick * STEP
+
+
+def nanoseconds(tick):
+    """Whole nanoseconds, turned into seconds."""
+    now, then = (round(STEP * 1e9) * count / 1e9 for count in (tick, tick + 1))
+    return now, then - now
+
+
+def reals(unit) -> list[str]:
+    """Outputs that are real and no wall-clock time."""
+    names = unit.names("output")
+    return [name for name in names if unit.variables[name].type == "Real" and name not in NOT_REPRODUCIBLE]
+
+
+@pytest.fixture(scope="module")
+def by_hand(fmu):
+    """Outputs of a unit with its start values at each communication point."""
+    done = {}
+
+    def run(name, clock=exact):
+        if (name, clock) not in done:
+            with Unit(fmu(name)).start() as unit:
+                rows = [unit.get(reals(fmu(name)))]
+                for tick in range(STEPS):
+                    unit.step(*clock(tick))
+                    rows.append(unit.get(reals(fmu(name))))
+            done[name, clock] = np.array(rows)
+            assert (np.ptp(done[name, clock], axis=0) > 0.0).any()
+        return done[name, clock]
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def loop(fmu):
+    """State and moment of the closed loop at each communication point, as read before they are passed on (Jacobi) or after."""
+    done = {}
+
+    def run(name, jacobi, clock=exact, parameters=True):
+        key = (name, jacobi, clock, parameters)
+        if key not in done:
+            with Unit(fmu(name)) as controller, Unit(fmu("ReentryPlant"), PARAMETERS if parameters else None) as plant:
+                stepped = Loop(controller, plant, STEP, jacobi, clock)
+                rows = [stepped.start()]
+                rows += [stepped.advance() for _ in range(STEPS)]
+            done[key] = np.array(rows)
+            # A loop that does something: degrees, and a moment that changes.
+            assert np.ptp(done[key][:, 0]) > 0.01 and np.ptp(done[key][:, 6]) > 1e3
+        return done[key]
+
+    return run
+
+
+# Unlike the start values, so that it shows whether they arrive.
+PARAMETERS = {"inertia.scale": 0.97, "disturbance.seed": 3}
+EXPERIMENT = """
+title = "{0} on the scenario of its defaults, but for two parameters"
+[simulation]
+stop = {1}
+step = {2}
+order = ["controller", "plant"]
+[components.plant]
+fmu = "ReentryPlant.fmu"
+unconnected = ["disturbanceMoment.*", "surface*", "jet*", "trajectory.*"]
+[components.plant.parameters]
+"inertia.scale" = 0.97
+"disturbance.seed" = 3
+[components.controller]
+fmu = "{0}.fmu"
+unconnected = ["achievedMoment.*", "reference.*"]
+[[connections]]
+from = "plant.attitude.*"
+to = "controller.attitude.*"
+[[connections]]
+from = "plant.rate.*"
+to = "controller.rate.*"
+[[connections]]
+from = "controller.moment.*"
+to = "plant.moment.*"
+[record]
+variables = ["plant.attitude.*", "plant.rate.*", "controller.moment.*"]
+"""
+WIRES = [("plant", "controller", name) for name in ANGLES + RATES] + [("controller", "plant", name) for name in MOMENT]
+SIGNALS = [(source, name) for source, _, name in WIRES]
+
+
+def orchestrate(folder, text, *arguments):
+    """Columns of the results by the variable's name, with the component."""
+    (folder / "experiment.toml").write_text(text)
+    command = [program("orchestrator"), "run", "experiment.toml", "--out", "out", "--fmu-dir", TARGET / "fmu", "--quiet"]
+    done = subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=60, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return columns(folder / "out" / "results.csv")
+
+
+def columns(path) -> dict[str, np.ndarray]:
+    with open(path, newline="") as file:
+        rows = list(csv.reader(file))
+    kept = [i for i, cell in enumerate(rows[-1]) if number(cell)]
+    return {rows[0][i].split(" ")[0]: np.array([float(row[i]) for row in rows[1:]]) for i in kept}
+
+
+def number(cell) -> bool:
+    try:
+        return bool(cell) and float(cell) is not None
+    except ValueError:
+        return False
+
+
+@pytest.fixture
+def packed(tmp_path):
+    """The closed loop as an SSP archive."""
+
+    def pack(name):
+        (tmp_path / "experiment.toml").write_text(EXPERIMENT.format(name, STOP, STEP))
+        command = [program("orchestrator"), "pack", "experiment.toml", "--ssp", "--out", "loop.ssp", "--fmu-dir", TARGET / "fmu"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        return tmp_path / "loop.ssp"
+
+    return pack
+
+
+# Each unit alone
+
+
+@each_unit
+@pytest.mark.importer("FMPy", "co-simulation", within=0.0)
+def test_oracle_fmpy_steps_a_unit(fmu, by_hand, agree, name):
+    found = simulate_fmu(str(archive(name)), stop_time=STOP, step_size=STEP, output_interval=STEP, output=reals(fmu(name)))
+    agree(np.array([found[column] for column in reals(fmu(name))]).T, by_hand(name, differences))
+
+
+@each_unit
+@pytest.mark.importer("orchestrator", "co-simulation", within=0.0)
+def test_oracle_the_orchestrator_steps_a_unit(fmu, by_hand, agree, tmp_path, name):
+    text = f'title = "alone"\n[simulation]\nstop = {STOP}\nstep = {STEP}\n[components.unit]\nfmu = "{name}.fmu"\nunconnected = ["*"]\n'
+    found = orchestrate(tmp_path, text + '[record]\nvariables = ["unit.*"]\n')
+    agree(np.array([found[f"unit.{column}"] for column in reals(fmu(name))]).T, by_hand(name))
+
+
+@each_unit
+@only_linux
+@pytest.mark.importer("libcosimpy", "co-simulation", within=0.0)
+def test_oracle_libcosim_steps_a_unit(fmu, by_hand, agree, name):
+    cosim = pytest.importorskip("cosim", reason="libcosimpy is for Python 3.11 and later")
+    agree(cosim.alone(archive(name), STEP, STEPS, reals(fmu(name))), by_hand(name, nanoseconds)[1:])
+
+
+@each_unit
+@pytest.mark.importer("fmi-rs", "co-simulation", within=0.0)
+def test_oracle_fmi_rs_steps_a_unit(fmu, by_hand, agree, tmp_path, name):
+    found = fmi_rs(tmp_path, "cs", archive(name))
+    agree(np.array([found[column] for column in reals(fmu(name))]).T, by_hand(name, differences))
+
+
+@each_unit
+@pytest.mark.importer("fmi-sim", "co-simulation", within=0.0)
+def test_oracle_fmi_sim_steps_a_unit(fmu, by_hand, agree, tmp_path, name):
+    found = fmi_sim(tmp_path, "co-simulation", archive(name))
+    agree(np.array([found[column] for column in reals(fmu(name))]).T, by_hand(name))
+
+
+@each_unit
+@pytest.mark.importer("fmu-manipulation-toolbox", "`fmutool -check`")
+def test_oracle_fmutool_finds_no_problem(tool, name):
+    done = subprocess.run([tool("fmutool"), "-input", archive(name), "-check"], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "seems to be compliant" in done.stdout + done.stderr
+
+
+def fmi_rs(folder, *arguments):
+    command = [example("fmi_rs"), *arguments, str(STEP), str(STOP), folder / "out.csv"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    return columns(folder / "out.csv")
+
+
+def fmi_sim(folder, *arguments):
+    name = TARGET / "tools" / "bin" / ("fmi-sim" + (".exe" if os.name == "nt" else ""))
+    assert name.is_file(), f"{name} does not exist: run scripts/install-tools"
+    *interface, path = arguments
+    command = [name, "--model", path, "-o", folder / "out.csv", *interface, "-s", "0", "-f", str(STOP)]
+    command += ["--step", str(STEP), "--output-interval", str(STEP)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return columns(folder / "out.csv")
+
+
+# The plant as model exchange. The same under CVode: test_exchange.py
+
+
+@pytest.fixture(scope="module")
+def euler(fmu):
+    """States by FMPy's Euler method, which test_exchange.py shows to converge to our co-simulation."""
+    settings = dict(fmi_type="ModelExchange", solver="Euler", step_size=STEP, output_interval=STEP, stop_time=STOP)
+    found = simulate_fmu(str(archive("ReentryPlant")), output=ANGLES + RATES, **settings)
+    return np.array([found[name] for name in ANGLES + RATES]).T
+
+
+# It adds up time and step in another order than FMPy: the last bits differ.
+@pytest.mark.importer("fmi-rs", "model exchange, Euler", unit="ReentryPlant", within=1e-12, to="FMPy's Euler")
+def test_oracle_fmi_rs_integrates_the_plant(euler, agree, tmp_path):
+    found = fmi_rs(tmp_path, "me", archive("ReentryPlant"))
+    agree(np.array([found[name] for name in ANGLES + RATES]).T, euler)
+
+
+@pytest.mark.importer("fmi-sim", "model exchange, Euler", unit="ReentryPlant", within=0.0, to="FMPy's Euler")
+def test_oracle_fmi_sim_integrates_the_plant(euler, agree, tmp_path):
+    found = fmi_sim(tmp_path, "model-exchange", archive("ReentryPlant"))
+    agree(np.array([found[name] for name in ANGLES + RATES]).T, euler)
+
+
+# The closed loop
+
+
+@each_controller
+@pytest.mark.importer("orchestrator", "closed loop, Gauss-Seidel", plant=True, within=0.0)
+def test_oracle_the_orchestrator_closes_the_loop(loop, agree, tmp_path, name):
+    found = orchestrate(tmp_path, EXPERIMENT.format(name, STOP, STEP))
+    agree(np.array([found[f"{unit}.{signal}"] for unit, signal in SIGNALS]).T, loop(name, jacobi=False))
+
+
+@each_controller
+@pytest.mark.importer("orchestrator", "closed loop, Jacobi", plant=True, within=0.0)
+def test_oracle_the_orchestrator_closes_the_loop_with_a_delay(loop, agree, tmp_path, name):
+    text = EXPERIMENT.format(name, STOP, STEP).replace("order =", 'coupling = "jacobi"\norder =')
+    found = orchestrate(tmp_path, text)
+    # The states: recorded moments are those after the exchange.
+    agree(np.array([found[f"plant.{signal}"] for signal in ANGLES + RATES]).T, loop(name, jacobi=True)[:, :6])
+
+
+@each_controller
+@pytest.mark.importer("fmi-rs", "closed loop, Gauss-Seidel by hand", plant=True, within=0.0)
+def test_oracle_fmi_rs_closes_the_loop(loop, agree, tmp_path, name):
+    found = fmi_rs(tmp_path, "loop", archive(name), archive("ReentryPlant"))
+    agree(np.array([found[signal] for _, signal in SIGNALS]).T, loop(name, jacobi=False, parameters=False))
+
+
+@each_controller
+@pytest.mark.importer("FMPy", "closed loop, SSP archive", plant=True, within=0.0, to="stepping its way by hand")
+def test_oracle_fmpy_closes_the_loop_of_an_archive(fmu, agree, packed, name):
+    """FMPy sets zeros at the first step, steps all units, and passes values on afterwards; rows bear the step's start. It leaves out the archive's values."""
+    found = simulate_ssp(str(packed(name)), stop_time=STOP, step_size=STEP)
+    expected = []
+    with Unit(fmu(name)).start() as controller, Unit(fmu("ReentryPlant")).start() as plant:
+        state, moment, time = [0.0] * 6, [0.0] * 3, 0.0
+        for _ in range(len(found)):
+            controller.set(dict(zip(ANGLES + RATES, state)))
+            controller.step(time, STEP)
+            plant.set(dict(zip(MOMENT, moment)))
+            plant.step(time, STEP)
+            state, moment = plant.get(ANGLES + RATES), controller.get(MOMENT)
+            expected.append([time, *state, *moment])
+            time += STEP
+    assert len(found) >= STEPS
+    columns = ["time", *(f"{unit}.{signal}" for unit, signal in SIGNALS)]
+    agree(np.array([found[column] for column in columns]).T, np.array(expected))
+
+
+@each_controller
+@only_linux
+@pytest.mark.importer("libcosimpy", "closed loop, SSP archive", plant=True, within=0.0, to="Jacobi by hand")
+def test_oracle_libcosim_closes_the_loop_of_an_archive(loop, agree, packed, tmp_path, name):
+    cosim = pytest.importorskip("cosim", reason="libcosimpy is for Python 3.11 and later")
+    shutil.unpack_archive(packed(name), tmp_path / "archive", "zip")
+    agree(cosim.archive(tmp_path / "archive", STEP, STEPS, SIGNALS), loop(name, jacobi=True, clock=nanoseconds)[1:])
+
+
+@each_controller
+@only_linux
+@pytest.mark.importer("libcosimpy", "closed loop, OSP system structure", plant=True, within=0.0, to="Jacobi by hand")
+def test_oracle_libcosim_closes_the_loop_of_a_system_structure(loop, agree, tmp_path, name):
+    cosim = pytest.importorskip("cosim", reason="libcosimpy is for Python 3.11 and later")
+    units = {"controller": (archive(name), {}), "plant": (archive("ReentryPlant"), PARAMETERS)}
+    cosim.write_structure(tmp_path, STEP, units, WIRES)
+    agree(cosim.structure(tmp_path, STEPS, SIGNALS), loop(name, jacobi=True, clock=nanoseconds)[1:])
+
+
+@each_controller
+@only_linux
+@pytest.mark.importer("fmu-manipulation-toolbox", "closed loop, container FMU in FMPy", plant=True, within=0.0, to="Jacobi by hand")
+def test_oracle_a_container_holds_the_closed_loop(loop, agree, packed, tool, tmp_path, name):
+    """Without the archive's values, which the toolbox leaves out."""
+    packed(name)
+    command = [tool("fmucontainer"), "-fmu-directory", ".", "-container", f"loop.ssp:{STEP}"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    container = tmp_path / "loop.fmu"
+    assert validate_fmu(str(container)) == []
+    prefix = {"plant": "reentryplant", "controller": name.lower()}
+    signals = [f"{prefix[unit]}.{signal}" for unit, signal in SIGNALS]
+    found = simulate_fmu(str(container), stop_time=STOP, step_size=STEP, output_interval=STEP, output=signals)
+    agree(np.array([found[signal] for signal in signals]).T, loop(name, jacobi=True, parameters=False))
+
+
+# A controller of another maker
+
+
+TURNS = [f"attitudeRate.{axis}" for axis in ("alpha", "beta", "sigma")]
+SECONDS = 20
+
+
+@pytest.fixture(scope="module")
+def foreign(tool, tmp_path_factory):
+    """tests/pd_controller.py as an FMU."""
+    folder = tmp_path_factory.mktemp("pythonfmu")
+    command = [tool("pythonfmu"), "build", "-f", ROOT / "tests" / "pd_controller.py", "-d", folder]
+    subprocess.run(command, check=True, capture_output=True, timeout=60)
+    return folder / "PdController.fmu"
+
+
+@pytest.fixture(scope="module")
+def expected(fmu):
+    """The controller as a Python object, with the plant stepped by hand."""
+    from pd_controller import PdController
+
+    controller = PdController(instance_name="controller")
+    rows = []
+    with Unit(fmu("ReentryPlant"), PARAMETERS).start() as plant:
+        for tick in range(round(SECONDS / STEP) + 1):
+            if tick > 0:
+                controller.do_step((tick - 1) * STEP, STEP)
+                plant.step((tick - 1) * STEP, STEP)
+            state = plant.get(ANGLES + TURNS)
+            controller.inputs.update(zip(ANGLES + TURNS, state))
+            moment = [controller.outputs[name] for name in MOMENT]
+            plant.set(dict(zip(MOMENT, moment)))
+            rows.append(state + moment)
+    rows = np.array(rows)
+    # From 30 degrees of bank to the noise about zero.
+    assert np.abs(rows[0, :3]).max() > 0.5 and np.abs(rows[-1, :3]).max() < 0.03
+    return rows
+
+
+@only_linux
+@pytest.mark.importer("orchestrator", "closed loop, controller by PythonFMU", unit="ReentryPlant", within=0.0)
+def test_oracle_the_orchestrator_steps_a_controller_by_pythonfmu(foreign, expected, agree, tmp_path, monkeypatch):
+    # PythonFMU leaves it to the importer to have Python's library in the process.
+    python = sysconfig.get_config_var("INSTSONAME")
+    folders = [sysconfig.get_config_var("LIBDIR"), os.path.join(sysconfig.get_config_var("LIBDIR"), sysconfig.get_config_var("MULTIARCH") or "")]
+    shared = [path for path in (os.path.join(folder, python) for folder in folders) if ".so" in python and os.path.exists(path)]
+    assert shared, f"{python} is in none of {folders}: on Debian and Ubuntu install the package libpython3-dev"
+    monkeypatch.setenv("LD_PRELOAD", shared[0])
+    shutil.copy(foreign, tmp_path)
+    text = EXPERIMENT.format("PdController", SECONDS, STEP).replace('unconnected = ["achievedMoment.*", "reference.*"]', "")
+    found = orchestrate(tmp_path, text.replace("rate.*", "attitudeRate.*"))
+    names = [f"plant.{name}" for name in ANGLES + TURNS] + [f"controller.{name}" for name in MOMENT]
+    agree(np.array([found[name] for name in names]).T, expected)
+
+
+@pytest.mark.importer("FMPy", "closed loop, controller by PythonFMU", unit="ReentryPlant", within=0.0)
+def test_oracle_fmpy_steps_a_controller_by_pythonfmu(fmu, foreign, expected, agree, tmp_path):
+    rows = []
+    with Unit(Fmu.open(foreign, tmp_path)).start() as controller, Unit(fmu("ReentryPlant"), PARAMETERS).start() as plant:
+        for tick in range(len(expected)):
+            if tick > 0:
+                controller.step((tick - 1) * STEP, STEP)
+                plant.step((tick - 1) * STEP, STEP)
+            state = plant.get(ANGLES + TURNS)
+            controller.set(dict(zip(ANGLES + TURNS, state)))
+            moment = controller.get(MOMENT)
+            plant.set(dict(zip(MOMENT, moment)))
+            rows.append(state + moment)
+    agree(np.array(rows), expected)
