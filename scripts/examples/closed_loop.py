@@ -1,0 +1,94 @@
+"""The closed loop of a controller and ReentryPlant, stepped by hand with FMPy. Writes closed_loop.csv.
+
+    python scripts/examples/closed_loop.py CRMPC
+"""
+
+import argparse
+import csv
+import math
+import shutil
+from pathlib import Path
+
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+
+FMUS = Path(__file__).resolve().parents[2] / "target" / "fmu"
+ATTITUDE = ["attitude.alpha", "attitude.beta", "attitude.sigma"]  # rad
+RATE = ["rate.p", "rate.q", "rate.r"]  # rad/s
+MOMENT = ["moment.x", "moment.y", "moment.z"]  # N m
+REFERENCE = ["reference.alpha", "reference.beta", "reference.sigma"]  # rad
+
+
+class Unit:
+    """An FMU that is read and set by the names of its variables, which are real or integer."""
+
+    def __init__(self, path, parameters=None):
+        description = read_model_description(path)
+        self.folder = extract(path)
+        self.variables = {variable.name: variable for variable in description.modelVariables}
+        self.fmu = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=self.folder,
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName=description.modelName,
+        )
+        self.fmu.instantiate()
+        for name, value in (parameters or {}).items():
+            self.set([name], [value])
+        self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+
+    def get(self, names):
+        return self.fmu.getReal([self.variables[name].valueReference for name in names])
+
+    def set(self, names, values):
+        set_values = self.fmu.setReal if self.variables[names[0]].type == "Real" else self.fmu.setInteger
+        set_values([self.variables[name].valueReference for name in names], values)
+
+    def close(self):
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def simulate(controller, stop=50.0, step=0.04, parameters=None, fmus=FMUS):
+    """Rows of time, attitude, rate, moment and reference. The parameters are those of the plant."""
+    plant = Unit(str(fmus / "ReentryPlant.fmu"), parameters)
+    law = Unit(str(fmus / f"{controller}.fmu"))
+    rows = []
+    for k in range(round(stop / step) + 1):
+        if k > 0:
+            law.fmu.doStep((k - 1) * step, step)
+            plant.fmu.doStep((k - 1) * step, step)
+        # The controller answers to the state of this very instant: no delay in the loop.
+        state = plant.get(ATTITUDE + RATE)
+        law.set(ATTITUDE + RATE, state)
+        moment = law.get(MOMENT)
+        plant.set(MOMENT, moment)
+        rows.append([k * step, *state, *moment, *law.get(REFERENCE)])
+    plant.close()
+    law.close()
+    return rows
+
+
+def mean_error(rows):
+    """Root of the mean of |attitude - reference|^2 over the instants at which steps begin, in degrees: EMS of the papers."""
+    squares = [sum((row[1 + i] - row[10 + i]) ** 2 for i in range(3)) for row in rows[:-1]]
+    return math.degrees(math.sqrt(sum(squares) / len(squares)))
+
+
+def arguments(description):
+    parser = argparse.ArgumentParser(description=description.splitlines()[0])
+    parser.add_argument("controller", nargs="?", default="CRMPC", help="name of a controller's FMU [CRMPC]")
+    parser.add_argument("--stop", type=float, default=50.0, help="s [50]")
+    parser.add_argument("--fmus", type=Path, default=FMUS, help="folder of the FMUs [target/fmu]")
+    return parser
+
+
+if __name__ == "__main__":
+    given = arguments(__doc__).parse_args()
+    result = simulate(given.controller, given.stop, fmus=given.fmus)
+    with open("closed_loop.csv", "w", newline="") as file:
+        csv.writer(file).writerows([["time", *ATTITUDE, *RATE, *MOMENT, *REFERENCE], *result])
+    print(f"{given.controller}: EMS {mean_error(result):.3f} deg; closed_loop.csv")

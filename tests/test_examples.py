@@ -1,0 +1,59 @@
+"""The programs of scripts/examples run, and give what the orchestrator gives."""
+
+import csv
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from conftest import EXPERIMENTS, ROOT, TARGET
+
+EXAMPLES = ROOT / "scripts" / "examples"
+
+
+def run(folder, name, *arguments):
+    """A program in a folder of its own; returns what it prints."""
+    command = [sys.executable, EXAMPLES / name, "--fmus", TARGET / "fmu", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", timeout=120, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def table(path):
+    with open(path, newline="") as file:
+        rows = list(csv.reader(file))
+    return rows[0], np.array([[float(cell) for cell in row] for row in rows[1:]])
+
+
+@pytest.mark.parametrize(("controller", "named"), [("CRMPC", "crmpc-robust"), ("LQR", "lqr")])
+def test_closed_loop_is_the_orchestrators(experiment, tmp_path, controller, named):
+    said = run(tmp_path, "closed_loop.py", controller)
+    names, found = table(tmp_path / "closed_loop.csv")
+    with (experiment(named) / "results.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    for i, name in enumerate(names):
+        component = "controller." if name.startswith(("moment", "reference")) else "plant." if i else ""
+        assert np.array_equal(found[:, i], [float(row[component + name]) for row in rows]), name
+    metrics = json.loads((experiment(named) / "metrics.json").read_text())
+    assert f"EMS {metrics['ems_deg']:.3f} deg" in said
+
+
+def test_variation_varies_the_noise(orchestrate, tmp_path):
+    run(tmp_path, "variation.py", "LQR", "--seeds", "20", "--stop", "10")
+    names, found = table(tmp_path / "variation.csv")
+    assert list(found[:, 0]) == list(range(1, 21)) and len(set(found[:, 1])) == 20
+    finished, out = orchestrate(EXPERIMENTS / "lqr.toml", "--stop", "10", "--set", "plant.disturbance.seed=7")
+    assert finished.returncode == 0, finished.stderr
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert found[6, 1:] == pytest.approx([metrics["ems_deg"], metrics["max_rate_deg_s"]], rel=1e-12)
+
+
+def test_plot_makes_a_picture(tmp_path):
+    run(tmp_path, "plot.py", "LQR", "--stop", "10")
+    with Image.open(tmp_path / "closed_loop.png") as image:
+        assert image.size == (1200, 900)
+        # More than a frame: the six lines have colours.
+        assert len(image.convert("RGB").getcolors(maxcolors=1 << 20)) > 100
