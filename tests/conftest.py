@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,15 @@ def tool():
         return found
 
     return path
+
+
+@pytest.fixture(scope="session")
+def libpython() -> str:
+    """Python's shared library. Units by PythonFMU leave it to the importer to have it in the process."""
+    name, folder, platform = (sysconfig.get_config_var(key) or "" for key in ("INSTSONAME", "LIBDIR", "MULTIARCH"))
+    found = [path for path in (Path(folder, name), Path(folder, platform, name)) if ".so" in name and path.is_file()]
+    assert found, f"{name} is not in {folder}: on Debian and Ubuntu install the package libpython3-dev"
+    return str(found[0])
 
 
 @pytest.fixture

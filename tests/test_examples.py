@@ -2,12 +2,15 @@
 
 import csv
 import json
+import shutil
 import subprocess
 import sys
 
+import nbformat
 import numpy as np
 import pytest
-from PIL import Image
+from matplotlib.image import imread
+from nbclient import NotebookClient
 
 from conftest import EXPERIMENTS, ROOT, TARGET
 
@@ -16,7 +19,7 @@ EXAMPLES = ROOT / "scripts" / "examples"
 
 def run(folder, name, *arguments):
     """A program in a folder of its own; returns what it prints."""
-    command = [sys.executable, EXAMPLES / name, "--fmus", TARGET / "fmu", *arguments]
+    command = [sys.executable, EXAMPLES / name, "--fmus", TARGET / "fmu", "--out", ".", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", timeout=120, cwd=folder)
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -53,7 +56,21 @@ def test_variation_varies_the_noise(orchestrate, tmp_path):
 
 def test_plot_makes_a_picture(tmp_path):
     run(tmp_path, "plot.py", "LQR", "--stop", "10")
-    with Image.open(tmp_path / "closed_loop.png") as image:
-        assert image.size == (1200, 900)
-        # More than a frame: the six lines have colours.
-        assert len(image.convert("RGB").getcolors(maxcolors=1 << 20)) > 100
+    picture = imread(tmp_path / "closed_loop.png")
+    assert picture.shape[:2] == (900, 1200)
+    # More than a frame: the lines have colours.
+    assert len(np.unique(picture.reshape(-1, picture.shape[2]), axis=0)) > 100
+
+
+def test_the_notebook_runs(tmp_path):
+    notebook = nbformat.read(EXAMPLES / "closed_loop.ipynb", as_version=4)
+    assert not any(cell.get("outputs") for cell in notebook.cells), "commit it without outputs"
+    for path in EXAMPLES.iterdir():
+        if path.suffix == ".py":
+            (tmp_path / "scripts" / "examples").mkdir(parents=True, exist_ok=True)
+            shutil.copy(path, tmp_path / "scripts" / "examples")
+    (tmp_path / "target").symlink_to(TARGET)
+    NotebookClient(notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(tmp_path / "scripts" / "examples")}}).execute()
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    assert "CRMPC: EMS 2.0" in outputs[0]["text"]
+    assert sum("image/png" in output.get("data", {}) for output in outputs) == 2

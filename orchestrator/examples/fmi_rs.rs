@@ -34,6 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// One unit with its start values, by the library's own simulation. In model exchange by its Euler method.
+#[expect(clippy::arc_with_non_send_sync, reason = "what the library wants")]
 fn alone(kind: &str, path: &str, step: f64, stop: f64, out: &str) -> Result<(), Box<dyn Error>> {
     let opened = FMU2Builder::new(&path)?;
     let description = Arc::new(opened.model_description);
@@ -103,7 +104,7 @@ fn closed_loop(controller: &str, plant: &str, step: f64, stop: f64, out: &str) -
         done(controller.fmu.setReal(&controller.state, &state))?;
         done(controller.fmu.getReal(&controller.moment, &mut moment))?;
         done(plant.fmu.setReal(&plant.moment, &moment))?;
-        Ok(state.iter().chain(&moment).map(|value| format!(",{value}")).collect())
+        Ok(state.iter().chain(&moment).map(f64::to_string).collect::<Vec<_>>().join(","))
     };
     for unit in [&controller, &plant] {
         done(unit.fmu.setupExperiment(None, 0.0, None))?;
@@ -122,7 +123,7 @@ fn closed_loop(controller: &str, plant: &str, step: f64, stop: f64, out: &str) -
                 done(unit.fmu.doStep(f64::from(tick - 1) * step, step, 0))?;
             }
         }
-        writeln!(file, "{time}{}", pass_on()?)?;
+        writeln!(file, "{time},{}", pass_on()?)?;
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-"""The closed loop of a controller and ReentryPlant, stepped by hand with FMPy. Writes closed_loop.csv.
+"""The closed loop of a controller and ReentryPlant, stepped by hand with FMPy. Writes out/closed_loop.csv.
 
     python scripts/examples/closed_loop.py CRMPC
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-FMUS = Path(__file__).resolve().parents[2] / "target" / "fmu"
+FMUS = Path(__file__).absolute().parents[2] / "target" / "fmu"
 ATTITUDE = ["attitude.alpha", "attitude.beta", "attitude.sigma"]  # rad
 RATE = ["rate.p", "rate.q", "rate.r"]  # rad/s
 MOMENT = ["moment.x", "moment.y", "moment.z"]  # N m
@@ -83,12 +83,14 @@ def arguments(description):
     parser.add_argument("controller", nargs="?", default="CRMPC", help="name of a controller's FMU [CRMPC]")
     parser.add_argument("--stop", type=float, default=50.0, help="s [50]")
     parser.add_argument("--fmus", type=Path, default=FMUS, help="folder of the FMUs [target/fmu]")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the results [out]")
     return parser
 
 
 if __name__ == "__main__":
     given = arguments(__doc__).parse_args()
     result = simulate(given.controller, given.stop, fmus=given.fmus)
-    with open("closed_loop.csv", "w", newline="") as file:
+    given.out.mkdir(exist_ok=True)
+    with open(given.out / "closed_loop.csv", "w", newline="") as file:
         csv.writer(file).writerows([["time", *ATTITUDE, *RATE, *MOMENT, *REFERENCE], *result])
-    print(f"{given.controller}: EMS {mean_error(result):.3f} deg; closed_loop.csv")
+    print(f"{given.controller}: EMS {mean_error(result):.3f} deg; {given.out / 'closed_loop.csv'}")

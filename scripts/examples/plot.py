@@ -1,4 +1,4 @@
-"""Attitude against its reference, and the moment, of a closed loop. Writes closed_loop.png.
+"""Attitude against its reference, and the moment, of a closed loop. Writes out/closed_loop.png.
 
     python scripts/examples/plot.py CRMPC
 """
@@ -28,5 +28,6 @@ moments.legend()
 for axes in (angles, moments):
     axes.grid(alpha=0.3)
 figure.suptitle(given.controller)
-figure.savefig("closed_loop.png", dpi=150)
-print("closed_loop.png")
+given.out.mkdir(exist_ok=True)
+figure.savefig(given.out / "closed_loop.png", dpi=150)
+print(given.out / "closed_loop.png")

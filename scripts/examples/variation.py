@@ -1,4 +1,4 @@
-"""The closed loop under 20 realisations of the noise. Writes variation.csv.
+"""The closed loop under 20 realisations of the noise. Writes out/variation.csv.
 
     python scripts/examples/variation.py CRMPC --seeds 20
 """
@@ -19,8 +19,9 @@ for seed in range(1, given.seeds + 1):
     largest_rate = max(math.hypot(*row[4:7]) for row in rows)
     table.append([seed, mean_error(rows), math.degrees(largest_rate)])
 
-with open("variation.csv", "w", newline="") as file:
+given.out.mkdir(exist_ok=True)
+with open(given.out / "variation.csv", "w", newline="") as file:
     csv.writer(file).writerows([["seed", "EMS [deg]", "largest rate [deg/s]"], *table])
 _, errors, rates = zip(*table)
 print(f"{given.controller}, {given.seeds} seeds: EMS {statistics.mean(errors):.3f} deg on average, {max(errors):.3f} deg at most")
-print(f"largest rate {max(rates):.3f} deg/s; variation.csv")
+print(f"largest rate {max(rates):.3f} deg/s; {given.out / 'variation.csv'}")
