@@ -47,20 +47,24 @@ need_python() {
     need_venv "$root/.venv" tests/requirements.txt
 }
 
-# Installs fmi-sim, an importer written in Rust, into $tools unless this very version is there.
+# Installs fmi-sim, an importer written in Rust, into the folder $1 unless this very version is there.
 fmi_sim=0.7.0
-tools="$target/tools"
-install_tools() {
+install_fmi_sim() {
     need_rust
     need_python
-    if grep --quiet --no-messages "\"fmi-sim $fmi_sim " "$tools/.crates.toml"; then return; fi
-    say "Installing fmi-sim $fmi_sim into $tools"
+    if grep --quiet --no-messages "\"fmi-sim $fmi_sim " "$1/.crates.toml"; then return; fi
+    say "Installing fmi-sim $fmi_sim into $1"
     # Its build reads C headers with libclang: the one of tests/requirements.txt, which has no headers of its own.
-    # Not optimised, it is built in a quarter of the time; its runs are short.
-    CARGO_PROFILE_RELEASE_OPT_LEVEL=0 LIBCLANG_PATH="$("$python" -c 'import clang, os; print(os.path.join(clang.__path__[0], "native"))')" \
+    LIBCLANG_PATH="$("$python" -c 'import clang, os; print(os.path.join(clang.__path__[0], "native"))')" \
         BINDGEN_EXTRA_CLANG_ARGS="-I$(cc -print-file-name=include)" \
-        cargo install fmi-sim --version "$fmi_sim" --locked --root "$tools" --target-dir "$tools/build"
-    rm -rf "$tools/build"
+        cargo install fmi-sim --version "$fmi_sim" --locked --root "$1" --target-dir "$1/build"
+    rm -rf "$1/build"
+}
+
+# For the tests: not optimised, it is built in a quarter of the time, and their runs are short.
+tools="$target/tools"
+install_tools() {
+    CARGO_PROFILE_RELEASE_OPT_LEVEL=0 install_fmi_sim "$tools"
 }
 
 # The built library of a crate in a folder, whatever the platform calls it.
