@@ -3,7 +3,7 @@
 use crate::law::{Law, Vehicle};
 use crate::table::{self, ANGLES, sampled_inputs, vector};
 use crate::unit::Unit;
-use control::sliding::{BoundaryLayer, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc};
+use control::sliding::{BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc};
 use fmi2_export::table::{discrete_output, parameter};
 use fmi2_export::{Failure, Table};
 use model_description::unit;
@@ -32,14 +32,14 @@ pub struct TvsmcLaw<V: Variant> {
     /// Gains of the observer; used if the law has one.
     observer: Observer,
     sliding: Vector3<f64>,
-    disturbance: Vector3<f64>,
+    estimate: Estimate,
 }
 
 impl<V: Variant> Default for TvsmcLaw<V> {
     fn default() -> Self {
         let settings = V::published();
         let observer = settings.observer.unwrap_or(Observer { lambda: [1.0; 3], l: [1.0; 3] });
-        Self { settings, observer, sliding: Vector3::zeros(), disturbance: Vector3::zeros() }
+        Self { settings, observer, sliding: Vector3::zeros(), estimate: Estimate::default() }
     }
 }
 
@@ -76,7 +76,7 @@ impl<V: Variant> Law for TvsmcLaw<V> {
 
     fn show(&mut self, memory: &Memory<<V::Reaching as Reaching>::Memory>) {
         self.sliding = memory.sliding;
-        self.disturbance = memory.estimate.disturbance;
+        self.estimate = memory.estimate;
     }
 }
 
@@ -119,7 +119,11 @@ fn outputs<V: Variant>(table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V
         let text = format!("Sliding variable of the {meaning} at the last tick");
         sampled(format!("slidingVariable.{axis}"), text).real().unit(unit::angular_rate()).nominal(1e-3)
     };
-    let estimate = |axis: &str, meaning: &str| {
+    let of_sliding = |axis: &str, meaning: &str| {
+        let text = format!("Observer's estimate z0 of the sliding variable of the {meaning}");
+        sampled(format!("slidingEstimate.{axis}"), text).real().unit(unit::angular_rate()).nominal(1e-3)
+    };
+    let of_disturbance = |axis: &str, meaning: &str| {
         let text =
             format!("Observer's estimate of the uncertainty in the second derivative of the {meaning}");
         let common = sampled(format!("disturbanceEstimate.{axis}"), text);
@@ -127,7 +131,8 @@ fn outputs<V: Variant>(table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V
     };
     let table = vector(table, ANGLES, sliding, |m| &mut m.law.sliding);
     if TvsmcLaw::<V>::has_observer() {
-        vector(table, ANGLES, estimate, |m| &mut m.law.disturbance)
+        let table = vector(table, ANGLES, of_sliding, |m| &mut m.law.estimate.sliding);
+        vector(table, ANGLES, of_disturbance, |m| &mut m.law.estimate.disturbance)
     } else {
         table
     }
