@@ -82,7 +82,8 @@ def main() -> None:
         found[unit] = {name: statistics.median(values) for name, values in rates.items()}
         print(f"\n{unit}, {len(outputs)} outputs recorded at every step of {STEP} s, median of {repeat}")
         for name, value in found[unit].items():
-            print(f"  {name:<14}{value / 1e6:8.3f} million steps/s{found[unit]['orchestrator'] / value:10.1f} times slower than the orchestrator")
+            ratio = value / found[unit]["orchestrator"]
+            print(f"  {name:<14}{value / 1e6:8.3f} million steps/s, {ratio:5.2f} of the orchestrator's")
 
     figure, axes = plt.subplots(1, len(units), figsize=(10, 3.2), layout="constrained")
     for axis, unit in zip(axes, units):
