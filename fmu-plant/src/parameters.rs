@@ -5,16 +5,21 @@ use serde::{Deserialize, Serialize};
 use vehicle::Scenario;
 use vehicle::actuators::{self, JetMode};
 use vehicle::atmosphere::Flight;
+use vehicle::calibration::Sequence;
 use vehicle::disturbance::{Disturbance, Kind, MomentWave, SineMoment};
 use vehicle::dynamics::Inertia;
 use vehicle::effectors::Effectors;
 use vehicle::error::Error;
 use vehicle::kinematics::Kinematics;
 use vehicle::plant::{Config, state};
+use vehicle::platform::Surroundings;
+use vehicle::sensor_data::SensorData;
+use vehicle::sensors::{self, Line};
+use vehicle::triad::Triad;
 
 /// Longest integration step by default, s.
 const STEP: f64 = 0.01;
-/// An end of the disturbance (s) that no simulation reaches; FMI importers do not all read an infinite number.
+/// A time (s) that no simulation reaches; FMI importers do not all read an infinite number.
 const NEVER: f64 = 1e9;
 
 /// The kinds in the order of their enumeration values 1, 2, …, with name and description.
@@ -52,6 +57,13 @@ pub(crate) const KINEMATICS: [(Kinematics, &str, &str); 2] = [
     ),
 ];
 
+/// `sensor.set`: what they feel is shown as it is.
+pub(crate) const NO_SENSORS: i32 = 0;
+/// `sensor.set`: sampled without errors.
+const IDEAL_SENSORS: i32 = 1;
+/// `sensor.set`: sampled with the errors that are set.
+pub(crate) const MEMS_SENSORS: i32 = 2;
+
 /// What a user sets before the simulation, named as in the table.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Parameters {
@@ -81,6 +93,13 @@ pub(crate) struct Parameters {
     pub(crate) aerodynamics_scale: f64,
     pub(crate) jet_duty: bool,
     pub(crate) jet_symmetric: bool,
+    pub(crate) sensor_set: i32,
+    pub(crate) triads: [Triad; 3],
+    pub(crate) line: Line,
+    pub(crate) sensor_seed: i32,
+    pub(crate) surroundings: Surroundings,
+    pub(crate) calibrates: bool,
+    pub(crate) sequence: Sequence,
 }
 
 impl Default for Parameters {
@@ -91,6 +110,9 @@ impl Default for Parameters {
         let Disturbance { kind, bound, period, seed, direction, square_period, start, end, .. } =
             scenario.disturbance;
         let number = (1..).zip(KINDS).find(|(_, item)| item.0 == kind).map_or(1, |(number, _)| number);
+        let sensors = SensorData::embedded();
+        let mut line = sensors.line;
+        line.drop_window.end = line.drop_window.end.min(NEVER);
         let wave = |i: usize| sine.waves.get(i).copied().unwrap_or_default();
         Self {
             inertia: scenario.inertia,
@@ -116,6 +138,13 @@ impl Default for Parameters {
             aerodynamics_scale: 1.0,
             jet_duty: false,
             jet_symmetric: false,
+            sensor_set: NO_SENSORS,
+            triads: sensors.mems,
+            line,
+            sensor_seed: 1,
+            surroundings: sensors.surroundings,
+            calibrates: false,
+            sequence: sensors.calibration,
         }
     }
 }
@@ -143,6 +172,20 @@ impl Parameters {
         }))
     }
 
+    /// The sensors, if what they feel is not shown as it is.
+    fn sensors(&self) -> Option<sensors::Config> {
+        let triads = match self.sensor_set {
+            NO_SENSORS => return None,
+            // Freezing is no error of the set.
+            IDEAL_SENSORS => std::array::from_fn(|i| Triad {
+                freeze: self.triads[i].freeze,
+                ..SensorData::embedded().ideal[i]
+            }),
+            _ => self.triads,
+        };
+        Some(sensors::Config { triads, line: self.line, seed: self.sensor_seed as u64 })
+    }
+
     /// The plant they describe.
     ///
     /// # Errors
@@ -167,6 +210,9 @@ impl Parameters {
             kinematics: item(self.kinematics, &KINEMATICS).map_or(Kinematics::Printed, |item| item.0),
             earth_rate: self.earth_rate,
             actuators: self.actuators()?,
+            calibration: self.calibrates.then_some(self.sequence),
+            surroundings: self.surroundings,
+            sensors: self.sensors(),
             step: self.step,
         })
     }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use vehicle::actuators::Command;
 use vehicle::effectors::Surfaces;
 use vehicle::plant::{Held, Input, Plant, State, check};
+use vehicle::sensors::Sample;
 
 /// Number of states that describe the motion: attitude and rates. Behind them come the deflections.
 const MOTION: usize = 6;
@@ -43,6 +44,7 @@ pub(crate) struct Output {
     pub(crate) deflection_rates: Surfaces,
     pub(crate) indicators: Surfaces,
     pub(crate) dynamic_pressure: f64,
+    pub(crate) measured: Sample,
 }
 
 impl ReentryPlant {
@@ -112,6 +114,11 @@ impl Model for ReentryPlant {
             deflection_rates: plant.deflection_rates(&held),
             indicators: plant.time_left(&held).map(|left| if left.is_finite() { left } else { AT_REST }),
             dynamic_pressure: self.dynamic_pressure,
+            measured: if self.event_driven {
+                plant.measured_since_held(time, &self.input)
+            } else {
+                plant.measured(time, &self.input)
+            },
         };
         Ok(())
     }
@@ -162,7 +169,7 @@ impl Model for ReentryPlant {
         let Some(plant) = &mut self.plant else { return Ok(EventInfo::default()) };
         let before = plant.deflections;
         plant.hold(time, &self.input, &self.command);
-        Ok(EventInfo { next_event_time: plant.next_jump(time), states_changed: plant.deflections != before })
+        Ok(EventInfo { next_event_time: plant.next_event(time), states_changed: plant.deflections != before })
     }
 
     fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure> {
@@ -198,6 +205,12 @@ impl Model for ReentryPlant {
             (Some(Unknown::AppliedMoment(i)), Some(Known::Jet(j))) => applied_by_jets[(i, j)],
             (Some(Unknown::AppliedMoment(i)), Some(Known::State(j @ MOTION..))) => {
                 applied_by_deflections[(i, j - MOTION)]
+            }
+            (Some(Unknown::Measured(i)), Some(Known::State(j @ 0..MOTION))) => {
+                plant.measured_by_state_and_trajectory(time, &self.input, &held).0[(i, j)]
+            }
+            (Some(Unknown::Measured(i)), Some(Known::Trajectory(j))) => {
+                plant.measured_by_state_and_trajectory(time, &self.input, &held).1[(i, j)]
             }
             (Some(Unknown::State(i)), Some(Known::State(j)))
             | (Some(Unknown::DisturbanceMoment(i)), Some(Known::DisturbanceMoment(j)))

@@ -1,5 +1,7 @@
 //! The one table of the unit's variables. The first 69 positions are those of outputs and inputs, see [`Unknown`] and
-//! [`Known`]; the parameters follow.
+//! [`Known`]; parameters follow, then [`sensors`].
+
+mod sensors;
 
 use crate::parameters::{ACTUATIONS, KINDS, KINEMATICS};
 use crate::plant::ReentryPlant;
@@ -7,7 +9,7 @@ use fmi2_export::table::{
     Description, Real, Table, discrete_input, discrete_output, input, output, parameter,
 };
 use model_description::DefaultExperiment;
-use model_description::unit::{self, Unit};
+use model_description::unit;
 use model_description::variable::EnumerationType;
 use nalgebra::Vector3;
 use vehicle::Scenario;
@@ -30,6 +32,9 @@ pub(crate) enum Unknown {
     Delta,
     DisturbanceMoment(usize),
     DynamicPressure,
+    Measured(usize),
+    /// The sample's time, which depends on nothing.
+    MeasuredTime,
 }
 
 impl Unknown {
@@ -43,6 +48,8 @@ impl Unknown {
             27..35 => Self::State(position - 27 + 6),
             35 => Self::DynamicPressure,
             54..62 => Self::Derivative(position - 54 + 6),
+            sensors::FIRST..sensors::TIME => Self::Measured(position - sensors::FIRST),
+            sensors::TIME => Self::MeasuredTime,
             _ => return None,
         })
     }
@@ -82,7 +89,7 @@ pub(crate) fn description() -> Description<ReentryPlant> {
     let step = parameter("integrator.step", "Longest step of the Runge-Kutta integration in co-simulation");
     let table = table
         .real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| &mut m.parameters.step);
-    let table = kinematics(actuation(table));
+    let table = sensors::all(kinematics(actuation(table)));
     Description {
         name: "ReentryPlant",
         description: "Attitude motion of a re-entry vehicle under moments and bounded disturbances",
@@ -307,7 +314,7 @@ fn actuation(table: Plant) -> Plant {
         .enumeration(parameter("actuation", "How the control moment comes about"), items, |m| {
             &mut m.parameters.actuation
         })
-        .real(altitude.real().unit(metre()).min(0.0).max(atmosphere::TOP).nominal(1e4), |m| {
+        .real(altitude.real().unit(unit::length()).min(0.0).max(atmosphere::TOP).nominal(1e4), |m| {
             &mut m.parameters.flight.altitude
         })
         .real(mach.real().min(0.0).max(100.0).nominal(10.0), |m| &mut m.parameters.flight.mach)
@@ -315,10 +322,6 @@ fn actuation(table: Plant) -> Plant {
         .real(aerodynamics.real().min(0.0).max(10.0).nominal(1.0), |m| &mut m.parameters.aerodynamics_scale)
         .boolean(duty, |m| &mut m.parameters.jet_duty)
         .boolean(symmetric, |m| &mut m.parameters.jet_symmetric)
-}
-
-fn metre() -> Unit {
-    Unit { name: "m".into(), kg: 0, m: 1, s: 0, kelvin: 0, rad: 0, display: None }
 }
 
 fn inertia(table: Plant) -> Plant {

@@ -43,6 +43,9 @@ fn outputs(unit: &mut ReentryPlant, time: f64) -> Output {
     unit.output
 }
 
+/// Position of the first of the readings of sensors.
+const MEASURED: usize = 113;
+
 /// The calculated variables with their position in the table.
 fn calculated(unit: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {
     let o = outputs(unit, time);
@@ -57,7 +60,11 @@ fn calculated(unit: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {
     ];
     let rest = o.deflections.iter().copied().chain([o.dynamic_pressure]);
     let last = o.deflection_rates.iter().copied();
-    (0..21).zip(all.iter().flatten().copied()).chain((27..36).zip(rest)).chain((54..62).zip(last)).collect()
+    let readings = o.measured.readings;
+    let measured = readings.iter().flatten().copied().chain([o.measured.time]);
+    let groups =
+        (0..21).zip(all.iter().flatten().copied()).chain((27..36).zip(rest)).chain((54..62).zip(last));
+    groups.chain((MEASURED..).zip(measured)).collect()
 }
 
 #[test]
@@ -76,6 +83,7 @@ fn positions_and_names_agree() {
             Some(Unknown::AppliedMoment(_)) => "appliedMoment",
             Some(Unknown::Delta | Unknown::DisturbanceMoment(_)) => "disturbance",
             Some(Unknown::DynamicPressure) => "flight",
+            Some(Unknown::Measured(_) | Unknown::MeasuredTime) => "measured",
             None => match Known::of(position) {
                 Some(Known::Moment(_)) => "moment",
                 Some(Known::DisturbanceMoment(_)) => "disturbanceMoment",
@@ -100,6 +108,25 @@ fn positions_and_names_agree() {
         (names[62].as_str(), names[68].as_str()),
         ("trajectory.flightPathAngle", "trajectory.latitudeRate")
     );
+    assert_eq!(
+        names[MEASURED..MEASURED + 11].iter().map(String::as_str).collect::<Vec<_>>(),
+        [
+            "measured.gyroscope.x",
+            "measured.gyroscope.y",
+            "measured.gyroscope.z",
+            "measured.accelerometer.x",
+            "measured.accelerometer.y",
+            "measured.accelerometer.z",
+            "measured.magnetometer.x",
+            "measured.magnetometer.y",
+            "measured.magnetometer.z",
+            "measured.time",
+            "measured.sample",
+        ]
+    );
+    assert_eq!(Unknown::of(MEASURED), Some(Unknown::Measured(0)));
+    assert_eq!(Unknown::of(MEASURED + 9), Some(Unknown::MeasuredTime));
+    assert_eq!(Unknown::of(MEASURED + 10), None, "an integer");
 }
 
 #[test]
@@ -524,11 +551,12 @@ fn an_event_puts_a_deflection_on_its_target_however_it_was_located() {
             assert_eq!(found.deflections[2], (-3f64).to_radians(), "{late}");
         }
         assert!(indicators(&mut unit, 0.3 + late).iter().all(|z| *z > 0.0), "{late}");
-        // At the same time again, and without an event: nothing changes.
+        // At the same time again, and without an event: nothing changes but the time of what sensors feel.
         let after = (states(&unit), found);
         for time in [0.3 + late, 0.3 + late + 1e-6] {
             assert!(!unit.new_discrete_states(time).unwrap().states_changed);
-            assert_eq!((states(&unit), outputs(&mut unit, time)), after, "{late}");
+            let found = Output { measured: found.measured, ..outputs(&mut unit, time) };
+            assert_eq!((states(&unit), found), after, "{late}");
         }
     }
 }
@@ -741,8 +769,14 @@ fn outputs_need_no_start_and_inputs_have_one() {
             "flight.mach",
             "density.scale",
             "aerodynamics.scale",
+            "sensor.drop.probability",
         ];
-        let jet = variable.name.starts_with("jet[");
-        assert_eq!(unit.is_none(), jet || plain.contains(&variable.name.as_str()), "{}", variable.name);
+        let plain_group = variable.name.starts_with("jet[") || variable.name.contains(".matrix[");
+        assert_eq!(
+            unit.is_none(),
+            plain_group || plain.contains(&variable.name.as_str()),
+            "{}",
+            variable.name
+        );
     }
 }

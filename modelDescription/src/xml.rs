@@ -122,6 +122,7 @@ impl ModelDescription {
                         ("kg", unit.kg),
                         ("m", unit.m),
                         ("s", unit.s),
+                        ("A", unit.ampere),
                         ("K", unit.kelvin),
                         ("rad", unit.rad),
                     ];

@@ -3,10 +3,9 @@
 use crate::dynamics::RigidBody;
 use crate::error::Error;
 use crate::kinematics::Kinematics;
+use crate::noise::uniform;
 use crate::time::{tick, tick_time, tolerance};
 use nalgebra::Vector3;
-use rand_pcg::Pcg64;
-use rand_pcg::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
 /// What the disturbance does.
@@ -187,7 +186,7 @@ impl Disturbance {
     pub fn sample(&self, tick: i64, view: &View) -> Vector3<f64> {
         match self.kind {
             Kind::None | Kind::Sine => Vector3::zeros(),
-            Kind::White => white(self.seed, tick) * self.bound,
+            Kind::White => Vector3::from(uniform(self.seed, tick)) * self.bound,
             Kind::Constant => self.direction * self.bound,
             Kind::Square => self.direction * if tick.rem_euclid(2) == 0 { self.bound } else { -self.bound },
             // d‖ω‖²/dt contains 2 ωᵀ R⁻¹ Δ
@@ -210,34 +209,7 @@ impl Disturbance {
     }
 }
 
-/// Three numbers uniform in [−1, 1): a pure function of seed and tick, by jumping ahead in the generator's sequence.
-fn white(seed: u64, tick: i64) -> Vector3<f64> {
-    let mut generator = Pcg64::seed_from_u64(seed);
-    // Backwards before tick 0, modulo 2¹²⁸.
-    generator.advance((3 * i128::from(tick)) as u128);
-    let mut uniform = || (generator.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0;
-    let (x, y, z) = (uniform(), uniform(), uniform());
-    Vector3::new(x, y, z)
-}
-
 /// Sign of each component, + for 0.
 fn signs(vector: &Vector3<f64>) -> Vector3<f64> {
     vector.map(|component| if component < 0.0 { -1.0 } else { 1.0 })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn oracle_white_noise_is_one_sequence_before_and_after_the_start() {
-        let mut generator = Pcg64::seed_from_u64(7);
-        generator.advance(9u128.wrapping_neg());
-        for tick in -3..3 {
-            let next: [u64; 3] = std::array::from_fn(|_| generator.next_u64() >> 11);
-            let expected = next.map(|bits| bits as f64 / (1u64 << 52) as f64 - 1.0);
-            assert_eq!(white(7, tick), Vector3::from(expected), "tick {tick}");
-        }
-        assert!(white(7, i64::MIN).iter().all(|value| value.abs() <= 1.0));
-    }
 }

@@ -1,19 +1,25 @@
-//! The vehicle: attitude kinematics and dynamics, inertia, atmosphere, effectors and actuators, reference profiles, disturbances and integrators.
+//! The vehicle: attitude kinematics and dynamics, inertia, atmosphere, effectors and actuators, reference profiles, disturbances, sensors and integrators.
 //! Knows neither control nor FMI. SI units and radians throughout.
 
 pub mod actuators;
 pub mod atmosphere;
+pub mod calibration;
 pub mod disturbance;
 pub mod dynamics;
 pub mod effectors;
 pub mod error;
 pub mod integrator;
 pub mod kinematics;
+pub mod noise;
 pub mod plant;
+pub mod platform;
 pub mod reference;
 pub mod scenario;
+pub mod sensor_data;
+pub mod sensors;
 pub mod table;
 pub mod time;
+pub mod triad;
 
 pub use error::Error;
 pub use plant::Plant;

@@ -2,12 +2,15 @@
 //! communication point to the next.
 
 use crate::actuators::{self, Actuators, Command, Drive};
+use crate::calibration::Sequence;
 use crate::disturbance::{Disturbance, View};
 use crate::dynamics::{Inertia, RigidBody};
 use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::error::Error;
 use crate::integrator::{equal_steps, rk4};
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
+use crate::platform::{Pose, Readings, Surroundings};
+use crate::sensors::{self, Sample, Sensors};
 use crate::time::tolerance;
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, SMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -57,7 +60,7 @@ pub fn derivative(body: &RigidBody, kinematics: Kinematics, state: &State, load:
 }
 
 /// Partial derivatives of [`derivative`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Partials {
     /// By the state.
     pub by_state: Matrix6<f64>,
@@ -141,6 +144,12 @@ pub struct Config {
     pub earth_rate: f64,
     /// Surfaces and jets that make the control moment; without them it is an input.
     pub actuators: Option<actuators::Config>,
+    /// A prescribed motion from the initial angles on, in place of the dynamics.
+    pub calibration: Option<Sequence>,
+    /// What the sensors feel.
+    pub surroundings: Surroundings,
+    /// Sampled sensors; without them what they would feel is shown as it is.
+    pub sensors: Option<sensors::Config>,
     /// Longest integration step, s.
     pub step: f64,
 }
@@ -168,6 +177,13 @@ impl Held {
     }
 }
 
+/// The motion that takes the place of the dynamics.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Calibration {
+    sequence: Sequence,
+    initial: Vector3<f64>,
+}
+
 /// The vehicle with its state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plant {
@@ -176,6 +192,9 @@ pub struct Plant {
     earth_rate: f64,
     disturbance: Disturbance,
     actuators: Option<Actuators>,
+    calibration: Option<Calibration>,
+    surroundings: Surroundings,
+    sensors: Option<Sensors>,
     step: f64,
     start_time: f64,
     held: Option<Held>,
@@ -212,16 +231,26 @@ impl Plant {
             return refuse("trajectory.earthRate", "is not finite".into());
         }
         config.disturbance.check()?;
+        config.surroundings.check()?;
+        let initial = angles(&config.initial);
+        let mut state = config.initial;
+        if let Some(sequence) = &config.calibration {
+            sequence.check(&initial)?;
+            (state, _) = sequence.motion(config.kinematics, &initial, 0.0);
+        }
         Ok(Self {
             body,
             kinematics: config.kinematics,
             earth_rate: config.earth_rate,
             disturbance: config.disturbance.clone(),
             actuators: config.actuators.as_ref().map(Actuators::new).transpose()?,
+            calibration: config.calibration.map(|sequence| Calibration { sequence, initial }),
+            surroundings: config.surroundings,
+            sensors: config.sensors.as_ref().map(|sensors| Sensors::new(sensors, start_time)).transpose()?,
             step: config.step,
             start_time,
             held: None,
-            state: config.initial,
+            state,
             deflections: Surfaces::zeros(),
         })
     }
@@ -241,9 +270,11 @@ impl Plant {
         rates(&self.state)
     }
 
-    /// The next time (s) after `time` at which the disturbance jumps.
-    pub fn next_jump(&self, time: f64) -> Option<f64> {
-        self.disturbance.next_change(self.start_time, time)
+    /// The next time (s) after `time` at which the disturbance jumps, or a sample is taken or arrives.
+    pub fn next_event(&self, time: f64) -> Option<f64> {
+        let jump = self.disturbance.next_change(self.start_time, time);
+        let sample = self.sensors.as_ref().map(|sensors| sensors.next_event(time));
+        jump.into_iter().chain(sample).min_by(f64::total_cmp)
     }
 
     /// Time (s) until each deflection comes to rest; infinite where it rests.
@@ -253,11 +284,12 @@ impl Plant {
         })
     }
 
-    /// The next time (s) after `time` at which the right side may not be smooth.
+    /// The next time (s) after `time` at which the right side may not be smooth or a sample is taken.
     fn next_change(&self, time: f64, held: &Held) -> Option<f64> {
-        let jump = self.next_jump(time);
+        let jump = self.disturbance.next_change(self.start_time, time);
         let rest = self.actuators.is_some().then(|| time + self.time_left(held).min());
-        jump.into_iter().chain(rest).min_by(f64::total_cmp)
+        let sample = self.sensors.as_ref().map(|sensors| sensors.next_sample(time));
+        jump.into_iter().chain(rest).chain(sample).min_by(f64::total_cmp)
     }
 
     /// What holds from `time` (s) on if commands are taken then: the disturbance is drawn from the present state and `input`
@@ -284,8 +316,9 @@ impl Plant {
     }
 
     /// Takes over what [`Plant::in_force`] says: commands hold until they are taken again, the disturbance until the next tick.
-    /// Deflections that have come to their target, or a little beyond it, are put on it.
+    /// Deflections that have come to their target, or a little beyond it, are put on it. A sample that is due is taken.
     pub fn hold(&mut self, time: f64, input: &Input, command: &Command) -> Held {
+        self.sense(time, input);
         if let Some(held) = self.held {
             self.settle(time, &held);
         }
@@ -296,9 +329,17 @@ impl Plant {
 
     /// The same on the way from one communication point to the next, where no commands are taken.
     fn hold_between(&mut self, time: f64, input: &Input, before: &Held) -> Held {
+        self.sense(time, input);
         let directed = |actuators: &Actuators| actuators.directed(time, before.drive, &self.deflections);
         let drive = self.actuators.as_ref().map_or_else(Drive::default, directed);
         *self.held.insert(self.drawn(time, input, drive))
+    }
+
+    fn sense(&mut self, time: f64, input: &Input) {
+        if let Some(mut sensors) = self.sensors.take() {
+            sensors.take(time, &self.felt(time, input));
+            self.sensors = Some(sensors);
+        }
     }
 
     fn settle(&mut self, time: f64, held: &Held) {
@@ -347,20 +388,66 @@ impl Plant {
         self.actuators.as_ref().map_or_else(SMatrix::zeros, |all| all.moment_by_jets(command))
     }
 
+    /// The trajectory's turn rate (rad/s); the calibration sequence is flown over one that rests.
+    fn turn_rate(&self, input: &Input) -> Vector3<f64> {
+        if self.calibration.is_some() {
+            return Vector3::zeros();
+        }
+        input.trajectory.turn_rate(self.earth_rate)
+    }
+
     /// At `time`, which is `elapsed` after the time of the deflections.
     fn load(&self, time: f64, input: &Input, held: &Held, elapsed: f64) -> Load {
         Load {
             moment: self.control_moment(input, &held.drive, elapsed)
                 + self.disturbance_moment(time, input, held),
             delta: held.delta(),
-            turn_rate: input.trajectory.turn_rate(self.earth_rate),
+            turn_rate: self.turn_rate(input),
+        }
+    }
+
+    /// State derivative at `time` (s).
+    fn derivative_at(&self, time: f64, state: &State, load: &Load) -> State {
+        match &self.calibration {
+            None => derivative(&self.body, self.kinematics, state, load),
+            Some(Calibration { sequence, initial }) => {
+                sequence.motion(self.kinematics, initial, time - self.start_time).1
+            }
         }
     }
 
     /// State derivative at `time` (s), at the present state.
     pub fn derivative(&self, time: f64, input: &Input, held: &Held) -> State {
-        let load = self.load(time, input, held, 0.0);
-        derivative(&self.body, self.kinematics, &self.state, &load)
+        self.derivative_at(time, &self.state, &self.load(time, input, held, 0.0))
+    }
+
+    fn pose(&self, time: f64, input: &Input) -> Pose {
+        let load = Load { turn_rate: self.turn_rate(input), ..Load::default() };
+        Pose {
+            kinematics: self.kinematics,
+            angles: self.angles(),
+            rates: self.rates(),
+            alpha_rate: self.derivative_at(time, &self.state, &load)[0],
+            trajectory: input.trajectory,
+        }
+    }
+
+    /// What ideal sensors feel at `time` (s).
+    pub fn felt(&self, time: f64, input: &Input) -> Readings {
+        self.pose(time, input).felt(&self.surroundings)
+    }
+
+    /// What the sensors show at `time` (s), before a sample is taken that is due then. Without sampled sensors: what they
+    /// feel, with the number 0.
+    pub fn measured(&self, time: f64, input: &Input) -> Sample {
+        let felt = self.felt(time, input);
+        let truth = Sample { number: 0, time, readings: felt };
+        self.sensors.as_ref().map_or(truth, |sensors| sensors.shown(time, &felt))
+    }
+
+    /// What the sensors show at `time` (s) since [`Plant::hold`].
+    pub fn measured_since_held(&self, time: f64, input: &Input) -> Sample {
+        self.sensors.as_ref().map_or_else(|| self.measured(time, input), Sensors::arrived)
     }
 
     /// Partial derivatives of [`Plant::derivative`], and of the turn rate by the trajectory (3 × 7).
@@ -371,8 +458,29 @@ impl Plant {
         held: &Held,
     ) -> (Partials, SMatrix<f64, 3, TRAJECTORY>) {
         let load = self.load(time, input, held, 0.0);
-        let partials = partial_derivatives(&self.body, self.kinematics, &self.state, &load);
+        let mut partials = partial_derivatives(&self.body, self.kinematics, &self.state, &load);
+        if self.calibration.is_some() {
+            partials = Partials::default();
+        }
         (partials, input.trajectory.turn_rate_by_fields(self.earth_rate))
+    }
+
+    /// Partial derivatives of what [`Plant::measured`] shows, in the order of its readings: by state (9 × 6) and trajectory
+    /// (9 × 7). Samples depend on neither, or do so at an instant only.
+    pub fn measured_by_state_and_trajectory(
+        &self,
+        time: f64,
+        input: &Input,
+        held: &Held,
+    ) -> (SMatrix<f64, 9, 6>, SMatrix<f64, 9, TRAJECTORY>) {
+        if self.sensors.is_some() {
+            return (SMatrix::zeros(), SMatrix::zeros());
+        }
+        let (partials, turn_rate_by_trajectory) = self.partial_derivatives(time, input, held);
+        let by_state = partials.by_state.fixed_rows::<1>(0).into_owned();
+        let by_trajectory = partials.by_turn_rate.fixed_rows::<1>(0) * turn_rate_by_trajectory;
+        let pose = self.pose(time, input);
+        pose.felt_by_state_and_trajectory(&self.surroundings, &by_state, &by_trajectory)
     }
 
     /// From `from` to `to` (s) under a constant control moment (N m).
@@ -411,7 +519,7 @@ impl Plant {
                 let begin = time + k as f64 * h;
                 let mut f = |t: f64, state: &State| {
                     let load = self.load(t, &input(t), &held, t - time);
-                    derivative(&self.body, self.kinematics, state, &load)
+                    self.derivative_at(t, state, &load)
                 };
                 let next = rk4(&mut f, begin, &self.state, h);
                 check(&next, begin + h).map_err(|error| {

@@ -6,6 +6,7 @@ use crate::dynamics::Inertia;
 use crate::error::Error;
 use crate::kinematics::Kinematics;
 use crate::plant::{self, Config};
+use crate::platform::Surroundings;
 use crate::reference::{Course, Profile, Segment, Wave};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -88,6 +89,9 @@ impl Scenario {
             kinematics: Kinematics::Printed,
             earth_rate: 0.0,
             actuators: None,
+            calibration: None,
+            surroundings: Surroundings::default(),
+            sensors: None,
             step,
         }
     }

@@ -1,0 +1,69 @@
+//! A rotation sequence for the calibration of sensors: the platform turns so that every direction in space is seen from the
+//! body in every direction.
+
+use crate::error::Error;
+use crate::kinematics::Kinematics;
+use crate::plant::{BETA_LIMIT, State, state};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// α and σ turn at constant rates, β swings: β = β₀ + amplitude · sin(frequency · t).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sequence {
+    /// Rate of α, rad/s.
+    pub alpha_rate: f64,
+    /// Rate of σ, rad/s.
+    pub sigma_rate: f64,
+    /// Amplitude of β, rad.
+    pub beta_amplitude: f64,
+    /// Angular frequency of β, rad/s.
+    pub beta_frequency: f64,
+}
+
+impl Sequence {
+    /// Refuses a sequence that comes to the singular sideslip from `initial` angles (rad).
+    ///
+    /// # Errors
+    /// Names the value at fault as the units do.
+    pub fn check(&self, initial: &Vector3<f64>) -> Result<(), Error> {
+        let values = [self.alpha_rate, self.sigma_rate, self.beta_amplitude, self.beta_frequency];
+        if !values.iter().all(|value| value.is_finite()) {
+            let problem = "holds a value that is not finite".into();
+            return Err(Error::Parameter { name: "calibration", problem });
+        }
+        let reach = initial.y.abs() + self.beta_amplitude.abs();
+        if reach >= BETA_LIMIT {
+            let problem = format!(
+                "= {} deg: with initial.beta beta comes to {} deg, it must stay within 90 deg",
+                self.beta_amplitude.to_degrees(),
+                reach.to_degrees()
+            );
+            return Err(Error::Parameter { name: "calibration.beta.amplitude", problem });
+        }
+        Ok(())
+    }
+
+    /// Θ, Θ̇ and Θ̈ (rad, s) at `time` (s) after the start at the angles `initial` (rad).
+    pub fn angles_and_derivatives(&self, initial: &Vector3<f64>, time: f64) -> [Vector3<f64>; 3] {
+        let (sine, cosine) = (self.beta_frequency * time).sin_cos();
+        let (amplitude, frequency) = (self.beta_amplitude, self.beta_frequency);
+        let swing = Vector3::new(self.alpha_rate * time, amplitude * sine, self.sigma_rate * time);
+        [
+            initial + swing,
+            Vector3::new(self.alpha_rate, amplitude * frequency * cosine, self.sigma_rate),
+            Vector3::new(0.0, -amplitude * frequency * frequency * sine, 0.0),
+        ]
+    }
+
+    /// State and its derivative at `time` (s) after the start. ω belongs to Θ̇ by the R in force, the trajectory at rest.
+    pub fn motion(&self, kinematics: Kinematics, initial: &Vector3<f64>, time: f64) -> (State, State) {
+        let [angles, angle_rates, angle_accelerations] = self.angles_and_derivatives(initial, time);
+        let r_inverse = kinematics.r_inverse(&angles);
+        let rates = r_inverse * angle_rates;
+        let r_dot = kinematics.r_alpha(&angles) * angle_rates.x + kinematics.r_beta(&angles) * angle_rates.y;
+        // Θ̈ = Ṙ ω + R ω̇
+        let accelerations = r_inverse * (angle_accelerations - r_dot * rates);
+        (state(&angles, &rates), state(&angle_rates, &accelerations))
+    }
+}

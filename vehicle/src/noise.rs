@@ -1,0 +1,70 @@
+//! Random numbers as pure functions of seed and tick: the same whoever asks, in whatever order, and how often.
+
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+
+/// `N` numbers uniform in [−1, 1), by jumping ahead in the generator's sequence.
+pub fn uniform<const N: usize>(seed: u64, tick: i64) -> [f64; N] {
+    let mut generator = Pcg64::seed_from_u64(seed);
+    // Backwards before tick 0, modulo 2¹²⁸.
+    generator.advance((N as i128 * i128::from(tick)) as u128);
+    std::array::from_fn(|_| (generator.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0)
+}
+
+/// Two independent normal numbers of variance 1 from two uniform in [−1, 1), by the method of Box and Muller.
+pub fn normal_pair([u, v]: [f64; 2]) -> [f64; 2] {
+    // In (0, 1], so that the logarithm is finite.
+    let radius = (-2.0 * ((1.0 - u) / 2.0).ln()).sqrt();
+    let (sine, cosine) = (std::f64::consts::PI * v).sin_cos();
+    [radius * cosine, radius * sine]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oracle_uniform_numbers_are_one_sequence_before_and_after_the_start() {
+        let mut generator = Pcg64::seed_from_u64(7);
+        generator.advance(9u128.wrapping_neg());
+        for tick in -3..3 {
+            let next: [u64; 3] = std::array::from_fn(|_| generator.next_u64() >> 11);
+            let expected = next.map(|bits| bits as f64 / (1u64 << 52) as f64 - 1.0);
+            assert_eq!(uniform(7, tick), expected, "tick {tick}");
+        }
+        assert!(uniform::<3>(7, i64::MIN).iter().all(|value| value.abs() <= 1.0));
+    }
+
+    #[test]
+    fn oracle_normal_numbers_have_the_moments_of_a_normal_distribution() {
+        const COUNT: i64 = 100_000;
+        let mut moments = [0.0; 4];
+        let mut product = 0.0;
+        for tick in 0..COUNT {
+            let pair = normal_pair(uniform(3, tick));
+            for value in pair {
+                for (power, moment) in (1..).zip(&mut moments) {
+                    *moment += value.powi(power) / (2 * COUNT) as f64;
+                }
+            }
+            product += pair[0] * pair[1] / COUNT as f64;
+        }
+        // Five standard deviations of each estimate: variances 1, 2, 15 and 96 over the number of values
+        let n = 2.0 * COUNT as f64;
+        for (found, expected, variance) in [
+            (moments[0], 0.0, 1.0),
+            (moments[1], 1.0, 2.0),
+            (moments[2], 0.0, 15.0),
+            (moments[3], 3.0, 96.0),
+            (product, 0.0, 2.0),
+        ] {
+            assert!((found - expected).abs() < 5.0 * (variance / n).sqrt(), "{found} {expected}");
+        }
+        assert!(
+            normal_pair([-1.0, 0.5])
+                .into_iter()
+                .chain(normal_pair([1f64.next_down(), 0.0]))
+                .all(f64::is_finite)
+        );
+    }
+}

@@ -1,0 +1,161 @@
+//! Sets of sensors, the fields around them and the calibration sequence as data.
+
+use crate::calibration::Sequence;
+use crate::platform::Surroundings;
+use crate::sensors::Line;
+use crate::triad::{Triad, Window};
+use nalgebra::{Matrix3, Vector3};
+use serde::Deserialize;
+
+const TEXT: &str = include_str!("../data/sensors.toml");
+
+/// What the file of sensors holds, in SI units and radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorData {
+    /// Gravity and the Earth's field.
+    pub surroundings: Surroundings,
+    /// Sample period and transport delay; nothing is dropped.
+    pub line: Line,
+    /// A typical MEMS set: gyroscope, accelerometer, magnetometer.
+    pub mems: [Triad; 3],
+    /// The set without errors.
+    pub ideal: [Triad; 3],
+    /// The calibration sequence.
+    pub calibration: Sequence,
+}
+
+impl SensorData {
+    /// The embedded file.
+    pub fn embedded() -> Self {
+        let file = file();
+        let Calibration { alpha_rate_deg_s, sigma_rate_deg_s, beta_amplitude_deg, beta_frequency_deg_s } =
+            file.calibration;
+        Self {
+            surroundings: Surroundings {
+                gravity: file.surroundings.gravity,
+                field: file.surroundings.field_ut * Unit::Microtesla.factor(),
+            },
+            line: Line {
+                period: file.line.period,
+                delay: file.line.delay,
+                drop_probability: 0.0,
+                drop_window: Window { start: 0.0, end: f64::INFINITY },
+            },
+            mems: file.mems.triads(),
+            ideal: file.ideal.triads(),
+            calibration: Sequence {
+                alpha_rate: alpha_rate_deg_s.to_radians(),
+                sigma_rate: sigma_rate_deg_s.to_radians(),
+                beta_amplitude: beta_amplitude_deg.to_radians(),
+                beta_frequency: beta_frequency_deg_s.to_radians(),
+            },
+        }
+    }
+}
+
+fn file() -> File {
+    // Cannot fail: a test reads it.
+    toml::from_str(TEXT).unwrap_or_else(|error| panic!("sensors.toml: {error}"))
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    surroundings: Fields,
+    line: Times,
+    mems: Set,
+    ideal: Set,
+    calibration: Calibration,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Fields {
+    gravity: f64,
+    #[serde(rename = "field_uT")]
+    field_ut: Vector3<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Times {
+    period: f64,
+    delay: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Calibration {
+    alpha_rate_deg_s: f64,
+    sigma_rate_deg_s: f64,
+    beta_amplitude_deg: f64,
+    beta_frequency_deg_s: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Set {
+    gyroscope: Sensor,
+    accelerometer: Sensor,
+    magnetometer: Sensor,
+}
+
+impl Set {
+    fn triads(&self) -> [Triad; 3] {
+        [&self.gyroscope, &self.accelerometer, &self.magnetometer].map(Sensor::triad)
+    }
+}
+
+#[derive(Clone, Copy, Deserialize)]
+enum Unit {
+    #[serde(rename = "deg/s")]
+    DegreePerSecond,
+    #[serde(rename = "g")]
+    StandardGravity,
+    #[serde(rename = "uT")]
+    Microtesla,
+}
+
+impl Unit {
+    /// In SI units.
+    fn factor(self) -> f64 {
+        match self {
+            Self::DegreePerSecond => 1f64.to_radians(),
+            Self::StandardGravity => 9.80665,
+            Self::Microtesla => 1e-6,
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sensor {
+    unit: Unit,
+    /// By rows.
+    matrix: Option<[[f64; 3]; 3]>,
+    #[serde(default)]
+    bias: Vector3<f64>,
+    #[serde(default)]
+    noise: f64,
+    #[serde(default)]
+    bandwidth: f64,
+    #[serde(default)]
+    range: f64,
+    #[serde(default)]
+    resolution: f64,
+}
+
+impl Sensor {
+    fn triad(&self) -> Triad {
+        let unit = self.unit.factor();
+        Triad {
+            matrix: self.matrix.map_or_else(Matrix3::identity, |rows| Matrix3::from(rows).transpose()),
+            bias: self.bias * unit,
+            noise: self.noise * unit,
+            bandwidth: self.bandwidth,
+            range: self.range * unit,
+            resolution: self.resolution * unit,
+            freeze: Window::default(),
+        }
+    }
+}

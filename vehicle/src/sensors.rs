@@ -1,0 +1,237 @@
+//! Gyroscope, accelerometer and magnetometer, sampled together, and the serial line that brings their samples.
+//!
+//! Samples are taken at the ticks start + k · period and arrive a delay later. A sample is evaluated from what was committed
+//! before its tick, so that it can be evaluated again at the tick; it is committed when time goes on.
+
+use crate::error::Error;
+use crate::noise::{normal_pair, uniform};
+use crate::platform::Readings;
+use crate::time::{tick, tick_time, tolerance};
+use crate::triad::{Memory, Names, Triad, Window};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Most samples that may be on their way at a time.
+pub const IN_FLIGHT: usize = 1000;
+
+const NAMES: [Names; 3] = [
+    Names {
+        matrix: "sensor.gyroscope.matrix",
+        bias: "sensor.gyroscope.bias",
+        noise: "sensor.gyroscope.noise",
+        bandwidth: "sensor.gyroscope.bandwidth",
+        range: "sensor.gyroscope.range",
+        resolution: "sensor.gyroscope.resolution",
+    },
+    Names {
+        matrix: "sensor.accelerometer.matrix",
+        bias: "sensor.accelerometer.bias",
+        noise: "sensor.accelerometer.noise",
+        bandwidth: "sensor.accelerometer.bandwidth",
+        range: "sensor.accelerometer.range",
+        resolution: "sensor.accelerometer.resolution",
+    },
+    Names {
+        matrix: "sensor.magnetometer.matrix",
+        bias: "sensor.magnetometer.bias",
+        noise: "sensor.magnetometer.noise",
+        bandwidth: "sensor.magnetometer.bandwidth",
+        range: "sensor.magnetometer.range",
+        resolution: "sensor.magnetometer.resolution",
+    },
+];
+
+/// Three sensors and their line.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Config {
+    /// Gyroscope (rad/s), accelerometer (m/s²), magnetometer (T).
+    pub triads: [Triad; 3],
+    /// The line.
+    pub line: Line,
+    /// Seed of noise and drops.
+    pub seed: u64,
+}
+
+/// When samples are taken, arrive, and are dropped.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// Time between samples, s.
+    pub period: f64,
+    /// Time from taking a sample to its arrival, s.
+    pub delay: f64,
+    /// Probability that a sample is dropped, while `drop_window` holds.
+    pub drop_probability: f64,
+    /// When samples can be dropped, by the time at which they are taken.
+    pub drop_window: Window,
+}
+
+/// What arrives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sample {
+    /// Counts the samples from 1; 0 before the first arrives.
+    pub number: i32,
+    /// When it was taken, s.
+    pub time: f64,
+    /// What the sensors said.
+    pub readings: Readings,
+}
+
+/// A sample that was taken.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Taken {
+    tick: i64,
+    /// By the clock of the line, s.
+    time: f64,
+    memories: [Memory; 3],
+    dropped: bool,
+}
+
+impl Taken {
+    fn sample(&self) -> Sample {
+        let number = i32::try_from(self.tick + 1).unwrap_or(i32::MAX);
+        Sample { number, time: self.time, readings: self.memories.map(|memory| memory.value) }
+    }
+}
+
+/// The sensors with their state.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sensors {
+    config: Config,
+    start: f64,
+    /// Before the last tick.
+    before: Option<Taken>,
+    /// Of the last tick.
+    last: Option<Taken>,
+    /// On their way, by tick modulo length.
+    line: Vec<Option<Taken>>,
+    /// The newest that has arrived.
+    arrived: Sample,
+}
+
+impl Config {
+    fn check(&self) -> Result<(), Error> {
+        let refuse = |name, problem: String| Err(Error::Parameter { name, problem });
+        let Line { period, delay, drop_probability, .. } = self.line;
+        if !(period > 0.0 && period.is_finite()) {
+            return refuse("sensor.period", format!("= {period} s must be positive"));
+        }
+        if !(delay >= 0.0 && delay / period <= IN_FLIGHT as f64) {
+            let problem = format!("= {delay} s must lie between 0 and {IN_FLIGHT} times sensor.period");
+            return refuse("sensor.delay", problem);
+        }
+        if !(0.0..=1.0).contains(&drop_probability) {
+            let problem = format!("= {drop_probability} must lie between 0 and 1");
+            return refuse("sensor.drop.probability", problem);
+        }
+        self.triads.iter().zip(&NAMES).try_for_each(|(triad, names)| triad.check(names))
+    }
+
+    /// Normal noise of the three sensors and a chance in [0, 1) to be dropped, of the tick.
+    fn draw(&self, tick: i64) -> ([Vector3<f64>; 3], f64) {
+        // Another sequence than that of a disturbance with the same seed.
+        let [a, b, c, d, e, f, g, h, i, j, chance] = uniform(!self.seed, tick);
+        let [first, second, third, fourth, fifth] = [[a, b], [c, d], [e, f], [g, h], [i, j]].map(normal_pair);
+        let noise = [
+            Vector3::new(first[0], first[1], second[0]),
+            Vector3::new(second[1], third[0], third[1]),
+            Vector3::new(fourth[0], fourth[1], fifth[0]),
+        ];
+        (noise, f64::midpoint(chance, 1.0))
+    }
+}
+
+impl Sensors {
+    /// Before the first sample, which is taken at `start` (s).
+    ///
+    /// # Errors
+    /// Names the value of the configuration that is out of range.
+    pub fn new(config: &Config, start: f64) -> Result<Self, Error> {
+        config.check()?;
+        let length = (config.line.delay / config.line.period) as usize + 2;
+        let arrived = Sample { time: start, ..Sample::default() };
+        Ok(Self { config: *config, start, before: None, last: None, line: vec![None; length], arrived })
+    }
+
+    fn tick_at(&self, time: f64) -> i64 {
+        tick(time, self.start, self.config.line.period)
+    }
+
+    /// The first time (s) after `time` at which a sample is taken.
+    pub fn next_sample(&self, time: f64) -> f64 {
+        tick_time(self.tick_at(time) + 1, self.start, self.config.line.period)
+    }
+
+    /// The first time (s) after `time` at which a sample is taken or arrives.
+    pub fn next_event(&self, time: f64) -> f64 {
+        let arrival = tick_time(self.tick_arrived(time) + 1, self.start, self.config.line.period);
+        self.next_sample(time).min(arrival.max(self.start) + self.config.line.delay)
+    }
+
+    /// The last tick whose sample has had the time to arrive.
+    fn tick_arrived(&self, time: f64) -> i64 {
+        let Line { period, delay, .. } = self.config.line;
+        ((time - delay - self.start + tolerance(time)) / period).floor() as i64
+    }
+
+    /// The sample that is due at `time` (s), if its tick has come and has not gone.
+    fn due(&self, time: f64, felt: &Readings) -> Option<Taken> {
+        let tick = self.tick_at(time);
+        let before = match self.last {
+            Some(last) if last.tick == tick && time <= last.time + tolerance(time) => self.before,
+            Some(last) if last.tick >= tick => return None,
+            last => last,
+        };
+        let Config { triads, line, .. } = &self.config;
+        // An importer may have missed the tick's time; the sample is then taken late.
+        let nominal = tick_time(tick, self.start, line.period);
+        let taken = if time > nominal + tolerance(time) { time } else { nominal };
+        let (noise, chance) = self.config.draw(tick);
+        let memories = std::array::from_fn(|i| {
+            let before = before.as_ref().map(|before| (&before.memories[i], taken - before.time));
+            triads[i].sample(taken, &felt[i], &noise[i], before)
+        });
+        let dropped = line.drop_window.holds(taken) && chance < line.drop_probability;
+        Some(Taken { tick, time: taken, memories, dropped })
+    }
+
+    fn slot(&self, tick: i64) -> usize {
+        tick as usize % self.line.len()
+    }
+
+    /// The newest sample that has arrived at `time` (s) of those taken.
+    fn newest(&self, time: f64) -> Sample {
+        let Some(last) = self.last else { return self.arrived };
+        let newest = self.tick_arrived(time).min(last.tick);
+        let on_the_line = (0..=newest)
+            .rev()
+            .take(self.line.len())
+            .find_map(|tick| self.line[self.slot(tick)].filter(|taken| taken.tick == tick && !taken.dropped));
+        on_the_line.map_or(self.arrived, |taken| taken.sample())
+    }
+
+    /// Takes the sample that is due at `time` (s), if one is, and what has arrived; again, if asked again at the tick.
+    pub fn take(&mut self, time: f64, felt: &Readings) {
+        self.arrived = self.newest(time);
+        if let Some(taken) = self.due(time, felt) {
+            if self.last.is_none_or(|last| last.tick != taken.tick) {
+                self.before = self.last;
+            }
+            self.last = Some(taken);
+            let slot = self.slot(taken.tick);
+            self.line[slot] = Some(taken);
+            self.arrived = self.newest(time);
+        }
+    }
+
+    /// What had arrived when [`Sensors::take`] was called last.
+    pub fn arrived(&self) -> Sample {
+        self.arrived
+    }
+
+    /// What [`Sensors::take`] at `time` (s) would show.
+    pub fn shown(&self, time: f64, felt: &Readings) -> Sample {
+        let due =
+            self.due(time, felt).filter(|taken| taken.tick <= self.tick_arrived(time) && !taken.dropped);
+        due.map_or_else(|| self.newest(time), |taken| taken.sample())
+    }
+}

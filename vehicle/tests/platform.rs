@@ -1,0 +1,189 @@
+//! What the platform's sensors feel, against readings by hand and against rotations that are differentiated numerically.
+
+use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
+use std::f64::consts::FRAC_PI_2;
+use vehicle::calibration::Sequence;
+use vehicle::kinematics::{Kinematics, Trajectory};
+use vehicle::plant::{BETA_LIMIT, Input, Plant};
+use vehicle::platform::{Pose, Surroundings, body_from_velocity, velocity_from_level};
+use vehicle::scenario::Scenario;
+use vehicle::sensor_data::SensorData;
+
+const G: f64 = 9.80665;
+/// North, east, down.
+const FIELD: Vector3<f64> = Vector3::new(2e-5, -0.5e-5, 4.6e-5);
+const AROUND: Surroundings = Surroundings { gravity: G, field: FIELD };
+
+fn at_rest(degrees: [f64; 3]) -> Pose {
+    Pose {
+        kinematics: Kinematics::Printed,
+        angles: Vector3::from(degrees.map(f64::to_radians)),
+        rates: Vector3::zeros(),
+        alpha_rate: 0.0,
+        trajectory: Trajectory::default(),
+    }
+}
+
+#[test]
+fn oracle_static_readings_by_hand() {
+    let [north, east, down] = [FIELD.x, FIELD.y, FIELD.z];
+    for (degrees, force, field) in [
+        // Level, to the north
+        ([0.0, 0.0, 0.0], [0.0, 0.0, -G], [north, east, down]),
+        // Nose up: the belly looks north
+        ([90.0, 0.0, 0.0], [G, 0.0, 0.0], [-down, east, north]),
+        // Sideslip: the wind comes from the right, the nose points to the left of north, to the west
+        ([0.0, 90.0, 0.0], [0.0, 0.0, -G], [-east, north, down]),
+        // Bank against the right-hand rule: the right wing is up
+        ([0.0, 0.0, 90.0], [0.0, G, 0.0], [north, -down, east]),
+    ] {
+        let [rate, found_force, found_field] = at_rest(degrees).felt(&AROUND);
+        assert_eq!(rate, Vector3::zeros());
+        assert!((found_force - Vector3::from(force)).amax() < 1e-14, "{degrees:?}: {found_force}");
+        assert!((found_field - Vector3::from(field)).amax() < 1e-19, "{degrees:?}: {found_field}");
+    }
+}
+
+#[test]
+fn oracle_heading_and_climb_turn_what_is_felt() {
+    let mut pose = at_rest([0.0; 3]);
+    pose.trajectory.heading = FRAC_PI_2;
+    let [_, force, field] = pose.felt(&AROUND);
+    // To the east: north is on the left
+    assert!((force - Vector3::new(0.0, 0.0, -G)).amax() < 1e-14);
+    assert!((field - Vector3::new(FIELD.y, -FIELD.x, FIELD.z)).amax() < 1e-19);
+    pose.trajectory = Trajectory { flight_path_angle: FRAC_PI_2, ..Trajectory::default() };
+    let [_, force, field] = pose.felt(&AROUND);
+    // Straight up: the belly looks north
+    assert!((force - Vector3::new(G, 0.0, 0.0)).amax() < 1e-14);
+    assert!((field - Vector3::new(-FIELD.z, FIELD.y, FIELD.x)).amax() < 1e-19);
+}
+
+fn attitude() -> impl Strategy<Value = Vector3<f64>> {
+    (-3.0..3.0, -1.4..1.4, -3.0..3.0).prop_map(|(alpha, beta, sigma)| Vector3::new(alpha, beta, sigma))
+}
+
+/// ω from C and Ċ: Ċ Cᵀ = −ω^×.
+fn rate_of(rotation: impl Fn(f64) -> Matrix3<f64>) -> Vector3<f64> {
+    let h = 1e-3;
+    let slope =
+        (rotation(-2.0 * h) - rotation(-h) * 8.0 + rotation(h) * 8.0 - rotation(2.0 * h)) / (12.0 * h);
+    let turning = -slope * rotation(0.0).transpose();
+    Vector3::new(turning[(2, 1)], turning[(0, 2)], turning[(1, 0)])
+}
+
+proptest! {
+    #[test]
+    fn rotations_are_orthonormal(angles in attitude(), gamma in -1.5..1.5, psi in -3.0..3.0) {
+        let trajectory = Trajectory { flight_path_angle: gamma, heading: psi, ..Trajectory::default() };
+        for c in [body_from_velocity(&angles), velocity_from_level(&trajectory)] {
+            prop_assert!((c * c.transpose() - Matrix3::identity()).amax() < 1e-15);
+            prop_assert!((c.determinant() - 1.0).abs() < 1e-15);
+        }
+    }
+
+    /// Whatever R the motion obeys, the gyroscope's rate is that of the orientation's change.
+    #[test]
+    fn oracle_the_gyroscope_against_differences_of_the_orientation(
+        angles in attitude(),
+        rates in proptest::array::uniform3(-0.5..0.5),
+        course in proptest::array::uniform4(-0.5..0.5),
+    ) {
+        let trajectory = Trajectory {
+            flight_path_angle: course[0],
+            heading: course[1],
+            flight_path_angle_rate: course[2],
+            heading_rate: course[3],
+            ..Trajectory::default()
+        };
+        for kinematics in [Kinematics::Printed, Kinematics::Exact] {
+            let rates = Vector3::from(rates);
+            let turn_rate = trajectory.turn_rate(0.0);
+            let angle_rates = kinematics.r(&angles) * rates + kinematics.turn(&angles) * turn_rate;
+            let pose = Pose { kinematics, angles, rates, alpha_rate: angle_rates.x, trajectory };
+            // About an Earth that neither turns nor curves, level axes are inertial.
+            let expected = rate_of(|t| {
+                let course = Trajectory {
+                    flight_path_angle: trajectory.flight_path_angle + t * trajectory.flight_path_angle_rate,
+                    heading: trajectory.heading + t * trajectory.heading_rate,
+                    ..Trajectory::default()
+                };
+                body_from_velocity(&(angles + angle_rates * t)) * velocity_from_level(&course)
+            });
+            let [found, ..] = pose.felt(&AROUND);
+            let scale = 1.0 + angle_rates.amax().powi(5);
+            prop_assert!((found - expected).amax() < 1e-9 * scale, "{kinematics:?}: {found} {expected}");
+        }
+    }
+}
+
+/// A plant that flies the sequence.
+fn calibrating(sequence: Sequence, kinematics: Kinematics) -> Plant {
+    let mut config = Scenario::crmpc2022().config(0.01);
+    config.calibration = Some(sequence);
+    config.kinematics = kinematics;
+    config.surroundings = AROUND;
+    Plant::new(&config, 0.0).unwrap()
+}
+
+#[test]
+fn oracle_along_the_calibration_sequence_the_gyroscope_is_the_change_of_orientation() {
+    let sequence = SensorData::embedded().calibration;
+    let initial = Scenario::crmpc2022().initial_angles;
+    for kinematics in [Kinematics::Printed, Kinematics::Exact] {
+        let mut plant = calibrating(sequence, kinematics);
+        for k in 0..100 {
+            let time = 0.3 * f64::from(k);
+            plant.advance(time, time + 0.3, Vector3::new(1e5, 1e5, 1e5)).unwrap();
+            let time = time + 0.3;
+            let [angles, ..] = sequence.angles_and_derivatives(&initial, time);
+            assert!((plant.angles() - angles).amax() < 1e-10, "{}", plant.angles() - angles);
+            let expected =
+                rate_of(|t| body_from_velocity(&sequence.angles_and_derivatives(&initial, time + t)[0]));
+            let [found, ..] = plant.felt(time, &Input::default());
+            assert!((found - expected).amax() < 1e-9, "{kinematics:?}: {}", found - expected);
+        }
+    }
+}
+
+/// `count` directions spread evenly over the sphere.
+fn directions(count: u32) -> impl Iterator<Item = Vector3<f64>> {
+    (0..count).map(move |k| {
+        let z = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(count);
+        let (sine, cosine) = (f64::from(k) * std::f64::consts::PI * (3.0 - 5f64.sqrt())).sin_cos();
+        Vector3::new(cosine, sine, 0.0) * (1.0 - z * z).sqrt() + Vector3::new(0.0, 0.0, z)
+    })
+}
+
+#[test]
+fn in_two_minutes_the_calibration_sequence_sees_every_direction_within_13_degrees() {
+    let data = SensorData::embedded();
+    let initial = Scenario::crmpc2022().initial_angles;
+    for fixed in [data.surroundings.field.normalize(), Vector3::z()] {
+        let seen: Vec<_> = (0..1200)
+            .map(|k| {
+                let [angles, ..] = data.calibration.angles_and_derivatives(&initial, 0.1 * f64::from(k));
+                body_from_velocity(&angles) * fixed
+            })
+            .collect();
+        let farthest = directions(1000)
+            .map(|wanted| seen.iter().map(|seen| seen.dot(&wanted)).fold(-1.0, f64::max))
+            .fold(1.0, f64::min);
+        assert!(farthest > 13f64.to_radians().cos(), "{} deg", farthest.acos().to_degrees());
+    }
+}
+
+#[test]
+fn a_calibration_sequence_that_comes_to_the_singular_sideslip_is_refused_by_name() {
+    let mut config = Scenario::crmpc2022().config(0.01);
+    let sequence = SensorData::embedded().calibration;
+    config.calibration = Some(Sequence { beta_amplitude: BETA_LIMIT - config.initial[1], ..sequence });
+    let message = Plant::new(&config, 0.0).unwrap_err().to_string();
+    assert!(message.contains("calibration.beta.amplitude") && message.contains("90 deg"), "{message}");
+    config.calibration = Some(Sequence { alpha_rate: f64::NAN, ..sequence });
+    assert!(Plant::new(&config, 0.0).unwrap_err().to_string().contains("calibration"));
+    config.calibration = None;
+    config.surroundings.gravity = -1.0;
+    assert!(Plant::new(&config, 0.0).unwrap_err().to_string().contains("sensor.gravity"));
+}
