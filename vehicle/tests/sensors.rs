@@ -1,0 +1,349 @@
+//! Sensors and their line, effect by effect, against values by hand and the statistics of their noise.
+
+use nalgebra::{Matrix3, Vector3};
+use vehicle::platform::Readings;
+use vehicle::sensor_data::SensorData;
+use vehicle::sensors::{Config, IN_FLIGHT, Line, Sample, Sensors};
+use vehicle::triad::{Triad, Window};
+
+const PERIOD: f64 = 1.0 / 128.0;
+
+/// Sensors without errors on a line without delay.
+fn ideal() -> Config {
+    Config {
+        triads: [Triad::default(); 3],
+        line: Line {
+            period: PERIOD,
+            delay: 0.0,
+            drop_probability: 0.0,
+            drop_window: Window { start: 0.0, end: 1e9 },
+        },
+        seed: 1,
+    }
+}
+
+fn with(change: impl Fn(&mut Config)) -> Sensors {
+    let mut config = ideal();
+    change(&mut config);
+    Sensors::new(&config, 0.0).unwrap()
+}
+
+/// Every sensor feels `value` along every axis.
+fn all(value: f64) -> Readings {
+    [Vector3::repeat(value); 3]
+}
+
+/// What is shown at `count` ticks of a signal of time.
+fn run(sensors: &mut Sensors, count: u32, signal: impl Fn(f64) -> Readings) -> Vec<Sample> {
+    (0..count)
+        .map(|k| {
+            let time = f64::from(k) * PERIOD;
+            sensors.take(time, &signal(time));
+            sensors.arrived()
+        })
+        .collect()
+}
+
+#[test]
+fn the_embedded_data_can_be_used_and_ideal_sensors_have_no_errors() {
+    let data = SensorData::embedded();
+    assert_eq!(data.ideal, [Triad::default(); 3]);
+    data.surroundings.check().unwrap();
+    let config = Config { triads: data.mems, line: data.line, seed: 1 };
+    Sensors::new(&config, 0.0).unwrap();
+}
+
+#[test]
+fn published_data_sheet_values_of_the_mems_set() {
+    // InvenSense DS-000189 1.3, sections 3.1 to 3.3
+    let data = SensorData::embedded();
+    let [gyroscope, accelerometer, magnetometer] = data.mems;
+    let near =
+        |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 5e-3, "{found} {expected}");
+    near(gyroscope.noise.to_degrees(), 0.015 * 73.3f64.sqrt());
+    near(1f64.to_radians() / gyroscope.resolution, 131.0);
+    near(gyroscope.range.to_degrees(), 250.0);
+    near(accelerometer.noise, 230e-6 * 9.80665 * 68.8f64.sqrt());
+    near(9.80665 / accelerometer.resolution, 8192.0);
+    near(accelerometer.range, 4.0 * 9.80665);
+    near(magnetometer.resolution, 0.15e-6);
+    near(magnetometer.range, 4900e-6);
+    for (triad, scale, bias) in [
+        (&gyroscope, 0.015, 5f64.to_radians()),
+        (&accelerometer, 0.005, 0.05 * 9.80665),
+        // The tolerance of the sensor alone; scale and soft iron are assumed
+        (&magnetometer, 0.1, 300e-6),
+    ] {
+        let off = triad.matrix - Matrix3::identity();
+        assert!(off.diagonal().amax() <= scale && triad.bias.amax() <= bias && triad.bias.amax() > 0.0);
+    }
+    // MathWorks, wrldmagm: F = 5.0940e4 nT, DEC = -13.6891, DIP = 65.9899
+    let field = data.surroundings.field;
+    near(field.norm(), 5.0940e-5);
+    near(field.y.atan2(field.x).to_degrees(), -13.6891);
+    near((field.z / field.norm()).asin().to_degrees(), 65.9899);
+}
+
+#[test]
+fn oracle_a_magnetometer_shows_soft_iron_times_field_plus_hard_iron() {
+    let soft = Matrix3::new(1.1, 0.05, -0.02, 0.03, 0.9, 0.04, -0.01, 0.02, 1.05);
+    let hard = Vector3::new(3e-5, -2e-5, 1e-5);
+    let mut sensors = with(|config| {
+        config.triads[2].matrix = soft;
+        config.triads[2].bias = hard;
+    });
+    let field = Vector3::new(2e-5, -1e-5, 4e-5);
+    sensors.take(0.0, &[Vector3::x(), Vector3::y(), field]);
+    let [x, y, found] = sensors.arrived().readings;
+    // 1.1·2 − 0.05 − 0.08 + 3; 0.06 − 0.9 + 0.16 − 2; −0.02 − 0.02 + 4.2 + 1
+    let expected = Vector3::new(5.07e-5, -2.68e-5, 5.16e-5);
+    assert!((found - expected).amax() < 1e-19, "{found}");
+    assert_eq!([x, y], [Vector3::x(), Vector3::y()]);
+}
+
+#[test]
+fn oracle_noise_has_the_standard_deviation_that_is_set_and_no_memory() {
+    const COUNT: u32 = 20_000;
+    let sigma = [0.1, 2.0, 1e-6];
+    let mut sensors = with(|config| {
+        for (triad, sigma) in config.triads.iter_mut().zip(sigma) {
+            triad.noise = sigma;
+        }
+    });
+    let samples = run(&mut sensors, COUNT, |_| all(0.0));
+    let n = f64::from(COUNT);
+    // All nine, each with variance 1
+    let values = |sample: &Sample| -> [f64; 9] {
+        std::array::from_fn(|i| sample.readings[i / 3][i % 3] / sigma[i / 3])
+    };
+    let mean = |product: &dyn Fn(usize) -> f64| (0..samples.len()).map(product).sum::<f64>() / n;
+    for i in 0..9 {
+        // Five standard deviations of each estimate
+        assert!(mean(&|k| values(&samples[k])[i]).abs() < 5.0 / n.sqrt(), "{i}");
+        let variance = mean(&|k| values(&samples[k])[i].powi(2));
+        assert!((variance - 1.0).abs() < 5.0 * (2.0 / n).sqrt(), "{i}: {variance}");
+        for j in 0..9 {
+            let next = mean(&|k| values(&samples[k])[i] * values(&samples[(k + 1) % samples.len()])[j]);
+            assert!(next.abs() < 5.0 / n.sqrt(), "{i} {j}: {next}");
+            if i != j {
+                let across = mean(&|k| values(&samples[k])[i] * values(&samples[k])[j]);
+                assert!(across.abs() < 5.0 / n.sqrt(), "{i} {j}: {across}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_seed_determines_the_noise() {
+    let noisy = |seed| {
+        let mut sensors = with(|config| {
+            config.seed = seed;
+            config.triads[0].noise = 1.0;
+        });
+        run(&mut sensors, 10, |_| all(0.0))
+    };
+    assert_eq!(noisy(5), noisy(5));
+    assert_ne!(noisy(5)[0].readings[0], noisy(6)[0].readings[0]);
+}
+
+/// First-order lag with the signal held and growing, by integration in small steps.
+#[test]
+fn oracle_bandwidth_against_integration_of_the_filter() {
+    let bandwidth = 5.0;
+    let mut sensors = with(|config| config.triads[1].bandwidth = bandwidth);
+    // A step at tick 0 would be felt from the start; the first sample finds the filter at rest.
+    let signal = |time: f64| (3.0 * time).sin() + 20.0 * time;
+    let found = run(&mut sensors, 200, |time| all(signal(time)));
+    let (mut y, fine) = (signal(0.0), 2000);
+    for (k, sample) in (0u32..).zip(&found) {
+        let begin = f64::from(k) * PERIOD;
+        assert!((sample.readings[1].x - y).abs() < 2e-4, "{k}: {} {y}", sample.readings[1].x);
+        assert_eq!(sample.readings[0].x, signal(begin), "no bandwidth");
+        for i in 0..fine {
+            let h = PERIOD / f64::from(fine);
+            let middle = begin + (f64::from(i) + 0.5) * h;
+            y += (signal(middle) - y) * (1.0 - (-std::f64::consts::TAU * bandwidth * h).exp());
+        }
+    }
+}
+
+#[test]
+fn oracle_a_ramp_comes_out_of_the_filter_late_by_its_time_constant() {
+    let bandwidth = 20.0;
+    let mut sensors = with(|config| config.triads[0].bandwidth = bandwidth);
+    let found = run(&mut sensors, 500, all);
+    let lag = 1.0 / (std::f64::consts::TAU * bandwidth);
+    let last = found.last().unwrap();
+    assert!((last.readings[0].z - (last.time - lag)).abs() < 1e-13);
+}
+
+#[test]
+fn oracle_range_is_applied_before_resolution_and_after_noise() {
+    let shown = |value: f64, change: fn(&mut Triad)| {
+        let mut sensors = with(|config| change(&mut config.triads[0]));
+        sensors.take(0.0, &all(value));
+        sensors.arrived().readings[0].x
+    };
+    let limited: fn(&mut Triad) = |triad| triad.range = 4.0;
+    assert_eq!([shown(5.0, limited), shown(-5.0, limited), shown(3.9, limited)], [4.0, -4.0, 3.9]);
+    let steps: fn(&mut Triad) = |triad| triad.resolution = 0.25;
+    assert_eq!([shown(0.12, steps), shown(0.13, steps), shown(-0.4, steps)], [0.0, 0.25, -0.5]);
+    // 4.1 is limited to 4.0, whose nearest step of 0.3 is 3.9
+    let both: fn(&mut Triad) = |triad| (triad.range, triad.resolution) = (4.0, 0.3);
+    assert!((shown(4.1, both) - 3.9).abs() < 1e-15);
+    // Noise does not get out of the range nor off the steps
+    let mut sensors = with(|config| {
+        config.triads[0] = Triad { noise: 3.0, range: 2.0, resolution: 0.5, ..Triad::default() };
+    });
+    let found = run(&mut sensors, 1000, |_| all(0.0));
+    let values: Vec<f64> = found.iter().map(|sample| sample.readings[0].y).collect();
+    assert!(values.iter().all(|value| value.abs() <= 2.0 && (value / 0.5).fract() == 0.0));
+    assert!(values.contains(&2.0) && values.contains(&-2.0) && values.contains(&0.5));
+}
+
+#[test]
+fn oracle_samples_arrive_late_by_any_delay() {
+    for ticks in [0.0, 0.4, 1.0, 2.5, 7.0] {
+        let mut sensors = with(|config| config.line.delay = ticks * PERIOD);
+        assert_eq!((sensors.arrived().number, sensors.arrived().readings), (0, all(0.0)));
+        for quarter in 0..400 {
+            let time = f64::from(quarter) * PERIOD / 4.0;
+            sensors.take(time, &all(1.0 + time));
+            let newest = (f64::from(quarter) / 4.0 - ticks).floor();
+            let found = sensors.arrived();
+            if newest < 0.0 {
+                assert_eq!((found.number, found.readings), (0, all(0.0)), "{ticks} {quarter}");
+            } else {
+                let taken = newest * PERIOD;
+                assert_eq!((f64::from(found.number), found.time), (newest + 1.0, taken), "{ticks} {quarter}");
+                assert_eq!(found.readings, all(1.0 + taken));
+            }
+        }
+    }
+}
+
+#[test]
+fn events_are_where_samples_are_taken_and_where_they_arrive() {
+    for (ticks, expected) in [
+        (0.0, [1.0, 2.0, 3.0, 4.0, 5.0]),
+        (0.25, [0.25, 1.0, 1.25, 2.0, 2.25]),
+        (2.5, [1.0, 2.0, 2.5, 3.0, 3.5]),
+        (1.0, [1.0, 2.0, 3.0, 4.0, 5.0]),
+    ] {
+        let sensors = with(|config| config.line.delay = ticks * PERIOD);
+        let mut time = 0.0;
+        let found = [0; 5].map(|_| {
+            time = sensors.next_event(time);
+            time / PERIOD
+        });
+        assert_eq!(found, expected, "delay of {ticks}");
+    }
+}
+
+#[test]
+fn a_dropped_sample_leaves_a_gap_in_the_numbers_and_the_one_before_in_place() {
+    let window = Window { start: 10.0 * PERIOD, end: 13.0 * PERIOD };
+    for delay in [0.0, 2.5 * PERIOD] {
+        let mut sensors = with(|config| {
+            config.line.delay = delay;
+            config.line.drop_probability = 1.0;
+            config.line.drop_window = window;
+        });
+        let found = run(&mut sensors, 30, all);
+        let mut numbers: Vec<i32> =
+            found.iter().map(|sample| sample.number).filter(|&number| number > 0).collect();
+        numbers.dedup();
+        // Ticks 10, 11 and 12 have the numbers 11, 12 and 13
+        assert_eq!(
+            numbers,
+            (1..numbers.last().unwrap() + 1).filter(|k| !(11..14).contains(k)).collect::<Vec<_>>()
+        );
+        for sample in found.iter().filter(|sample| sample.number > 0) {
+            assert_eq!(sample.readings, all(f64::from(sample.number - 1) * PERIOD), "consistent");
+        }
+    }
+}
+
+#[test]
+fn oracle_samples_are_dropped_as_often_as_set() {
+    const COUNT: u32 = 20_000;
+    let mut sensors = with(|config| config.line.drop_probability = 0.3);
+    let mut numbers: Vec<i32> = run(&mut sensors, COUNT, all).iter().map(|sample| sample.number).collect();
+    numbers.retain(|&number| number > 0);
+    numbers.dedup();
+    let n = f64::from(COUNT);
+    let share = 1.0 - numbers.len() as f64 / n;
+    assert!((share - 0.3).abs() < 5.0 * (0.3 * 0.7 / n).sqrt(), "{share}");
+}
+
+#[test]
+fn a_frozen_sensor_repeats_its_value_while_the_samples_count_on() {
+    let mut sensors = with(|config| {
+        config.triads[2].noise = 1.0;
+        config.triads[2].freeze = Window { start: 5.0 * PERIOD, end: 8.0 * PERIOD };
+    });
+    let found = run(&mut sensors, 12, all);
+    for (k, sample) in found.iter().enumerate() {
+        assert_eq!(sample.number as usize, k + 1);
+        assert_eq!(sample.readings[0].x, k as f64 * PERIOD, "the others go on");
+        let repeats = k > 0 && sample.readings[2] == found[k - 1].readings[2];
+        assert_eq!(repeats, (5..8).contains(&k), "{k}");
+    }
+    // From the start on it repeats the first
+    let mut sensors = with(|config| config.triads[0].freeze = Window { start: 0.0, end: 1.0 });
+    let found = run(&mut sensors, 4, |time| all(1.0 + time));
+    assert!(found.iter().all(|sample| sample.readings[0] == Vector3::repeat(1.0)));
+}
+
+#[test]
+fn a_sample_is_taken_again_when_asked_again_at_its_tick_and_looking_takes_none() {
+    let change = |config: &mut Config| {
+        config.triads[0] = Triad { bandwidth: 5.0, noise: 0.1, ..Triad::default() };
+    };
+    let [mut once, mut often] = [0, 1].map(|_| with(change));
+    for k in 0..20 {
+        let time = f64::from(k) * PERIOD;
+        assert_eq!(often.shown(time, &all(9.0)).number, k + 1);
+        often.take(time, &all(9.0));
+        often.take(time + 1e-10, &all(time));
+        once.take(time, &all(time));
+        assert_eq!(once.shown(time, &all(time)), once.arrived());
+        assert_eq!(once.arrived(), often.arrived(), "{k}");
+        // Between ticks nothing is taken
+        often.take(time + PERIOD / 3.0, &all(7.0));
+        assert_eq!(often.shown(time + PERIOD / 2.0, &all(8.0)), once.arrived());
+    }
+}
+
+#[test]
+fn a_sample_whose_tick_was_missed_is_taken_late_and_says_so() {
+    let mut sensors = with(|_| {});
+    sensors.take(0.0, &all(0.0));
+    sensors.take(3.25 * PERIOD, &all(3.25));
+    let late = sensors.arrived();
+    assert_eq!((late.number, late.time, late.readings), (4, 3.25 * PERIOD, all(3.25)));
+}
+
+#[test]
+fn impossible_sensors_are_refused_by_name() {
+    type Change = fn(&mut Config);
+    let refused: [(&str, Change); 11] = [
+        ("sensor.period", |config| config.line.period = 0.0),
+        ("sensor.period", |config| config.line.period = f64::NAN),
+        ("sensor.delay", |config| config.line.delay = -1e-3),
+        ("sensor.delay", |config| config.line.delay = (IN_FLIGHT as f64 + 1.0) * PERIOD),
+        ("sensor.drop.probability", |config| config.line.drop_probability = 1.5),
+        ("sensor.gyroscope.range", |config| config.triads[0].range = -1.0),
+        ("sensor.accelerometer.noise", |config| config.triads[1].noise = f64::INFINITY),
+        ("sensor.magnetometer.resolution", |config| config.triads[2].resolution = -1e-9),
+        ("sensor.gyroscope.bandwidth", |config| config.triads[0].bandwidth = f64::NAN),
+        ("sensor.accelerometer.bias", |config| config.triads[1].bias.y = f64::NAN),
+        ("sensor.magnetometer.matrix", |config| config.triads[2].matrix[(0, 1)] = f64::INFINITY),
+    ];
+    for (name, change) in refused {
+        let mut config = ideal();
+        change(&mut config);
+        let message = Sensors::new(&config, 0.0).unwrap_err().to_string();
+        assert!(message.starts_with(name), "{message}");
+    }
+}
