@@ -1,5 +1,7 @@
 //! The unit through the interface that the shell uses.
 
+mod sensors;
+
 use crate::plant::{Output, ReentryPlant};
 use crate::table::{Known, Unknown};
 use fmi2_export::{Context, Failure, Inputs, Model, describe};

@@ -256,7 +256,7 @@ fn a_dropped_sample_leaves_a_gap_in_the_numbers_and_the_one_before_in_place() {
         // Ticks 10, 11 and 12 have the numbers 11, 12 and 13
         assert_eq!(
             numbers,
-            (1..numbers.last().unwrap() + 1).filter(|k| !(11..14).contains(k)).collect::<Vec<_>>()
+            (1..=*numbers.last().unwrap()).filter(|k| !(11..14).contains(k)).collect::<Vec<_>>()
         );
         for sample in found.iter().filter(|sample| sample.number > 0) {
             assert_eq!(sample.readings, all(f64::from(sample.number - 1) * PERIOD), "consistent");
