@@ -176,11 +176,11 @@ impl Parameters {
     fn sensors(&self) -> Option<sensors::Config> {
         let triads = match self.sensor_set {
             NO_SENSORS => return None,
-            // Freezing is no error of the set.
-            IDEAL_SENSORS => std::array::from_fn(|i| Triad {
-                freeze: self.triads[i].freeze,
-                ..SensorData::embedded().ideal[i]
-            }),
+            IDEAL_SENSORS => {
+                let ideal = SensorData::embedded().ideal;
+                // Freezing is no error of the set.
+                std::array::from_fn(|i| Triad { freeze: self.triads[i].freeze, ..ideal[i] })
+            }
             _ => self.triads,
         };
         Some(sensors::Config { triads, line: self.line, seed: self.sensor_seed as u64 })

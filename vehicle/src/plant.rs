@@ -1,6 +1,8 @@
 //! The vehicle in motion: Θ̇ = R ω and what a turning trajectory adds, ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ; integrated from one
 //! communication point to the next.
 
+mod sensing;
+
 use crate::actuators::{self, Actuators, Command, Drive};
 use crate::calibration::Sequence;
 use crate::disturbance::{Disturbance, View};
@@ -9,8 +11,8 @@ use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::error::Error;
 use crate::integrator::{equal_steps, rk4};
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
-use crate::platform::{Pose, Readings, Surroundings};
-use crate::sensors::{self, Sample, Sensors};
+use crate::platform::Surroundings;
+use crate::sensors::{self, Sensors};
 use crate::time::tolerance;
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, SMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -335,13 +337,6 @@ impl Plant {
         *self.held.insert(self.drawn(time, input, drive))
     }
 
-    fn sense(&mut self, time: f64, input: &Input) {
-        if let Some(mut sensors) = self.sensors.take() {
-            sensors.take(time, &self.felt(time, input));
-            self.sensors = Some(sensors);
-        }
-    }
-
     fn settle(&mut self, time: f64, held: &Held) {
         if let Some(actuators) = &self.actuators {
             actuators.settle(time, &held.drive, &mut self.deflections);
@@ -421,35 +416,6 @@ impl Plant {
         self.derivative_at(time, &self.state, &self.load(time, input, held, 0.0))
     }
 
-    fn pose(&self, time: f64, input: &Input) -> Pose {
-        let load = Load { turn_rate: self.turn_rate(input), ..Load::default() };
-        Pose {
-            kinematics: self.kinematics,
-            angles: self.angles(),
-            rates: self.rates(),
-            alpha_rate: self.derivative_at(time, &self.state, &load)[0],
-            trajectory: input.trajectory,
-        }
-    }
-
-    /// What ideal sensors feel at `time` (s).
-    pub fn felt(&self, time: f64, input: &Input) -> Readings {
-        self.pose(time, input).felt(&self.surroundings)
-    }
-
-    /// What the sensors show at `time` (s), before a sample is taken that is due then. Without sampled sensors: what they
-    /// feel, with the number 0.
-    pub fn measured(&self, time: f64, input: &Input) -> Sample {
-        let felt = self.felt(time, input);
-        let truth = Sample { number: 0, time, readings: felt };
-        self.sensors.as_ref().map_or(truth, |sensors| sensors.shown(time, &felt))
-    }
-
-    /// What the sensors show at `time` (s) since [`Plant::hold`].
-    pub fn measured_since_held(&self, time: f64, input: &Input) -> Sample {
-        self.sensors.as_ref().map_or_else(|| self.measured(time, input), Sensors::arrived)
-    }
-
     /// Partial derivatives of [`Plant::derivative`], and of the turn rate by the trajectory (3 × 7).
     pub fn partial_derivatives(
         &self,
@@ -463,24 +429,6 @@ impl Plant {
             partials = Partials::default();
         }
         (partials, input.trajectory.turn_rate_by_fields(self.earth_rate))
-    }
-
-    /// Partial derivatives of what [`Plant::measured`] shows, in the order of its readings: by state (9 × 6) and trajectory
-    /// (9 × 7). Samples depend on neither, or do so at an instant only.
-    pub fn measured_by_state_and_trajectory(
-        &self,
-        time: f64,
-        input: &Input,
-        held: &Held,
-    ) -> (SMatrix<f64, 9, 6>, SMatrix<f64, 9, TRAJECTORY>) {
-        if self.sensors.is_some() {
-            return (SMatrix::zeros(), SMatrix::zeros());
-        }
-        let (partials, turn_rate_by_trajectory) = self.partial_derivatives(time, input, held);
-        let by_state = partials.by_state.fixed_rows::<1>(0).into_owned();
-        let by_trajectory = partials.by_turn_rate.fixed_rows::<1>(0) * turn_rate_by_trajectory;
-        let pose = self.pose(time, input);
-        pose.felt_by_state_and_trajectory(&self.surroundings, &by_state, &by_trajectory)
     }
 
     /// From `from` to `to` (s) under a constant control moment (N m).

@@ -1,0 +1,248 @@
+"""Sensors of ReentryPlant: what they show at rest, along the calibration sequence, through lost samples, in both interfaces. The
+errors are those of vehicle/data/sensors.toml, read back from the unit's parameters."""
+
+import csv
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+
+from conftest import EXPERIMENTS
+from fmi import RATES, Unit
+
+SENSORS = ["gyroscope", "accelerometer", "magnetometer"]
+READINGS = {sensor: [f"measured.{sensor}.{axis}" for axis in "xyz"] for sensor in SENSORS}
+ALL = [name for names in READINGS.values() for name in names]
+SAMPLE = ["measured.sample", "measured.time"]
+REST = {"disturbance.kind": "none"}
+OFF, IDEAL, MEMS = 0, 1, 2
+
+
+def matrix(sensor: str) -> list[str]:
+    return [f"sensor.{sensor}.matrix[{i},{j}]" for i in (1, 2, 3) for j in (1, 2, 3)]
+
+
+def errors(unit: Unit, sensor: str) -> tuple[np.ndarray, np.ndarray]:
+    """A and b of m = A h + b."""
+    bias = unit.get([f"sensor.{sensor}.bias.{axis}" for axis in "xyz"])
+    return np.reshape(unit.get(matrix(sensor)), (3, 3)), np.array(bias)
+
+
+def flown(fmu, parameters: dict, steps: int, step: float, names=SAMPLE + ALL) -> np.ndarray:
+    rows = []
+    with Unit(fmu("ReentryPlant"), REST | parameters).start() as unit:
+        for tick in range(steps + 1):
+            rows.append(unit.get(names))
+            unit.step(tick * step, step)
+    return np.array(rows)
+
+
+@pytest.mark.parametrize(
+    "angles, force, field",
+    [
+        # Level, to the north
+        ({}, [0, 0, -1], ["north", "east", "down"]),
+        # Nose up: the belly looks north
+        ({"initial.alpha": 90.0}, [1, 0, 0], ["-down", "east", "north"]),
+        # Bank against the right-hand rule: the right wing is up
+        ({"initial.sigma": 90.0}, [0, 1, 0], ["north", "-down", "east"]),
+    ],
+)
+def test_oracle_readings_at_rest_by_hand(fmu, angles, force, field):
+    level = {f"initial.{axis}": 0.0 for axis in ("alpha", "beta", "sigma")}
+    parameters = REST | level | {name: np.radians(value) for name, value in angles.items()}
+    with Unit(fmu("ReentryPlant"), parameters).start() as unit:
+        gravity = unit.get(["sensor.gravity"])[0]
+        components = {name: unit.get([f"sensor.field.{name}"])[0] for name in ("north", "east", "down")}
+        expected = [-components[name[1:]] if name[0] == "-" else components[name] for name in field]
+        assert unit.get(READINGS["gyroscope"]) == [0.0] * 3
+        np.testing.assert_allclose(unit.get(READINGS["accelerometer"]), gravity * np.array(force), rtol=0, atol=1e-14)
+        np.testing.assert_allclose(unit.get(READINGS["magnetometer"]), expected, rtol=0, atol=1e-19)
+        assert unit.get(SAMPLE) == [0, 0.0]
+
+
+def test_oracle_mean_and_deviation_at_rest_are_those_of_the_parameters(fmu):
+    count = 4000
+    rows = flown(fmu, {"sensor.set": MEMS}, count, 0.01)
+    # The delay is less than a period: of a step's end the sample of its beginning has arrived.
+    assert rows[1:, 0].tolist() == list(range(1, count + 1))
+    np.testing.assert_allclose(rows[1:, 1], 0.01 * np.arange(count), rtol=0, atol=1e-12)
+    with Unit(fmu("ReentryPlant"), REST).start() as unit:
+        for i, sensor in enumerate(SENSORS):
+            a, b = errors(unit, sensor)
+            expected = a @ unit.get(READINGS[sensor]) + b
+            noise, step = unit.get([f"sensor.{sensor}.noise", f"sensor.{sensor}.resolution"])
+            deviation = np.hypot(noise, step / np.sqrt(12))
+            found = rows[1:, 2 + 3 * i : 5 + 3 * i]
+            # Five standard deviations of each estimate
+            assert np.abs(found.mean(axis=0) - expected).max() < 5 * deviation / np.sqrt(count)
+            assert np.abs(found.std(axis=0) / deviation - 1).max() < 5 / np.sqrt(2 * count)
+            np.testing.assert_allclose(found / step, np.round(found / step), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("step", [0.01, 0.02, 0.05])
+def test_samples_do_not_depend_on_the_communication_step(fmu, step):
+    parameters = {"sensor.set": MEMS, "sensor.drop.probability": 0.2, "calibration.active": True}
+    expected = flown(fmu, parameters, 100, 0.01)[:: round(step / 0.01)]
+    found = flown(fmu, parameters, round(1.0 / step), step)
+    assert found[:, 0].tolist() == expected[:, 0].tolist()
+    # To the bit, as steps of the converter are coarser than what the integration differs by
+    np.testing.assert_array_equal(found[:, 2:], expected[:, 2:])
+
+
+def test_dropped_samples_leave_gaps_and_frozen_sensors_count_on(fmu):
+    parameters = {
+        "sensor.set": MEMS,
+        "sensor.drop.probability": 1.0,
+        "sensor.drop.start": 0.2,
+        "sensor.drop.end": 0.3,
+        "sensor.magnetometer.freeze.start": 0.5,
+        "sensor.magnetometer.freeze.end": 0.6,
+        "calibration.active": True,
+    }
+    rows = flown(fmu, parameters, 100, 0.01)
+    numbers = rows[1:, 0].astype(int)
+    assert set(range(1, 101)) - set(numbers) == set(range(21, 31)), "taken from 0.20 s to 0.29 s"
+    still = np.all(np.diff(rows[1:, 8:11], axis=0) == 0, axis=1)
+    moving = np.any(np.diff(rows[1:, 2:5], axis=0) != 0, axis=1)
+    # Row k has arrived at (k + 1) · 0.01 s; it repeats the one before if it was dropped or frozen.
+    assert np.flatnonzero(still).tolist() == list(range(19, 29)) + list(range(49, 59))
+    assert np.flatnonzero(~moving).tolist() == list(range(19, 29))
+
+
+def test_oracle_the_gyroscope_measures_the_change_of_orientation_whatever_the_kinematics(fmu):
+    def orientation(angles: np.ndarray) -> np.ndarray:
+        (sa, sb, ss), (ca, cb, cs) = np.sin(angles), np.cos(angles)
+        bank = np.array([[1, 0, 0], [0, cs, -ss], [0, ss, cs]])
+        sideslip = np.array([[cb, -sb, 0], [sb, cb, 0], [0, 0, 1]])
+        attack = np.array([[ca, 0, -sa], [0, 1, 0], [sa, 0, ca]])
+        return attack @ sideslip @ bank
+
+    names = [f"attitude.{axis}" for axis in ("alpha", "beta", "sigma")] + READINGS["gyroscope"] + RATES
+    start = {"initial.p": 0.3, "initial.q": -0.2, "initial.r": 0.4}
+    step = 1e-3
+    for kinematics in ("printed", "exact"):
+        rows = flown(fmu, {"kinematics": kinematics, "integrator.step": step, **start}, 400, step, names)
+        turned = np.array([orientation(row[:3]) for row in rows])
+        # Fourth-order difference of C; dC/dt C' = -omega^x
+        slope = (turned[:-4] - 8 * turned[1:-3] + 8 * turned[3:-1] - turned[4:]) / (12 * step)
+        spin = -slope @ turned[2:-2].transpose(0, 2, 1)
+        expected = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        assert np.abs(rows[2:-2, 3:6] - expected).max() < 1e-9
+        model = np.abs(rows[:, 3:6] - rows[:, 6:9]).max()
+        # alpha_dot sin(beta) is 0.0456 rad/s at the start
+        assert model == 0.0 if kinematics == "exact" else model > 0.045
+
+
+def exchanged(fmu, parameters: dict, solver: str):
+    unit = fmu("ReentryPlant")
+    parameters = REST | parameters
+    values = {
+        name: unit.item(name, value) if isinstance(value, str) else value for name, value in parameters.items()
+    }
+    return simulate_fmu(
+        str(unit.path),
+        fmi_type="ModelExchange",
+        solver=solver,
+        start_values=values,
+        stop_time=1.0,
+        step_size=1e-3,
+        output_interval=1e-3 if solver == "Euler" else 0.05,
+        output=SAMPLE + ALL,
+        **({"relative_tolerance": 1e-10} if solver == "CVode" else {}),
+    )
+
+
+@pytest.mark.parametrize("solver", ["CVode", "Euler"])
+def test_oracle_model_exchange_takes_the_same_samples(fmu, solver):
+    # At rest, so that Euler's errors do not matter; noise, drops and delay do.
+    parameters = {"sensor.set": MEMS, "sensor.drop.probability": 0.2, "sensor.delay": 0.025}
+    expected = {int(row[0]): row for row in flown(fmu, parameters, 100, 0.01)}
+    result = exchanged(fmu, parameters, solver)
+    found = {int(row["measured.sample"]): row for row in result}
+    assert sorted(found) == sorted(expected) and len(found) > 70
+    for number, row in found.items():
+        # At most a step of the converter, where the integrators' last bits tip it
+        values = np.array([row[name] for name in SAMPLE + ALL])
+        tolerance = np.array([0, 1e-9] + [1.4e-4] * 3 + [1.2e-3] * 3 + [1.6e-7] * 3)
+        assert (np.abs(values - expected[number]) <= tolerance).all(), number
+        assert row["measured.time"] == pytest.approx(0.01 * (number - 1), abs=1e-9) or number == 0
+
+
+def test_a_restored_state_takes_the_same_samples(fmu):
+    parameters = REST | {"sensor.set": MEMS, "sensor.delay": 0.05, "sensor.drop.probability": 0.2, "calibration.active": True}
+    with Unit(fmu("ReentryPlant"), parameters).start() as unit:
+
+        def drive(ticks):
+            rows = []
+            for tick in ticks:
+                rows.append([float(value).hex() for value in unit.get(SAMPLE + ALL)])
+                unit.step(0.013 * tick, 0.013)
+            return rows
+
+        drive(range(50))
+        saved = unit.save()
+        expected = drive(range(50, 120))
+        unit.restore(saved)
+        assert drive(range(50, 120)) == expected
+
+
+@pytest.mark.parametrize(
+    "parameters, name",
+    [
+        ({"sensor.period": 1e-4, "sensor.delay": 5.0}, "sensor.delay"),
+        ({"calibration.active": True, "calibration.beta.amplitude": 1.5}, "calibration.beta.amplitude"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(fmu, parameters, name):
+    with Unit(fmu("ReentryPlant"), {"sensor.set": MEMS, **parameters}) as unit:
+        with pytest.raises(Exception):
+            unit.start()
+        assert name in unit.messages()
+
+
+@pytest.mark.parametrize("name, value", [("sensor.set", 3), ("sensor.gyroscope.range", -1.0), ("sensor.period", 0.0)])
+def test_what_is_out_of_its_limits_is_refused_when_it_is_set(fmu, name, value):
+    with Unit(fmu("ReentryPlant")) as unit:
+        with pytest.raises(Exception):
+            unit.set({name: value})
+        assert name in unit.messages()
+
+
+def test_oracle_the_calibration_sequence_determines_hard_and_soft_iron(fmu):
+    # |A^-1 (m - b)| is the field's strength: an ellipsoid, fitted by least squares to what the magnetometer shows.
+    m = flown(fmu, {"sensor.set": MEMS, "calibration.active": True}, 12000, 0.01, READINGS["magnetometer"])[1:]
+    scale = 5e-5
+    x, y, z = m.T / scale
+    design = np.stack([x * x, y * y, z * z, 2 * x * y, 2 * x * z, 2 * y * z, 2 * x, 2 * y, 2 * z], axis=1)
+    v = np.linalg.lstsq(design, np.ones(len(m)), rcond=None)[0]
+    q = np.array([[v[0], v[3], v[4]], [v[3], v[1], v[5]], [v[4], v[5], v[2]]])
+    center = -np.linalg.solve(q, v[6:])
+    q = q / (1.0 + center @ q @ center)
+    with Unit(fmu("ReentryPlant"), REST).start() as unit:
+        a, b = errors(unit, "magnetometer")
+        strength = np.linalg.norm(unit.get([f"sensor.field.{axis}" for axis in ("north", "east", "down")]))
+    # Noise of 0.3 uT in 12000 samples; the fit's own bias is of the noise's square by the field
+    np.testing.assert_allclose(center * scale, b, rtol=0, atol=5e-8)
+    inverse = np.linalg.inv(a)
+    expected = inverse.T @ inverse * (scale / strength) ** 2
+    np.testing.assert_allclose(q, expected, rtol=0, atol=2e-3 * np.abs(expected).max())
+
+
+def test_regress_what_the_dropped_term_does_to_the_gyroscope_in_the_scenario_of_chai_2022(orchestrate, tmp_path):
+    text = (EXPERIMENTS / "crmpc-robust.toml").read_text()
+    wanted = text.replace('"plant.rate.*",', '"plant.rate.*",\n    "plant.measured.gyroscope.*",')
+    assert wanted != text
+    path = tmp_path / "gyroscope.toml"
+    path.write_text(wanted)
+    finished, out = orchestrate(path)
+    assert finished.returncode == 0, finished.stderr
+    with (out / "results.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    shown, model = (np.array([[float(row[f"plant.{n}"]) for n in names] for row in rows]) for names in (READINGS["gyroscope"], RATES))
+    difference = np.degrees(np.linalg.norm(shown - model, axis=1))
+    time = np.array([float(row["time"]) for row in rows])
+    # docs/ReentryPlant.md, deg/s
+    assert difference.max() == pytest.approx(0.288, abs=2e-3)
+    assert np.sqrt(np.mean(difference**2)) == pytest.approx(0.042, abs=1e-3)
+    assert difference[time > 5.0].max() == pytest.approx(0.0054, abs=3e-4)

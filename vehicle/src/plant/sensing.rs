@@ -1,0 +1,64 @@
+//! What the plant's sensors feel and show.
+
+use super::{Held, Input, Load, Plant};
+use crate::kinematics::TRAJECTORY;
+use crate::platform::{Pose, Readings};
+use crate::sensors::{Sample, Sensors};
+use nalgebra::SMatrix;
+
+impl Plant {
+    /// Takes the sample that is due at `time` (s), if one is.
+    pub(super) fn sense(&mut self, time: f64, input: &Input) {
+        if let Some(mut sensors) = self.sensors.take() {
+            sensors.take(time, &self.felt(time, input));
+            self.sensors = Some(sensors);
+        }
+    }
+
+    fn pose(&self, time: f64, input: &Input) -> Pose {
+        let load = Load { turn_rate: self.turn_rate(input), ..Load::default() };
+        Pose {
+            kinematics: self.kinematics,
+            angles: self.angles(),
+            rates: self.rates(),
+            alpha_rate: self.derivative_at(time, &self.state, &load)[0],
+            trajectory: input.trajectory,
+        }
+    }
+
+    /// What ideal sensors feel at `time` (s).
+    pub fn felt(&self, time: f64, input: &Input) -> Readings {
+        self.pose(time, input).felt(&self.surroundings)
+    }
+
+    /// What the sensors show at `time` (s), with a sample that is due then though not taken yet. Without sampled sensors: what
+    /// they feel, with the number 0.
+    pub fn measured(&self, time: f64, input: &Input) -> Sample {
+        let felt = self.felt(time, input);
+        let truth = Sample { number: 0, time, readings: felt };
+        self.sensors.as_ref().map_or(truth, |sensors| sensors.shown(time, &felt))
+    }
+
+    /// What the sensors show at `time` (s) since [`Plant::hold`].
+    pub fn measured_since_held(&self, time: f64, input: &Input) -> Sample {
+        self.sensors.as_ref().map_or_else(|| self.measured(time, input), Sensors::arrived)
+    }
+
+    /// Partial derivatives of what [`Plant::measured`] shows, in the order of its readings: by state (9 × 6) and trajectory
+    /// (9 × 7). Samples depend on neither, or do so at an instant only.
+    pub fn measured_by_state_and_trajectory(
+        &self,
+        time: f64,
+        input: &Input,
+        held: &Held,
+    ) -> (SMatrix<f64, 9, 6>, SMatrix<f64, 9, TRAJECTORY>) {
+        if self.sensors.is_some() {
+            return (SMatrix::zeros(), SMatrix::zeros());
+        }
+        let (partials, turn_rate_by_trajectory) = self.partial_derivatives(time, input, held);
+        let by_state = partials.by_state.fixed_rows::<1>(0).into_owned();
+        let by_trajectory = partials.by_turn_rate.fixed_rows::<1>(0) * turn_rate_by_trajectory;
+        let pose = self.pose(time, input);
+        pose.felt_by_state_and_trajectory(&self.surroundings, &by_state, &by_trajectory)
+    }
+}
