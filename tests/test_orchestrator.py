@@ -45,7 +45,7 @@ def test_a_run_leaves_its_results(experiment, fmu, name):
     assert found["loop_delay_s"] == 0.0
     sidecar = json.loads((out / "results.json").read_text())
     assert sidecar["status"] == "completed"
-    assert sidecar["seeds"] == {"plant.disturbance.seed": 1}
+    assert sidecar["seeds"] == {"plant.disturbance.seed": 1, "plant.sensor.seed": 1}
     for component in sidecar["components"].values():
         assert component["guid"] == fmu(component["fmu"].removesuffix(".fmu")).description.guid
 
