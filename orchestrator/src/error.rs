@@ -1,5 +1,6 @@
 //! The crate's one error type. A message names the culprit and what to do about it.
 
+use crate::interrupt::Request;
 use std::path::PathBuf;
 
 /// What can go wrong, from reading an experiment to writing its results.
@@ -30,6 +31,26 @@ pub enum Error {
         time: f64,
         /// The call and the unit's own words.
         failure: UnitFailure,
+    },
+    /// A deadline was missed in a run that was to end then.
+    #[error(
+        "{component} missed its deadline at t = {time} s by {late_ms:.3} ms, which was to end the run (--on-miss stop)"
+    )]
+    Deadline {
+        /// Whose values came late.
+        component: String,
+        /// Communication point, s.
+        time: f64,
+        /// From the deadline to the values, ms.
+        late_ms: f64,
+    },
+    /// A run was to end before its stop time.
+    #[error("ended by {} before t = {time} s", match request { Request::Quit => "the user", Request::Signal => "a signal" })]
+    Interrupted {
+        /// The first communication point that was not reached, s.
+        time: f64,
+        /// Who asked.
+        request: Request,
     },
     /// A run of a study failed.
     #[error("run {run}: {source}")]
@@ -64,12 +85,14 @@ impl Error {
         move |source| Self::File { path, source }
     }
 
-    /// The process's exit code: 1 for a run that failed, 2 for bad usage or a bad experiment.
+    /// The process's exit code: 1 for a run that failed, 2 for bad usage or a bad experiment, 130 for one that a signal ended.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Experiment { .. } | Self::Fmu { .. } => 2,
             Self::Run { source, .. } => source.exit_code(),
-            Self::Unit { .. } | Self::File { .. } | Self::Output(_) => 1,
+            Self::Interrupted { request: Request::Quit, .. } => 0,
+            Self::Interrupted { request: Request::Signal, .. } => 130,
+            Self::Unit { .. } | Self::Deadline { .. } | Self::File { .. } | Self::Output(_) => 1,
         }
     }
 

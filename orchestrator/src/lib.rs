@@ -1,10 +1,10 @@
 //! Steps FMUs along an experiment file and reports what they did. It knows FMUs only: nothing of vehicles or controllers
-//! but the names by which an experiment's figures of merit find their variables.
+//! but the names by which an experiment's figures of merit and the live view find their variables.
 //!
 //! [`experiment`] is read, [`run::Plan`] resolves it ([`wiring`], [`settings`], [`delay`]) against what the archives say
 //! ([`fmu`], [`archive`], [`description`], [`quantity`]), [`master`] steps the units ([`unit`]) on integer ticks
-//! ([`clock`]), and observers look on: [`recorder`], [`metrics`], [`plot`], [`progress`]. [`report`] and [`sidecar`] tell
-//! what came of it.
+//! ([`clock`]), in [`realtime`] if it is asked to, and observers look on: [`recorder`], [`metrics`], [`plot`], [`progress`],
+//! [`live`]. [`report`] and [`sidecar`] tell what came of it.
 //!
 //! A [`study`] runs many experiments, draws [`figure`]s of them, and holds them against what a paper prints.
 
@@ -17,13 +17,16 @@ pub mod experiment;
 pub mod figure;
 pub mod fmu;
 pub mod inspect;
+pub mod interrupt;
 pub mod list;
+pub mod live;
 pub mod master;
 pub mod metrics;
 pub mod names;
 pub mod plot;
 pub mod progress;
 pub mod quantity;
+pub mod realtime;
 pub mod recorder;
 pub mod report;
 pub mod run;

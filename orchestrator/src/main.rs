@@ -3,6 +3,9 @@
 use clap::{Parser, Subcommand};
 use orchestrator::error::Error;
 use orchestrator::experiment::{Experiment, Overrides};
+use orchestrator::interrupt::Request;
+use orchestrator::live::log::Messages;
+use orchestrator::realtime::{self, Factor, OnMiss};
 use orchestrator::run::{Options, Plan};
 use orchestrator::study::{Study, reproduce};
 use orchestrator::{inspect, list, report, ssp};
@@ -13,7 +16,7 @@ use tracing_subscriber::EnvFilter;
 
 /// Runs FMI 2.0 co-simulation experiments.
 ///
-/// Exit code 0: fine; 1: the run failed; 2: bad usage or a bad experiment. Log messages go to standard error; the
+/// Exit code 0: fine; 1: the run failed; 2: bad usage or a bad experiment; 130: ended by Ctrl-C. Log messages go to standard error; the
 /// environment variable RUST_LOG chooses how many (error, warn, info, debug).
 #[derive(Parser)]
 #[command(version)]
@@ -25,6 +28,9 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Run an experiment and write results.csv, results.json, metrics.json and plot.svg.
+    ///
+    /// With --real-time the run keeps in step with the wall clock, and says how well in the summary, in metrics.json and in
+    /// realtime.svg. Ctrl-C then ends it and keeps the results.
     Run {
         /// Experiment file, or SSP archive.
         experiment: PathBuf,
@@ -39,6 +45,21 @@ enum Command {
         /// No progress and no summary.
         #[arg(long)]
         quiet: bool,
+        /// Run in step with the wall clock, FACTOR times as fast: 1, if it is left out, is real time.
+        #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1", allow_negative_numbers = true)]
+        real_time: Option<Factor>,
+        /// What is done about a missed deadline, that is if a component's values for one of its communication points are not
+        /// there at its next one. All are counted and reported.
+        #[arg(long, value_enum, default_value_t, requires = "real_time")]
+        on_miss: OnMiss,
+        /// Ask for real-time scheduling (SCHED_FIFO of this priority, 1 to 99; 50 if it is left out) and for memory that is
+        /// never swapped out. What the system refuses is reported, and the run goes on without.
+        #[arg(long, value_name = "PRIORITY", num_args = 0..=1, default_missing_value = "50", requires = "real_time",
+              value_parser = clap::value_parser!(u8).range(1..=99))]
+        priority: Option<u8>,
+        /// Show the run on the terminal while it goes on; q ends it and keeps the results.
+        #[arg(long, conflicts_with = "quiet")]
+        live: bool,
     },
     /// Run a paper's comparison and write report.html, with figures, tables and a verdict on each claim.
     ///
@@ -101,13 +122,13 @@ fn main() -> ExitCode {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(usual));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(stderr)
+        .with_writer(Messages::default)
         .with_ansi(stderr().is_terminal())
         .without_time()
         .with_target(false)
         .init();
 
-    let mut out = BufWriter::new(stdout().lock());
+    let mut out = BufWriter::new(stdout());
     let outcome = execute(arguments.command, &mut out).and_then(|()| out.flush().map_err(Error::from));
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -125,7 +146,17 @@ fn main() -> ExitCode {
 
 fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
     match command {
-        Command::Run { experiment, out: folder, fmu_dir, overrides, quiet } => {
+        Command::Run {
+            experiment,
+            out: folder,
+            fmu_dir,
+            overrides,
+            quiet,
+            real_time,
+            on_miss,
+            priority,
+            live,
+        } => {
             let plan = if experiment.extension().is_some_and(|extension| extension == "ssp") {
                 let mut loaded = ssp::load(&experiment, &overrides)?;
                 Plan::with(loaded.experiment, &fmu_dir, &mut loaded.opened)?
@@ -134,11 +165,16 @@ fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
                 experiment.apply(&overrides)?;
                 Plan::new(experiment, &fmu_dir)?
             };
-            let report = plan.run(&Options { out: folder, quiet })?;
+            let real_time = real_time.map(|factor| realtime::Settings { factor, on_miss, priority });
+            let report = plan.run(&Options { out: folder, quiet, real_time, live })?;
             if !quiet {
                 report::summary(&report, out)?;
+                out.flush()?;
             }
-            Ok(())
+            match report.ended {
+                None | Some(Error::Interrupted { request: Request::Quit, .. }) => Ok(()),
+                Some(error) => Err(error),
+            }
         }
         Command::Reproduce { study, out: folder, fmu_dir, jobs, members, fresh, quiet } => {
             let study = Study::load(&reproduce::find(&study)?)?;

@@ -7,6 +7,10 @@
 use crate::clock::Clock;
 use crate::error::{Error, UnitFailure};
 use crate::experiment::{Coupling, Scaling};
+use crate::interrupt::Interrupt;
+use crate::realtime::Settings;
+use crate::realtime::pacer::Pacer;
+use crate::realtime::timer::{Monotonic, Timer};
 use crate::stopwatch::{Spent, Stopwatch};
 use crate::unit::{CoSimulationUnit, Outcome};
 use crate::wiring::{Carrier, Port, Wire};
@@ -53,6 +57,8 @@ pub struct Master {
     probe: Probe,
     /// The time spent in each unit, if it is measured.
     spent: Vec<Rc<Spent>>,
+    pacer: Option<Pacer>,
+    interrupt: Interrupt,
 }
 
 /// Values of one type on their way to one unit: one get per source, one set.
@@ -219,15 +225,40 @@ impl Master {
         probes: &[Port],
     ) -> Self {
         let inputs = (0..members.len()).map(|target| Inputs::new(wires, target)).collect();
-        Self { clock, coupling, members, inputs, probe: Probe::new(probes), spent: Vec::new() }
+        let (probe, interrupt) = (Probe::new(probes), Interrupt::default());
+        Self { clock, coupling, members, inputs, probe, spent: Vec::new(), pacer: None, interrupt }
+    }
+
+    /// Who may end the run from outside.
+    pub fn interrupt(&self) -> &Interrupt {
+        &self.interrupt
+    }
+
+    /// Runs in step with the timer from now on.
+    pub fn pace(&mut self, settings: Settings, timer: Rc<dyn Timer>) -> &Pacer {
+        self.measure(&timer);
+        let spent = self.members.iter().zip(&self.spent);
+        let components = spent.map(|(member, spent)| (member.name.clone(), member.every, Rc::clone(spent)));
+        let pacer = Pacer::new(settings, self.clock, timer, self.interrupt.clone(), components);
+        self.pacer.insert(pacer)
+    }
+
+    /// What kept the run in step, if anything did.
+    pub fn take_pacer(&mut self) -> Option<Pacer> {
+        self.pacer.take()
     }
 
     /// From now on the time spent in each unit is measured.
     pub fn measure_time(&mut self) {
+        let timer: Rc<dyn Timer> = Rc::new(Monotonic);
+        self.measure(&timer);
+    }
+
+    fn measure(&mut self, timer: &Rc<dyn Timer>) {
         let members = std::mem::take(&mut self.members).into_iter();
         (self.members, self.spent) = members
             .map(|Member { name, every, unit }| {
-                let (unit, spent) = Stopwatch::new(unit);
+                let (unit, spent) = Stopwatch::new(unit, Rc::clone(timer));
                 (Member { name, every, unit: Box::new(unit) }, spent)
             })
             .unzip();
@@ -273,19 +304,36 @@ impl Master {
     /// Runs from start to stop.
     ///
     /// # Errors
-    /// What a unit or an observer said. Observers have seen everything up to then.
+    /// What a unit or an observer said; a missed deadline, if it is to end the run; a request to end it. Observers have
+    /// seen everything up to then.
     pub fn run(&mut self, observers: &mut [&mut dyn Observer]) -> Result<(), Error> {
+        let outcome = self.pass_through(observers);
+        if let Some(pacer) = &mut self.pacer {
+            pacer.finish();
+        }
+        outcome
+    }
+
+    fn pass_through(&mut self, observers: &mut [&mut dyn Observer]) -> Result<(), Error> {
         for tick in 0..=self.clock.ticks() {
+            if let Some(pacer) = &mut self.pacer {
+                pacer.wait(tick);
+            }
+            let time = self.clock.time(tick);
+            if let Some(request) = self.interrupt.asked() {
+                return Err(Error::Interrupted { time, request });
+            }
             if tick > 0 {
                 self.step_to(tick)?;
             }
-            let time = self.clock.time(tick);
             self.propagate(tick).map_err(|culprit| self.error(time, culprit))?;
             self.probe.read(&mut self.members).map_err(|culprit| self.error(time, culprit))?;
+            let deadlines = self.pacer.as_mut().map_or(Ok(()), |pacer| pacer.check(tick));
             let sample = Sample { tick, time, last: tick == self.clock.ticks(), values: &self.probe.values };
             for observer in observers.iter_mut() {
                 observer.observe(&sample)?;
             }
+            deadlines?;
         }
         for index in 0..self.members.len() {
             let outcome = self.members[index].unit.terminate();

@@ -4,12 +4,13 @@ use crate::error::Error;
 use crate::experiment::Roles;
 use crate::master::{Observer, Sample};
 use crate::names;
+use crate::realtime::report::RealTime;
 use crate::wiring::{Part, Port, find};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Variables that observers look at, each read once.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Probes {
     /// What the master is to read.
     pub ports: Vec<Port>,
@@ -53,6 +54,9 @@ pub struct Limits {
     pub moment: Option<f64>,
 }
 
+/// Where the solver's variables are, unless the experiment says otherwise.
+pub(crate) const SOLVER: &str = "controller.solver";
+
 const ANGLES: [&str; 3] = ["alpha", "beta", "sigma"];
 const RATES: [&str; 3] = ["p", "q", "r"];
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -93,10 +97,8 @@ pub fn places(
         let port = find(&path, parts);
         if port.is_none() && stated.is_some() { Err(unknown(role, &path, parts)) } else { Ok(port) }
     };
-    let mut solver = |name| {
-        single("solver", &roles.solver, "controller.solver", name)
-            .map(|port| port.map(|port| probes.place(port)))
-    };
+    let mut solver =
+        |name| single("solver", &roles.solver, SOLVER, name).map(|port| port.map(|port| probes.place(port)));
     places.solver_time = solver("time")?;
     places.solver_solves = solver("solves")?;
     places.solver_fallbacks = solver("fallbacks")?;
@@ -153,6 +155,9 @@ pub struct Metrics {
     /// Mean time spent in each component per step of its own, µs, where it was measured.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub step_us: BTreeMap<String, f64>,
+    /// How the run kept up with the wall clock, if it was paced.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub real_time: Option<RealTime>,
 }
 
 /// Sums up the figures of merit.
@@ -229,6 +234,7 @@ impl Merit {
             samples: self.samples,
             completed: self.completed,
             step_us: BTreeMap::new(),
+            real_time: None,
         }
     }
 }

@@ -26,13 +26,16 @@ pub struct Progress {
 
 impl Progress {
     /// A bar for `ticks` steps, drawn to standard error if that is a terminal and `quiet` is not asked for; otherwise one
-    /// plain line.
-    pub fn new(title: &str, ticks: u64, quiet: bool) -> Self {
+    /// plain line. `apart` draws it by a thread of its own, so that the run never waits for the terminal.
+    pub fn new(title: &str, ticks: u64, quiet: bool, apart: bool) -> Self {
         if !stderr().is_terminal() && !quiet {
             eprintln!("running {title}: {ticks} steps");
         }
         let bar = bar(ticks, quiet, "{msg} [{bar:40}] {percent} %, {eta} left");
         bar.set_message(title.to_string());
+        if apart {
+            bar.enable_steady_tick(Duration::from_millis(100));
+        }
         Self { bar, stride: (ticks / 200).max(1) }
     }
 }

@@ -90,6 +90,13 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
     if let Some(factor) = metrics.real_time_factor {
         line("real-time factor", format!("{factor:.1} ({:.3} s elapsed)", metrics.wall_s))?;
     }
+    if let Some(ended) = &report.ended {
+        line("ended early", ended.to_string())?;
+    }
+    if let Some(real_time) = &metrics.real_time {
+        real_time.print(&report.order, out)?;
+    }
+    let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
     line("results", format!("{}: {}", report.out.display(), report.files.join(", ")))
 }
 

@@ -6,11 +6,17 @@ use crate::description::{Kind, ModelDescription};
 use crate::error::Error;
 use crate::experiment::{Coupling, Experiment};
 use crate::fmu::Fmu;
+use crate::interrupt::Interrupt;
+use crate::live::scene::Scene;
+use crate::live::{self, Live};
 use crate::master::{Master, Member, Observer};
 use crate::metrics::{self, Limits, Merit, Metrics, Places, Probes};
 use crate::names;
 use crate::plot::Curves;
 use crate::progress::Progress;
+use crate::realtime;
+use crate::realtime::priority::{Priority, Scheduling};
+use crate::realtime::timer::{self, Monotonic};
 use crate::recorder::Recorder;
 use crate::settings::{self, Setting};
 use crate::sidecar;
@@ -29,6 +35,10 @@ pub struct Options {
     pub out: Option<PathBuf>,
     /// Show no progress.
     pub quiet: bool,
+    /// Run in step with the wall clock.
+    pub real_time: Option<realtime::Settings>,
+    /// Show the run on the terminal while it goes on.
+    pub live: bool,
 }
 
 /// What a run leaves behind.
@@ -50,6 +60,8 @@ pub struct Report {
     pub out: PathBuf,
     /// The files in it.
     pub files: Vec<&'static str>,
+    /// Why the run ended before its stop time, if it did: it was asked to, or a deadline was missed.
+    pub ended: Option<Error>,
 }
 
 /// Archives that are open, by path. Plans that share them unpack each only once.
@@ -138,18 +150,29 @@ impl Plan {
         parts(&self.order, &self.fmus)
     }
 
-    /// Runs the experiment and writes its results. If a unit fails, what was seen until then is written all the same.
+    /// Runs the experiment and writes its results. If a unit fails or the run is ended, what was seen until then is written
+    /// all the same.
     ///
     /// # Errors
     /// What a unit said; files that cannot be written.
     pub fn run(&self, options: &Options) -> Result<Report, Error> {
+        if options.live {
+            live::check_terminal()?;
+        }
         let experiment = &self.experiment;
         let stem = experiment.source.path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy());
         let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(stem.as_ref()));
 
-        let (mut master, limits) = self.initialized()?;
+        let mut probes = self.probes.clone();
+        let factor = options.real_time.map(|settings| settings.factor.get());
+        let scene = options.live.then(|| Scene::new(self, self.places, factor, &mut probes));
+        let (mut master, limits) = self.initialized_with(&probes)?;
         let parameters = self.parameters(&mut master)?;
 
+        let interrupt: Interrupt = master.interrupt().clone();
+        if options.real_time.is_some() || options.live {
+            interrupt.listen()?;
+        }
         fs::create_dir_all(&out).map_err(Error::file(&out))?;
         let columns: Vec<_> = self
             .columns
@@ -159,22 +182,45 @@ impl Plan {
         let mut recorder = Recorder::create(&out.join("results.csv"), &columns, experiment.record.every)?;
         let mut merit = self.merit(limits);
         let mut curves = Curves::new(self.places, limits, self.clock.ticks());
-        let mut progress = Progress::new(&experiment.title, self.clock.ticks(), options.quiet);
+        let silent = options.quiet || options.live;
+        let mut progress =
+            Progress::new(&experiment.title, self.clock.ticks(), silent, options.real_time.is_some());
+
+        let tally = options.real_time.map(|settings| {
+            timer::wake_up_sharply();
+            master.pace(settings, Rc::new(Monotonic)).tally()
+        });
+        let live =
+            scene.map(|scene| Live::start(Scene { limits, ..scene }, probes.ports.len(), tally, interrupt));
+        let mut live = live.transpose()?;
+        // After the threads that draw, which are not to have it.
+        let scheduling = Scheduling::request(options.real_time.and_then(|settings| settings.priority));
 
         let begin = Instant::now();
-        let observers: &mut [&mut dyn Observer] =
-            &mut [&mut recorder, &mut merit, &mut curves, &mut progress];
-        let outcome = master.run(observers);
+        let mut observers: Vec<&mut dyn Observer> =
+            vec![&mut recorder, &mut merit, &mut curves, &mut progress];
+        observers.extend(live.as_mut().map(|live| live as &mut dyn Observer));
+        let outcome = master.run(&mut observers);
         let wall = begin.elapsed().as_secs_f64();
-        drop(progress);
+        let priority = scheduling.priority.clone();
+        drop((scheduling, live, progress));
 
         recorder.finish()?;
         let reached = self.clock.step() * merit.metrics(0.0, 0.0, None).samples.saturating_sub(1) as f64;
         let loop_delay =
             self.loops.iter().map(|l| l.ticks).max().map(|ticks| ticks as f64 * self.clock.step());
-        let metrics = merit.metrics(wall, reached, loop_delay);
+        let mut metrics = merit.metrics(wall, reached, loop_delay);
         let mut files = vec!["results.csv", "results.json", "metrics.json"];
-        write_json(&out.join("results.json"), &sidecar::sidecar(self, &parameters, outcome.as_ref().err()))?;
+        let sidecar = sidecar::sidecar(self, &parameters, options.real_time, outcome.as_ref().err());
+        write_json(&out.join("results.json"), &sidecar)?;
+        if let Some(pacer) = master.take_pacer() {
+            let (mut real_time, wake_ups, steps) = pacer.report();
+            real_time.priority = priority;
+            warn(&real_time, options.quiet);
+            realtime::plot::draw(&out.join("realtime.svg"), &experiment.title, &real_time, wake_ups, steps)?;
+            files.push("realtime.svg");
+            metrics.real_time = Some(real_time);
+        }
         write_json(&out.join("metrics.json"), &metrics)?;
         if curves.draw(&out.join("plot.svg"), &experiment.title)? {
             files.push("plot.svg");
@@ -182,7 +228,11 @@ impl Plan {
         if outcome.is_err() {
             tracing::warn!("the results until then are in {}", out.display());
         }
-        outcome?;
+        let ended = match outcome {
+            Ok(()) => None,
+            Err(error @ (Error::Deadline { .. } | Error::Interrupted { .. })) => Some(error),
+            Err(error) => return Err(error),
+        };
         Ok(Report {
             title: experiment.title.clone(),
             clock: self.clock,
@@ -192,6 +242,7 @@ impl Plan {
             loops: self.loops.clone(),
             out,
             files,
+            ended,
         })
     }
 
@@ -200,7 +251,11 @@ impl Plan {
     /// # Errors
     /// What a unit said.
     pub fn initialized(&self) -> Result<(Master, Limits), Error> {
-        let mut master = self.master()?;
+        self.initialized_with(&self.probes)
+    }
+
+    fn initialized_with(&self, probes: &Probes) -> Result<(Master, Limits), Error> {
+        let mut master = self.master(probes)?;
         master.initialize()?;
         let limit = |port: Option<Port>, master: &mut Master| {
             port.map(|port| master.read(&[port]).map(|values| values[0])).transpose()
@@ -221,7 +276,7 @@ impl Plan {
     }
 
     /// Instantiates the units and sets their parameters.
-    fn master(&self) -> Result<Master, Error> {
+    fn master(&self, probes: &Probes) -> Result<Master, Error> {
         let every = periods(&self.experiment, &self.order);
         let mut members = Vec::new();
         for (index, name) in self.order.iter().enumerate() {
@@ -234,7 +289,7 @@ impl Plan {
             members.push(Member { name: name.clone(), every: every[index], unit });
         }
         let coupling = self.experiment.simulation.coupling;
-        Ok(Master::new(self.clock, coupling, members, &self.wires, &self.probes.ports))
+        Ok(Master::new(self.clock, coupling, members, &self.wires, &probes.ports))
     }
 
     /// All parameters as the units have them after initialization, except texts.
@@ -254,6 +309,19 @@ impl Plan {
             all.insert(part.name.to_string(), own);
         }
         Ok(all)
+    }
+}
+
+/// What must not go unsaid where there is no summary.
+fn warn(real_time: &realtime::report::RealTime, quiet: bool) {
+    if !quiet {
+        return;
+    }
+    if let Some(done) = real_time.done_about_it() {
+        tracing::warn!("{} of {} deadlines missed; {done}", real_time.misses, real_time.deadlines);
+    }
+    if let Priority::Refused(reason) | Priority::Fifo { unlocked: Some(reason), .. } = &real_time.priority {
+        tracing::warn!("--priority: {reason}");
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::description::Kind;
 use crate::error::Error;
+use crate::realtime;
 use crate::run::Plan;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -12,7 +13,12 @@ use std::fmt::Write as _;
 pub type Parameters = BTreeMap<String, BTreeMap<String, Value>>;
 
 /// The content of the file. `failure` is why the run ended early, if it did.
-pub fn sidecar(plan: &Plan, parameters: &Parameters, failure: Option<&Error>) -> Value {
+pub fn sidecar(
+    plan: &Plan,
+    parameters: &Parameters,
+    real_time: Option<realtime::Settings>,
+    failure: Option<&Error>,
+) -> Value {
     let experiment = &plan.experiment;
     let simulation = &experiment.simulation;
     let seeds: BTreeMap<String, &Value> = parameters
@@ -64,12 +70,13 @@ pub fn sidecar(plan: &Plan, parameters: &Parameters, failure: Option<&Error>) ->
     }
     json!({
         "title": experiment.title,
-        "status": failure.map_or_else(|| "completed".to_string(), |error| format!("failed: {error}")),
+        "status": status(failure),
         "orchestrator": env!("CARGO_PKG_VERSION"),
         "simulation": {
             "start": simulation.start, "stop": simulation.stop, "step": simulation.step,
             "steps": plan.clock.ticks(), "coupling": simulation.coupling, "order": plan.order,
         },
+        "real_time": real_time.map(|s| json!({ "factor": s.factor, "on_miss": s.on_miss, "priority": s.priority })),
         "components": components,
         "seeds": seeds,
         "connections": connections,
@@ -80,6 +87,14 @@ pub fn sidecar(plan: &Plan, parameters: &Parameters, failure: Option<&Error>) ->
             "text": experiment.source.text,
         },
     })
+}
+
+fn status(failure: Option<&Error>) -> String {
+    match failure {
+        None => "completed".into(),
+        Some(error @ Error::Interrupted { .. }) => error.to_string(),
+        Some(error) => format!("failed: {error}"),
+    }
 }
 
 fn component(plan: &Plan, index: usize, name: &str, parameters: &Parameters) -> Value {

@@ -1,18 +1,36 @@
 //! A unit whose calls are timed. All of them count, as a unit may do the work of a step when its outputs are asked for.
 
+use crate::realtime::timer::Timer;
 use crate::unit::{CoSimulationUnit, Outcome};
 use std::cell::Cell;
 use std::rc::Rc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// What was spent in a unit's calls so far.
 #[derive(Debug, Default)]
 pub struct Spent {
     time: Cell<Duration>,
     steps: Cell<u32>,
+    ended: Cell<Duration>,
 }
 
 impl Spent {
+    /// The time.
+    pub fn time(&self) -> Duration {
+        self.time.get()
+    }
+
+    /// A call that began and ended then, on the timer.
+    pub(crate) fn add(&self, begin: Duration, end: Duration) {
+        self.time.set(self.time.get() + end.saturating_sub(begin));
+        self.ended.set(end);
+    }
+
+    /// When the last call ended, on the timer.
+    pub fn ended(&self) -> Duration {
+        self.ended.get()
+    }
+
     /// Mean time per step, s; nothing before the first.
     pub fn seconds_per_step(&self) -> Option<f64> {
         let steps = self.steps.get();
@@ -23,20 +41,21 @@ impl Spent {
 /// The unit.
 pub struct Stopwatch {
     unit: Box<dyn CoSimulationUnit>,
+    timer: Rc<dyn Timer>,
     spent: Rc<Spent>,
 }
 
 impl Stopwatch {
     /// A unit that is timed from now on, and where to see the time.
-    pub fn new(unit: Box<dyn CoSimulationUnit>) -> (Self, Rc<Spent>) {
+    pub fn new(unit: Box<dyn CoSimulationUnit>, timer: Rc<dyn Timer>) -> (Self, Rc<Spent>) {
         let spent = Rc::new(Spent::default());
-        (Self { unit, spent: Rc::clone(&spent) }, spent)
+        (Self { unit, timer, spent: Rc::clone(&spent) }, spent)
     }
 
     fn time(&mut self, call: impl FnOnce(&mut dyn CoSimulationUnit) -> Outcome) -> Outcome {
-        let begin = Instant::now();
+        let begin = self.timer.now();
         let outcome = call(self.unit.as_mut());
-        self.spent.time.set(self.spent.time.get() + begin.elapsed());
+        self.spent.add(begin, self.timer.now());
         outcome
     }
 }

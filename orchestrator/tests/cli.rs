@@ -4,6 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
@@ -185,6 +186,133 @@ fn a_failing_unit_ends_the_run_with_its_own_words_and_keeps_the_results() {
     assert!(
         errors.contains("gain failed at t = 0 s in enterInitializationMode: gain too large: 500"),
         "{errors}"
+    );
+}
+
+#[test]
+fn a_run_in_real_time_takes_its_time() {
+    let bench = Bench::new();
+    let begin = Instant::now();
+    let (code, summary, errors) = bench.run(&["--stop", "1", "--real-time"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(begin.elapsed() >= Duration::from_secs(1));
+    assert!(summary.contains("real time         factor 1: 0 of 4 deadlines missed"), "{summary}");
+    assert!(summary.contains("realtime.svg"), "{summary}");
+    let real_time = &bench.json("out/loop/metrics.json")["real_time"];
+    assert!(real_time["elapsed_s"].as_f64().unwrap() >= 1.0);
+    assert_eq!(real_time["components"]["plant"]["step_ms"]["count"], 2);
+    // The first communication point is not waited for.
+    assert_eq!(real_time["components"]["plant"]["wake_up_ms"]["count"], 1);
+    assert_eq!(bench.json("out/loop/results.json")["real_time"]["on_miss"], "catch-up");
+    assert!(fs::read_to_string(bench.path("out/loop/realtime.svg")).unwrap().contains("wake-up jitter, ms"));
+}
+
+/// No machine steps units in a nanosecond.
+const IMPOSSIBLE: &str = "1e9";
+
+#[test]
+fn every_missed_deadline_is_counted_and_what_was_done_is_said() {
+    let bench = Bench::new();
+    let (_, _, _) = bench.run(&["--out", "usual"]);
+    for (policy, said) in
+        [("catch-up", "went on at once, 3 times"), ("slip", "shifted the time base 3 times, by ")]
+    {
+        let (code, summary, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--on-miss", policy]);
+        assert_eq!(code, 0, "{errors}");
+        assert!(summary.contains(": 8 of 8 deadlines missed") && summary.contains(said), "{summary}");
+        assert!(
+            summary.contains("first miss        gain at t = 0 s, ") && summary.contains("worst miss"),
+            "{summary}"
+        );
+        // The results are those of a run without pacing.
+        let rows = |out: &str| fs::read(bench.path(out).join("results.csv")).unwrap();
+        assert_eq!(rows("out/loop"), rows("usual"));
+        let (_, _, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--on-miss", policy, "--quiet"]);
+        assert!(errors.contains("8 of 8 deadlines missed") && errors.contains(said), "{errors}");
+    }
+    let (code, summary, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--on-miss", "stop"]);
+    assert_eq!(code, 1);
+    assert!(errors.contains("error: gain missed its deadline at t = 0 s by "), "{errors}");
+    assert!(summary.contains("2 of 2 deadlines missed"), "{summary}");
+    assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(), 2);
+    assert_eq!(bench.json("out/loop/metrics.json")["completed"], false);
+    let status = bench.json("out/loop/results.json")["status"].as_str().unwrap().to_string();
+    assert!(status.starts_with("failed: gain missed its deadline"), "{status}");
+}
+
+#[test]
+fn a_slow_unit_is_named() {
+    let bench = Bench::new();
+    // 20 ms from tick to tick, and a step of the plant takes 50 ms.
+    let (code, summary, errors) = bench.run(&["--real-time", "50", "--set", "plant.delay=0.05"]);
+    assert_eq!(code, 0, "{errors}");
+    let worst = summary.lines().find(|line| line.contains("worst miss")).unwrap();
+    assert!(worst.contains("longest step since the last wait: plant, "), "{worst}");
+    let real_time = &bench.json("out/loop/metrics.json")["real_time"];
+    let plant = &real_time["components"]["plant"];
+    // The histogram has three digits.
+    assert!(plant["step_ms"]["max"].as_f64().unwrap() >= 49.9, "{plant}");
+    // The tick at the start needs no step.
+    assert!(plant["misses"].as_u64().unwrap() >= 3, "{plant}");
+    assert!(real_time["worst_miss"]["late_ms"].as_f64().unwrap() >= 29.9, "{real_time}");
+}
+
+#[test]
+fn factors_and_priorities_that_make_no_sense_are_refused() {
+    let bench = Bench::new();
+    for factor in ["0", "-1", "nan", "inf"] {
+        let (code, _, errors) = bench.run(&["--real-time", factor]);
+        assert_eq!(code, 2);
+        assert!(errors.contains("must be finite and above 0"), "{factor}: {errors}");
+    }
+    let (code, _, errors) = bench.call(&["run", "--real-time", "loop.toml"]);
+    assert_eq!(code, 2);
+    assert!(errors.contains("write the experiment before --real-time"), "{errors}");
+    for arguments in [&["--on-miss", "stop"][..], &["--priority"], &["--real-time", "--priority", "100"]] {
+        assert_eq!(bench.run(arguments).0, 2, "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_priority_is_had_or_refused_in_words() {
+    let bench = Bench::new();
+    let (code, summary, errors) = bench.run(&["--real-time", "1000", "--priority", "1"]);
+    assert_eq!(code, 0, "{errors}");
+    let line = summary.lines().find(|line| line.starts_with("  priority ")).unwrap();
+    assert!(line.contains("SCHED_FIFO 1") || line.contains("REFUSED, ran with usual scheduling: "), "{line}");
+}
+
+#[test]
+fn the_live_view_wants_a_terminal() {
+    let bench = Bench::new();
+    let message = bench.refusal(&["--live"]);
+    assert!(message.contains("--live draws on a terminal, and standard output is none"), "{message}");
+    assert!(!bench.path("out").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_a_paced_run_and_keeps_its_results() {
+    let bench = Bench::new();
+    // A step takes ten hours.
+    let mut child = bench
+        .command(&["run", "loop.toml", "--real-time", "2.7e-5"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while !bench.path("out/loop/results.csv").exists() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let status = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(status.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let status = bench.json("out/loop/results.json")["status"].as_str().unwrap().to_string();
+    assert!(status.starts_with("ended by a signal before t = "), "{status}");
+    assert!(
+        fs::read_to_string(bench.path("out/loop/results.csv"))
+            .unwrap()
+            .starts_with("time,gain.output.direct")
     );
 }
 

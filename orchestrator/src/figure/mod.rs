@@ -143,7 +143,9 @@ impl Panel {
         if along_x && let Some([low, high]) = self.x_range {
             return (low, high);
         }
-        let Some((low, high)) = self.extent(along_x) else { return (0.0, 1.0) };
+        let Some((low, high)) = self.extent(along_x) else {
+            return if along_x && self.log_x { (1.0, 10.0) } else { (0.0, 1.0) };
+        };
         if along_x && self.log_x {
             return (low / 1.3, high * 1.3);
         }
@@ -197,6 +199,9 @@ mod tests {
 
     #[test]
     fn a_panel_without_values_has_a_range_all_the_same() {
-        assert_eq!(panel(Vec::new()).range(false), (0.0, 1.0));
+        let empty = panel(Vec::new());
+        assert_eq!((empty.range(false), empty.range(true)), ((0.0, 1.0), (0.0, 1.0)));
+        // The logarithm of its ends is to be finite.
+        assert_eq!(Panel { log_x: true, ..empty }.range(true), (1.0, 10.0));
     }
 }

@@ -1,7 +1,9 @@
 /* A small FMI 2.0 co-simulation unit, to try the orchestrator on a library that is not ours: it keeps the pointer to the
    callbacks, wants memory from its environment, and logs with printf arguments.
-   Output 1 = gain * input (direct), output 2 = integral of the input. It fails as its parameters say. */
+   Output 1 = gain * input (direct), output 2 = integral of the input. It fails, and is slow, as its parameters say. */
+#define _POSIX_C_SOURCE 199309L
 #include <stddef.h>
+#include <time.h>
 
 typedef struct {
     void (*logger)(void *, const char *, int, const char *, const char *, ...);
@@ -14,7 +16,7 @@ typedef struct {
 typedef struct {
     const Callbacks *callbacks;
     const char *name;
-    double input, state, gain, fail_time;
+    double input, state, gain, fail_time, delay;
     int fail_status, flag, kind, count;
     char text[64];
 } Unit;
@@ -63,6 +65,7 @@ int fmi2GetReal(Unit *unit, const unsigned *references, size_t n, double *values
         case 2: values[i] = unit->state; break;
         case 3: values[i] = unit->gain; break;
         case 4: values[i] = unit->fail_time; break;
+        case 12: values[i] = unit->delay; break;
         default: return complain(unit, ERROR, "no such real:", references[i]);
         }
     }
@@ -75,6 +78,7 @@ int fmi2SetReal(Unit *unit, const unsigned *references, size_t n, const double *
         case 0: unit->input = values[i]; break;
         case 3: unit->gain = values[i]; break;
         case 4: unit->fail_time = values[i]; break;
+        case 12: unit->delay = values[i]; break;
         default: return complain(unit, ERROR, "real cannot be set:", references[i]);
         }
     }
@@ -112,6 +116,8 @@ int fmi2SetString(Unit *unit, const unsigned *references, size_t n, const char *
 int fmi2DoStep(Unit *unit, double time, double step, int no_set_state) {
     (void)no_set_state;
     if (time >= unit->fail_time - 1e-9) return complain(unit, unit->fail_status, "out of propellant at", time);
+    struct timespec delay = {(time_t)unit->delay, (long)(1e9 * (unit->delay - (double)(time_t)unit->delay))};
+    nanosleep(&delay, NULL);
     unit->state += step * unit->input;
     unit->count += 1;
     return OK;

@@ -1,0 +1,187 @@
+//! A view of the run on the terminal while it goes on, drawn by a thread of its own.
+//!
+//! At every communication point the master leaves a copy of what it sees, if the copy is not just being read; it never waits
+//! for the view. [`scene`] is what there is to show, [`view`] how it looks, [`log`] where messages go meanwhile.
+
+pub mod log;
+pub mod scene;
+pub mod view;
+
+use crate::error::Error;
+use crate::interrupt::{Interrupt, Request};
+use crate::master::{Observer, Sample};
+use crate::realtime::pacer::Tally;
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use scene::Scene;
+use std::cell::Cell;
+use std::io::{self, IsTerminal, stdout};
+use std::process;
+use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+use view::State;
+
+/// Time from picture to picture.
+const BETWEEN_PICTURES: Duration = Duration::from_millis(66);
+
+/// What the master leaves for the view.
+#[derive(Clone, Debug, Default)]
+pub struct Snapshot {
+    /// Communication point, s; nothing before the first.
+    pub time: Option<f64>,
+    /// The probed values.
+    pub values: Vec<f64>,
+    /// How the pacing is doing, if the run is paced.
+    pub tally: Option<Tally>,
+}
+
+/// The view, for as long as this lives. The terminal is as before when it is dropped, also by a panic.
+pub struct Live {
+    snapshot: Arc<Mutex<Snapshot>>,
+    tally: Option<Rc<Cell<Tally>>>,
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<io::Result<()>>>,
+}
+
+/// Whether there is a terminal to draw on.
+///
+/// # Errors
+/// If there is none.
+pub fn check_terminal() -> Result<(), Error> {
+    if stdout().is_terminal() {
+        return Ok(());
+    }
+    Err(Error::experiment(
+        "--live draws on a terminal, and standard output is none: leave --live out, or run it in a terminal",
+    ))
+}
+
+impl Live {
+    /// Takes the terminal and begins to draw. The keys q and Ctrl-C ask to end the run.
+    ///
+    /// # Errors
+    /// If there is no terminal that can be drawn on.
+    pub fn start(
+        scene: Scene,
+        values: usize,
+        tally: Option<Rc<Cell<Tally>>>,
+        interrupt: Interrupt,
+    ) -> Result<Self, Error> {
+        check_terminal()?;
+        log::hold();
+        let terminal = ratatui::try_init().inspect_err(|_| ratatui::restore())?;
+        let snapshot = Arc::new(Mutex::new(Snapshot { values: vec![0.0; values], ..Snapshot::default() }));
+        let over = Arc::new(AtomicBool::new(false));
+        let (shared, ends) = (Arc::clone(&snapshot), Arc::clone(&over));
+        let thread = thread::Builder::new().name("live view".into()).spawn(move || {
+            let outcome = show(terminal, scene, &shared, &ends, &interrupt);
+            ratatui::restore();
+            outcome
+        })?;
+        Ok(Self { snapshot, tally, over, thread: Some(thread) })
+    }
+}
+
+impl Observer for Live {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        // The run does not wait for the view: what cannot be left now is left at the next communication point.
+        if let Ok(mut snapshot) = self.snapshot.try_lock() {
+            snapshot.time = Some(sample.time);
+            snapshot.values.copy_from_slice(sample.values);
+            snapshot.tally = self.tally.as_ref().map(|tally| tally.get());
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        let outcome = self.thread.take().map(JoinHandle::join);
+        ratatui::restore();
+        log::release();
+        match outcome {
+            Some(Ok(Err(error))) => tracing::warn!("the live view ended early: {error}"),
+            Some(Err(_)) => tracing::warn!("the live view ended early by a defect"),
+            _ => {}
+        }
+    }
+}
+
+/// Draws until the run is over.
+fn show(
+    mut terminal: DefaultTerminal,
+    scene: Scene,
+    shared: &Mutex<Snapshot>,
+    over: &AtomicBool,
+    interrupt: &Interrupt,
+) -> io::Result<()> {
+    let mut state = State::new(scene);
+    let mut snapshot = Snapshot::default();
+    while !over.load(Ordering::Relaxed) {
+        snapshot.clone_from(&shared.lock().unwrap_or_else(PoisonError::into_inner));
+        state.see(&snapshot);
+        terminal.draw(|frame| view::draw(frame, &state))?;
+        if event::poll(BETWEEN_PICTURES)?
+            && let Event::Key(key) = event::read()?
+            && let Some(request) = request(key)
+        {
+            if interrupt.asked().is_some() {
+                // Asked twice: a unit does not come back from a call.
+                ratatui::restore();
+                log::release();
+                process::exit(130);
+            }
+            interrupt.ask(request);
+            state.ending = true;
+        }
+    }
+    Ok(())
+}
+
+/// What a key asks for. In the view Ctrl-C is a key, not a signal.
+fn request(key: KeyEvent) -> Option<Request> {
+    if key.kind != KeyEventKind::Press {
+        return None;
+    }
+    match (key.code, key.modifiers.contains(KeyModifiers::CONTROL)) {
+        (KeyCode::Char('c'), true) => Some(Request::Signal),
+        (KeyCode::Char('q'), false) => Some(Request::Quit),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn q_and_control_c_end_the_run() {
+        let key = |code, modifiers| request(KeyEvent::new(code, modifiers));
+        assert_eq!(key(KeyCode::Char('q'), KeyModifiers::NONE), Some(Request::Quit));
+        assert_eq!(key(KeyCode::Char('c'), KeyModifiers::CONTROL), Some(Request::Signal));
+        assert_eq!(key(KeyCode::Char('c'), KeyModifiers::NONE), None);
+        let release = KeyEvent::new_with_kind(KeyCode::Char('q'), KeyModifiers::NONE, KeyEventKind::Release);
+        assert_eq!(request(release), None);
+    }
+
+    #[test]
+    fn the_run_does_not_wait_while_the_view_reads() {
+        let snapshot = Arc::new(Mutex::new(Snapshot { values: vec![0.0], ..Snapshot::default() }));
+        let mut live =
+            Live { snapshot: Arc::clone(&snapshot), tally: None, over: Arc::default(), thread: None };
+        let sample = |time| Sample { tick: 0, time, last: false, values: &[7.0] };
+        let reading = snapshot.lock().unwrap();
+        live.observe(&sample(1.0)).unwrap();
+        assert_eq!(reading.time, None);
+        drop(reading);
+        live.observe(&sample(2.0)).unwrap();
+        let left = snapshot.lock().unwrap().clone();
+        assert_eq!((left.time, left.values[0]), (Some(2.0), 7.0));
+        // Without a view there is no terminal to give back.
+        std::mem::forget(live);
+    }
+}

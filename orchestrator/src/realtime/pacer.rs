@@ -1,0 +1,508 @@
+//! Keeps a run in step with a timer, and watches the deadlines.
+
+use super::distribution::Distribution;
+use super::report::{Component, Lag, Late, RealTime, Series};
+use super::timer::Timer;
+use super::{OnMiss, Settings};
+use crate::clock::Clock;
+use crate::error::Error;
+use crate::interrupt::Interrupt;
+use crate::stopwatch::Spent;
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+use std::time::Duration;
+
+/// A wait is cut into pieces of this length, to see whether the run is to end.
+const PIECE: Duration = Duration::from_millis(100);
+
+/// A missed deadline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Miss {
+    /// Index of the component whose values came late.
+    pub component: usize,
+    /// Communication point they belong to, s.
+    pub time: f64,
+    /// From the deadline to the values.
+    pub late: Duration,
+    /// How late the communication point began: by the wake-up, or by what was before it.
+    pub lag: Duration,
+    /// The longest step since the run last waited: what to blame, if it is not the component itself.
+    pub longest: Step,
+}
+
+/// A step of a component.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Step {
+    /// Index of the component.
+    pub component: usize,
+    /// Communication point at its end, s.
+    pub time: f64,
+    /// Time spent in the unit.
+    pub duration: Duration,
+}
+
+/// What there is to tell while the run goes on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// Deadlines so far.
+    pub deadlines: u64,
+    /// Missed ones.
+    pub misses: u64,
+    /// The last miss.
+    pub last: Option<Miss>,
+    /// How long after its instant the present communication point began.
+    pub lag: Duration,
+    /// Sum of all shifts of the time base.
+    pub slipped: Duration,
+}
+
+/// A component as the pacer sees it.
+struct Task {
+    name: String,
+    every: u64,
+    spent: Rc<Spent>,
+    /// What of `spent` is counted already.
+    counted: Duration,
+    steps: Distribution,
+    responses: Distribution,
+    wake_ups: Distribution,
+    misses: u64,
+    series: Series,
+}
+
+/// The pacer.
+pub struct Pacer {
+    settings: Settings,
+    clock: Clock,
+    timer: Rc<dyn Timer>,
+    interrupt: Interrupt,
+    tasks: Vec<Task>,
+    /// When the start of the simulation is on the timer. A slip moves it.
+    base: Duration,
+    began: Duration,
+    elapsed: Duration,
+    /// When the work of the present tick began, and what was spent in the units until then.
+    tick_began: Duration,
+    tick_spent: Duration,
+    /// Wake-up jitter of the present tick, if there was a wait.
+    woken: Option<Duration>,
+    /// Whether a deadline was missed since the present tick began.
+    missed: bool,
+    longest: Step,
+    first: Option<Miss>,
+    worst: Option<Miss>,
+    late_starts: u64,
+    largest_lag: Duration,
+    slips: u64,
+    tally: Rc<Cell<Tally>>,
+    /// What the orchestrator itself needs at a communication point.
+    own: Distribution,
+    wake_ups: Distribution,
+    wake_up_series: Series,
+}
+
+impl Pacer {
+    /// For components with their name, their number of ticks from step to step, and what is spent in them.
+    pub fn new(
+        settings: Settings,
+        clock: Clock,
+        timer: Rc<dyn Timer>,
+        interrupt: Interrupt,
+        components: impl Iterator<Item = (String, u32, Rc<Spent>)>,
+    ) -> Self {
+        let tasks = components.map(|(name, every, spent)| Task {
+            name,
+            every: u64::from(every),
+            counted: spent.time(),
+            spent,
+            steps: Distribution::default(),
+            responses: Distribution::default(),
+            wake_ups: Distribution::default(),
+            misses: 0,
+            series: Series::new(clock.ticks() / u64::from(every)),
+        });
+        Self {
+            tasks: tasks.collect(),
+            settings,
+            clock,
+            timer,
+            interrupt,
+            base: Duration::ZERO,
+            began: Duration::ZERO,
+            elapsed: Duration::ZERO,
+            tick_began: Duration::ZERO,
+            tick_spent: Duration::ZERO,
+            woken: None,
+            missed: false,
+            longest: Step::default(),
+            first: None,
+            worst: None,
+            late_starts: 0,
+            largest_lag: Duration::ZERO,
+            slips: 0,
+            tally: Rc::default(),
+            own: Distribution::default(),
+            wake_ups: Distribution::default(),
+            wake_up_series: Series::new(clock.ticks()),
+        }
+    }
+
+    /// Where to see how the run is doing.
+    pub fn tally(&self) -> Rc<Cell<Tally>> {
+        Rc::clone(&self.tally)
+    }
+
+    /// Waits for a communication point, unless it is past. Returns early if the run is to end.
+    pub fn wait(&mut self, tick: u64) {
+        let now = self.timer.now();
+        if tick == 0 {
+            (self.base, self.began) = (now, now);
+        } else {
+            self.count_own(now);
+        }
+        let mut release = self.release(tick);
+        let lag = now.saturating_sub(release);
+        if self.missed && self.settings.on_miss == OnMiss::Slip {
+            self.base += lag;
+            self.slips += 1;
+            self.update(|tally| tally.slipped += lag);
+            release = now;
+        }
+        self.missed = false;
+        if now < release {
+            self.sleep_until(release);
+            self.longest = Step::default();
+            self.woken = Some(self.timer.now().saturating_sub(release));
+        } else {
+            self.woken = None;
+            self.late_starts += u64::from(now > release);
+        }
+        self.tick_began = self.timer.now();
+        self.tick_spent = self.spent();
+        let lag = self.tick_began.saturating_sub(release);
+        self.largest_lag = self.largest_lag.max(lag);
+        self.update(|tally| tally.lag = lag);
+    }
+
+    fn sleep_until(&self, release: Duration) {
+        while self.interrupt.asked().is_none() {
+            let piece = self.timer.now() + PIECE;
+            if piece >= release {
+                self.timer.sleep_until(release);
+                return;
+            }
+            self.timer.sleep_until(piece);
+        }
+    }
+
+    /// Counts what the components did at a communication point, and looks at their deadlines.
+    ///
+    /// # Errors
+    /// If one was missed, and that is to end the run.
+    pub fn check(&mut self, tick: u64) -> Result<(), Error> {
+        let time = self.clock.time(tick);
+        if let Some(woken) = self.woken {
+            self.wake_ups.record(woken);
+            self.wake_up_series.add(time, woken);
+        }
+        let release = self.release(tick);
+        for (component, task) in self.tasks.iter_mut().enumerate() {
+            if !tick.is_multiple_of(task.every) {
+                continue;
+            }
+            let duration = task.spent.time() - task.counted;
+            task.counted += duration;
+            task.steps.record(duration);
+            task.series.add(time, duration);
+            task.responses.record(task.spent.ended().saturating_sub(release));
+            if let Some(woken) = self.woken {
+                task.wake_ups.record(woken);
+            }
+            if duration > self.longest.duration {
+                self.longest = Step { component, time, duration };
+            }
+        }
+        let mut outcome = Ok(());
+        for component in 0..self.tasks.len() {
+            let task = &self.tasks[component];
+            if !tick.is_multiple_of(task.every) {
+                continue;
+            }
+            let late = task.spent.ended().saturating_sub(self.release(tick + task.every));
+            self.update(|tally| tally.deadlines += 1);
+            if !late.is_zero() {
+                let miss = Miss { component, time, late, lag: self.tally.get().lag, longest: self.longest };
+                self.note(miss);
+                if self.settings.on_miss == OnMiss::Stop && outcome.is_ok() {
+                    let Late { component, time, late_ms, .. } = self.late(miss);
+                    outcome = Err(Error::Deadline { component, time, late_ms });
+                }
+            }
+        }
+        outcome
+    }
+
+    fn note(&mut self, miss: Miss) {
+        self.missed = true;
+        self.tasks[miss.component].misses += 1;
+        self.first = self.first.or(Some(miss));
+        if self.worst.is_none_or(|worst| miss.late > worst.late) {
+            self.worst = Some(miss);
+        }
+        self.update(|tally| {
+            tally.misses += 1;
+            tally.last = Some(miss);
+        });
+    }
+
+    /// The run is over.
+    pub fn finish(&mut self) {
+        let now = self.timer.now();
+        self.count_own(now);
+        self.elapsed = now.saturating_sub(self.began);
+    }
+
+    /// When a communication point is on the timer. Beyond the stop the ticks go on.
+    fn release(&self, tick: u64) -> Duration {
+        let simulated = if tick <= self.clock.ticks() {
+            self.clock.time(tick) - self.clock.start()
+        } else {
+            tick as f64 * self.clock.step()
+        };
+        let after =
+            Duration::try_from_secs_f64(simulated / self.settings.factor.get()).unwrap_or(Duration::MAX);
+        self.base.saturating_add(after)
+    }
+
+    fn spent(&self) -> Duration {
+        self.tasks.iter().map(|task| task.spent.time()).sum()
+    }
+
+    fn count_own(&mut self, now: Duration) {
+        let in_units = self.spent() - self.tick_spent;
+        self.own.record(now.saturating_sub(self.tick_began).saturating_sub(in_units));
+    }
+
+    fn update(&self, change: impl FnOnce(&mut Tally)) {
+        let mut tally = self.tally.get();
+        change(&mut tally);
+        self.tally.set(tally);
+    }
+
+    fn late(&self, miss: Miss) -> Late {
+        let milliseconds = |duration: Duration| duration.as_secs_f64() * 1e3;
+        Late {
+            component: self.tasks[miss.component].name.clone(),
+            time: miss.time,
+            late_ms: milliseconds(miss.late),
+            lag_ms: milliseconds(miss.lag),
+            longest: self.tasks[miss.longest.component].name.clone(),
+            longest_time: miss.longest.time,
+            longest_ms: milliseconds(miss.longest.duration),
+        }
+    }
+
+    /// What came of it; and the course of the wake-up jitter and of each component's step time.
+    pub fn report(self) -> (RealTime, Series, Vec<(String, Series)>) {
+        let (first_miss, worst_miss) = (self.first.map(|m| self.late(m)), self.worst.map(|m| self.late(m)));
+        let tally = self.tally.get();
+        let milliseconds = |duration: Duration| duration.as_secs_f64() * 1e3;
+        let period = self.clock.step() / self.settings.factor.get() * 1e3;
+        let mut components = BTreeMap::new();
+        let mut series = Vec::new();
+        for task in self.tasks {
+            let component = Component {
+                period_ms: period * task.every as f64,
+                misses: task.misses,
+                step_ms: task.steps.summary(),
+                response_ms: task.responses.summary(),
+                wake_up_ms: task.wake_ups.summary(),
+            };
+            components.insert(task.name.clone(), component);
+            series.push((task.name, task.series));
+        }
+        let report = RealTime {
+            factor: self.settings.factor,
+            on_miss: self.settings.on_miss,
+            priority: super::priority::Priority::default(),
+            elapsed_s: self.elapsed.as_secs_f64(),
+            deadlines: tally.deadlines,
+            misses: tally.misses,
+            first_miss,
+            worst_miss,
+            lag: Lag {
+                late_starts: self.late_starts,
+                largest_ms: milliseconds(self.largest_lag),
+                at_end_ms: milliseconds(tally.lag),
+                slips: self.slips,
+                slipped_ms: milliseconds(tally.slipped),
+            },
+            components,
+            wake_up_ms: self.wake_ups.summary(),
+            orchestrator_ms: self.own.summary(),
+        };
+        (report, self.wake_up_series, series)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::timer::fake::Fake;
+    use super::*;
+    use crate::interrupt::Request;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    /// Paces components with these periods (ticks) through 10 ticks of 1 s at factor 100, so of 10 ms. `work` says how long
+    /// (ms) a component computes at a tick. Returns what came of it and when each tick began, ms.
+    fn paced(
+        on_miss: OnMiss,
+        every: &[u32],
+        jitter: Duration,
+        work: impl Fn(usize, u64) -> u32,
+    ) -> (Result<(), Error>, RealTime, Vec<u128>) {
+        let timer = Rc::new(Fake { jitter, ..Fake::default() });
+        // The timer's origin is not that of the run.
+        timer.pass(12345 * MS);
+        let clock = Clock::new(5.0, 15.0, 1.0).unwrap();
+        let settings = Settings { factor: "100".parse().unwrap(), on_miss, priority: None };
+        let spent: Vec<Rc<Spent>> = every.iter().map(|_| Rc::default()).collect();
+        let components = ["controller", "plant"].into_iter().zip(every).zip(&spent);
+        let components =
+            components.map(|((name, every), spent)| (name.to_string(), *every, Rc::clone(spent)));
+        let mut pacer = Pacer::new(settings, clock, timer.clone(), Interrupt::default(), components);
+        let mut begins = Vec::new();
+        let mut outcome = Ok(());
+        for tick in 0..=clock.ticks() {
+            pacer.wait(tick);
+            begins.push((timer.now() - 12345 * MS).as_millis());
+            for (index, (&every, spent)) in every.iter().zip(&spent).enumerate() {
+                if tick.is_multiple_of(u64::from(every)) {
+                    let begin = timer.now();
+                    timer.pass(work(index, tick) * MS);
+                    spent.add(begin, timer.now());
+                }
+            }
+            outcome = pacer.check(tick);
+            // The observers.
+            timer.pass(MS);
+            if outcome.is_err() {
+                break;
+            }
+        }
+        pacer.finish();
+        (outcome, pacer.report().0, begins)
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() <= 1e-3 * expected, "{found} {expected}");
+    }
+
+    #[test]
+    fn oracle_a_run_that_keeps_up_begins_every_tick_in_time() {
+        let (outcome, report, begins) = paced(OnMiss::Stop, &[1, 1], Duration::ZERO, |_, _| 4);
+        outcome.unwrap();
+        assert_eq!(begins, (0..=10).map(|tick| tick * 10).collect::<Vec<_>>());
+        assert_eq!((report.deadlines, report.misses, report.lag), (22, 0, Lag::default()));
+        assert_eq!(report.done_about_it(), None);
+        let plant = &report.components["plant"];
+        assert_eq!(plant.step_ms.count, 11);
+        near(plant.period_ms, 10.0);
+        near(plant.step_ms.median, 4.0);
+        // The controller's 4 ms come before the plant's.
+        near(plant.response_ms.max, 8.0);
+        near(report.orchestrator_ms.median, 1.0);
+        near(report.elapsed_s, 0.109);
+    }
+
+    #[test]
+    fn oracle_wake_up_jitter_is_measured_where_there_was_a_wait_and_adds_up_to_nothing() {
+        let (_, report, begins) = paced(OnMiss::CatchUp, &[1, 5], 2 * MS, |_, _| 1);
+        assert_eq!(begins[10], 102);
+        let [controller, plant] =
+            ["controller", "plant"].map(|name| report.components[name].wake_up_ms.clone());
+        assert_eq!((controller.count, plant.count), (10, 2));
+        near(controller.min, 2.0);
+        near(controller.max, 2.0);
+    }
+
+    /// 25 ms of work at tick 3, else 1 ms.
+    fn one_long_step(_: usize, tick: u64) -> u32 {
+        if tick == 3 { 25 } else { 1 }
+    }
+
+    #[test]
+    fn oracle_catching_up_returns_to_the_original_time_base() {
+        let (outcome, report, begins) = paced(OnMiss::CatchUp, &[1], Duration::ZERO, one_long_step);
+        outcome.unwrap();
+        // Done at 55 and with 1 ms of observers at 56, then 58 and 60: then there is time to wait.
+        assert_eq!(begins, [0, 10, 20, 30, 56, 58, 60, 70, 80, 90, 100]);
+        // Values of tick 3 came at 55 instead of 40, those of tick 4 at 57 instead of 50; those of tick 5 at 59 are in time.
+        assert_eq!((report.misses, report.lag.late_starts), (2, 2));
+        let [first, worst] = [report.first_miss.as_ref().unwrap(), report.worst_miss.as_ref().unwrap()];
+        assert_eq!((first, first.component.as_str(), first.time), (worst, "controller", 8.0));
+        near(first.late_ms, 15.0);
+        near(report.lag.largest_ms, 16.0);
+        assert_eq!(report.lag.at_end_ms, 0.0);
+        near(report.elapsed_s, 0.102);
+        assert!(
+            report
+                .done_about_it()
+                .unwrap()
+                .contains("2 times without waiting; at most 16.000 ms behind, 0.000 ms")
+        );
+    }
+
+    #[test]
+    fn oracle_slipping_shifts_the_time_base_and_says_by_how_much() {
+        let (outcome, report, begins) = paced(OnMiss::Slip, &[1], Duration::ZERO, one_long_step);
+        outcome.unwrap();
+        assert_eq!(begins, [0, 10, 20, 30, 56, 66, 76, 86, 96, 106, 116]);
+        assert_eq!((report.misses, report.lag.slips, report.lag.late_starts), (1, 1, 0));
+        near(report.lag.slipped_ms, 16.0);
+        near(report.elapsed_s, 0.118);
+        assert_eq!(report.done_about_it().unwrap(), "shifted the time base 1 times, by 16.000 ms in all");
+    }
+
+    #[test]
+    fn oracle_stopping_names_component_time_and_delay() {
+        let (outcome, report, begins) = paced(OnMiss::Stop, &[1], Duration::ZERO, one_long_step);
+        let message = outcome.unwrap_err().to_string();
+        assert!(message.starts_with("controller missed its deadline at t = 8 s by 15.000 ms"), "{message}");
+        assert_eq!((begins.len(), report.misses), (4, 1));
+    }
+
+    #[test]
+    fn oracle_a_slow_component_has_the_time_to_its_own_next_tick_and_is_blamed_for_what_others_miss() {
+        // The plant steps every 5 ticks of 10 ms and takes 25 ms: in time. The controller steps at every tick, before it.
+        let work = |index: usize, tick: u64| if index == 1 && tick == 5 { 25 } else { 1 };
+        let (_, report, begins) = paced(OnMiss::CatchUp, &[1, 5], Duration::ZERO, work);
+        assert_eq!(begins[5..9], [50, 77, 79, 81]);
+        let [controller, plant] = ["controller", "plant"].map(|name| &report.components[name]);
+        near(plant.period_ms, 50.0);
+        assert_eq!((plant.misses, controller.misses, report.deadlines), (0, 1, 14));
+        // Its values of tick 6, due at 70, came at 78.
+        let miss = report.first_miss.unwrap();
+        assert_eq!((miss.component.as_str(), miss.time), ("controller", 11.0));
+        near(miss.late_ms, 8.0);
+        // It began at 77.
+        near(miss.lag_ms, 17.0);
+        assert_eq!((miss.longest.as_str(), miss.longest_time), ("plant", 10.0));
+        near(miss.longest_ms, 25.0);
+    }
+
+    #[test]
+    fn a_request_to_end_cuts_a_wait_short() {
+        let timer = Rc::new(Fake::default());
+        let settings =
+            Settings { factor: "1e-300".parse().unwrap(), on_miss: OnMiss::CatchUp, priority: None };
+        let interrupt = Interrupt::default();
+        let clock = Clock::new(0.0, 10.0, 1.0).unwrap();
+        let mut pacer = Pacer::new(settings, clock, timer, interrupt.clone(), std::iter::empty());
+        pacer.wait(0);
+        interrupt.ask(Request::Quit);
+        pacer.wait(1);
+        assert_eq!(interrupt.asked(), Some(Request::Quit));
+    }
+}

@@ -1,0 +1,265 @@
+//! What came of a paced run.
+
+use super::distribution::Summary;
+use super::priority::Priority;
+use super::{Factor, OnMiss};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::time::Duration;
+
+/// The numbers, as `metrics.json` has them under `real_time`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RealTime {
+    /// Simulated time over elapsed time, as asked for.
+    pub factor: Factor,
+    /// What was to be done about a miss.
+    pub on_miss: OnMiss,
+    /// Scheduling of the run's thread.
+    pub priority: Priority,
+    /// From the first communication point to the end of the last, s.
+    pub elapsed_s: f64,
+    /// Deadlines that were looked at.
+    pub deadlines: u64,
+    /// Those that were missed.
+    pub misses: u64,
+    /// The first of them.
+    pub first_miss: Option<Late>,
+    /// The one with the longest delay.
+    pub worst_miss: Option<Late>,
+    /// How far the run fell behind.
+    pub lag: Lag,
+    /// By component.
+    pub components: BTreeMap<String, Component>,
+    /// Wake-up jitter: delay of each wake-up, at all communication points with a wait.
+    pub wake_up_ms: Summary,
+    /// What the orchestrator itself needed at a communication point: passing on values, recording.
+    pub orchestrator_ms: Summary,
+}
+
+/// A missed deadline.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Late {
+    /// Whose values came late.
+    pub component: String,
+    /// Communication point they belong to, s.
+    pub time: f64,
+    /// From the deadline to the values, ms.
+    pub late_ms: f64,
+    /// How late the communication point began, by the wake-up or by what was before it, ms.
+    pub lag_ms: f64,
+    /// The component with the longest step since the run last waited.
+    pub longest: String,
+    /// The communication point at the end of that step, s.
+    pub longest_time: f64,
+    /// Its duration, ms.
+    pub longest_ms: f64,
+}
+
+/// How far a run fell behind, and what was done about it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Lag {
+    /// Communication points that began late as what was before them took too long.
+    pub late_starts: u64,
+    /// Largest delay of a communication point's beginning, ms; wake-up jitter included.
+    pub largest_ms: f64,
+    /// That of the last one, ms.
+    pub at_end_ms: f64,
+    /// How often the time base was shifted.
+    pub slips: u64,
+    /// By how much in all, ms.
+    pub slipped_ms: f64,
+}
+
+/// A component's times.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Component {
+    /// From a communication point of its own to the next, ms on the wall clock.
+    pub period_ms: f64,
+    /// Missed deadlines.
+    pub misses: u64,
+    /// Time spent in all calls of the unit, per step.
+    pub step_ms: Summary,
+    /// From the instant of the communication point to the component's values; to be shorter than the period.
+    pub response_ms: Summary,
+    /// Wake-up jitter at its own communication points.
+    pub wake_up_ms: Summary,
+}
+
+/// A figure shows at most about so many points of a course.
+const POINTS: u64 = 5000;
+
+/// The course of a duration, the largest of each stretch.
+#[derive(Clone, Debug, Default)]
+pub struct Series {
+    stride: u64,
+    count: u64,
+    /// Communication points, s.
+    pub time: Vec<f64>,
+    /// Durations, ms.
+    pub milliseconds: Vec<f64>,
+}
+
+impl Series {
+    /// Room for so many durations.
+    pub fn new(expected: u64) -> Self {
+        let stride = expected.div_ceil(POINTS).max(1);
+        let capacity = (expected / stride + 2) as usize;
+        let (time, milliseconds) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
+        Self { stride, count: 0, time, milliseconds }
+    }
+
+    /// One more.
+    pub fn add(&mut self, time: f64, duration: Duration) {
+        let milliseconds = duration.as_secs_f64() * 1e3;
+        if self.count.is_multiple_of(self.stride) {
+            self.time.push(time);
+            self.milliseconds.push(milliseconds);
+        } else if let (Some(last), Some(at)) = (self.milliseconds.last_mut(), self.time.last_mut())
+            && milliseconds > *last
+        {
+            (*at, *last) = (time, milliseconds);
+        }
+        self.count += 1;
+    }
+}
+
+impl RealTime {
+    /// Prints it, below the summary of the run.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn print(&self, order: &[String], out: &mut impl Write) -> io::Result<()> {
+        let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
+        line(
+            "real time",
+            format!(
+                "factor {}: {} of {} deadlines missed; {:.3} s elapsed",
+                self.factor.get(),
+                self.misses,
+                self.deadlines,
+                self.elapsed_s
+            ),
+        )?;
+        let width = order.iter().map(String::len).max().unwrap_or(0).max("orchestrator".len());
+        let mut row = |label: &str, name: &str, cells: [String; 11]| {
+            let [
+                period,
+                min,
+                median,
+                p99,
+                max,
+                response_p99,
+                response_max,
+                woken,
+                woken_p99,
+                woken_max,
+                missed,
+            ] = cells;
+            line(
+                label,
+                format!(
+                    "{name:width$} {period:>8} |{min:>8}{median:>8}{p99:>8}{max:>8} |{response_p99:>8}{response_max:>8} \
+                     |{woken:>8}{woken_p99:>8}{woken_max:>8} |{missed:>7}"
+                ),
+            )
+        };
+        let texts = |cells: [&str; 11]| cells.map(String::from);
+        row("", "", texts(["", "step", "time", "", "", "response", "", "wake-up", "jitter", "", ""]))?;
+        row(
+            "ms",
+            "",
+            texts(["period", "min", "median", "p99", "max", "p99", "max", "median", "p99", "max", "missed"]),
+        )?;
+        for name in order {
+            let Some(component) = self.components.get(name) else { continue };
+            let Component { step_ms: step, response_ms: response, wake_up_ms: woken, .. } = component;
+            let woken = [woken.median, woken.p99, woken.max]
+                .map(|ms| if woken.count > 0 { plain(ms) } else { "-".into() });
+            let [woken_median, woken_p99, woken_max] = woken;
+            let cells = [
+                plain(component.period_ms),
+                plain(step.min),
+                plain(step.median),
+                plain(step.p99),
+                plain(step.max),
+                plain(response.p99),
+                plain(response.max),
+                woken_median,
+                woken_p99,
+                woken_max,
+                component.misses.to_string(),
+            ];
+            row("", name, cells)?;
+        }
+        let own = &self.orchestrator_ms;
+        let own = [own.min, own.median, own.p99, own.max].map(plain);
+        row(
+            "",
+            "orchestrator",
+            std::array::from_fn(|k| own.get(k.wrapping_sub(1)).cloned().unwrap_or_default()),
+        )?;
+        for (label, miss) in [("first miss", &self.first_miss), ("worst miss", &self.worst_miss)] {
+            if let Some(miss) = miss {
+                line(label, miss.to_string())?;
+            }
+        }
+        if let Some(text) = self.done_about_it() {
+            line("done about it", text)?;
+        }
+        if let Some(text) = self.scheduling() {
+            line("priority", text)?;
+        }
+        Ok(())
+    }
+
+    /// What was done about the misses, if there were any.
+    pub fn done_about_it(&self) -> Option<String> {
+        let Lag { late_starts, largest_ms, at_end_ms, slips, slipped_ms } = self.lag;
+        (self.misses > 0).then(|| match self.on_miss {
+            OnMiss::CatchUp => format!(
+                "went on at once, {late_starts} times without waiting; at most {} ms behind, {} ms at the last \
+                 communication point",
+                plain(largest_ms),
+                plain(at_end_ms)
+            ),
+            OnMiss::Slip => format!("shifted the time base {slips} times, by {} ms in all", plain(slipped_ms)),
+            OnMiss::Stop => "ended the run".into(),
+        })
+    }
+
+    fn scheduling(&self) -> Option<String> {
+        match &self.priority {
+            Priority::Usual => None,
+            Priority::Fifo { priority, unlocked: None } => {
+                Some(format!("SCHED_FIFO {priority}, memory locked"))
+            }
+            Priority::Fifo { priority, unlocked: Some(reason) } => {
+                Some(format!("SCHED_FIFO {priority}; memory NOT locked: {reason}"))
+            }
+            Priority::Refused(reason) => Some(format!("REFUSED, ran with usual scheduling: {reason}")),
+        }
+    }
+}
+
+impl std::fmt::Display for Late {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{} at t = {} s, {} ms late", self.component, self.time, plain(self.late_ms))?;
+        write!(f, "; that communication point began {} ms late", plain(self.lag_ms))?;
+        write!(
+            f,
+            "; longest step since the last wait: {}, {} ms, to t = {} s",
+            self.longest,
+            plain(self.longest_ms),
+            self.longest_time
+        )
+    }
+}
+
+/// Milliseconds, to the microsecond or to four digits.
+fn plain(milliseconds: f64) -> String {
+    match milliseconds {
+        ms if ms < 100.0 => format!("{ms:.3}"),
+        ms => format!("{ms:.1}"),
+    }
+}
