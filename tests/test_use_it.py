@@ -32,7 +32,7 @@ def test_the_steps_of_the_page(libpython, tmp_path):
         done = subprocess.run([*command, text], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
         assert done.returncode == 0, text + done.stdout + done.stderr
     made = [path.name for path in (tmp_path / "out").iterdir()]
-    wanted = "crmpc loop.ssp again plant.csv exchange.csv closed_loop.csv variation.csv closed_loop.png archive crmpc.csv loop.fmu container.csv"
+    wanted = "crmpc paced loop.ssp again plant.csv exchange.csv closed_loop.csv variation.csv closed_loop.png archive crmpc.csv loop.fmu container.csv"
     for name in [*wanted.split(), "PdController.fmu", "pd"]:
         assert name in made
     assert {language for language, _ in BLOCKS} == {"sh", "python", "toml"}

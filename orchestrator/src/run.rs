@@ -225,13 +225,13 @@ impl Plan {
         if curves.draw(&out.join("plot.svg"), &experiment.title)? {
             files.push("plot.svg");
         }
-        if outcome.is_err() {
-            tracing::warn!("the results until then are in {}", out.display());
-        }
         let ended = match outcome {
             Ok(()) => None,
             Err(error @ (Error::Deadline { .. } | Error::Interrupted { .. })) => Some(error),
-            Err(error) => return Err(error),
+            Err(error) => {
+                tracing::warn!("the results until then are in {}", out.display());
+                return Err(error);
+            }
         };
         Ok(Report {
             title: experiment.title.clone(),

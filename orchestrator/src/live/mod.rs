@@ -71,17 +71,18 @@ impl Live {
         interrupt: Interrupt,
     ) -> Result<Self, Error> {
         check_terminal()?;
-        log::hold();
-        let terminal = ratatui::try_init().inspect_err(|_| ratatui::restore())?;
         let snapshot = Arc::new(Mutex::new(Snapshot { values: vec![0.0; values], ..Snapshot::default() }));
-        let over = Arc::new(AtomicBool::new(false));
-        let (shared, ends) = (Arc::clone(&snapshot), Arc::clone(&over));
+        let mut live = Self { snapshot, tally, over: Arc::default(), thread: None };
+        log::hold();
+        let terminal = ratatui::try_init()?;
+        let (shared, over) = (Arc::clone(&live.snapshot), Arc::clone(&live.over));
         let thread = thread::Builder::new().name("live view".into()).spawn(move || {
-            let outcome = show(terminal, scene, &shared, &ends, &interrupt);
+            let outcome = show(terminal, scene, &shared, &over, &interrupt);
             ratatui::restore();
             outcome
         })?;
-        Ok(Self { snapshot, tally, over, thread: Some(thread) })
+        live.thread = Some(thread);
+        Ok(live)
     }
 }
 
@@ -101,7 +102,10 @@ impl Drop for Live {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         let outcome = self.thread.take().map(JoinHandle::join);
-        ratatui::restore();
+        if outcome.is_none() {
+            // It could not be started.
+            ratatui::restore();
+        }
         log::release();
         match outcome {
             Some(Ok(Err(error))) => tracing::warn!("the live view ended early: {error}"),

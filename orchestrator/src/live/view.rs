@@ -18,6 +18,9 @@ const COLORS: [Color; 3] = [Color::LightBlue, Color::LightGreen, Color::LightRed
 /// The course that is kept; when it is full, every second point goes.
 const POINTS: usize = 2000;
 
+/// Of three axes.
+type Courses = [Vec<(f64, f64)>; 3];
+
 /// What was seen so far.
 #[derive(Debug, Default)]
 pub struct State {
@@ -26,9 +29,9 @@ pub struct State {
     began: Option<Instant>,
     elapsed: Duration,
     /// Angles and errors, deg, against time, s.
-    attitude: [Vec<(f64, f64)>; 3],
-    reference: [Vec<(f64, f64)>; 3],
-    error: [Vec<(f64, f64)>; 3],
+    attitude: Courses,
+    reference: Courses,
+    error: Courses,
     /// Whether the run was asked to end.
     pub ending: bool,
 }
@@ -145,13 +148,7 @@ fn charts(frame: &mut Frame, state: &State, area: Rect) {
     chart(frame, state, Line::from(legend("error, deg:")), &[(&state.error, true)], right);
 }
 
-fn chart(
-    frame: &mut Frame,
-    state: &State,
-    title: Line,
-    courses: &[(&[Vec<(f64, f64)>; 3], bool)],
-    area: Rect,
-) {
+fn chart(frame: &mut Frame, state: &State, title: Line, courses: &[(&Courses, bool)], area: Rect) {
     let datasets = courses.iter().flat_map(|(courses, colored)| {
         courses.iter().zip(COLORS).map(|(course, color)| {
             let color = if *colored { color } else { Color::DarkGray };
@@ -293,6 +290,7 @@ mod tests {
     use crate::realtime::pacer::{Miss, Step};
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
+    use ratatui::buffer::Cell;
 
     /// The picture, line by line without trailing spaces.
     fn picture(state: &State, width: u16, height: u16) -> Vec<String> {
@@ -300,9 +298,7 @@ mod tests {
         terminal.draw(|frame| draw(frame, state)).unwrap();
         let buffer = terminal.backend().buffer();
         let cells = buffer.content().chunks(usize::from(width));
-        cells
-            .map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>().trim_end().to_string())
-            .collect()
+        cells.map(|row| row.iter().map(Cell::symbol).collect::<String>().trim_end().to_string()).collect()
     }
 
     fn scene() -> Scene {

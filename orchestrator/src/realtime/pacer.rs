@@ -211,7 +211,7 @@ impl Pacer {
             if !tick.is_multiple_of(task.every) {
                 continue;
             }
-            let duration = task.spent.time() - task.counted;
+            let duration = task.spent.time().saturating_sub(task.counted);
             task.counted += duration;
             task.steps.record(duration);
             task.series.add(time, duration);
@@ -280,7 +280,7 @@ impl Pacer {
     }
 
     fn count_own(&mut self, now: Duration) {
-        let in_units = self.spent() - self.tick_spent;
+        let in_units = self.spent().saturating_sub(self.tick_spent);
         self.own.record(now.saturating_sub(self.tick_began).saturating_sub(in_units));
     }
 
@@ -294,11 +294,11 @@ impl Pacer {
         let milliseconds = |duration: Duration| duration.as_secs_f64() * 1e3;
         Late {
             component: self.tasks[miss.component].name.clone(),
-            time: miss.time,
+            time: shown(miss.time),
             late_ms: milliseconds(miss.late),
             lag_ms: milliseconds(miss.lag),
             longest: self.tasks[miss.longest.component].name.clone(),
-            longest_time: miss.longest.time,
+            longest_time: shown(miss.longest.time),
             longest_ms: milliseconds(miss.longest.duration),
         }
     }
@@ -346,6 +346,11 @@ impl Pacer {
     }
 }
 
+/// A time without what multiplication adds in its last digits.
+fn shown(time: f64) -> f64 {
+    (time * 1e9).round() / 1e9
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::timer::fake::Fake;
@@ -376,7 +381,7 @@ mod tests {
         let mut outcome = Ok(());
         for tick in 0..=clock.ticks() {
             pacer.wait(tick);
-            begins.push((timer.now() - 12345 * MS).as_millis());
+            begins.push(timer.now().as_millis() - 12345);
             for (index, (&every, spent)) in every.iter().zip(&spent).enumerate() {
                 if tick.is_multiple_of(u64::from(every)) {
                     let begin = timer.now();

@@ -142,6 +142,11 @@ impl RealTime {
             ),
         )?;
         let width = order.iter().map(String::len).max().unwrap_or(0).max("orchestrator".len());
+        let groups = format!(
+            "{:width$} {:>8} |{:>32} |{:>16} |{:>24} |",
+            "", "", "step time", "response", "wake-up jitter"
+        );
+        line("", groups)?;
         let mut row = |label: &str, name: &str, cells: [String; 11]| {
             let [
                 period,
@@ -165,7 +170,6 @@ impl RealTime {
             )
         };
         let texts = |cells: [&str; 11]| cells.map(String::from);
-        row("", "", texts(["", "step", "time", "", "", "response", "", "wake-up", "jitter", "", ""]))?;
         row(
             "ms",
             "",
