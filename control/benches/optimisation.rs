@@ -9,6 +9,7 @@ mod harness;
 
 use control::crmpc::{self, Constraints};
 use control::dlmpc;
+use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::report::{Report, Status};
 use control::{Controller, Crmpc, Dlmpc, Measurement};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
@@ -90,6 +91,18 @@ fn print_distribution<C: Optimising>(name: &str, controller: &mut C, ticks: &[Ti
             (0..REPETITIONS).map(time).fold(f64::INFINITY, f64::min)
         })
         .collect();
+    let mut iterations = 0;
+    let mut worst: (f64, u32) = (0.0, 0);
+    let mut counts = std::collections::BTreeMap::new();
+    for tick in ticks.iter().filter(|tick| tick.number % ratio == 0) {
+        let mut memory = tick.before.clone();
+        update(controller, tick, &scenario, &mut memory);
+        let report = C::report(&memory);
+        iterations += report.iterations;
+        worst = (worst.0.max(report.residual), worst.1.max(report.iterations));
+        *counts.entry(format!("{:?}", report.status)).or_insert(0) += 1;
+    }
+    println!("iterations {iterations}, residual, most {worst:?} {counts:?}");
     let first = times_ms[0];
     let mean = times_ms.iter().sum::<f64>() / times_ms.len() as f64;
     times_ms.sort_by(f64::total_cmp);
@@ -104,22 +117,36 @@ fn print_distribution<C: Optimising>(name: &str, controller: &mut C, ticks: &[Ti
     );
 }
 
-/// Both distributions of one controller, over the samples of a run with exits.
-fn print_both<C: Optimising>(name: &str, mut with: C, mut without: C) {
-    let ticks = run(&mut with);
-    print_distribution(name, &mut with, &ticks);
-    print_distribution(&format!("{name}, without exits"), &mut without, &ticks);
+/// The ways to solve that are compared.
+const WAYS: [(&str, SolverSettings); 4] = [
+    ("exits, then riccati", WAY),
+    ("riccati", SolverSettings { exits: false, ..WAY }),
+    ("riccati, frozen", SolverSettings { exits: false, nonlinearity: Nonlinearity::Frozen, ..WAY }),
+    ("cone", SolverSettings { exits: false, method: Method::Cone, ..WAY }),
+];
+const WAY: SolverSettings = SolverSettings {
+    method: Method::Riccati,
+    nonlinearity: Nonlinearity::Exact,
+    max_iterations: 50,
+    exits: true,
+    time_budget: 0.0,
+};
+
+/// The distributions of one controller, over the samples of one run.
+fn print_all<C: Optimising>(name: &str, new: impl Fn(SolverSettings) -> C) {
+    let ticks = run(&mut new(WAY));
+    for (way, settings) in WAYS {
+        print_distribution(&format!("{name}, {way}"), &mut new(settings), &ticks);
+    }
 }
 
 fn distributions() {
     for (name, constraints) in [("CRMPC robust", Constraints::Robust), ("CRMPC paper", Constraints::Paper)] {
-        let new = || Crmpc::new(settings(constraints)).unwrap();
-        print_both(name, new(), new().without_exits());
+        print_all(name, |solver| Crmpc::new(crmpc::Settings { solver, ..settings(constraints) }).unwrap());
     }
     let (published, tuned) = (dlmpc::Settings::published(), dlmpc::Settings::tuned());
     for (name, settings) in [("DLMPC published", published), ("DLMPC tuned", tuned)] {
-        let new = || Dlmpc::new(settings).unwrap();
-        print_both(name, new(), new().without_exits());
+        print_all(name, |solver| Dlmpc::new(dlmpc::Settings { solver, ..settings }).unwrap());
     }
 }
 
@@ -156,7 +183,8 @@ fn optimisations(criterion: &mut Criterion) {
             });
         }
         if let Some(tick) = after(0.2, Status::Constrained) {
-            let mut whole = Crmpc::new(settings(constraints)).unwrap().without_exits();
+            let cone = SolverSettings { exits: false, method: Method::Cone, ..WAY };
+            let mut whole = Crmpc::new(crmpc::Settings { solver: cone, ..settings(constraints) }).unwrap();
             group.bench_function("whole horizon", |bencher| {
                 bencher.iter_batched_ref(
                     || tick.before.clone(),

@@ -51,6 +51,12 @@ pub(crate) struct Programme {
     pub(crate) right_side: Vec<f64>,
 }
 
+/// An optimum: x and the duals of the rows of A.
+pub(crate) struct Optimum<'a> {
+    pub(crate) x: &'a [f64],
+    pub(crate) duals: &'a [f64],
+}
+
 impl Programme {
     /// Sets the solver up for these patterns.
     ///
@@ -70,8 +76,8 @@ impl Programme {
         Ok(Self { solver, cost: cost.nzval, linear_cost, matrix: matrix.nzval, right_side })
     }
 
-    /// Solves with the data as they are now: the optimum, if there is one, and the iterations.
-    pub(crate) fn solve(&mut self) -> (Option<&[f64]>, u32) {
+    /// Solves with the data as they are now: the optimum and its duals, if there is one, and the iterations.
+    pub(crate) fn solve(&mut self) -> (Option<Optimum<'_>>, u32) {
         let accepted = self.solver.update_P(&self.cost).is_ok()
             && self.solver.update_q(&self.linear_cost).is_ok()
             && self.solver.update_A(&self.matrix).is_ok()
@@ -82,7 +88,7 @@ impl Programme {
         self.solver.solve();
         let solution = &self.solver.solution;
         let solved = matches!(solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
-        (solved.then_some(&solution.x), solution.iterations)
+        (solved.then_some(Optimum { x: &solution.x, duals: &solution.z }), solution.iterations)
     }
 }
 

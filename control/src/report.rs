@@ -10,9 +10,13 @@ pub enum Status {
     None,
     /// The unconstrained optimum satisfies every constraint exactly, so it is the optimum.
     Unconstrained,
-    /// The cone solver's optimum.
+    /// The optimum with the terminal ball alone satisfies every other constraint exactly, so it is the optimum.
+    TerminalBall,
+    /// The optimum by the Riccati method.
     Constrained,
-    /// The cone solver did not succeed: the shifted previous plan with the terminal law.
+    /// The optimum by the cone solver.
+    Cone,
+    /// No solver succeeded: the shifted previous plan with the terminal law.
     Fallback,
 }
 
@@ -23,8 +27,10 @@ pub struct Report {
     pub status: Status,
     /// Optimal cost; of the shifted plan in a fallback.
     pub cost: f64,
-    /// Iterations of the cone solver, summed over its passes.
+    /// Iterations of the solvers, summed over their passes.
     pub iterations: u32,
+    /// Residual of the conditions of optimality, relative, of the constraints as they are; of the shifted plan in a fallback.
+    pub residual: f64,
     /// Wall-clock time of the last optimisation, s. Not reproducible.
     pub time: f64,
     /// Optimisations so far.

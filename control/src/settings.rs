@@ -1,6 +1,7 @@
 //! The published settings, from `data/crmpc-2022.toml`.
 
 use crate::crmpc::{Constraints, InitialState, Settings};
+use crate::mpc::SolverSettings;
 use crate::sampled::Gain;
 use serde::Deserialize;
 use vehicle::dynamics::RigidBody;
@@ -114,7 +115,7 @@ impl Settings {
             sideslip_bound: bounds.sideslip_deg.to_radians(),
             reference_rate: bounds.reference_rate_deg_s.to_radians(),
             reference_acceleration: bounds.reference_acceleration_deg_s2.to_radians(),
-            max_iterations: solver.max_iterations,
+            solver: SolverSettings::new(solver.max_iterations),
         }
     }
 }

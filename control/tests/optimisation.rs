@@ -3,6 +3,7 @@
 mod harness;
 
 use control::crmpc::{Constraints, Memory, Plan, Report, Settings, Status};
+use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::schedule::Sampled;
 use control::{Controller, Crmpc, Measurement};
 use harness::{disturbance, settings, simulate};
@@ -23,6 +24,13 @@ fn reference() -> impl Fn(f64) -> Reference {
 
 fn controller(constraints: Constraints) -> Crmpc {
     Crmpc::new(settings(constraints)).unwrap()
+}
+
+/// The same with the cone programme of the whole horizon at every sample.
+fn cone(constraints: Constraints) -> Crmpc {
+    let settings = settings(constraints);
+    let solver = SolverSettings { method: Method::Cone, exits: false, ..settings.solver };
+    Crmpc::new(Settings { solver, ..settings }).unwrap()
 }
 
 /// The memory without what a clock wrote into it.
@@ -76,7 +84,7 @@ fn exits_lead_to_the_optimum_of_the_whole_horizon() {
     };
     let states = (0.0..1.0f64, cube(8.0), cube(1.5), 0..225u64);
     for constraints in [Constraints::Robust, Constraints::Paper] {
-        let (with, without) = (controller(constraints), controller(constraints).without_exits());
+        let (with, without) = (controller(constraints), cone(constraints));
         let (with, without) = (RefCell::new(with), RefCell::new(without));
         let limit = settings(constraints).limit_moment;
         let counts = [Cell::new(0), Cell::new(0)];
@@ -92,7 +100,7 @@ fn exits_lead_to_the_optimum_of_the_whole_horizon() {
                     let moment = controller.update(&mut memory, 0, time, &measured, &reference());
                     (memory.report.status, memory.report.cost, moment)
                 });
-            prop_assume!(status_whole == Status::Constrained);
+            prop_assume!(status_whole == Status::Cone);
             prop_assert_ne!(status, Status::Fallback);
             counts[usize::from(status == Status::Constrained)].update(|count| count + 1);
             prop_assert!((cost - cost_whole).abs() <= 1e-6 * cost_whole, "{cost} {cost_whole}");
@@ -160,24 +168,51 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
 
 #[test]
 fn exits_change_nothing_along_a_run() {
+    // The balls as functions of the motion, and linearised, where the cone solver is the judge.
+    let ways = [(Nonlinearity::Exact, Method::Riccati), (Nonlinearity::Frozen, Method::Cone)];
     for constraints in [Constraints::Robust, Constraints::Paper] {
-        let (mut with, mut without) = (controller(constraints), controller(constraints).without_exits());
-        let limit = settings(constraints).limit_moment;
-        let mut counts = [0, 0];
-        for sample in recorded(constraints).iter().step_by(3) {
-            let (memory, moment) = sample.update(&mut with);
-            let (whole, moment_whole) = sample.update(&mut without);
-            counts[usize::from(memory.report.status == Status::Constrained)] += 1;
-            let (cost, cost_whole) = (memory.report.cost, whole.report.cost);
-            assert!(
-                (cost - cost_whole).abs() <= 1e-7 * cost_whole,
-                "tick {}: {cost} {cost_whole}",
-                sample.tick
-            );
-            let difference = (moment - moment_whole).norm() / limit;
-            assert!(difference < 1e-4, "tick {}: {difference}", sample.tick);
+        for (nonlinearity, method) in ways {
+            let settings = settings(constraints);
+            let solver = SolverSettings { nonlinearity, ..settings.solver };
+            let mut with = Crmpc::new(Settings { solver, ..settings }).unwrap();
+            let solver = SolverSettings { method, exits: false, ..solver };
+            let mut without = Crmpc::new(Settings { solver, ..settings }).unwrap();
+            let limit = settings.limit_moment;
+            let mut counts = [0, 0];
+            for sample in recorded(constraints).iter().step_by(3) {
+                let (memory, moment) = sample.update(&mut with);
+                let (whole, moment_whole) = sample.update(&mut without);
+                counts[usize::from(memory.report.status == Status::Constrained)] += 1;
+                let (cost, cost_whole) = (memory.report.cost, whole.report.cost);
+                let tick = sample.tick;
+                assert!((cost - cost_whole).abs() <= 1e-7 * cost_whole, "tick {tick}: {cost} {cost_whole}");
+                let difference = (moment - moment_whole).norm() / limit;
+                assert!(difference < 1e-4, "tick {tick}: {difference}");
+            }
+            assert!(counts.iter().all(|&count| count > 1), "{constraints:?}: {counts:?}");
         }
-        assert!(counts.iter().all(|&count| count > 2), "{constraints:?}: {counts:?}");
+    }
+}
+
+#[test]
+fn every_way_to_the_optimum_shows_that_it_is_one() {
+    // By the residual of the conditions of optimality, with the constraints as they are.
+    for constraints in [Constraints::Robust, Constraints::Paper] {
+        let mut controller = controller(constraints);
+        let mut seen = Vec::new();
+        for sample in recorded(constraints) {
+            let Report { status, residual, .. } = sample.update(&mut controller).0.report;
+            let largest = match status {
+                Status::Unconstrained | Status::TerminalBall => 1e-9,
+                _ => 2e-6,
+            };
+            assert!(residual <= largest, "tick {}: {status:?} {residual}", sample.tick);
+            if !seen.contains(&status) {
+                seen.push(status);
+            }
+        }
+        assert!(seen.contains(&Status::Unconstrained) && seen.contains(&Status::Constrained), "{seen:?}");
+        assert!(constraints == Constraints::Robust || seen.contains(&Status::TerminalBall), "{seen:?}");
     }
 }
 
@@ -200,7 +235,9 @@ fn assert_is_shifted(after: &Plan, before: &Plan, end: &Reference, settings: &Se
 #[test]
 fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
     let settings = settings(Constraints::Robust);
-    let mut failing = Crmpc::new(Settings { max_iterations: 1, ..settings }).unwrap();
+    let mut failing =
+        Crmpc::new(Settings { solver: SolverSettings { max_iterations: 1, ..settings.solver }, ..settings })
+            .unwrap();
     let recorded = recorded(Constraints::Robust);
     let constrained = |sample: &&Recorded| {
         sample.tick > 0
@@ -282,7 +319,11 @@ fn run_failing(during: Range<u64>) -> (harness::Outcome, [u32; 2], Memory) {
     let settings = settings(Constraints::Robust);
     let mut controller = Interrupted {
         working: Crmpc::new(settings).unwrap(),
-        failing: Crmpc::new(Settings { max_iterations: 1, ..settings }).unwrap(),
+        failing: Crmpc::new(Settings {
+            solver: SolverSettings { max_iterations: 1, ..settings.solver },
+            ..settings
+        })
+        .unwrap(),
         during: during.clone(),
     };
     let mut memory = Memory::default();

@@ -75,7 +75,7 @@ impl Default for CrmpcLaw {
             sideslip_bound: s.sideslip_bound,
             reference_rate: s.reference_rate,
             reference_acceleration: s.reference_acceleration,
-            solver: SolverParameters::new(s.max_iterations),
+            solver: SolverParameters::from(&s.solver),
             shown: Shown::default(),
         }
     }
@@ -114,10 +114,9 @@ impl Law for CrmpcLaw {
             sideslip_bound: self.sideslip_bound,
             reference_rate: self.reference_rate,
             reference_acceleration: self.reference_acceleration,
-            max_iterations: self.solver.max_iterations(),
+            solver: self.solver.settings(),
         };
-        let controller = Crmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))?;
-        Ok(if self.solver.exits { controller } else { controller.without_exits() })
+        Crmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))
     }
 
     fn show(&mut self, memory: &Memory) {

@@ -43,7 +43,7 @@ impl Default for DlmpcLaw {
             p: s.p,
             q: s.q,
             sliding_mode: s.sliding_mode,
-            solver: SolverParameters::new(s.max_iterations),
+            solver: SolverParameters::from(&s.solver),
             shown: Shown::default(),
         }
     }
@@ -72,10 +72,9 @@ impl Law for DlmpcLaw {
             p: self.p,
             q: self.q,
             sliding_mode: self.sliding_mode,
-            max_iterations: self.solver.max_iterations(),
+            solver: self.solver.settings(),
         };
-        let controller = Dlmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))?;
-        Ok(if self.solver.exits { controller } else { controller.without_exits() })
+        Dlmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))
     }
 
     fn show(&mut self, memory: &Memory) {

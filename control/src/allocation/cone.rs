@@ -105,6 +105,7 @@ impl ConeProblem {
             self.programme.right_side[BOX_ROWS + 1 + i] = weight[i] * rest[i];
         }
         let (solution, iterations) = self.programme.solve();
+        let solution = solution.map(|optimum| optimum.x);
         let found = solution.map(|solution| {
             let x = Surfaces::from_column_slice(&solution[1..=SURFACES]);
             let u = Jets::from_column_slice(&solution[1 + SURFACES..]);

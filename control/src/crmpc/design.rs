@@ -1,6 +1,7 @@
 //! Offline design of CRMPC: every constant of Chai 2022 from the raw data, and the tightening of the `robust` set.
 
 use crate::error::DesignError;
+use crate::mpc::SolverSettings;
 use crate::sampled::{Gain, InvariantSet, Reach, SampledError};
 use nalgebra::{Matrix2, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -69,8 +70,8 @@ pub struct Settings {
     pub reference_rate: f64,
     /// Bound Θ̄₂ on ‖Θ̈_r‖, rad/s².
     pub reference_acceleration: f64,
-    /// Iteration limit of the cone solver.
-    pub max_iterations: u32,
+    /// How the optimisation is solved.
+    pub solver: SolverSettings,
 }
 
 /// The constants printed in Chai 2022, section 5.1, computed from the raw data.

@@ -1,7 +1,9 @@
 //! A nominal motion over the horizon.
 
+use crate::mpc::Motion;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
+use vehicle::reference::Reference;
 
 /// States x̃_0 … x̃_N and the accelerations a_0 … a_{N−1} held between them.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -35,9 +37,32 @@ impl Plan {
         self.accelerations.resize(horizon, Vector3::zeros());
     }
 
-    /// Largest difference of any state component.
-    pub(super) fn distance(&self, other: &Self) -> f64 {
-        self.states.iter().zip(&other.states).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
+    /// The errors E = x̃ − x_r and v = a − Θ̈_r.
+    pub(super) fn errors(&self, references: &[Reference], motion: &mut Motion<2>) {
+        for ((error, state), reference) in motion.states.iter_mut().zip(&self.states).zip(references) {
+            *error = super::error(state, reference);
+        }
+        for ((v, a), reference) in motion.inputs.iter_mut().zip(&self.accelerations).zip(references) {
+            *v = a - reference.accelerations;
+        }
+    }
+
+    /// The motion with these errors, rolled out from `start` (or from its own) so that it is an exact motion of the nominal model.
+    pub(super) fn follow(
+        &mut self,
+        motion: &Motion<2>,
+        start: Option<Vector6<f64>>,
+        references: &[Reference],
+        h: f64,
+    ) {
+        self.states[0] = start.unwrap_or_else(|| {
+            let [angles, rates] = motion.states[0];
+            super::join(&(angles + references[0].angles), &(rates + references[0].rates))
+        });
+        for (k, (v, reference)) in motion.inputs.iter().zip(references).enumerate() {
+            self.accelerations[k] = v + reference.accelerations;
+            self.states[k + 1] = advance(&self.states[k], &self.accelerations[k], h);
+        }
     }
 }
 

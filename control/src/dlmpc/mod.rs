@@ -5,8 +5,6 @@
 //! The outer layer predicts Θ⁺ = Θ + h v, where v = R ω is the commanded rate of the angles; the body rates R⁻¹(Θ) v that are
 //! bounded are linearised along the previous prediction, and exact in the present.
 
-mod cone;
-mod lq;
 mod settings;
 
 pub use crate::report::{Report, Status};
@@ -14,9 +12,9 @@ pub use settings::{Settings, SlidingMode};
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
-use cone::{ConeProblem, Rates, Sample, Start, Structure};
-use lq::AngleLq;
-use nalgebra::{Matrix3x2, Vector3};
+use crate::linearise::{self, InverseKinematics};
+use crate::mpc::{self, Ball, Balls, Bounded, Chain, Cost, Layout, Motion, Optimiser, State};
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::time::Instant;
@@ -50,9 +48,23 @@ impl Plan {
         Self { angles: vec![Vector3::zeros(); horizon + 1], commands: vec![Vector3::zeros(); horizon] }
     }
 
-    /// Largest difference of any angle.
-    fn distance(&self, other: &Self) -> f64 {
-        self.angles.iter().zip(&other.angles).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
+    /// The errors Θ − Θ_r and v − Θ̇_r.
+    fn errors(&self, references: &[Reference], motion: &mut Motion<1>) {
+        for ((error, angles), reference) in motion.states.iter_mut().zip(&self.angles).zip(references) {
+            *error = [angles - reference.angles];
+        }
+        for ((w, v), reference) in motion.inputs.iter_mut().zip(&self.commands).zip(references) {
+            *w = v - reference.rates;
+        }
+    }
+
+    /// The motion with these errors, rolled out from `start` so that it is an exact motion of the model.
+    fn follow(&mut self, motion: &Motion<1>, start: Vector3<f64>, references: &[Reference], h: f64) {
+        self.angles[0] = start;
+        for (k, (w, reference)) in motion.inputs.iter().zip(references).enumerate() {
+            self.commands[k] = w + reference.rates;
+            self.angles[k + 1] = self.angles[k] + self.commands[k] * h;
+        }
     }
 }
 
@@ -98,42 +110,72 @@ pub struct Dlmpc {
     settings: Settings,
     /// Inner ticks per optimisation.
     ratio: u64,
-    lq: [AngleLq; 3],
     /// κ of the terminal law v = Θ̇_r − κ (Θ − Θ_r).
     gains: Vector3<f64>,
-    /// The whole horizon.
-    whole: ConeProblem,
-    windows: Option<Windows>,
-    /// Whether the unconstrained optimum is tried first.
-    exits: bool,
+    cost: Cost<1>,
+    rates: RateLimit,
+    optimiser: Optimiser<1>,
     // Scratch of one optimisation.
+    affine: Vec<State<1>>,
+    previous: Motion<1>,
+}
+
+/// ‖R⁻¹(Θ) v‖ within its limit, as a function of the errors from these references.
+#[derive(Clone, Debug)]
+struct RateLimit {
+    limit: f64,
     references: Vec<Reference>,
-    affine: Vec<Vector3<f64>>,
-    errors: Vec<Vector3<f64>>,
-    candidate: Plan,
-    previous: Plan,
-    rates: Vec<Rates>,
 }
 
-/// Parts of the horizon that stand for the whole of it while no constraint outside is active, as in [`crate::crmpc`].
-struct Windows {
-    /// The first [`HEAD`] intervals.
-    head: ConeProblem,
-    /// [`MIDDLE`] intervals anywhere later.
-    middle: ConeProblem,
-}
-
-/// Lengths of the windows in intervals: the start of a manoeuvre, a jump of the reference ahead.
-const HEAD: usize = 24;
-const MIDDLE: usize = 8;
-/// Passes of the first optimisation at most.
-const FIRST_PASSES: usize = 20;
 /// The first optimisation has converged when no angle moves by more than this (rad) between passes.
-const FIRST_TOLERANCE: f64 = 1e-7;
-/// Relative slack when the exact constraints are checked, for rounding.
+const STANDSTILL: f64 = 1e-7;
+/// Relative slack when the exact constraint is checked, for rounding.
 const CHECK_SLACK: f64 = 1e-9;
-/// Typical angle error, by which the solver's unknowns are scaled, rad.
+/// Typical angle error, by which the cone solver's unknowns are scaled, rad.
 const ANGLE_SCALE: f64 = 0.1;
+
+impl mpc::Constraints<1> for RateLimit {
+    fn has_state_balls(&self) -> bool {
+        false
+    }
+
+    fn balls(&self, k: usize, state: &State<1>, input: &Vector3<f64>) -> Balls<1> {
+        let reference = &self.references[k];
+        let command = reference.rates + input;
+        let angles = reference.angles + state[0];
+        let w = kinematics::r_inverse(&angles);
+        let (rates, [by_alpha, by_beta]) = InverseKinematics::at(&angles).body_rates(&command);
+        let by_state = Matrix3::from_columns(&[by_alpha, by_beta, Vector3::zeros()]) / self.limit;
+        let input = Ball { value: rates / self.limit, by_state: [by_state], by_input: w / self.limit };
+        Balls { state: Ball::default(), input }
+    }
+
+    fn squares(&self, k: usize, state: &State<1>, input: &Vector3<f64>) -> (f64, f64) {
+        let reference = &self.references[k];
+        let rates = linearise::body_rates(&(reference.angles + state[0]), &(reference.rates + input));
+        (0.0, rates.norm_squared() / (self.limit * self.limit))
+    }
+}
+
+impl Bounded<1> for RateLimit {
+    fn tighten(&mut self, _: &Motion<1>, _: Range<usize>) {}
+
+    fn violated(&mut self, motion: &Motion<1>, skip: Range<usize>) -> Option<Range<usize>> {
+        let bound = (1.0 + CHECK_SLACK).powi(2);
+        let violates = |&k: &usize| {
+            !skip.contains(&k)
+                && mpc::Constraints::squares(self, k, &motion.states[k], &motion.inputs[k]).1 > bound
+        };
+        let n = motion.inputs.len();
+        let first = (0..n).find(violates)?;
+        let last = (first..n).rfind(violates).unwrap_or(first);
+        Some(first..last + 1)
+    }
+
+    fn terminal_radius(&self) -> Option<f64> {
+        None
+    }
+}
 
 impl Dlmpc {
     /// Checks the settings and sets the solvers up.
@@ -143,45 +185,29 @@ impl Dlmpc {
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
         let ratio = settings.ratio()?;
         let Settings { horizon: n, period_optimisation: h, p, q, .. } = settings;
-        let problem = |stages, start| {
-            ConeProblem::new(Structure {
-                stages,
-                step: h,
-                p,
-                q,
-                start,
-                limit: settings.limit_rate,
-                angle_scale: ANGLE_SCALE,
-                max_iterations: settings.max_iterations,
-            })
-            .map_err(DesignError::Solver)
+        let p = Vector3::from(p);
+        let cost = Cost { state: [p], input: Vector3::from(q), end: [[p]] };
+        let layout = Layout {
+            chain: Chain::new(h),
+            cost,
+            horizon: n,
+            state_balls: false,
+            terminal: false,
+            start: None,
+            scale: [ANGLE_SCALE],
+            standstill: STANDSTILL,
         };
-        let windows =
-            Windows { head: problem(HEAD, Start::Fixed)?, middle: problem(MIDDLE, Start::Arrival)? };
-        let lq: [AngleLq; 3] = std::array::from_fn(|i| AngleLq::new(n, h, p[i], q[i]));
+        let optimiser = Optimiser::new(layout, settings.solver).map_err(DesignError::Solver)?;
         Ok(Self {
             ratio,
-            gains: Vector3::from_fn(|i, _| lq[i].gain()),
-            lq,
-            whole: problem(n, Start::Fixed)?,
-            windows: (n >= HEAD + 2).then_some(windows),
-            exits: true,
-            references: vec![Reference::default(); n + 1],
-            affine: vec![Vector3::zeros(); n],
-            errors: vec![Vector3::zeros(); n + 1],
-            candidate: Plan::new(n),
-            previous: Plan::new(n),
-            rates: vec![Rates::default(); n],
+            gains: -optimiser.feedback()[0],
+            cost,
+            rates: RateLimit { limit: settings.limit_rate, references: vec![Reference::default(); n + 1] },
+            optimiser,
+            affine: vec![[Vector3::zeros()]; n],
+            previous: Motion::new(n),
             settings,
         })
-    }
-
-    /// Always solves the cone programme of the whole horizon, for comparison: the same optimum, only later.
-    #[must_use]
-    pub fn without_exits(mut self) -> Self {
-        self.exits = false;
-        self.windows = None;
-        self
     }
 
     /// Inner ticks per optimisation.
@@ -201,29 +227,23 @@ impl Dlmpc {
             self.shift(&mut memory.plan);
         }
 
-        self.unconstrained(measured);
-        let (mut status, mut iterations) = (Status::Unconstrained, 0);
-        let violated = if self.exits { self.violated(0..0) } else { Some(0..self.settings.horizon) };
-        if let Some(violated) = violated {
-            let solved = if first {
-                self.constrained_first(measured, &violated, &mut iterations)
-            } else {
-                self.constrained(&memory.plan, measured, &violated, &mut iterations)
-            };
-            status = if solved { Status::Constrained } else { Status::Fallback };
-        }
-        if status == Status::Fallback {
+        let start = [measured - self.rates.references[0].angles];
+        memory.plan.errors(&self.rates.references, &mut self.previous);
+        let previous = (!first).then_some(&self.previous);
+        let report = self.optimiser.optimise(&mut self.rates, &start, &self.affine, previous);
+        memory.report.cost = if report.status == Status::Fallback {
             self.track(&mut memory.plan, measured);
             memory.report.fallbacks += 1;
-            for (k, error) in self.errors.iter_mut().enumerate() {
-                *error = memory.plan.angles[k] - self.references[k].angles;
-            }
+            memory.plan.errors(&self.rates.references, &mut self.previous);
+            self.cost.of(&self.previous)
         } else {
-            memory.plan.clone_from(&self.candidate);
-        }
-        memory.report.status = status;
-        memory.report.cost = self.cost();
-        memory.report.iterations = iterations;
+            let motion = self.optimiser.motion();
+            memory.plan.follow(motion, measured, &self.rates.references, self.settings.period_optimisation);
+            self.cost.of(motion)
+        };
+        memory.report.status = report.status;
+        memory.report.iterations = report.iterations;
+        memory.report.residual = report.certificate.residual();
         memory.report.solves += 1;
         memory.report.time = clock.elapsed().as_secs_f64();
     }
@@ -231,27 +251,27 @@ impl Dlmpc {
     /// References at the prediction times, and d_k = Θ_r,k + h Θ̇_r,k − Θ_r,k+1.
     fn preview(&mut self, time: f64, reference: ReferenceAt) {
         let h = self.settings.period_optimisation;
-        for (k, slot) in self.references.iter_mut().enumerate() {
+        for (k, slot) in self.rates.references.iter_mut().enumerate() {
             *slot = reference(time + k as f64 * h);
         }
-        for (d, pair) in self.affine.iter_mut().zip(self.references.windows(2)) {
-            *d = pair[0].angles + pair[0].rates * h - pair[1].angles;
+        for (d, pair) in self.affine.iter_mut().zip(self.rates.references.windows(2)) {
+            *d = [pair[0].angles + pair[0].rates * h - pair[1].angles];
         }
     }
 
     /// The plan that there is before the first optimisation: the reference.
     fn follow_reference(&self, plan: &mut Plan) {
         plan.angles.clear();
-        plan.angles.extend(self.references.iter().map(|reference| reference.angles));
+        plan.angles.extend(self.rates.references.iter().map(|reference| reference.angles));
         plan.commands.clear();
         plan.commands
-            .extend(self.references[..self.settings.horizon].iter().map(|reference| reference.rates));
+            .extend(self.rates.references[..self.settings.horizon].iter().map(|reference| reference.rates));
     }
 
     /// Drops the first interval and appends one under the terminal law, within the limit.
     fn shift(&self, plan: &mut Plan) {
         let n = self.settings.horizon;
-        let (last, reference) = (plan.angles[n], &self.references[n - 1]);
+        let (last, reference) = (plan.angles[n], &self.rates.references[n - 1]);
         let command = reference.rates - self.gains.component_mul(&(last - reference.angles));
         plan.angles.rotate_left(1);
         plan.commands.rotate_left(1);
@@ -274,163 +294,6 @@ impl Dlmpc {
     /// `command` scaled so that ‖R⁻¹(Θ) v‖ keeps its limit.
     fn within_limit(&self, angles: &Vector3<f64>, command: Vector3<f64>) -> Vector3<f64> {
         within((kinematics::r_inverse(angles) * command).norm(), self.settings.limit_rate) * command
-    }
-
-    /// The optimum without constraints into `candidate` and `errors`.
-    fn unconstrained(&mut self, measured: Vector3<f64>) {
-        let Self { lq, references, affine, errors, candidate, settings, .. } = self;
-        let start = measured - references[0].angles;
-        for (i, lq) in lq.iter_mut().enumerate() {
-            errors[settings.horizon][i] = lq.solve(
-                start[i],
-                |k| affine[k][i],
-                |k, error, w| {
-                    errors[k][i] = error;
-                    candidate.commands[k][i] = w + references[k].rates[i];
-                },
-            );
-        }
-        for (k, error) in errors.iter().enumerate() {
-            candidate.angles[k] = error + references[k].angles;
-        }
-        candidate.angles[0] = measured;
-    }
-
-    /// The intervals, from the first to the last, in which `candidate` violates the constraint (exactly evaluated). Those in
-    /// `skip` are not looked at.
-    fn violated(&self, skip: Range<usize>) -> Option<Range<usize>> {
-        let n = self.settings.horizon;
-        let bound = self.settings.limit_rate * (1.0 + CHECK_SLACK);
-        let violates = |&k: &usize| {
-            let rates = kinematics::r_inverse(&self.candidate.angles[k]) * self.candidate.commands[k];
-            let feasible = rates.norm() <= bound;
-            !skip.contains(&k) && !feasible
-        };
-        let first = (0..n).find(violates)?;
-        let last = (first..n).rfind(violates).unwrap_or(first);
-        Some(first..last + 1)
-    }
-
-    /// Σ_{k≤N} EᵀPE + Σ_{k<N} (v − Θ̇_r)ᵀQ(v − Θ̇_r) of `errors`.
-    fn cost(&self) -> f64 {
-        let Settings { period_optimisation: h, p, q, .. } = self.settings;
-        let (p, q) = (Vector3::from(p), Vector3::from(q));
-        let square = |weight: &Vector3<f64>, x: Vector3<f64>| weight.dot(&x.component_mul(&x));
-        let angles: f64 = self.errors.iter().map(|error| square(&p, *error)).sum();
-        let command = |(pair, d): (&[Vector3<f64>], &Vector3<f64>)| square(&q, (pair[1] - pair[0] - d) / h);
-        angles + self.errors.windows(2).zip(&self.affine).map(command).sum::<f64>()
-    }
-
-    /// The first optimisation: linearised again about its own solution until that stands still.
-    fn constrained_first(
-        &mut self,
-        measured: Vector3<f64>,
-        violated: &Range<usize>,
-        iterations: &mut u32,
-    ) -> bool {
-        let mut about = std::mem::take(&mut self.previous);
-        let mut solved = true;
-        for _ in 0..FIRST_PASSES {
-            about.clone_from(&self.candidate);
-            solved = self.constrained(&about, measured, violated, iterations);
-            if !solved || about.distance(&self.candidate) < FIRST_TOLERANCE {
-                break;
-            }
-        }
-        self.previous = about;
-        solved
-    }
-
-    /// The optimum with the constraint linearised about a plan, into `candidate` and `errors`; whether there is one.
-    fn constrained(
-        &mut self,
-        about: &Plan,
-        measured: Vector3<f64>,
-        violated: &Range<usize>,
-        iterations: &mut u32,
-    ) -> bool {
-        for (k, rates) in self.rates.iter_mut().enumerate() {
-            let angles = if k == 0 { measured } else { about.angles[k] };
-            *rates = linearise(&angles, &about.commands[k], &self.references[k]);
-        }
-        self.in_window(measured, violated, iterations) || self.over_whole_horizon(measured, iterations)
-    }
-
-    /// Solves only a window around the violated intervals, with arrival cost and cost-to-go for the rest of the horizon. If
-    /// the rest then satisfies the constraint exactly, this is the optimum of the whole, as it is that of a relaxation.
-    fn in_window(&mut self, measured: Vector3<f64>, violated: &Range<usize>, iterations: &mut u32) -> bool {
-        let n = self.settings.horizon;
-        let Some(Windows { head, middle }) = &mut self.windows else { return false };
-        let centred = ((violated.start + violated.end).saturating_sub(MIDDLE) / 2).min(n - MIDDLE);
-        let (problem, window) = if violated.len() <= MIDDLE / 2 && centred >= 1 {
-            (middle, centred..centred + MIDDLE)
-        } else {
-            (head, 0..HEAD)
-        };
-        if violated.end > window.end {
-            return false;
-        }
-
-        let start = measured - self.references[0].angles;
-        let affine = &self.affine;
-        let mut arrival = [(0.0, 0.0); 3];
-        let mut to_go = [(0.0, 0.0); 3];
-        for (i, lq) in self.lq.iter_mut().enumerate() {
-            to_go[i] = lq.cost_to_go(window.end);
-            if window.start > 0 {
-                let (weight, centre) = lq.arrival_cost(window.start, start[i], |k| affine[k][i]);
-                arrival[i] = (weight, -weight * centre);
-            }
-        }
-        let sample = Sample {
-            start,
-            arrival,
-            to_go,
-            affine: &affine[window.clone()],
-            rates: &self.rates[window.clone()],
-        };
-        let (solved, spent) = problem.solve(&sample, &mut self.errors[window.start..=window.end]);
-        *iterations += spent;
-        if !solved {
-            return false;
-        }
-        let (begin, end) = (self.errors[window.start], self.errors[window.end]);
-        for (i, lq) in self.lq.iter().enumerate() {
-            let errors = &mut self.errors;
-            lq.trace_back(window.start, begin[i], |k, error| errors[k][i] = error);
-            errors[n][i] =
-                lq.follow(window.end, end[i], |k| affine[k][i], |k, error, _| errors[k][i] = error);
-        }
-        self.plan_from_errors(measured);
-        self.violated(window).is_none()
-    }
-
-    fn over_whole_horizon(&mut self, measured: Vector3<f64>, iterations: &mut u32) -> bool {
-        let sample = Sample {
-            start: measured - self.references[0].angles,
-            arrival: [(0.0, 0.0); 3],
-            to_go: self.settings.p.map(|p| (p, 0.0)),
-            affine: &self.affine,
-            rates: &self.rates,
-        };
-        let (solved, spent) = self.whole.solve(&sample, &mut self.errors);
-        *iterations += spent;
-        if solved {
-            self.plan_from_errors(measured);
-        }
-        solved
-    }
-
-    /// `candidate` from `errors`, rolled out so that it is an exact motion of the model.
-    fn plan_from_errors(&mut self, measured: Vector3<f64>) {
-        let h = self.settings.period_optimisation;
-        let plan = &mut self.candidate;
-        plan.angles[0] = measured;
-        for k in 0..self.settings.horizon {
-            let next = self.errors[k + 1] + self.references[k + 1].angles;
-            plan.commands[k] = (next - plan.angles[k]) / h;
-            plan.angles[k + 1] = plan.angles[k] + plan.commands[k] * h;
-        }
     }
 
     /// The inner law at one tick; moves the manifold's integral on.
@@ -490,18 +353,4 @@ fn within(norm: f64, limit: f64) -> f64 {
 /// sig^ρ(x) = |x|^ρ sgn x, by component.
 fn signed_power(x: &Vector3<f64>, rho: f64) -> Vector3<f64> {
     x.map(|x| x.abs().powf(rho).copysign(x))
-}
-
-/// ω = R⁻¹(Θ) v near a point of a plan, in terms of the errors.
-fn linearise(angles: &Vector3<f64>, command: &Vector3<f64>, reference: &Reference) -> Rates {
-    let by_command = kinematics::r_inverse(angles);
-    let rates = by_command * command;
-    // ∂R⁻¹/∂z = −R⁻¹ (∂R/∂z) R⁻¹
-    let by_angles = Matrix3x2::from_columns(&[
-        -(by_command * (kinematics::r_alpha(angles) * rates)),
-        -(by_command * (kinematics::r_beta(angles) * rates)),
-    ]);
-    let error = angles - reference.angles;
-    let offset = rates - by_angles * error.xy() - by_command * (command - reference.rates);
-    Rates { offset, by_angles, by_command }
 }

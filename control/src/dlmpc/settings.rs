@@ -1,6 +1,7 @@
 //! Settings of DLMPC, and the published and the tuned ones from `data/dlmpc-2022.toml`.
 
 use crate::error::DesignError;
+use crate::mpc::SolverSettings;
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
@@ -40,8 +41,8 @@ pub struct Settings {
     pub q: [f64; 3],
     /// Gains of the inner layer.
     pub sliding_mode: SlidingMode,
-    /// Iteration limit of the cone solver.
-    pub max_iterations: u32,
+    /// How the outer optimisation is solved.
+    pub solver: SolverSettings,
 }
 
 #[derive(Deserialize)]
@@ -95,7 +96,7 @@ impl Settings {
             p: outer.p,
             q: outer.q,
             sliding_mode: inner.published,
-            max_iterations: solver.max_iterations,
+            solver: SolverSettings::new(solver.max_iterations),
         }
     }
 

@@ -1,0 +1,315 @@
+//! The sets that the optimisation keeps the nominal motion in, as functions of the tracking error.
+
+use super::design::{Constraints, Design, Settings};
+use crate::error::DesignError;
+use crate::linearise::{self, InverseKinematics, Linear};
+use crate::mpc::{self, Ball, Balls, Bounded, Motion, State};
+use crate::sampled::Reach;
+use nalgebra::{Matrix3, Vector3};
+use std::ops::Range;
+use vehicle::dynamics::RigidBody;
+use vehicle::reference::Reference;
+
+/// The sets with the references of the horizon and the bounds about a motion.
+#[derive(Clone, Debug)]
+pub(super) struct Sets {
+    kind: Kind,
+    body: RigidBody,
+    /// References at the prediction times.
+    pub(super) references: Vec<Reference>,
+    terminal_radius: f64,
+}
+
+#[derive(Clone, Debug)]
+enum Kind {
+    /// ‖ω‖ and ‖m‖ with stage-wise bounds.
+    Robust(Box<Robust>),
+    /// Constant bounds on ‖x_ω‖ and ‖u‖ of (21).
+    Paper { x_tube: f64, u_tube: f64 },
+}
+
+/// What the bounds follow from, and the bounds.
+#[derive(Clone, Debug)]
+struct Robust {
+    settings: Settings,
+    design: Design,
+    /// On ‖ω̃‖ of each stage, rad/s.
+    rate: Vec<f64>,
+    /// On ‖m̃‖ of each interval, N m.
+    moment: Vec<f64>,
+}
+
+/// Relative slack when constraints are checked, for rounding.
+const CHECK_SLACK: f64 = 1e-9;
+/// Smallest share of a limit that a tightened bound keeps, so that the problem stays well posed.
+const SMALLEST_SHARE: f64 = 0.02;
+/// Smallest terminal radius in the G-norm: 0.03° of angle.
+const SMALLEST_RADIUS: f64 = 5e-3;
+
+impl Sets {
+    /// # Errors
+    /// Names the set of the paper that is empty, or the gain without real eigenvalues that its constants need.
+    pub(super) fn new(settings: &Settings, design: &Design) -> Result<Self, DesignError> {
+        let n = settings.horizon;
+        let (kind, terminal_radius) = match settings.constraints {
+            Constraints::Robust => {
+                let robust = Robust {
+                    settings: *settings,
+                    design: design.clone(),
+                    rate: vec![settings.limit_rate; n + 1],
+                    moment: vec![settings.limit_moment; n],
+                };
+                (Kind::Robust(Box::new(robust)), SMALLEST_RADIUS)
+            }
+            Constraints::Paper => {
+                let paper = design.paper.ok_or(DesignError::NotReal { name: "feedback" })?;
+                let (x_tube, u_tube, epsilon) =
+                    (paper.x_tube, paper.u_tube, paper.epsilon1.min(paper.epsilon2));
+                for (name, value) in [("x_tube", x_tube), ("u_tube", u_tube), ("epsilon", epsilon)] {
+                    if value.is_nan() || value <= 0.0 {
+                        return Err(DesignError::EmptySet { name, value });
+                    }
+                }
+                (Kind::Paper { x_tube, u_tube }, epsilon)
+            }
+        };
+        let references = vec![Reference::default(); n + 1];
+        Ok(Self { kind, body: settings.body, references, terminal_radius })
+    }
+
+    /// To be called when the references are new.
+    pub(super) fn renew(&mut self) {
+        if let Kind::Robust(robust) = &self.kind {
+            self.terminal_radius = robust.terminal_radius(&self.references[self.references.len() - 1]);
+        }
+    }
+
+    /// (Θ̃, x̃_ω, a) of an error and its input at stage `k`.
+    fn nominal(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> [Vector3<f64>; 3] {
+        let Reference { angles, rates, accelerations } = &self.references[k];
+        [angles + state[0], rates + state[1], accelerations + input]
+    }
+}
+
+impl mpc::Constraints<2> for Sets {
+    fn has_state_balls(&self) -> bool {
+        true
+    }
+
+    fn balls(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> Balls<2> {
+        let [angles, rates, a] = self.nominal(k, state, input);
+        let at = linearise::linearise(&self.body, &angles, &rates, &a);
+        match &self.kind {
+            Kind::Robust(robust) => Balls {
+                state: ball(&at.rates, robust.rate[k]),
+                input: ball(&at.moment, robust.moment.get(k).copied().unwrap_or(f64::INFINITY)),
+            },
+            Kind::Paper { x_tube, u_tube } => Balls {
+                state: Ball {
+                    value: rates / *x_tube,
+                    by_state: [Matrix3::zeros(), Matrix3::from_diagonal_element(1.0 / x_tube)],
+                    by_input: Matrix3::zeros(),
+                },
+                input: ball(&linearise::input_of_moment(&self.body, &angles, &at.moment), *u_tube),
+            },
+        }
+    }
+
+    fn squares(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> (f64, f64) {
+        let [angles, rates, a] = self.nominal(k, state, input);
+        let (state, input) = match &self.kind {
+            Kind::Robust(robust) => (
+                linearise::body_rates(&angles, &rates) / robust.rate[k],
+                linearise::moment(&self.body, &angles, &rates, &a)
+                    / robust.moment.get(k).copied().unwrap_or(f64::INFINITY),
+            ),
+            Kind::Paper { x_tube, u_tube } => {
+                (rates / *x_tube, linearise::input(&self.body, &angles, &rates, &a) / *u_tube)
+            }
+        };
+        (state.norm_squared(), input.norm_squared())
+    }
+}
+
+impl Bounded<2> for Sets {
+    fn tighten(&mut self, motion: &Motion<2>, of: Range<usize>) {
+        let Self { kind, body, references, .. } = self;
+        if let Kind::Robust(robust) = kind {
+            let mut here = Point::at(references, motion, of.start);
+            for k in of {
+                let next = Point::at(references, motion, k + 1);
+                robust.tighten(body, k, &here, &next);
+                here = next;
+            }
+        }
+    }
+
+    fn violated(&mut self, motion: &Motion<2>, skip: Range<usize>) -> Option<Range<usize>> {
+        let n = motion.inputs.len();
+        let mut violated: Option<Range<usize>> = None;
+        for range in [0..skip.start, skip.end.min(n)..n] {
+            if range.is_empty() {
+                continue;
+            }
+            let mut here = Point::at(&self.references, motion, range.start);
+            for k in range {
+                let next = Point::at(&self.references, motion, k + 1);
+                if self.violates(k, &here, &next) {
+                    let first = violated.map_or(k, |range| range.start);
+                    violated = Some(first..k + 1);
+                }
+                here = next;
+            }
+        }
+        violated
+    }
+
+    fn terminal_radius(&self) -> Option<f64> {
+        Some(self.terminal_radius)
+    }
+}
+
+/// One stage of a motion.
+struct Point {
+    angles: Vector3<f64>,
+    /// x_ω.
+    rates: Vector3<f64>,
+    /// a; zero at the last stage.
+    acceleration: Vector3<f64>,
+    kinematics: InverseKinematics,
+}
+
+impl Point {
+    fn at(references: &[Reference], motion: &Motion<2>, k: usize) -> Self {
+        let Reference { angles, rates, accelerations } = &references[k];
+        let angles = angles + motion.states[k][0];
+        Self {
+            angles,
+            rates: rates + motion.states[k][1],
+            acceleration: motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input),
+            kinematics: InverseKinematics::at(&angles),
+        }
+    }
+}
+
+impl Sets {
+    /// Whether the input of interval `k` or the state at its end violates its constraint, with the bounds about themselves.
+    fn violates(&mut self, k: usize, here: &Point, next: &Point) -> bool {
+        let exceeds = |value: f64, bound: f64| value > bound * (1.0 + CHECK_SLACK);
+        match &mut self.kind {
+            Kind::Paper { x_tube, u_tube } => {
+                exceeds(next.rates.norm(), *x_tube)
+                    || exceeds(
+                        linearise::input(&self.body, &here.angles, &here.rates, &here.acceleration).norm(),
+                        *u_tube,
+                    )
+            }
+            Kind::Robust(robust) => {
+                let moment = here.kinematics.moment(&self.body, &here.rates, &here.acceleration).norm();
+                let rates = robust.tighten_cheaply(&self.body, k, moment, here, next);
+                if exceeds(moment, robust.moment[k]) {
+                    robust.tighten(&self.body, k, here, next);
+                }
+                exceeds(rates, robust.rate[k + 1]) || exceeds(moment, robust.moment[k])
+            }
+        }
+    }
+}
+
+impl Robust {
+    /// Sets the bounds of interval `k`.
+    fn tighten(&mut self, body: &RigidBody, k: usize, here: &Point, next: &Point) {
+        let at = linearise::linearise(body, &here.angles, &here.rates, &here.acceleration).moment;
+        let after = next.kinematics.moment(body, &next.rates, &here.acceleration).norm();
+        let (_, by_angles) = next.kinematics.body_rates(&next.rates);
+        let feedback = largest_over_box(&at.by_acceleration, &self.design.tightening.disturbance);
+        let slopes = (at.by_angles.norm(), at.by_rates.norm());
+        self.moment[k] = self.moment_bound(k, at.value.norm(), after, feedback, slopes);
+        self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&by_angles));
+    }
+
+    /// Sets bounds that are at most those of [`Self::tighten`], without derivatives of the moment. Returns ‖ω̃‖ at the interval's end.
+    fn tighten_cheaply(
+        &mut self,
+        body: &RigidBody,
+        k: usize,
+        moment: f64,
+        here: &Point,
+        next: &Point,
+    ) -> f64 {
+        let after = next.kinematics.moment(body, &next.rates, &here.acceleration).norm();
+        let (rates, by_angles) = next.kinematics.body_rates(&next.rates);
+        let inertia = self.design.largest_inertia;
+        let feedback = inertia * self.design.tightening.disturbance.norm();
+        let (by_angle, by_rate) = linearise::moment_slope_bounds(here.rates.norm(), here.acceleration.norm());
+        self.moment[k] =
+            self.moment_bound(k, moment, after, feedback, (inertia * by_angle, inertia * by_rate));
+        self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&by_angles));
+        rates.norm()
+    }
+
+    /// What ‖ω̃‖ may be at prediction step k so that ‖ω‖ keeps its limit whatever the error dynamics do, where ∂ω/∂(α, β) has this norm.
+    fn rate_bound(&self, k: usize, by_angles: f64) -> f64 {
+        let tightening = &self.design.tightening;
+        let Reach { angle, rate, .. } = tightening.at_stage[k];
+        // ω = R⁻¹ x_ω with ‖R⁻¹‖ = 1
+        let deviation = (rate + by_angles * angle) * tightening.norm;
+        let limit = self.settings.limit_rate;
+        (limit - deviation).max(SMALLEST_SHARE * limit)
+    }
+
+    /// What ‖m̃‖ may be at the start of prediction interval k so that ‖m‖ keeps its limit at each of its feedback ticks. With a held,
+    /// ‖m̃‖ moves from `here` to `after` within the interval; `feedback` is the largest ‖I R⁻¹ δ‖ over the disturbances, and `slopes` are
+    /// ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖.
+    fn moment_bound(&self, k: usize, here: f64, after: f64, feedback: f64, slopes: (f64, f64)) -> f64 {
+        let tightening = &self.design.tightening;
+        let reach = tightening.within_stage[k];
+        let limit = self.settings.limit_moment;
+        // I R⁻¹ K o for disturbances in a box, and for the inertia error, which acts along m.
+        let feedback = reach.feedback * (feedback + tightening.inertia * limit);
+        // The cancellation of f sees the deviation too.
+        let drift = (slopes.0 * reach.angle + slopes.1 * reach.rate) * tightening.norm;
+        let within = (after - here).max(0.0);
+        (limit - feedback - drift - within).max(SMALLEST_SHARE * limit)
+    }
+
+    /// ε by the argument of (12)–(13), with the bounds of this set and the reference at the end of the horizon.
+    fn terminal_radius(&self, end: &Reference) -> f64 {
+        let n = self.settings.horizon;
+        let at = linearise::linearise(&self.settings.body, &end.angles, &end.rates, &end.accelerations);
+        let moment = at.moment.value.norm();
+        let rate = self.rate_bound(n, at.rates.by_angles.norm()) - at.rates.value.norm();
+        let feedback = largest_over_box(&at.moment.by_acceleration, &self.design.tightening.disturbance);
+        let slopes = (at.moment.by_angles.norm(), at.moment.by_rates.norm());
+        let moment = self.moment_bound(n - 1, moment, moment, feedback, slopes) - moment;
+        let gain = self.settings.terminal.k1.hypot(self.settings.terminal.k2);
+        let radius = self.design.terminal_scale * rate.min(moment / (self.design.largest_inertia * gain));
+        radius.max(SMALLEST_RADIUS)
+    }
+}
+
+/// ‖y‖ ≤ bound in terms of the tracking error and v = a − Θ̈_r.
+fn ball(y: &Linear, bound: f64) -> Ball<2> {
+    let share = 1.0 / bound;
+    let mut by_angles = Matrix3::zeros();
+    by_angles.fixed_view_mut::<3, 2>(0, 0).copy_from(&(y.by_angles * share));
+    Ball {
+        value: y.value * share,
+        by_state: [by_angles, y.by_rates * share],
+        by_input: y.by_acceleration * share,
+    }
+}
+
+/// Frobenius norm of the matrix with these columns.
+fn norm_of_columns(columns: &[Vector3<f64>; 2]) -> f64 {
+    (columns[0].norm_squared() + columns[1].norm_squared()).sqrt()
+}
+
+/// max ‖M s‖ over |s_i| ≤ b_i.
+fn largest_over_box(m: &Matrix3<f64>, b: &Vector3<f64>) -> f64 {
+    [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
+        .map(|(y, z)| (m * Vector3::new(b.x, y * b.y, z * b.z)).norm_squared())
+        .into_iter()
+        .fold(0.0, f64::max)
+        .sqrt()
+}

@@ -1,0 +1,109 @@
+//! What shows a motion to be the optimum, evaluated apart from the solvers: they have no part in it but the multipliers.
+
+use super::problem::{Balls, Constraints, Motion, Problem, Solution, Start, State, dot};
+use nalgebra::Vector3;
+
+/// Residuals of the conditions of Karush, Kuhn and Tucker for the problem with its constraints as they are, not as a solver sees them.
+/// All relative: to the largest ∂(½ cost)/∂v, to the bounds and to half the cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Certificate {
+    /// Largest ∂L/∂v.
+    pub stationarity: f64,
+    /// Largest excess of a ball, or error of the chain.
+    pub feasibility: f64,
+    /// Σ |λ c|, and negative multipliers.
+    pub complementarity: f64,
+}
+
+impl Certificate {
+    /// The largest of the three.
+    pub fn residual(&self) -> f64 {
+        self.stationarity.max(self.feasibility).max(self.complementarity)
+    }
+
+    /// Of `solution`.
+    pub fn of<const O: usize, C: Constraints<O>>(problem: &Problem<O, C>, solution: &Solution<O>) -> Self {
+        let Solution { motion, multipliers } = solution;
+        let (chain, cost) = (problem.chain, problem.cost);
+        let n = motion.inputs.len();
+        let state_balls = problem.constraints.has_state_balls();
+
+        let (mut excess, mut gap, mut negative) = (0.0_f64, multipliers.start_gap, 0.0_f64);
+        let mut count = |square: f64, multiplier: f64| {
+            excess = excess.max(square.sqrt() - 1.0);
+            gap += 0.5 * (multiplier * (square - 1.0)).abs();
+            negative = negative.max(-multiplier);
+        };
+
+        // p of the last stage.
+        let end = &motion.states[n];
+        let mut weight = 1.0;
+        let weighted = problem.end.weighted(end);
+        if let Some(radius) = problem.end.radius {
+            let square = radius * radius;
+            weight += multipliers.terminal / square;
+            count(dot(end, &weighted) / square, multipliers.terminal);
+        }
+        let mut p: State<O> = std::array::from_fn(|i| weighted[i] * weight + problem.end.slope[i]);
+        let (mut slope, mut scale) = (0.0_f64, f64::MIN_POSITIVE);
+        for k in (0..=n).rev() {
+            let state = &motion.states[k];
+            let input = motion.inputs.get(k).copied().unwrap_or_default();
+            // Without multipliers only the norms matter.
+            let by_input = multipliers.input.get(k).copied().unwrap_or_default();
+            let by_state = if k > 0 && state_balls { multipliers.state[k - 1] } else { 0.0 };
+            let idle = by_input == 0.0 && by_state == 0.0;
+            let (balls, squares) = if idle {
+                (Balls::default(), problem.constraints.squares(k, state, &input))
+            } else {
+                let balls = problem.constraints.balls(k, state, &input);
+                (balls, (balls.state.value.norm_squared(), balls.input.value.norm_squared()))
+            };
+            if k < n {
+                let multiplier = by_input;
+                let own = cost.input.component_mul(&input);
+                let by_ball = balls.input.by_input.tr_mul(&balls.input.value) * multiplier;
+                let by_future = chain.input_adjoint(&p);
+                slope = slope.max((own + by_ball + by_future).amax());
+                scale = [own, by_ball, by_future].iter().fold(scale, |scale, part| scale.max(part.amax()));
+                let (through, weighted) = (chain.adjoint(&p), cost.slope(state));
+                p = std::array::from_fn(|i| {
+                    through[i] + weighted[i] + balls.input.by_state[i].tr_mul(&balls.input.value) * multiplier
+                });
+                count(squares.1, multiplier);
+            }
+            if k > 0 && state_balls {
+                add(&mut p, |i| balls.state.by_state[i].tr_mul(&balls.state.value) * by_state);
+                count(squares.0, by_state);
+            }
+        }
+        if let Start::Within(..) = problem.start {
+            add(&mut p, |i| multipliers.start[i]);
+            slope = p.iter().fold(slope, |slope, p| slope.max(p.amax()));
+        }
+        let half_cost = (0.5 * cost.of(motion)).max(f64::MIN_POSITIVE);
+        Self {
+            stationarity: slope / scale,
+            feasibility: excess.max(chain_error(problem, motion)),
+            complementarity: (gap / half_cost).max(negative / half_cost),
+        }
+    }
+}
+
+fn add<const O: usize>(p: &mut State<O>, term: impl Fn(usize) -> Vector3<f64>) {
+    for (i, p) in p.iter_mut().enumerate() {
+        *p += term(i);
+    }
+}
+
+/// Largest ‖E_{k+1} − (A E_k + B v_k + d_k)‖, relative to the largest ‖E‖.
+fn chain_error<const O: usize, C>(problem: &Problem<O, C>, motion: &Motion<O>) -> f64 {
+    let square = |state: &State<O>| dot(state, state);
+    let error = |k: usize| {
+        let next = problem.chain.advance(&motion.states[k], &motion.inputs[k]);
+        square(&std::array::from_fn(|i| motion.states[k + 1][i] - next[i] - problem.affine[k][i]))
+    };
+    let error = (0..motion.inputs.len()).map(error).fold(0.0, f64::max);
+    let size = motion.states.iter().map(square).fold(f64::MIN_POSITIVE, f64::max);
+    (error / size).sqrt()
+}

@@ -1,0 +1,330 @@
+//! The problem with its balls linearised, as a second-order cone programme for Clarabel: the judge of [`super::riccati`], and what
+//! takes over where that fails.
+//!
+//! Unknowns are the errors E_k, k = 0..=N, scaled; the inputs are eliminated, as the last derivative's error moves by
+//! h v_k = E_{k+1} − E_k − d_k.
+
+use super::problem::{Balls, Cost, Frozen, Outcome, Problem, Solution, Start, of_axis};
+use crate::cone::{Optimum, Programme, Triplets};
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT, ZeroConeT};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+/// What does not change between samples.
+#[derive(Clone, Debug)]
+pub struct Structure<const O: usize> {
+    /// A and B.
+    pub chain: super::Chain<O>,
+    /// Weights.
+    pub cost: Cost<O>,
+    /// Number of intervals.
+    pub horizon: usize,
+    /// Whether states have a ball of their own.
+    pub state_balls: bool,
+    /// Whether the last state has to be in the terminal ball.
+    pub terminal: bool,
+    /// Normals of the set that the start is in; `None` if it is given.
+    pub start: Option<[Vec<SVector<f64, O>>; 3]>,
+    /// Typical errors, by which the unknowns are scaled.
+    pub scale: [f64; O],
+    /// Iteration limit.
+    pub max_iterations: u32,
+}
+
+/// The programme with its solver.
+pub struct Cone<const O: usize> {
+    structure: Structure<O>,
+    programme: Programme,
+    /// Where each stage's ball coefficients stand in the matrix, and its rows in the right side.
+    state_slots: Vec<Slots<O>>,
+    input_slots: Vec<Slots<O>>,
+    start_row: usize,
+    terminal_row: Option<usize>,
+}
+
+struct Slots<const O: usize> {
+    row: usize,
+    /// Positions of the block on E_k of the stage the ball belongs to.
+    here: [[[usize; 3]; O]; 3],
+    /// Positions of the block on the last derivative of E_{k+1} (input balls).
+    next: Option<[[usize; 3]; 3]>,
+}
+
+impl<const O: usize> Cone<O> {
+    /// Sets the programme up.
+    ///
+    /// # Errors
+    /// The solver's own message if it refuses the data, for example weights that are not positive semidefinite.
+    pub fn new(structure: Structure<O>) -> Result<Self, String> {
+        let Structure { chain, horizon: n, scale, .. } = &structure;
+        let n = *n;
+        let column = |k: usize, i: usize, axis: usize| 3 * (O * k + i) + axis;
+        let top = O - 1;
+
+        let mut a = Triplets::default();
+        let mut cones: Vec<SupportedConeT<f64>> = Vec::new();
+        let mut row = 0;
+        // The chain below its last derivative, with v eliminated, divided by the scale.
+        for k in 0..n {
+            for i in 0..top {
+                let by_input = chain.b[i] / chain.step;
+                for axis in 0..3 {
+                    a.push(row, column(k + 1, i, axis), 1.0);
+                    a.push(row, column(k + 1, top, axis), -by_input * scale[top] / scale[i]);
+                    for j in i..O {
+                        let own = if j == top { chain.a[(i, j)] - by_input } else { chain.a[(i, j)] };
+                        a.push(row, column(k, j, axis), -own * scale[j] / scale[i]);
+                    }
+                    row += 1;
+                }
+            }
+        }
+        if row > 0 {
+            cones.push(ZeroConeT(row));
+        }
+        let start_row = row;
+        match &structure.start {
+            None => {
+                for i in 0..3 * O {
+                    a.push(row, i, 1.0);
+                    row += 1;
+                }
+                cones.push(ZeroConeT(3 * O));
+            }
+            Some(normals) => {
+                // ±nᵀ(E_given − E_0) ≤ 1
+                for (axis, normals) in normals.iter().enumerate() {
+                    for (normal, sign) in normals.iter().flat_map(|normal| [(normal, 1.0), (normal, -1.0)]) {
+                        for i in 0..O {
+                            a.push(row, column(0, i, axis), -sign * normal[i] * scale[i]);
+                        }
+                        row += 1;
+                    }
+                }
+                cones.push(NonnegativeConeT(row - start_row));
+            }
+        }
+        let mut ball = |a: &mut Triplets, k: usize, next: bool| {
+            let mut block = |k: usize, i: usize, component: usize| {
+                std::array::from_fn(|axis| a.push(row + 1 + component, column(k, i, axis), 0.0))
+            };
+            let here = std::array::from_fn(|component| std::array::from_fn(|i| block(k, i, component)));
+            let next = next.then(|| std::array::from_fn(|component| block(k + 1, top, component)));
+            let slots = Slots { row, here, next };
+            row += 4;
+            cones.push(SecondOrderConeT(4));
+            slots
+        };
+        let stages = if structure.state_balls { n } else { 0 };
+        let mut state_slots: Vec<Slots<O>> = (1..=stages).map(|k| ball(&mut a, k, false)).collect();
+        let mut input_slots: Vec<Slots<O>> = (0..n).map(|k| ball(&mut a, k, true)).collect();
+        let terminal_row = structure.terminal.then(|| {
+            // ‖Lᵀ E_N‖ ≤ ε with G = L Lᵀ, divided by the scale.
+            for axis in 0..3 {
+                let root = square_root(&of_axis(&structure.cost.end, axis));
+                for i in 0..O {
+                    for j in 0..O {
+                        a.push(
+                            row + 1 + O * axis + i,
+                            column(n, j, axis),
+                            -root[(i, j)] * scale[j] / scale[0],
+                        );
+                    }
+                }
+            }
+            cones.push(SecondOrderConeT(1 + 3 * O));
+            row += 1 + 3 * O;
+            row - 1 - 3 * O
+        });
+
+        let (matrix, position) = a.compress(row, 3 * O * (n + 1));
+        for slots in state_slots.iter_mut().chain(&mut input_slots) {
+            let next = slots.next.iter_mut().flatten().flatten();
+            for i in slots.here.iter_mut().flatten().flatten().chain(next) {
+                *i = position[*i];
+            }
+        }
+        let mut right_side = vec![0.0; row];
+        // A strictly feasible placeholder, so that the solver's setup sees finite data.
+        for slots in state_slots.iter().chain(&input_slots) {
+            right_side[slots.row] = 1.0;
+        }
+        let cost = cost_matrix(&structure);
+        let programme = Programme::new(cost, matrix, right_side, &cones, structure.max_iterations)?;
+        Ok(Self { structure, programme, state_slots, input_slots, start_row, terminal_row })
+    }
+
+    /// The optimum of `problem`, replacing the motion in `solution` if it is found.
+    pub fn solve(&mut self, problem: &Problem<O, Frozen<O>>, solution: &mut Solution<O>) -> Outcome {
+        self.update(problem);
+        let Structure { chain, scale, horizon: n, .. } = &self.structure;
+        let (found, iterations) = self.programme.solve();
+        let Some(Optimum { x, duals }) = found else { return Outcome::Failed(iterations) };
+        let Solution { motion, multipliers } = solution;
+        for (k, x) in x.chunks_exact(3 * O).enumerate() {
+            motion.states[k] =
+                std::array::from_fn(|i| Vector3::new(x[3 * i], x[3 * i + 1], x[3 * i + 2]) * scale[i]);
+        }
+        if let Start::Fixed(given) = problem.start {
+            motion.states[0] = given;
+        }
+        for k in 0..*n {
+            let moved = motion.states[k + 1][O - 1] - motion.states[k][O - 1] - problem.affine[k][O - 1];
+            motion.inputs[k] = moved / chain.step;
+        }
+        motion.roll_out(chain, problem.affine);
+        // The dual of ‖y‖ ≤ 1 is the multiplier of ½(‖y‖² − 1), for the whole cost.
+        multipliers.clear();
+        for (multiplier, slots) in multipliers.state.iter_mut().zip(&self.state_slots) {
+            *multiplier = 0.5 * duals[slots.row];
+        }
+        for (multiplier, slots) in multipliers.input.iter_mut().zip(&self.input_slots) {
+            *multiplier = 0.5 * duals[slots.row];
+        }
+        if let (Some(row), Some(radius)) = (self.terminal_row, problem.end.radius) {
+            multipliers.terminal = 0.5 * duals[row] * radius / scale[0];
+        }
+        if let Start::Within(given, normals) = &problem.start {
+            let mut row = self.start_row;
+            for (axis, normals) in normals.iter().enumerate() {
+                for normal in normals {
+                    let force = 0.5 * (duals[row] - duals[row + 1]);
+                    let deviation: f64 =
+                        (0..O).map(|i| normal[i] * (given[i][axis] - motion.states[0][i][axis])).sum();
+                    for i in 0..O {
+                        multipliers.start[i][axis] -= normal[i] * force;
+                    }
+                    multipliers.start_gap += 0.5
+                        * (duals[row] * (deviation - 1.0).abs() + duals[row + 1] * (deviation + 1.0).abs());
+                    row += 2;
+                }
+            }
+        }
+        Outcome::Solved(iterations)
+    }
+
+    fn update(&mut self, problem: &Problem<O, Frozen<O>>) {
+        let Structure { chain, cost, scale, .. } = &self.structure;
+        let top = O - 1;
+        let h = chain.step;
+        self.programme.linear_cost.fill(0.0);
+        for (k, d) in problem.affine.iter().enumerate() {
+            for axis in 0..3 {
+                // V/h² (E_{k+1} − E_k − d)² of the last derivative
+                let slope = 2.0 * cost.input[axis] / (h * h) * d[top][axis] * scale[top];
+                self.programme.linear_cost[3 * (O * k + top) + axis] += slope;
+                self.programme.linear_cost[3 * (O * (k + 1) + top) + axis] -= slope;
+                for i in 0..top {
+                    self.programme.right_side[3 * (top * k + i) + axis] =
+                        (d[i][axis] - chain.b[i] / h * d[top][axis]) / scale[i];
+                }
+            }
+        }
+        match &problem.start {
+            Start::Fixed(given) => {
+                for i in 0..3 * O {
+                    self.programme.right_side[self.start_row + i] = given[i / 3][i % 3] / scale[i / 3];
+                }
+            }
+            Start::Arrival(..) => {}
+            Start::Within(given, normals) => {
+                let mut row = self.start_row;
+                for (axis, normals) in normals.iter().enumerate() {
+                    for normal in normals {
+                        let at: f64 = (0..O).map(|i| normal[i] * given[i][axis]).sum();
+                        self.programme.right_side[row] = 1.0 - at;
+                        self.programme.right_side[row + 1] = 1.0 + at;
+                        row += 2;
+                    }
+                }
+            }
+        }
+        let balls = problem.constraints.stages();
+        for (slots, Balls { state, .. }) in self.state_slots.iter().zip(&balls[1..]) {
+            write_ball(&mut self.programme, slots, &state.by_state, &state.value, scale);
+        }
+        for (k, (slots, Balls { input, .. })) in self.input_slots.iter().zip(balls).enumerate() {
+            let by_difference = input.by_input / h;
+            let mut by_state = input.by_state;
+            by_state[top] -= by_difference;
+            let value = input.value - by_difference * problem.affine[k][top];
+            write_ball(&mut self.programme, slots, &by_state, &value, scale);
+            for (i, places) in slots.next.iter().flatten().enumerate() {
+                for (j, &place) in places.iter().enumerate() {
+                    self.programme.matrix[place] = -by_difference[(i, j)] * scale[top];
+                }
+            }
+        }
+        if let (Some(row), Some(radius)) = (self.terminal_row, problem.end.radius) {
+            self.programme.right_side[row] = radius / scale[0];
+        }
+    }
+}
+
+fn write_ball<const O: usize>(
+    programme: &mut Programme,
+    slots: &Slots<O>,
+    by_state: &[Matrix3<f64>; O],
+    value: &Vector3<f64>,
+    scale: &[f64; O],
+) {
+    for (component, places) in slots.here.iter().enumerate() {
+        for (i, places) in places.iter().enumerate() {
+            for (axis, &place) in places.iter().enumerate() {
+                programme.matrix[place] = -by_state[i][(component, axis)] * scale[i];
+            }
+        }
+        programme.right_side[slots.row + 1 + component] = value[component];
+    }
+    programme.right_side[slots.row] = 1.0;
+}
+
+/// Lᵀ with G = L Lᵀ; zero where G is zero.
+fn square_root<const O: usize>(g: &SMatrix<f64, O, O>) -> SMatrix<f64, O, O> {
+    // nalgebra's Cholesky asks for a dimension that is known to be one.
+    let mut l = SMatrix::<f64, O, O>::zeros();
+    for i in 0..O {
+        for j in 0..=i {
+            let rest = g[(i, j)] - (0..j).map(|m| l[(i, m)] * l[(j, m)]).sum::<f64>();
+            l[(i, j)] = if i == j {
+                rest.max(0.0).sqrt()
+            } else if l[(j, j)] > 0.0 {
+                rest / l[(j, j)]
+            } else {
+                0.0
+            };
+        }
+    }
+    l.transpose()
+}
+
+/// ½ xᵀP x with the cost Σ EᵀW E + V/h² (ΔE)² + E_NᵀG E_N, upper triangle, scaled.
+fn cost_matrix<const O: usize>(structure: &Structure<O>) -> CscMatrix<f64> {
+    let Structure { chain, cost, horizon: n, scale, .. } = structure;
+    let (top, h2) = (O - 1, chain.step * chain.step);
+    let mut triplets = Triplets::default();
+    for k in 0..=*n {
+        let column = |i: usize, axis: usize| 3 * (O * k + i) + axis;
+        let intervals = if k == 0 || k == *n { 1.0 } else { 2.0 };
+        let weight = |i: usize, j: usize| match (k == *n, i == j) {
+            (true, _) => cost.end[i][j],
+            (false, true) => cost.state[i],
+            (false, false) => Vector3::zeros(),
+        };
+        for axis in 0..3 {
+            for i in 0..O {
+                for j in i..O {
+                    let moved = if i == top { intervals * cost.input[axis] / h2 } else { 0.0 };
+                    let sum = weight(i, j)[axis] + moved;
+                    triplets.push(column(i, axis), column(j, axis), 2.0 * sum * scale[i] * scale[j]);
+                }
+            }
+            if k > 0 {
+                let before = column(top, axis) - 3 * O;
+                let moved = -2.0 * cost.input[axis] / h2;
+                triplets.push(before, column(top, axis), moved * scale[top] * scale[top]);
+            }
+        }
+    }
+    triplets.compress(3 * O * (n + 1), 3 * O * (n + 1)).0
+}

@@ -1,0 +1,253 @@
+//! The problem without balls: finite-horizon linear-quadratic optimum. Gains and weights depend on the cost alone and are computed
+//! once; what the affine terms do costs one sweep per sample.
+
+use super::problem::{Chain, Cost, Motion, PerAxis, State, apply, dot, of_axis, per_axis, zero_state};
+use nalgebra::{SMatrix, SVector, Vector3};
+
+/// The recursion from the end, v = K E − M⁻¹Bᵀ(P⁺d + p⁺).
+#[derive(Clone, Copy, Debug)]
+struct Gain<const O: usize> {
+    /// K.
+    feedback: State<O>,
+    /// M⁻¹Bᵀ.
+    feedforward: State<O>,
+    /// (A + B K)ᵀ.
+    closed_loop_transposed: PerAxis<O>,
+    /// P of the next stage.
+    next_weight: PerAxis<O>,
+}
+
+/// The recursion from the start: the cost of getting from E_0 to E_k is (E_k − Ē)ᵀ Π⁻¹ (E_k − Ē) + const, as for a Kalman filter with v
+/// as process noise of variance V⁻¹ and the stage cost as a measurement of E = 0 with information W.
+#[derive(Clone, Copy, Debug)]
+struct Arrival<const O: usize> {
+    /// Ē⁺ = discount·Ē once the stage's own cost is counted.
+    discount: PerAxis<O>,
+    /// E_k = Ē_k⁺ + smoother·(E_{k+1} − Ē_{k+1}).
+    smoother: PerAxis<O>,
+    /// Π⁻¹ of the next stage.
+    next_weight: PerAxis<O>,
+}
+
+/// The optimum without balls, or with the terminal ball alone; and parts of the horizon to stand for the whole of it.
+#[derive(Clone, Debug)]
+pub struct Unconstrained<const O: usize> {
+    chain: Chain<O>,
+    end: PerAxis<O>,
+    gains: Vec<Gain<O>>,
+    arrivals: Vec<Arrival<O>>,
+    /// p of each stage's cost-to-go EᵀP E + 2 pᵀE + const.
+    slopes: Vec<State<O>>,
+    /// Ē of each stage.
+    means: Vec<State<O>>,
+}
+
+/// A per-axis computation on ordinary matrices, for what is done once.
+fn each_axis<const O: usize>(f: impl Fn(usize) -> SMatrix<f64, O, O>) -> PerAxis<O> {
+    per_axis(&[f(0), f(1), f(2)])
+}
+
+impl<const O: usize> Unconstrained<O> {
+    /// For `horizon` intervals.
+    pub fn new(horizon: usize, chain: &Chain<O>, cost: &Cost<O>) -> Self {
+        let (a, b) = (chain.a, chain.b);
+        let information =
+            |axis: usize| SMatrix::from_fn(|i, j| if i == j { cost.state[i][axis] } else { 0.0 });
+        let mut weight = cost.end;
+        let mut gains = Vec::with_capacity(horizon);
+        for _ in 0..horizon {
+            let mut gain = Gain {
+                feedback: zero_state(),
+                feedforward: zero_state(),
+                closed_loop_transposed: [[Vector3::zeros(); O]; O],
+                next_weight: weight,
+            };
+            weight = each_axis(|axis| {
+                let next: SMatrix<f64, O, O> = of_axis(&gain.next_weight, axis);
+                let curvature = cost.input[axis] + b.dot(&(next * b));
+                let feedback = -(b.transpose() * next * a) / curvature;
+                information(axis) + a.transpose() * next * (a + b * feedback)
+            });
+            // P is symmetric but for rounding.
+            weight = each_axis(|axis| {
+                let full: SMatrix<f64, O, O> = of_axis(&weight, axis);
+                (full + full.transpose()) * 0.5
+            });
+            for axis in 0..3 {
+                let next: SMatrix<f64, O, O> = of_axis(&gain.next_weight, axis);
+                let curvature = cost.input[axis] + b.dot(&(next * b));
+                let feedback = -(b.transpose() * next * a) / curvature;
+                let closed_loop = a + b * feedback;
+                for i in 0..O {
+                    gain.feedback[i][axis] = feedback[i];
+                    gain.feedforward[i][axis] = b[i] / curvature;
+                    for j in 0..O {
+                        gain.closed_loop_transposed[i][j][axis] = closed_loop[(j, i)];
+                    }
+                }
+            }
+            gains.push(gain);
+        }
+        gains.reverse();
+
+        let zeros = [[Vector3::zeros(); O]; O];
+        let mut spread = zeros;
+        let mut arrivals = Vec::with_capacity(horizon);
+        for _ in 0..horizon {
+            // (Π⁻¹ + W)⁻¹ Π⁻¹, written so that it also holds for a singular Π.
+            let discount = each_axis(|axis| {
+                (SMatrix::identity() + of_axis(&spread, axis) * information(axis))
+                    .try_inverse()
+                    .unwrap_or_else(SMatrix::identity)
+            });
+            let counted = |axis| of_axis(&discount, axis) * of_axis(&spread, axis);
+            let next = each_axis(|axis| {
+                let next = a * counted(axis) * a.transpose() + b * b.transpose() / cost.input[axis];
+                (next + next.transpose()) * 0.5
+            });
+            // The first Π that is not zero has rank one, but then the state before is known anyway.
+            let smoother = each_axis(|axis| {
+                of_axis(&next, axis)
+                    .try_inverse()
+                    .map_or_else(SMatrix::zeros, |inverse| counted(axis) * a.transpose() * inverse)
+            });
+            let next_weight =
+                each_axis(|axis| of_axis(&next, axis).try_inverse().unwrap_or_else(SMatrix::zeros));
+            arrivals.push(Arrival { discount, smoother, next_weight });
+            spread = next;
+        }
+        Self {
+            chain: *chain,
+            end: cost.end,
+            gains,
+            arrivals,
+            slopes: vec![zero_state(); horizon + 1],
+            means: vec![zero_state(); horizon + 1],
+        }
+    }
+
+    /// K of the first stage, negative: v = K E without affine terms.
+    pub fn feedback(&self) -> State<O> {
+        self.gains.first().map_or_else(zero_state, |gain| gain.feedback)
+    }
+
+    /// The optimum from `start` into `motion`.
+    pub fn solve(&mut self, start: &State<O>, affine: &[State<O>], motion: &mut Motion<O>) {
+        for (k, gain) in self.gains.iter().enumerate().rev() {
+            let costate = costate(gain, &self.slopes[k + 1], &affine[k]);
+            self.slopes[k] = apply(&gain.closed_loop_transposed, &costate);
+        }
+        motion.states[0] = *start;
+        self.follow(0, affine, motion);
+    }
+
+    /// The optimum from stage `first` of `motion` on, for the affine terms of the last [`Self::solve`].
+    pub fn follow(&self, first: usize, affine: &[State<O>], motion: &mut Motion<O>) {
+        for (k, gain) in self.gains.iter().enumerate().skip(first) {
+            let state = motion.states[k];
+            let costate = costate(gain, &self.slopes[k + 1], &affine[k]);
+            let v = (0..O).fold(Vector3::zeros(), |sum, i| {
+                sum + gain.feedback[i].component_mul(&state[i])
+                    - gain.feedforward[i].component_mul(&costate[i])
+            });
+            motion.inputs[k] = v;
+            let next = self.chain.advance(&state, &v);
+            motion.states[k + 1] = std::array::from_fn(|i| next[i] + affine[k][i]);
+        }
+    }
+
+    /// P and p of the cost of going on from stage `k`, for the affine terms of the last [`Self::solve`].
+    pub fn to_go(&self, k: usize) -> (&PerAxis<O>, State<O>) {
+        let weight = if k == self.gains.len() { &self.end } else { &self.gains[k - 1].next_weight };
+        (weight, self.slopes[k])
+    }
+
+    /// Computes the costs of arriving at each stage from `start`.
+    pub fn arrive(&mut self, start: &State<O>, affine: &[State<O>]) {
+        self.means[0] = *start;
+        for (k, Arrival { discount, .. }) in self.arrivals.iter().enumerate() {
+            let next = self.chain.advance(&apply(discount, &self.means[k]), &Vector3::zeros());
+            self.means[k + 1] = std::array::from_fn(|i| next[i] + affine[k][i]);
+        }
+    }
+
+    /// Π⁻¹ and Ē at stage `k`, which must be at least `O`, as fewer steps do not reach every E; after [`Self::arrive`].
+    pub fn arrival(&self, k: usize) -> (&PerAxis<O>, State<O>) {
+        (&self.arrivals[k - 1].next_weight, self.means[k])
+    }
+
+    /// The optimum from the start of [`Self::arrive`] to the state that `motion` has at stage `k`, exact in the chain: what follows is
+    /// rolled out anew.
+    pub fn trace_back(&self, k: usize, affine: &[State<O>], motion: &mut Motion<O>) {
+        for (j, Arrival { discount, smoother, .. }) in self.arrivals[..k].iter().enumerate().rev() {
+            let (counted, after) = (apply(discount, &self.means[j]), motion.states[j + 1]);
+            let deviation = apply(smoother, &std::array::from_fn(|i| after[i] - self.means[j + 1][i]));
+            motion.states[j] = std::array::from_fn(|i| counted[i] + deviation[i]);
+        }
+        motion.states[0] = self.means[0];
+        for j in 0..k {
+            let moved = motion.states[j + 1][O - 1] - motion.states[j][O - 1] - affine[j][O - 1];
+            motion.inputs[j] = moved / self.chain.step;
+        }
+    }
+
+    /// The optimum from `start` with ‖E_N‖_G = `radius` into `motion`; its multiplier for half the cost. For a start whose
+    /// optimum without balls ends outside; nothing if none is found.
+    ///
+    /// The end minimises (E − Ē)ᵀΠ⁻¹(E − Ē) + EᵀG E, so that (Π⁻¹ + (1 + λ)G) E = Π⁻¹Ē, and 1/‖E‖_G is nearly linear in λ: a
+    /// secant finds it in a few steps.
+    pub fn solve_onto_terminal_ball(
+        &mut self,
+        start: &State<O>,
+        affine: &[State<O>],
+        radius: f64,
+        motion: &mut Motion<O>,
+    ) -> Option<f64> {
+        let n = self.arrivals.len();
+        if n < O {
+            return None;
+        }
+        self.arrive(start, affine);
+        let (weight, mean) = self.arrival(n);
+        let pull = apply(weight, &mean);
+        let end_of = |lambda: f64| -> Option<(State<O>, f64)> {
+            let mut end = zero_state();
+            for axis in 0..3 {
+                let sum: SMatrix<f64, O, O> =
+                    of_axis(weight, axis) + of_axis(&self.end, axis) * (1.0 + lambda);
+                let solution = sum.try_inverse()? * SVector::<f64, O>::from_fn(|i, _| pull[i][axis]);
+                for (i, slot) in end.iter_mut().enumerate() {
+                    slot[axis] = solution[i];
+                }
+            }
+            let norm = dot(&end, &apply(&self.end, &end)).sqrt();
+            Some((end, radius / norm - 1.0))
+        };
+
+        let (mut lambda, mut excess) = (0.0, end_of(0.0)?.1);
+        let mut next = 1.0;
+        for _ in 0..SECANT_STEPS {
+            let (end, left) = end_of(next)?;
+            if left.abs() <= SECANT_TOLERANCE {
+                motion.states[n] = end;
+                self.trace_back(n, affine, motion);
+                motion.roll_out(&self.chain, affine);
+                return Some(next * radius * radius);
+            }
+            let slope = (left - excess) / (next - lambda);
+            (lambda, excess) = (next, left);
+            next = (lambda - left / slope).max(0.0);
+        }
+        None
+    }
+}
+
+/// P⁺d + p⁺.
+fn costate<const O: usize>(gain: &Gain<O>, next_slope: &State<O>, d: &State<O>) -> State<O> {
+    let moved = apply(&gain.next_weight, d);
+    std::array::from_fn(|i| next_slope[i] + moved[i])
+}
+
+/// Limits of the search for λ.
+const SECANT_STEPS: usize = 30;
+const SECANT_TOLERANCE: f64 = 1e-12;

@@ -1,0 +1,406 @@
+//! The ways to the optimum, cheapest first. Each is checked against the constraints as they are, so that none loses anything.
+
+use super::certificate::Certificate;
+use super::cone::{Cone, Structure};
+use super::lq::Unconstrained;
+use super::problem::{
+    Chain, Constraints, Cost, End, From, Frozen, Motion, Problem, Solution, Start, State, zero_state,
+};
+use super::riccati::Riccati;
+use crate::report::Status;
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+/// Which solver is asked first where the exits do not lead to the optimum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum Method {
+    /// The interior point method on the Riccati recursion; the cone solver where it fails.
+    #[default]
+    Riccati,
+    /// The cone solver.
+    Cone,
+}
+
+/// What the Riccati method is given; the cone solver is always given linearised balls.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum Nonlinearity {
+    /// The balls as functions of the motion.
+    #[default]
+    Exact,
+    /// The balls linearised about the previous plan.
+    Frozen,
+}
+
+/// How an optimisation is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SolverSettings {
+    /// The first solver.
+    pub method: Method,
+    /// What it is given.
+    pub nonlinearity: Nonlinearity,
+    /// Iteration limit of each solver in each pass.
+    pub max_iterations: u32,
+    /// Whether the exits are tried first.
+    pub exits: bool,
+    /// Wall-clock time after which no further iteration or solver is begun, s; 0 for none. Runs with one do not repeat.
+    pub time_budget: f64,
+}
+
+impl SolverSettings {
+    /// The default, with so many iterations at most.
+    pub fn new(max_iterations: u32) -> Self {
+        Self {
+            method: Method::default(),
+            nonlinearity: Nonlinearity::default(),
+            max_iterations,
+            exits: true,
+            time_budget: 0.0,
+        }
+    }
+}
+
+/// The constraints of a controller. Their bounds may depend on the motion, and are then those about a motion that was given before.
+pub trait Bounded<const O: usize>: Constraints<O> {
+    /// Sets the bounds of the intervals `of` about `motion`: of the state at the end of each, and of its input.
+    fn tighten(&mut self, motion: &Motion<O>, of: Range<usize>);
+
+    /// Sets the bounds of all intervals about `motion` but those in `skip`. Those that it violates, from the first to the last; the
+    /// terminal ball is not looked at.
+    fn violated(&mut self, motion: &Motion<O>, skip: Range<usize>) -> Option<Range<usize>>;
+
+    /// ε of the terminal ball.
+    fn terminal_radius(&self) -> Option<f64>;
+}
+
+/// How an optimisation ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Report {
+    /// Which way led to the optimum; [`Status::Fallback`] if none did.
+    pub status: Status,
+    /// Iterations, over all passes and solvers.
+    pub iterations: u32,
+    /// What shows it to be the optimum.
+    pub certificate: Certificate,
+}
+
+/// What the structure of a controller's problem is.
+#[derive(Clone, Debug)]
+pub struct Layout<const O: usize> {
+    /// A and B.
+    pub chain: Chain<O>,
+    /// Weights.
+    pub cost: Cost<O>,
+    /// Number of intervals.
+    pub horizon: usize,
+    /// Whether states have a ball of their own.
+    pub state_balls: bool,
+    /// Whether there is a terminal ball.
+    pub terminal: bool,
+    /// Normals of the set that the start is in; `None` if it is given.
+    pub start: Option<[Vec<SVector<f64, O>>; 3]>,
+    /// Typical errors and their derivatives.
+    pub scale: [f64; O],
+    /// The first optimisation has converged when no error moves by more than this between passes.
+    pub standstill: f64,
+}
+
+/// What an optimisation is about.
+struct Sample<'a, const O: usize> {
+    start: &'a State<O>,
+    affine: &'a [State<O>],
+    deadline: Option<Instant>,
+}
+
+/// How far the search for the optimum has come.
+#[derive(Default)]
+struct Search {
+    /// What has to be looked at, if that is not the whole horizon.
+    window: Option<Range<usize>>,
+    /// Whether the multipliers are those of a similar problem.
+    warm: bool,
+    iterations: u32,
+}
+
+/// All solvers of one controller, with their scratch.
+pub struct Optimiser<const O: usize> {
+    layout: Layout<O>,
+    settings: SolverSettings,
+    unconstrained: Unconstrained<O>,
+    riccati: Riccati<O>,
+    cone: Cone<O>,
+    frozen: Frozen<O>,
+    about: Motion<O>,
+    solution: Solution<O>,
+}
+
+/// Passes of the first optimisation at most.
+const FIRST_PASSES: usize = 20;
+/// Relative slack when the terminal ball is checked, for rounding.
+const CHECK_SLACK: f64 = 1e-9;
+
+impl<const O: usize> Optimiser<O> {
+    /// Sets the solvers up.
+    ///
+    /// # Errors
+    /// The cone solver's message if it refuses the data.
+    pub fn new(layout: Layout<O>, settings: SolverSettings) -> Result<Self, String> {
+        let Layout { chain, cost, horizon, start, .. } = &layout;
+        let cone = Cone::new(Structure {
+            chain: *chain,
+            cost: *cost,
+            horizon: *horizon,
+            state_balls: layout.state_balls,
+            terminal: layout.terminal,
+            start: start.clone(),
+            scale: layout.scale,
+            max_iterations: settings.max_iterations,
+        })?;
+        let faces = start.iter().flatten().map(Vec::len).sum();
+        Ok(Self {
+            unconstrained: Unconstrained::new(*horizon, chain, cost),
+            riccati: Riccati::new(*horizon, faces, settings.max_iterations),
+            cone,
+            frozen: Frozen::new(*horizon),
+            about: Motion::new(*horizon),
+            solution: Solution::new(*horizon),
+            layout,
+            settings,
+        })
+    }
+
+    /// The optimum, or in a fallback whatever was there.
+    pub fn motion(&self) -> &Motion<O> {
+        &self.solution.motion
+    }
+
+    /// K of the first stage of the optimum without constraints, negative.
+    pub fn feedback(&self) -> State<O> {
+        self.unconstrained.feedback()
+    }
+
+    /// One optimisation from `start`. `previous` holds the motion planned before from now on; without one, the bounds and the linearised
+    /// balls are set about the solution again until that stands still.
+    pub fn optimise<B: Bounded<O>>(
+        &mut self,
+        bounded: &mut B,
+        start: &State<O>,
+        affine: &[State<O>],
+        previous: Option<&Motion<O>>,
+    ) -> Report {
+        let budget = self.settings.time_budget;
+        let deadline = (budget > 0.0).then(|| Instant::now() + Duration::from_secs_f64(budget));
+        let sample = Sample { start, affine, deadline };
+        let Self { layout, settings, unconstrained, solution, .. } = self;
+        let Solution { motion, multipliers } = solution;
+        multipliers.clear();
+        unconstrained.solve(start, affine, motion);
+        let mut search = Search::default();
+        if settings.exits && layout.start.is_none() {
+            let outside = layout.ends_outside(motion, bounded.terminal_radius());
+            let multiplier = match outside {
+                None => Some(0.0),
+                Some(radius) => unconstrained.solve_onto_terminal_ball(start, affine, radius, motion),
+            };
+            let violated = bounded.violated(motion, 0..0);
+            match (multiplier, violated) {
+                (Some(multiplier), None) => {
+                    multipliers.terminal = multiplier;
+                    let status = if outside.is_some() { Status::TerminalBall } else { Status::Unconstrained };
+                    return self.report(bounded, &sample, status, 0);
+                }
+                (_, violated) => search.window = layout.window(violated, outside.is_some()),
+            }
+        }
+
+        let mut status = Status::Fallback;
+        match previous {
+            Some(previous) => {
+                self.about.clone_from(previous);
+                self.about.states[0] = *start;
+                status = self.solve(bounded, &sample, &mut search);
+            }
+            None => {
+                for _ in 0..FIRST_PASSES {
+                    self.about.clone_from(&self.solution.motion);
+                    status = self.solve(bounded, &sample, &mut search);
+                    search.warm = true;
+                    let moved = self.about.distance(&self.solution.motion);
+                    if status == Status::Fallback || moved < self.layout.standstill {
+                        break;
+                    }
+                }
+            }
+        }
+        self.report(bounded, &sample, status, search.iterations)
+    }
+
+    /// The optimum with the bounds about `about`, by the solvers in turn.
+    fn solve<B: Bounded<O>>(&mut self, bounded: &mut B, sample: &Sample<O>, search: &mut Search) -> Status {
+        if self.settings.method == Method::Riccati
+            && (self.in_windows(bounded, sample, search) || self.over_whole_horizon(bounded, sample, search))
+        {
+            return Status::Constrained;
+        }
+        if sample.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+            return Status::Fallback;
+        }
+        bounded.tighten(&self.about, 0..self.layout.horizon);
+        self.frozen.set(bounded, &self.about);
+        let end = self.layout.end(bounded.terminal_radius());
+        let problem = self.layout.problem(sample, end, &self.frozen);
+        let outcome = self.cone.solve(&problem, &mut self.solution);
+        search.iterations += outcome.iterations();
+        if outcome.solved() { Status::Cone } else { Status::Fallback }
+    }
+
+    fn over_whole_horizon<B: Bounded<O>>(
+        &mut self,
+        bounded: &mut B,
+        sample: &Sample<O>,
+        search: &mut Search,
+    ) -> bool {
+        if !search.warm {
+            self.solution.multipliers.clear();
+        }
+        bounded.tighten(&self.about, 0..self.layout.horizon);
+        let end = self.layout.end(bounded.terminal_radius());
+        let outcome = match self.settings.nonlinearity {
+            Nonlinearity::Exact => {
+                let exact = self.layout.problem(sample, end, &*bounded);
+                self.riccati.solve(&exact, &mut self.solution, 0, search.warm, sample.deadline)
+            }
+            Nonlinearity::Frozen => {
+                self.frozen.set(bounded, &self.about);
+                let frozen = self.layout.problem(sample, end, &self.frozen);
+                self.riccati.solve(&frozen, &mut self.solution, 0, search.warm, sample.deadline)
+            }
+        };
+        search.iterations += outcome.iterations();
+        outcome.solved()
+    }
+
+    /// Solves only for a window of the horizon that holds what is violated, with the cost of arriving there and the cost of going
+    /// on. If the rest then satisfies its constraints, this is the optimum of the whole, as it is that of a relaxation; else the window
+    /// grows.
+    fn in_windows<B: Bounded<O>>(
+        &mut self,
+        bounded: &mut B,
+        sample: &Sample<O>,
+        search: &mut Search,
+    ) -> bool {
+        let Self { layout, unconstrained, riccati, frozen, about, solution, .. } = self;
+        let n = layout.horizon;
+        let Sample { start, affine, deadline } = *sample;
+        let Some(window) = search.window.as_mut() else { return false };
+        unconstrained.arrive(start, affine);
+        for _ in 0..WINDOWS {
+            // At most half the horizon, or it does not pay.
+            if 2 * window.len() > n {
+                return false;
+            }
+            bounded.tighten(about, window.clone());
+            let (weight, slope) = unconstrained.to_go(window.end);
+            let radius = bounded.terminal_radius().filter(|_| window.end == n);
+            let start = if window.start == 0 {
+                Start::Fixed(*start)
+            } else {
+                let (weight, mean) = unconstrained.arrival(window.start);
+                Start::Arrival(weight, mean)
+            };
+            let problem = Problem {
+                chain: &layout.chain,
+                cost: &layout.cost,
+                start,
+                affine: &affine[window.clone()],
+                constraints: &From { constraints: &*bounded, first: window.start },
+                end: End { weight, slope, radius },
+            };
+            let outcome = if self.settings.nonlinearity == Nonlinearity::Exact {
+                riccati.solve(&problem, solution, window.start, search.warm, deadline)
+            } else {
+                frozen.set(bounded, about);
+                let constraints = &From { constraints: &*frozen, first: window.start };
+                let Problem { chain, cost, start, affine, end, .. } = problem;
+                let problem = Problem { chain, cost, start, affine, constraints, end };
+                riccati.solve(&problem, solution, window.start, search.warm, deadline)
+            };
+            search.iterations += outcome.iterations();
+            if !outcome.solved() {
+                return false;
+            }
+            let motion = &mut solution.motion;
+            unconstrained.trace_back(window.start, affine, motion);
+            unconstrained.follow(window.end, affine, motion);
+            let outside = layout.ends_outside(motion, bounded.terminal_radius().filter(|_| window.end < n));
+            let violated = bounded.violated(motion, window.clone());
+            if outside.is_none() && violated.is_none() {
+                return true;
+            }
+            search.warm = true;
+            let Some(more) = layout.window(violated, outside.is_some()) else { return false };
+            *window = window.start.min(more.start)..window.end.max(more.end);
+        }
+        false
+    }
+
+    fn report<B: Bounded<O>>(
+        &self,
+        bounded: &B,
+        sample: &Sample<O>,
+        status: Status,
+        iterations: u32,
+    ) -> Report {
+        let exact = self.layout.problem(sample, self.layout.end(bounded.terminal_radius()), bounded);
+        Report { status, iterations, certificate: Certificate::of(&exact, &self.solution) }
+    }
+}
+
+impl<const O: usize> Layout<O> {
+    /// The problem of the whole horizon.
+    fn problem<'a, C>(
+        &'a self,
+        sample: &Sample<'a, O>,
+        end: End<'a, O>,
+        constraints: &'a C,
+    ) -> Problem<'a, O, C> {
+        let start = match &self.start {
+            None => Start::Fixed(*sample.start),
+            Some(normals) => Start::Within(*sample.start, normals),
+        };
+        Problem { chain: &self.chain, cost: &self.cost, start, affine: sample.affine, constraints, end }
+    }
+
+    /// The end of the whole horizon.
+    fn end(&self, radius: Option<f64>) -> End<'_, O> {
+        End { weight: &self.cost.end, slope: zero_state(), radius }
+    }
+
+    /// `radius` if the motion ends outside the terminal ball.
+    fn ends_outside(&self, motion: &Motion<O>, radius: Option<f64>) -> Option<f64> {
+        let square = self.cost.end_square(&motion.states[self.horizon]);
+        radius.filter(|radius| square > radius * radius * (1.0 + CHECK_SLACK))
+    }
+
+    /// The violated intervals with a margin, and the last interval if the terminal ball is to be in it.
+    fn window(&self, violated: Option<Range<usize>>, terminal: bool) -> Option<Range<usize>> {
+        let n = self.horizon;
+        let violated = match (violated, terminal) {
+            (Some(violated), true) => violated.start..n,
+            (None, true) => n..n,
+            (violated, false) => violated?,
+        };
+        let margin = MARGIN + violated.len() / 2;
+        let start = violated.start.saturating_sub(margin);
+        // Fewer steps than the order do not reach every state.
+        Some(if start < O { 0 } else { start }..(violated.end + margin).min(n))
+    }
+}
+
+/// Intervals before and after those that are violated, which a window takes in.
+const MARGIN: usize = 3;
+/// Windows tried before the whole horizon.
+const WINDOWS: usize = 4;

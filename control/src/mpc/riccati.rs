@@ -1,0 +1,599 @@
+//! Primal-dual interior point method on the Riccati recursion, docs/solver.md.
+//!
+//! Balls are written c = ½(‖y‖² − 1) ≤ 0 with one slack s and one multiplier λ each. Every motion in between satisfies the chain of
+//! integrators exactly, so that Newton's method is left with three residuals: stationarity of the inputs, c + s, and sλ. The
+//! curvature of the balls is exact, that of y is left out (Gauss-Newton).
+
+use super::problem::{Balls, Constraints, Outcome, Problem, Solution, Start, State, apply, dot, zero_state};
+use super::sweep::{Blocks, Gain, Quadratic, minimiser};
+use nalgebra::{Matrix3, SVector, Vector3};
+use std::time::Instant;
+
+/// Relative residuals at which a motion is the optimum.
+const STATIONARITY: f64 = 1e-6;
+const FEASIBILITY: f64 = 1e-9;
+const GAP: f64 = 1e-9;
+/// Share of the way to the boundary that a step goes at most.
+const TO_BOUNDARY: f64 = 0.9999;
+/// A step shorter than this is tried again without second order, towards this share of the mean of sλ.
+const SHORT: f64 = 0.1;
+const RECENTRING: f64 = 0.5;
+/// Smallest slack at the start, and Σ sλ over half the cost.
+const COLD: (f64, f64) = (0.03, 0.03);
+/// The same where the multipliers of a similar problem are known.
+const WARM: (f64, f64) = (1e-3, 1e-5);
+
+/// One inequality c ≤ 0 with its slack and multiplier.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pair {
+    /// c at the iterate.
+    c: f64,
+    /// s > 0.
+    slack: f64,
+    /// λ > 0.
+    multiplier: f64,
+    /// c + s, with the curvature that the predictor met.
+    infeasibility: f64,
+    /// What sλ shall become, less the predictor's Δs Δλ.
+    target: f64,
+    /// ∇cᵀΔz of the last direction.
+    change: f64,
+    /// ½‖JΔz‖² of it.
+    curvature: f64,
+    d_slack: f64,
+    d_multiplier: f64,
+}
+
+impl Pair {
+    /// λ/s.
+    fn scaling(&self) -> f64 {
+        self.multiplier / self.slack
+    }
+
+    /// The multiplier in the direction's right side, once Δs and Δλ are eliminated.
+    fn effective(&self) -> f64 {
+        (self.target + self.multiplier * self.infeasibility) / self.slack
+    }
+
+    fn aim(&mut self) {
+        self.infeasibility = self.c + self.slack;
+        self.target = 0.0;
+    }
+
+    /// The direction to sλ = `centre`, with this share of the second order that the predictor met: the products of its changes, and the
+    /// ball's curvature along it.
+    fn correct(&mut self, centre: f64, (products, curvature): (f64, f64)) {
+        self.infeasibility = self.c + self.slack + curvature * self.curvature;
+        self.target = centre - products * self.d_slack * self.d_multiplier;
+    }
+
+    /// Δs and Δλ of a direction in which c changes by `change`.
+    fn set_direction(&mut self, change: f64, curvature: f64) {
+        self.change = change;
+        self.curvature = curvature;
+        self.d_slack = -self.infeasibility - change;
+        self.d_multiplier = (self.target - self.multiplier * self.d_slack) / self.slack - self.multiplier;
+    }
+
+    /// The longest step that keeps s and λ positive.
+    fn longest(&self) -> f64 {
+        let until = |value: f64, change: f64| if change < 0.0 { -value / change } else { f64::INFINITY };
+        until(self.slack, self.d_slack).min(until(self.multiplier, self.d_multiplier))
+    }
+}
+
+/// One stage of the horizon.
+#[derive(Clone, Copy, Debug)]
+struct Stage<const O: usize> {
+    state: State<O>,
+    input: Vector3<f64>,
+    balls: Balls<O>,
+    slopes: Slopes<O>,
+    state_pair: Pair,
+    input_pair: Pair,
+    gain: Gain<O>,
+    feedforward: Vector3<f64>,
+    d_state: State<O>,
+    d_input: Vector3<f64>,
+}
+
+/// ∇c of a stage's balls: of that on the state, then of that on state and input.
+#[derive(Clone, Copy, Debug)]
+struct Slopes<const O: usize> {
+    state: State<O>,
+    input: (State<O>, Vector3<f64>),
+}
+
+/// A face ±nᵀ(E_given − E_0) ≤ 1 of the set that the start is in.
+#[derive(Clone, Copy, Debug)]
+struct Face<const O: usize> {
+    axis: usize,
+    normal: SVector<f64, O>,
+    pair: Pair,
+}
+
+/// The solver: its iterate and scratch. Nothing is carried from one problem to the next.
+pub struct Riccati<const O: usize> {
+    stages: Vec<Stage<O>>,
+    terminal: Pair,
+    faces: Vec<Face<O>>,
+    /// P of the first stage and its p.
+    first: (Blocks<O>, State<O>),
+    /// Intervals of the problem at hand.
+    horizon: usize,
+    max_iterations: u32,
+}
+
+/// How far the iterate is from the optimum.
+#[derive(Clone, Copy, Debug)]
+struct Residuals {
+    stationarity: f64,
+    feasibility: f64,
+    /// Σ sλ.
+    gap: f64,
+    /// Half the cost.
+    cost: f64,
+    /// Number of inequalities.
+    count: f64,
+}
+
+impl Residuals {
+    fn converged(&self) -> bool {
+        self.stationarity <= STATIONARITY && self.feasibility <= FEASIBILITY && self.gap <= GAP * self.cost
+    }
+
+    /// μ.
+    fn mean(&self) -> f64 {
+        self.gap / self.count
+    }
+}
+
+impl<const O: usize> Riccati<O> {
+    /// For `horizon` intervals and at most `faces` normals of the start's set.
+    pub fn new(horizon: usize, faces: usize, max_iterations: u32) -> Self {
+        let stage = Stage {
+            state: zero_state(),
+            input: Vector3::zeros(),
+            balls: Balls::default(),
+            slopes: Slopes { state: zero_state(), input: (zero_state(), Vector3::zeros()) },
+            state_pair: Pair::default(),
+            input_pair: Pair::default(),
+            gain: Gain::default(),
+            feedforward: Vector3::zeros(),
+            d_state: zero_state(),
+            d_input: Vector3::zeros(),
+        };
+        Self {
+            stages: vec![stage; horizon + 1],
+            terminal: Pair::default(),
+            faces: Vec::with_capacity(2 * faces),
+            first: ([[Matrix3::zeros(); O]; O], zero_state()),
+            horizon,
+            max_iterations,
+        }
+    }
+
+    /// The optimum of `problem`, which takes the stages from `first` on of `solution`. Their motion is the first guess, which must satisfy
+    /// the chain, and is replaced if the optimum is found.
+    pub fn solve<C: Constraints<O>>(
+        &mut self,
+        problem: &Problem<O, C>,
+        solution: &mut Solution<O>,
+        first: usize,
+        warm: bool,
+        deadline: Option<Instant>,
+    ) -> Outcome {
+        self.horizon = problem.affine.len();
+        self.begin(problem, solution, first, warm);
+        for iteration in 0..=self.max_iterations {
+            let residuals = self.residuals(problem);
+            if residuals.converged() {
+                self.write(problem, solution, first);
+                return Outcome::Solved(iteration);
+            }
+            let late = deadline.is_some_and(|deadline| Instant::now() >= deadline);
+            if iteration == self.max_iterations || late || self.factor(problem).is_none() {
+                return Outcome::Failed(iteration);
+            }
+            let affine = self.predictor(problem);
+            // Mehrotra's rule; not below what converges, or the scaling grows without bound while the motion still moves.
+            let least = 0.1 * GAP * residuals.cost / residuals.gap;
+            let ratio = self.mean_after(problem, affine, residuals.count) / residuals.mean();
+            let centring = ratio.powi(3).max(least).min(1.0);
+            // The step goes about so far along the predictor.
+            let second_order = (1.0, affine * (1.0 - centring));
+            let mut alpha = self.corrector(problem, centring * residuals.mean(), second_order);
+            if alpha < SHORT {
+                // The second order misleads.
+                alpha = self.corrector(problem, RECENTRING * residuals.mean(), (0.0, 0.0));
+            }
+            self.step(problem, alpha);
+        }
+        Outcome::Failed(self.max_iterations)
+    }
+
+    /// The first iterate: slacks as large as the constraints leave room, at least [`SMALLEST_SLACK`].
+    fn begin<C: Constraints<O>>(
+        &mut self,
+        problem: &Problem<O, C>,
+        solution: &Solution<O>,
+        first: usize,
+        warm: bool,
+    ) {
+        let motion = &solution.motion;
+        for (stage, state) in self.stages[..=self.horizon].iter_mut().zip(&motion.states[first..]) {
+            stage.state = *state;
+        }
+        for (stage, input) in self.stages[..self.horizon].iter_mut().zip(&motion.inputs[first..]) {
+            stage.input = *input;
+        }
+        self.faces.clear();
+        if let Start::Within(_, normals) = problem.start {
+            for (axis, normals) in normals.iter().enumerate() {
+                for normal in normals {
+                    let face = |normal| Face { axis, normal, pair: Pair::default() };
+                    self.faces.extend([face(*normal), face(-normal)]);
+                }
+            }
+        }
+        self.evaluate(problem);
+        let (cost, _) = self.costs(problem);
+        let mut count = 0.0;
+        self.each_pair(problem, |_| count += 1.0);
+        let (smallest, gap) = if warm { WARM } else { COLD };
+        let mean = gap * cost / count;
+        let begin = |pair: &mut Pair, known: f64| {
+            pair.slack = (-pair.c).max(smallest);
+            pair.multiplier = (mean / pair.slack).max(if warm { known } else { 0.0 });
+        };
+        let multipliers = &solution.multipliers;
+        for (k, stage) in self.stages[..=self.horizon].iter_mut().enumerate() {
+            begin(&mut stage.state_pair, if k > 0 { multipliers.state[first + k - 1] } else { 0.0 });
+            begin(&mut stage.input_pair, multipliers.input.get(first + k).copied().unwrap_or_default());
+        }
+        begin(&mut self.terminal, multipliers.terminal);
+        for face in &mut self.faces {
+            begin(&mut face.pair, 0.0);
+        }
+    }
+
+    /// c and its slopes at the iterate.
+    fn evaluate<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) {
+        let of = |value: &Vector3<f64>| 0.5 * (value.norm_squared() - 1.0);
+        let end = self.end();
+        for (k, stage) in self.stages[..=end].iter_mut().enumerate() {
+            stage.balls = problem.constraints.balls(k, &stage.state, &stage.input);
+            let Balls { state, input } = &stage.balls;
+            stage.slopes = Slopes {
+                state: state.by_state.map(|by| by.tr_mul(&state.value)),
+                input: (
+                    input.by_state.map(|by| by.tr_mul(&input.value)),
+                    input.by_input.tr_mul(&input.value),
+                ),
+            };
+            stage.state_pair.c = of(&state.value);
+            stage.input_pair.c = of(&input.value);
+        }
+        if let Some(radius) = problem.end.radius {
+            let end = &self.stages[end].state;
+            self.terminal.c = 0.5 * (dot(end, &problem.end.weighted(end)) / (radius * radius) - 1.0);
+        }
+        if let Start::Within(given, _) = &problem.start {
+            let first = self.stages[0].state;
+            for Face { axis, normal, pair } in &mut self.faces {
+                let deviation: f64 = (0..O).map(|i| normal[i] * (given[i][*axis] - first[i][*axis])).sum();
+                pair.c = deviation - 1.0;
+            }
+        }
+    }
+
+    fn each_pair<C: Constraints<O>>(&mut self, problem: &Problem<O, C>, mut visit: impl FnMut(&mut Pair)) {
+        let last = self.end();
+        let state_balls = problem.constraints.has_state_balls();
+        for (k, stage) in self.stages[..=last].iter_mut().enumerate() {
+            if k > 0 && state_balls {
+                visit(&mut stage.state_pair);
+            }
+            if k < last {
+                visit(&mut stage.input_pair);
+            }
+        }
+        if problem.end.radius.is_some() {
+            visit(&mut self.terminal);
+        }
+        for face in &mut self.faces {
+            visit(&mut face.pair);
+        }
+    }
+
+    /// What is left of the conditions of optimality at the iterate, with the costates p of the motion.
+    fn residuals<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> Residuals {
+        let (mut feasibility, mut gap, mut count) = (0.0_f64, 0.0, 0.0);
+        self.each_pair(problem, |pair| {
+            feasibility = feasibility.max((pair.c + pair.slack).abs());
+            gap += pair.slack * pair.multiplier;
+            count += 1.0;
+        });
+        let (mut largest, mut scale) = (0.0_f64, f64::MIN_POSITIVE);
+        self.adjoint(
+            problem,
+            |pair| pair.multiplier,
+            |stage, r| {
+                largest = largest.max(r.amax());
+                scale = scale.max(problem.cost.input.component_mul(&stage.input).amax());
+            },
+        );
+        if !matches!(problem.start, Start::Fixed(_)) {
+            largest = self.first.1.iter().fold(largest, |largest, p| largest.max(p.amax()));
+        }
+        let (cost, input_scale) = self.costs(problem);
+        Residuals { stationarity: largest / scale.max(input_scale), feasibility, gap, cost, count }
+    }
+
+    /// Half the cost of the iterate without what is linear in its end, and the largest part of its slope in E_N.
+    fn costs<C: Constraints<O>>(&self, problem: &Problem<O, C>) -> (f64, f64) {
+        let stages = self.stages[..self.horizon].iter();
+        let inner: f64 = stages
+            .map(|stage| {
+                dot(&stage.state, &problem.cost.slope(&stage.state))
+                    + stage.input.dot(&problem.cost.input.component_mul(&stage.input))
+            })
+            .sum();
+        let end = &self.stages[self.end()].state;
+        let weighted = problem.end.weighted(end);
+        let scale = problem.chain.input_adjoint(&weighted).amax();
+        (0.5 * (inner + dot(end, &weighted)), scale)
+    }
+
+    /// Position of the last stage.
+    fn end(&self) -> usize {
+        self.horizon
+    }
+
+    /// ∇L from the end to the start: calls `visit` with the slope in each input; leaves that in E_0.
+    fn adjoint<C: Constraints<O>>(
+        &mut self,
+        problem: &Problem<O, C>,
+        multiplier: impl Fn(&Pair) -> f64,
+        mut visit: impl FnMut(&Stage<O>, Vector3<f64>),
+    ) {
+        let last = self.end();
+        let mut p = self.end_slope(problem, &multiplier);
+        for (k, stage) in self.stages[..last].iter().enumerate().rev() {
+            let (q, r) = stage.slope(problem, k, &multiplier);
+            visit(stage, r + problem.chain.input_adjoint(&p));
+            p = add(&problem.chain.adjoint(&p), &q);
+        }
+        self.first.1 = add(&p, &self.start_slope(problem, &multiplier));
+    }
+
+    /// ∂L/∂E_N.
+    fn end_slope<C: Constraints<O>>(
+        &self,
+        problem: &Problem<O, C>,
+        multiplier: &impl Fn(&Pair) -> f64,
+    ) -> State<O> {
+        let stage = &self.stages[self.end()];
+        let mut weight = 1.0;
+        if let Some(radius) = problem.end.radius {
+            weight += multiplier(&self.terminal) / (radius * radius);
+        }
+        let weighted = problem.end.weighted(&stage.state);
+        let mut slope: State<O> = std::array::from_fn(|i| weighted[i] * weight + problem.end.slope[i]);
+        if problem.constraints.has_state_balls() {
+            let multiplier = multiplier(&stage.state_pair);
+            slope = std::array::from_fn(|i| slope[i] + stage.slopes.state[i] * multiplier);
+        }
+        slope
+    }
+
+    /// What the start adds to ∂L/∂E_0.
+    fn start_slope<C>(&self, problem: &Problem<O, C>, multiplier: &impl Fn(&Pair) -> f64) -> State<O> {
+        let mut slope = zero_state();
+        if let Start::Arrival(weight, mean) = &problem.start {
+            slope = apply(weight, &std::array::from_fn(|i| self.stages[0].state[i] - mean[i]));
+        }
+        for face in &self.faces {
+            for (i, slope) in slope.iter_mut().enumerate() {
+                slope[face.axis] -= face.normal[i] * multiplier(&face.pair);
+            }
+        }
+        slope
+    }
+
+    /// The backward recursion for P and the gains.
+    fn factor<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> Option<()> {
+        let last = self.end();
+        let state_balls = problem.constraints.has_state_balls();
+        let mut p = self.end_weight(problem);
+        for (k, stage) in self.stages[..last].iter_mut().enumerate().rev() {
+            let mut quadratic = Quadratic::diagonal(&problem.cost.state, &problem.cost.input);
+            let Pair { multiplier, .. } = stage.input_pair;
+            quadratic.add_ball(&stage.balls.input, multiplier, stage.input_pair.scaling());
+            if k > 0 && state_balls {
+                let Pair { multiplier, .. } = stage.state_pair;
+                quadratic.add_state_ball(&stage.balls.state, multiplier, stage.state_pair.scaling());
+            }
+            stage.gain = Gain::factor(&quadratic, problem.chain, &mut p)?;
+        }
+        for face in &self.faces {
+            for i in 0..O {
+                for j in i..O {
+                    p[i][j][(face.axis, face.axis)] += face.pair.scaling() * face.normal[i] * face.normal[j];
+                }
+            }
+        }
+        if let Start::Arrival(weight, _) = &problem.start {
+            for i in 0..O {
+                for j in i..O {
+                    p[i][j] += Matrix3::from_diagonal(&weight[i][j]);
+                }
+            }
+        }
+        self.first.0 = p;
+        Some(())
+    }
+
+    /// P_N.
+    fn end_weight<C: Constraints<O>>(&self, problem: &Problem<O, C>) -> Blocks<O> {
+        let stage = &self.stages[self.end()];
+        let mut quadratic = Quadratic::diagonal(&zero_state(), &Vector3::zeros());
+        let (mut weight, mut outer) = (1.0, 0.0);
+        if let Some(radius) = problem.end.radius {
+            weight += self.terminal.multiplier / (radius * radius);
+            outer = self.terminal.scaling() / radius.powi(4);
+        }
+        let slope = problem.end.weighted(&stage.state);
+        for i in 0..O {
+            for j in i..O {
+                quadratic.q[i][j] = Matrix3::from_diagonal(&(problem.end.weight[i][j] * weight))
+                    + slope[i] * outer * slope[j].transpose();
+            }
+        }
+        if problem.constraints.has_state_balls() {
+            let pair = &stage.state_pair;
+            quadratic.add_state_ball(&stage.balls.state, pair.multiplier, pair.scaling());
+        }
+        quadratic.q
+    }
+
+    /// The direction to sλ = 0; returns the longest step along it.
+    fn predictor<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> f64 {
+        self.each_pair(problem, Pair::aim);
+        self.direction(problem);
+        self.longest(problem).min(1.0)
+    }
+
+    /// The direction to sλ = σμ with what the predictor learnt of second order; returns the step along it.
+    fn corrector<C: Constraints<O>>(
+        &mut self,
+        problem: &Problem<O, C>,
+        centre: f64,
+        second_order: (f64, f64),
+    ) -> f64 {
+        self.each_pair(problem, |pair| pair.correct(centre, second_order));
+        self.direction(problem);
+        (TO_BOUNDARY * self.longest(problem)).min(1.0)
+    }
+
+    fn longest<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> f64 {
+        let mut longest = f64::INFINITY;
+        self.each_pair(problem, |pair| longest = longest.min(pair.longest()));
+        longest
+    }
+
+    /// Mean of sλ after a step.
+    fn mean_after<C: Constraints<O>>(&mut self, problem: &Problem<O, C>, alpha: f64, count: f64) -> f64 {
+        let mut gap = 0.0;
+        self.each_pair(problem, |pair| {
+            gap += (pair.slack + alpha * pair.d_slack) * (pair.multiplier + alpha * pair.d_multiplier);
+        });
+        gap / count
+    }
+
+    /// Newton's direction by the factors at hand: feedforward backwards, then the motion forwards.
+    fn direction<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) {
+        let last = self.end();
+        let mut p = self.end_slope(problem, &Pair::effective);
+        for (k, stage) in self.stages[..last].iter_mut().enumerate().rev() {
+            let (q, r) = stage.slope(problem, k, &Pair::effective);
+            let (feedforward, through) = stage.gain.feedforward(&(r + problem.chain.input_adjoint(&p)));
+            stage.feedforward = feedforward;
+            p = add(&add(&problem.chain.adjoint(&p), &q), &through);
+        }
+        let mut change = zero_state();
+        if !matches!(problem.start, Start::Fixed(_)) {
+            let slope = add(&p, &self.start_slope(problem, &Pair::effective));
+            change = minimiser(&self.first.0, &slope).unwrap_or(change);
+        }
+        for face in &mut self.faces {
+            let of_face: f64 = (0..O).map(|i| -face.normal[i] * change[i][face.axis]).sum();
+            face.pair.set_direction(of_face, 0.0);
+        }
+        let state_balls = problem.constraints.has_state_balls();
+        for (k, stage) in self.stages[..=last].iter_mut().enumerate() {
+            stage.d_state = change;
+            if k > 0 && state_balls {
+                let ball = &stage.balls.state;
+                let y = ball.by_state.iter().zip(&change).fold(Vector3::zeros(), |sum, (by, e)| sum + by * e);
+                stage.state_pair.set_direction(ball.value.dot(&y), 0.5 * y.norm_squared());
+            }
+            if k < last {
+                stage.d_input = stage.gain.input(&change, &stage.feedforward);
+                let ball = &stage.balls.input;
+                let y = ball.change(&change, &stage.d_input);
+                stage.input_pair.set_direction(ball.value.dot(&y), 0.5 * y.norm_squared());
+                change = problem.chain.advance(&change, &stage.d_input);
+            }
+        }
+        if let Some(radius) = problem.end.radius {
+            let end = problem.end.weighted(&self.stages[last].state);
+            let scale = 1.0 / (radius * radius);
+            let curvature = 0.5 * dot(&change, &problem.end.weighted(&change)) * scale;
+            self.terminal.set_direction(dot(&end, &change) * scale, curvature);
+        }
+    }
+
+    fn step<C: Constraints<O>>(&mut self, problem: &Problem<O, C>, alpha: f64) {
+        for stage in &mut self.stages[..=self.horizon] {
+            stage.state = std::array::from_fn(|i| stage.state[i] + stage.d_state[i] * alpha);
+            stage.input += stage.d_input * alpha;
+        }
+        self.each_pair(problem, |pair| {
+            pair.slack += alpha * pair.d_slack;
+            pair.multiplier += alpha * pair.d_multiplier;
+        });
+        self.evaluate(problem);
+    }
+
+    fn write<C: Constraints<O>>(&self, problem: &Problem<O, C>, solution: &mut Solution<O>, first: usize) {
+        let Solution { motion, multipliers } = solution;
+        let state_balls = problem.constraints.has_state_balls();
+        for (k, stage) in self.stages[..=self.horizon].iter().enumerate() {
+            motion.states[first + k] = stage.state;
+            if k > 0 && state_balls {
+                multipliers.state[first + k - 1] = stage.state_pair.multiplier;
+            }
+            if k < self.horizon {
+                motion.inputs[first + k] = stage.input;
+                multipliers.input[first + k] = stage.input_pair.multiplier;
+            }
+        }
+        if problem.end.radius.is_some() {
+            multipliers.terminal = self.terminal.multiplier;
+        }
+        if let Start::Within(..) = problem.start {
+            multipliers.start = self.start_slope(problem, &|pair| pair.multiplier);
+            multipliers.start_gap =
+                self.faces.iter().map(|face| face.pair.multiplier * face.pair.c.abs()).sum();
+        }
+    }
+}
+
+impl<const O: usize> Stage<O> {
+    /// ∂/∂E and ∂/∂v of the stage's cost and of its balls by their multipliers.
+    fn slope<C: Constraints<O>>(
+        &self,
+        problem: &Problem<O, C>,
+        k: usize,
+        multiplier: &impl Fn(&Pair) -> f64,
+    ) -> (State<O>, Vector3<f64>) {
+        let mut by_state = problem.cost.slope(&self.state);
+        let by_ball = multiplier(&self.input_pair);
+        let by_input = problem.cost.input.component_mul(&self.input) + self.slopes.input.1 * by_ball;
+        for i in 0..O {
+            by_state[i] += self.slopes.input.0[i] * by_ball;
+        }
+        if k > 0 && problem.constraints.has_state_balls() {
+            let by_ball = multiplier(&self.state_pair);
+            for i in 0..O {
+                by_state[i] += self.slopes.state[i] * by_ball;
+            }
+        }
+        (by_state, by_input)
+    }
+}
+
+fn add<const O: usize>(a: &State<O>, b: &State<O>) -> State<O> {
+    std::array::from_fn(|i| a[i] + b[i])
+}
