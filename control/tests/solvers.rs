@@ -6,11 +6,15 @@ use control::mpc::cone::{Cone, Structure};
 use control::mpc::lq::Unconstrained;
 use control::mpc::problem::{End, Frozen, Outcome, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
-use control::mpc::{Ball, Balls, Chain, Constraints, Cost, State};
+use control::mpc::{
+    Ball, Balls, Bounded, Chain, Constraints, Cost, Layout, Motion, Optimiser, SolverSettings, State,
+};
+use control::report::Status;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;
+use std::ops::Range;
 use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
 
@@ -236,4 +240,168 @@ fn oracle_riccati_and_cone_agree_on_the_cost_of_5500_random_problems() {
         most.get()
     );
     assert!(both >= 4000 && neither >= 20, "{both} {neither} {alone}");
+}
+
+/// The problem of Chai 2022, section 5.1, with a terminal ball.
+fn published() -> Shape {
+    let settings = control::crmpc::Settings::published();
+    let h = settings.period_optimisation;
+    let g = control::crmpc::terminal_weight(settings.terminal, nalgebra::Vector2::new(50.0, 50.0), 10.0);
+    let cost = Cost {
+        state: [Vector3::repeat(50.0 * h); 2],
+        input: Vector3::repeat(10.0 * h),
+        end: control::mpc::per_axis(&[g; 3]),
+    };
+    Shape { horizon: settings.horizon, cost, terminal: true }
+}
+
+/// A moderate problem from which the cases below depart.
+const MODERATE: Sample = Sample {
+    start: [Vector3::new(0.1, -0.05, -0.15), Vector3::new(0.01, 0.0, -0.01)],
+    jump: (0.5, [0.0; 3]),
+    printed: false,
+    bounds: (0.0, 0.0),
+    radius: 1.2,
+};
+
+fn assert_agree([(ours, cost, certificate), (judge, judged, _)]: Verdict, context: &str) {
+    assert!(ours.solved() && judge.solved(), "{context}: {ours:?} {judge:?}");
+    assert!((cost - judged).abs() <= 1e-7 * judged, "{context}: {cost} {judged}");
+    assert!(certificate.residual() <= 1e-5, "{context}: {certificate:?}");
+}
+
+#[test]
+fn oracle_riccati_and_cone_agree_wherever_the_reference_jumps() {
+    let mut solvers = Solvers::new(published(), None);
+    for k in 0..solvers.shape.horizon {
+        let jump = (k as f64 / solvers.shape.horizon as f64 + 1e-9, [0.012, 0.0, -0.087]);
+        assert_agree(solvers.solve(&Sample { jump, ..MODERATE }, None), &format!("jump in interval {k}"));
+    }
+}
+
+#[test]
+fn oracle_riccati_and_cone_agree_in_degenerate_cases() {
+    let mut solvers = Solvers::new(published(), None);
+    // The first state is as fast as it may be, so that the first input cannot but keep it there or slow it down.
+    let limit = 5.0_f64.to_radians();
+    let start = [Vector3::new(0.3, 0.05, -0.2), Vector3::new(0.0, 0.0, 0.999 * limit)];
+    assert_agree(solvers.solve(&Sample { start, ..MODERATE }, None), "rate at its bound at the start");
+    // Balls so large that none is active; an end that is all but given.
+    assert_agree(solvers.solve(&Sample { bounds: (3.0, 3.0), ..MODERATE }, None), "no ball active");
+    let jump = (0.99, [0.012, 0.0, -0.087]);
+    assert_agree(solvers.solve(&Sample { radius: 1e-3, jump, ..MODERATE }, None), "tiny terminal ball");
+    // One axis has nothing to do.
+    let start = [Vector3::new(0.3, 0.0, 0.0), Vector3::zeros()];
+    assert_agree(solvers.solve(&Sample { start, ..MODERATE }, None), "one axis only");
+}
+
+#[test]
+fn an_infeasible_problem_is_recognised_within_the_iteration_limit() {
+    let mut solvers = Solvers::new(published(), None);
+    // Three times as fast as allowed, and no moment to speak of.
+    let start = [Vector3::zeros(), Vector3::new(0.0, 0.26, 0.0)];
+    for moment in [0.0, -1.0, -3.0] {
+        let [(ours, ..), (judge, ..)] =
+            solvers.solve(&Sample { start, bounds: (0.0, moment), ..MODERATE }, None);
+        assert!(!ours.solved() && !judge.solved(), "{ours:?} {judge:?}");
+        assert!(ours.iterations() <= MAX_ITERATIONS, "{ours:?}");
+    }
+}
+
+#[test]
+fn oracle_riccati_and_cone_agree_where_the_start_is_free_within_a_set() {
+    use control::sampled::{Gain, SampledError};
+    let set = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04).invariant_set().unwrap();
+    let normals: [Vec<SVector<f64, 2>>; 3] =
+        [0.03, 0.05, 0.1].map(|bound| set.normals().iter().map(|normal| normal / bound).collect());
+    let mut solvers = Solvers::new(published(), Some(normals.clone()));
+    let solved = Cell::new(0);
+    let mut runner = runner(200);
+    let solvers = std::cell::RefCell::new(&mut solvers);
+    runner
+        .run(&sample(), |sample| {
+            let verdict = solvers.borrow_mut().solve(&sample, Some(&normals));
+            if verdict[1].0.solved() {
+                solved.update(|count| count + 1);
+                assert_agree(verdict, &format!("{sample:?}"));
+            }
+            Ok(())
+        })
+        .unwrap();
+    assert!(solved.get() > 150, "{}", solved.get());
+}
+
+/// Sets that the Riccati method cannot evaluate: what it meets after the first call of `tighten` is no number.
+struct Spoilt {
+    sets: Sets,
+    tightened: usize,
+}
+
+impl Constraints<2> for Spoilt {
+    fn has_state_balls(&self) -> bool {
+        true
+    }
+
+    fn balls(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> Balls<2> {
+        let mut balls = self.sets.balls(k, state, input);
+        if self.tightened == 1 {
+            balls.input.value *= f64::NAN;
+        }
+        balls
+    }
+}
+
+impl Bounded<2> for Spoilt {
+    fn tighten(&mut self, _: &Motion<2>, _: Range<usize>) {
+        self.tightened += 1;
+    }
+
+    fn violated(&mut self, motion: &Motion<2>, skip: Range<usize>) -> Option<Range<usize>> {
+        let violates = |&k: &usize| {
+            !skip.contains(&k) && self.sets.squares(k, &motion.states[k], &motion.inputs[k]).1 > 1.0
+        };
+        let first = (0..motion.inputs.len()).find(violates)?;
+        let last = (first..motion.inputs.len()).rfind(violates).unwrap_or(first);
+        Some(first..last + 1)
+    }
+
+    fn terminal_radius(&self) -> Option<f64> {
+        None
+    }
+}
+
+#[test]
+fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
+    let Shape { horizon, cost, .. } = published();
+    let chain = Chain::new(0.2);
+    let layout = Layout {
+        chain,
+        cost,
+        horizon,
+        state_balls: true,
+        terminal: false,
+        start: None,
+        scale: [0.1, 0.1],
+        standstill: 1e-6,
+    };
+    let affine = vec![[Vector3::zeros(); 2]; horizon];
+    let body = Scenario::crmpc2022().inertia.body(1.0).unwrap();
+    let previous = Motion::new(horizon);
+    // The spoilt sets are whole again when the cone solver asks.
+    for (tightened, status) in [(0, Status::Cone), (1, Status::Constrained)] {
+        let solver = SolverSettings { exits: false, ..SolverSettings::new(MAX_ITERATIONS) };
+        let mut optimiser = Optimiser::new(layout.clone(), solver).unwrap();
+        let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
+        let mut spoilt = Spoilt { sets, tightened };
+        let report = optimiser.optimise(&mut spoilt, &MODERATE.start, &affine, Some(&previous));
+        assert_eq!(report.status, status);
+        assert!(report.certificate.feasibility < 0.1, "{report:?}");
+    }
+    // With no time left, neither solver is begun.
+    let solver = SolverSettings { exits: false, time_budget: 1e-9, ..SolverSettings::new(MAX_ITERATIONS) };
+    let mut optimiser = Optimiser::new(layout, solver).unwrap();
+    let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
+    let mut sets = Spoilt { sets, tightened: 1 };
+    let report = optimiser.optimise(&mut sets, &MODERATE.start, &affine, Some(&previous));
+    assert_eq!((report.status, report.iterations), (Status::Fallback, 0));
 }
