@@ -27,6 +27,8 @@ pub struct Linear {
 /// W = R⁻¹ and its derivatives by β at given angles.
 #[derive(Clone, Copy, Debug)]
 pub struct InverseKinematics {
+    /// Sine and cosine of α and of β.
+    sines: [f64; 4],
     w: Matrix3<f64>,
     w_beta: Matrix3<f64>,
     w_beta_beta: Matrix3<f64>,
@@ -40,6 +42,7 @@ impl InverseKinematics {
         // cos 2β, sin 2β
         let (c2, s2) = (cb * cb - sb * sb, 2.0 * sb * cb);
         Self {
+            sines: [sa, ca, sb, cb],
             w: Matrix3::new(-ca * sb * cb, sa, -ca * cb, cb * cb, 0.0, -sb, -sa * sb * cb, -ca, -sa * cb),
             w_beta: Matrix3::new(-ca * c2, 0.0, ca * sb, -s2, 0.0, -cb, -sa * c2, 0.0, sa * sb),
             w_beta_beta: Matrix3::new(
@@ -125,44 +128,50 @@ pub fn linearise(
     angle_rates: &Vector3<f64>,
     acceleration: &Vector3<f64>,
 ) -> Linearisation {
-    let kinematics = InverseKinematics::at(angles);
-    let InverseKinematics { w, w_beta, w_beta_beta } = &kinematics;
-    let (x, a) = (angle_rates, acceleration);
+    InverseKinematics::at(angles).linearise(body, angle_rates, acceleration)
+}
 
-    let rates = w * x;
-    let rates_by_angles = [by_alpha(&rates), w_beta * x];
+impl InverseKinematics {
+    /// Derivatives of ω and m, as [`linearise`].
+    pub fn linearise(&self, body: &RigidBody, x: &Vector3<f64>, a: &Vector3<f64>) -> Linearisation {
+        let Self { w, w_beta, w_beta_beta, .. } = self;
 
-    let omega_dot = kinematics.acceleration(x, a);
-    let omega_dot_by_beta = w_beta * a + by_alpha(&rates_by_angles[1]) * x.x + w_beta_beta * x * x.y;
-    let omega_dot_by_angles = [by_alpha(&omega_dot), omega_dot_by_beta];
-    // Ẇ, and what α̇ and β̇ in it contribute.
-    let mut omega_dot_by_rates = w_beta * x.y;
-    for (i, by_angle) in rates_by_angles.iter().enumerate() {
-        let mut column = omega_dot_by_rates.column_mut(i);
-        column += by_angle;
-    }
-    for (i, column) in w.column_iter().enumerate() {
-        let mut sum = omega_dot_by_rates.column_mut(i);
-        sum += by_alpha(&column.into_owned()) * x.x;
-    }
+        let rates = w * x;
+        let rates_by_angles = [by_alpha(&rates), w_beta * x];
 
-    let momentum = body.inertia * rates;
-    // ∂(ω × I ω)/∂ω
-    let gyroscopic = rates.cross_matrix() * body.inertia - momentum.cross_matrix();
-    let moment_by_angle = |i: usize| body.inertia * omega_dot_by_angles[i] + gyroscopic * rates_by_angles[i];
-    Linearisation {
-        rates: Linear {
-            value: rates,
-            by_angles: Matrix3x2::from_columns(&rates_by_angles),
-            by_rates: *w,
-            by_acceleration: Matrix3::zeros(),
-        },
-        moment: Linear {
-            value: body.inertia * omega_dot + rates.cross(&momentum),
-            by_angles: Matrix3x2::from_columns(&[moment_by_angle(0), moment_by_angle(1)]),
-            by_rates: body.inertia * omega_dot_by_rates + gyroscopic * w,
-            by_acceleration: body.inertia * w,
-        },
+        let omega_dot = self.acceleration(x, a);
+        let omega_dot_by_beta = w_beta * a + by_alpha(&rates_by_angles[1]) * x.x + w_beta_beta * x * x.y;
+        let omega_dot_by_angles = [by_alpha(&omega_dot), omega_dot_by_beta];
+        // Ẇ, and what α̇ and β̇ in it contribute.
+        let mut omega_dot_by_rates = w_beta * x.y;
+        for (i, by_angle) in rates_by_angles.iter().enumerate() {
+            let mut column = omega_dot_by_rates.column_mut(i);
+            column += by_angle;
+        }
+        for (i, column) in w.column_iter().enumerate() {
+            let mut sum = omega_dot_by_rates.column_mut(i);
+            sum += by_alpha(&column.into_owned()) * x.x;
+        }
+
+        let momentum = body.inertia * rates;
+        // ∂(ω × I ω)/∂ω
+        let gyroscopic = rates.cross_matrix() * body.inertia - momentum.cross_matrix();
+        let moment_by_angle =
+            |i: usize| body.inertia * omega_dot_by_angles[i] + gyroscopic * rates_by_angles[i];
+        Linearisation {
+            rates: Linear {
+                value: rates,
+                by_angles: Matrix3x2::from_columns(&rates_by_angles),
+                by_rates: *w,
+                by_acceleration: Matrix3::zeros(),
+            },
+            moment: Linear {
+                value: body.inertia * omega_dot + rates.cross(&momentum),
+                by_angles: Matrix3x2::from_columns(&[moment_by_angle(0), moment_by_angle(1)]),
+                by_rates: body.inertia * omega_dot_by_rates + gyroscopic * w,
+                by_acceleration: body.inertia * w,
+            },
+        }
     }
 }
 
@@ -180,21 +189,26 @@ pub fn moment_slope_bounds(x: f64, a: f64) -> (f64, f64) {
     ((by_alpha * by_alpha + by_beta * by_beta).sqrt(), x * (root5 + 1.0 + root2 + 2.0 * root3))
 }
 
-/// The input u = R I⁻¹ m with its derivatives, from those of the moment.
-pub fn input_of_moment(body: &RigidBody, angles: &Vector3<f64>, moment: &Linear) -> Linear {
-    let torque_to_input = kin::r(angles) * body.inverse;
-    let acceleration = body.inverse * moment.value;
-    let mut by_angles = torque_to_input * moment.by_angles;
-    for (i, r_z) in [kin::r_alpha(angles), kin::r_beta(angles)].iter().enumerate() {
-        let mut column = by_angles.column_mut(i);
-        column += r_z * acceleration;
-    }
-    Linear {
-        value: torque_to_input * moment.value,
-        by_angles,
-        by_rates: torque_to_input * moment.by_rates,
-        // R I⁻¹ I R⁻¹
-        by_acceleration: Matrix3::identity(),
+impl InverseKinematics {
+    /// The input u = R I⁻¹ m with its derivatives, from those of the moment. With γ = I⁻¹m and R = W⁻¹, column by column,
+    /// ∂u = R (∂γ) + (∂R) γ.
+    pub fn input_of_moment(&self, body: &RigidBody, moment: &Linear) -> Linear {
+        let [sa, ca, sb, cb] = self.sines;
+        let (tb, sec2) = (sb / cb, 1.0 / (cb * cb));
+        let r = Matrix3::new(-ca * tb, 1.0, -sa * tb, sa, 0.0, -ca, -ca * cb, -sb, -cb * sa);
+        let gamma = body.inverse * moment.value;
+        let (p, q) = (ca * gamma.x + sa * gamma.z, sa * gamma.x - ca * gamma.z);
+        // R γ = [γ_y − p tan β, q, −p cos β − γ_y sin β], and α turns (p, q) into each other.
+        let by_alpha = Vector3::new(q * tb, p, q * cb);
+        let by_beta = Vector3::new(-p * sec2, 0.0, p * sb - gamma.y * cb);
+        let torque_to_input = r * body.inverse;
+        Linear {
+            value: r * gamma,
+            by_angles: torque_to_input * moment.by_angles + Matrix3x2::from_columns(&[by_alpha, by_beta]),
+            by_rates: torque_to_input * moment.by_rates,
+            // R I⁻¹ I R⁻¹
+            by_acceleration: Matrix3::identity(),
+        }
     }
 }
 
@@ -264,7 +278,7 @@ mod tests {
         };
         let (angles, rates, a) = split(&point);
         let exact = linearise(&body, &angles, &rates, &a);
-        let exact_input = input_of_moment(&body, &angles, &exact.moment);
+        let exact_input = InverseKinematics::at(&angles).input_of_moment(&body, &exact.moment);
         for (y, linear) in [exact.rates, exact.moment, exact_input].iter().enumerate() {
             assert!((linear.value - all(&point)[y]).norm() <= 1e-12 * linear.value.norm());
             for i in 0..9 {

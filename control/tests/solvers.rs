@@ -1,6 +1,6 @@
 //! The Riccati method with the cone solver as its judge: the same problem, the same cost, or neither finds an optimum.
 
-use control::linearise::{self, Linear};
+use control::linearise::{InverseKinematics, Linear};
 use control::mpc::certificate::Certificate;
 use control::mpc::cone::{Cone, Structure};
 use control::mpc::lq::Unconstrained;
@@ -36,7 +36,8 @@ impl Constraints<2> for Sets {
     }
 
     fn balls(&self, _: usize, state: &State<2>, input: &Vector3<f64>) -> Balls<2> {
-        let at = linearise::linearise(&self.body, &state[0], &state[1], input);
+        let kinematics = InverseKinematics::at(&state[0]);
+        let at = kinematics.linearise(&self.body, &state[1], input);
         let of = |y: &Linear, bound: f64| {
             let mut by_angles = Matrix3::zeros();
             by_angles.fixed_view_mut::<3, 2>(0, 0).copy_from(&y.by_angles);
@@ -52,7 +53,7 @@ impl Constraints<2> for Sets {
                 by_state: [Matrix3::zeros(), Matrix3::identity() / self.bounds.0],
                 by_input: Matrix3::zeros(),
             };
-            let u = linearise::input_of_moment(&self.body, &state[0], &at.moment);
+            let u = kinematics.input_of_moment(&self.body, &at.moment);
             Balls { state: rates, input: of(&u, self.bounds.1) }
         } else {
             Balls { state: of(&at.rates, self.bounds.0), input: of(&at.moment, self.bounds.1) }

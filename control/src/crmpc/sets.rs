@@ -98,7 +98,8 @@ impl mpc::Constraints<2> for Sets {
 
     fn balls(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> Balls<2> {
         let [angles, rates, a] = self.nominal(k, state, input);
-        let at = linearise::linearise(&self.body, &angles, &rates, &a);
+        let kinematics = InverseKinematics::at(&angles);
+        let at = kinematics.linearise(&self.body, &rates, &a);
         match &self.kind {
             Kind::Robust(robust) => Balls {
                 state: ball(&at.rates, robust.rate[k]),
@@ -110,7 +111,7 @@ impl mpc::Constraints<2> for Sets {
                     by_state: [Matrix3::zeros(), Matrix3::from_diagonal_element(1.0 / x_tube)],
                     by_input: Matrix3::zeros(),
                 },
-                input: ball(&linearise::input_of_moment(&self.body, &angles, &at.moment), *u_tube),
+                input: ball(&kinematics.input_of_moment(&self.body, &at.moment), *u_tube),
             },
         }
     }
@@ -219,7 +220,7 @@ impl Sets {
 impl Robust {
     /// Sets the bounds of interval `k`.
     fn tighten(&mut self, body: &RigidBody, k: usize, here: &Point, next: &Point) {
-        let at = linearise::linearise(body, &here.angles, &here.rates, &here.acceleration).moment;
+        let at = here.kinematics.linearise(body, &here.rates, &here.acceleration).moment;
         let after = next.kinematics.moment(body, &next.rates, &here.acceleration).norm();
         let (_, by_angles) = next.kinematics.body_rates(&next.rates);
         let feedback = largest_over_box(&at.by_acceleration, &self.design.tightening.disturbance);

@@ -409,10 +409,12 @@ impl<const O: usize> Riccati<O> {
         for (k, stage) in self.stages[..last].iter_mut().enumerate().rev() {
             let mut quadratic = Quadratic::diagonal(&problem.cost.state, &problem.cost.input);
             let Pair { multiplier, .. } = stage.input_pair;
-            quadratic.add_ball(&stage.balls.input, multiplier, stage.input_pair.scaling());
+            let scaling = stage.input_pair.scaling();
+            quadratic.add_ball(&stage.balls.input, &stage.slopes.input, multiplier, scaling);
             if k > 0 && state_balls {
                 let Pair { multiplier, .. } = stage.state_pair;
-                quadratic.add_state_ball(&stage.balls.state, multiplier, stage.state_pair.scaling());
+                let scaling = stage.state_pair.scaling();
+                quadratic.add_state_ball(&stage.balls.state, &stage.slopes.state, multiplier, scaling);
             }
             stage.gain = Gain::factor(&quadratic, problem.chain, &mut p)?;
         }
@@ -452,7 +454,12 @@ impl<const O: usize> Riccati<O> {
         }
         if problem.constraints.has_state_balls() {
             let pair = &stage.state_pair;
-            quadratic.add_state_ball(&stage.balls.state, pair.multiplier, pair.scaling());
+            quadratic.add_state_ball(
+                &stage.balls.state,
+                &stage.slopes.state,
+                pair.multiplier,
+                pair.scaling(),
+            );
         }
         quadratic.q
     }

@@ -24,22 +24,25 @@ impl<const O: usize> Quadratic<O> {
         Self { q, s: [Matrix3::zeros(); O], r: Matrix3::from_diagonal(input) }
     }
 
-    /// Adds the ball's share: λ JᵀJ, the curvature of ½‖y‖², and (λ/s) ∇c ∇cᵀ with ∇c = Jᵀy.
-    pub(super) fn add_ball(&mut self, ball: &Ball<O>, multiplier: f64, scaling: f64) {
-        self.add_state_ball(ball, multiplier, scaling);
-        let slope = ball.by_input.tr_mul(&ball.value);
+    /// Adds the ball's share: λ JᵀJ, the curvature of ½‖y‖², and (λ/s) ∇c ∇cᵀ with `slope` ∇c = Jᵀy.
+    pub(super) fn add_ball(
+        &mut self,
+        ball: &Ball<O>,
+        slope: &(State<O>, Vector3<f64>),
+        multiplier: f64,
+        scaling: f64,
+    ) {
+        self.add_state_ball(ball, &slope.0, multiplier, scaling);
         let by_input = ball.by_input.transpose() * multiplier;
-        let weighted = slope * scaling;
+        let weighted = slope.1 * scaling;
         for i in 0..O {
-            self.s[i] +=
-                by_input * ball.by_state[i] + weighted * ball.by_state[i].tr_mul(&ball.value).transpose();
+            self.s[i] += by_input * ball.by_state[i] + weighted * slope.0[i].transpose();
         }
-        self.r += by_input * ball.by_input + weighted * slope.transpose();
+        self.r += by_input * ball.by_input + weighted * slope.1.transpose();
     }
 
     /// The same of a ball that the input is not in.
-    pub(super) fn add_state_ball(&mut self, ball: &Ball<O>, multiplier: f64, scaling: f64) {
-        let slope: State<O> = std::array::from_fn(|i| ball.by_state[i].tr_mul(&ball.value));
+    pub(super) fn add_state_ball(&mut self, ball: &Ball<O>, slope: &State<O>, multiplier: f64, scaling: f64) {
         for i in 0..O {
             let by_state = ball.by_state[i].transpose() * multiplier;
             let weighted = slope[i] * scaling;
