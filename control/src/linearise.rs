@@ -9,7 +9,6 @@
 
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 use vehicle::dynamics::RigidBody;
-use vehicle::kinematics as kin;
 
 /// A vector quantity y(Θ, x_ω, a) at a point, and its partial derivatives. Nothing depends on the bank angle.
 #[derive(Clone, Copy, Debug)]
@@ -24,45 +23,63 @@ pub struct Linear {
     pub by_acceleration: Matrix3<f64>,
 }
 
-/// W = R⁻¹ and its derivatives by β at given angles.
+/// W = R⁻¹ at given angles, and its derivatives by β: W x = T(α) V(β) x, where T turns about the pitch axis.
 #[derive(Clone, Copy, Debug)]
 pub struct InverseKinematics {
-    /// Sine and cosine of α and of β.
-    sines: [f64; 4],
-    w: Matrix3<f64>,
-    w_beta: Matrix3<f64>,
-    w_beta_beta: Matrix3<f64>,
+    /// Sine and cosine of α.
+    alpha: (f64, f64),
+    /// Sine and cosine of β.
+    beta: (f64, f64),
 }
 
 impl InverseKinematics {
     /// At these angles, rad.
     pub fn at(angles: &Vector3<f64>) -> Self {
-        let (sa, ca) = angles.x.sin_cos();
-        let (sb, cb) = angles.y.sin_cos();
-        // cos 2β, sin 2β
-        let (c2, s2) = (cb * cb - sb * sb, 2.0 * sb * cb);
-        Self {
-            sines: [sa, ca, sb, cb],
-            w: Matrix3::new(-ca * sb * cb, sa, -ca * cb, cb * cb, 0.0, -sb, -sa * sb * cb, -ca, -sa * cb),
-            w_beta: Matrix3::new(-ca * c2, 0.0, ca * sb, -s2, 0.0, -cb, -sa * c2, 0.0, sa * sb),
-            w_beta_beta: Matrix3::new(
-                2.0 * ca * s2,
-                0.0,
-                ca * cb,
-                -2.0 * c2,
-                0.0,
-                sb,
-                2.0 * sa * s2,
-                0.0,
-                sa * cb,
-            ),
-        }
+        Self { alpha: angles.x.sin_cos(), beta: angles.y.sin_cos() }
+    }
+
+    /// T [p, t, q].
+    #[inline]
+    fn turn(&self, p: f64, t: f64, q: f64) -> Vector3<f64> {
+        let (sa, ca) = self.alpha;
+        Vector3::new(ca * p + sa * q, t, sa * p - ca * q)
+    }
+
+    /// W x.
+    #[inline]
+    fn w(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        let (sb, cb) = self.beta;
+        self.turn(-cb * (sb * x.x + x.z), cb * cb * x.x - sb * x.z, x.y)
+    }
+
+    /// ∂W/∂β x.
+    #[inline]
+    fn w_beta(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        let (sb, cb) = self.beta;
+        self.turn(sb * x.z - (cb * cb - sb * sb) * x.x, -cb * (2.0 * sb * x.x + x.z), 0.0)
+    }
+
+    /// ∂²W/∂β² x.
+    #[inline]
+    fn w_beta_beta(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        let (sb, cb) = self.beta;
+        self.turn(cb * (4.0 * sb * x.x + x.z), sb * x.z - 2.0 * (cb * cb - sb * sb) * x.x, 0.0)
+    }
+
+    /// The columns of W and of ∂W/∂β.
+    #[inline]
+    fn columns(&self) -> ([Vector3<f64>; 3], [Vector3<f64>; 3]) {
+        let (sb, cb) = self.beta;
+        let w = [self.turn(-cb * sb, cb * cb, 0.0), self.turn(0.0, 0.0, 1.0), self.turn(-cb, -sb, 0.0)];
+        let w_beta =
+            [self.turn(sb * sb - cb * cb, -2.0 * sb * cb, 0.0), Vector3::zeros(), self.turn(sb, -cb, 0.0)];
+        (w, w_beta)
     }
 
     /// ω and ∂ω/∂(α, β).
     pub fn body_rates(&self, angle_rates: &Vector3<f64>) -> (Vector3<f64>, [Vector3<f64>; 2]) {
-        let rates = self.w * angle_rates;
-        (rates, [by_alpha(&rates), self.w_beta * angle_rates])
+        let rates = self.w(angle_rates);
+        (rates, [by_alpha(&rates), self.w_beta(angle_rates)])
     }
 
     /// m, as [`moment`].
@@ -72,13 +89,36 @@ impl InverseKinematics {
         angle_rates: &Vector3<f64>,
         acceleration: &Vector3<f64>,
     ) -> Vector3<f64> {
-        let rates = self.w * angle_rates;
-        body.inertia * self.acceleration(angle_rates, acceleration) + rates.cross(&(body.inertia * rates))
+        let (rates, by_angles) = self.body_rates(angle_rates);
+        let omega_dot = self.acceleration(angle_rates, acceleration, &by_angles);
+        body.inertia * omega_dot + rates.cross(&(body.inertia * rates))
     }
 
-    /// ω̇ = W a + Ẇ x_ω.
-    fn acceleration(&self, x: &Vector3<f64>, a: &Vector3<f64>) -> Vector3<f64> {
-        self.w * a + by_alpha(&(self.w * x)) * x.x + self.w_beta * x * x.y
+    /// u = R I⁻¹ m, as [`input`].
+    pub fn input(
+        &self,
+        body: &RigidBody,
+        angle_rates: &Vector3<f64>,
+        acceleration: &Vector3<f64>,
+    ) -> Vector3<f64> {
+        self.r(&(body.inverse * self.moment(body, angle_rates, acceleration)))
+    }
+
+    /// ω̇ = W a + Ẇ x_ω, Ẇ x_ω = ∂ω/∂α α̇ + ∂ω/∂β β̇.
+    fn acceleration(
+        &self,
+        x: &Vector3<f64>,
+        a: &Vector3<f64>,
+        by_angles: &[Vector3<f64>; 2],
+    ) -> Vector3<f64> {
+        self.w(a) + by_angles[0] * x.x + by_angles[1] * x.y
+    }
+
+    /// R y = [y_y − p tan β, q, −p cos β − y_y sin β] with p = y_x cos α + y_z sin α, q = y_x sin α − y_z cos α.
+    fn r(&self, y: &Vector3<f64>) -> Vector3<f64> {
+        let ((sa, ca), (sb, cb)) = (self.alpha, self.beta);
+        let (p, q) = (ca * y.x + sa * y.z, sa * y.x - ca * y.z);
+        Vector3::new(y.y - p * sb / cb, q, -p * cb - y.y * sb)
     }
 }
 
@@ -89,7 +129,7 @@ fn by_alpha(y: &Vector3<f64>) -> Vector3<f64> {
 
 /// Body rates ω = R⁻¹(Θ) x_ω, rad/s.
 pub fn body_rates(angles: &Vector3<f64>, angle_rates: &Vector3<f64>) -> Vector3<f64> {
-    kin::r_inverse(angles) * angle_rates
+    InverseKinematics::at(angles).w(angle_rates)
 }
 
 /// Control moment that gives the nominal motion the acceleration `a` (rad/s²): m = I R⁻¹ (a − f), N m.
@@ -109,7 +149,7 @@ pub fn input(
     angle_rates: &Vector3<f64>,
     acceleration: &Vector3<f64>,
 ) -> Vector3<f64> {
-    acceleration - body.drift(angles, angle_rates)
+    InverseKinematics::at(angles).input(body, angle_rates, acceleration)
 }
 
 /// Body rates and moment together with their derivatives at one point of a motion.
@@ -134,42 +174,40 @@ pub fn linearise(
 impl InverseKinematics {
     /// Derivatives of ω and m, as [`linearise`].
     pub fn linearise(&self, body: &RigidBody, x: &Vector3<f64>, a: &Vector3<f64>) -> Linearisation {
-        let Self { w, w_beta, w_beta_beta, .. } = self;
-
-        let rates = w * x;
-        let rates_by_angles = [by_alpha(&rates), w_beta * x];
-
-        let omega_dot = self.acceleration(x, a);
-        let omega_dot_by_beta = w_beta * a + by_alpha(&rates_by_angles[1]) * x.x + w_beta_beta * x * x.y;
+        let (rates, rates_by_angles) = self.body_rates(x);
+        let omega_dot = self.acceleration(x, a, &rates_by_angles);
+        let omega_dot_by_beta =
+            self.w_beta(a) + by_alpha(&rates_by_angles[1]) * x.x + self.w_beta_beta(x) * x.y;
         let omega_dot_by_angles = [by_alpha(&omega_dot), omega_dot_by_beta];
+        let (w, w_beta) = self.columns();
         // Ẇ, and what α̇ and β̇ in it contribute.
-        let mut omega_dot_by_rates = w_beta * x.y;
-        for (i, by_angle) in rates_by_angles.iter().enumerate() {
-            let mut column = omega_dot_by_rates.column_mut(i);
-            column += by_angle;
-        }
-        for (i, column) in w.column_iter().enumerate() {
-            let mut sum = omega_dot_by_rates.column_mut(i);
-            sum += by_alpha(&column.into_owned()) * x.x;
-        }
+        let mut omega_dot_by_rates: [Vector3<f64>; 3] =
+            std::array::from_fn(|i| by_alpha(&w[i]) * x.x + w_beta[i] * x.y);
+        omega_dot_by_rates[0] += rates_by_angles[0];
+        omega_dot_by_rates[1] += rates_by_angles[1];
 
+        // ∂(ω × I ω) = ∂ω × I ω + ω × I ∂ω
         let momentum = body.inertia * rates;
-        // ∂(ω × I ω)/∂ω
-        let gyroscopic = rates.cross_matrix() * body.inertia - momentum.cross_matrix();
-        let moment_by_angle =
-            |i: usize| body.inertia * omega_dot_by_angles[i] + gyroscopic * rates_by_angles[i];
+        let moment_by = |omega_dot: &Vector3<f64>, omega: &Vector3<f64>, momentum_by: &Vector3<f64>| {
+            body.inertia * omega_dot + omega.cross(&momentum) + rates.cross(momentum_by)
+        };
+        let momentum_by_rates = w.map(|w| body.inertia * w);
+        let by_angle = |i: usize| {
+            moment_by(&omega_dot_by_angles[i], &rates_by_angles[i], &(body.inertia * rates_by_angles[i]))
+        };
+        let by_rate = |i: usize| moment_by(&omega_dot_by_rates[i], &w[i], &momentum_by_rates[i]);
         Linearisation {
             rates: Linear {
                 value: rates,
                 by_angles: Matrix3x2::from_columns(&rates_by_angles),
-                by_rates: *w,
+                by_rates: Matrix3::from_columns(&w),
                 by_acceleration: Matrix3::zeros(),
             },
             moment: Linear {
                 value: body.inertia * omega_dot + rates.cross(&momentum),
-                by_angles: Matrix3x2::from_columns(&[moment_by_angle(0), moment_by_angle(1)]),
-                by_rates: body.inertia * omega_dot_by_rates + gyroscopic * w,
-                by_acceleration: body.inertia * w,
+                by_angles: Matrix3x2::from_columns(&[by_angle(0), by_angle(1)]),
+                by_rates: Matrix3::from_columns(&[by_rate(0), by_rate(1), by_rate(2)]),
+                by_acceleration: Matrix3::from_columns(&momentum_by_rates),
             },
         }
     }
@@ -193,7 +231,7 @@ impl InverseKinematics {
     /// The input u = R I⁻¹ m with its derivatives, from those of the moment. With γ = I⁻¹m and R = W⁻¹, column by column,
     /// ∂u = R (∂γ) + (∂R) γ.
     pub fn input_of_moment(&self, body: &RigidBody, moment: &Linear) -> Linear {
-        let [sa, ca, sb, cb] = self.sines;
+        let ((sa, ca), (sb, cb)) = (self.alpha, self.beta);
         let (tb, sec2) = (sb / cb, 1.0 / (cb * cb));
         let r = Matrix3::new(-ca * tb, 1.0, -sa * tb, sa, 0.0, -ca, -ca * cb, -sb, -cb * sa);
         let gamma = body.inverse * moment.value;
@@ -216,6 +254,7 @@ impl InverseKinematics {
 mod tests {
     use super::*;
     use vehicle::dynamics::Inertia;
+    use vehicle::kinematics as kin;
 
     fn body() -> RigidBody {
         let inertia = Inertia { Ixx: 588791.0, Iyy: 1303212.0, Izz: 1534163.0, Ixz: 24242.0 };
@@ -228,6 +267,8 @@ mod tests {
         let body = body();
         let angles = Vector3::new(0.17, 0.12, -0.5);
         let (x, a) = (Vector3::new(0.05, -0.06, 0.04), Vector3::new(0.1, -0.08, 0.05));
+        let u = a - body.drift(&angles, &x);
+        assert!((input(&body, &angles, &x, &a) - u).norm() < 1e-13 * u.norm());
         let printed = body.inertia * kin::r_inverse(&angles) * (a - body.drift(&angles, &x));
         let ours = moment(&body, &angles, &x, &a);
         assert!((ours - printed).norm() < 1e-13 * printed.norm(), "{ours} {printed}");

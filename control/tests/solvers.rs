@@ -189,7 +189,7 @@ impl Solvers {
         let outcome = riccati.solve(&problem, &mut solution, 0, false, None);
         let verdict = cone.solve(&problem, &mut judged);
         let of = |outcome, solution: &Solution<2>| {
-            (outcome, shape.cost.of(&solution.motion), Certificate::of(&problem, solution))
+            (outcome, shape.cost.of(&solution.motion), Certificate::of(&problem, solution, false))
         };
         [of(outcome, &solution), of(verdict, &judged)]
     }

@@ -118,14 +118,15 @@ impl mpc::Constraints<2> for Sets {
 
     fn squares(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> (f64, f64) {
         let [angles, rates, a] = self.nominal(k, state, input);
+        let kinematics = InverseKinematics::at(&angles);
         let (state, input) = match &self.kind {
             Kind::Robust(robust) => (
-                linearise::body_rates(&angles, &rates) / robust.rate[k],
-                linearise::moment(&self.body, &angles, &rates, &a)
+                kinematics.body_rates(&rates).0 / robust.rate[k],
+                kinematics.moment(&self.body, &rates, &a)
                     / robust.moment.get(k).copied().unwrap_or(f64::INFINITY),
             ),
             Kind::Paper { x_tube, u_tube } => {
-                (rates / *x_tube, linearise::input(&self.body, &angles, &rates, &a) / *u_tube)
+                (rates / *x_tube, kinematics.input(&self.body, &rates, &a) / *u_tube)
             }
         };
         (state.norm_squared(), input.norm_squared())
@@ -172,7 +173,6 @@ impl Bounded<2> for Sets {
 
 /// One stage of a motion.
 struct Point {
-    angles: Vector3<f64>,
     /// x_ω.
     rates: Vector3<f64>,
     /// a; zero at the last stage.
@@ -185,7 +185,6 @@ impl Point {
         let Reference { angles, rates, accelerations } = &references[k];
         let angles = angles + motion.states[k][0];
         Self {
-            angles,
             rates: rates + motion.states[k][1],
             acceleration: motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input),
             kinematics: InverseKinematics::at(&angles),
@@ -201,7 +200,7 @@ impl Sets {
             Kind::Paper { x_tube, u_tube } => {
                 exceeds(next.rates.norm(), *x_tube)
                     || exceeds(
-                        linearise::input(&self.body, &here.angles, &here.rates, &here.acceleration).norm(),
+                        here.kinematics.input(&self.body, &here.rates, &here.acceleration).norm(),
                         *u_tube,
                     )
             }

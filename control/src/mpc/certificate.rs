@@ -21,8 +21,12 @@ impl Certificate {
         self.stationarity.max(self.feasibility).max(self.complementarity)
     }
 
-    /// Of `solution`.
-    pub fn of<const O: usize, C: Constraints<O>>(problem: &Problem<O, C>, solution: &Solution<O>) -> Self {
+    /// Of `solution`. If `checked`, intervals without multipliers are known to satisfy their constraints and are not looked at again.
+    pub fn of<const O: usize, C: Constraints<O>>(
+        problem: &Problem<O, C>,
+        solution: &Solution<O>,
+        checked: bool,
+    ) -> Self {
         let Solution { motion, multipliers } = solution;
         let (chain, cost) = (problem.chain, problem.cost);
         let n = motion.inputs.len();
@@ -53,7 +57,9 @@ impl Certificate {
             let by_input = multipliers.input.get(k).copied().unwrap_or_default();
             let by_state = if k > 0 && state_balls { multipliers.state[k - 1] } else { 0.0 };
             let idle = by_input == 0.0 && by_state == 0.0;
-            let (balls, squares) = if idle {
+            let (balls, squares) = if idle && checked {
+                (Balls::default(), (0.0, 0.0))
+            } else if idle {
                 (Balls::default(), problem.constraints.squares(k, state, &input))
             } else {
                 let balls = problem.constraints.balls(k, state, &input);
