@@ -394,7 +394,8 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
         let mut optimiser = Optimiser::new(layout.clone(), solver).unwrap();
         let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
         let mut spoilt = Spoilt { sets, tightened };
-        let report = optimiser.optimise(&mut spoilt, &MODERATE.start, &affine, Some(&previous));
+        let report =
+            optimiser.optimise(&mut spoilt, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
         assert_eq!(report.status, status);
         assert!(report.certificate.feasibility < 0.1, "{report:?}");
     }
@@ -403,6 +404,6 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
     let mut optimiser = Optimiser::new(layout, solver).unwrap();
     let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
     let mut sets = Spoilt { sets, tightened: 1 };
-    let report = optimiser.optimise(&mut sets, &MODERATE.start, &affine, Some(&previous));
+    let report = optimiser.optimise(&mut sets, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
     assert_eq!((report.status, report.iterations), (Status::Fallback, 0));
 }

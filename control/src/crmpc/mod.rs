@@ -144,7 +144,7 @@ impl Crmpc {
         let error = error(&start, &self.sets.references[0]);
         let previous = (!first).then(|| {
             memory.plan.errors(&self.sets.references, &mut self.previous);
-            &self.previous
+            (&self.previous, &memory.plan.multipliers[..])
         });
         let report = self.optimiser.optimise(&mut self.sets, &error, &self.affine, previous);
         memory.report.cost = if report.status == Status::Fallback {
@@ -158,6 +158,8 @@ impl Crmpc {
             let start = (self.settings.initial_state != InitialState::Tube).then_some(start);
             let motion = self.optimiser.motion();
             memory.plan.follow(motion, start, &self.sets.references, self.settings.period_optimisation);
+            memory.plan.multipliers.clear();
+            memory.plan.multipliers.extend(self.optimiser.multipliers());
             self.cost.of(motion)
         };
         memory.report.status = report.status;
@@ -186,6 +188,8 @@ impl Crmpc {
         let last = *plan.states.last().unwrap_or(&Vector6::zeros());
         plan.states.rotate_left(1);
         plan.accelerations.rotate_left(1);
+        plan.multipliers.rotate_left(1);
+        plan.multipliers[n - 1] = [0.0; 2];
         let a = self.terminal_acceleration(&last, &self.sets.references[n - 1]);
         plan.accelerations[n - 1] = a;
         plan.states[n] = plan::advance(&last, &a, self.settings.period_optimisation);

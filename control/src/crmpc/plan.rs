@@ -12,29 +12,41 @@ pub struct Plan {
     pub states: Vec<Vector6<f64>>,
     /// a = ẋ̃_ω, N of them, rad/s².
     pub accelerations: Vec<Vector3<f64>>,
+    /// Multipliers of the balls on the state at each interval's end and on its input, from which the next optimisation begins.
+    pub multipliers: Vec<[f64; 2]>,
 }
 
 impl Clone for Plan {
     fn clone(&self) -> Self {
-        Self { states: self.states.clone(), accelerations: self.accelerations.clone() }
+        Self {
+            states: self.states.clone(),
+            accelerations: self.accelerations.clone(),
+            multipliers: self.multipliers.clone(),
+        }
     }
 
     // Keeps the memory it has.
     fn clone_from(&mut self, source: &Self) {
         self.states.clone_from(&source.states);
         self.accelerations.clone_from(&source.accelerations);
+        self.multipliers.clone_from(&source.multipliers);
     }
 }
 
 impl Plan {
     /// A plan of `horizon` intervals at rest at the origin.
     pub fn new(horizon: usize) -> Self {
-        Self { states: vec![Vector6::zeros(); horizon + 1], accelerations: vec![Vector3::zeros(); horizon] }
+        Self {
+            states: vec![Vector6::zeros(); horizon + 1],
+            accelerations: vec![Vector3::zeros(); horizon],
+            multipliers: vec![[0.0; 2]; horizon],
+        }
     }
 
     pub(super) fn resize(&mut self, horizon: usize) {
         self.states.resize(horizon + 1, Vector6::zeros());
         self.accelerations.resize(horizon, Vector3::zeros());
+        self.multipliers.resize(horizon, [0.0; 2]);
     }
 
     /// The errors E = x̃ − x_r and v = a − Θ̈_r.

@@ -28,24 +28,35 @@ pub struct Plan {
     pub angles: Vec<Vector3<f64>>,
     /// v_0 … v_{N−1}, held between them, rad/s.
     pub commands: Vec<Vector3<f64>>,
+    /// Multipliers of the constraint, from which the next optimisation begins; the first of each pair is zero, as angles have none.
+    pub multipliers: Vec<[f64; 2]>,
 }
 
 impl Clone for Plan {
     fn clone(&self) -> Self {
-        Self { angles: self.angles.clone(), commands: self.commands.clone() }
+        Self {
+            angles: self.angles.clone(),
+            commands: self.commands.clone(),
+            multipliers: self.multipliers.clone(),
+        }
     }
 
     // Keeps the memory it has.
     fn clone_from(&mut self, source: &Self) {
         self.angles.clone_from(&source.angles);
         self.commands.clone_from(&source.commands);
+        self.multipliers.clone_from(&source.multipliers);
     }
 }
 
 impl Plan {
     /// A plan of `horizon` intervals at rest at the origin.
     pub fn new(horizon: usize) -> Self {
-        Self { angles: vec![Vector3::zeros(); horizon + 1], commands: vec![Vector3::zeros(); horizon] }
+        Self {
+            angles: vec![Vector3::zeros(); horizon + 1],
+            commands: vec![Vector3::zeros(); horizon],
+            multipliers: vec![[0.0; 2]; horizon],
+        }
     }
 
     /// The errors Θ − Θ_r and v − Θ̇_r.
@@ -229,7 +240,7 @@ impl Dlmpc {
 
         let start = [measured - self.rates.references[0].angles];
         memory.plan.errors(&self.rates.references, &mut self.previous);
-        let previous = (!first).then_some(&self.previous);
+        let previous = (!first).then_some((&self.previous, &memory.plan.multipliers[..]));
         let report = self.optimiser.optimise(&mut self.rates, &start, &self.affine, previous);
         memory.report.cost = if report.status == Status::Fallback {
             self.track(&mut memory.plan, measured);
@@ -239,6 +250,8 @@ impl Dlmpc {
         } else {
             let motion = self.optimiser.motion();
             memory.plan.follow(motion, measured, &self.rates.references, self.settings.period_optimisation);
+            memory.plan.multipliers.clear();
+            memory.plan.multipliers.extend(self.optimiser.multipliers());
             self.cost.of(motion)
         };
         memory.report.status = report.status;
@@ -263,6 +276,8 @@ impl Dlmpc {
     fn follow_reference(&self, plan: &mut Plan) {
         plan.angles.clear();
         plan.angles.extend(self.rates.references.iter().map(|reference| reference.angles));
+        plan.multipliers.clear();
+        plan.multipliers.resize(self.settings.horizon, [0.0; 2]);
         plan.commands.clear();
         plan.commands
             .extend(self.rates.references[..self.settings.horizon].iter().map(|reference| reference.rates));
@@ -275,6 +290,8 @@ impl Dlmpc {
         let command = reference.rates - self.gains.component_mul(&(last - reference.angles));
         plan.angles.rotate_left(1);
         plan.commands.rotate_left(1);
+        plan.multipliers.rotate_left(1);
+        plan.multipliers[n - 1] = [0.0; 2];
         plan.commands[n - 1] = self.within_limit(&last, command);
         plan.angles[n] = last + plan.commands[n - 1] * self.settings.period_optimisation;
     }

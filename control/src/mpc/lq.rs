@@ -156,6 +156,26 @@ impl<const O: usize> Unconstrained<O> {
         }
     }
 
+    /// Leads stages `first` to `last` of `motion` along `plan` from the state that it has at `first`, with the gains of the optimum.
+    pub fn track(
+        &self,
+        first: usize,
+        last: usize,
+        plan: &Motion<O>,
+        affine: &[State<O>],
+        motion: &mut Motion<O>,
+    ) {
+        for k in first..last {
+            let (state, planned) = (motion.states[k], plan.states[k]);
+            let v = (0..O).fold(plan.inputs[k], |sum, i| {
+                sum + self.gains[k].feedback[i].component_mul(&(state[i] - planned[i]))
+            });
+            motion.inputs[k] = v;
+            let next = self.chain.advance(&state, &v);
+            motion.states[k + 1] = std::array::from_fn(|i| next[i] + affine[k][i]);
+        }
+    }
+
     /// P and p of the cost of going on from stage `k`, for the affine terms of the last [`Self::solve`].
     pub fn to_go(&self, k: usize) -> (&PerAxis<O>, State<O>) {
         let weight = if k == self.gains.len() { &self.end } else { &self.gains[k - 1].next_weight };

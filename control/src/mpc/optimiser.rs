@@ -4,7 +4,8 @@ use super::certificate::Certificate;
 use super::cone::{Cone, Structure};
 use super::lq::Unconstrained;
 use super::problem::{
-    Chain, Constraints, Cost, End, From, Frozen, Motion, Problem, Solution, Start, State, zero_state,
+    Chain, Constraints, Cost, End, From, Frozen, Motion, Multipliers, Problem, Solution, Start, State,
+    zero_state,
 };
 use super::riccati::Riccati;
 use crate::report::Status;
@@ -182,14 +183,20 @@ impl<const O: usize> Optimiser<O> {
         self.unconstrained.feedback()
     }
 
-    /// One optimisation from `start`. `previous` holds the motion planned before from now on; without one, the bounds and the linearised
+    /// Multipliers of the ball on the state at each interval's end and of that on its input.
+    pub fn multipliers(&self) -> impl Iterator<Item = [f64; 2]> {
+        let Multipliers { state, input, .. } = &self.solution.multipliers;
+        state.iter().zip(input).map(|(&state, &input)| [state, input])
+    }
+
+    /// One optimisation from `start`. `previous` holds the motion planned before from now on, with its multipliers; without one, the bounds and the linearised
     /// balls are set about the solution again until that stands still.
     pub fn optimise<B: Bounded<O>>(
         &mut self,
         bounded: &mut B,
         start: &State<O>,
         affine: &[State<O>],
-        previous: Option<&Motion<O>>,
+        previous: Option<(&Motion<O>, &[[f64; 2]])>,
     ) -> Report {
         let budget = self.settings.time_budget;
         let deadline = (budget > 0.0).then(|| Instant::now() + Duration::from_secs_f64(budget));
@@ -218,8 +225,11 @@ impl<const O: usize> Optimiser<O> {
 
         let mut status = Status::Fallback;
         match previous {
-            Some(previous) => {
+            Some((previous, active)) => {
                 self.about.clone_from(previous);
+                if self.settings.method == Method::Riccati && self.layout.start.is_none() {
+                    self.begin_at(start, affine, active, &mut search);
+                }
                 self.about.states[0] = *start;
                 status = self.solve(bounded, &sample, &mut search);
             }
@@ -236,6 +246,23 @@ impl<const O: usize> Optimiser<O> {
             }
         }
         self.report(bounded, &sample, status, search.iterations)
+    }
+
+    /// Takes the previous plan and its multipliers as first guess where they are active in what is to be solved.
+    fn begin_at(&mut self, start: &State<O>, affine: &[State<O>], active: &[[f64; 2]], search: &mut Search) {
+        let range = search.window.clone().unwrap_or(0..self.layout.horizon);
+        let is_active = |&[state, input]: &[f64; 2]| state > 0.0 || input > 0.0;
+        if !active[range.clone()].iter().any(is_active) {
+            return;
+        }
+        let Self { unconstrained, about, solution, .. } = self;
+        let Solution { motion, multipliers } = solution;
+        motion.states[range.start] = if range.start == 0 { *start } else { about.states[range.start] };
+        unconstrained.track(range.start, range.end, about, affine, motion);
+        for k in range {
+            [multipliers.state[k], multipliers.input[k]] = active[k];
+        }
+        search.warm = true;
     }
 
     /// The optimum with the bounds about `about`, by the solvers in turn.

@@ -21,7 +21,7 @@ const RECENTRING: f64 = 0.5;
 /// Smallest slack at the start, and Σ sλ over half the cost.
 const COLD: (f64, f64) = (0.03, 0.03);
 /// The same where the multipliers of a similar problem are known.
-const WARM: (f64, f64) = (1e-3, 1e-5);
+const WARM: (f64, f64) = (3e-4, 1e-6);
 
 /// One inequality c ≤ 0 with its slack and multiplier.
 #[derive(Clone, Copy, Debug, Default)]
