@@ -271,3 +271,132 @@ fn costate<const O: usize>(gain: &Gain<O>, next_slope: &State<O>, d: &State<O>) 
 /// Limits of the search for λ.
 const SECANT_STEPS: usize = 30;
 const SECANT_TOLERANCE: f64 = 1e-12;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    const N: usize = 20;
+
+    fn chain<const O: usize>() -> Chain<O> {
+        Chain::new(0.2)
+    }
+
+    fn cost<const O: usize>() -> Cost<O> {
+        let end = SMatrix::<f64, O, O>::from_fn(|i, j| if i == j { 80.0 - 40.0 * i as f64 } else { 30.0 });
+        Cost {
+            state: std::array::from_fn(|i| Vector3::new(10.0, 7.0, 3.0) / (1.0 + i as f64)),
+            input: Vector3::new(2.0, 1.0, 0.5),
+            end: per_axis(&[end, end * 0.5, end * 2.0]),
+        }
+    }
+
+    fn start<const O: usize>() -> State<O> {
+        std::array::from_fn(|i| Vector3::new(0.1, -0.2, 0.05) / (1.0 + i as f64))
+    }
+
+    /// With a jump.
+    fn affine<const O: usize>() -> Vec<State<O>> {
+        let d = |k: usize| if k == 13 { 0.08 } else { 1e-3 * k as f64 };
+        (0..N)
+            .map(|k| std::array::from_fn(|i| Vector3::new(d(k), -d(k), 0.5 * d(k)) / (1.0 + i as f64)))
+            .collect()
+    }
+
+    fn optimum<const O: usize>() -> (Unconstrained<O>, Motion<O>) {
+        let mut lq = Unconstrained::new(N, &chain(), &cost());
+        let mut motion = Motion::new(N);
+        lq.solve(&start(), &affine(), &mut motion);
+        (lq, motion)
+    }
+
+    /// The slope of the cost in every input, by differences of the cost of the motion that the inputs lead to. A quadratic has no error.
+    fn slopes<const O: usize>(motion: &Motion<O>, terminal: f64) -> DVector<f64> {
+        let (chain, affine) = (chain(), affine());
+        let mut cost = cost::<O>();
+        let value = |cost: &Cost<O>, motion: &Motion<O>, i: usize, change: f64| {
+            let mut changed = motion.clone();
+            changed.inputs[i / 3][i % 3] += change;
+            changed.roll_out(&chain, &affine);
+            cost.of(&changed)
+        };
+        cost.end = cost.end.map(|row| row.map(|block| block * (1.0 + terminal)));
+        DVector::from_fn(3 * N, |i, _| (value(&cost, motion, i, 0.5) - value(&cost, motion, i, -0.5)) / 1.0)
+    }
+
+    fn assert_stationary<const O: usize>() {
+        let (_, motion) = optimum::<O>();
+        let mut still = motion.clone();
+        still.inputs.fill(Vector3::zeros());
+        let largest = slopes(&still, 0.0).amax();
+        assert!(slopes(&motion, 0.0).amax() < 1e-11 * largest);
+        // Newton's step from anywhere leads there: the normal equations.
+        let slope = slopes(&still, 0.0);
+        let columns: Vec<_> = (0..3 * N)
+            .map(|i| {
+                let mut moved = still.clone();
+                moved.inputs[i / 3][i % 3] += 1.0;
+                slopes(&moved, 0.0) - &slope
+            })
+            .collect();
+        let solution = DMatrix::from_columns(&columns).cholesky().unwrap().solve(&-slope);
+        for (i, value) in solution.iter().enumerate() {
+            assert!((motion.inputs[i / 3][i % 3] - value).abs() < 1e-10, "{i}");
+        }
+    }
+
+    #[test]
+    fn oracle_optimum_solves_the_normal_equations() {
+        assert_stationary::<1>();
+        assert_stationary::<2>();
+    }
+
+    fn assert_parts_give_the_whole<const O: usize>() {
+        let (mut lq, motion) = optimum::<O>();
+        lq.arrive(&start(), &affine());
+        for k in [O, O + 1, 7, 13, 14, N] {
+            // The stationary point of arrival cost and cost-to-go lies on the optimal motion, and both ways lead back to it.
+            let ((weight, mean), (to_go, slope)) = (lq.arrival(k), lq.to_go(k));
+            for axis in 0..3 {
+                let (weight, to_go): (SMatrix<f64, O, O>, _) = (of_axis(weight, axis), of_axis(to_go, axis));
+                let of = |state: &State<O>| SVector::<f64, O>::from_fn(|i, _| state[i][axis]);
+                let joint = (weight + to_go).try_inverse().unwrap() * (weight * of(&mean) - of(&slope));
+                assert!((joint - of(&motion.states[k])).amax() < 1e-10, "stage {k}");
+            }
+            let mut again = Motion::new(N);
+            again.states[k] = motion.states[k];
+            lq.trace_back(k, &affine(), &mut again);
+            lq.follow(k, &affine(), &mut again);
+            assert!(again.distance(&motion) < 1e-10, "stage {k}: {}", again.distance(&motion));
+        }
+        // Tracking the optimum from elsewhere is the optimum from there.
+        let elsewhere: State<O> = std::array::from_fn(|i| start::<O>()[i] * 1.5);
+        let (mut tracked, mut optimum) = (motion.clone(), motion.clone());
+        tracked.states[0] = elsewhere;
+        lq.track(0, N, &motion, &affine(), &mut tracked);
+        lq.solve(&elsewhere, &affine(), &mut optimum);
+        assert!(tracked.distance(&optimum) < 1e-12);
+    }
+
+    #[test]
+    fn oracle_parts_of_the_horizon_give_the_optimum_of_the_whole() {
+        assert_parts_give_the_whole::<1>();
+        assert_parts_give_the_whole::<2>();
+    }
+
+    #[test]
+    fn oracle_the_terminal_ball_adds_its_multiplier_to_the_end() {
+        let (mut lq, motion) = optimum::<2>();
+        let norm = cost().end_square(&motion.states[N]).sqrt();
+        for share in [0.99, 0.5, 0.01] {
+            let radius = share * norm;
+            let mut onto = Motion::new(N);
+            let multiplier = lq.solve_onto_terminal_ball(&start(), &affine(), radius, &mut onto).unwrap();
+            assert!(multiplier > 0.0);
+            assert!((cost().end_square(&onto.states[N]).sqrt() - radius).abs() < 1e-9 * radius);
+            let slope = slopes(&onto, multiplier / (radius * radius)).amax();
+            assert!(slope < 1e-8, "{share}: {slope}");
+        }
+    }
+}
