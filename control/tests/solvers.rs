@@ -1,65 +1,29 @@
 //! The Riccati method with the cone solver as its judge: the same problem, the same cost, or neither finds an optimum.
 
-use control::linearise::{InverseKinematics, Linear};
+#[path = "harness/balls.rs"]
+mod balls;
+
+use balls::Sets;
 use control::mpc::certificate::Certificate;
 use control::mpc::cone::{Cone, Structure};
 use control::mpc::lq::Unconstrained;
 use control::mpc::problem::{End, Frozen, Outcome, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
 use control::mpc::{
-    Ball, Balls, Bounded, Chain, Constraints, Cost, Layout, Motion, Optimiser, SolverSettings, State,
+    Balls, Bounded, Chain, Constraints, Cost, Layout, Motion, Optimiser, SolverSettings, State,
 };
 use control::report::Status;
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, SVector, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;
 use std::ops::Range;
-use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
 
 const MAX_ITERATIONS: u32 = 60;
 /// Problems per shape: their horizon and weights belong to the solvers' construction.
 const PER_SHAPE: usize = 125;
 const SHAPES: u32 = 44;
-
-/// Bounds on body rates and moment (the limits themselves), or on x_ω and u (the printed sets), about the origin.
-struct Sets {
-    body: RigidBody,
-    printed: bool,
-    bounds: (f64, f64),
-}
-
-impl Constraints<2> for Sets {
-    fn has_state_balls(&self) -> bool {
-        true
-    }
-
-    fn balls(&self, _: usize, state: &State<2>, input: &Vector3<f64>) -> Balls<2> {
-        let kinematics = InverseKinematics::at(&state[0]);
-        let at = kinematics.linearise(&self.body, &state[1], input);
-        let of = |y: &Linear, bound: f64| {
-            let mut by_angles = Matrix3::zeros();
-            by_angles.fixed_view_mut::<3, 2>(0, 0).copy_from(&y.by_angles);
-            Ball {
-                value: y.value / bound,
-                by_state: [by_angles / bound, y.by_rates / bound],
-                by_input: y.by_acceleration / bound,
-            }
-        };
-        if self.printed {
-            let rates = Ball {
-                value: state[1] / self.bounds.0,
-                by_state: [Matrix3::zeros(), Matrix3::identity() / self.bounds.0],
-                by_input: Matrix3::zeros(),
-            };
-            let u = kinematics.input_of_moment(&self.body, &at.moment);
-            Balls { state: rates, input: of(&u, self.bounds.1) }
-        } else {
-            Balls { state: of(&at.rates, self.bounds.0), input: of(&at.moment, self.bounds.1) }
-        }
-    }
-}
 
 /// What the solvers are built for.
 #[derive(Clone, Debug)]

@@ -13,6 +13,7 @@ pub use design::{
     terminal_weight,
 };
 pub use plan::Plan;
+pub use sets::Bounds;
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
@@ -123,6 +124,11 @@ impl Crmpc {
     /// The offline design.
     pub fn design(&self) -> &Design {
         &self.design
+    }
+
+    /// The bounds that the last optimisation was under, for benchmarks and tests that solve the same problem otherwise.
+    pub fn bounds(&self) -> Bounds {
+        self.sets.bounds()
     }
 
     /// One optimisation at `time` from the measured state (Θ, x_ω): leaves the plan and the report in `memory`.

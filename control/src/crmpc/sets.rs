@@ -20,6 +20,17 @@ pub(super) struct Sets {
     terminal_radius: f64,
 }
 
+/// The bounds that an optimisation was under, for benchmarks and tests that solve the same problem otherwise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bounds {
+    /// Of stages 0..=N, the first without effect: on ‖ω̃‖ with the robust set, on ‖x̃_ω‖ with the paper's, rad/s.
+    pub rate: Vec<f64>,
+    /// Of intervals 0..N: on ‖m̃‖ (N m) with the robust set, on ‖ũ‖ (rad/s²) with the paper's.
+    pub input: Vec<f64>,
+    /// ε of ‖Ẽ_N‖_G ≤ ε.
+    pub terminal: f64,
+}
+
 #[derive(Clone, Debug)]
 enum Kind {
     /// ‖ω‖ and ‖m‖ with stage-wise bounds.
@@ -75,6 +86,16 @@ impl Sets {
         };
         let references = vec![Reference::default(); n + 1];
         Ok(Self { kind, body: settings.body, references, terminal_radius })
+    }
+
+    /// The bounds in force.
+    pub(super) fn bounds(&self) -> Bounds {
+        let n = self.references.len() - 1;
+        let (rate, input) = match &self.kind {
+            Kind::Robust(robust) => (robust.rate.clone(), robust.moment.clone()),
+            Kind::Paper { x_tube, u_tube } => (vec![*x_tube; n + 1], vec![*u_tube; n]),
+        };
+        Bounds { rate, input, terminal: self.terminal_radius }
     }
 
     /// To be called when the references are new.

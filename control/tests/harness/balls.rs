@@ -1,0 +1,48 @@
+//! Balls with the same bounds at all stages, for problems of the solvers alone.
+#![allow(unreachable_pub)]
+
+use control::linearise::{InverseKinematics, Linear};
+use control::mpc::{Ball, Balls, Constraints, State};
+use nalgebra::{Matrix3, Vector3};
+use vehicle::dynamics::RigidBody;
+
+/// Bounds on body rates and moment (the limits themselves), or on x_ω and u (the printed sets), about the origin.
+pub struct Sets {
+    /// The vehicle.
+    pub body: RigidBody,
+    /// Whether on x_ω and u.
+    pub printed: bool,
+    /// Of rates and input.
+    pub bounds: (f64, f64),
+}
+
+impl Constraints<2> for Sets {
+    fn has_state_balls(&self) -> bool {
+        true
+    }
+
+    fn balls(&self, _: usize, state: &State<2>, input: &Vector3<f64>) -> Balls<2> {
+        let kinematics = InverseKinematics::at(&state[0]);
+        let at = kinematics.linearise(&self.body, &state[1], input);
+        let of = |y: &Linear, bound: f64| {
+            let mut by_angles = Matrix3::zeros();
+            by_angles.fixed_view_mut::<3, 2>(0, 0).copy_from(&y.by_angles);
+            Ball {
+                value: y.value / bound,
+                by_state: [by_angles / bound, y.by_rates / bound],
+                by_input: y.by_acceleration / bound,
+            }
+        };
+        if self.printed {
+            let rates = Ball {
+                value: state[1] / self.bounds.0,
+                by_state: [Matrix3::zeros(), Matrix3::identity() / self.bounds.0],
+                by_input: Matrix3::zeros(),
+            };
+            let u = kinematics.input_of_moment(&self.body, &at.moment);
+            Balls { state: rates, input: of(&u, self.bounds.1) }
+        } else {
+            Balls { state: of(&at.rates, self.bounds.0), input: of(&at.moment, self.bounds.1) }
+        }
+    }
+}

@@ -1,0 +1,377 @@
+"""How long CRMPC's optimisations take over the 50 s scenario of Chai 2022: ours, CasADi with IPOPT, CasADi's sqpmethod, QOCO.
+
+All get the same samples, each from the same previous plan, shifted. IPOPT and sqpmethod solve the nonlinear programme as it is
+(multiple shooting, exact derivatives, warm-started in the primal unknowns); QOCO the cone programme linearised about that plan, its
+data updated in place. Only the solve calls are timed; ours include the preview of the references, the linearisation and the
+certificate. Of the repetitions of each sample the fastest counts, as what else the machine does can only add to it. No test: times
+differ from machine to machine, so only the ratios of one run count.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import subprocess
+import time
+from dataclasses import dataclass, field
+
+import casadi as ca
+import matplotlib.pyplot as plt
+import numpy as np
+import qoco
+from scipy import sparse
+
+import nlp
+from conftest import ROOT, TARGET
+
+N, H = nlp.HORIZON, nlp.STEP
+OURS = ["exits, riccati", "riccati", "cone"]
+# The cost is in deg^2 to the solvers, so that their absolute tolerances mean something.
+SCALE = (180.0 / np.pi) ** 2
+# Ours stop there, too.
+STANDSTILL = 1e-6
+FIRST_PASSES = 20
+# Seconds that one of the others may take for one constraint set before it gets every k-th sample only.
+PATIENCE = 60.0
+
+
+def pieces(kind: str) -> ca.Function:
+    """The two balls of a stage, (theta, x_omega, a) -> y of rates and y of input, not yet divided by their bounds.
+
+    With W = R^-1 in closed form, so that the expressions are as short as ours: m = I (W a + (dW/dt) x_omega) + omega x I omega.
+    """
+    angles, rates, a = (ca.SX.sym(name, 3) for name in ("angles", "rates", "a"))
+    sa, ca_, sb, cb = ca.sin(angles[0]), ca.cos(angles[0]), ca.sin(angles[1]), ca.cos(angles[1])
+    w = ca.vertcat(
+        ca.horzcat(-ca_ * sb * cb, sa, -ca_ * cb),
+        ca.horzcat(cb * cb, 0.0, -sb),
+        ca.horzcat(-sa * sb * cb, -ca_, -sa * cb),
+    )
+    w_dot = ca.reshape(ca.jtimes(ca.reshape(w, 9, 1), angles, rates), 3, 3)
+    inertia = ca.DM(nlp.INERTIA)
+    omega = ca.mtimes(w, rates)
+    m = ca.mtimes(inertia, ca.mtimes(w, a) + ca.mtimes(w_dot, rates)) + ca.cross(omega, ca.mtimes(inertia, omega))
+    u = ca.mtimes(nlp.kinematics(angles), ca.mtimes(ca.inv(inertia), m))
+    check = ca.Function("check", [angles, rates, a], [u - (a - nlp.drift_function()(angles, rates))])
+    assert np.abs(np.array(check([0.2, -0.1, 0.3], [0.05, 0.02, -0.04], [0.03, -0.02, 0.01]))).max() < 1e-12
+    return ca.Function("balls", [angles, rates, a], [rates, u] if kind == "paper" else [omega, m])
+
+
+@dataclass
+class Sample:
+    """One optimisation, in the order of unknowns that all of the others share: x_0 ... x_N, a_0 ... a_N-1."""
+
+    kind: str
+    time: float
+    start: np.ndarray
+    references: np.ndarray
+    bounds: np.ndarray
+    guess: np.ndarray
+    first: bool
+    ways: dict
+
+    @staticmethod
+    def read(line: str) -> Sample:
+        raw = json.loads(line)
+        references = np.array(raw["references"]).reshape(N + 1, 9)
+        previous = raw["previous"]
+        if previous is None:
+            states, inputs = references[:, :6], references[:N, 6:]
+        else:
+            # (31): the first interval dropped, one under the terminal law appended.
+            states, inputs = np.array(previous["states"]), np.array(previous["accelerations"])
+            last = states[-1]
+            a = references[N - 1, 6:] - 5.0 * (last[:3] - references[N - 1, :3] + last[3:] - references[N - 1, 3:6])
+            end = np.concatenate([last[:3] + H * last[3:] + 0.5 * H * H * a, last[3:] + H * a])
+            states, inputs = np.vstack([states[1:], end]), np.vstack([inputs[1:], a])
+        bounds = raw["bounds"]
+        return Sample(
+            raw["set"],
+            raw["time"],
+            np.array(raw["start"]),
+            references,
+            np.concatenate([bounds["rate"][1:], bounds["input"], [bounds["terminal"]]]),
+            np.concatenate([np.ravel(states), np.ravel(inputs)]),
+            previous is None,
+            raw["ways"],
+        )
+
+
+def stage_weights() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of (10), sampled: of a state, of an input, of the last state."""
+    g = nlp.printed_sets().weight
+    return H * nlp.P * np.eye(6), H * nlp.Q * np.eye(3), np.kron(g, np.eye(3))
+
+
+def hessian() -> sparse.csc_matrix:
+    """P of z'Pz / 2, the cost in deg^2."""
+    w, v, g = stage_weights()
+    return sparse.csc_matrix(2.0 * SCALE * sparse.block_diag([w] * N + [g] + [v] * N))
+
+
+def target(sample: Sample) -> np.ndarray:
+    """The unknowns without any error."""
+    return np.concatenate([sample.references[:, :6].ravel(), sample.references[:N, 6:].ravel()])
+
+
+class Casadi:
+    """The nonlinear programme, parametric in start, references and bounds."""
+
+    def __init__(self, kind: str, plugin: str, options: dict):
+        balls = pieces(kind)
+        x, a = ca.SX.sym("x", 6, N + 1), ca.SX.sym("a", 3, N)
+        start, references = ca.SX.sym("start", 6), ca.SX.sym("references", 9, N + 1)
+        bounds = ca.SX.sym("bounds", 2 * N + 1)
+        w, v, g = (ca.DM(weight) for weight in stage_weights())
+        cost = 0.0
+        equal, below_one = [x[:, 0] - start], []
+        for k in range(N):
+            cost += ca.bilin(w, x[:, k] - references[:6, k]) + ca.bilin(v, a[:, k] - references[6:, k])
+            angles, rates = x[:3, k], x[3:, k]
+            equal += [x[:3, k + 1] - (angles + H * rates + 0.5 * H * H * a[:, k]), x[3:, k + 1] - (rates + H * a[:, k])]
+            after, _ = balls(x[:3, k + 1], x[3:, k + 1], np.zeros(3))
+            _, moment = balls(angles, rates, a[:, k])
+            below_one += [ca.sumsqr(after / bounds[k]), ca.sumsqr(moment / bounds[N + k])]
+        terminal = ca.bilin(g, x[:, N] - references[:6, N])
+        below_one.append(terminal / bounds[2 * N] ** 2)
+        equalities, inequalities = ca.vertcat(*equal), ca.vertcat(*below_one)
+        problem = {
+            "x": ca.veccat(x, a),
+            "f": SCALE * (cost + terminal),
+            "g": ca.vertcat(equalities, inequalities),
+            "p": ca.veccat(start, references, bounds),
+        }
+        self.solver = ca.nlpsol("solver", plugin, problem, {"print_time": False, "error_on_fail": False, **options})
+        self.lower = ca.DM(np.concatenate([np.zeros(equalities.numel()), np.full(inequalities.numel(), -np.inf)]))
+        self.upper = ca.DM(np.concatenate([np.zeros(equalities.numel()), np.ones(inequalities.numel())]))
+
+    def solve(self, sample: Sample) -> tuple[float, int, float | None]:
+        """Seconds, iterations and cost; no cost if it failed."""
+        parameters = ca.DM(np.concatenate([sample.start, sample.references.ravel(), sample.bounds]))
+        guess = ca.DM(sample.guess)
+        begin = time.perf_counter()
+        solution = self.solver(x0=guess, p=parameters, lbg=self.lower, ubg=self.upper)
+        seconds = time.perf_counter() - begin
+        stats = self.solver.stats()
+        return seconds, stats["iter_count"], float(solution["f"]) / SCALE if stats["success"] else None
+
+
+class Qoco:
+    """The cone programme linearised about the previous plan; the first, as ours, about its own solution until that stands still."""
+
+    def __init__(self, kind: str):
+        balls = pieces(kind)
+        arguments = [ca.SX.sym(name, 3) for name in ("angles", "rates", "a")]
+        rate, moment = balls(*arguments)
+        point = ca.vertcat(*arguments)
+        values = [rate, ca.jacobian(rate, point), moment, ca.jacobian(moment, point)]
+        self.balls = ca.Function("linear", arguments, [ca.densify(value) for value in values]).map(N + 1)
+        self.p = hessian()
+        e, b = sparse.eye(6), np.vstack([0.5 * H * H * np.eye(3), H * np.eye(3)])
+        step = np.block([[np.eye(3), H * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]])
+        moved = sparse.kron(sparse.eye(N, N + 1, k=1), e) - sparse.kron(sparse.eye(N, N + 1), step)
+        chain = sparse.hstack([moved, -sparse.kron(sparse.eye(N), b)])
+        first = sparse.hstack([e, sparse.csc_matrix((6, 9 * N))])
+        self.a = sparse.csc_matrix(sparse.vstack([first, chain]))
+        # Rows and columns of G's blocks: for each stage the ball on its state, then that on its input; ours, zeros included.
+        column = lambda k, of: 6 * k + np.arange(6) if of == "x" else 6 * (N + 1) + 3 * k + np.arange(3)
+        self.columns = [(column(k + 1, "x"), np.concatenate([column(k, "x"), column(k, "a")])) for k in range(N)]
+        rows, columns = [], []
+        for k, (state, both) in enumerate(self.columns):
+            for row, own in ((8 * k + 1, state), (8 * k + 5, both)):
+                rows.append(np.repeat(row + np.arange(3), len(own)))
+                columns.append(np.tile(own, 3))
+        self.root = np.linalg.cholesky(stage_weights()[2]).T
+        rows.append(np.repeat(8 * N + 1 + np.arange(6), 6))
+        columns.append(np.tile(column(N, "x"), 6))
+        self.rows, self.at = np.concatenate(rows), np.concatenate(columns)
+        self.m, self.n = 8 * N + 7, 9 * N + 6
+        # Where each entry goes among those that are stored column by column.
+        marked = sparse.csc_matrix((np.arange(1.0, len(self.rows) + 1.0), (self.rows, self.at)), (self.m, self.n))
+        self.order = marked.data.astype(int) - 1
+        self.marked = marked
+        self.solver = None
+
+    def linearise(self, sample: Sample, about: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Entries of G, column by column, and h: h - G z in the cones."""
+        states, inputs = about[: 6 * (N + 1)].reshape(N + 1, 6), about[6 * (N + 1) :].reshape(N, 3)
+        rate, by_rate, moment, by_moment = (
+            np.array(value) for value in self.balls(states[:, :3].T, states[:, 3:].T, np.vstack([inputs, np.zeros(3)]).T)
+        )
+        entries, h = [], np.zeros(self.m)
+        for k, (state, both) in enumerate(self.columns):
+            own = by_rate[:, 9 * (k + 1) : 9 * (k + 1) + 6] / sample.bounds[k]
+            entries.append(-own.ravel())
+            h[8 * k] = h[8 * k + 4] = 1.0
+            h[8 * k + 1 : 8 * k + 4] = rate[:, k + 1] / sample.bounds[k] - own @ about[state]
+            own = by_moment[:, 9 * k : 9 * k + 9] / sample.bounds[N + k]
+            entries.append(-own.ravel())
+            h[8 * k + 5 : 8 * k + 8] = moment[:, k] / sample.bounds[N + k] - own @ about[both]
+        root = self.root / sample.bounds[2 * N]
+        entries.append(-root.ravel())
+        h[8 * N] = 1.0
+        h[8 * N + 1 :] = -root @ sample.references[N, :6]
+        return np.concatenate(entries)[self.order], h
+
+    def solve(self, sample: Sample) -> tuple[float, int, float | None]:
+        """Seconds, iterations and cost; no cost if it failed."""
+        about, best = sample.guess.copy(), target(sample)
+        about[:6] = sample.start
+        c = -self.p @ best
+        b = np.concatenate([sample.start, np.zeros(6 * N)])
+        seconds, iterations = 0.0, 0
+        for _ in range(FIRST_PASSES if sample.first else 1):
+            g, h = self.linearise(sample, about)
+            if self.solver is None:
+                self.solver = qoco.QOCO()
+                tolerances = {"abstol": 1e-8, "reltol": 1e-8}
+                matrix = sparse.csc_matrix((g, self.marked.indices, self.marked.indptr), (self.m, self.n))
+                cones = np.array([4] * 2 * N + [7])
+                sizes = (self.n, self.m, 6 * (N + 1))
+                self.solver.setup(*sizes, self.p, c, self.a, b, matrix, h, 0, len(cones), cones, **tolerances)
+            else:
+                self.solver.update_vector_data(c=c, b=b, h=h)
+                self.solver.update_matrix_data(G=g)
+            begin = time.perf_counter()
+            result = self.solver.solve()
+            seconds += time.perf_counter() - begin
+            iterations += result.iters
+            if result.status != "QOCO_SOLVED":
+                return seconds, iterations, None
+            x = np.array(result.x)
+            moved = np.abs(x - about)[: 6 * (N + 1)].max()
+            about = x
+            if moved < STANDSTILL:
+                break
+        error = about - best
+        return seconds, iterations, float(0.5 * error @ (self.p @ error)) / SCALE
+
+
+def others(kind: str) -> dict:
+    """The solvers to compare with."""
+    ipopt = {"print_level": 0, "sb": "yes", "tol": 1e-9, "bound_relax_factor": 0.0}
+    quiet = {"print_header": False, "print_iteration": False, "print_status": False}
+    qp = {"print_iter": False, "print_header": False, "print_info": False, "error_on_fail": False}
+    sqp = {**quiet, "qpsol": "qrqp", "qpsol_options": qp, "tol_pr": 1e-8, "tol_du": 1e-6, "max_iter": 50}
+    return {
+        "CasADi + IPOPT": Casadi(kind, "ipopt", {"ipopt": ipopt}),
+        "CasADi sqpmethod": Casadi(kind, "sqpmethod", sqp),
+        "QOCO": Qoco(kind),
+    }
+
+
+# Which of our ways solves the same programme.
+SAME = {"CasADi + IPOPT": "riccati", "CasADi sqpmethod": "riccati", "QOCO": "cone"}
+
+
+@dataclass
+class Timed:
+    """What one solver did with the samples that it got."""
+
+    samples: list[int] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    iterations: list[int] = field(default_factory=list)
+    costs: list[float | None] = field(default_factory=list)
+
+    def add(self, sample: int, seconds: float, iterations: int, cost: float | None) -> None:
+        self.samples.append(sample)
+        self.seconds.append(seconds)
+        self.iterations.append(iterations)
+        self.costs.append(cost)
+
+
+def measure(kind: str, samples: list[Sample], every: int | None, repeat: int) -> dict[str, Timed]:
+    """All solvers on the samples of one constraint set."""
+    found = {name: Timed() for name in OURS}
+    for index, sample in enumerate(samples):
+        for name in OURS:
+            way = sample.ways[name]
+            cost = None if way["status"] == "Fallback" else way["cost"]
+            found[name].add(index, way["seconds"], way["iterations"], cost)
+    for name, solver in others(kind).items():
+        step = every
+        if step is None:
+            trial = [solver.solve(sample)[0] for sample in samples[:: max(1, len(samples) // 8)]]
+            step = max(1, int(np.ceil(np.mean(trial) * len(samples) * repeat / PATIENCE)))
+        if step > 1:
+            print(f"{kind}: {name} gets every {step}th sample only", flush=True)
+        found[name] = Timed()
+        for index in range(0, len(samples), step):
+            found[name].add(index, *min((solver.solve(samples[index]) for _ in range(repeat)), key=lambda result: result[0]))
+    return found
+
+
+def table(kind: str, found: dict[str, Timed]) -> None:
+    """Prints what came out."""
+    ours = np.array(found[OURS[0]].seconds)
+    print(f"\n{kind} set, {len(ours)} optimisations, times in ms; the ratio is that of the means over the same samples")
+    columns = ("mean", "median", "p99", "max", "first", "iterations", "solved", "ratio", "cost differs by")
+    print(f"  {'':<18}" + "".join(f"{column:>11}" for column in columns[:-1]) + f"{columns[-1]:>18}")
+    for name, timed in found.items():
+        ms = np.array(timed.seconds) * 1e3
+        ratio = np.mean(timed.seconds) / np.mean(ours[timed.samples])
+        numbers = [ms.mean(), np.median(ms), np.percentile(ms, 99), ms.max(), ms[0]]
+        solved = sum(cost is not None for cost in timed.costs)
+        text = f"  {name:<18}" + "".join(f"{number:11.4f}" for number in numbers)
+        text += f"{np.mean(timed.iterations):11.1f}{solved:>7}/{len(ms):<3}{ratio:11.1f}"
+        if name in SAME:
+            other = found[SAME[name]].costs
+            pairs = [(cost, other[i]) for i, cost in zip(timed.samples, timed.costs) if cost and other[i]]
+            largest = max((abs(cost / own - 1.0) for cost, own in pairs), default=np.nan)
+            text += f"{largest:18.1e}"
+        print(text)
+
+
+def draw(all_found: dict[str, dict[str, Timed]]) -> None:
+    """Every time as a point, with median and 99th percentile."""
+    figure, axes = plt.subplots(1, len(all_found), figsize=(11, 3.8), layout="constrained", sharex=True, sharey=True)
+    scatter = np.random.default_rng(0)
+    for axis, (kind, found) in zip(np.atleast_1d(axes), all_found.items()):
+        for row, (name, timed) in enumerate(found.items()):
+            ms = np.array(timed.seconds) * 1e3
+            colour = "#1f77b4" if name in OURS else "#d62728"
+            rows = row + scatter.uniform(-0.28, 0.28, len(ms))
+            axis.scatter(ms, rows, s=5, alpha=0.45, color=colour, linewidths=0, rasterized=True)
+            for share, style in ((50, "-"), (99, ":")):
+                axis.plot([np.percentile(ms, share)] * 2, [row - 0.4, row + 0.4], style, color="black", linewidth=1.4)
+        axis.set(title=f"{kind} set", xlabel="one optimisation, ms", xscale="log")
+        axis.set_yticks(range(len(found)), list(found))
+        axis.grid(axis="x", which="major", linewidth=0.5, alpha=0.6)
+    axes = np.atleast_1d(axes)
+    axes[0].invert_yaxis()
+    figure.suptitle("Every optimisation of the 50 s scenario (line: median, dotted: 99th percentile)", fontsize=11)
+    for suffix in ("png", "svg"):
+        figure.savefig(ROOT / "out" / "bench" / f"solvers.{suffix}", dpi=150)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--repeat", type=int, default=20, help="repetitions of each sample by ours")
+    parser.add_argument("--repeat-others", type=int, default=3, help="repetitions of each sample by the others")
+    parser.add_argument("--every", type=int, help="solve every k-th sample by the others; all, unless they take minutes")
+    arguments = parser.parse_args()
+    command = [TARGET / "release" / "examples" / "samples", str(arguments.repeat)]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    samples = [Sample.read(line) for line in lines]
+    out = ROOT / "out" / "bench"
+    out.mkdir(parents=True, exist_ok=True)
+    found = {}
+    for kind in ("robust", "paper"):
+        own = [sample for sample in samples if sample.kind == kind]
+        found[kind] = measure(kind, own, arguments.every, arguments.repeat_others)
+        table(kind, found[kind])
+    with (out / "solvers.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["set", "solver", "time_s", "seconds", "iterations", "cost"])
+        for kind, solvers in found.items():
+            times = [sample.time for sample in samples if sample.kind == kind]
+            for name, timed in solvers.items():
+                for row in zip(timed.samples, timed.seconds, timed.iterations, timed.costs):
+                    writer.writerow([kind, name, times[row[0]], *row[1:]])
+    draw(found)
+    print(f"\n{out}: solvers.csv, solvers.png, solvers.svg")
+
+
+if __name__ == "__main__":
+    main()

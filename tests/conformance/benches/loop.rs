@@ -1,0 +1,133 @@
+//! Times through the C interface: `fmi2DoStep` of plant and controller, and the whole 50 s loop of Chai 2022 through both libraries
+//! (white noise, inertia + 5 %).
+//!
+//! The loop is what a master cannot do without: the controller's inputs set, its moment asked for and set, both stepped, 1250 times.
+//! Instantiation and initialization are not timed, and nothing is recorded.
+
+use conformance::interface::CO_SIMULATION;
+use conformance::{Instance, Unit, c, unit};
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+
+const STEP: f64 = 0.04;
+const TICKS: u32 = 1250;
+
+/// A vector's value references.
+fn vector(unit: &Unit, name: &str, axes: [&str; 3]) -> [u32; 3] {
+    axes.map(|axis| unit.reference(&format!("{name}.{axis}")))
+}
+
+fn get<const N: usize>(from: &Instance, references: &[u32; N]) -> [f64; N] {
+    let mut values = [f64::NAN; N];
+    from.ok(c!(from, fmi2GetReal(from.component, references.as_ptr(), N, values.as_mut_ptr())));
+    values
+}
+
+fn set<const N: usize>(to: &Instance, references: &[u32; N], values: &[f64; N]) {
+    to.ok(c!(to, fmi2SetReal(to.component, references.as_ptr(), N, values.as_ptr())));
+}
+
+/// Plant and controller, connected.
+struct Loop {
+    plant: Instance,
+    controller: Instance,
+    /// Attitude and rate, of the plant and of the controller.
+    motion: [[u32; 6]; 2],
+    moment: [[u32; 3]; 2],
+}
+
+impl Loop {
+    fn new(plant: &Unit, controller: &Unit, constraints: Option<&str>) -> Self {
+        let motion = [plant, controller].map(|unit| {
+            let [alpha, beta, sigma] = vector(unit, "attitude", ["alpha", "beta", "sigma"]);
+            let [p, q, r] = vector(unit, "rate", ["p", "q", "r"]);
+            [alpha, beta, sigma, p, q, r]
+        });
+        let moment = [plant, controller].map(|unit| vector(unit, "moment", ["x", "y", "z"]));
+        let (plant, controller) = (plant.instance(CO_SIMULATION), controller.instance(CO_SIMULATION));
+        plant.choose("disturbance.kind", "white");
+        plant.ok(plant.set_real(plant.unit.reference("inertia.scale"), 1.05));
+        if let Some(constraints) = constraints {
+            controller.choose("constraints", constraints);
+        }
+        Self { plant: plant.initialized(), controller: controller.initialized(), motion, moment }
+    }
+
+    /// What the controller sees, and its moment.
+    fn pass_on(&self) {
+        set(&self.controller, &self.motion[1], &get(&self.plant, &self.motion[0]));
+        set(&self.plant, &self.moment[0], &get(&self.controller, &self.moment[1]));
+    }
+
+    fn step(&self, tick: u32) {
+        let time = f64::from(tick) * STEP;
+        self.controller.ok(self.controller.step(time, STEP));
+        self.plant.ok(self.plant.step(time, STEP));
+    }
+
+    fn run(&self) {
+        for tick in 0..TICKS {
+            self.pass_on();
+            self.step(tick);
+        }
+    }
+}
+
+fn loops(criterion: &mut Criterion) {
+    let (plant, crmpc) = (unit("ReentryPlant"), unit("CRMPC"));
+    let mut group = criterion.benchmark_group("fmi2DoStep");
+    let alone = plant.instance(CO_SIMULATION).initialized();
+    let (start, mut tick) = (alone.save(), 0);
+    group.bench_function("ReentryPlant", |bencher| {
+        bencher.iter(|| {
+            // Without a controller it is to stay near where it started.
+            if tick == 25 {
+                alone.restore(start);
+                tick = 0;
+            }
+            alone.ok(alone.step(f64::from(tick) * STEP, STEP));
+            tick += 1;
+        });
+    });
+    // At tick 5 CRMPC optimises, at the next it only feeds back.
+    for (name, tick) in [("CRMPC, optimising", 5), ("CRMPC, between", 6)] {
+        let closed = Loop::new(&plant, &crmpc, None);
+        for before in 0..tick {
+            closed.pass_on();
+            closed.step(before);
+        }
+        let motion = get(&closed.plant, &closed.motion[0]);
+        let state = closed.controller.save();
+        group.bench_function(name, |bencher| {
+            // The work is done when the step is asked for, as no output was.
+            bencher.iter_batched(
+                || {
+                    closed.controller.restore(state);
+                    set(&closed.controller, &closed.motion[1], &motion);
+                },
+                |()| closed.controller.ok(closed.controller.step(f64::from(tick) * STEP, STEP)),
+                BatchSize::PerIteration,
+            );
+        });
+    }
+    group.finish();
+
+    let mut group = criterion.benchmark_group("50 s through two FMUs");
+    group.sample_size(20);
+    for (name, controller, constraints) in [
+        ("CRMPC robust", &crmpc, Some("robust")),
+        ("CRMPC paper", &crmpc, Some("paper")),
+        ("LQR", &unit("LQR"), None),
+    ] {
+        group.bench_function(name, |bencher| {
+            bencher.iter_batched_ref(
+                || Loop::new(&plant, controller, constraints),
+                |closed| closed.run(),
+                BatchSize::PerIteration,
+            );
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, loops);
+criterion_main!(benches);
