@@ -105,6 +105,12 @@ pub enum DesignError {
         /// The value at fault.
         value: f64,
     },
+    /// A matrix must have an inverse.
+    #[error("{name} must be finite and have an inverse")]
+    Singular {
+        /// Which matrix.
+        name: String,
+    },
     /// A quantity must exceed a bound.
     #[error("{name} = {value} must be finite and above {bound}")]
     NotAbove {

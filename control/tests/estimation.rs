@@ -1,0 +1,266 @@
+//! The attitude estimator on the sensors of the vehicle crate.
+
+mod harness;
+
+use control::estimation::ellipsoid::Correction;
+use control::estimation::{
+    Alignment, CalibrationMode, CalibrationStatus, Estimate, Estimator, Health, Settings, angles,
+    mems_corrections,
+};
+use harness::platform::{
+    CALIBRATION_DURATION, CALIBRATION_SEED, PERIOD, Truth, calibrated, calibration, config, errors,
+    estimates, lines, mems, rest, scenario,
+};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use proptest::prelude::*;
+use std::sync::LazyLock;
+use vehicle::kinematics::Kinematics;
+use vehicle::platform::body_from_velocity;
+use vehicle::sensor_data::SensorData;
+use vehicle::sensors::Config;
+use vehicle::triad::Window;
+
+/// For the MEMS set, with the corrections of the data file.
+static CALIBRATED: LazyLock<Settings> =
+    LazyLock::new(|| Settings { corrections: mems_corrections(), ..Settings::default() });
+
+fn ideal() -> Config {
+    config(&SensorData::embedded().ideal, 1)
+}
+
+/// No filter, and no delay but that of the line.
+fn sharp() -> Settings {
+    Settings { cutoff: 0.0, sensor_delay: 0.0, ..Settings::default() }
+}
+
+fn health_at(estimates: &[Estimate], time: f64) -> Health {
+    estimates[(time / PERIOD).round() as usize].health
+}
+
+proptest! {
+    #[test]
+    fn oracle_angles_come_back_from_the_rotation(alpha in -3.1..3.1, beta in -1.5..1.5, sigma in -3.1..3.1) {
+        let wanted = Vector3::new(alpha, beta, sigma);
+        let rotation = Rotation3::from_matrix_unchecked(body_from_velocity(&wanted));
+        prop_assert!((angles(&rotation) - wanted).amax() < 1e-12);
+    }
+}
+
+/// Required: ‖W A − I‖ ≤ 5e-3 at a noise of 0.5 %. The set's is 0.6 %, its converter's steps aside.
+#[test]
+fn oracle_the_calibration_flight_finds_the_magnetometers_errors() {
+    for seed in 1..=5 {
+        let Settings { corrections: [_, _, found], .. } = calibrated(&mems(seed), 120.0);
+        let SensorData { mems: [_, _, magnetometer], surroundings, .. } = SensorData::embedded();
+        let size = surroundings.field.norm();
+        let left = found.matrix * size * magnetometer.matrix - Matrix3::identity();
+        let error = left.singular_values().max();
+        assert!(error < 5e-3, "seed {seed}: {error}");
+        assert!((found.bias - magnetometer.bias).norm() < 1e-3 * size, "seed {seed}");
+    }
+}
+
+/// To rounding, which may differ from machine to machine.
+#[test]
+fn regress_the_corrections_in_the_data_file_are_those_of_the_flight() {
+    let found = calibrated(&mems(CALIBRATION_SEED), CALIBRATION_DURATION).corrections;
+    for (found, file) in found.iter().zip(&CALIBRATED.corrections) {
+        let size = file.matrix.norm();
+        assert!((found.matrix - file.matrix).norm() < 1e-9 * size, "{} {}", found.matrix, file.matrix);
+        assert!((found.bias - file.bias).norm() < 1e-9 / size.min(1.0), "{} {}", found.bias, file.bias);
+    }
+}
+
+#[test]
+fn a_calibration_flight_cut_short_is_refused() {
+    let motion = calibration(10.0);
+    let lines = lines(&motion, &mems(1));
+    let settings = Settings {
+        calibration: CalibrationMode::Fit,
+        calibration_duration: 5.0,
+        corrections: CALIBRATED.corrections,
+        ..Settings::default()
+    };
+    let estimator = Estimator::new(settings).unwrap();
+    let mut memory = estimator.memory();
+    for (truth, line) in motion.iter().zip(&lines) {
+        estimator.update(&mut memory, truth.time, line);
+        let wanted = match truth.time {
+            time if time < 0.005 => Health::Waiting,
+            time if time < 5.005 => Health::Calibrating,
+            _ => Health::Uncalibrated,
+        };
+        assert_eq!(memory.estimate.health, wanted, "t = {}", truth.time);
+    }
+    assert_eq!(memory.calibration.status, CalibrationStatus::Refused);
+    assert_eq!(memory.calibration.correction, settings.corrections[2], "the given one stays in use");
+    let [found, wanted] = [memory.estimate.angles, motion[motion.len() - 1].angles]
+        .map(|angles| Rotation3::from_matrix_unchecked(body_from_velocity(&angles)));
+    assert!(found.angle_to(&wanted) < 2f64.to_radians(), "and the attitude is found with it");
+}
+
+/// Required with the MEMS set: 0.2 deg at rest, 0.5 deg in motion, 0.1 deg/s. The norm of three angles, and each rate.
+#[test]
+fn oracle_errors_with_the_mems_set_are_within_what_is_required() {
+    let settings = *CALIBRATED;
+    for seed in 1..=5 {
+        for (name, motion, limit) in [("rest", rest(50.0), 0.2), ("motion", scenario(seed), 0.5)] {
+            let lines = lines(&motion, &mems(seed));
+            let estimates = estimates(&settings, &lines);
+            let [angles, rates] = errors(&motion, &estimates, 0.0);
+            assert!(angles.norm() < limit, "{name}, seed {seed}: {angles}");
+            assert!(rates.max() < 0.1, "{name}, seed {seed}: {rates}");
+            assert!(estimates[1..].iter().all(|estimate| estimate.health == Health::Ok));
+        }
+    }
+}
+
+#[test]
+fn oracle_without_errors_a_steady_turn_is_followed_exactly() {
+    // σ turns about the velocity with α and β held: the platform's rate is constant about a fixed axis.
+    let rate = 5f64.to_radians();
+    let turning = |time: f64| {
+        let angles = Vector3::new(0.2, 0.1, rate * time);
+        Truth { time, angles, rates: Kinematics::Printed.r_inverse(&angles) * Vector3::new(0.0, 0.0, rate) }
+    };
+    let motion: Vec<_> = (0..1000).map(|k| turning(f64::from(k) * PERIOD)).collect();
+    let lines = lines(&motion, &ideal());
+    for (name, settings, limit) in [
+        ("without filter", sharp(), 1e-6),
+        ("with filter and prediction", Settings { sensor_delay: 0.0, ..Settings::default() }, 2e-2),
+    ] {
+        let settings = Settings { frozen_samples: 0, ..settings };
+        let estimates = estimates(&settings, &lines);
+        let [angles, rates] = errors(&motion, &estimates, 5.0);
+        assert!(angles.norm() < limit, "{name}: {angles} deg");
+        assert!(rates.norm() < 1e-2 * limit.max(1e-4), "{name}: {rates} deg/s");
+    }
+}
+
+#[test]
+fn without_prediction_the_angles_are_late_by_the_delays() {
+    let rate = 5f64.to_radians();
+    let turning = |time: f64| {
+        let angles = Vector3::new(0.0, 0.0, rate * time);
+        Truth { time, angles, rates: Kinematics::Printed.r_inverse(&angles) * Vector3::new(0.0, 0.0, rate) }
+    };
+    let motion: Vec<_> = (0..1000).map(|k| turning(f64::from(k) * PERIOD)).collect();
+    let lines = lines(&motion, &ideal());
+    let settings = Settings { prediction: false, ..sharp() };
+    let estimate = estimates(&settings, &lines)[900];
+    // A sample is seen one tick after it was taken.
+    assert!((motion[900].angles.z - estimate.angles.z - rate * PERIOD).abs() < 1e-6);
+}
+
+#[test]
+fn the_printed_kinematics_get_the_rates_that_they_take() {
+    let motion = scenario(1);
+    let lines = lines(&motion, &ideal());
+    let of = |kinematics| errors(&motion, &estimates(&Settings { kinematics, ..sharp() }, &lines), 0.02)[1];
+    let (printed, exact) = (of(Kinematics::Printed), of(Kinematics::Exact));
+    assert!(printed.norm() < 0.03, "one tick late: {printed}");
+    assert!(exact.norm() > 1.5 * printed.norm(), "what the printed R lacks: {exact}");
+}
+
+#[test]
+fn dropped_samples_are_bridged_counted_and_flagged() {
+    let motion = scenario(1);
+    let mut config = mems(1);
+    config.line.drop_probability = 0.3;
+    let settings = *CALIBRATED;
+    let lines = lines(&motion, &config);
+    let estimates = estimates(&settings, &lines);
+    let [angles, rates] = errors(&motion, &estimates, 0.0);
+    assert!(angles.norm() < 0.5 && rates.max() < 0.15, "{angles} {rates}");
+    let dropped = estimates[estimates.len() - 1].dropped;
+    assert!((1400..1600).contains(&dropped), "{dropped}");
+    let bridged = estimates.iter().filter(|estimate| estimate.health == Health::Bridging).count();
+    assert!(bridged.abs_diff(usize::try_from(dropped).unwrap()) < 5, "{bridged} {dropped}");
+}
+
+#[test]
+fn after_a_long_silence_the_attitude_is_lost_and_found_again() {
+    let motion = scenario(1);
+    let mut config = mems(1);
+    config.line.drop_probability = 1.0;
+    config.line.drop_window = Window { start: 10.0, end: 13.0 };
+    let settings = *CALIBRATED;
+    let estimates = estimates(&settings, &lines(&motion, &config));
+    assert_eq!(health_at(&estimates, 9.99), Health::Ok);
+    assert_eq!(health_at(&estimates, 10.2), Health::Bridging);
+    assert_eq!(health_at(&estimates, 12.0), Health::Lost);
+    assert_eq!(health_at(&estimates, 13.1), Health::Ok);
+    let [angles, _] = errors(&motion[1300..1500], &estimates[1300..1500], 13.5);
+    assert!(angles.norm() < 0.5, "{angles}");
+    let bridged = |time: f64| {
+        let k = (time / PERIOD).round() as usize;
+        (estimates[k].angles - motion[k].angles).norm().to_degrees()
+    };
+    assert!(bridged(10.2) < 0.5, "{}", bridged(10.2));
+}
+
+#[test]
+fn a_frozen_sensor_is_left_out() {
+    let settings = *CALIBRATED;
+    for sensor in 0..3 {
+        let motion = scenario(1);
+        let mut config = mems(1);
+        config.triads[sensor].freeze = Window { start: 10.0, end: 10.4 };
+        let estimates = estimates(&settings, &lines(&motion, &config));
+        assert_eq!(health_at(&estimates, 10.02), Health::Ok, "one equal reading is no proof");
+        assert_eq!(health_at(&estimates, 10.2), Health::Frozen);
+        assert_eq!(health_at(&estimates, 10.5), Health::Ok);
+        let [angles, _] = errors(&motion, &estimates, 10.0);
+        assert!(angles.norm() < 0.5, "sensor {sensor}: {angles}");
+    }
+}
+
+#[test]
+fn the_gyroscopes_bias_is_learned_and_seen_at_rest() {
+    let mut config = ideal();
+    let bias = Vector3::new(0.3, -0.2, 0.1).map(f64::to_radians);
+    config.triads[0].bias = bias;
+    config.triads[0].noise = 1e-3;
+    let settings = Settings { frozen_samples: 0, ..Settings::default() };
+    let seen = Settings { rest_duration: 5.0, ..settings };
+    let motion = rest(120.0);
+    let lines = lines(&motion, &config);
+    let learned = estimates(&settings, &lines)[motion.len() - 1].gyroscope_bias;
+    assert!((learned - bias).amax() < 0.02f64.to_radians(), "{}", learned.map(f64::to_degrees));
+    let estimates = estimates(&seen, &lines);
+    let at_rest = estimates[600].gyroscope_bias;
+    assert!((at_rest - bias).amax() < 0.01f64.to_radians(), "{}", at_rest.map(f64::to_degrees));
+}
+
+#[test]
+fn the_first_estimate_is_the_given_attitude_or_the_measured_one() {
+    let motion = rest(1.0);
+    let lines = lines(&motion, &ideal());
+    let elsewhere =
+        Settings { initial: Vector3::new(0.3, 0.2, 0.1), frozen_samples: 0, ..Settings::default() };
+    let measured = estimates(&elsewhere, &lines);
+    assert_eq!((measured[0].health, measured[0].angles), (Health::Waiting, elsewhere.initial));
+    assert!((measured[1].angles - motion[1].angles).amax() < 1e-12);
+    let given = estimates(&Settings { alignment: Alignment::Given, ..elsewhere }, &lines);
+    assert!((given[1].angles - elsewhere.initial).amax() < 0.01);
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused_by_name() {
+    let s = Settings::default();
+    let singular = Correction { matrix: Matrix3::zeros(), ..Correction::default() };
+    let nan = Correction { matrix: Matrix3::repeat(f64::NAN), ..Correction::default() };
+    for (name, settings) in [
+        ("period", Settings { period: 0.0, ..s }),
+        ("filter.cutoff", Settings { cutoff: 50.0, ..s }),
+        ("filter.cutoff", Settings { cutoff: f64::NAN, ..s }),
+        ("sensor.delay", Settings { sensor_delay: -0.1, ..s }),
+        ("lost.after", Settings { lost_after: 0.0, ..s }),
+        ("calibration.duration", Settings { calibration_duration: f64::INFINITY, ..s }),
+        ("gyroscope.matrix", Settings { corrections: [singular, s.corrections[1], s.corrections[2]], ..s }),
+        ("magnetometer.matrix", Settings { corrections: [s.corrections[0], s.corrections[1], nan], ..s }),
+    ] {
+        let text = Estimator::new(settings).unwrap_err().to_string();
+        assert!(text.contains(name), "{name}: {text}");
+    }
+}

@@ -1,0 +1,185 @@
+//! What the sensors of a platform show that rests, follows the scenario of Chai 2022, or turns for calibration.
+#![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
+
+use control::Measurement;
+use control::controller::Controller;
+use control::crmpc::{Constraints, Crmpc, Memory};
+use control::estimation::ellipsoid::Correction;
+use control::estimation::{self, CalibrationMode, CalibrationStatus, Estimate, Estimator, Settings};
+use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3};
+use vehicle::kinematics::{self, Kinematics};
+use vehicle::plant::{Plant, angles, rates};
+use vehicle::platform::{Pose, Readings};
+use vehicle::scenario::Scenario;
+use vehicle::sensor_data::SensorData;
+use vehicle::sensors::{Config, Sensors};
+use vehicle::triad::Triad;
+
+/// Time between samples and ticks, s.
+pub const PERIOD: f64 = 0.01;
+
+/// Length of the flight that the MEMS set is calibrated on, s.
+pub const CALIBRATION_DURATION: f64 = 120.0;
+/// Its seed.
+pub const CALIBRATION_SEED: u64 = 100;
+
+/// Where the platform is at a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth {
+    /// s.
+    pub time: f64,
+    /// Θ, rad.
+    pub angles: Vector3<f64>,
+    /// ω of the model, rad/s.
+    pub rates: Vector3<f64>,
+}
+
+fn times(duration: f64) -> impl Iterator<Item = f64> {
+    (0..(duration / PERIOD).round() as u32).map(|k| f64::from(k) * PERIOD)
+}
+
+/// At the scenario's initial attitude.
+pub fn rest(duration: f64) -> Vec<Truth> {
+    let angles = Scenario::crmpc2022().initial_angles;
+    times(duration).map(|time| Truth { time, angles, rates: Vector3::zeros() }).collect()
+}
+
+/// Under CRMPC, which sees the truth, with the noise of this seed.
+pub fn scenario(seed: u64) -> Vec<Truth> {
+    let scenario = Scenario::crmpc2022();
+    let mut config = scenario.config(PERIOD);
+    config.inertia_scale = 1.05;
+    config.disturbance.seed = seed;
+    let mut plant = Plant::new(&config, 0.0).unwrap();
+    let mut controller = Crmpc::new(super::settings(Constraints::Robust)).unwrap();
+    let mut memory = Memory::default();
+    let mut moment = Vector3::zeros();
+    let every = (controller.period() / PERIOD).round() as u64;
+    (0..)
+        .zip(times(scenario.duration))
+        .map(|(k, time)| {
+            let truth = Truth { time, angles: plant.angles(), rates: plant.rates() };
+            if k % every == 0 {
+                let Truth { angles, rates, .. } = truth;
+                let measured = Measurement { angles, rates, ..Measurement::default() };
+                let reference = |time: f64| scenario.reference.at(time);
+                moment = controller.update(&mut memory, k / every, time, &measured, &reference);
+            }
+            plant.advance(time, time + PERIOD, moment).unwrap();
+            truth
+        })
+        .collect()
+}
+
+/// On the calibration sequence.
+pub fn calibration(duration: f64) -> Vec<Truth> {
+    let start = Scenario::crmpc2022().initial_angles;
+    let sequence = SensorData::embedded().calibration;
+    let at = |time: f64| {
+        let (state, _) = sequence.motion(Kinematics::Printed, &start, time);
+        Truth { time, angles: angles(&state), rates: rates(&state) }
+    };
+    times(duration).map(at).collect()
+}
+
+/// What sensors without errors feel there.
+pub fn felt(truth: &Truth) -> Readings {
+    let pose = Pose {
+        kinematics: Kinematics::Printed,
+        angles: truth.angles,
+        rates: truth.rates,
+        alpha_rate: (kinematics::r(&truth.angles) * truth.rates).x,
+        trajectory: vehicle::kinematics::Trajectory::default(),
+    };
+    pose.felt(&SensorData::embedded().surroundings)
+}
+
+/// What the line shows at each tick.
+pub fn lines(motion: &[Truth], config: &Config) -> Vec<estimation::Line> {
+    let mut sensors = Sensors::new(config, 0.0).unwrap();
+    let show = |truth: &Truth| {
+        sensors.take(truth.time, &felt(truth));
+        let sample = sensors.arrived();
+        estimation::Line { sample: sample.number, time: sample.time, readings: sample.readings }
+    };
+    motion.iter().map(show).collect()
+}
+
+/// Sensors on the line of the data file.
+pub fn config(triads: &[Triad; 3], seed: u64) -> Config {
+    Config { triads: *triads, line: SensorData::embedded().line, seed }
+}
+
+/// The typical MEMS set.
+pub fn mems(seed: u64) -> Config {
+    config(&SensorData::embedded().mems, seed)
+}
+
+/// Estimates at each tick.
+pub fn estimates(settings: &Settings, lines: &[estimation::Line]) -> Vec<Estimate> {
+    let estimator = Estimator::new(*settings).unwrap();
+    let mut memory = estimator.memory();
+    let mut update = |(k, line): (u32, &estimation::Line)| {
+        estimator.update(&mut memory, f64::from(k) * PERIOD, line);
+        memory.estimate
+    };
+    (0..).zip(lines).map(&mut update).collect()
+}
+
+/// The correction that takes the readings back to what was felt: least squares of y = A x + b.
+fn regression(felt: &[Vector3<f64>], readings: &[Vector3<f64>]) -> Correction {
+    let mut normal = Matrix4::zeros();
+    let mut right = SMatrix::<f64, 4, 3>::zeros();
+    for (x, y) in felt.iter().zip(readings) {
+        let x = x.push(1.0);
+        normal += x * x.transpose();
+        right += x * y.transpose();
+    }
+    let solution = (normal.try_inverse().unwrap() * right).transpose();
+    let matrix: Matrix3<f64> = solution.fixed_view::<3, 3>(0, 0).into();
+    Correction { matrix: matrix.try_inverse().unwrap(), bias: solution.column(3).into() }
+}
+
+/// Calibration of all sensors from one flight of the sequence: gyroscope and accelerometer against the platform's own angles, the
+/// magnetometer by the estimator's ellipsoid.
+pub fn calibrated(config: &Config, duration: f64) -> Settings {
+    let motion = calibration(duration + 2.0 * PERIOD);
+    let lines = lines(&motion, config);
+    let fit = Settings {
+        calibration: CalibrationMode::Fit,
+        calibration_duration: duration - PERIOD,
+        ..Settings::default()
+    };
+    let estimator = Estimator::new(fit).unwrap();
+    let mut memory = estimator.memory();
+    for (truth, line) in motion.iter().zip(&lines) {
+        estimator.update(&mut memory, truth.time, line);
+    }
+    assert_eq!(memory.calibration.status, CalibrationStatus::Fitted);
+
+    let arrived: Vec<_> = lines.iter().filter(|line| line.sample > 0).collect();
+    let corrections = [0, 1].map(|i| {
+        let felt: Vec<_> =
+            arrived.iter().map(|line| felt(&motion[usize::try_from(line.sample - 1).unwrap()])[i]).collect();
+        let readings: Vec<_> = arrived.iter().map(|line| line.readings[i]).collect();
+        regression(&felt, &readings)
+    });
+    let [gyroscope, accelerometer] = corrections;
+    Settings { corrections: [gyroscope, accelerometer, memory.calibration.correction], ..Settings::default() }
+}
+
+/// Root mean square of each component (deg or deg/s) from `from` (s) on.
+pub fn rms(from: f64, errors: impl Iterator<Item = (f64, Vector3<f64>)>) -> Vector3<f64> {
+    let later: Vec<_> = errors.filter(|(time, _)| *time >= from).map(|(_, error)| error).collect();
+    let sum: Vector3<f64> = later.iter().map(|error| error.component_mul(error)).sum();
+    (sum / later.len() as f64).map(|mean| mean.sqrt().to_degrees())
+}
+
+/// Of angles and rates.
+pub fn errors(motion: &[Truth], estimates: &[Estimate], from: f64) -> [Vector3<f64>; 2] {
+    let pairs = || motion.iter().zip(estimates);
+    [
+        rms(from, pairs().map(|(truth, estimate)| (truth.time, estimate.angles - truth.angles))),
+        rms(from, pairs().map(|(truth, estimate)| (truth.time, estimate.rates - truth.rates))),
+    ]
+}
