@@ -28,6 +28,7 @@ NAMES = [
     "SOTVSMC_DO",
     "TwoLoopSMC",
     "ControlAllocator",
+    "AttitudeEstimator",
 ]
 
 

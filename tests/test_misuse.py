@@ -10,7 +10,7 @@ from conftest import NAMES
 from fmi import ANGLES, RATES, Unit
 
 STEP = 0.04
-INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "DLMPC": "rate.q", "LQR": "attitude.beta", "ControlAllocator": "moment.y"}
+INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "DLMPC": "rate.q", "LQR": "attitude.beta", "ControlAllocator": "moment.y", "AttitudeEstimator": "measured.gyroscope.y"}
 INPUT |= {name: "rate.p" for name in NAMES if name not in INPUT}
 
 
@@ -87,6 +87,7 @@ def test_value_references_that_do_not_exist(unit):
         ("LQR", "limit.moment", -1.0),
         ("ControlAllocator", "limit.surfaceMax[3]", -0.1),
         ("ControlAllocator", "dynamicPressure", -1.0),
+        ("AttitudeEstimator", "filter.cutoff", -1.0),
         ("LQR", "reference.profile", 77),
     ],
 )
@@ -115,6 +116,8 @@ def test_parameters_out_of_range_are_refused_when_set(fmu, name, variable, value
         ("ControlAllocator", {"period": 0.0105}, ["period", "pwpf.period"]),
         ("ControlAllocator", {"pwpf.on": 5.0}, ["pwpf.on"]),
         ("ControlAllocator", {"weight.moment[2]": 0.0}, ["weight.moment[2]"]),
+        ("AttitudeEstimator", {"filter.cutoff": 50.0}, ["filter.cutoff"]),
+        ("AttitudeEstimator", {"lost.after": 0.0}, ["lost.after"]),
     ],
 )
 def test_designs_that_cannot_work_are_refused_at_initialization(fmu, name, settings, words):
@@ -171,7 +174,7 @@ def test_calls_in_the_wrong_state(unit):
 
 
 def test_parameters_are_fixed_once_the_simulation_runs(unit):
-    name = "weight.jet" if unit.fmu.name == "ControlAllocator" else "inertia.Ixx"
+    name = {"ControlAllocator": "weight.jet", "AttitudeEstimator": "field.declination"}.get(unit.fmu.name, "inertia.Ixx")
     unit.start()
     with refuses(unit, name):
         unit.set({name: 6e5})

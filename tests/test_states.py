@@ -23,6 +23,8 @@ def course(tick: int) -> dict:
 
 
 def inputs(name: str, tick: int) -> dict:
+    if name == "AttitudeEstimator":
+        return {"measured.gyroscope.x": 1e-3 * tick, "measured.gyroscope.y": -0.02, "measured.time": STEP * tick, "measured.sample": tick + 1}
     if name not in ("ReentryPlant", "ControlAllocator"):
         return course(tick)
     return dict(zip(MOMENT, [1e4 * (-1) ** (tick // 10), 2e3 * tick, -3e4 + 1e3 * tick]))
@@ -94,6 +96,7 @@ def test_interleaved_instances_do_not_disturb_each_other(fmu, name):
         "TwoLoopSMC": {"commandFilter.frequency": 0.3},
         "LQR": {"weight.P[1]": 20.0},
         "ControlAllocator": {"method": "blending"},
+        "AttitudeEstimator": {"filter.cutoff": 3.0},
         "FBL": {"gain.p": 4.0},
     }.get(name, {"surface.lambda": 1.5})
     alone = []

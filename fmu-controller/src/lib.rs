@@ -4,6 +4,7 @@
 mod allocator;
 mod crmpc;
 mod dlmpc;
+mod estimator;
 mod fbl;
 mod law;
 mod lqr;
@@ -17,6 +18,7 @@ mod two_loop;
 mod unit;
 
 pub use allocator::ControlAllocator;
+pub use estimator::AttitudeEstimator;
 pub use unit::Unit;
 
 /// `CRMPC`: centralised robust model predictive control.
@@ -36,4 +38,15 @@ pub type TwoLoopSmc = Unit<two_loop::TwoLoopLaw>;
 /// `LQR`: linear-quadratic regulator.
 pub type Lqr = Unit<lqr::LqrLaw>;
 
-fmi2_export::export_fmus!(Crmpc, Dlmpc, Lqr, ControlAllocator, Fbl, Btvsmc, BtvsmcDo, SotvsmcDo, TwoLoopSmc);
+fmi2_export::export_fmus!(
+    Crmpc,
+    Dlmpc,
+    Lqr,
+    ControlAllocator,
+    Fbl,
+    Btvsmc,
+    BtvsmcDo,
+    SotvsmcDo,
+    TwoLoopSmc,
+    AttitudeEstimator
+);

@@ -13,7 +13,7 @@ use vehicle::Scenario;
 pub(crate) const ANGLES: [(&str, &str); 3] =
     [("alpha", "angle of attack"), ("beta", "sideslip angle"), ("sigma", "bank angle")];
 pub(crate) const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
-const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
+pub(crate) const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
 
 /// Inputs that the outputs of a tick depend on.
 pub(crate) const MEASURED: [&str; 6] =

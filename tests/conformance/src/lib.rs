@@ -101,13 +101,10 @@ impl Unit {
 
     /// A continuous input: one whose change every unit notices.
     pub fn input(&self) -> u32 {
-        self.reference(
-            if self.references(|v| v.name == "moment.y" && v.causality == Causality::Input).is_empty() {
-                "rate.q"
-            } else {
-                "moment.y"
-            },
-        )
+        let is_input =
+            |name: &&str| !self.references(|v| v.name == *name && v.causality == Causality::Input).is_empty();
+        let name = ["moment.y", "rate.q", "measured.gyroscope.y"].into_iter().find(is_input);
+        self.reference(name.expect("an input that is known here"))
     }
 
     /// Everything that is calculated but wall-clock times.

@@ -19,7 +19,7 @@ fn both_libraries_have_every_function_and_say_what_they_are() {
 #[test]
 fn the_guid_picks_the_unit() {
     let units = units();
-    assert_eq!(units.len(), 10);
+    assert_eq!(units.len(), 11);
     for unit in &units {
         assert_eq!(units.iter().filter(|other| other.guid() == unit.guid()).count(), 1, "{}", unit.name());
         // A saved state says whose it is.
