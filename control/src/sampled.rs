@@ -139,6 +139,41 @@ impl SampledError {
         self.reach(steps).pop()
     }
 
+    /// What errors of the measured rate do within 0, 1, …, `steps` periods, the feedback and the first nominal state taken from
+    /// the measurement. Independent errors add up by their squares: per unit of the error's standard deviation, or of any
+    /// quantile of a normal error, the same of the deviation o and of the measured deviation o + e, with the feedback K (o + e).
+    pub fn noise(&self, steps: usize) -> Vec<[Reach; 2]> {
+        let feedback = |deviation: &Vector2<f64>| (self.gain.row() * deviation).x;
+        // Squares of what the errors at ticks 1, 2, …, n − 1 do at tick n, and what that at tick 0 does.
+        let (mut squares, mut squared_feedback) = (Vector2::zeros(), 0.0);
+        let mut impulse = self.gamma * self.gain.k2;
+        let mut first = -Vector2::y();
+        let mut all = Vec::with_capacity(steps + 1);
+        for n in 0..=steps {
+            let deviation = (squares + first.component_mul(&first)).map(f64::sqrt);
+            // The newest error is seen at once; at tick 0 it is the first one.
+            let newest = if n == 0 { 0.0 } else { 1.0 };
+            let measured_first = if n == 0 { first + Vector2::y() } else { first };
+            let angle = (squares.x + measured_first.x.powi(2)).sqrt();
+            let rate = (squares.y + measured_first.y.powi(2) + newest).sqrt();
+            let by_first = feedback(&measured_first).powi(2);
+            let by_newest = newest * self.gain.k2 * self.gain.k2;
+            all.push([
+                Reach { angle: deviation.x, rate: deviation.y, feedback: 0.0 },
+                Reach { angle, rate, feedback: (squared_feedback + by_first + by_newest).sqrt() },
+            ]);
+            first = self.phi * first;
+            if n == 0 {
+                first += self.gamma * self.gain.k2;
+            } else {
+                squares += impulse.component_mul(&impulse);
+                squared_feedback += feedback(&impulse).powi(2);
+                impulse = self.phi * impulse;
+            }
+        }
+        all
+    }
+
     /// A set that |Δ| ≤ 1, held over each period, can never drive the deviation out of. `None` if the dynamics are not
     /// stable with real, distinct eigenvalues.
     pub fn invariant_set(&self) -> Option<InvariantSet> {
@@ -197,6 +232,37 @@ mod tests {
                 [(set.angle, reach.angle), (set.rate, reach.rate), (set.feedback, reach.feedback)]
             {
                 assert!(outer >= exact * (1.0 - 1e-12) && outer < 1.25 * exact, "{outer} {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn oracle_noise_adds_up_as_in_a_simulation() {
+        // By superposition: one error of 1 at each tick in turn, everything else exact.
+        let error = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04);
+        let steps = 12;
+        let mut squares = vec![[[0.0; 3]; 2]; steps + 1];
+        for at in 0..=steps {
+            let noise = |n: usize| Vector2::new(0.0, if n == at { 1.0 } else { 0.0 });
+            let mut deviation = -noise(0);
+            for (n, squares) in squares.iter_mut().enumerate() {
+                let measured = deviation + noise(n);
+                let feedback = (error.gain.row() * measured).x;
+                for (of, value) in
+                    [(0, [deviation.x, deviation.y, 0.0]), (1, [measured.x, measured.y, feedback])]
+                {
+                    for i in 0..3 {
+                        squares[of][i] += value[i] * value[i];
+                    }
+                }
+                deviation = transition(error.period) * deviation + error.gamma * feedback;
+            }
+        }
+        for (n, (squares, found)) in squares.iter().zip(error.noise(steps)).enumerate() {
+            for (squares, Reach { angle, rate, feedback }) in squares.iter().zip(found) {
+                for (square, found) in squares.iter().zip([angle, rate, feedback]) {
+                    assert!((square.sqrt() - found).abs() < 1e-12, "tick {n}: {} {found}", square.sqrt());
+                }
             }
         }
     }

@@ -112,6 +112,8 @@ impl Settings {
             tube: gains.tube,
             disturbance_bound: scenario.disturbance.bound,
             inertia_error: bounds.inertia_error,
+            angle_error: 0.0,
+            rate_error: 0.0,
             sideslip_bound: bounds.sideslip_deg.to_radians(),
             reference_rate: bounds.reference_rate_deg_s.to_radians(),
             reference_acceleration: bounds.reference_acceleration_deg_s2.to_radians(),

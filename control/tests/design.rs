@@ -2,8 +2,8 @@
 //! Tolerances are half a unit of the last digit that is printed.
 
 use control::DesignError;
-use control::crmpc::{Design, PaperConstants, Settings, step_response_peak, terminal_weight};
-use control::sampled::{Gain, SampledError};
+use control::crmpc::{Design, InitialState, PaperConstants, Settings, step_response_peak, terminal_weight};
+use control::sampled::{Gain, Reach, SampledError};
 use control::settings::Published;
 use nalgebra::{Matrix2, Vector2};
 use vehicle::scenario::Scenario;
@@ -321,5 +321,45 @@ fn oracle_invariant_set_holds_what_can_be_reached_and_is_less_than_half_larger()
             assert!(of_set >= least * (1.0 - 1e-12), "K {k}, period {period}: {of_set} {least}");
             assert!(of_set < 1.5 * least, "K {k}, period {period}: {of_set} {least}");
         }
+    }
+}
+
+#[test]
+fn oracle_errors_of_measurement_count_until_the_next_plan() {
+    let (angle_error, rate_error) = (4e-3, 3e-3);
+    let exact = settings();
+    let noisy = Settings { angle_error, rate_error, ..exact };
+    let [exact, noisy] = [exact, noisy].map(|settings| Design::new(&settings).unwrap().tightening);
+    assert_eq!(
+        (&exact.at_stage, &exact.within_stage, exact.norm),
+        (&noisy.at_stage, &noisy.within_stage, noisy.norm)
+    );
+    assert!(
+        exact.noise_at_stage.iter().chain(&exact.noise_within_stage).all(|noise| *noise == Reach::default())
+    );
+
+    // At the first state the vehicle is off by the error itself. One tick later that has become (−τ e₀, −e₀), and a new error
+    // comes: K (o + e) = (k₂ + τ k₁) e₀ + k₂ e₁ up to signs, the largest within the first interval.
+    let size = rate_error / 10f64.to_radians().cos();
+    assert!((noisy.noise_at_stage[0].rate - size).abs() < 1e-15);
+    let feedback = noisy.noise_within_stage[0].feedback;
+    assert!((feedback - size * 5.2f64.hypot(5.0)).abs() < 1e-12, "{feedback}");
+    assert_eq!(noisy.noise_within_stage[1], Reach::default());
+    assert!(noisy.noise_at_stage.iter().all(|noise| noise.angle >= angle_error));
+
+    let nominal = Settings { angle_error, rate_error, initial_state: InitialState::Nominal, ..settings() };
+    let grown = Design::new(&nominal).unwrap().tightening;
+    assert_eq!(grown.noise_within_stage[0], grown.noise_within_stage[99], "never reset by a plan");
+}
+
+#[test]
+fn errors_of_measurement_out_of_range_are_refused_by_name() {
+    let base = settings();
+    for (name, settings) in [
+        ("estimation.angleError", Settings { angle_error: -1e-3, ..base }),
+        ("estimation.rateError", Settings { rate_error: f64::NAN, ..base }),
+    ] {
+        let text = Design::new(&settings).unwrap_err().to_string();
+        assert!(text.contains(name), "{text}");
     }
 }

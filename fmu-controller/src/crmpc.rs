@@ -27,6 +27,8 @@ pub struct CrmpcLaw {
     tube: Gain,
     disturbance_bound: f64,
     inertia_error: f64,
+    angle_error: f64,
+    rate_error: f64,
     sideslip_bound: f64,
     reference_rate: f64,
     reference_acceleration: f64,
@@ -72,6 +74,8 @@ impl Default for CrmpcLaw {
             tube: s.tube,
             disturbance_bound: s.disturbance_bound,
             inertia_error: s.inertia_error,
+            angle_error: s.angle_error,
+            rate_error: s.rate_error,
             sideslip_bound: s.sideslip_bound,
             reference_rate: s.reference_rate,
             reference_acceleration: s.reference_acceleration,
@@ -111,6 +115,8 @@ impl Law for CrmpcLaw {
             tube: self.tube,
             disturbance_bound: self.disturbance_bound,
             inertia_error: self.inertia_error,
+            angle_error: self.angle_error,
+            rate_error: self.rate_error,
             sideslip_bound: self.sideslip_bound,
             reference_rate: self.reference_rate,
             reference_acceleration: self.reference_acceleration,
@@ -201,6 +207,14 @@ fn bounds(table: Controller) -> Controller {
         "Bound on each component of the disturbance of the angles' second derivatives that the sets are tightened for",
     );
     let inertia = parameter("inertia.error", "Relative inertia error that the robust set is tightened for");
+    let angle_error = parameter(
+        "estimation.angleError",
+        "Bound on the error of each angle given that the robust set is tightened for; it changes slowly",
+    );
+    let rate_error = parameter(
+        "estimation.rateError",
+        "Bound on the error of each rate given that the robust set is tightened for; white from tick to tick",
+    );
     let sideslip = parameter("bound.sideslip", "Sideslip angle up to which the bounds of the design hold");
     let rate =
         parameter("bound.referenceRate", "Bound on the reference's rate in the paper's terminal set (13)");
@@ -220,6 +234,8 @@ fn bounds(table: Controller) -> Controller {
         .real(acceleration.real().unit(unit::angular_acceleration()).min(0.0).nominal(0.02), |m| {
             &mut m.law.reference_acceleration
         })
+        .real(angle_error.real().unit(unit::angle()).min(0.0).nominal(0.003), |m| &mut m.law.angle_error)
+        .real(rate_error.real().unit(unit::angular_rate()).min(0.0).nominal(0.005), |m| &mut m.law.rate_error)
 }
 
 fn outputs(table: Controller) -> Controller {

@@ -64,6 +64,10 @@ pub struct Settings {
     pub disturbance_bound: f64,
     /// Relative error of the inertia that the robust set allows for.
     pub inertia_error: f64,
+    /// Bound on the error of each measured angle, rad.
+    pub angle_error: f64,
+    /// Bound on the error of each measured rate, rad/s: white from one feedback to the next.
+    pub rate_error: f64,
     /// |β| that the bounds of Lemma 1 allow for, rad.
     pub sideslip_bound: f64,
     /// Bound Θ̄₁ on ‖Θ̇_r‖, rad/s.
@@ -141,6 +145,10 @@ pub struct Tightening {
     pub inertia: f64,
     /// Bound on the norm of the whole disturbance, inertia error included, rad/s².
     pub norm: f64,
+    /// What errors of measurement add to the deviation at prediction step k = 0..=N: rad, rad/s.
+    pub noise_at_stage: Vec<Reach>,
+    /// What they add to the measured deviation at the feedback ticks within prediction interval k = 0..N: rad, rad/s, rad/s².
+    pub noise_within_stage: Vec<Reach>,
 }
 
 /// The result of the offline design.
@@ -191,13 +199,15 @@ impl Design {
         let (smallest_inertia, largest_inertia) = (eigenvalues.min(), eigenvalues.max());
 
         let invariant = error.invariant_set();
-        let tightening = match s.initial_state {
+        let mut tightening = match s.initial_state {
             InitialState::Measured => growing(s, &error, ratio, smallest_inertia),
             InitialState::Tube => {
                 constant(s, invariant.as_ref().ok_or(DesignError::NotReal { name: "feedback" })?)
             }
             InitialState::Nominal => full(s, reach, smallest_inertia),
         };
+
+        (tightening.noise_at_stage, tightening.noise_within_stage) = noise(s, &error, ratio);
 
         Ok(Self {
             paper: paper_constants(s, terminal_scale, smallest_inertia, largest_inertia),
@@ -238,6 +248,8 @@ fn full(s: &Settings, reach: Reach, smallest_inertia: f64) -> Tightening {
         disturbance: Vector3::repeat(s.disturbance_bound),
         inertia,
         norm: 3.0_f64.sqrt() * s.disturbance_bound + inertia * s.limit_moment * input_of_moment,
+        noise_at_stage: vec![],
+        noise_within_stage: vec![],
     }
 }
 
@@ -251,7 +263,37 @@ fn constant(s: &Settings, invariant: &InvariantSet) -> Tightening {
         disturbance,
         inertia: 0.0,
         norm: disturbance.norm(),
+        noise_at_stage: vec![],
+        noise_within_stage: vec![],
     }
+}
+
+/// What errors of measurement add at each step and within each interval. An error of the angles that stays shifts the motion by
+/// itself and does nothing else. Errors of the rates are white: each plan meets new ones, so that they count until the next plan
+/// comes, and no longer. Plans that do not begin at the measured state meet them fully grown at any step.
+fn noise(s: &Settings, error: &SampledError, ratio: usize) -> (Vec<Reach>, Vec<Reach>) {
+    // ẋ = R ω with rows no longer than sec β, Chai 2022, Lemma 1.
+    let size = s.rate_error / s.sideslip_bound.cos();
+    let grown = error.noise(ratio * s.horizon);
+    let begins = s.initial_state == InitialState::Measured;
+    let reach = |tick: usize, of: usize| {
+        let tick = if begins { tick } else { ratio * s.horizon };
+        let Reach { angle, rate, feedback } = grown[tick][of];
+        Reach { angle: angle * size, rate: rate * size, feedback: feedback * size }
+    };
+    let at_stage = (0..=s.horizon).map(|k| {
+        let deviation = if k <= 1 || !begins { reach(ratio * k, 0) } else { Reach::default() };
+        Reach { angle: deviation.angle + s.angle_error, ..deviation }
+    });
+    let within_stage = (0..s.horizon).map(|k| {
+        let ticks = if k == 0 || !begins { 0..ratio } else { 0..0 };
+        ticks.map(|i| reach(ratio * k + i, 1)).fold(Reach::default(), |largest, next| Reach {
+            angle: largest.angle.max(next.angle),
+            rate: largest.rate.max(next.rate),
+            feedback: largest.feedback.max(next.feedback),
+        })
+    });
+    (at_stage.collect(), within_stage.collect())
 }
 
 /// Angle of attack up to which the inertia error's share in each axis is counted.
@@ -302,6 +344,11 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
             low: 0.0,
             high: 1.0,
         });
+    }
+    for (name, value) in [("estimation.angleError", s.angle_error), ("estimation.rateError", s.rate_error)] {
+        if !(0.0..1.0).contains(&value) {
+            return Err(DesignError::OutOfRange { name, value, low: 0.0, high: 1.0 });
+        }
     }
     let ratio = (s.period_optimisation / s.period_feedback).round();
     if ratio < 1.0 || (ratio * s.period_feedback - s.period_optimisation).abs() > 1e-9 * s.period_optimisation

@@ -6,6 +6,7 @@ use crate::linearise::{self, InverseKinematics, Linear};
 use crate::mpc::{self, Ball, Balls, Bounded, Motion, State};
 use crate::sampled::Reach;
 use nalgebra::{Matrix3, Vector3};
+use std::f64::consts::SQRT_2;
 use std::ops::Range;
 use vehicle::dynamics::RigidBody;
 use vehicle::reference::Reference;
@@ -244,7 +245,7 @@ impl Robust {
         let after = next.kinematics.moment(body, &next.rates, &here.acceleration).norm();
         let (_, by_angles) = next.kinematics.body_rates(&next.rates);
         let feedback = largest_over_box(&at.by_acceleration, &self.design.tightening.disturbance);
-        let slopes = (at.by_angles.norm(), at.by_rates.norm());
+        let slopes = (at.by_angles.norm(), at.by_rates.norm(), along(&at));
         self.moment[k] = self.moment_bound(k, at.value.norm(), after, feedback, slopes);
         self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&by_angles));
     }
@@ -263,8 +264,8 @@ impl Robust {
         let inertia = self.design.largest_inertia;
         let feedback = inertia * self.design.tightening.disturbance.norm();
         let (by_angle, by_rate) = linearise::moment_slope_bounds(here.rates.norm(), here.acceleration.norm());
-        self.moment[k] =
-            self.moment_bound(k, moment, after, feedback, (inertia * by_angle, inertia * by_rate));
+        let slopes = (inertia * by_angle, inertia * by_rate, inertia);
+        self.moment[k] = self.moment_bound(k, moment, after, feedback, slopes);
         self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&by_angles));
         rates.norm()
     }
@@ -275,14 +276,17 @@ impl Robust {
         let Reach { angle, rate, .. } = tightening.at_stage[k];
         // ω = R⁻¹ x_ω with ‖R⁻¹‖ = 1
         let deviation = (rate + by_angles * angle) * tightening.norm;
+        let noise = tightening.noise_at_stage[k];
+        // Normal errors count along ω̃ only.
+        let noise = noise.rate + by_angles * SQRT_2 * noise.angle;
         let limit = self.settings.limit_rate;
-        (limit - deviation).max(SMALLEST_SHARE * limit)
+        (limit - deviation - noise).max(SMALLEST_SHARE * limit)
     }
 
     /// What ‖m̃‖ may be at the start of prediction interval k so that ‖m‖ keeps its limit at each of its feedback ticks. With a held,
     /// ‖m̃‖ moves from `here` to `after` within the interval; `feedback` is the largest ‖I R⁻¹ δ‖ over the disturbances, and `slopes` are
-    /// ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖.
-    fn moment_bound(&self, k: usize, here: f64, after: f64, feedback: f64, slopes: (f64, f64)) -> f64 {
+    /// ‖∂m/∂(α, β)‖, ‖∂m/∂x_ω‖ and [`along`].
+    fn moment_bound(&self, k: usize, here: f64, after: f64, feedback: f64, slopes: (f64, f64, f64)) -> f64 {
         let tightening = &self.design.tightening;
         let reach = tightening.within_stage[k];
         let limit = self.settings.limit_moment;
@@ -290,8 +294,10 @@ impl Robust {
         let feedback = reach.feedback * (feedback + tightening.inertia * limit);
         // The cancellation of f sees the deviation too.
         let drift = (slopes.0 * reach.angle + slopes.1 * reach.rate) * tightening.norm;
+        let noise = tightening.noise_within_stage[k];
+        let noise = slopes.2 * noise.feedback + slopes.0 * SQRT_2 * noise.angle + slopes.1 * noise.rate;
         let within = (after - here).max(0.0);
-        (limit - feedback - drift - within).max(SMALLEST_SHARE * limit)
+        (limit - feedback - drift - noise - within).max(SMALLEST_SHARE * limit)
     }
 
     /// ε by the argument of (12)–(13), with the bounds of this set and the reference at the end of the horizon.
@@ -301,12 +307,17 @@ impl Robust {
         let moment = at.moment.value.norm();
         let rate = self.rate_bound(n, at.rates.by_angles.norm()) - at.rates.value.norm();
         let feedback = largest_over_box(&at.moment.by_acceleration, &self.design.tightening.disturbance);
-        let slopes = (at.moment.by_angles.norm(), at.moment.by_rates.norm());
+        let slopes = (at.moment.by_angles.norm(), at.moment.by_rates.norm(), along(&at.moment));
         let moment = self.moment_bound(n - 1, moment, moment, feedback, slopes) - moment;
         let gain = self.settings.terminal.k1.hypot(self.settings.terminal.k2);
         let radius = self.design.terminal_scale * rate.min(moment / (self.design.largest_inertia * gain));
         radius.max(SMALLEST_RADIUS)
     }
+}
+
+/// ‖(∂m/∂a)ᵀ m/‖m‖‖: what normal errors of a with the same size about each axis do to ‖m‖.
+fn along(moment: &Linear) -> f64 {
+    moment.by_acceleration.tr_mul(&moment.value.try_normalize(0.0).unwrap_or_default()).norm()
 }
 
 /// ‖y‖ ≤ bound in terms of the tracking error and v = a − Θ̈_r.
