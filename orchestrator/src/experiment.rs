@@ -37,6 +37,7 @@
 //! moment = "controller.moment"      # .x .y .z
 //! limit = "controller.limit"        # parameters .rate and .moment
 //! solver = "controller.solver"      # .time .solves .fallbacks
+//! every = 1                         # means are of every n-th communication point, largest values of all
 //! ```
 
 use crate::error::Error;
@@ -181,7 +182,7 @@ pub struct Record {
 }
 
 /// Prefixes below which the figures of merit find their variables. `None` takes the default, if it exists.
-#[derive(Clone, Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Roles {
     /// Attitude angles.
@@ -196,6 +197,23 @@ pub struct Roles {
     pub limit: Option<String>,
     /// Statistics of the controller's solver.
     pub solver: Option<String>,
+    /// The means are of every so many communication points, from the first on.
+    #[serde(default = "one")]
+    pub every: u32,
+}
+
+impl Default for Roles {
+    fn default() -> Self {
+        Self {
+            attitude: None,
+            reference: None,
+            rate: None,
+            moment: None,
+            limit: None,
+            solver: None,
+            every: 1,
+        }
+    }
 }
 
 fn one() -> u32 {

@@ -27,7 +27,7 @@ impl Probes {
 }
 
 /// Places of the variables that play a role in the figures of merit; what an experiment does not have is `None`.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Places {
     /// Attitude angles α, β, σ.
     pub attitude: Option<[usize; 3]>,
@@ -43,6 +43,24 @@ pub struct Places {
     pub solver_solves: Option<usize>,
     /// Number of fallbacks so far.
     pub solver_fallbacks: Option<usize>,
+    /// The means are of every so many communication points.
+    pub every: u64,
+}
+
+impl Default for Places {
+    /// Nothing, at every communication point.
+    fn default() -> Self {
+        Self {
+            attitude: None,
+            reference: None,
+            rate: None,
+            moment: None,
+            solver_time: None,
+            solver_solves: None,
+            solver_fallbacks: None,
+            every: 1,
+        }
+    }
 }
 
 /// Limits against which rate and moment are held.
@@ -70,6 +88,9 @@ pub fn places(
     parts: &[Part],
     probes: &mut Probes,
 ) -> Result<(Places, [Option<Port>; 2]), Error> {
+    if roles.every == 0 {
+        return Err(Error::experiment("[metrics] every = 0: at least 1"));
+    }
     let mut triple = |role: &str, stated: &Option<String>, default: &str, names: [&str; 3]| {
         let prefix = stated.as_deref().unwrap_or(default);
         let mut ports = [None; 3];
@@ -90,6 +111,7 @@ pub fn places(
         reference: triple("reference", &roles.reference, "controller.reference", ANGLES)?,
         rate: triple("rate", &roles.rate, "plant.rate", RATES)?,
         moment: triple("moment", &roles.moment, "controller.moment", AXES)?,
+        every: u64::from(roles.every),
         ..Places::default()
     };
     let single = |role: &str, stated: &Option<String>, default: &str, name: &str| {
@@ -246,7 +268,7 @@ pub(crate) fn larger(a: f64, b: f64) -> f64 {
 
 impl Observer for Merit {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
-        let Sample { values, last, .. } = *sample;
+        let Sample { tick, values, last, .. } = *sample;
         let angle = match (self.places.attitude, self.places.reference) {
             (Some(attitude), Some(reference)) => {
                 attitude.iter().zip(reference).map(|(&a, r)| (values[a] - values[r]).powi(2)).sum()
@@ -255,7 +277,7 @@ impl Observer for Merit {
         };
         let moment = self.places.moment.map_or(0.0, |places| norm_squared(values, places));
         let rate = self.places.rate.map_or(0.0, |places| norm_squared(values, places));
-        if !last {
+        if !last && tick % self.places.every == 0 {
             self.sums[0] += angle;
             self.sums[1] += moment;
             self.steps += 1;
@@ -290,6 +312,7 @@ mod tests {
             solver_time: Some(12),
             solver_solves: Some(13),
             solver_fallbacks: Some(14),
+            every: 1,
         };
         Merit::new(places, Limits { rate: Some(0.1), moment: Some(10.0) }, 3)
     }
@@ -327,6 +350,21 @@ mod tests {
         near(metrics.real_time_factor, 4.0);
         assert_eq!((metrics.solves, metrics.fallbacks, metrics.samples), (Some(2), Some(1), 3));
         assert!(metrics.completed);
+    }
+
+    #[test]
+    fn oracle_means_of_every_second_point_and_largest_values_of_all() {
+        let mut merit = merit();
+        merit.places.every = 2;
+        let row = |alpha: f64, p: f64| {
+            let mut row = [0.0; 15];
+            (row[0], row[6]) = (alpha, p);
+            row
+        };
+        feed(&mut merit, &[row(3.0, 0.0), row(100.0, 0.2), row(4.0, 0.0), row(100.0, 0.0)]);
+        let metrics = merit.metrics(0.5, 2.0, None);
+        assert!((metrics.ems_deg.unwrap() - 12.5_f64.sqrt().to_degrees()).abs() < 1e-12);
+        assert!((metrics.max_rate_deg_s.unwrap() - 0.2_f64.to_degrees()).abs() < 1e-12);
     }
 
     #[test]

@@ -24,7 +24,7 @@
 //! fmu = { controller = "FBL.fmu" }     # optional: another FMU for a component
 //! set = { "plant.disturbance.kind" = "none" }
 //! unset = ["controller.weight.P[1]"]   # optional: parameters that the experiment sets, and this FMU has not
-//! vary = { parameter = "plant.disturbance.seed", first = 1, count = 20 }   # optional: one run for each value
+//! vary = { parameter = "plant.disturbance.seed", first = 1, count = 20 }   # optional: one run for each value; or several parameters: ["…", "…"]
 //! timed = true                         # its first run has the machine for itself
 //! within = ["tube"]                    # bounds that it is held against
 //! measures = ["settling"]              # further numbers that are taken of it
@@ -78,11 +78,14 @@
 //! id = "table-1"
 //! title = "…"
 //! against = "Paper"                    # heading of what is compared with; this is the default
+//! ours = "Ours"                        # heading of ours; this is the default
+//! beside = "Ours, without noise"       # heading of a further column; none is the default
 //!
 //! [[table.row]]
 //! label = "EMS of LQR, deg"
 //! paper = "ems.lqr"                    # optional
 //! ours = "lqr.ems_deg"                 # run.metric, or run.parameter.COMPONENT.NAME
+//! beside = "calm-lqr.ems_deg"          # optional, in the further column
 //!
 //! [[overview]]                         # all runs against metrics
 //! title = "…"
@@ -243,12 +246,32 @@ pub struct Run {
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Vary {
-    /// `component.parameter`.
-    pub parameter: String,
+    /// `component.parameter`, or several of them that take the same values.
+    pub parameter: Parameters,
     /// The first value.
     pub first: i32,
     /// How many.
     pub count: u32,
+}
+
+/// One parameter or several.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(untagged)]
+pub enum Parameters {
+    /// One.
+    One(String),
+    /// Several.
+    Several(Vec<String>),
+}
+
+impl Parameters {
+    /// All of them.
+    pub fn all(&self) -> &[String] {
+        match self {
+            Self::One(parameter) => std::slice::from_ref(parameter),
+            Self::Several(parameters) => parameters,
+        }
+    }
 }
 
 /// A bound on the magnitude of signals.
@@ -291,6 +314,10 @@ fn one() -> usize {
 
 fn paper() -> String {
     "Paper".into()
+}
+
+fn ours() -> String {
+    "Ours".into()
 }
 
 /// A panel of a figure. Exactly one of `signal`, `signals`, `histogram` and `scatter` says what is drawn, or `points` alone.
@@ -417,6 +444,12 @@ pub struct Table {
     /// Heading of what is compared with.
     #[serde(default = "paper")]
     pub against: String,
+    /// Heading of ours.
+    #[serde(default = "ours")]
+    pub ours: String,
+    /// Heading of a further column of ours; none if it is empty.
+    #[serde(default)]
+    pub beside: String,
     /// The rows.
     #[serde(rename = "row")]
     pub rows: Vec<Row>,
@@ -432,6 +465,8 @@ pub struct Row {
     pub paper: Option<Quantity>,
     /// `run.metric`.
     pub ours: String,
+    /// `run.metric` of the further column.
+    pub beside: Option<String>,
     /// Beside the numbers.
     #[serde(default)]
     pub note: String,

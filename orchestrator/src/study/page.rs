@@ -200,19 +200,30 @@ fn because(check: &Check, checked: &Checked) -> Markup {
 }
 
 fn table(table: &Table, results: &Results) -> Result<Markup, String> {
-    let rows = table.rows.iter().map(|r| row(r, results)).collect::<Result<Vec<_>, _>>()?;
+    let rows = table
+        .rows
+        .iter()
+        .map(|r| row(r, !table.beside.is_empty(), results))
+        .collect::<Result<Vec<_>, _>>()?;
     Ok(html! {
         h3 { (table.title) }
         table.numbers {
-            thead { tr { th { "Quantity" } th { (table.against) } th { "Ours" } th { "Difference" } th { "" } } }
+            thead {
+                tr {
+                    th { "Quantity" } th { (table.against) } th { (table.ours) } th { "Difference" }
+                    @if !table.beside.is_empty() { th { (table.beside) } }
+                    th { "" }
+                }
+            }
             tbody { @for row in rows { (row) } }
         }
         @if !table.note.is_empty() { p.note { (table.note) } }
     })
 }
 
-fn row(row: &Row, results: &Results) -> Result<Markup, String> {
+fn row(row: &Row, has_beside: bool, results: &Results) -> Result<Markup, String> {
     let ours = results.numbers(&row.ours)?;
+    let beside = row.beside.as_ref().map(|beside| results.numbers(beside)).transpose()?;
     let paper = row.paper.as_ref().map(|paper| results.study.values.number(paper)).transpose()?;
     let origin = match &row.paper {
         Some(Quantity::Named(id)) => results.study.values.find(id).map(|value| value.source.as_str()),
@@ -232,6 +243,7 @@ fn row(row: &Row, results: &Results) -> Result<Markup, String> {
             td title=[origin] { @match paper { Some(paper) => (shown(paper)), None => "–" } }
             td { (several(&ours)) }
             td { (difference.as_deref().unwrap_or("–")) }
+            @if has_beside { td { (beside.as_ref().map_or("–".into(), several)) } }
             td.remark { (row.note) }
         }
     })
@@ -284,7 +296,7 @@ fn all_runs(results: &Results) -> Markup {
                             @for (name, fmu) in &run.fmu { code { (name) " = " (fmu) } " " }
                             @for (name, value) in &run.set { code { (name) " = " (value) } " " }
                             @if let Some(vary) = &run.vary {
-                                code { (vary.parameter) " = " (vary.first) "…" (i64::from(vary.first) + i64::from(vary.count) - 1) }
+                                code { (vary.parameter.all().join(" = ")) " = " (vary.first) "…" (i64::from(vary.first) + i64::from(vary.count) - 1) }
                             }
                         }
                         td { (result.members.len()) }

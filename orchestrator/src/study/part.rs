@@ -162,7 +162,9 @@ impl<'a> Preparation<'a> {
         let mut experiment = self.experiment.clone();
         if let Some(vary) = &self.run.vary {
             let value = Value::Integer(i64::from(vary.first) + i64::from(member));
-            experiment.set(&vary.parameter, value).map_err(|message| self.fault(&message))?;
+            for parameter in vary.parameter.all() {
+                experiment.set(parameter, value.clone()).map_err(|message| self.fault(&message))?;
+            }
         }
         Plan::with(experiment, self.fmu_dirs, opened)
     }

@@ -171,7 +171,9 @@ fn check(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Re
     let fault = |message: String| study.source.error(&(0..0), message);
     claims::check(study).map_err(fault)?;
     for row in study.tables.iter().flat_map(|table| &table.rows) {
-        resolve(study, &row.ours).map_err(fault)?;
+        for name in [Some(&row.ours), row.beside.as_ref()].into_iter().flatten() {
+            resolve(study, name).map_err(fault)?;
+        }
     }
     for overview in &study.overviews {
         for column in &overview.metrics {
