@@ -1,6 +1,8 @@
 //! What an optimisation reports, whichever controller does it.
 
+use crate::mpc;
 use serde::{Deserialize, Serialize};
+use std::time::Instant;
 
 /// How the last plan came about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,4 +39,17 @@ pub struct Report {
     pub solves: u32,
     /// Fallbacks so far.
     pub fallbacks: u32,
+}
+
+impl Report {
+    /// Takes over how an optimisation ended that began at `clock`.
+    pub(crate) fn record(&mut self, ended: &mpc::Report, clock: Instant) {
+        self.status = ended.status;
+        self.cost = ended.certificate.cost;
+        self.iterations = ended.iterations;
+        self.residual = ended.certificate.residual();
+        self.solves += 1;
+        self.fallbacks += u32::from(ended.status == Status::Fallback);
+        self.time = clock.elapsed().as_secs_f64();
+    }
 }

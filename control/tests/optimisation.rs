@@ -255,6 +255,9 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
         let at = |k: usize| reference()(time + k as f64 * h);
         assert_is_shifted(&after.plan, &sample.before.plan, &at(settings.horizon - 1), &settings);
 
+        // That it is no optimum shows.
+        assert!(after.report.residual > 1e-3, "{}", after.report.residual);
+
         // Its cost, written out.
         let mut cost = 0.0;
         for k in 0..=settings.horizon {

@@ -60,7 +60,6 @@ pub struct Crmpc {
     settings: Settings,
     design: Design,
     chain: Chain<2>,
-    cost: Cost<2>,
     sets: Sets,
     optimiser: Optimiser<2>,
     // Scratch of one optimisation.
@@ -113,7 +112,6 @@ impl Crmpc {
             settings,
             design,
             chain,
-            cost,
             sets,
             optimiser,
             affine: vec![[Vector3::zeros(); 2]; n],
@@ -152,27 +150,22 @@ impl Crmpc {
             memory.plan.errors(&self.sets.references, &mut self.previous);
             (&self.previous, &memory.plan.multipliers[..])
         });
-        let report = self.optimiser.optimise(&mut self.sets, &error, &self.affine, previous);
-        memory.report.cost = if report.status == Status::Fallback {
+        let mut report = self.optimiser.optimise(&mut self.sets, &error, &self.affine, previous);
+        if report.status == Status::Fallback {
             if first {
                 self.follow_terminal_law(&mut memory.plan, start);
             }
-            memory.report.fallbacks += 1;
             memory.plan.errors(&self.sets.references, &mut self.previous);
-            self.cost.of(&self.previous)
+            let Self { optimiser, sets, affine, previous, .. } = self;
+            report = optimiser.fall_back(sets, &error, affine, previous, report.iterations);
         } else {
             let start = (self.settings.initial_state != InitialState::Tube).then_some(start);
             let motion = self.optimiser.motion();
             memory.plan.follow(motion, start, &self.sets.references, self.settings.period_optimisation);
             memory.plan.multipliers.clear();
             memory.plan.multipliers.extend(self.optimiser.multipliers());
-            self.cost.of(motion)
-        };
-        memory.report.status = report.status;
-        memory.report.iterations = report.iterations;
-        memory.report.residual = report.certificate.residual();
-        memory.report.solves += 1;
-        memory.report.time = clock.elapsed().as_secs_f64();
+        }
+        memory.report.record(&report, clock);
     }
 
     /// References at the prediction times, and d_k = A x_r,k + B Θ̈_r,k − x_r,k+1.

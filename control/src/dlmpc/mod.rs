@@ -123,7 +123,6 @@ pub struct Dlmpc {
     ratio: u64,
     /// κ of the terminal law v = Θ̇_r − κ (Θ − Θ_r).
     gains: Vector3<f64>,
-    cost: Cost<1>,
     rates: RateLimit,
     optimiser: Optimiser<1>,
     // Scratch of one optimisation.
@@ -212,7 +211,6 @@ impl Dlmpc {
         Ok(Self {
             ratio,
             gains: -optimiser.feedback()[0],
-            cost,
             rates: RateLimit { limit: settings.limit_rate, references: vec![Reference::default(); n + 1] },
             optimiser,
             affine: vec![[Vector3::zeros()]; n],
@@ -241,24 +239,19 @@ impl Dlmpc {
         let start = [measured - self.rates.references[0].angles];
         memory.plan.errors(&self.rates.references, &mut self.previous);
         let previous = (!first).then_some((&self.previous, &memory.plan.multipliers[..]));
-        let report = self.optimiser.optimise(&mut self.rates, &start, &self.affine, previous);
-        memory.report.cost = if report.status == Status::Fallback {
+        let mut report = self.optimiser.optimise(&mut self.rates, &start, &self.affine, previous);
+        if report.status == Status::Fallback {
             self.track(&mut memory.plan, measured);
-            memory.report.fallbacks += 1;
             memory.plan.errors(&self.rates.references, &mut self.previous);
-            self.cost.of(&self.previous)
+            let Self { optimiser, rates, affine, previous, .. } = self;
+            report = optimiser.fall_back(rates, &start, affine, previous, report.iterations);
         } else {
             let motion = self.optimiser.motion();
             memory.plan.follow(motion, measured, &self.rates.references, self.settings.period_optimisation);
             memory.plan.multipliers.clear();
             memory.plan.multipliers.extend(self.optimiser.multipliers());
-            self.cost.of(motion)
-        };
-        memory.report.status = report.status;
-        memory.report.iterations = report.iterations;
-        memory.report.residual = report.certificate.residual();
-        memory.report.solves += 1;
-        memory.report.time = clock.elapsed().as_secs_f64();
+        }
+        memory.report.record(&report, clock);
     }
 
     /// References at the prediction times, and d_k = Θ_r,k + h Θ̇_r,k − Θ_r,k+1.

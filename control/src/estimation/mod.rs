@@ -88,9 +88,7 @@ struct File {
 impl Default for Settings {
     /// Of `data/estimator.toml`, for the start of Chai 2022 and sensors without errors in the field of the vehicle's data.
     fn default() -> Self {
-        // Cannot fail: a test reads the embedded file.
-        let file: File = toml::from_str(include_str!("../../data/estimator.toml"))
-            .unwrap_or_else(|error| panic!("{error}"));
+        let file: File = embedded(include_str!("../../data/estimator.toml"));
         let field = SensorData::embedded().surroundings.field;
         Self {
             period: file.period,

@@ -13,6 +13,8 @@ pub struct Certificate {
     pub feasibility: f64,
     /// Σ |λ c|, and negative multipliers.
     pub complementarity: f64,
+    /// Cost of the motion.
+    pub cost: f64,
 }
 
 impl Certificate {
@@ -87,11 +89,13 @@ impl Certificate {
             add(&mut p, |i| multipliers.start[i]);
             slope = p.iter().fold(slope, |slope, p| slope.max(p.amax()));
         }
-        let half_cost = (0.5 * cost.of(motion)).max(f64::MIN_POSITIVE);
+        let cost = cost.of(motion);
+        let half_cost = (0.5 * cost).max(f64::MIN_POSITIVE);
         Self {
             stationarity: slope / scale,
             feasibility: excess.max(chain_error(problem, motion)),
             complementarity: (gap / half_cost).max(negative / half_cost),
+            cost,
         }
     }
 }

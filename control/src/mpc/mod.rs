@@ -14,5 +14,5 @@ pub mod riccati;
 mod sweep;
 
 pub use certificate::Certificate;
-pub use optimiser::{Bounded, Layout, Method, Nonlinearity, Optimiser, SolverSettings};
+pub use optimiser::{Bounded, Layout, Method, Nonlinearity, Optimiser, Report, SolverSettings};
 pub use problem::{Ball, Balls, Chain, Constraints, Cost, Motion, State, per_axis};

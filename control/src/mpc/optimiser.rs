@@ -374,6 +374,21 @@ impl<const O: usize> Optimiser<O> {
         false
     }
 
+    /// The report of a fallback: of the plan that is followed instead of an optimum.
+    pub fn fall_back<B: Bounded<O>>(
+        &mut self,
+        bounded: &B,
+        start: &State<O>,
+        affine: &[State<O>],
+        plan: &Motion<O>,
+        iterations: u32,
+    ) -> Report {
+        self.solution.motion.clone_from(plan);
+        self.solution.multipliers.clear();
+        let sample = Sample { start, affine, deadline: None };
+        self.report(bounded, &sample, Status::Fallback, iterations)
+    }
+
     fn report<B: Bounded<O>>(
         &self,
         bounded: &B,
