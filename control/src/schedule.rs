@@ -50,9 +50,9 @@ where
         self.next_time(period) <= time + tolerance(time)
     }
 
-    /// Whether the first uncommitted tick comes before `time` (s).
-    pub fn comes_before(&self, time: f64, period: f64) -> bool {
-        self.next_time(period) < time - tolerance(time)
+    /// Time of the first uncommitted tick (s), if it comes before `time` (s).
+    pub fn next_before(&self, time: f64, period: f64) -> Option<f64> {
+        Some(self.next_time(period)).filter(|tick| *tick < time - tolerance(time))
     }
 
     /// Evaluates the first uncommitted tick: `update` gets memory and number of the tick. It must be a function of these and
@@ -161,7 +161,9 @@ mod tests {
         for k in 0..10_000_u32 {
             let time = 0.1 + f64::from(k) * 0.04;
             assert!(sampled.is_due(time.next_down(), 0.04) && sampled.is_due(time, 0.04));
-            assert!(!sampled.is_due(time - 0.01, 0.04) && !sampled.comes_before(time.next_up(), 0.04));
+            assert!(
+                !sampled.is_due(time - 0.01, 0.04) && sampled.next_before(time.next_up(), 0.04).is_none()
+            );
             evaluate(&mut sampled, 0.0);
             sampled.commit();
         }

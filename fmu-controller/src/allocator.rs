@@ -1,6 +1,7 @@
 //! `ControlAllocator`: the commanded moment divided among surfaces and jets.
 
 use crate::table::{enumeration, item, number};
+use crate::ticks::{self, Ticked};
 use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Settings, Status};
 use control::schedule::Sampled;
 use fmi2_export::table::{Common, discrete_output, input, parameter};
@@ -119,8 +120,14 @@ impl ControlAllocator {
             _ => Err(Failure::Error("the unit is not initialized".into())),
         }
     }
+}
 
-    /// Brings the first uncommitted tick up to date with the inputs.
+impl Ticked for ControlAllocator {
+    fn tick_before(&mut self, to: f64) -> Result<Option<f64>, Failure> {
+        let (allocator, sampled) = self.parts()?;
+        Ok(sampled.next_before(to, allocator.period()))
+    }
+
     fn evaluate(&mut self) -> Result<(), Failure> {
         let command = self.command;
         if !(command.moment.iter().all(|value| value.is_finite()) && command.dynamic_pressure.is_finite()) {
@@ -129,6 +136,15 @@ impl ControlAllocator {
         let (allocator, sampled) = self.parts()?;
         sampled.evaluate_with(command, |memory, tick| allocator.update(memory, tick, &command));
         Ok(())
+    }
+
+    fn commit(&mut self) -> Result<Option<&'static str>, Failure> {
+        let (_, sampled) = self.parts()?;
+        sampled.commit();
+        let fell_back = sampled.last_change(|before, after| after.report.fallbacks > before.report.fallbacks);
+        Ok(fell_back.then_some(
+            "the optimisation did not succeed: the previous allocation is kept (solver.fallbacks)",
+        ))
     }
 }
 
@@ -185,21 +201,7 @@ impl Model for ControlAllocator {
         inputs: &dyn Inputs<Self>,
         log: &mut dyn FnMut(&str),
     ) -> Result<(), Failure> {
-        loop {
-            let (allocator, sampled) = self.parts()?;
-            let period = allocator.period();
-            if !sampled.comes_before(to, period) {
-                return Ok(());
-            }
-            let tick = sampled.next_time(period).max(from);
-            inputs.advance(self, tick);
-            self.evaluate()?;
-            let (_, sampled) = self.parts()?;
-            sampled.commit();
-            if sampled.last_change(|before, after| after.report.fallbacks > before.report.fallbacks) {
-                log("the optimisation did not succeed: the previous allocation is kept (solver.fallbacks)");
-            }
-        }
+        ticks::step(self, from, to, inputs, log)
     }
 
     fn restored(&mut self) -> Result<(), Failure> {

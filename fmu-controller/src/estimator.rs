@@ -1,6 +1,7 @@
 //! `AttitudeEstimator`: attitude and rates from gyroscope, accelerometer and magnetometer.
 
 use crate::table::{ANGLES, AXES, RATES, enumeration, item, number};
+use crate::ticks::{self, Ticked};
 use control::estimation::ellipsoid::Correction;
 use control::estimation::{
     Alignment, CalibrationMode, CalibrationStatus, Estimator, Health, Line, Memory, Settings,
@@ -150,8 +151,14 @@ impl AttitudeEstimator {
             _ => Err(Failure::Error("the unit is not initialized".into())),
         }
     }
+}
 
-    /// Brings the first uncommitted tick up to date with the inputs.
+impl Ticked for AttitudeEstimator {
+    fn tick_before(&mut self, to: f64) -> Result<Option<f64>, Failure> {
+        let (estimator, sampled) = self.parts()?;
+        Ok(sampled.next_before(to, estimator.period()))
+    }
+
     fn evaluate(&mut self) -> Result<(), Failure> {
         let line = self.line;
         if !(line.time.is_finite() && line.readings.iter().flatten().all(|value| value.is_finite())) {
@@ -161,6 +168,12 @@ impl AttitudeEstimator {
         let time = sampled.next_time(estimator.period());
         sampled.evaluate_with(line, |memory, _| estimator.update(memory, time, &line));
         Ok(())
+    }
+
+    fn commit(&mut self) -> Result<Option<&'static str>, Failure> {
+        let (_, sampled) = self.parts()?;
+        sampled.commit();
+        Ok(sampled.last_change(warning))
     }
 }
 
@@ -217,21 +230,7 @@ impl Model for AttitudeEstimator {
         inputs: &dyn Inputs<Self>,
         log: &mut dyn FnMut(&str),
     ) -> Result<(), Failure> {
-        loop {
-            let (estimator, sampled) = self.parts()?;
-            let period = estimator.period();
-            if !sampled.comes_before(to, period) {
-                return Ok(());
-            }
-            let tick = sampled.next_time(period).max(from);
-            inputs.advance(self, tick);
-            self.evaluate()?;
-            let (_, sampled) = self.parts()?;
-            sampled.commit();
-            if let Some(text) = sampled.last_change(warning) {
-                log(text);
-            }
-        }
+        ticks::step(self, from, to, inputs, log)
     }
 
     fn restored(&mut self) -> Result<(), Failure> {

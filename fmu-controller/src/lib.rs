@@ -13,6 +13,7 @@ mod solver;
 mod table;
 #[cfg(test)]
 mod tests;
+mod ticks;
 mod tvsmc;
 mod two_loop;
 mod unit;

@@ -3,6 +3,7 @@
 use crate::law::{Law, Vehicle};
 use crate::reference::{self, Source};
 use crate::table;
+use crate::ticks::{self, Ticked};
 use control::controller::{Controller, Measurement};
 use control::schedule::Sampled;
 use fmi2_export::{Context, Description, Failure, Inputs, Model};
@@ -76,7 +77,19 @@ impl<L: Law> Unit<L> {
         }
     }
 
-    /// Brings the first uncommitted tick up to date with the inputs.
+    fn design(&self) -> Result<L::Controller, Failure> {
+        let Parameters { inertia, limit_rate, limit_moment, saturation, .. } = self.parameters;
+        let body = inertia.body(1.0).map_err(|error| Failure::Error(error.to_string()))?;
+        self.law.design(&Vehicle { body, limit_rate, limit_moment, saturation })
+    }
+}
+
+impl<L: Law> Ticked for Unit<L> {
+    fn tick_before(&mut self, to: f64) -> Result<Option<f64>, Failure> {
+        let Parts { controller, sampled, .. } = self.parts()?;
+        Ok(sampled.next_before(to, controller.period()))
+    }
+
     fn evaluate(&mut self) -> Result<(), Failure> {
         let used = self.parameters.achieved_moment_used;
         let Parts { controller, sampled, input, source } = self.parts()?;
@@ -100,10 +113,10 @@ impl<L: Law> Unit<L> {
         )))
     }
 
-    fn design(&self) -> Result<L::Controller, Failure> {
-        let Parameters { inertia, limit_rate, limit_moment, saturation, .. } = self.parameters;
-        let body = inertia.body(1.0).map_err(|error| Failure::Error(error.to_string()))?;
-        self.law.design(&Vehicle { body, limit_rate, limit_moment, saturation })
+    fn commit(&mut self) -> Result<Option<&'static str>, Failure> {
+        let Parts { sampled, .. } = self.parts()?;
+        sampled.commit();
+        Ok(sampled.last_change(L::warning))
     }
 }
 
@@ -172,21 +185,7 @@ impl<L: Law> Model for Unit<L> {
         inputs: &dyn Inputs<Self>,
         log: &mut dyn FnMut(&str),
     ) -> Result<(), Failure> {
-        loop {
-            let Parts { controller, sampled, .. } = self.parts()?;
-            let period = controller.period();
-            if !sampled.comes_before(to, period) {
-                return Ok(());
-            }
-            let tick = sampled.next_time(period).max(from);
-            inputs.advance(self, tick);
-            self.evaluate()?;
-            let Some(sampled) = &mut self.sampled else { return Ok(()) };
-            sampled.commit();
-            if let Some(text) = sampled.last_change(L::warning) {
-                log(text);
-            }
-        }
+        ticks::step(self, from, to, inputs, log)
     }
 
     fn restored(&mut self) -> Result<(), Failure> {
