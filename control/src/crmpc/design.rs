@@ -170,6 +170,8 @@ pub struct Design {
     pub terminal_scale: f64,
     /// Largest eigenvalue of I, kg m².
     pub largest_inertia: f64,
+    /// The largest moment of inertia over the smallest.
+    pub inertia_ratio: f64,
 }
 
 impl Design {
@@ -218,6 +220,7 @@ impl Design {
             ratio,
             terminal_scale,
             largest_inertia,
+            inertia_ratio: largest_inertia / smallest_inertia,
         })
     }
 }

@@ -2,10 +2,11 @@
 
 use super::design::{Constraints, Design, Settings};
 use crate::error::DesignError;
-use crate::linearise::{self, InverseKinematics, Linear};
+use crate::linearise::{self, InverseKinematics, Linear, MomentSlopeBounds};
 use crate::mpc::{self, Ball, Balls, Bounded, Motion, State};
 use crate::sampled::Reach;
 use nalgebra::{Matrix3, Vector3};
+use std::cell::OnceCell;
 use std::f64::consts::SQRT_2;
 use std::ops::Range;
 use vehicle::dynamics::RigidBody;
@@ -36,8 +37,8 @@ pub struct Bounds {
 enum Kind {
     /// ‖ω‖ and ‖m‖ with stage-wise bounds.
     Robust(Box<Robust>),
-    /// Constant bounds on ‖x_ω‖ and ‖u‖ of (21).
-    Paper { x_tube: f64, u_tube: f64 },
+    /// Constant bounds on ‖x_ω‖ and ‖u‖ of (21), and the ratio of the largest to the smallest moment of inertia.
+    Paper { x_tube: f64, u_tube: f64, inertia_ratio: f64 },
 }
 
 /// What the bounds follow from, and the bounds.
@@ -82,7 +83,7 @@ impl Sets {
                         return Err(DesignError::EmptySet { name, value });
                     }
                 }
-                (Kind::Paper { x_tube, u_tube }, epsilon)
+                (Kind::Paper { x_tube, u_tube, inertia_ratio: design.inertia_ratio }, epsilon)
             }
         };
         let references = vec![Reference::default(); n + 1];
@@ -94,7 +95,7 @@ impl Sets {
         let n = self.references.len() - 1;
         let (rate, input) = match &self.kind {
             Kind::Robust(robust) => (robust.rate.clone(), robust.moment.clone()),
-            Kind::Paper { x_tube, u_tube } => (vec![*x_tube; n + 1], vec![*u_tube; n]),
+            Kind::Paper { x_tube, u_tube, .. } => (vec![*x_tube; n + 1], vec![*u_tube; n]),
         };
         Bounds { rate, input, terminal: self.terminal_radius }
     }
@@ -127,7 +128,7 @@ impl mpc::Constraints<2> for Sets {
                 state: ball(&at.rates, robust.rate[k]),
                 input: ball(&at.moment, robust.moment.get(k).copied().unwrap_or(f64::INFINITY)),
             },
-            Kind::Paper { x_tube, u_tube } => Balls {
+            Kind::Paper { x_tube, u_tube, .. } => Balls {
                 state: Ball {
                     value: rates / *x_tube,
                     by_state: [Matrix3::zeros(), Matrix3::from_diagonal_element(1.0 / x_tube)],
@@ -147,7 +148,7 @@ impl mpc::Constraints<2> for Sets {
                 kinematics.moment(&self.body, &rates, &a)
                     / robust.moment.get(k).copied().unwrap_or(f64::INFINITY),
             ),
-            Kind::Paper { x_tube, u_tube } => {
+            Kind::Paper { x_tube, u_tube, .. } => {
                 (rates / *x_tube, kinematics.input(&self.body, &rates, &a) / *u_tube)
             }
         };
@@ -195,22 +196,28 @@ impl Bounded<2> for Sets {
 
 /// One stage of a motion.
 struct Point {
+    angles: Vector3<f64>,
     /// x_ω.
     rates: Vector3<f64>,
     /// a; zero at the last stage.
     acceleration: Vector3<f64>,
-    kinematics: InverseKinematics,
+    kinematics: OnceCell<InverseKinematics>,
 }
 
 impl Point {
     fn at(references: &[Reference], motion: &Motion<2>, k: usize) -> Self {
         let Reference { angles, rates, accelerations } = &references[k];
-        let angles = angles + motion.states[k][0];
         Self {
+            angles: angles + motion.states[k][0],
             rates: rates + motion.states[k][1],
             acceleration: motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input),
-            kinematics: InverseKinematics::at(&angles),
+            kinematics: OnceCell::new(),
         }
+    }
+
+    /// W, computed where it is needed first.
+    fn kinematics(&self) -> &InverseKinematics {
+        self.kinematics.get_or_init(|| InverseKinematics::at(&self.angles))
     }
 }
 
@@ -219,15 +226,16 @@ impl Sets {
     fn violates(&mut self, k: usize, here: &Point, next: &Point) -> bool {
         let exceeds = |value: f64, bound: f64| value > bound * (1.0 + CHECK_SLACK);
         match &mut self.kind {
-            Kind::Paper { x_tube, u_tube } => {
+            Kind::Paper { x_tube, u_tube, inertia_ratio } => {
+                let Point { angles, rates, acceleration, .. } = here;
+                let bound =
+                    linearise::input_bound(angles.y, rates.norm(), acceleration.norm(), *inertia_ratio);
                 exceeds(next.rates.norm(), *x_tube)
-                    || exceeds(
-                        here.kinematics.input(&self.body, &here.rates, &here.acceleration).norm(),
-                        *u_tube,
-                    )
+                    || exceeds(bound, *u_tube)
+                        && exceeds(here.kinematics().input(&self.body, rates, acceleration).norm(), *u_tube)
             }
             Kind::Robust(robust) => {
-                let moment = here.kinematics.moment(&self.body, &here.rates, &here.acceleration).norm();
+                let moment = here.kinematics().moment(&self.body, &here.rates, &here.acceleration).norm();
                 let rates = robust.tighten_cheaply(&self.body, k, moment, here, next);
                 if exceeds(moment, robust.moment[k]) {
                     robust.tighten(&self.body, k, here, next);
@@ -241,16 +249,16 @@ impl Sets {
 impl Robust {
     /// Sets the bounds of interval `k`.
     fn tighten(&mut self, body: &RigidBody, k: usize, here: &Point, next: &Point) {
-        let at = here.kinematics.linearise(body, &here.rates, &here.acceleration).moment;
-        let after = next.kinematics.moment(body, &next.rates, &here.acceleration).norm();
-        let (_, by_angles) = next.kinematics.body_rates(&next.rates);
+        let at = here.kinematics().linearise(body, &here.rates, &here.acceleration).moment;
+        let after = next.kinematics().moment(body, &next.rates, &here.acceleration).norm();
+        let (_, by_angles) = next.kinematics().body_rates(&next.rates);
         let feedback = largest_over_box(&at.by_acceleration, &self.design.tightening.disturbance);
         let slopes = (at.by_angles.norm(), at.by_rates.norm(), along(&at));
         self.moment[k] = self.moment_bound(k, at.value.norm(), after, feedback, slopes);
         self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&by_angles));
     }
 
-    /// Sets bounds that are at most those of [`Self::tighten`], without derivatives of the moment. Returns ‖ω̃‖ at the interval's end.
+    /// Sets bounds that are at most those of [`Self::tighten`], without the moment's derivatives by angles and rates. Returns ‖ω̃‖ at the interval's end.
     fn tighten_cheaply(
         &mut self,
         body: &RigidBody,
@@ -259,12 +267,13 @@ impl Robust {
         here: &Point,
         next: &Point,
     ) -> f64 {
-        let after = next.kinematics.moment(body, &next.rates, &here.acceleration).norm();
-        let (rates, by_angles) = next.kinematics.body_rates(&next.rates);
+        let after = next.kinematics().moment(body, &next.rates, &here.acceleration).norm();
+        let (rates, by_angles) = next.kinematics().body_rates(&next.rates);
         let inertia = self.design.largest_inertia;
-        let feedback = inertia * self.design.tightening.disturbance.norm();
-        let (by_angle, by_rate) = linearise::moment_slope_bounds(here.rates.norm(), here.acceleration.norm());
-        let slopes = (inertia * by_angle, inertia * by_rate, inertia);
+        let by_acceleration = here.kinematics().moment_by_acceleration(body);
+        let feedback = largest_over_box(&by_acceleration, &self.design.tightening.disturbance);
+        let bounds = MomentSlopeBounds::new(here.rates.norm(), here.acceleration.norm());
+        let slopes = (inertia * bounds.by_angles, inertia * bounds.by_rates, inertia);
         self.moment[k] = self.moment_bound(k, moment, after, feedback, slopes);
         self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&by_angles));
         rates.norm()
