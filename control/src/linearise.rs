@@ -238,7 +238,10 @@ impl MomentSlopeBounds {
         let acceleration = a + root3 * x * x;
         let by_alpha = acceleration + 2.0 * x * x;
         let by_beta = root2 * a + (2.0 + 5.0_f64).sqrt() * x * x + 2.0 * root2 * x * x;
-        Self { by_angles: (by_alpha * by_alpha + by_beta * by_beta).sqrt(), by_rates: x * (root5 + 1.0 + root2 + 2.0 * root3) }
+        Self {
+            by_angles: (by_alpha * by_alpha + by_beta * by_beta).sqrt(),
+            by_rates: x * (root5 + 1.0 + root2 + 2.0 * root3),
+        }
     }
 }
 

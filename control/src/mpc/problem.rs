@@ -131,6 +131,11 @@ impl<const O: usize> Default for Ball<O> {
 }
 
 impl<const O: usize> Ball<O> {
+    /// y once state and input have changed, if it is linear.
+    fn at(&self, state: &State<O>, input: &Vector3<f64>) -> Vector3<f64> {
+        self.value + self.change(state, input)
+    }
+
     /// ∂y of a change of state and input.
     pub fn change(&self, state: &State<O>, input: &Vector3<f64>) -> Vector3<f64> {
         self.by_state.iter().zip(state).fold(self.by_input * input, |sum, (by, e)| sum + by * e)
@@ -176,6 +181,10 @@ impl<const O: usize, C: Constraints<O>> Constraints<O> for From<'_, C> {
     fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> Balls<O> {
         self.constraints.balls(self.first + k, state, input)
     }
+
+    fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> (f64, f64) {
+        self.constraints.squares(self.first + k, state, input)
+    }
 }
 
 /// Constraints linearised about a motion: ‖c + J_E E_k + J_v v_k‖ ≤ 1.
@@ -216,9 +225,14 @@ impl<const O: usize> Constraints<O> for Frozen<O> {
 
     fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> Balls<O> {
         let mut balls = self.balls[k];
-        balls.state.value += balls.state.change(state, &Vector3::zeros());
-        balls.input.value += balls.input.change(state, input);
+        balls.state.value = balls.state.at(state, &Vector3::zeros());
+        balls.input.value = balls.input.at(state, input);
         balls
+    }
+
+    fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> (f64, f64) {
+        let Balls { state: of_state, input: of_input } = &self.balls[k];
+        (of_state.at(state, &Vector3::zeros()).norm_squared(), of_input.at(state, input).norm_squared())
     }
 }
 

@@ -2,9 +2,12 @@
 //!
 //! Balls are written c = ½(‖y‖² − 1) ≤ 0 with one slack s and one multiplier λ each. Every motion in between satisfies the chain of
 //! integrators exactly, so that Newton's method is left with three residuals: stationarity of the inputs, c + s, and sλ. The
-//! curvature of the balls is exact, that of y is left out (Gauss-Newton).
+//! curvature of the balls is exact, that of y is left out (Gauss-Newton). Stages whose balls the motion stays well inside of are left
+//! without them: every iterate is looked at, and from where it comes near they are in the problem.
 
-use super::problem::{Balls, Constraints, Outcome, Problem, Solution, Start, State, apply, dot, zero_state};
+use super::problem::{
+    Balls, Constraints, Multipliers, Outcome, Problem, Solution, Start, State, apply, dot, zero_state,
+};
 use super::sweep::{Blocks, Gain, Quadratic, minimiser};
 use nalgebra::{Matrix3, SVector, Vector3};
 use std::time::Instant;
@@ -18,6 +21,8 @@ const TO_BOUNDARY: f64 = 0.9999;
 /// A step shorter than this is tried again without second order, towards this share of the mean of sλ.
 const SHORT: f64 = 0.1;
 const RECENTRING: f64 = 0.5;
+/// ‖y‖² from which on a ball is near.
+const NEAR: f64 = 0.5;
 /// Smallest slack at the start, and Σ sλ over half the cost.
 const COLD: (f64, f64) = (0.03, 0.03);
 /// The same where the multipliers of a similar problem are known.
@@ -45,6 +50,12 @@ struct Pair {
 }
 
 impl Pair {
+    /// A slack as large as there is room, at least `smallest`, with sλ = `mean` or a known multiplier if that is larger.
+    fn begin(&mut self, smallest: f64, mean: f64, known: f64) {
+        self.slack = (-self.c).max(smallest);
+        self.multiplier = (mean / self.slack).max(known);
+    }
+
     /// λ/s.
     fn scaling(&self) -> f64 {
         self.multiplier / self.slack
@@ -87,6 +98,8 @@ impl Pair {
 struct Stage<const O: usize> {
     state: State<O>,
     input: Vector3<f64>,
+    /// Whether its balls are in the problem.
+    watched: bool,
     balls: Balls<O>,
     slopes: Slopes<O>,
     state_pair: Pair,
@@ -144,7 +157,7 @@ impl Residuals {
 
     /// μ.
     fn mean(&self) -> f64 {
-        self.gap / self.count
+        self.gap / self.count.max(1.0)
     }
 }
 
@@ -154,6 +167,7 @@ impl<const O: usize> Riccati<O> {
         let stage = Stage {
             state: zero_state(),
             input: Vector3::zeros(),
+            watched: false,
             balls: Balls::default(),
             slopes: Slopes { state: zero_state(), input: (zero_state(), Vector3::zeros()) },
             state_pair: Pair::default(),
@@ -200,19 +214,22 @@ impl<const O: usize> Riccati<O> {
             let least = 0.1 * GAP * residuals.cost / residuals.gap;
             let ratio = self.mean_after(problem, affine, residuals.count) / residuals.mean();
             let centring = ratio.powi(3).max(least).min(1.0);
-            // The step goes about so far along the predictor.
-            let second_order = (1.0, affine * (1.0 - centring));
-            let mut alpha = self.corrector(problem, centring * residuals.mean(), second_order);
+            // The step goes about so far along the predictor; where it does not follow it at all, its second order only disturbs.
+            let second_order = (1.0 - centring * centring, affine * (1.0 - centring));
+            let centre = centring * residuals.mean();
+            let mut alpha = self.corrector(problem, centre, second_order);
             if alpha < SHORT {
                 // The second order misleads.
                 alpha = self.corrector(problem, RECENTRING * residuals.mean(), (0.0, 0.0));
             }
             self.step(problem, alpha);
+            let mean = centre.max(WARM.1 * residuals.cost / residuals.count);
+            self.watch(problem, COLD.0, mean, |_| [0.0; 2]);
         }
         Outcome::Failed(self.max_iterations)
     }
 
-    /// The first iterate: slacks as large as the constraints leave room, at least [`SMALLEST_SLACK`].
+    /// The first iterate.
     fn begin<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
@@ -220,9 +237,10 @@ impl<const O: usize> Riccati<O> {
         first: usize,
         warm: bool,
     ) {
-        let motion = &solution.motion;
+        let Solution { motion, multipliers } = solution;
         for (stage, state) in self.stages[..=self.horizon].iter_mut().zip(&motion.states[first..]) {
             stage.state = *state;
+            stage.watched = false;
         }
         for (stage, input) in self.stages[..self.horizon].iter_mut().zip(&motion.inputs[first..]) {
             stage.input = *input;
@@ -237,42 +255,53 @@ impl<const O: usize> Riccati<O> {
             }
         }
         self.evaluate(problem);
-        let (cost, _) = self.costs(problem);
-        let mut count = 0.0;
-        self.each_pair(problem, |_| count += 1.0);
+        let cost = self.cost(problem);
         let (smallest, gap) = if warm { WARM } else { COLD };
-        let mean = gap * cost / count;
-        let begin = |pair: &mut Pair, known: f64| {
-            pair.slack = (-pair.c).max(smallest);
-            pair.multiplier = (mean / pair.slack).max(if warm { known } else { 0.0 });
-        };
-        let multipliers = &solution.multipliers;
-        for (k, stage) in self.stages[..=self.horizon].iter_mut().enumerate() {
-            begin(&mut stage.state_pair, if k > 0 { multipliers.state[first + k - 1] } else { 0.0 });
-            begin(&mut stage.input_pair, multipliers.input.get(first + k).copied().unwrap_or_default());
-        }
-        begin(&mut self.terminal, multipliers.terminal);
+        let balls = if problem.constraints.has_state_balls() { 2 } else { 1 };
+        let mean = gap * cost / (balls * self.horizon + self.faces.len() + 1) as f64;
+        let Multipliers { state, input, terminal, .. } = multipliers;
+        self.terminal.begin(smallest, mean, if warm { *terminal } else { 0.0 });
         for face in &mut self.faces {
-            begin(&mut face.pair, 0.0);
+            face.pair.begin(smallest, mean, 0.0);
+        }
+        self.watch(problem, smallest, mean, |k| {
+            let before = (first + k).checked_sub(1);
+            let known = [before.and_then(|k| state.get(k)), input.get(first + k)];
+            known.map(|known| known.copied().filter(|_| warm).unwrap_or_default())
+        });
+    }
+
+    /// Takes the balls in that the iterate has come near; `known` gives their multipliers, that on the state first.
+    fn watch<C: Constraints<O>>(
+        &mut self,
+        problem: &Problem<O, C>,
+        smallest: f64,
+        mean: f64,
+        known: impl Fn(usize) -> [f64; 2],
+    ) {
+        let end = self.end();
+        for (k, stage) in self.stages[..=end].iter_mut().enumerate() {
+            if stage.watched {
+                continue;
+            }
+            let (state, input) = problem.constraints.squares(k, &stage.state, &stage.input);
+            stage.watched = k > 0 && state > NEAR || k < end && input > NEAR;
+            if stage.watched {
+                stage.evaluate(problem.constraints, k);
+                let [state, input] = known(k);
+                stage.state_pair.begin(smallest, mean, state);
+                stage.input_pair.begin(smallest, mean, input);
+            }
         }
     }
 
     /// c and its slopes at the iterate.
     fn evaluate<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) {
-        let of = |value: &Vector3<f64>| 0.5 * (value.norm_squared() - 1.0);
         let end = self.end();
         for (k, stage) in self.stages[..=end].iter_mut().enumerate() {
-            stage.balls = problem.constraints.balls(k, &stage.state, &stage.input);
-            let Balls { state, input } = &stage.balls;
-            stage.slopes = Slopes {
-                state: state.by_state.map(|by| by.tr_mul(&state.value)),
-                input: (
-                    input.by_state.map(|by| by.tr_mul(&input.value)),
-                    input.by_input.tr_mul(&input.value),
-                ),
-            };
-            stage.state_pair.c = of(&state.value);
-            stage.input_pair.c = of(&input.value);
+            if stage.watched {
+                stage.evaluate(problem.constraints, k);
+            }
         }
         if let Some(radius) = problem.end.radius {
             let end = &self.stages[end].state;
@@ -290,7 +319,7 @@ impl<const O: usize> Riccati<O> {
     fn each_pair<C: Constraints<O>>(&mut self, problem: &Problem<O, C>, mut visit: impl FnMut(&mut Pair)) {
         let last = self.end();
         let state_balls = problem.constraints.has_state_balls();
-        for (k, stage) in self.stages[..=last].iter_mut().enumerate() {
+        for (k, stage) in self.stages[..=last].iter_mut().enumerate().filter(|(_, stage)| stage.watched) {
             if k > 0 && state_balls {
                 visit(&mut stage.state_pair);
             }
@@ -318,20 +347,19 @@ impl<const O: usize> Riccati<O> {
         self.adjoint(
             problem,
             |pair| pair.multiplier,
-            |stage, r| {
-                largest = largest.max(r.amax());
-                scale = scale.max(problem.cost.input.component_mul(&stage.input).amax());
+            |own, future| {
+                largest = largest.max((own + future).amax());
+                scale = scale.max(own.amax()).max(future.amax());
             },
         );
         if !matches!(problem.start, Start::Fixed(_)) {
             largest = self.first.1.iter().fold(largest, |largest, p| largest.max(p.amax()));
         }
-        let (cost, input_scale) = self.costs(problem);
-        Residuals { stationarity: largest / scale.max(input_scale), feasibility, gap, cost, count }
+        Residuals { stationarity: largest / scale, feasibility, gap, cost: self.cost(problem), count }
     }
 
-    /// Half the cost of the iterate without what is linear in its end, and the largest part of its slope in E_N.
-    fn costs<C: Constraints<O>>(&self, problem: &Problem<O, C>) -> (f64, f64) {
+    /// Half the cost of the iterate without what is linear in its end.
+    fn cost<C: Constraints<O>>(&self, problem: &Problem<O, C>) -> f64 {
         let stages = self.stages[..self.horizon].iter();
         let inner: f64 = stages
             .map(|stage| {
@@ -340,9 +368,7 @@ impl<const O: usize> Riccati<O> {
             })
             .sum();
         let end = &self.stages[self.end()].state;
-        let weighted = problem.end.weighted(end);
-        let scale = problem.chain.input_adjoint(&weighted).amax();
-        (0.5 * (inner + dot(end, &weighted)), scale)
+        0.5 * (inner + dot(end, &problem.end.weighted(end)))
     }
 
     /// Position of the last stage.
@@ -350,18 +376,19 @@ impl<const O: usize> Riccati<O> {
         self.horizon
     }
 
-    /// ∇L from the end to the start: calls `visit` with the slope in each input; leaves that in E_0.
+    /// ∇L from the end to the start: calls `visit` with the slope in each input, its own part and that of what follows; leaves that in
+    /// E_0.
     fn adjoint<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
         multiplier: impl Fn(&Pair) -> f64,
-        mut visit: impl FnMut(&Stage<O>, Vector3<f64>),
+        mut visit: impl FnMut(Vector3<f64>, Vector3<f64>),
     ) {
         let last = self.end();
         let mut p = self.end_slope(problem, &multiplier);
         for (k, stage) in self.stages[..last].iter().enumerate().rev() {
             let (q, r) = stage.slope(problem, k, &multiplier);
-            visit(stage, r + problem.chain.input_adjoint(&p));
+            visit(r, problem.chain.input_adjoint(&p));
             p = add(&problem.chain.adjoint(&p), &q);
         }
         self.first.1 = add(&p, &self.start_slope(problem, &multiplier));
@@ -380,7 +407,7 @@ impl<const O: usize> Riccati<O> {
         }
         let weighted = problem.end.weighted(&stage.state);
         let mut slope: State<O> = std::array::from_fn(|i| weighted[i] * weight + problem.end.slope[i]);
-        if problem.constraints.has_state_balls() {
+        if stage.watched && problem.constraints.has_state_balls() {
             let multiplier = multiplier(&stage.state_pair);
             slope = std::array::from_fn(|i| slope[i] + stage.slopes.state[i] * multiplier);
         }
@@ -408,13 +435,13 @@ impl<const O: usize> Riccati<O> {
         let mut p = self.end_weight(problem);
         for (k, stage) in self.stages[..last].iter_mut().enumerate().rev() {
             let mut quadratic = Quadratic::diagonal(&problem.cost.state, &problem.cost.input);
-            let Pair { multiplier, .. } = stage.input_pair;
-            let scaling = stage.input_pair.scaling();
-            quadratic.add_ball(&stage.balls.input, &stage.slopes.input, multiplier, scaling);
-            if k > 0 && state_balls {
-                let Pair { multiplier, .. } = stage.state_pair;
-                let scaling = stage.state_pair.scaling();
-                quadratic.add_state_ball(&stage.balls.state, &stage.slopes.state, multiplier, scaling);
+            if stage.watched {
+                let Stage { balls, slopes, state_pair, input_pair, .. } = &stage;
+                quadratic.add_ball(&balls.input, &slopes.input, input_pair.multiplier, input_pair.scaling());
+                if k > 0 && state_balls {
+                    let (multiplier, scaling) = (state_pair.multiplier, state_pair.scaling());
+                    quadratic.add_state_ball(&balls.state, &slopes.state, multiplier, scaling);
+                }
             }
             stage.gain = Gain::factor(&quadratic, problem.chain, &mut p)?;
         }
@@ -452,7 +479,7 @@ impl<const O: usize> Riccati<O> {
                     + slope[i] * outer * slope[j].transpose();
             }
         }
-        if problem.constraints.has_state_balls() {
+        if stage.watched && problem.constraints.has_state_balls() {
             let pair = &stage.state_pair;
             quadratic.add_state_ball(
                 &stage.balls.state,
@@ -520,16 +547,18 @@ impl<const O: usize> Riccati<O> {
         let state_balls = problem.constraints.has_state_balls();
         for (k, stage) in self.stages[..=last].iter_mut().enumerate() {
             stage.d_state = change;
-            if k > 0 && state_balls {
+            if stage.watched && k > 0 && state_balls {
                 let ball = &stage.balls.state;
                 let y = ball.by_state.iter().zip(&change).fold(Vector3::zeros(), |sum, (by, e)| sum + by * e);
                 stage.state_pair.set_direction(ball.value.dot(&y), 0.5 * y.norm_squared());
             }
             if k < last {
                 stage.d_input = stage.gain.input(&change, &stage.feedforward);
-                let ball = &stage.balls.input;
-                let y = ball.change(&change, &stage.d_input);
-                stage.input_pair.set_direction(ball.value.dot(&y), 0.5 * y.norm_squared());
+                if stage.watched {
+                    let ball = &stage.balls.input;
+                    let y = ball.change(&change, &stage.d_input);
+                    stage.input_pair.set_direction(ball.value.dot(&y), 0.5 * y.norm_squared());
+                }
                 change = problem.chain.advance(&change, &stage.d_input);
             }
         }
@@ -557,13 +586,14 @@ impl<const O: usize> Riccati<O> {
         let Solution { motion, multipliers } = solution;
         let state_balls = problem.constraints.has_state_balls();
         for (k, stage) in self.stages[..=self.horizon].iter().enumerate() {
+            let multiplier = |pair: &Pair| if stage.watched { pair.multiplier } else { 0.0 };
             motion.states[first + k] = stage.state;
             if k > 0 && state_balls {
-                multipliers.state[first + k - 1] = stage.state_pair.multiplier;
+                multipliers.state[first + k - 1] = multiplier(&stage.state_pair);
             }
             if k < self.horizon {
                 motion.inputs[first + k] = stage.input;
-                multipliers.input[first + k] = stage.input_pair.multiplier;
+                multipliers.input[first + k] = multiplier(&stage.input_pair);
             }
         }
         if problem.end.radius.is_some() {
@@ -578,6 +608,18 @@ impl<const O: usize> Riccati<O> {
 }
 
 impl<const O: usize> Stage<O> {
+    /// Balls, c and its slopes at the iterate.
+    fn evaluate(&mut self, constraints: &impl Constraints<O>, k: usize) {
+        self.balls = constraints.balls(k, &self.state, &self.input);
+        let Balls { state, input } = &self.balls;
+        self.slopes = Slopes {
+            state: state.by_state.map(|by| by.tr_mul(&state.value)),
+            input: (input.by_state.map(|by| by.tr_mul(&input.value)), input.by_input.tr_mul(&input.value)),
+        };
+        self.state_pair.c = 0.5 * (state.value.norm_squared() - 1.0);
+        self.input_pair.c = 0.5 * (input.value.norm_squared() - 1.0);
+    }
+
     /// ∂/∂E and ∂/∂v of the stage's cost and of its balls by their multipliers.
     fn slope<C: Constraints<O>>(
         &self,
@@ -586,16 +628,18 @@ impl<const O: usize> Stage<O> {
         multiplier: &impl Fn(&Pair) -> f64,
     ) -> (State<O>, Vector3<f64>) {
         let mut by_state = problem.cost.slope(&self.state);
-        let by_ball = multiplier(&self.input_pair);
-        let by_input = problem.cost.input.component_mul(&self.input) + self.slopes.input.1 * by_ball;
-        for i in 0..O {
-            by_state[i] += self.slopes.input.0[i] * by_ball;
-        }
-        if k > 0 && problem.constraints.has_state_balls() {
-            let by_ball = multiplier(&self.state_pair);
+        let mut by_input = problem.cost.input.component_mul(&self.input);
+        if self.watched {
+            let of_input = multiplier(&self.input_pair);
+            let of_state = if k > 0 && problem.constraints.has_state_balls() {
+                multiplier(&self.state_pair)
+            } else {
+                0.0
+            };
             for i in 0..O {
-                by_state[i] += self.slopes.state[i] * by_ball;
+                by_state[i] += self.slopes.input.0[i] * of_input + self.slopes.state[i] * of_state;
             }
+            by_input += self.slopes.input.1 * of_input;
         }
         (by_state, by_input)
     }
