@@ -94,9 +94,16 @@ impl InverseKinematics {
         body.inertia * omega_dot + rates.cross(&(body.inertia * rates))
     }
 
-    /// ∂m/∂a = I W.
-    pub fn moment_by_acceleration(&self, body: &RigidBody) -> Matrix3<f64> {
-        Matrix3::from_columns(&self.columns().0.map(|w| body.inertia * w))
+    /// ω with its derivatives by (α, β), and the moment that each acceleration takes.
+    pub fn motion(&self, body: &RigidBody, angle_rates: &Vector3<f64>) -> BodyMotion {
+        let (rates, by_angles) = self.body_rates(angle_rates);
+        let omega_dot = self.acceleration(angle_rates, &Vector3::zeros(), &by_angles);
+        BodyMotion {
+            rates,
+            rates_by_angles: by_angles,
+            moment_by_acceleration: Matrix3::from_columns(&self.columns().0.map(|w| body.inertia * w)),
+            moment_at_rest: body.inertia * omega_dot + rates.cross(&(body.inertia * rates)),
+        }
     }
 
     /// u = R I⁻¹ m, as [`input`].
@@ -124,6 +131,26 @@ impl InverseKinematics {
         let ((sa, ca), (sb, cb)) = (self.alpha, self.beta);
         let (p, q) = (ca * y.x + sa * y.z, sa * y.x - ca * y.z);
         Vector3::new(y.y - p * sb / cb, q, -p * cb - y.y * sb)
+    }
+}
+
+/// What a motion is like at some angles and their rates, whatever its acceleration.
+#[derive(Clone, Copy, Debug)]
+pub struct BodyMotion {
+    /// ω, rad/s.
+    pub rates: Vector3<f64>,
+    /// ∂ω/∂(α, β).
+    pub rates_by_angles: [Vector3<f64>; 2],
+    /// ∂m/∂a = I W.
+    pub moment_by_acceleration: Matrix3<f64>,
+    /// I Ẇ x_ω + ω × I ω: m for a = 0, N m.
+    pub moment_at_rest: Vector3<f64>,
+}
+
+impl BodyMotion {
+    /// m for this acceleration, N m.
+    pub fn moment(&self, acceleration: &Vector3<f64>) -> Vector3<f64> {
+        self.moment_by_acceleration * acceleration + self.moment_at_rest
     }
 }
 
@@ -354,6 +381,8 @@ mod tests {
         let exact_input = InverseKinematics::at(&angles).input_of_moment(&body, &exact.moment);
         for (y, linear) in [exact.rates, exact.moment, exact_input].iter().enumerate() {
             assert!((linear.value - all(&point)[y]).norm() <= 1e-12 * linear.value.norm());
+            let motion = InverseKinematics::at(&angles).motion(&body, &rates);
+            assert!((motion.moment(&a) - exact.moment.value).norm() <= 1e-12 * exact.moment.value.norm());
             for i in 0..9 {
                 let step = 1e-5;
                 let (mut plus, mut minus) = (point, point);

@@ -2,7 +2,7 @@
 
 use super::design::{Constraints, Design, Settings};
 use crate::error::DesignError;
-use crate::linearise::{self, InverseKinematics, Linear, MomentSlopeBounds};
+use crate::linearise::{self, BodyMotion, InverseKinematics, Linear, Linearisation, MomentSlopeBounds};
 use crate::mpc::{self, Ball, Balls, Bounded, Motion, State};
 use crate::sampled::Reach;
 use nalgebra::{Matrix3, Vector3};
@@ -17,9 +17,13 @@ use vehicle::reference::Reference;
 pub(super) struct Sets {
     kind: Kind,
     body: RigidBody,
+    /// h, s.
+    period: f64,
     /// References at the prediction times.
     pub(super) references: Vec<Reference>,
     terminal_radius: f64,
+    /// Whether the bounds are those about the motion that is evaluated.
+    follow: bool,
 }
 
 /// The bounds that an optimisation was under, for benchmarks and tests that solve the same problem otherwise.
@@ -87,7 +91,14 @@ impl Sets {
             }
         };
         let references = vec![Reference::default(); n + 1];
-        Ok(Self { kind, body: settings.body, references, terminal_radius })
+        Ok(Self {
+            kind,
+            body: settings.body,
+            period: settings.period_optimisation,
+            references,
+            terminal_radius,
+            follow: false,
+        })
     }
 
     /// The bounds in force.
@@ -124,10 +135,15 @@ impl mpc::Constraints<2> for Sets {
         let kinematics = InverseKinematics::at(&angles);
         let at = kinematics.linearise(&self.body, &rates, &a);
         match &self.kind {
-            Kind::Robust(robust) => Balls {
-                state: ball(&at.rates, robust.rate[k]),
-                input: ball(&at.moment, robust.moment.get(k).copied().unwrap_or(f64::INFINITY)),
-            },
+            Kind::Robust(robust) => {
+                let (rate, moment) = if self.follow {
+                    let after = self.moment_after(k, &angles, &rates, &a);
+                    robust.bounds_about(k, &at, after)
+                } else {
+                    robust.bounds(k)
+                };
+                Balls { state: ball(&at.rates, rate), input: ball(&at.moment, moment) }
+            }
             Kind::Paper { x_tube, u_tube, .. } => Balls {
                 state: Ball {
                     value: rates / *x_tube,
@@ -143,11 +159,14 @@ impl mpc::Constraints<2> for Sets {
         let [angles, rates, a] = self.nominal(k, state, input);
         let kinematics = InverseKinematics::at(&angles);
         let (state, input) = match &self.kind {
-            Kind::Robust(robust) => (
-                kinematics.body_rates(&rates).0 / robust.rate[k],
-                kinematics.moment(&self.body, &rates, &a)
-                    / robust.moment.get(k).copied().unwrap_or(f64::INFINITY),
-            ),
+            Kind::Robust(_) if self.follow => {
+                let Balls { state, input } = self.balls(k, state, input);
+                (state.value, input.value)
+            }
+            Kind::Robust(robust) => {
+                let (rate, moment) = robust.bounds(k);
+                (kinematics.body_rates(&rates).0 / rate, kinematics.moment(&self.body, &rates, &a) / moment)
+            }
             Kind::Paper { x_tube, u_tube, .. } => {
                 (rates / *x_tube, kinematics.input(&self.body, &rates, &a) / *u_tube)
             }
@@ -157,6 +176,10 @@ impl mpc::Constraints<2> for Sets {
 }
 
 impl Bounded<2> for Sets {
+    fn follow(&mut self, follow: bool) {
+        self.follow = follow;
+    }
+
     fn tighten(&mut self, motion: &Motion<2>, of: Range<usize>) {
         let Self { kind, body, references, .. } = self;
         if let Kind::Robust(robust) = kind {
@@ -201,7 +224,7 @@ struct Point {
     rates: Vector3<f64>,
     /// a; zero at the last stage.
     acceleration: Vector3<f64>,
-    kinematics: OnceCell<InverseKinematics>,
+    turned: OnceCell<(InverseKinematics, BodyMotion)>,
 }
 
 impl Point {
@@ -211,34 +234,46 @@ impl Point {
             angles: angles + motion.states[k][0],
             rates: rates + motion.states[k][1],
             acceleration: motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input),
-            kinematics: OnceCell::new(),
+            turned: OnceCell::new(),
         }
     }
 
-    /// W, computed where it is needed first.
-    fn kinematics(&self) -> &InverseKinematics {
-        self.kinematics.get_or_init(|| InverseKinematics::at(&self.angles))
+    /// W and what it makes of the motion, computed where it is needed first.
+    fn turned(&self, body: &RigidBody) -> &(InverseKinematics, BodyMotion) {
+        self.turned.get_or_init(|| {
+            let kinematics = InverseKinematics::at(&self.angles);
+            (kinematics, kinematics.motion(body, &self.rates))
+        })
     }
 }
 
 impl Sets {
+    /// ‖m̃‖ at the end of interval `k`, with a held, N m.
+    fn moment_after(&self, k: usize, angles: &Vector3<f64>, rates: &Vector3<f64>, a: &Vector3<f64>) -> f64 {
+        if k + 1 >= self.references.len() {
+            return 0.0;
+        }
+        let h = self.period;
+        let angles = angles + (rates + a * (0.5 * h)) * h;
+        linearise::moment(&self.body, &angles, &(rates + a * h), a).norm()
+    }
+
     /// Whether the input of interval `k` or the state at its end violates its constraint, with the bounds about themselves.
     fn violates(&mut self, k: usize, here: &Point, next: &Point) -> bool {
         let exceeds = |value: f64, bound: f64| value > bound * (1.0 + CHECK_SLACK);
+        let body = &self.body;
         match &mut self.kind {
             Kind::Paper { x_tube, u_tube, inertia_ratio } => {
                 let Point { angles, rates, acceleration, .. } = here;
                 let bound =
                     linearise::input_bound(angles.y, rates.norm(), acceleration.norm(), *inertia_ratio);
-                exceeds(next.rates.norm(), *x_tube)
-                    || exceeds(bound, *u_tube)
-                        && exceeds(here.kinematics().input(&self.body, rates, acceleration).norm(), *u_tube)
+                let input = || here.turned(body).0.input(body, rates, acceleration).norm();
+                exceeds(next.rates.norm(), *x_tube) || exceeds(bound, *u_tube) && exceeds(input(), *u_tube)
             }
             Kind::Robust(robust) => {
-                let moment = here.kinematics().moment(&self.body, &here.rates, &here.acceleration).norm();
-                let rates = robust.tighten_cheaply(&self.body, k, moment, here, next);
+                let (moment, rates) = robust.tighten_cheaply(body, k, here, next);
                 if exceeds(moment, robust.moment[k]) {
-                    robust.tighten(&self.body, k, here, next);
+                    robust.tighten(body, k, here, next);
                 }
                 exceeds(rates, robust.rate[k + 1]) || exceeds(moment, robust.moment[k])
             }
@@ -247,36 +282,46 @@ impl Sets {
 }
 
 impl Robust {
-    /// Sets the bounds of interval `k`.
-    fn tighten(&mut self, body: &RigidBody, k: usize, here: &Point, next: &Point) {
-        let at = here.kinematics().linearise(body, &here.rates, &here.acceleration).moment;
-        let after = next.kinematics().moment(body, &next.rates, &here.acceleration).norm();
-        let (_, by_angles) = next.kinematics().body_rates(&next.rates);
-        let feedback = largest_over_box(&at.by_acceleration, &self.design.tightening.disturbance);
-        let slopes = (at.by_angles.norm(), at.by_rates.norm(), along(&at));
-        self.moment[k] = self.moment_bound(k, at.value.norm(), after, feedback, slopes);
-        self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&by_angles));
+    /// Those on ‖ω̃‖ and ‖m̃‖ at stage `k`.
+    fn bounds(&self, k: usize) -> (f64, f64) {
+        (self.rate[k], self.moment.get(k).copied().unwrap_or(f64::INFINITY))
     }
 
-    /// Sets bounds that are at most those of [`Self::tighten`], without the moment's derivatives by angles and rates. Returns ‖ω̃‖ at the interval's end.
-    fn tighten_cheaply(
-        &mut self,
-        body: &RigidBody,
-        k: usize,
-        moment: f64,
-        here: &Point,
-        next: &Point,
-    ) -> f64 {
-        let after = next.kinematics().moment(body, &next.rates, &here.acceleration).norm();
-        let (rates, by_angles) = next.kinematics().body_rates(&next.rates);
+    /// The same about a motion that is linearised there, with ‖m̃‖ = `after` at the interval's end.
+    fn bounds_about(&self, k: usize, at: &Linearisation, after: f64) -> (f64, f64) {
+        let moment =
+            if k < self.moment.len() { self.moment_bound_about(k, &at.moment, after) } else { f64::INFINITY };
+        (self.rate_bound(k, at.rates.by_angles.norm()), moment)
+    }
+
+    /// Sets the bounds of interval `k`.
+    fn tighten(&mut self, body: &RigidBody, k: usize, here: &Point, next: &Point) {
+        let at = here.turned(body).0.linearise(body, &here.rates, &here.acceleration).moment;
+        let after = &next.turned(body).1;
+        self.moment[k] = self.moment_bound_about(k, &at, after.moment(&here.acceleration).norm());
+        self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&after.rates_by_angles));
+    }
+
+    /// Sets bounds that are at most those of [`Self::tighten`], without the moment's derivatives by angles and rates. Returns ‖m̃‖ of
+    /// the interval and ‖ω̃‖ at its end.
+    fn tighten_cheaply(&mut self, body: &RigidBody, k: usize, here: &Point, next: &Point) -> (f64, f64) {
+        let Point { rates, acceleration, .. } = here;
+        let ((_, now), (_, after)) = (here.turned(body), next.turned(body));
+        let moment = now.moment(acceleration).norm();
         let inertia = self.design.largest_inertia;
-        let by_acceleration = here.kinematics().moment_by_acceleration(body);
-        let feedback = largest_over_box(&by_acceleration, &self.design.tightening.disturbance);
-        let bounds = MomentSlopeBounds::new(here.rates.norm(), here.acceleration.norm());
+        let feedback = largest_over_box(&now.moment_by_acceleration, &self.design.tightening.disturbance);
+        let bounds = MomentSlopeBounds::new(rates.norm(), acceleration.norm());
         let slopes = (inertia * bounds.by_angles, inertia * bounds.by_rates, inertia);
-        self.moment[k] = self.moment_bound(k, moment, after, feedback, slopes);
-        self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&by_angles));
-        rates.norm()
+        self.moment[k] = self.moment_bound(k, moment, after.moment(acceleration).norm(), feedback, slopes);
+        self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&after.rates_by_angles));
+        (moment, after.rates.norm())
+    }
+
+    /// [`Self::moment_bound`] about a moment that is linearised there.
+    fn moment_bound_about(&self, k: usize, at: &Linear, after: f64) -> f64 {
+        let feedback = largest_over_box(&at.by_acceleration, &self.design.tightening.disturbance);
+        let slopes = (at.by_angles.norm(), at.by_rates.norm(), along(at));
+        self.moment_bound(k, at.value.norm(), after, feedback, slopes)
     }
 
     /// What ‖ω̃‖ may be at prediction step k so that ‖ω‖ keeps its limit whatever the error dynamics do, where ∂ω/∂(α, β) has this norm.
@@ -315,9 +360,7 @@ impl Robust {
         let at = linearise::linearise(&self.settings.body, &end.angles, &end.rates, &end.accelerations);
         let moment = at.moment.value.norm();
         let rate = self.rate_bound(n, at.rates.by_angles.norm()) - at.rates.value.norm();
-        let feedback = largest_over_box(&at.moment.by_acceleration, &self.design.tightening.disturbance);
-        let slopes = (at.moment.by_angles.norm(), at.moment.by_rates.norm(), along(&at.moment));
-        let moment = self.moment_bound(n - 1, moment, moment, feedback, slopes) - moment;
+        let moment = self.moment_bound_about(n - 1, &at.moment, moment) - moment;
         let gain = self.settings.terminal.k1.hypot(self.settings.terminal.k2);
         let radius = self.design.terminal_scale * rate.min(moment / (self.design.largest_inertia * gain));
         radius.max(SMALLEST_RADIUS)

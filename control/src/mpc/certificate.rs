@@ -70,18 +70,22 @@ impl Certificate {
             if k < n {
                 let multiplier = by_input;
                 let own = cost.input.component_mul(&input);
-                let by_ball = balls.input.by_input.tr_mul(&balls.input.value) * multiplier;
                 let by_future = chain.input_adjoint(&p);
+                let (through, weighted) = (chain.adjoint(&p), cost.slope(state));
+                p = std::array::from_fn(|i| through[i] + weighted[i]);
+                let mut by_ball = Vector3::zeros();
+                if !idle {
+                    by_ball = balls.input.by_input.tr_mul(&balls.input.value) * multiplier;
+                    add(&mut p, |i| balls.input.by_state[i].tr_mul(&balls.input.value) * multiplier);
+                }
                 slope = slope.max((own + by_ball + by_future).amax());
                 scale = [own, by_ball, by_future].iter().fold(scale, |scale, part| scale.max(part.amax()));
-                let (through, weighted) = (chain.adjoint(&p), cost.slope(state));
-                p = std::array::from_fn(|i| {
-                    through[i] + weighted[i] + balls.input.by_state[i].tr_mul(&balls.input.value) * multiplier
-                });
                 count(squares.1, multiplier);
             }
             if k > 0 && state_balls {
-                add(&mut p, |i| balls.state.by_state[i].tr_mul(&balls.state.value) * by_state);
+                if !idle {
+                    add(&mut p, |i| balls.state.by_state[i].tr_mul(&balls.state.value) * by_state);
+                }
                 count(squares.0, by_state);
             }
         }

@@ -66,6 +66,10 @@ impl SolverSettings {
 
 /// The constraints of a controller. Their bounds may depend on the motion, and are then those about a motion that was given before.
 pub trait Bounded<const O: usize>: Constraints<O> {
+    /// Whether the bounds are from now on those about the motion that is evaluated, rather than those of the last [`Self::tighten`]. Their
+    /// own derivatives are left out. Nothing to do for bounds that do not depend on the motion.
+    fn follow(&mut self, _follow: bool) {}
+
     /// Sets the bounds of the intervals `of` about `motion`: of the state at the end of each, and of its input.
     fn tighten(&mut self, motion: &Motion<O>, of: Range<usize>);
 
@@ -233,6 +237,7 @@ impl<const O: usize> Optimiser<O> {
                 self.about.states[0] = *start;
                 status = self.solve(bounded, &sample, &mut search);
             }
+            None if self.settled_by_riccati(bounded, &sample, &mut search) => status = Status::Constrained,
             None => {
                 for _ in 0..FIRST_PASSES {
                     self.about.clone_from(&self.solution.motion);
@@ -263,6 +268,25 @@ impl<const O: usize> Optimiser<O> {
             [multipliers.state[k], multipliers.input[k]] = active[k];
         }
         search.warm = true;
+    }
+
+    /// The first optimisation by the Riccati method, with bounds that follow its iterates.
+    fn settled_by_riccati<B: Bounded<O>>(
+        &mut self,
+        bounded: &mut B,
+        sample: &Sample<O>,
+        search: &mut Search,
+    ) -> bool {
+        if self.settings.method != Method::Riccati || self.settings.nonlinearity != Nonlinearity::Exact {
+            return false;
+        }
+        self.about.clone_from(&self.solution.motion);
+        bounded.follow(true);
+        let settled =
+            self.in_windows(bounded, sample, search) || self.over_whole_horizon(bounded, sample, search);
+        bounded.follow(false);
+        bounded.tighten(&self.solution.motion, 0..self.layout.horizon);
+        settled
     }
 
     /// The optimum with the bounds about `about`, by the solvers in turn.
