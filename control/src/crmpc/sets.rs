@@ -389,11 +389,10 @@ fn norm_of_columns(columns: &[Vector3<f64>; 2]) -> f64 {
     (columns[0].norm_squared() + columns[1].norm_squared()).sqrt()
 }
 
-/// max ‖M s‖ over |s_i| ≤ b_i.
+/// max ‖M s‖ over |s_i| ≤ b_i: at a corner, where the columns' products count with the product of their signs.
 fn largest_over_box(m: &Matrix3<f64>, b: &Vector3<f64>) -> f64 {
-    [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
-        .map(|(y, z)| (m * Vector3::new(b.x, y * b.y, z * b.z)).norm_squared())
-        .into_iter()
-        .fold(0.0, f64::max)
-        .sqrt()
+    let [x, y, z] = std::array::from_fn(|i| m.column(i) * b[i]);
+    let (xy, xz, yz) = (x.dot(&y), x.dot(&z), y.dot(&z));
+    let products = (xy + xz + yz).max(xy - xz - yz).max(xz - xy - yz).max(yz - xy - xz);
+    (x.norm_squared() + y.norm_squared() + z.norm_squared() + 2.0 * products).sqrt()
 }
