@@ -281,6 +281,8 @@ impl<const O: usize> Optimiser<O> {
             return false;
         }
         self.about.clone_from(&self.solution.motion);
+        // Without a plan the motion still moves far: a window of twice the length need not grow.
+        search.window = search.window.take().map(|window| self.layout.widen(&window, window.len() / 2));
         bounded.follow(true);
         let settled =
             self.in_windows(bounded, sample, search) || self.over_whole_horizon(bounded, sample, search);
@@ -461,10 +463,14 @@ impl<const O: usize> Layout<O> {
             (None, true) => n..n,
             (violated, false) => violated?,
         };
-        let margin = MARGIN + violated.len() / 2;
-        let start = violated.start.saturating_sub(margin);
+        Some(self.widen(&violated, MARGIN + violated.len() / 2))
+    }
+
+    /// These intervals and so many before and after.
+    fn widen(&self, range: &Range<usize>, margin: usize) -> Range<usize> {
+        let start = range.start.saturating_sub(margin);
         // Fewer steps than the order do not reach every state.
-        Some(if start < O { 0 } else { start }..(violated.end + margin).min(n))
+        (if start < O { 0 } else { start })..(range.end + margin).min(self.horizon)
     }
 }
 
