@@ -296,6 +296,37 @@ fn oracle_riccati_and_cone_agree_where_the_start_is_free_within_a_set() {
     assert!(solved.get() > 150, "{}", solved.get());
 }
 
+#[test]
+fn oracle_balls_that_only_the_iterates_come_near_are_found() {
+    let Shape { horizon, cost, .. } = published();
+    let chain = Chain::new(0.2);
+    let affine = vec![[Vector3::zeros(); 2]; horizon];
+    let body = Scenario::crmpc2022().inertia.body(1.0).unwrap();
+    let sets = Sets { body, printed: false, bounds: (5.0_f64.to_radians(), 1.356e5) };
+    let start = [Vector3::new(0.35, -0.2, -0.35), Vector3::zeros()];
+    let problem = Problem {
+        chain: &chain,
+        cost: &cost,
+        start: Start::Fixed(start),
+        affine: &affine,
+        constraints: &sets,
+        end: End { weight: &cost.end, slope: [Vector3::zeros(); 2], radius: None },
+    };
+    // One guess breaks its bounds, the other rests where it is, far from all.
+    let (mut fast, mut still) = (Solution::new(horizon), Solution::new(horizon));
+    Unconstrained::new(horizon, &chain, &cost).solve(&start, &affine, &mut fast.motion);
+    still.motion.states.fill(start);
+    let optima = [fast, still].map(|mut solution| {
+        let outcome = Riccati::new(horizon, 0, MAX_ITERATIONS).solve(&problem, &mut solution, 0, false, None);
+        assert!(outcome.solved(), "{outcome:?}");
+        let residual = Certificate::of(&problem, &solution, false).residual();
+        assert!(residual <= 1e-6, "{residual}");
+        assert!(solution.multipliers.state.iter().any(|multiplier| *multiplier > 1e-3));
+        cost.of(&solution.motion)
+    });
+    assert!((optima[0] - optima[1]).abs() <= 1e-8 * optima[0], "{optima:?}");
+}
+
 /// Sets that the Riccati method cannot evaluate: what it meets after the first call of `tighten` is no number.
 struct Spoilt {
     sets: Sets,

@@ -146,7 +146,7 @@ struct Residuals {
     gap: f64,
     /// Half the cost.
     cost: f64,
-    /// Number of inequalities.
+    /// Number of inequalities, at least 1.
     count: f64,
 }
 
@@ -157,7 +157,7 @@ impl Residuals {
 
     /// μ.
     fn mean(&self) -> f64 {
-        self.gap / self.count.max(1.0)
+        self.gap / self.count
     }
 }
 
@@ -337,7 +337,7 @@ impl<const O: usize> Riccati<O> {
 
     /// What is left of the conditions of optimality at the iterate, with the costates p of the motion.
     fn residuals<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> Residuals {
-        let (mut feasibility, mut gap, mut count) = (0.0_f64, 0.0, 0.0);
+        let (mut feasibility, mut gap, mut count) = (0.0_f64, 0.0, 0.0_f64);
         self.each_pair(problem, |pair| {
             feasibility = feasibility.max((pair.c + pair.slack).abs());
             gap += pair.slack * pair.multiplier;
@@ -355,7 +355,13 @@ impl<const O: usize> Riccati<O> {
         if !matches!(problem.start, Start::Fixed(_)) {
             largest = self.first.1.iter().fold(largest, |largest, p| largest.max(p.amax()));
         }
-        Residuals { stationarity: largest / scale, feasibility, gap, cost: self.cost(problem), count }
+        Residuals {
+            stationarity: largest / scale,
+            feasibility,
+            gap,
+            cost: self.cost(problem),
+            count: count.max(1.0),
+        }
     }
 
     /// Half the cost of the iterate without what is linear in its end.
