@@ -2,7 +2,7 @@
 
 mod harness;
 
-use control::crmpc::{Constraints, Memory, Plan, Report, Settings, Status};
+use control::crmpc::{Constraints, InitialState, Memory, Plan, Report, Settings, Status};
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::schedule::Sampled;
 use control::{Controller, Crmpc, Measurement};
@@ -190,6 +190,32 @@ fn exits_change_nothing_along_a_run() {
                 assert!(difference < 1e-4, "tick {tick}: {difference}");
             }
             assert!(counts.iter().all(|&count| count > 1), "{constraints:?}: {counts:?}");
+        }
+    }
+}
+
+#[test]
+fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins() {
+    let measured = Measurement { angles: Scenario::crmpc2022().initial_angles, ..Measurement::default() };
+    for constraints in [Constraints::Robust, Constraints::Paper] {
+        for initial_state in [InitialState::Measured, InitialState::Nominal, InitialState::Tube] {
+            let [cost, cost_cone] = [Method::Riccati, Method::Cone].map(|method| {
+                let settings = Settings {
+                    disturbance_bound: 0.0,
+                    inertia_error: 0.0,
+                    initial_state,
+                    ..settings(constraints)
+                };
+                let solver = SolverSettings { method, exits: false, ..settings.solver };
+                let mut controller = Crmpc::new(Settings { solver, ..settings }).unwrap();
+                let mut memory = Memory::default();
+                controller.update(&mut memory, 0, 0.0, &measured, &reference());
+                let expected = if method == Method::Riccati { Status::Constrained } else { Status::Cone };
+                assert_eq!(memory.report.status, expected, "{constraints:?}, {initial_state:?}");
+                memory.report.cost
+            });
+            let context = format!("{constraints:?}, {initial_state:?}: {cost} {cost_cone}");
+            assert!((cost - cost_cone).abs() <= 1e-6 * cost_cone, "{context}");
         }
     }
 }

@@ -72,7 +72,7 @@ const STANDSTILL: f64 = 1e-6;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
 const ANGLE_SCALE: f64 = 0.1;
 /// Disturbance bound (rad/s²) that the invariant set has at least, so that it keeps an inside.
-const SMALLEST_DISTURBANCE: f64 = 1e-6;
+const SMALLEST_DISTURBANCE: f64 = 1e-5;
 
 impl Crmpc {
     /// Designs the controller and sets its solver up.
