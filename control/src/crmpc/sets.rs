@@ -17,8 +17,6 @@ use vehicle::reference::Reference;
 pub(super) struct Sets {
     kind: Kind,
     body: RigidBody,
-    /// h, s.
-    period: f64,
     /// References at the prediction times.
     pub(super) references: Vec<Reference>,
     terminal_radius: f64,
@@ -91,14 +89,7 @@ impl Sets {
             }
         };
         let references = vec![Reference::default(); n + 1];
-        Ok(Self {
-            kind,
-            body: settings.body,
-            period: settings.period_optimisation,
-            references,
-            terminal_radius,
-            follow: false,
-        })
+        Ok(Self { kind, body: settings.body, references, terminal_radius, follow: false })
     }
 
     /// The bounds in force.
@@ -137,8 +128,7 @@ impl mpc::Constraints<2> for Sets {
         match &self.kind {
             Kind::Robust(robust) => {
                 let (rate, moment) = if self.follow {
-                    let after = self.moment_after(k, &angles, &rates, &a);
-                    robust.bounds_about(k, &at, after)
+                    robust.bounds_about(k, &at, robust.moment_after(&angles, &rates, &a))
                 } else {
                     robust.bounds(k)
                 };
@@ -156,13 +146,14 @@ impl mpc::Constraints<2> for Sets {
     }
 
     fn squares(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> (f64, f64) {
+        if self.follow {
+            // The bounds need the derivatives.
+            let Balls { state, input } = self.balls(k, state, input);
+            return (state.value.norm_squared(), input.value.norm_squared());
+        }
         let [angles, rates, a] = self.nominal(k, state, input);
         let kinematics = InverseKinematics::at(&angles);
         let (state, input) = match &self.kind {
-            Kind::Robust(_) if self.follow => {
-                let Balls { state, input } = self.balls(k, state, input);
-                (state.value, input.value)
-            }
             Kind::Robust(robust) => {
                 let (rate, moment) = robust.bounds(k);
                 (kinematics.body_rates(&rates).0 / rate, kinematics.moment(&self.body, &rates, &a) / moment)
@@ -181,8 +172,8 @@ impl Bounded<2> for Sets {
     }
 
     fn tighten(&mut self, motion: &Motion<2>, of: Range<usize>) {
-        let Self { kind, body, references, .. } = self;
-        if let Kind::Robust(robust) = kind {
+        let Self { kind, body, references, follow, .. } = self;
+        if let (Kind::Robust(robust), false) = (kind, *follow) {
             let mut here = Point::at(references, motion, of.start);
             for k in of {
                 let next = Point::at(references, motion, k + 1);
@@ -248,16 +239,6 @@ impl Point {
 }
 
 impl Sets {
-    /// ‖m̃‖ at the end of interval `k`, with a held, N m.
-    fn moment_after(&self, k: usize, angles: &Vector3<f64>, rates: &Vector3<f64>, a: &Vector3<f64>) -> f64 {
-        if k + 1 >= self.references.len() {
-            return 0.0;
-        }
-        let h = self.period;
-        let angles = angles + (rates + a * (0.5 * h)) * h;
-        linearise::moment(&self.body, &angles, &(rates + a * h), a).norm()
-    }
-
     /// Whether the input of interval `k` or the state at its end violates its constraint, with the bounds about themselves.
     fn violates(&mut self, k: usize, here: &Point, next: &Point) -> bool {
         let exceeds = |value: f64, bound: f64| value > bound * (1.0 + CHECK_SLACK);
@@ -292,6 +273,13 @@ impl Robust {
         let moment =
             if k < self.moment.len() { self.moment_bound_about(k, &at.moment, after) } else { f64::INFINITY };
         (self.rate_bound(k, at.rates.by_angles.norm()), moment)
+    }
+
+    /// ‖m̃‖ at the end of an interval that begins so, with a held, N m.
+    fn moment_after(&self, angles: &Vector3<f64>, rates: &Vector3<f64>, a: &Vector3<f64>) -> f64 {
+        let Settings { body, period_optimisation: h, .. } = &self.settings;
+        let angles = angles + (rates + a * (0.5 * h)) * *h;
+        linearise::moment(body, &angles, &(rates + a * *h), a).norm()
     }
 
     /// Sets the bounds of interval `k`.
