@@ -66,8 +66,8 @@ impl SolverSettings {
 
 /// The constraints of a controller. Their bounds may depend on the motion, and are then those about a motion that was given before.
 pub trait Bounded<const O: usize>: Constraints<O> {
-    /// Whether the bounds are from now on those about the motion that is evaluated, rather than those of the last [`Self::tighten`]. Their
-    /// own derivatives are left out. Nothing to do for bounds that do not depend on the motion.
+    /// Whether the bounds are from now on those about the motion that is evaluated, rather than those of the last [`Self::tighten`], which
+    /// then has nothing to do. Their own derivatives are left out. Nothing to do for bounds that do not depend on the motion.
     fn follow(&mut self, _follow: bool) {}
 
     /// Sets the bounds of the intervals `of` about `motion`: of the state at the end of each, and of its input.
@@ -277,25 +277,33 @@ impl<const O: usize> Optimiser<O> {
         sample: &Sample<O>,
         search: &mut Search,
     ) -> bool {
-        if self.settings.method != Method::Riccati || self.settings.nonlinearity != Nonlinearity::Exact {
+        if self.settings.nonlinearity == Nonlinearity::Frozen {
             return false;
         }
         self.about.clone_from(&self.solution.motion);
         // Without a plan the motion still moves far: a window of twice the length need not grow.
         search.window = search.window.take().map(|window| self.layout.widen(&window, window.len() / 2));
         bounded.follow(true);
-        let settled =
-            self.in_windows(bounded, sample, search) || self.over_whole_horizon(bounded, sample, search);
+        let settled = self.by_riccati(bounded, sample, search);
         bounded.follow(false);
         bounded.tighten(&self.solution.motion, 0..self.layout.horizon);
         settled
     }
 
-    /// The optimum with the bounds about `about`, by the solvers in turn.
-    fn solve<B: Bounded<O>>(&mut self, bounded: &mut B, sample: &Sample<O>, search: &mut Search) -> Status {
-        if self.settings.method == Method::Riccati
+    /// The optimum with the bounds about `about`, by the Riccati method if it is wanted.
+    fn by_riccati<B: Bounded<O>>(
+        &mut self,
+        bounded: &mut B,
+        sample: &Sample<O>,
+        search: &mut Search,
+    ) -> bool {
+        self.settings.method == Method::Riccati
             && (self.in_windows(bounded, sample, search) || self.over_whole_horizon(bounded, sample, search))
-        {
+    }
+
+    /// The same by the solvers in turn.
+    fn solve<B: Bounded<O>>(&mut self, bounded: &mut B, sample: &Sample<O>, search: &mut Search) -> Status {
+        if self.by_riccati(bounded, sample, search) {
             return Status::Constrained;
         }
         if sample.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
