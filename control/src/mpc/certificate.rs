@@ -68,19 +68,18 @@ impl Certificate {
                 (balls, (balls.state.value.norm_squared(), balls.input.value.norm_squared()))
             };
             if k < n {
-                let multiplier = by_input;
                 let own = cost.input.component_mul(&input);
                 let by_future = chain.input_adjoint(&p);
                 let (through, weighted) = (chain.adjoint(&p), cost.slope(state));
                 p = std::array::from_fn(|i| through[i] + weighted[i]);
                 let mut by_ball = Vector3::zeros();
                 if !idle {
-                    by_ball = balls.input.by_input.tr_mul(&balls.input.value) * multiplier;
-                    add(&mut p, |i| balls.input.by_state[i].tr_mul(&balls.input.value) * multiplier);
+                    by_ball = balls.input.by_input.tr_mul(&balls.input.value) * by_input;
+                    add(&mut p, |i| balls.input.by_state[i].tr_mul(&balls.input.value) * by_input);
                 }
                 slope = slope.max((own + by_ball + by_future).amax());
                 scale = [own, by_ball, by_future].iter().fold(scale, |scale, part| scale.max(part.amax()));
-                count(squares.1, multiplier);
+                count(squares.1, by_input);
             }
             if k > 0 && state_balls {
                 if !idle {
