@@ -357,6 +357,8 @@ mod tests {
                 *tightest = tightest.max(*share);
             }
         }
+        let [by_angles, by_rates, _] = tightest;
+        assert!(by_angles.max(by_rates) > 0.5, "{tightest:?}");
         assert!(tightest.iter().all(|share| *share > 0.2), "{tightest:?}");
     }
 
