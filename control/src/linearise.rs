@@ -8,6 +8,7 @@
 //! product and only those by β are written out.
 
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
+use std::f64::consts::SQRT_2;
 use vehicle::dynamics::RigidBody;
 
 /// A vector quantity y(Θ, x_ω, a) at a point, and its partial derivatives. Nothing depends on the bank angle.
@@ -245,6 +246,9 @@ impl InverseKinematics {
     }
 }
 
+/// Bound on ‖∂(W y)/∂(α, β)‖ over ‖y‖ (Frobenius): √(5/2).
+pub const TURN_BY_ANGLES: f64 = 1.581_138_830_084_189_8;
+
 /// What the size of a motion alone says about the derivatives of its moment, over the largest moment of inertia.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentSlopeBounds {
@@ -255,19 +259,17 @@ pub struct MomentSlopeBounds {
 }
 
 impl MomentSlopeBounds {
-    /// At any angles with these ‖x_ω‖ and ‖a‖: far off where a is large, but they cost nothing.
+    /// At any angles, with ‖x_ω‖ ≤ x, ‖a‖ ≤ a and this ratio of the largest to the smallest moment of inertia.
     ///
-    /// With ‖W‖ = 1 (Lemma 1), hence ‖ω‖ ≤ ‖x‖, and from the columns above ‖W‖² ≤ 3, ‖∂W/∂β‖² = 2 (‖·‖₂² ≤ 2) and
-    /// ‖∂²W/∂β²‖² ≤ 5 in Frobenius' norm, term by term of [`linearise`].
-    pub fn new(x: f64, a: f64) -> Self {
-        let (root2, root3, root5) = (std::f64::consts::SQRT_2, 3.0_f64.sqrt(), 5.0_f64.sqrt());
-        // ‖ω̇‖ ≤ ‖a‖ + |α̇| ‖ω‖ + |β̇| √2 ‖x‖
-        let acceleration = a + root3 * x * x;
-        let by_alpha = acceleration + 2.0 * x * x;
-        let by_beta = root2 * a + (2.0 + 5.0_f64).sqrt() * x * x + 2.0 * root2 * x * x;
+    /// From the columns above, in Frobenius' norm: ‖∂W/∂α‖² ≤ 2 and ‖∂W/∂β‖² = 2, orthogonal to each other, hence ‖Ẇ‖² ≤ 2 ‖x‖²;
+    /// ‖∂W/∂α y‖² + ‖∂W/∂β y‖² ≤ 5/2 ‖y‖²; ‖∂²W y‖² ≤ (1 + 2 · 2 + 5) ‖y‖² over α², twice αβ, and β². With principal axes,
+    /// ‖∂(ω × I ω)/∂ω‖² ≤ 2 (I_max − I_min)² ‖ω‖², and ‖ω‖ ≤ ‖x‖ as ‖W‖ = 1 (Lemma 1).
+    pub fn new(x: f64, a: f64, ratio: f64) -> Self {
+        let gyroscopic = SQRT_2 * (1.0 - 1.0 / ratio);
+        let turn = TURN_BY_ANGLES;
         Self {
-            by_angles: (by_alpha * by_alpha + by_beta * by_beta).sqrt(),
-            by_rates: x * (root5 + 1.0 + root2 + 2.0 * root3),
+            by_angles: turn * (a + gyroscopic * x * x) + 10.0_f64.sqrt() * x * x,
+            by_rates: (SQRT_2 + turn + gyroscopic) * x,
         }
     }
 }
@@ -344,9 +346,10 @@ mod tests {
             let x = Vector3::new(at(i, 2), at(i, 3), at(i, 4)) * 10.0_f64.powf(2.0 * at(i, 5) - 1.0);
             let a = Vector3::new(at(i, 4), at(i, 2), at(i, 6)) * 10.0_f64.powf(2.0 * at(i, 6) - 1.0);
             let exact = linearise(&body, &angles, &x, &a);
-            let bounds = MomentSlopeBounds::new(x.norm(), a.norm());
+            let ratio = inertia.max() / inertia.min();
+            let bounds = MomentSlopeBounds::new(x.norm(), a.norm(), ratio);
             let u = input(&body, &angles, &x, &a).norm();
-            let input_bound = input_bound(angles.y, x.norm(), a.norm(), inertia.max() / inertia.min());
+            let input_bound = input_bound(angles.y, x.norm(), a.norm(), ratio);
             let shares = [
                 exact.moment.by_angles.norm() / (inertia.max() * bounds.by_angles),
                 exact.moment.by_rates.norm() / (inertia.max() * bounds.by_rates),

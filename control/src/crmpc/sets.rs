@@ -2,7 +2,9 @@
 
 use super::design::{Constraints, Design, Settings};
 use crate::error::DesignError;
-use crate::linearise::{self, BodyMotion, InverseKinematics, Linear, Linearisation, MomentSlopeBounds};
+use crate::linearise::{
+    self, BodyMotion, InverseKinematics, Linear, Linearisation, MomentSlopeBounds, TURN_BY_ANGLES,
+};
 use crate::mpc::{self, Ball, Balls, Bounded, Motion, State};
 use crate::sampled::Reach;
 use nalgebra::{Matrix3, Vector3};
@@ -191,9 +193,10 @@ impl Bounded<2> for Sets {
                 continue;
             }
             let mut here = Point::at(&self.references, motion, range.start);
+            let mut anchor = None;
             for k in range {
                 let next = Point::at(&self.references, motion, k + 1);
-                if self.violates(k, &here, &next) {
+                if self.violates(k, &here, &next, &mut anchor) {
                     let first = violated.map_or(k, |range| range.start);
                     violated = Some(first..k + 1);
                 }
@@ -218,6 +221,16 @@ struct Point {
     turned: OnceCell<(InverseKinematics, BodyMotion)>,
 }
 
+/// A stage whose kinematics are known.
+struct Anchor {
+    angles: Vector3<f64>,
+    /// x_ω.
+    rates: Vector3<f64>,
+    motion: BodyMotion,
+    /// Largest ‖I W δ‖ over the disturbances.
+    feedback: f64,
+}
+
 impl Point {
     fn at(references: &[Reference], motion: &Motion<2>, k: usize) -> Self {
         let Reference { angles, rates, accelerations } = &references[k];
@@ -239,8 +252,9 @@ impl Point {
 }
 
 impl Sets {
-    /// Whether the input of interval `k` or the state at its end violates its constraint, with the bounds about themselves.
-    fn violates(&mut self, k: usize, here: &Point, next: &Point) -> bool {
+    /// Whether the input of interval `k` or the state at its end violates its constraint, with the bounds about themselves or smaller
+    /// ones. `anchor` is a stage not far away.
+    fn violates(&mut self, k: usize, here: &Point, next: &Point, anchor: &mut Option<Anchor>) -> bool {
         let exceeds = |value: f64, bound: f64| value > bound * (1.0 + CHECK_SLACK);
         let body = &self.body;
         match &mut self.kind {
@@ -252,10 +266,14 @@ impl Sets {
                 exceeds(next.rates.norm(), *x_tube) || exceeds(bound, *u_tube) && exceeds(input(), *u_tube)
             }
             Kind::Robust(robust) => {
-                let (moment, rates) = robust.tighten_cheaply(body, k, here, next);
-                if exceeds(moment, robust.moment[k]) {
-                    robust.tighten(body, k, here, next);
+                if anchor.as_ref().is_some_and(|anchor| robust.keeps_by_size(k, here, next, anchor)) {
+                    return false;
                 }
+                let anchor = anchor.insert(robust.anchor(body, here));
+                if robust.keeps_by_size(k, here, next, anchor) {
+                    return false;
+                }
+                let (moment, rates) = robust.tighten(body, k, here, next);
                 exceeds(rates, robust.rate[k + 1]) || exceeds(moment, robust.moment[k])
             }
         }
@@ -282,27 +300,47 @@ impl Robust {
         linearise::moment(body, &angles, &(rates + a * *h), a).norm()
     }
 
-    /// Sets the bounds of interval `k`.
-    fn tighten(&mut self, body: &RigidBody, k: usize, here: &Point, next: &Point) {
+    /// Sets the bounds of interval `k`. Returns ‖m̃‖ of the interval and ‖ω̃‖ at its end.
+    fn tighten(&mut self, body: &RigidBody, k: usize, here: &Point, next: &Point) -> (f64, f64) {
         let at = here.turned(body).0.linearise(body, &here.rates, &here.acceleration).moment;
         let after = &next.turned(body).1;
         self.moment[k] = self.moment_bound_about(k, &at, after.moment(&here.acceleration).norm());
         self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&after.rates_by_angles));
+        (at.value.norm(), after.rates.norm())
     }
 
-    /// Sets bounds that are at most those of [`Self::tighten`], without the moment's derivatives by angles and rates. Returns ‖m̃‖ of
-    /// the interval and ‖ω̃‖ at its end.
-    fn tighten_cheaply(&mut self, body: &RigidBody, k: usize, here: &Point, next: &Point) -> (f64, f64) {
-        let Point { rates, acceleration, .. } = here;
-        let ((_, now), (_, after)) = (here.turned(body), next.turned(body));
-        let moment = now.moment(acceleration).norm();
-        let inertia = self.design.largest_inertia;
-        let feedback = largest_over_box(&now.moment_by_acceleration, &self.design.tightening.disturbance);
-        let bounds = MomentSlopeBounds::new(rates.norm(), acceleration.norm());
-        let slopes = (inertia * bounds.by_angles, inertia * bounds.by_rates, inertia);
-        self.moment[k] = self.moment_bound(k, moment, after.moment(acceleration).norm(), feedback, slopes);
-        self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&after.rates_by_angles));
-        (moment, after.rates.norm())
+    fn anchor(&self, body: &RigidBody, here: &Point) -> Anchor {
+        let motion = here.turned(body).1;
+        let feedback = largest_over_box(&motion.moment_by_acceleration, &self.design.tightening.disturbance);
+        Anchor { angles: here.angles, rates: here.rates, motion, feedback }
+    }
+
+    /// Whether interval `k` keeps its constraints for its size alone, with the bounds that are set.
+    fn keeps_by_size(&mut self, k: usize, here: &Point, next: &Point, anchor: &Anchor) -> bool {
+        let (moment, rates) = self.tighten_by_size(k, here, next, anchor);
+        moment <= self.moment[k] && rates <= self.rate[k + 1]
+    }
+
+    /// Sets bounds that are at most those of [`Self::tighten`], and returns what ‖m̃‖ and ‖ω̃‖ are at most: all is bounded along the ways
+    /// from `anchor` to `here` and on to `next` by the largest size of the derivatives there.
+    fn tighten_by_size(&mut self, k: usize, here: &Point, next: &Point, anchor: &Anchor) -> (f64, f64) {
+        let Design { largest_inertia, inertia_ratio, tightening, .. } = &self.design;
+        let a = &here.acceleration;
+        let rates = next.rates.norm();
+        let largest_rates = rates.max(here.rates.norm()).max(anchor.rates.norm());
+        let slopes = MomentSlopeBounds::new(largest_rates, a.norm(), *inertia_ratio);
+        let (by_angles, by_rates) = (largest_inertia * slopes.by_angles, largest_inertia * slopes.by_rates);
+        let turn = (here.angles - anchor.angles).xy().norm();
+        let moment =
+            anchor.motion.moment(a).norm() + by_angles * turn + by_rates * (here.rates - anchor.rates).norm();
+        let turn_within = (next.angles - here.angles).xy().norm();
+        let after = moment + by_angles * turn_within + by_rates * (next.rates - here.rates).norm();
+        // ‖∂W/∂α‖² and ‖∂W/∂β‖² are at most 2, and orthogonal to each other.
+        let feedback = anchor.feedback + largest_inertia * SQRT_2 * turn * tightening.disturbance.norm();
+        let slopes = (by_angles, by_rates, *largest_inertia);
+        self.moment[k] = self.moment_bound(k, moment, after, feedback, slopes);
+        self.rate[k + 1] = self.rate_bound(k + 1, TURN_BY_ANGLES * rates);
+        (moment, rates)
     }
 
     /// [`Self::moment_bound`] about a moment that is linearised there.
@@ -383,4 +421,115 @@ fn largest_over_box(m: &Matrix3<f64>, b: &Vector3<f64>) -> f64 {
     let (xy, xz, yz) = (x.dot(&y), x.dot(&z), y.dot(&z));
     let products = (xy + xz + yz).max(xy - xz - yz).max(xz - xy - yz).max(yz - xy - xz);
     (x.norm_squared() + y.norm_squared() + z.norm_squared() + 2.0 * products).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mpc::Constraints as _;
+    use proptest::prelude::*;
+    use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+    use std::cell::Cell;
+    use vehicle::scenario::Scenario;
+
+    fn robust() -> Sets {
+        let scenario = Scenario::crmpc2022();
+        let body = scenario.inertia.body(1.0).unwrap();
+        let settings = Settings { constraints: Constraints::Robust, ..Settings::crmpc2022(&scenario, body) };
+        Sets::new(&settings, &Design::new(&settings).unwrap()).unwrap()
+    }
+
+    /// A wave of (Θ̃, x̃_ω, a) over the horizon: what the check needs of a motion.
+    fn wave() -> impl Strategy<Value = Motion<2>> {
+        let component = || (-1.0..1.0, -1.0..1.0, 0.0..0.3, 0.0..6.3);
+        let sizes = ((-2.0..0.0), (-3.0..-0.8), (-3.0..-0.8));
+        (sizes, prop::collection::vec(component(), 9)).prop_map(
+            |((angle, rate, acceleration), components)| {
+                let mut motion = Motion::new(100);
+                let at = |k: usize, first: usize, decade: f64| {
+                    Vector3::from_fn(|i, _| {
+                        let (mean, amplitude, frequency, phase) = components[first + i];
+                        10.0_f64.powf(decade) * (mean + amplitude * f64::sin(phase + frequency * k as f64))
+                    })
+                };
+                for (k, state) in motion.states.iter_mut().enumerate() {
+                    *state = [at(k, 0, angle), at(k, 3, rate)];
+                }
+                for (k, input) in motion.inputs.iter_mut().enumerate() {
+                    *input = at(k, 6, acceleration);
+                }
+                motion
+            },
+        )
+    }
+
+    fn run(cases: u32, property: impl Fn(Motion<2>) -> Result<(), TestCaseError>) {
+        let random = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+        let config = Config { cases, failure_persistence: None, ..Config::default() };
+        TestRunner::new_with_rng(config, random).run(&wave(), property).unwrap();
+    }
+
+    fn count(of: &Cell<[usize; 2]>, which: bool) {
+        let mut counts = of.get();
+        counts[usize::from(which)] += 1;
+        of.set(counts);
+    }
+
+    #[test]
+    fn oracle_the_check_of_the_horizon_finds_what_exact_bounds_find() {
+        let (violations, by_size) = (Cell::new([0; 2]), Cell::new([0; 2]));
+        run(400, |motion| {
+            let n = motion.inputs.len();
+            let mut sets = robust();
+            let found = sets.violated(&motion, 0..0);
+            let checked = sets.bounds();
+            sets.tighten(&motion, 0..n);
+            let exact = sets.bounds();
+            let limit = (1.0 + CHECK_SLACK).powi(2);
+            let violates = |&k: &usize| {
+                let input = motion.inputs.get(k + 1).copied().unwrap_or_default();
+                sets.squares(k + 1, &motion.states[k + 1], &input).0 > limit
+                    || sets.squares(k, &motion.states[k], &motion.inputs[k]).1 > limit
+            };
+            let expected = (0..n).find(violates).zip((0..n).rfind(violates));
+            count(&violations, found.is_some());
+            prop_assert_eq!(found, expected.map(|(first, last)| first..last + 1));
+            for k in 0..n {
+                prop_assert!(checked.rate[k + 1] <= exact.rate[k + 1] * (1.0 + 1e-12), "{}", k);
+                prop_assert!(checked.input[k] <= exact.input[k] * (1.0 + 1e-12), "{}", k);
+                count(&by_size, checked.input[k] < exact.input[k]);
+            }
+            Ok(())
+        });
+        // Both outcomes, and both ways to them.
+        let least = |of: &Cell<[usize; 2]>| of.get().into_iter().min().unwrap();
+        assert!(least(&violations) > 40 && least(&by_size) > 4000, "{violations:?} {by_size:?}");
+    }
+
+    #[test]
+    fn oracle_bounds_by_size_hold_from_any_stage() {
+        let tightest = Cell::new(0.0_f64);
+        run(100, |motion| {
+            let mut sets = robust();
+            let Sets { kind: Kind::Robust(robust), body, references, .. } = &mut sets else { unreachable!() };
+            let point = |k| Point::at(references, &motion, k);
+            for k in 0..motion.inputs.len() {
+                let (here, next) = (point(k), point(k + 1));
+                let anchor = robust.anchor(body, &point(k - k % 10));
+                let (moment, rates) = robust.tighten_by_size(k, &here, &next, &anchor);
+                let (moment_bound, rate_bound) = (robust.moment[k], robust.rate[k + 1]);
+                let exact = robust.tighten(body, k, &here, &next);
+                let rounding = 1.0 + 1e-12;
+                prop_assert!(moment * rounding >= exact.0 && rates * rounding >= exact.1, "{}", k);
+                let bounds = (robust.moment[k] * rounding, robust.rate[k + 1] * rounding);
+                prop_assert!(moment_bound <= bounds.0 && rate_bound <= bounds.1, "{}", k);
+                let known = anchor.motion.moment(&here.acceleration).norm();
+                if moment > known {
+                    tightest.set(tightest.get().max((exact.0 - known) / (moment - known)));
+                }
+            }
+            Ok(())
+        });
+        assert!(tightest.get() > 0.3, "{tightest:?}");
+    }
 }
