@@ -106,10 +106,15 @@ impl Segment {
 
     fn at(&self, time: f64) -> Reference {
         let mut reference = Reference::default();
+        // Angles that oscillate together share one sine and cosine.
+        let (mut frequency, mut s, mut c) = (0.0, 0.0, 1.0);
         for (i, course) in self.angles.iter().enumerate() {
             reference.angles[i] = course.constant;
             for wave in &course.waves {
-                let (s, c) = (wave.frequency * time).sin_cos();
+                if wave.frequency != frequency {
+                    frequency = wave.frequency;
+                    (s, c) = (frequency * time).sin_cos();
+                }
                 let value = wave.sine * s + wave.cosine * c;
                 reference.angles[i] += value;
                 reference.rates[i] += wave.frequency * (wave.sine * c - wave.cosine * s);

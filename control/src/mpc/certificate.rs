@@ -34,9 +34,9 @@ impl Certificate {
         let n = motion.inputs.len();
         let state_balls = problem.constraints.has_state_balls();
 
-        let (mut excess, mut gap, mut negative) = (0.0_f64, multipliers.start_gap, 0.0_f64);
+        let (mut largest, mut gap, mut negative) = (1.0_f64, multipliers.start_gap, 0.0_f64);
         let mut count = |square: f64, multiplier: f64| {
-            excess = excess.max(square.sqrt() - 1.0);
+            largest = largest.max(square);
             gap += 0.5 * (multiplier * (square - 1.0)).abs();
             negative = negative.max(-multiplier);
         };
@@ -96,7 +96,7 @@ impl Certificate {
         let half_cost = (0.5 * cost).max(f64::MIN_POSITIVE);
         Self {
             stationarity: slope / scale,
-            feasibility: excess.max(chain_error(problem, motion)),
+            feasibility: (largest.sqrt() - 1.0).max(chain_error(problem, motion)),
             complementarity: (gap / half_cost).max(negative / half_cost),
             cost,
         }
