@@ -77,6 +77,11 @@ impl InverseKinematics {
         (w, w_beta)
     }
 
+    /// W.
+    pub fn matrix(&self) -> Matrix3<f64> {
+        Matrix3::from_columns(&self.columns().0)
+    }
+
     /// ω and ∂ω/∂(α, β).
     pub fn body_rates(&self, angle_rates: &Vector3<f64>) -> (Vector3<f64>, [Vector3<f64>; 2]) {
         let rates = self.w(angle_rates);

@@ -152,11 +152,14 @@ impl mpc::Constraints<1> for RateLimit {
     fn balls(&self, k: usize, state: &State<1>, input: &Vector3<f64>) -> Balls<1> {
         let reference = &self.references[k];
         let command = reference.rates + input;
-        let angles = reference.angles + state[0];
-        let w = kinematics::r_inverse(&angles);
-        let (rates, [by_alpha, by_beta]) = InverseKinematics::at(&angles).body_rates(&command);
+        let kinematics = InverseKinematics::at(&(reference.angles + state[0]));
+        let (rates, [by_alpha, by_beta]) = kinematics.body_rates(&command);
         let by_state = Matrix3::from_columns(&[by_alpha, by_beta, Vector3::zeros()]) / self.limit;
-        let input = Ball { value: rates / self.limit, by_state: [by_state], by_input: w / self.limit };
+        let input = Ball {
+            value: rates / self.limit,
+            by_state: [by_state],
+            by_input: kinematics.matrix() / self.limit,
+        };
         Balls { state: Ball::default(), input }
     }
 
