@@ -2,8 +2,8 @@
 //!
 //! Balls are written c = ½(‖y‖² − 1) ≤ 0 with one slack s and one multiplier λ each. Every motion in between satisfies the chain of
 //! integrators exactly, so that Newton's method is left with three residuals: stationarity of the inputs, c + s, and sλ. The
-//! curvature of the balls is exact, that of y is left out (Gauss-Newton). Stages whose balls the motion stays well inside of are left
-//! without them: every iterate is looked at, and from where it comes near they are in the problem.
+//! curvature of the balls is exact, that of y is left out (Gauss-Newton). Balls that the motion stays well inside of are left out: every
+//! iterate is looked at, and from where it comes near a ball, that is in the problem.
 
 use super::problem::{
     Balls, Constraints, Multipliers, Outcome, Problem, Solution, Start, State, apply, dot, zero_state,
@@ -31,6 +31,8 @@ const WARM: (f64, f64) = (3e-4, 1e-6);
 /// One inequality c ≤ 0 with its slack and multiplier.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pair {
+    /// Whether it is in the problem.
+    watched: bool,
     /// c at the iterate.
     c: f64,
     /// s > 0.
@@ -52,8 +54,14 @@ struct Pair {
 impl Pair {
     /// A slack as large as there is room, at least `smallest`, with sλ = `mean` or a known multiplier if that is larger.
     fn begin(&mut self, smallest: f64, mean: f64, known: f64) {
+        self.watched = true;
         self.slack = (-self.c).max(smallest);
         self.multiplier = (mean / self.slack).max(known);
+    }
+
+    /// c of a ball.
+    fn evaluate(&mut self, y: &Vector3<f64>) {
+        self.c = 0.5 * (y.norm_squared() - 1.0);
     }
 
     /// λ/s.
@@ -98,8 +106,6 @@ impl Pair {
 struct Stage<const O: usize> {
     state: State<O>,
     input: Vector3<f64>,
-    /// Whether its balls are in the problem.
-    watched: bool,
     balls: Balls<O>,
     slopes: Slopes<O>,
     state_pair: Pair,
@@ -167,7 +173,6 @@ impl<const O: usize> Riccati<O> {
         let stage = Stage {
             state: zero_state(),
             input: Vector3::zeros(),
-            watched: false,
             balls: Balls::default(),
             slopes: Slopes { state: zero_state(), input: (zero_state(), Vector3::zeros()) },
             state_pair: Pair::default(),
@@ -240,7 +245,7 @@ impl<const O: usize> Riccati<O> {
         let Solution { motion, multipliers } = solution;
         for (stage, state) in self.stages[..=self.horizon].iter_mut().zip(&motion.states[first..]) {
             stage.state = *state;
-            stage.watched = false;
+            (stage.state_pair.watched, stage.input_pair.watched) = (false, false);
         }
         for (stage, input) in self.stages[..self.horizon].iter_mut().zip(&motion.inputs[first..]) {
             stage.input = *input;
@@ -280,17 +285,26 @@ impl<const O: usize> Riccati<O> {
         known: impl Fn(usize) -> [f64; 2],
     ) {
         let end = self.end();
+        let state_balls = problem.constraints.has_state_balls();
+        // What is no number must not go unnoticed.
+        let near = |square: f64| square.is_nan() || square > NEAR;
         for (k, stage) in self.stages[..=end].iter_mut().enumerate() {
-            if stage.watched {
-                continue;
-            }
-            let (state, input) = problem.constraints.squares(k, &stage.state, &stage.input);
-            stage.watched = k > 0 && state > NEAR || k < end && input > NEAR;
-            if stage.watched {
+            let (has_state, has_input) = (k > 0 && state_balls, k < end);
+            if !stage.watched() {
+                let (state, input) = problem.constraints.squares(k, &stage.state, &stage.input);
+                if !(has_state && near(state) || has_input && near(input)) {
+                    continue;
+                }
                 stage.evaluate(problem.constraints, k);
-                let [state, input] = known(k);
-                stage.state_pair.begin(smallest, mean, state);
-                stage.input_pair.begin(smallest, mean, input);
+            }
+            let known = known(k);
+            let Stage { state_pair, input_pair, .. } = stage;
+            for (pair, exists, known) in
+                [(state_pair, has_state, known[0]), (input_pair, has_input, known[1])]
+            {
+                if exists && !pair.watched && near(2.0 * pair.c + 1.0) {
+                    pair.begin(smallest, mean, known);
+                }
             }
         }
     }
@@ -299,7 +313,7 @@ impl<const O: usize> Riccati<O> {
     fn evaluate<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) {
         let end = self.end();
         for (k, stage) in self.stages[..=end].iter_mut().enumerate() {
-            if stage.watched {
+            if stage.watched() {
                 stage.evaluate(problem.constraints, k);
             }
         }
@@ -317,16 +331,10 @@ impl<const O: usize> Riccati<O> {
     }
 
     fn each_pair<C: Constraints<O>>(&mut self, problem: &Problem<O, C>, mut visit: impl FnMut(&mut Pair)) {
-        let last = self.end();
-        let state_balls = problem.constraints.has_state_balls();
-        for (k, stage) in self.stages[..=last].iter_mut().enumerate().filter(|(_, stage)| stage.watched) {
-            if k > 0 && state_balls {
-                visit(&mut stage.state_pair);
-            }
-            if k < last {
-                visit(&mut stage.input_pair);
-            }
-        }
+        let pairs = self.stages[..=self.horizon]
+            .iter_mut()
+            .flat_map(|Stage { state_pair, input_pair, .. }| [state_pair, input_pair]);
+        pairs.filter(|pair| pair.watched).for_each(&mut visit);
         if problem.end.radius.is_some() {
             visit(&mut self.terminal);
         }
@@ -392,8 +400,8 @@ impl<const O: usize> Riccati<O> {
     ) {
         let last = self.end();
         let mut p = self.end_slope(problem, &multiplier);
-        for (k, stage) in self.stages[..last].iter().enumerate().rev() {
-            let (q, r) = stage.slope(problem, k, &multiplier);
+        for stage in self.stages[..last].iter().rev() {
+            let (q, r) = stage.slope(problem, &multiplier);
             visit(r, problem.chain.input_adjoint(&p));
             p = add(&problem.chain.adjoint(&p), &q);
         }
@@ -413,7 +421,7 @@ impl<const O: usize> Riccati<O> {
         }
         let weighted = problem.end.weighted(&stage.state);
         let mut slope: State<O> = std::array::from_fn(|i| weighted[i] * weight + problem.end.slope[i]);
-        if stage.watched && problem.constraints.has_state_balls() {
+        if stage.state_pair.watched {
             let multiplier = multiplier(&stage.state_pair);
             slope = std::array::from_fn(|i| slope[i] + stage.slopes.state[i] * multiplier);
         }
@@ -437,17 +445,16 @@ impl<const O: usize> Riccati<O> {
     /// The backward recursion for P and the gains.
     fn factor<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> Option<()> {
         let last = self.end();
-        let state_balls = problem.constraints.has_state_balls();
         let mut p = self.end_weight(problem);
-        for (k, stage) in self.stages[..last].iter_mut().enumerate().rev() {
+        for stage in self.stages[..last].iter_mut().rev() {
             let mut quadratic = Quadratic::diagonal(&problem.cost.state, &problem.cost.input);
-            if stage.watched {
-                let Stage { balls, slopes, state_pair, input_pair, .. } = &stage;
+            let Stage { balls, slopes, state_pair, input_pair, .. } = &stage;
+            if input_pair.watched {
                 quadratic.add_ball(&balls.input, &slopes.input, input_pair.multiplier, input_pair.scaling());
-                if k > 0 && state_balls {
-                    let (multiplier, scaling) = (state_pair.multiplier, state_pair.scaling());
-                    quadratic.add_state_ball(&balls.state, &slopes.state, multiplier, scaling);
-                }
+            }
+            if state_pair.watched {
+                let (multiplier, scaling) = (state_pair.multiplier, state_pair.scaling());
+                quadratic.add_state_ball(&balls.state, &slopes.state, multiplier, scaling);
             }
             stage.gain = Gain::factor(&quadratic, problem.chain, &mut p)?;
         }
@@ -485,8 +492,8 @@ impl<const O: usize> Riccati<O> {
                     + slope[i] * outer * slope[j].transpose();
             }
         }
-        if stage.watched && problem.constraints.has_state_balls() {
-            let pair = &stage.state_pair;
+        let pair = &stage.state_pair;
+        if pair.watched {
             quadratic.add_state_ball(
                 &stage.balls.state,
                 &stage.slopes.state,
@@ -535,8 +542,8 @@ impl<const O: usize> Riccati<O> {
     fn direction<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) {
         let last = self.end();
         let mut p = self.end_slope(problem, &Pair::effective);
-        for (k, stage) in self.stages[..last].iter_mut().enumerate().rev() {
-            let (q, r) = stage.slope(problem, k, &Pair::effective);
+        for stage in self.stages[..last].iter_mut().rev() {
+            let (q, r) = stage.slope(problem, &Pair::effective);
             let (feedforward, through) = stage.gain.feedforward(&(r + problem.chain.input_adjoint(&p)));
             stage.feedforward = feedforward;
             p = add(&add(&problem.chain.adjoint(&p), &q), &through);
@@ -550,17 +557,16 @@ impl<const O: usize> Riccati<O> {
             let of_face: f64 = (0..O).map(|i| -face.normal[i] * change[i][face.axis]).sum();
             face.pair.set_direction(of_face, 0.0);
         }
-        let state_balls = problem.constraints.has_state_balls();
         for (k, stage) in self.stages[..=last].iter_mut().enumerate() {
             stage.d_state = change;
-            if stage.watched && k > 0 && state_balls {
+            if stage.state_pair.watched {
                 let ball = &stage.balls.state;
                 let y = ball.by_state.iter().zip(&change).fold(Vector3::zeros(), |sum, (by, e)| sum + by * e);
                 stage.state_pair.set_direction(ball.value.dot(&y), 0.5 * y.norm_squared());
             }
             if k < last {
                 stage.d_input = stage.gain.input(&change, &stage.feedforward);
-                if stage.watched {
+                if stage.input_pair.watched {
                     let ball = &stage.balls.input;
                     let y = ball.change(&change, &stage.d_input);
                     stage.input_pair.set_direction(ball.value.dot(&y), 0.5 * y.norm_squared());
@@ -592,7 +598,7 @@ impl<const O: usize> Riccati<O> {
         let Solution { motion, multipliers } = solution;
         let state_balls = problem.constraints.has_state_balls();
         for (k, stage) in self.stages[..=self.horizon].iter().enumerate() {
-            let multiplier = |pair: &Pair| if stage.watched { pair.multiplier } else { 0.0 };
+            let multiplier = |pair: &Pair| if pair.watched { pair.multiplier } else { 0.0 };
             motion.states[first + k] = stage.state;
             if k > 0 && state_balls {
                 multipliers.state[first + k - 1] = multiplier(&stage.state_pair);
@@ -614,6 +620,11 @@ impl<const O: usize> Riccati<O> {
 }
 
 impl<const O: usize> Stage<O> {
+    /// Whether any of its balls is.
+    fn watched(&self) -> bool {
+        self.state_pair.watched || self.input_pair.watched
+    }
+
     /// Balls, c and its slopes at the iterate.
     fn evaluate(&mut self, constraints: &impl Constraints<O>, k: usize) {
         self.balls = constraints.balls(k, &self.state, &self.input);
@@ -622,30 +633,26 @@ impl<const O: usize> Stage<O> {
             state: state.by_state.map(|by| by.tr_mul(&state.value)),
             input: (input.by_state.map(|by| by.tr_mul(&input.value)), input.by_input.tr_mul(&input.value)),
         };
-        self.state_pair.c = 0.5 * (state.value.norm_squared() - 1.0);
-        self.input_pair.c = 0.5 * (input.value.norm_squared() - 1.0);
+        self.state_pair.evaluate(&state.value);
+        self.input_pair.evaluate(&input.value);
     }
 
     /// ∂/∂E and ∂/∂v of the stage's cost and of its balls by their multipliers.
     fn slope<C: Constraints<O>>(
         &self,
         problem: &Problem<O, C>,
-        k: usize,
         multiplier: &impl Fn(&Pair) -> f64,
     ) -> (State<O>, Vector3<f64>) {
         let mut by_state = problem.cost.slope(&self.state);
         let mut by_input = problem.cost.input.component_mul(&self.input);
-        if self.watched {
-            let of_input = multiplier(&self.input_pair);
-            let of_state = if k > 0 && problem.constraints.has_state_balls() {
-                multiplier(&self.state_pair)
-            } else {
-                0.0
-            };
-            for i in 0..O {
-                by_state[i] += self.slopes.input.0[i] * of_input + self.slopes.state[i] * of_state;
-            }
-            by_input += self.slopes.input.1 * of_input;
+        if self.input_pair.watched {
+            let multiplier = multiplier(&self.input_pair);
+            by_state = std::array::from_fn(|i| by_state[i] + self.slopes.input.0[i] * multiplier);
+            by_input += self.slopes.input.1 * multiplier;
+        }
+        if self.state_pair.watched {
+            let multiplier = multiplier(&self.state_pair);
+            by_state = std::array::from_fn(|i| by_state[i] + self.slopes.state[i] * multiplier);
         }
         (by_state, by_input)
     }
