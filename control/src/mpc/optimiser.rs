@@ -210,8 +210,8 @@ impl<const O: usize> Optimiser<O> {
         multipliers.clear();
         unconstrained.solve(start, affine, motion);
         let mut search = Search::default();
+        let outside = layout.ends_outside(motion, bounded.terminal_radius());
         if settings.exits && layout.start.is_none() {
-            let outside = layout.ends_outside(motion, bounded.terminal_radius());
             let multiplier = match outside {
                 None => Some(0.0),
                 Some(radius) => unconstrained.solve_onto_terminal_ball(start, affine, radius, motion),
@@ -231,7 +231,9 @@ impl<const O: usize> Optimiser<O> {
         match previous {
             Some((previous, active)) => {
                 self.about.clone_from(previous);
-                if self.settings.method == Method::Riccati && self.layout.start.is_none() {
+                // Where the terminal ball is active, each sample has one stage more to reach it, and the plans differ too much.
+                if self.settings.method == Method::Riccati && self.layout.start.is_none() && outside.is_none()
+                {
                     self.begin_at(start, affine, active, &mut search);
                 }
                 self.about.states[0] = *start;
