@@ -127,10 +127,13 @@ def test_the_orders_that_the_paper_prints(results):
 
 def test_exits_change_the_time_and_not_the_motion(results):
     for run in ["crmpc-paper", "crmpc-robust", "dlmpc"]:
-        cone = results["runs"][f"{run}-cone"]["members"][0]["metrics"]
-        exits = results["runs"][run]["members"][0]["metrics"]
-        assert cone["ems_deg"] == pytest.approx(exits["ems_deg"], rel=1e-6)
-        assert cone["solver_ms_mean"] > exits["solver_ms_mean"]
+        exits, whole, cone = (
+            results["runs"][f"{run}{way}"]["members"][0]["metrics"] for way in ["", "-whole", "-cone"]
+        )
+        assert whole["ems_deg"] == pytest.approx(exits["ems_deg"], rel=1e-6)
+        # The cone solver sees the constraints linearised about the previous plan.
+        assert cone["ems_deg"] == pytest.approx(exits["ems_deg"], rel=1e-5)
+        assert exits["solver_ms_mean"] < whole["solver_ms_mean"] < cone["solver_ms_mean"]
 
 
 @pytest.mark.parametrize("case", [1, 2])
