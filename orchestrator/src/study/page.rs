@@ -363,7 +363,8 @@ fn several(numbers: &Numbers) -> String {
         return mean;
     }
     let (low, high) = numbers.extent();
-    format!("{mean} [{}, {}]", shown(low), shown(high))
+    // Wide tables break a line before the range, not within.
+    format!("{mean} [{},\u{a0}{}]", shown(low), shown(high))
 }
 
 /// Fractions as differences in per cent.
@@ -405,7 +406,7 @@ mod tests {
     #[test]
     fn several_numbers_show_their_mean_and_extent() {
         assert_eq!(several(&Numbers(vec![1.0, 1.0])), "1");
-        assert_eq!(several(&Numbers(vec![1.0, 2.0])), "1.5 [1, 2]");
+        assert_eq!(several(&Numbers(vec![1.0, 2.0])), "1.5 [1,\u{a0}2]");
         assert_eq!(several(&Numbers(Vec::new())), "–");
         assert_eq!(percent(&Numbers(vec![-0.342])), "−34.2 %");
     }
