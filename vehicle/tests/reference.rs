@@ -1,6 +1,7 @@
 //! Reference profiles: derivatives against differences, the spline against closed forms, tables that are refused.
 
 use nalgebra::Vector3;
+use vehicle::reference::{Course, Segment, Wave};
 use vehicle::table::Table;
 use vehicle::{Profile, Reference, Scenario};
 
@@ -66,6 +67,21 @@ fn oracle_sine_has_its_phase_and_amplitude() {
     let at = Profile::sine(mean, amplitude, 0.8, 0.3).at(2.5);
     assert!((at.angles - mean - amplitude * (0.8f64 * 2.5 + 0.3).sin()).amax() < 1e-15);
     assert!((at.rates - amplitude * 0.8 * (0.8f64 * 2.5 + 0.3).cos()).amax() < 1e-15);
+}
+
+#[test]
+fn oracle_waves_add_up_whichever_of_them_share_a_frequency() {
+    let wave = |frequency| Wave { frequency, sine: 0.1 * frequency, cosine: 0.3 };
+    let frequencies = [vec![0.5, 0.25], vec![0.25, 0.0, 0.5], vec![0.5]];
+    let angles =
+        frequencies.clone().map(|axis| Course { constant: 0.2, waves: axis.into_iter().map(wave).collect() });
+    let profile = Profile::Piecewise(vec![Segment { until: f64::INFINITY, angles }]);
+    let at = profile.at(3.0);
+    for (i, axis) in frequencies.iter().enumerate() {
+        let angle: f64 = axis.iter().map(|w| 0.1 * w * (w * 3.0).sin() + 0.3 * (w * 3.0).cos()).sum();
+        let rate: f64 = axis.iter().map(|w| w * (0.1 * w * (w * 3.0).cos() - 0.3 * (w * 3.0).sin())).sum();
+        assert!((at.angles[i] - 0.2 - angle).abs() < 1e-15 && (at.rates[i] - rate).abs() < 1e-15, "{i}");
+    }
 }
 
 #[test]
