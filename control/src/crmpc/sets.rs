@@ -170,7 +170,8 @@ impl mpc::Constraints<2> for Sets {
 
 impl Bounded<2> for Sets {
     fn follow(&mut self, follow: bool) {
-        self.follow = follow;
+        // The paper's bounds are constant.
+        self.follow = follow && matches!(self.kind, Kind::Robust(_));
     }
 
     fn tighten(&mut self, motion: &Motion<2>, of: Range<usize>) {
