@@ -217,6 +217,8 @@ struct Point {
     angles: Vector3<f64>,
     /// x_ω.
     rates: Vector3<f64>,
+    /// ‖x_ω‖.
+    size: f64,
     /// a; zero at the last stage.
     acceleration: Vector3<f64>,
     turned: OnceCell<(InverseKinematics, BodyMotion)>,
@@ -227,17 +229,23 @@ struct Anchor {
     angles: Vector3<f64>,
     /// x_ω.
     rates: Vector3<f64>,
+    /// ‖x_ω‖.
+    size: f64,
     motion: BodyMotion,
     /// Largest ‖I W δ‖ over the disturbances.
     feedback: f64,
+    /// How fast that grows with the angles at most.
+    feedback_by_angles: f64,
 }
 
 impl Point {
     fn at(references: &[Reference], motion: &Motion<2>, k: usize) -> Self {
         let Reference { angles, rates, accelerations } = &references[k];
+        let rates = rates + motion.states[k][1];
         Self {
             angles: angles + motion.states[k][0],
-            rates: rates + motion.states[k][1],
+            rates,
+            size: rates.norm(),
             acceleration: motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input),
             turned: OnceCell::new(),
         }
@@ -260,11 +268,10 @@ impl Sets {
         let body = &self.body;
         match &mut self.kind {
             Kind::Paper { x_tube, u_tube, inertia_ratio } => {
-                let Point { angles, rates, acceleration, .. } = here;
-                let bound =
-                    linearise::input_bound(angles.y, rates.norm(), acceleration.norm(), *inertia_ratio);
+                let Point { angles, rates, size, acceleration, .. } = here;
+                let bound = linearise::input_bound(angles.y, *size, acceleration.norm(), *inertia_ratio);
                 let input = || here.turned(body).0.input(body, rates, acceleration).norm();
-                exceeds(next.rates.norm(), *x_tube) || exceeds(bound, *u_tube) && exceeds(input(), *u_tube)
+                exceeds(next.size, *x_tube) || exceeds(bound, *u_tube) && exceeds(input(), *u_tube)
             }
             Kind::Robust(robust) => {
                 if anchor.as_ref().is_some_and(|anchor| robust.keeps_by_size(k, here, next, anchor)) {
@@ -312,8 +319,12 @@ impl Robust {
 
     fn anchor(&self, body: &RigidBody, here: &Point) -> Anchor {
         let motion = here.turned(body).1;
-        let feedback = largest_over_box(&motion.moment_by_acceleration, &self.design.tightening.disturbance);
-        Anchor { angles: here.angles, rates: here.rates, motion, feedback }
+        let disturbance = &self.design.tightening.disturbance;
+        let feedback = largest_over_box(&motion.moment_by_acceleration, disturbance);
+        // ‖∂W/∂α‖² and ‖∂W/∂β‖² are at most 2, and orthogonal to each other.
+        let feedback_by_angles = self.design.largest_inertia * SQRT_2 * disturbance.norm();
+        let Point { angles, rates, size, .. } = *here;
+        Anchor { angles, rates, size, motion, feedback, feedback_by_angles }
     }
 
     /// Whether interval `k` keeps its constraints for its size alone, with the bounds that are set.
@@ -325,23 +336,21 @@ impl Robust {
     /// Sets bounds that are at most those of [`Self::tighten`], and returns what ‖m̃‖ and ‖ω̃‖ are at most: all is bounded along the ways
     /// from `anchor` to `here` and on to `next` by the largest size of the derivatives there.
     fn tighten_by_size(&mut self, k: usize, here: &Point, next: &Point, anchor: &Anchor) -> (f64, f64) {
-        let Design { largest_inertia, inertia_ratio, tightening, .. } = &self.design;
+        let Design { largest_inertia, inertia_ratio, .. } = &self.design;
         let a = &here.acceleration;
-        let rates = next.rates.norm();
-        let largest_rates = rates.max(here.rates.norm()).max(anchor.rates.norm());
-        let slopes = MomentSlopeBounds::new(largest_rates, a.norm(), *inertia_ratio);
+        let size = next.size.max(here.size).max(anchor.size);
+        let slopes = MomentSlopeBounds::new(size, a.norm(), *inertia_ratio);
         let (by_angles, by_rates) = (largest_inertia * slopes.by_angles, largest_inertia * slopes.by_rates);
         let turn = (here.angles - anchor.angles).xy().norm();
         let moment =
             anchor.motion.moment(a).norm() + by_angles * turn + by_rates * (here.rates - anchor.rates).norm();
         let turn_within = (next.angles - here.angles).xy().norm();
         let after = moment + by_angles * turn_within + by_rates * (next.rates - here.rates).norm();
-        // ‖∂W/∂α‖² and ‖∂W/∂β‖² are at most 2, and orthogonal to each other.
-        let feedback = anchor.feedback + largest_inertia * SQRT_2 * turn * tightening.disturbance.norm();
+        let feedback = anchor.feedback + anchor.feedback_by_angles * turn;
         let slopes = (by_angles, by_rates, *largest_inertia);
         self.moment[k] = self.moment_bound(k, moment, after, feedback, slopes);
-        self.rate[k + 1] = self.rate_bound(k + 1, TURN_BY_ANGLES * rates);
-        (moment, rates)
+        self.rate[k + 1] = self.rate_bound(k + 1, TURN_BY_ANGLES * next.size);
+        (moment, next.size)
     }
 
     /// [`Self::moment_bound`] about a moment that is linearised there.
