@@ -136,6 +136,13 @@ def test_exits_change_the_time_and_not_the_motion(results):
         assert exits["solver_ms_mean"] < whole["solver_ms_mean"] < cone["solver_ms_mean"]
 
 
+def test_parameters_are_shown_in_the_unit_of_their_heading(report):
+    page = (report[1] / "report.html").read_text()
+    row = page.split("What counting the errors of measurement costs")[1].split("errors counted, estimator")[1]
+    # 0.2 deg/s and 2 deg/s2, which the unit holds in rad.
+    assert re.findall(r"<td[^>]*>([^<]*)</td>", row)[:2] == ["0.2", "2"]
+
+
 @pytest.mark.parametrize("case", [1, 2])
 def test_a_square_wave_drives_the_rate_to_twice_the_printed_tube(results, case):
     within = results["runs"][f"tube-{case}-square"]["members"][0]["within"]

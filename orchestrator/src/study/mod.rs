@@ -90,7 +90,10 @@
 //! [[overview]]                         # all runs against metrics
 //! title = "…"
 //! runs = ["lqr"]
-//! metrics = [{ of = "ems_deg", label = "EMS, deg" }]
+//! metrics = [
+//!     { of = "ems_deg", label = "EMS, deg" },
+//!     { of = "parameter.controller.disturbance.bound", label = "bound, deg/s²", factor = 57.29577951308232 },   # factor: optional
+//! ]
 //!
 //! [[claim]]
 //! says = "in our words, what the paper claims"
@@ -495,6 +498,13 @@ pub struct Column {
     pub of: String,
     /// Its heading, with unit.
     pub label: String,
+    /// The heading's unit for a value of 1: parameters are in the units of the FMU's variables.
+    #[serde(default = "unscaled")]
+    pub factor: f64,
+}
+
+fn unscaled() -> f64 {
+    1.0
 }
 
 /// A claim of the paper with the checks that decide on it.

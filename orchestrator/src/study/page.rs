@@ -255,7 +255,8 @@ fn overview(overview: &Overview, results: &Results) -> Markup {
         let Some(run) = results.study.run(id.get_ref()) else { continue };
         let number = |column: &Column| {
             let reference = format!("{}.{}", id.get_ref(), column.of);
-            results.numbers(&reference).unwrap_or_else(|_| Numbers(Vec::new()))
+            let numbers = results.numbers(&reference).map_or_else(|_| Vec::new(), |numbers| numbers.0);
+            Numbers(numbers.into_iter().map(|number| number * column.factor).collect())
         };
         let numbers: Vec<Numbers> = overview.metrics.iter().map(number).collect();
         rows.push((run, numbers));
