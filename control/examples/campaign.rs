@@ -11,7 +11,7 @@ mod harness;
 
 use control::crmpc::Constraints;
 use harness::{
-    Case, Outcome, adversaries, constant, in_parallel, lqr, run, settings, simulate, square, white,
+    Case, Kept, Outcome, adversaries, constant, in_parallel, lqr, run, settings, simulate, square, white,
 };
 
 fn main() {
@@ -29,8 +29,8 @@ fn main() {
         ("the same every 0.01 s", adversaries(0.01)),
     ];
     println!(
-        "{:7} {:27} {:>4} {:>9} {:>9} {:>9} {:>11} {:>9}  largest at",
-        "", "", "runs", "mean EMS", "max EMS", "max rate", "max moment", "fallbacks"
+        "{:7} {:27} {:>4} {:>9} {:>9} {:>9} {:>11} {:>9} {:>10} {:>6}  largest at",
+        "", "", "runs", "mean EMS", "max EMS", "max rate", "max moment", "fallbacks", "in force", "broken"
     );
     for (name, cases) in &families {
         let crmpc = |constraints| {
@@ -42,24 +42,28 @@ fn main() {
         report("paper", name, cases, &crmpc(Constraints::Paper));
         let regulated = in_parallel(cases, |case| {
             let disturbance = case.disturbance.clone();
-            (simulate(&mut lqr(), &mut (), case.inertia_scale, disturbance, |(), _, _| {}), 0)
+            let outcome = simulate(&mut lqr(), &mut (), case.inertia_scale, disturbance, |(), _, _| {});
+            (outcome, Kept { fallbacks: 0, in_force: 0.0, broken: false })
         });
         report("LQR", name, cases, &regulated);
     }
 }
 
-fn report(controller: &str, family: &str, cases: &[Case], outcomes: &[(Outcome, u32)]) {
+fn report(controller: &str, family: &str, cases: &[Case], outcomes: &[(Outcome, Kept)]) {
     let largest = |value: fn(&Outcome) -> f64| {
         let values = outcomes.iter().map(|(outcome, _)| value(outcome)).enumerate();
         values.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::NAN))
     };
     let mean = outcomes.iter().map(|(outcome, _)| outcome.ems_deg).sum::<f64>() / outcomes.len() as f64;
-    let fallbacks: u32 = outcomes.iter().map(|(_, fallbacks)| fallbacks).sum();
+    let fallbacks: u32 = outcomes.iter().map(|(_, kept)| kept.fallbacks).sum();
+    let in_force = outcomes.iter().map(|(_, kept)| kept.in_force).fold(1.0, f64::min);
+    let broken = outcomes.iter().filter(|(_, kept)| kept.broken).count();
     let (ems, (rate_case, rate), (moment_case, moment)) =
         (largest(|o| o.ems_deg).1, largest(|o| o.rate), largest(|o| o.moment));
     println!(
-        "{controller:7} {family:27} {:4} {mean:8.4}° {ems:8.4}° {rate:9.4} {moment:11.4} {fallbacks:9}  {} / {}",
+        "{controller:7} {family:27} {:4} {mean:8.4}° {ems:8.4}° {rate:9.4} {moment:11.4} {fallbacks:9} {:8.1} % {broken:6}  {} / {}",
         outcomes.len(),
+        100.0 * in_force,
         cases[rate_case].name,
         cases[moment_case].name,
     );

@@ -17,6 +17,38 @@ pub enum DesignError {
         /// Spectral radius of the sampled error dynamics.
         radius: f64,
     },
+    /// The terminal gain does not stabilise the nominal motion when it is held between two optimisations.
+    #[error(
+        "terminal gain K~ = [{k1}, {k2}] held for {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter period.optimisation"
+    )]
+    UnstableTerminal {
+        /// Gain on the angle, 1/s².
+        k1: f64,
+        /// Gain on the rate, 1/s.
+        k2: f64,
+        /// Optimisation period, s.
+        period: f64,
+        /// Spectral radius.
+        radius: f64,
+    },
+    /// The limits leave no room to guarantee them.
+    #[error("constraints = robust cannot be guaranteed: {}", no_guarantee(self))]
+    NoGuarantee {
+        /// Share of the moment limit that is left, negative where it is not enough.
+        moment_left: f64,
+        /// Share of the rate limit that is left.
+        rate_left: f64,
+        /// N m.
+        limit_moment: f64,
+        /// rad/s.
+        limit_rate: f64,
+        /// Largest disturbance.bound that is accepted, the rest as it is, rad/s²; `None` if not even 0 is.
+        disturbance: Option<f64>,
+        /// Largest errors of angles (rad) and rates (rad/s) in the proportion given.
+        errors: Option<(f64, f64)>,
+        /// Largest delay, s.
+        delay: Option<f64>,
+    },
     /// A gain violates Lemma 2 or 3 of Chai 2022.
     #[error(
         "{name}.k1 and {name}.k2 need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)"
@@ -146,4 +178,61 @@ pub enum DesignError {
     /// The solver refuses the problem.
     #[error("the cone solver refuses the problem: {0}")]
     Solver(String),
+}
+
+/// What is missing, and what would be accepted.
+fn no_guarantee(error: &DesignError) -> String {
+    let DesignError::NoGuarantee {
+        moment_left,
+        rate_left,
+        limit_moment,
+        limit_rate,
+        disturbance,
+        errors,
+        delay,
+    } = error
+    else {
+        return String::new();
+    };
+    let mut lacks = Vec::new();
+    for (what, left, limit) in [
+        ("moment", *moment_left, format!("limit.moment = {limit_moment} N m")),
+        ("rate", *rate_left, format!("limit.rate = {:.4} deg/s", limit_rate.to_degrees())),
+    ] {
+        if left <= 0.0 {
+            lacks.push(format!("the {what} that the worst disturbance takes exceeds {limit} by {:.1} %", -100.0 * left));
+        }
+    }
+    if lacks.is_empty() {
+        lacks.push(format!(
+            "only {:.1} % of the moment and {:.1} % of the rate are left to move with",
+            100.0 * moment_left,
+            100.0 * rate_left
+        ));
+    }
+    let mut accepted = Vec::new();
+    match disturbance {
+        Some(bound) => accepted.push(format!("disturbance.bound = {:.4} deg/s2", down(bound.to_degrees()))),
+        None => accepted.push("no disturbance.bound".into()),
+    }
+    if let Some((angle, rate)) = errors {
+        accepted.push(format!(
+            "estimation.angleError = {:.4} deg with estimation.rateError = {:.4} deg/s",
+            down(angle.to_degrees()),
+            down(rate.to_degrees())
+        ));
+    }
+    if let Some(delay) = delay {
+        accepted.push(format!("delay = {:.4} s", down(*delay)));
+    }
+    format!(
+        "{}; with all else as it is, what would be accepted is at most {}; guarantee.policy = bestEffort runs all the same, without guarantee",
+        lacks.join(" and "),
+        accepted.join(", or ")
+    )
+}
+
+/// Rounded down to four digits after the point, so that the number printed is accepted.
+fn down(value: f64) -> f64 {
+    (value * 1e4).floor() / 1e4
 }

@@ -38,28 +38,74 @@ pub fn transition(h: f64) -> Matrix2<f64> {
     Matrix2::new(1.0, h, 0.0, 1.0)
 }
 
+/// ∫ |c₀ + c₁ u| du over `within`.
+fn integral_of_size(c0: f64, c1: f64, within: (f64, f64)) -> f64 {
+    let primitive = |u: f64| c0 * u + 0.5 * c1 * u * u;
+    let (low, high) = within;
+    let zero = -c0 / c1;
+    if low < zero && zero < high {
+        (primitive(zero) - primitive(low)).abs() + (primitive(high) - primitive(zero)).abs()
+    } else {
+        (primitive(high) - primitive(low)).abs()
+    }
+}
+
 /// Response of the double integrator to a unit acceleration held over `h`.
 pub fn response(h: f64) -> Vector2<f64> {
     Vector2::new(0.5 * h * h, h)
 }
 
-/// Bounds per unit of disturbance bound: |o_angle| ≤ `angle`·Δ̄, |o_rate| ≤ `rate`·Δ̄, |K o| ≤ `feedback`·Δ̄.
+/// Bounds on the deviation of one axis, per unit of the bound on what drives it. Units are for a disturbance in rad/s².
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub struct Reach {
-    /// s².
+    /// Largest deviation of the angle, s².
     pub angle: f64,
-    /// s.
+    /// Largest deviation of its rate, s.
     pub rate: f64,
-    /// Dimensionless.
+    /// Largest deviation of the angle that the law acts on: without what happened since the measurement, s².
+    pub seen_angle: f64,
+    /// The same of the rate, s.
+    pub seen_rate: f64,
+    /// Largest |K o| that the law commands, dimensionless.
     pub feedback: f64,
+    /// What the feedback holds, each part times how long ago it was caused, s.
+    pub feedback_age: f64,
 }
 
-/// Error dynamics of one axis with the feedback sampled every `period` seconds.
+impl Reach {
+    /// The sum of each.
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            angle: self.angle + other.angle,
+            rate: self.rate + other.rate,
+            seen_angle: self.seen_angle + other.seen_angle,
+            seen_rate: self.seen_rate + other.seen_rate,
+            feedback: self.feedback + other.feedback,
+            feedback_age: self.feedback_age + other.feedback_age,
+        }
+    }
+
+    /// Every bound times `size`.
+    pub fn times(&self, size: f64) -> Self {
+        Self {
+            angle: self.angle * size,
+            rate: self.rate * size,
+            seen_angle: self.seen_angle * size,
+            seen_rate: self.seen_rate * size,
+            feedback: self.feedback * size,
+            feedback_age: self.feedback_age * size,
+        }
+    }
+}
+
+/// Error dynamics of one axis with the feedback sampled every `period` seconds. The law acts `latency` seconds after its measurement, on
+/// the state predicted for that instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledError {
     gain: Gain,
     period: f64,
-    /// o⁺ = Φ o + Γ Δ.
+    latency: f64,
+    /// o⁺ = Φ o + Γ Δ for a held Δ.
     phi: Matrix2<f64>,
     gamma: Vector2<f64>,
 }
@@ -94,15 +140,24 @@ impl InvariantSet {
             angle: self.support(&Vector2::x()),
             rate: self.support(&Vector2::y()),
             feedback: self.support(&self.gain.row().transpose()),
+            ..Reach::default()
         }
     }
 }
 
+/// Largest spectral radius of sampled dynamics that count as stable: what is slower than 10⁴ periods cannot be told from what stays.
+const LARGEST_RADIUS: f64 = 1.0 - 1e-4;
+
 impl SampledError {
-    /// Error dynamics under `gain` sampled every `period` s.
+    /// Error dynamics under `gain` sampled every `period` s, acting at once.
     pub fn new(gain: Gain, period: f64) -> Self {
         let gamma = response(period);
-        Self { gain, period, phi: transition(period) + gamma * gain.row(), gamma }
+        Self { gain, period, latency: 0.0, phi: transition(period) + gamma * gain.row(), gamma }
+    }
+
+    /// The same, acting `latency` s after the measurement.
+    pub fn delayed(gain: Gain, period: f64, latency: f64) -> Self {
+        Self { latency, ..Self::new(gain, period) }
     }
 
     /// Largest magnitude of the closed-loop eigenvalues; stable if below 1.
@@ -112,74 +167,112 @@ impl SampledError {
         if discriminant < 0.0 { det.sqrt() } else { 0.5 * trace.abs() + discriminant.sqrt() }
     }
 
-    /// What disturbances held over each period can do within 0, 1, …, `steps` periods, starting from o = 0.
+    /// What any measurable |Δ| ≤ 1 can do within 0, 1, …, `steps` periods from o = 0.
+    ///
+    /// A pulse at time v moves the vehicle freely, to [u; 1] after u seconds, until the first tick whose measurement was taken after v: then
+    /// `latency` ≤ u < `latency` + `period`. From there on it fades by Φ. The bounds are the integrals of the absolute responses.
     pub fn reach(&self, steps: usize) -> Vec<Reach> {
-        let mut impulse = self.gamma;
-        let mut reach = Reach::default();
+        let unseen = Reach { angle: 0.5 * self.latency * self.latency, rate: self.latency, ..Reach::default() };
+        let within = (self.latency, self.latency + self.period);
+        let mut reach = unseen;
         let mut all = Vec::with_capacity(steps + 1);
         all.push(reach);
-        for _ in 0..steps {
-            reach.angle += impulse.x.abs();
-            reach.rate += impulse.y.abs();
-            reach.feedback += (self.gain.row() * impulse).x.abs();
+        let mut power = Matrix2::identity();
+        for n in 0..steps {
+            // [u; 1] has become Φⁿ [u; 1].
+            let size = |row: RowVector2<f64>| integral_of_size(row.y, row.x, within);
+            let (angle, rate) = (size(power.row(0).into()), size(power.row(1).into()));
+            let feedback = size(self.gain.row() * power);
+            reach = Reach {
+                angle: reach.angle + angle,
+                rate: reach.rate + rate,
+                seen_angle: reach.seen_angle + angle,
+                seen_rate: reach.seen_rate + rate,
+                feedback: reach.feedback + feedback,
+                feedback_age: reach.feedback_age + feedback * (within.1 + n as f64 * self.period),
+            };
             all.push(reach);
-            impulse = self.phi * impulse;
+            power = self.phi * power;
         }
         all
     }
 
     /// The limit of [`Self::reach`] for infinitely many periods; `None` if the dynamics are not stable.
     pub fn reach_forever(&self) -> Option<Reach> {
-        let radius = self.spectral_radius();
-        if radius >= 1.0 - 1e-9 {
-            return None;
-        }
-        // The impulse response falls at least as fast as n·radiusⁿ: carry on until the rest is below rounding.
-        let steps = (60.0 / -radius.max(0.5).ln()).ceil() as usize;
-        self.reach(steps).pop()
+        self.reach(self.settling()?).pop()
     }
 
-    /// What errors of the measured rate do within 0, 1, …, `steps` periods, the feedback and the first nominal state taken from
-    /// the measurement. Independent errors add up by their squares: per unit of the error's standard deviation, or of any
-    /// quantile of a normal error, the same of the deviation o and of the measured deviation o + e, with the feedback K (o + e).
-    pub fn noise(&self, steps: usize) -> Vec<[Reach; 2]> {
-        let feedback = |deviation: &Vector2<f64>| (self.gain.row() * deviation).x;
-        // Squares of what the errors at ticks 1, 2, …, n − 1 do at tick n, and what that at tick 0 does.
-        let (mut squares, mut squared_feedback) = (Vector2::zeros(), 0.0);
-        let mut impulse = self.gamma * self.gain.k2;
-        let mut first = -Vector2::y();
+    /// Periods after which a response has fallen below rounding; `None` if the dynamics are not stable.
+    pub fn settling(&self) -> Option<usize> {
+        let radius = self.spectral_radius();
+        // Falls at least as fast as n·radiusⁿ.
+        (radius <= LARGEST_RADIUS).then(|| (60.0 / -radius.max(0.5).ln()).ceil() as usize)
+    }
+
+    /// What errors of the measured rate can do within 0, 1, …, `steps` periods, per unit of their bound; they may be anything within it at every
+    /// tick. The motion begins at the measured state.
+    ///
+    /// With e = (0, e_rate) the predicted state is off by A_d e (A_d: `latency`), and so
+    /// ô_n = A_d e_n + Σ_{0<j<n} Φ^{n−1−j} Γ K A_d e_j − Φ^{n−1} A A_d e_0. The vehicle itself deviates by o_n = ô_n − A_d e_n.
+    pub fn errors(&self, steps: usize) -> Vec<Reach> {
+        let Self { gain, period, latency, phi, gamma } = *self;
+        let newest = Vector2::new(latency, 1.0);
+        let feedback = |deviation: &Vector2<f64>| (gain.row() * deviation).x.abs();
+        let (mut sum, mut sum_feedback) = (Vector2::zeros(), 0.0);
+        let mut older = gamma * (gain.row() * newest).x;
+        let mut first = -(transition(period) * newest);
         let mut all = Vec::with_capacity(steps + 1);
-        for n in 0..=steps {
-            let deviation = (squares + first.component_mul(&first)).map(f64::sqrt);
-            // The newest error is seen at once; at tick 0 it is the first one.
-            let newest = if n == 0 { 0.0 } else { 1.0 };
-            let measured_first = if n == 0 { first + Vector2::y() } else { first };
-            let angle = (squares.x + measured_first.x.powi(2)).sqrt();
-            let rate = (squares.y + measured_first.y.powi(2) + newest).sqrt();
-            let by_first = feedback(&measured_first).powi(2);
-            let by_newest = newest * self.gain.k2 * self.gain.k2;
-            all.push([
-                Reach { angle: deviation.x, rate: deviation.y, feedback: 0.0 },
-                Reach { angle, rate, feedback: (squared_feedback + by_first + by_newest).sqrt() },
-            ]);
-            first = self.phi * first;
-            if n == 0 {
-                first += self.gamma * self.gain.k2;
-            } else {
-                squares += impulse.component_mul(&impulse);
-                squared_feedback += feedback(&impulse).powi(2);
-                impulse = self.phi * impulse;
+        all.push(Reach { angle: newest.x, rate: newest.y, ..Reach::default() });
+        for n in 1..=steps {
+            if n > 1 {
+                sum += older.abs();
+                sum_feedback += feedback(&older);
+                older = phi * older;
             }
+            let own = sum + first.abs();
+            let seen = own + newest;
+            all.push(Reach {
+                angle: own.x,
+                rate: own.y,
+                seen_angle: seen.x,
+                seen_rate: seen.y,
+                feedback: sum_feedback + feedback(&first) + feedback(&newest),
+                feedback_age: 0.0,
+            });
+            first = phi * first;
         }
         all
     }
 
-    /// A set that |Δ| ≤ 1, held over each period, can never drive the deviation out of. `None` if the dynamics are not
-    /// stable with real, distinct eigenvalues.
-    pub fn invariant_set(&self) -> Option<InvariantSet> {
+    /// What shifts of the angle alone, by no more than the period at each tick, can do within 0, 1, …, `steps` periods, in s, 1 and 1/s.
+    pub fn shifts(&self, steps: usize) -> Vec<Reach> {
+        let mut shift = Vector2::new(self.period, 0.0);
+        let mut reach = Reach::default();
+        let mut all = Vec::with_capacity(steps + 1);
+        all.push(reach);
+        for _ in 0..steps {
+            reach = Reach {
+                angle: reach.angle + shift.x.abs(),
+                rate: reach.rate + shift.y.abs(),
+                seen_angle: reach.seen_angle + shift.x.abs(),
+                seen_rate: reach.seen_rate + shift.y.abs(),
+                feedback: reach.feedback + (self.gain.row() * shift).x.abs(),
+                feedback_age: 0.0,
+            };
+            all.push(reach);
+            shift = self.phi * shift;
+        }
+        all
+    }
+
+    /// A set that |Δ| ≤ 1, held over each period, can never drive the deviation out of, together with shifts of the angle by up to `lateral` (s²) at
+    /// each tick. `None` if the dynamics are not stable with real, distinct eigenvalues.
+    ///
+    /// A Δ that changes within the period does what its mean does, and shifts the angle by no more than τ²/4 besides.
+    pub fn invariant_set(&self, lateral: f64) -> Option<InvariantSet> {
         let (trace, det) = (self.phi.trace(), self.phi.determinant());
         let discriminant = 0.25 * trace * trace - det;
-        if discriminant <= 0.0 || self.spectral_radius() >= 1.0 - 1e-9 {
+        if discriminant <= 0.0 || self.spectral_radius() > LARGEST_RADIUS {
             return None;
         }
         let eigenvalues = [0.5 * trace + discriminant.sqrt(), 0.5 * trace - discriminant.sqrt()];
@@ -187,14 +280,15 @@ impl SampledError {
         let basis = Matrix2::from_columns(&vectors).try_inverse()?;
 
         let mut generators = Vec::with_capacity(EXPLICIT + 2);
-        let mut impulse = self.gamma;
+        // Free until a measurement has seen it.
+        let mut impulse = transition(self.latency) * self.gamma;
         for _ in 0..EXPLICIT {
             generators.push(impulse);
             impulse = self.phi * impulse;
         }
-        let rest = basis * impulse;
+        let (rest, shift) = (basis * impulse, basis * Vector2::new(lateral, 0.0));
         for i in 0..2 {
-            generators.push(vectors[i] * (rest[i].abs() / (1.0 - eigenvalues[i].abs())));
+            generators.push(vectors[i] * ((rest[i].abs() + shift[i].abs()) / (1.0 - eigenvalues[i].abs())));
         }
         Some(InvariantSet { generators, gain: self.gain })
     }
@@ -202,6 +296,11 @@ impl SampledError {
     /// Sampling period, s.
     pub fn period(&self) -> f64 {
         self.period
+    }
+
+    /// Φ, the transition over one period under the held feedback.
+    pub fn transition(&self) -> &Matrix2<f64> {
+        &self.phi
     }
 
     /// One period: o⁺ = Φ o + Γ Δ.
@@ -219,7 +318,7 @@ mod tests {
         // Support functions: h(Φᵀn) + |nᵀΓ| ≤ h(n) for every facet of the set.
         for (k, period) in [(-5.0, 0.04), (-5.0, 0.2), (-10.0, 0.04), (-4.5, 0.1)] {
             let error = SampledError::new(Gain { k1: k, k2: k }, period);
-            let set = error.invariant_set().unwrap();
+            let set = error.invariant_set(0.0).unwrap();
             let normals = set.normals();
             assert!(normals.len() > EXPLICIT);
             for normal in normals {
@@ -236,35 +335,94 @@ mod tests {
         }
     }
 
+    /// Largest |angle|, |rate| and |K ô| at each tick over all signs of what `drive` gives for a source: by superposition the sum over the sources.
+    fn superposed(
+        steps: usize,
+        sources: usize,
+        respond: impl Fn(usize) -> Vec<[f64; 5]>,
+    ) -> Vec<[f64; 5]> {
+        let mut sums = vec![[0.0; 5]; steps + 1];
+        for source in 0..sources {
+            for (sum, value) in sums.iter_mut().zip(respond(source)) {
+                for (sum, value) in sum.iter_mut().zip(value) {
+                    *sum += value.abs();
+                }
+            }
+        }
+        sums
+    }
+
+    fn assert_agree(found: &[Reach], expected: &[[f64; 5]], tolerance: f64) {
+        for (n, (found, expected)) in found.iter().zip(expected).enumerate() {
+            let Reach { angle, rate, seen_angle, seen_rate, feedback, .. } = *found;
+            for (found, expected) in [angle, rate, seen_angle, seen_rate, feedback].iter().zip(expected) {
+                assert!((found - expected).abs() <= tolerance * (1.0 + expected), "tick {n}: {found} {expected}");
+            }
+        }
+    }
+
     #[test]
-    fn oracle_noise_adds_up_as_in_a_simulation() {
-        // By superposition: one error of 1 at each tick in turn, everything else exact.
-        let error = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04);
-        let steps = 12;
-        let mut squares = vec![[[0.0; 3]; 2]; steps + 1];
-        for at in 0..=steps {
-            let noise = |n: usize| Vector2::new(0.0, if n == at { 1.0 } else { 0.0 });
-            let mut deviation = -noise(0);
-            for (n, squares) in squares.iter_mut().enumerate() {
-                let measured = deviation + noise(n);
-                let feedback = (error.gain.row() * measured).x;
-                for (of, value) in
-                    [(0, [deviation.x, deviation.y, 0.0]), (1, [measured.x, measured.y, feedback])]
-                {
-                    for i in 0..3 {
-                        squares[of][i] += value[i] * value[i];
-                    }
-                }
-                deviation = transition(error.period) * deviation + error.gamma * feedback;
-            }
+    fn oracle_errors_of_the_rate_add_up_as_in_a_simulation() {
+        for latency in [0.0, 0.05] {
+            let error = SampledError::delayed(Gain { k1: -5.0, k2: -4.0 }, 0.04, latency);
+            let steps = 12;
+            let expected = superposed(steps, steps + 1, |at| {
+                let off = |n: usize| Vector2::new(latency, 1.0) * if n == at { 1.0 } else { 0.0 };
+                let mut deviation = -off(0);
+                (0..=steps)
+                    .map(|n| {
+                        let seen = deviation + off(n);
+                        let feedback = (error.gain.row() * seen).x;
+                        let values = [deviation.x, deviation.y, seen.x, seen.y, feedback];
+                        deviation = transition(error.period) * deviation + error.gamma * feedback;
+                        values
+                    })
+                    .collect()
+            });
+            assert_agree(&error.errors(steps), &expected, 1e-12);
         }
-        for (n, (squares, found)) in squares.iter().zip(error.noise(steps)).enumerate() {
-            for (squares, Reach { angle, rate, feedback }) in squares.iter().zip(found) {
-                for (square, found) in squares.iter().zip([angle, rate, feedback]) {
-                    assert!((square.sqrt() - found).abs() < 1e-12, "tick {n}: {} {found}", square.sqrt());
-                }
-            }
+    }
+
+    #[test]
+    fn oracle_pulses_add_up_as_in_a_simulation() {
+        // Pulses of a thousandth of a period, each seen by the first measurement after it, `latency` before the tick that it leads to.
+        let (period, fine) = (0.04, 1000);
+        let pulse = period / f64::from(fine);
+        for late in [0, 1000, 2925] {
+            let latency = f64::from(late) * pulse;
+            let error = SampledError::delayed(Gain { k1: -5.0, k2: -5.0 }, period, latency);
+            let steps = 8_u32;
+            let sources = (late + steps as i32 * fine) as usize;
+            // Source i acts from −latency + i·pulse on.
+            let expected = superposed(steps as usize, sources, |source| {
+                let begins = (source as f64 + 0.5) * pulse - latency;
+                let mut seen = Vector2::zeros();
+                (0..=steps)
+                    .map(|n| {
+                        let time = f64::from(n) * period;
+                        let free = (time - begins).max(0.0);
+                        // Before a measurement has seen it, it moves freely.
+                        let fresh = if free > 0.0 && free < latency { Vector2::new(free, 1.0) } else { Vector2::zeros() };
+                        if n > 0 {
+                            seen = error.phi * seen;
+                            if (latency..latency + period).contains(&free) {
+                                seen = Vector2::new(free, 1.0);
+                            }
+                        }
+                        let own = seen + fresh;
+                        [own.x, own.y, seen.x, seen.y, (error.gain.row() * seen).x].map(|value| value * pulse)
+                    })
+                    .collect()
+            });
+            assert_agree(&error.reach(steps as usize), &expected, 2e-4);
         }
+    }
+
+    #[test]
+    fn oracle_a_held_disturbance_reaches_as_far_as_one_that_changes_within_the_period() {
+        // Where the response does not change its sign within a period. (26) is for constant ones.
+        let reach = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04).reach_forever().unwrap();
+        assert!((reach.angle - 0.2).abs() < 1e-4 && (reach.feedback - 1.2473).abs() < 1e-4, "{reach:?}");
     }
 
     #[test]

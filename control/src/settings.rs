@@ -1,6 +1,6 @@
 //! The published settings, from `data/crmpc-2022.toml`.
 
-use crate::crmpc::{Constraints, InitialState, Settings};
+use crate::crmpc::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
 use crate::mpc::SolverSettings;
 use crate::sampled::Gain;
 use serde::Deserialize;
@@ -14,6 +14,7 @@ struct File {
     schedule: Schedule,
     gains: Gains,
     bounds: Bounds,
+    guarantee: Robust,
     solver: Solver,
     published: Published,
 }
@@ -48,6 +49,14 @@ struct Bounds {
     sideslip_deg: f64,
     reference_rate_deg_s: f64,
     reference_acceleration_deg_s2: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Robust {
+    sideslip_deg: f64,
+    observer_time_constant: f64,
+    observer_stiffness: f64,
 }
 
 #[derive(Deserialize)]
@@ -95,7 +104,7 @@ impl Settings {
 
     /// Chai 2022, section 5.1, for the vehicle and limits of `scenario`; robust set, measured initial state.
     pub fn crmpc2022(scenario: &Scenario, body: RigidBody) -> Self {
-        let File { weights, schedule, gains, bounds, solver, .. } = embedded();
+        let File { weights, schedule, gains, bounds, guarantee, solver, .. } = embedded();
         Self {
             body,
             limit_rate: scenario.limit_rate,
@@ -114,6 +123,14 @@ impl Settings {
             inertia_error: bounds.inertia_error,
             angle_error: 0.0,
             rate_error: 0.0,
+            delay: 0.0,
+            sideslip_domain: guarantee.sideslip_deg.to_radians(),
+            guarantee: Guarantee::Required,
+            observer: ObserverSettings {
+                active: true,
+                time_constant: guarantee.observer_time_constant,
+                stiffness: guarantee.observer_stiffness,
+            },
             sideslip_bound: bounds.sideslip_deg.to_radians(),
             reference_rate: bounds.reference_rate_deg_s.to_radians(),
             reference_acceleration: bounds.reference_acceleration_deg_s2.to_radians(),

@@ -2,11 +2,11 @@
 
 use crate::error::DesignError;
 use crate::mpc::SolverSettings;
+use super::guarantee::{self, Assessment, Tightening};
 use crate::sampled::{Gain, InvariantSet, Reach, SampledError};
-use nalgebra::{Matrix2, Vector2, Vector3};
+use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
-use vehicle::kinematics;
 
 /// Which sets the optimisation keeps the nominal motion in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,6 +29,28 @@ pub enum InitialState {
     /// Where the previous plan put it; the first at the measured state. The nominal motion never sees a disturbance, and the
     /// deviation obeys the error dynamics (22) alone.
     Nominal,
+}
+
+/// What happens where the design of the robust set does not hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum Guarantee {
+    /// It is refused.
+    #[default]
+    Required,
+    /// It runs all the same, tightened by as much as there is room for, and says that nothing is guaranteed.
+    BestEffort,
+}
+
+/// The observer of the disturbance, by which the reference of the nominal motion is shifted so that the vehicle comes to rest on the reference.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObserverSettings {
+    /// Whether the reference is shifted.
+    pub active: bool,
+    /// Time constant of its filter, s.
+    pub time_constant: f64,
+    /// k of the shift −Δ̂/k of the reference's angles, 1/s².
+    pub stiffness: f64,
 }
 
 /// Everything CRMPC is built from. Units SI, angles rad.
@@ -64,11 +86,19 @@ pub struct Settings {
     pub disturbance_bound: f64,
     /// Relative error of the inertia that the robust set allows for.
     pub inertia_error: f64,
-    /// Bound on the error of each measured angle, rad.
+    /// Bound on the error of each measured angle, rad. It moves no faster than `rate_error`.
     pub angle_error: f64,
-    /// Bound on the error of each measured rate, rad/s: white from one feedback to the next.
+    /// Bound on the error of each measured component of x_ω, rad/s. It may be anything within it at each tick.
     pub rate_error: f64,
-    /// |β| that the bounds of Lemma 1 allow for, rad.
+    /// Time from a measurement to the moment that it leads to, s. The state given to the law is the one predicted for that instant.
+    pub delay: f64,
+    /// |β| up to which the guarantee of the robust set is given, rad.
+    pub sideslip_domain: f64,
+    /// What happens where the design of the robust set does not hold.
+    pub guarantee: Guarantee,
+    /// Observer of the disturbance; of the robust set only.
+    pub observer: ObserverSettings,
+    /// |β| that the paper's bounds of Lemma 1 allow for, rad.
     pub sideslip_bound: f64,
     /// Bound Θ̄₁ on ‖Θ̇_r‖, rad/s.
     pub reference_rate: f64,
@@ -120,6 +150,24 @@ pub fn terminal_weight(gain: Gain, p: Vector2<f64>, q: f64) -> Matrix2<f64> {
     Matrix2::new(g11, g12, g12, g22)
 }
 
+/// G of (15) as it is when the terminal law is held over h, with equality: ΦᵀG Φ − G + h (P + K̃ᵀQ K̃) = 0, so that (11c) holds for the sampled cost.
+pub fn held_terminal_weight(held: &SampledError, gain: Gain, p: Vector2<f64>, q: f64) -> Matrix2<f64> {
+    let mut load = (Matrix2::from_diagonal(&p) + gain.row().transpose() * gain.row() * q) * held.period();
+    let mut power = *held.transition();
+    let mut sum = Matrix2::zeros();
+    // Σ (Φᵀ)ⁱ L Φⁱ by doubling, until Φ has vanished.
+    for _ in 0..60 {
+        let next = load + power.transpose() * load * power;
+        sum = next;
+        if next == load {
+            break;
+        }
+        load = next;
+        power *= power;
+    }
+    sum
+}
+
 /// c̄ of (21): the peak over time of G_i(τ) = (e^{λ₂τ} − e^{λ₁τ})/√(k₂² + 4k₁), with λ₁ the faster root.
 pub fn step_response_peak(gain: Gain) -> Option<f64> {
     let (slow, fast) = gain.eigenvalues()?;
@@ -130,25 +178,6 @@ pub fn step_response_peak(gain: Gain) -> Option<f64> {
 /// Smallest eigenvalue of a symmetric 2×2 matrix.
 fn smallest_eigenvalue(m: &Matrix2<f64>) -> f64 {
     0.5 * m.trace() - (0.25 * (m.m11 - m.m22).powi(2) + m.m12 * m.m12).sqrt()
-}
-
-/// How the robust set is tightened, per feedback tick of the prediction.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tightening {
-    /// Reach of the error dynamics per unit disturbance at prediction step k = 0..=N.
-    pub at_stage: Vec<Reach>,
-    /// Largest reach of K·o at the feedback ticks within prediction interval k = 0..N.
-    pub within_stage: Vec<Reach>,
-    /// Bound on the disturbance of each axis, rad/s².
-    pub disturbance: Vector3<f64>,
-    /// Relative moment error that an inertia error is equivalent to, where `disturbance` does not hold it.
-    pub inertia: f64,
-    /// Bound on the norm of the whole disturbance, inertia error included, rad/s².
-    pub norm: f64,
-    /// What errors of measurement add to the deviation at prediction step k = 0..=N: rad, rad/s.
-    pub noise_at_stage: Vec<Reach>,
-    /// What they add to the measured deviation at the feedback ticks within prediction interval k = 0..N: rad, rad/s, rad/s².
-    pub noise_within_stage: Vec<Reach>,
 }
 
 /// The result of the offline design.
@@ -162,14 +191,20 @@ pub struct Design {
     pub reach: Reach,
     /// Invariant set of the deviation of one axis per unit of its disturbance bound; `None` if the eigenvalues are complex.
     pub invariant: Option<InvariantSet>,
-    /// Stage-wise tightening of the robust set.
+    /// Tightening of the robust set.
     pub tightening: Tightening,
+    /// What the tightening leaves of the limits.
+    pub assessment: Assessment,
+    /// Share of the disturbance bound and the errors that the tightening counts: 1 where the guarantee is given.
+    pub counted: f64,
     /// Feedback ticks per optimisation.
     pub ratio: usize,
     /// √λ_min(G), the smallest over the axes.
     pub terminal_scale: f64,
     /// Largest eigenvalue of I, kg m².
     pub largest_inertia: f64,
+    /// Smallest eigenvalue of I, kg m².
+    pub smallest_inertia: f64,
     /// The largest moment of inertia over the smallest.
     pub inertia_ratio: f64,
 }
@@ -186,7 +221,7 @@ impl Design {
                 return Err(DesignError::NotReal { name });
             }
         }
-        let error = SampledError::new(s.feedback, s.period_feedback);
+        let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
         let reach = error.reach_forever().ok_or(DesignError::Unstable {
             k1: s.feedback.k1,
             k2: s.feedback.k2,
@@ -194,125 +229,54 @@ impl Design {
             radius: error.spectral_radius(),
         })?;
 
-        let g: [Matrix2<f64>; 3] =
-            std::array::from_fn(|i| terminal_weight(s.terminal, Vector2::new(s.p[i], s.p[i + 3]), s.q[i]));
+        let held = SampledError::new(s.terminal, s.period_optimisation);
+        let g: [Matrix2<f64>; 3] = std::array::from_fn(|i| {
+            let p = Vector2::new(s.p[i], s.p[i + 3]);
+            match s.constraints {
+                Constraints::Robust => held_terminal_weight(&held, s.terminal, p, s.q[i]),
+                Constraints::Paper => terminal_weight(s.terminal, p, s.q[i]),
+            }
+        });
         let terminal_scale = g.iter().map(smallest_eigenvalue).fold(f64::INFINITY, f64::min).sqrt();
+        if held.settling().is_none() {
+            let Gain { k1, k2 } = s.terminal;
+            let radius = held.spectral_radius();
+            return Err(DesignError::UnstableTerminal { k1, k2, period: s.period_optimisation, radius });
+        }
         let eigenvalues = s.body.inertia.symmetric_eigenvalues();
         let (smallest_inertia, largest_inertia) = (eigenvalues.min(), eigenvalues.max());
 
-        let invariant = error.invariant_set();
-        let mut tightening = match s.initial_state {
-            InitialState::Measured => growing(s, &error, ratio, smallest_inertia),
-            InitialState::Tube => {
-                constant(s, invariant.as_ref().ok_or(DesignError::NotReal { name: "feedback" })?)
-            }
-            InitialState::Nominal => full(s, reach, smallest_inertia),
-        };
-
-        (tightening.noise_at_stage, tightening.noise_within_stage) = noise(s, &error, ratio);
-
+        let (counted, tightening, assessment) = robust(s)?;
+        let invariant = error.invariant_set(guarantee::lateral(s));
         Ok(Self {
             paper: paper_constants(s, terminal_scale, smallest_inertia, largest_inertia),
             g,
             reach,
             invariant,
             tightening,
+            assessment,
+            counted,
             ratio,
             terminal_scale,
             largest_inertia,
+            smallest_inertia,
             inertia_ratio: largest_inertia / smallest_inertia,
         })
     }
 }
 
-/// Relative moment error that an inertia error e is equivalent to: I⁻¹ becomes I⁻¹/(1 ± e).
-fn moment_error(s: &Settings) -> f64 {
-    s.inertia_error / (1.0 - s.inertia_error)
-}
-
-/// Tightening by what k steps can do from a deviation of zero.
-fn growing(s: &Settings, error: &SampledError, ratio: usize, smallest_inertia: f64) -> Tightening {
-    let reach = error.reach(ratio * s.horizon);
-    Tightening {
-        at_stage: reach.iter().step_by(ratio).copied().collect(),
-        within_stage: reach.iter().skip(ratio - 1).step_by(ratio).copied().collect(),
-        ..full(s, Reach::default(), smallest_inertia)
+/// Share of the bounds that is counted, tightening and what it leaves.
+fn robust(s: &Settings) -> Result<(f64, Tightening, Assessment), DesignError> {
+    let (tightening, assessment) = guarantee::tighten(s)?;
+    if s.constraints == Constraints::Paper || assessment.holds() {
+        return Ok((1.0, tightening, assessment));
     }
-}
-
-/// Tightening by `reach` at every step: a deviation that the plan does not reset may have its full size from the start.
-fn full(s: &Settings, reach: Reach, smallest_inertia: f64) -> Tightening {
-    let inertia = moment_error(s);
-    // ‖R‖ = sec β, Chai 2022, Lemma 1.
-    let input_of_moment = 1.0 / (s.sideslip_bound.cos() * smallest_inertia);
-    Tightening {
-        at_stage: vec![reach; s.horizon + 1],
-        within_stage: vec![reach; s.horizon],
-        disturbance: Vector3::repeat(s.disturbance_bound),
-        inertia,
-        norm: 3.0_f64.sqrt() * s.disturbance_bound + inertia * s.limit_moment * input_of_moment,
-        noise_at_stage: vec![],
-        noise_within_stage: vec![],
+    if s.guarantee == Guarantee::Required {
+        return Err(guarantee::refusal(s, &assessment));
     }
-}
-
-/// Tightening by the whole invariant set, whose size counts the inertia error as a disturbance of each axis.
-fn constant(s: &Settings, invariant: &InvariantSet) -> Tightening {
-    let reach = invariant.reach();
-    let disturbance = axis_disturbances(s);
-    Tightening {
-        at_stage: vec![reach; s.horizon + 1],
-        within_stage: vec![reach; s.horizon],
-        disturbance,
-        inertia: 0.0,
-        norm: disturbance.norm(),
-        noise_at_stage: vec![],
-        noise_within_stage: vec![],
-    }
-}
-
-/// What errors of measurement add at each step and within each interval. An error of the angles that stays shifts the motion by
-/// itself and does nothing else. Errors of the rates are white: each plan meets new ones, so that they count until the next plan
-/// comes, and no longer. Plans that do not begin at the measured state meet them fully grown at any step.
-fn noise(s: &Settings, error: &SampledError, ratio: usize) -> (Vec<Reach>, Vec<Reach>) {
-    // ẋ = R ω with rows no longer than sec β, Chai 2022, Lemma 1.
-    let size = s.rate_error / s.sideslip_bound.cos();
-    let grown = error.noise(ratio * s.horizon);
-    let begins = s.initial_state == InitialState::Measured;
-    let reach = |tick: usize, of: usize| {
-        let tick = if begins { tick } else { ratio * s.horizon };
-        let Reach { angle, rate, feedback } = grown[tick][of];
-        Reach { angle: angle * size, rate: rate * size, feedback: feedback * size }
-    };
-    let at_stage = (0..=s.horizon).map(|k| {
-        let deviation = if k <= 1 || !begins { reach(ratio * k, 0) } else { Reach::default() };
-        Reach { angle: deviation.angle + s.angle_error, ..deviation }
-    });
-    let within_stage = (0..s.horizon).map(|k| {
-        let ticks = if k == 0 || !begins { 0..ratio } else { 0..0 };
-        ticks.map(|i| reach(ratio * k + i, 1)).fold(Reach::default(), |largest, next| Reach {
-            angle: largest.angle.max(next.angle),
-            rate: largest.rate.max(next.rate),
-            feedback: largest.feedback.max(next.feedback),
-        })
-    });
-    (at_stage.collect(), within_stage.collect())
-}
-
-/// Angle of attack up to which the inertia error's share in each axis is counted.
-const ATTACK_BOUND: f64 = std::f64::consts::FRAC_PI_4;
-
-/// Δ̄ and the inertia error's part, per axis: the error of m times the largest row of R I⁻¹.
-fn axis_disturbances(s: &Settings) -> Vector3<f64> {
-    let mut largest = Vector3::<f64>::zeros();
-    for i in -20..=20 {
-        for beta in [-s.sideslip_bound, 0.0, s.sideslip_bound] {
-            let angles = Vector3::new(ATTACK_BOUND * f64::from(i) / 20.0, beta, 0.0);
-            let rows = kinematics::r(&angles) * s.body.inverse;
-            largest = largest.sup(&Vector3::from_fn(|i, _| rows.row(i).norm()));
-        }
-    }
-    largest * (moment_error(s) * s.limit_moment) + Vector3::repeat(s.disturbance_bound)
+    let counted = guarantee::largest_share(s).unwrap_or(0.0);
+    let (tightening, within) = guarantee::tighten(&guarantee::counting(s, counted))?;
+    Ok((counted, tightening, Assessment { terminal_rate: within.terminal_rate, ..assessment }))
 }
 
 fn ratio(s: &Settings) -> Result<usize, DesignError> {
@@ -321,6 +285,8 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
         ("period.optimisation", s.period_optimisation),
         ("limit.rate", s.limit_rate),
         ("limit.moment", s.limit_moment),
+        ("observer.timeConstant", s.observer.time_constant),
+        ("observer.stiffness", s.observer.stiffness),
     ];
     for (name, value) in positive {
         if !(value > 0.0 && value.is_finite()) {
@@ -348,9 +314,16 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
             high: 1.0,
         });
     }
-    for (name, value) in [("estimation.angleError", s.angle_error), ("estimation.rateError", s.rate_error)] {
-        if !(0.0..1.0).contains(&value) {
-            return Err(DesignError::OutOfRange { name, value, low: 0.0, high: 1.0 });
+    let ranges = [
+        ("estimation.angleError", s.angle_error, 1.0),
+        ("estimation.rateError", s.rate_error, 1.0),
+        ("delay", s.delay, 1.0),
+        ("guarantee.sideslip", s.sideslip_domain, 0.8),
+        ("disturbance.bound", s.disturbance_bound, f64::MAX),
+    ];
+    for (name, value, high) in ranges {
+        if !(0.0..high).contains(&value) {
+            return Err(DesignError::OutOfRange { name, value, low: 0.0, high });
         }
     }
     let ratio = (s.period_optimisation / s.period_feedback).round();

@@ -4,21 +4,25 @@
 //! E = x̃ − x_r is formed afterwards, so that a jump of the reference is seen in the preview and never enters the dynamics.
 
 mod design;
+mod guarantee;
+mod observer;
 mod plan;
 mod sets;
 
 pub use crate::report::{Report, Status};
 pub use design::{
-    Constraints, Design, InitialState, PaperConstants, Settings, Tightening, step_response_peak,
-    terminal_weight,
+    Constraints, Design, Guarantee, InitialState, ObserverSettings, PaperConstants, Settings,
+    held_terminal_weight, step_response_peak, terminal_weight,
 };
+pub use guarantee::{Assessment, Deviation, Geometry, Tightening};
+pub use observer::Observed;
 pub use plan::Plan;
-pub use sets::Bounds;
+pub use sets::{Bounds, Margins};
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
 use crate::linearise;
-use crate::mpc::{Chain, Cost, Layout, Motion, Optimiser, State, per_axis};
+use crate::mpc::{self, Chain, Cost, Layout, Motion, Optimiser, State, per_axis};
 use crate::sampled::InvariantSet;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -38,20 +42,50 @@ pub struct Memory {
     pub report: Report,
     /// Nominal state (Θ̃, x̃_ω) at the last tick.
     pub nominal: Vector6<f64>,
+    /// Whether the guarantee is in force.
+    pub standing: Standing,
+    /// What the plan in force leaves of the limits in its first interval.
+    pub margins: Margins,
+    /// Feedback ticks from the beginning of the nominal motion to that of the plan in force.
+    pub age: u32,
+    /// What is known of the disturbance.
+    pub observed: Observed,
+}
+
+/// Whether the guarantee of the robust set is in force at a tick: ‖ω‖ and ‖m‖ keep their limits for as long as the assumptions hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Standing {
+    /// No optimisation yet, or sets that guarantee nothing.
+    #[default]
+    None,
+    /// In force.
+    InForce,
+    /// The design does not hold for the settings, so that all is best effort.
+    Refused,
+    /// No plan has been found that keeps the conditions of the theorem.
+    Uncertified,
+    /// The vehicle is further from the plan than the assumptions explain.
+    Exceeded,
 }
 
 impl Clone for Memory {
     fn clone(&self) -> Self {
-        let Self { plan, started, report, nominal } = self;
-        Self { plan: plan.clone(), started: *started, report: *report, nominal: *nominal }
+        let mut clone = Self::default();
+        clone.clone_from(self);
+        clone
     }
 
     // The derived version would allocate a new plan at every tick.
     fn clone_from(&mut self, source: &Self) {
-        self.plan.clone_from(&source.plan);
-        self.started = source.started;
-        self.report = source.report;
-        self.nominal = source.nominal;
+        let Self { plan, started, report, nominal, standing, margins, age, observed } = source;
+        self.plan.clone_from(plan);
+        self.started = *started;
+        self.report = *report;
+        self.nominal = *nominal;
+        self.standing = *standing;
+        self.margins = *margins;
+        self.age = *age;
+        self.observed = *observed;
     }
 }
 
@@ -65,8 +99,11 @@ pub struct Crmpc {
     // Scratch of one optimisation.
     affine: Vec<State<2>>,
     previous: Motion<2>,
+    multipliers: Vec<[f64; 2]>,
 }
 
+/// Shares of the tightening that are tried where no plan is certified.
+const LESS: [f64; 2] = [0.5, 0.0];
 /// The first optimisation has converged when no state moves by more than this (rad, rad/s) between passes.
 const STANDSTILL: f64 = 1e-6;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
@@ -85,7 +122,7 @@ impl Crmpc {
         let Settings { horizon: n, period_optimisation: h, p, q, .. } = settings;
         let start = (settings.initial_state == InitialState::Tube).then(|| {
             let normals = design.invariant.as_ref().map(InvariantSet::normals).unwrap_or_default();
-            let disturbance = design.tightening.disturbance;
+            let disturbance = start_box(&settings, &design);
             std::array::from_fn(|i| {
                 normals.iter().map(|n| n / disturbance[i].max(SMALLEST_DISTURBANCE)).collect()
             })
@@ -102,7 +139,8 @@ impl Crmpc {
             cost,
             horizon: n,
             state_balls: true,
-            terminal: true,
+            // The robust set ends in a bound on the rates (docs/guarantee.md).
+            terminal: settings.constraints == Constraints::Paper,
             start,
             scale: [ANGLE_SCALE, settings.limit_rate],
             standstill: STANDSTILL,
@@ -116,6 +154,7 @@ impl Crmpc {
             optimiser,
             affine: vec![[Vector3::zeros(); 2]; n],
             previous: Motion::new(n),
+            multipliers: Vec::with_capacity(n),
         })
     }
 
@@ -132,56 +171,149 @@ impl Crmpc {
     /// One optimisation at `time` from the measured state (Θ, x_ω): leaves the plan and the report in `memory`.
     fn optimise(&mut self, memory: &mut Memory, time: f64, measured: Vector6<f64>, reference: ReferenceAt) {
         let clock = Instant::now();
-        self.preview(time, reference);
+        self.preview(time, reference, memory.observed.shift(&self.settings));
         let first = !memory.started;
         if first {
             memory.plan.resize(self.settings.horizon);
             memory.started = true;
         } else {
             self.shift(&mut memory.plan);
+            memory.age = memory.age.saturating_add(self.design.ratio as u32);
         }
+        let report = match self.settings.constraints {
+            Constraints::Robust => self.plan_robustly(memory, &measured, first),
+            Constraints::Paper => self.plan_as_printed(memory, &measured, first),
+        };
+        memory.report.record(&report, clock);
+    }
 
+    /// The optimum within the paper's sets, or the shifted previous plan (31).
+    fn plan_as_printed(&mut self, memory: &mut Memory, measured: &Vector6<f64>, first: bool) -> mpc::Report {
         let start = match self.settings.initial_state {
             InitialState::Nominal if !first => memory.plan.states[0],
-            _ => measured,
+            _ => *measured,
         };
-        let error = error(&start, &self.sets.references[0]);
+        let report = self.solve(memory, &start, first);
+        if report.status != Status::Fallback {
+            self.follow_optimum(memory, &start);
+            return report;
+        }
+        if first {
+            self.follow_terminal_law(&mut memory.plan, start);
+        }
+        self.keep(memory, &start, report.iterations)
+    }
+
+    /// A plan that keeps the conditions of the theorem (docs/guarantee.md): the optimum, or else the previous plan as it is, which keeps them if it did
+    /// before and the vehicle is no further from it than the assumptions explain. Without either, what violates the limits least.
+    fn plan_robustly(&mut self, memory: &mut Memory, measured: &Vector6<f64>, first: bool) -> mpc::Report {
+        let refused = self.design.counted < 1.0;
+        let assured = memory.standing == Standing::InForce;
+        // The nominal motion goes on where it is for as long as the guarantee is in force.
+        let goes_on = self.settings.initial_state == InitialState::Nominal && assured;
+        let (start, age) = if goes_on { (memory.plan.states[0], memory.age) } else { (*measured, 0) };
+
+        self.sets.begin(age as usize, 1.0);
+        let mut report = self.solve(memory, &start, first);
+        let mut iterations = report.iterations;
+        if report.status != Status::Fallback {
+            let mut certified = self.sets.certify(self.optimiser.motion());
+            if certified.is_none() && !refused {
+                // The bounds were those about the previous plan; now about this one.
+                report = self.solve_again(&start);
+                iterations += report.iterations;
+                if report.status != Status::Fallback {
+                    certified = self.sets.certify(self.optimiser.motion());
+                }
+            }
+            if report.status != Status::Fallback && (certified.is_some() || !assured) {
+                self.follow_optimum(memory, &start);
+                memory.age = age;
+                memory.margins = certified.unwrap_or_else(|| self.sets.margins(self.optimiser.motion()));
+                memory.standing = match certified {
+                    Some(_) => Standing::InForce,
+                    None if refused => Standing::Refused,
+                    None => Standing::Uncertified,
+                };
+                return mpc::Report { iterations, ..report };
+            }
+        }
+        if assured {
+            self.sets.begin(memory.age as usize, 1.0);
+            let report = self.keep(memory, measured, iterations);
+            memory.margins = self.sets.margins(&self.previous);
+            return report;
+        }
+        memory.standing = if refused { Standing::Refused } else { Standing::Uncertified };
+        memory.age = 0;
+        for share in LESS {
+            self.sets.begin(0, share);
+            report = self.solve(memory, measured, true);
+            iterations += report.iterations;
+            if report.status != Status::Fallback {
+                break;
+            }
+        }
+        let error = error(measured, &self.sets.references[0]);
+        if report.status == Status::Fallback {
+            report = self.optimiser.without_constraints(&self.sets, &error, &self.affine);
+        }
+        self.follow_optimum(memory, measured);
+        memory.margins = self.sets.margins(self.optimiser.motion());
+        mpc::Report { iterations, ..report }
+    }
+
+    /// The optimum from `start` with the bounds about the previous plan; without one (`first`) about itself.
+    fn solve(&mut self, memory: &Memory, start: &Vector6<f64>, first: bool) -> mpc::Report {
+        let error = error(start, &self.sets.references[0]);
         let previous = (!first).then(|| {
             memory.plan.errors(&self.sets.references, &mut self.previous);
             (&self.previous, &memory.plan.multipliers[..])
         });
-        let mut report = self.optimiser.optimise(&mut self.sets, &error, &self.affine, previous);
-        if report.status == Status::Fallback {
-            if first {
-                self.follow_terminal_law(&mut memory.plan, start);
-            }
-            memory.plan.errors(&self.sets.references, &mut self.previous);
-            let Self { optimiser, sets, affine, previous, .. } = self;
-            report = optimiser.fall_back(sets, &error, affine, previous, report.iterations);
-        } else {
-            let start = (self.settings.initial_state != InitialState::Tube).then_some(start);
-            let motion = self.optimiser.motion();
-            memory.plan.follow(motion, start, &self.sets.references, self.settings.period_optimisation);
-            memory.plan.multipliers.clear();
-            memory.plan.multipliers.extend(self.optimiser.multipliers());
-        }
-        memory.report.record(&report, clock);
+        self.optimiser.optimise(&mut self.sets, &error, &self.affine, previous)
     }
 
-    /// References at the prediction times, and d_k = A x_r,k + B Θ̈_r,k − x_r,k+1.
-    fn preview(&mut self, time: f64, reference: ReferenceAt) {
+    /// The same with the bounds about the optimum that was found last.
+    fn solve_again(&mut self, start: &Vector6<f64>) -> mpc::Report {
+        let error = error(start, &self.sets.references[0]);
+        self.previous.clone_from(self.optimiser.motion());
+        self.multipliers.clear();
+        self.multipliers.extend(self.optimiser.multipliers());
+        let previous = Some((&self.previous, &self.multipliers[..]));
+        self.optimiser.optimise(&mut self.sets, &error, &self.affine, previous)
+    }
+
+    /// Takes the optimum over as the plan.
+    fn follow_optimum(&mut self, memory: &mut Memory, start: &Vector6<f64>) {
+        let start = (self.settings.initial_state != InitialState::Tube).then_some(*start);
+        let motion = self.optimiser.motion();
+        memory.plan.follow(motion, start, &self.sets.references, self.settings.period_optimisation);
+        memory.plan.multipliers.clear();
+        memory.plan.multipliers.extend(self.optimiser.multipliers());
+    }
+
+    /// Keeps the plan that there is, and reports on it.
+    fn keep(&mut self, memory: &Memory, start: &Vector6<f64>, iterations: u32) -> mpc::Report {
+        let error = error(start, &self.sets.references[0]);
+        memory.plan.errors(&self.sets.references, &mut self.previous);
+        let Self { optimiser, sets, affine, previous, .. } = self;
+        optimiser.fall_back(sets, &error, affine, previous, iterations)
+    }
+
+    /// References at the prediction times, their angles shifted, and d_k = A x_r,k + B Θ̈_r,k − x_r,k+1.
+    fn preview(&mut self, time: f64, reference: ReferenceAt, shift: Vector3<f64>) {
         let h = self.settings.period_optimisation;
         for (k, slot) in self.sets.references.iter_mut().enumerate() {
             *slot = reference(time + k as f64 * h);
+            slot.angles += shift;
         }
         for (d, pair) in self.affine.iter_mut().zip(self.sets.references.windows(2)) {
             let moved = self.chain.advance(&[pair[0].angles, pair[0].rates], &pair[0].accelerations);
             *d = [moved[0] - pair[1].angles, moved[1] - pair[1].rates];
         }
-        self.sets.renew();
     }
 
-    /// (31): drops the first interval and appends one under the terminal law (14), a = K̃ E + Θ̈_r.
+    /// (31): drops the first interval and appends one under the terminal law (14), a = K̃ E + Θ̈_r; with the robust set one that brakes.
     fn shift(&self, plan: &mut Plan) {
         let n = self.settings.horizon;
         let last = *plan.states.last().unwrap_or(&Vector6::zeros());
@@ -189,7 +321,10 @@ impl Crmpc {
         plan.accelerations.rotate_left(1);
         plan.multipliers.rotate_left(1);
         plan.multipliers[n - 1] = [0.0; 2];
-        let a = self.terminal_acceleration(&last, &self.sets.references[n - 1]);
+        let a = match self.settings.constraints {
+            Constraints::Robust => last.fixed_rows::<3>(3) * -guarantee::BRAKING,
+            Constraints::Paper => self.terminal_acceleration(&last, &self.sets.references[n - 1]),
+        };
         plan.accelerations[n - 1] = a;
         plan.states[n] = plan::advance(&last, &a, self.settings.period_optimisation);
     }
@@ -233,6 +368,7 @@ impl Controller for Crmpc {
     ) -> Vector3<f64> {
         let angle_rates = kinematics::r(&measured.angles) * measured.rates;
         let within = tick % self.design.ratio as u64;
+        memory.observed.observe(&self.settings, &angle_rates);
         if within == 0 {
             self.optimise(memory, time, join(&measured.angles, &angle_rates), reference);
         }
@@ -241,12 +377,78 @@ impl Controller for Crmpc {
             plan::advance(&memory.plan.states[0], &a, within as f64 * self.settings.period_feedback);
         // (20): with ũ* = a − f(x̃*), u = K O_e − f(x) + a, and m = I R⁻¹ u.
         let (nominal_angles, nominal_rates) = split(&memory.nominal);
+        let (off_angles, off_rates) = (measured.angles - nominal_angles, angle_rates - nominal_rates);
         let gain = self.settings.feedback;
-        let feedback = (measured.angles - nominal_angles) * gain.k1 + (angle_rates - nominal_rates) * gain.k2;
-        let moment = linearise::moment(&self.settings.body, &measured.angles, &angle_rates, &(a + feedback));
+        let commanded = a + off_angles * gain.k1 + off_rates * gain.k2;
+        let Settings { body, limit_moment, .. } = &self.settings;
+        let robust = self.settings.constraints == Constraints::Robust;
+        let moment = if robust {
+            self.moment_over_the_period(&measured.angles, &angle_rates, &commanded)
+        } else {
+            linearise::moment(body, &measured.angles, &angle_rates, &commanded)
+        };
+        let excess = moment.norm() / limit_moment;
+        if robust {
+            let explained = self.explains(within, &off_angles, &off_rates, &(commanded - a));
+            let kept = excess <= 1.0 + 1e-9 && measured.rates.norm() <= self.rate_shown();
+            if memory.standing == Standing::InForce && !(explained && kept) {
+                memory.standing = Standing::Exceeded;
+            }
+        }
         // Without a solution nothing keeps the moment within its limit.
-        let excess = moment.norm() / self.settings.limit_moment;
-        if memory.report.status == Status::Fallback && excess > 1.0 { moment / excess } else { moment }
+        let limited = excess > 1.0 && (robust || memory.report.status == Status::Fallback);
+        let moment = if limited { moment / excess } else { moment };
+        if robust {
+            let acceleration = if limited {
+                let u = kinematics::r(&measured.angles) * self.settings.body.inverse * moment;
+                u + self.settings.body.drift(&measured.angles, &angle_rates)
+            } else {
+                commanded
+            };
+            memory.observed.remember(&angle_rates, &acceleration);
+        }
+        moment
+    }
+}
+
+impl Crmpc {
+    /// The moment that gives the commanded acceleration in the middle of the period over which it is held, so that what f does in between adds up to nothing.
+    fn moment_over_the_period(
+        &self,
+        angles: &Vector3<f64>,
+        rates: &Vector3<f64>,
+        commanded: &Vector3<f64>,
+    ) -> Vector3<f64> {
+        let half = 0.5 * self.settings.period_feedback;
+        let angles = angles + (rates + commanded * (0.5 * half)) * half;
+        linearise::moment(&self.settings.body, &angles, &(rates + commanded * half), commanded)
+    }
+
+    /// Whether the assumptions explain this deviation of the seen state from the nominal one, and this K ô, so many ticks after the optimisation.
+    fn explains(&self, tick: u64, angles: &Vector3<f64>, rates: &Vector3<f64>, feedback: &Vector3<f64>) -> bool {
+        let Some((bounds, tightening)) = self.sets.explained(tick as usize) else { return false };
+        let slack = 1.0 + 1e-9;
+        let r = 1.0 / self.settings.sideslip_domain.cos();
+        let ball = bounds.feedback_norm + bounds.feedback_moment * r / self.design.smallest_inertia;
+        let within = |i: usize| feedback[i].abs() <= (tightening.shape[i] * bounds.feedback + ball) * slack + 1e-12;
+        angles.norm() <= bounds.seen_angle * slack + 1e-12
+            && rates.norm() <= bounds.seen_rate * slack + 1e-12
+            && (0..3).all(within)
+    }
+
+    /// What ‖ω‖ as it is measured may be, rad/s.
+    fn rate_shown(&self) -> f64 {
+        let Settings { limit_rate, rate_error, angle_error, .. } = self.settings;
+        let of_rates = 3.0_f64.sqrt() * rate_error;
+        (limit_rate + of_rates + linearise::TURN_BY_ANGLES * 1.5 * limit_rate * angle_error) * (1.0 + 1e-9)
+    }
+}
+
+/// Sizes of the box that the start's set is made for, per axis, rad/s².
+fn start_box(settings: &Settings, design: &Design) -> Vector3<f64> {
+    match settings.constraints {
+        Constraints::Robust => design.tightening.shape,
+        Constraints::Paper => Vector3::repeat(settings.disturbance_bound),
     }
 }
 

@@ -1,13 +1,14 @@
 //! The sets that the optimisation keeps the nominal motion in, as functions of the tracking error.
 
 use super::design::{Constraints, Design, Settings};
+use super::guarantee::{self, Dynamics};
 use crate::error::DesignError;
 use crate::linearise::{
     self, BodyMotion, InverseKinematics, Linear, Linearisation, MomentSlopeBounds, TURN_BY_ANGLES,
 };
 use crate::mpc::{self, Ball, Balls, Bounded, Motion, State};
-use crate::sampled::Reach;
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 use std::f64::consts::SQRT_2;
 use std::ops::Range;
@@ -21,7 +22,8 @@ pub(super) struct Sets {
     body: RigidBody,
     /// References at the prediction times.
     pub(super) references: Vec<Reference>,
-    terminal_radius: f64,
+    /// ε of the paper's terminal ball.
+    terminal_radius: Option<f64>,
     /// Whether the bounds are those about the motion that is evaluated.
     follow: bool,
 }
@@ -33,8 +35,8 @@ pub struct Bounds {
     pub rate: Vec<f64>,
     /// Of intervals 0..N: on ‖m̃‖ (N m) with the robust set, on ‖ũ‖ (rad/s²) with the paper's.
     pub input: Vec<f64>,
-    /// ε of ‖Ẽ_N‖_G ≤ ε.
-    pub terminal: f64,
+    /// ε of ‖Ẽ_N‖_G ≤ ε, with the paper's set.
+    pub terminal: Option<f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -50,18 +52,21 @@ enum Kind {
 struct Robust {
     settings: Settings,
     design: Design,
-    /// On ‖ω̃‖ of each stage, rad/s.
+    dynamics: Dynamics,
+    /// Feedback ticks since the nominal motion began at the measured state.
+    age: usize,
+    /// Share of the tightening that is applied: 1 but for best effort.
+    share: f64,
+    /// On ‖ω̃‖ of each stage, rad/s. Negative where nothing is left.
     rate: Vec<f64>,
-    /// On ‖m̃‖ of each interval, N m.
+    /// On ‖m̃‖ of each interval, N m. Negative where nothing is left.
     moment: Vec<f64>,
 }
 
 /// Relative slack when constraints are checked, for rounding.
 const CHECK_SLACK: f64 = 1e-9;
-/// Smallest share of a limit that a tightened bound keeps, so that the problem stays well posed.
-const SMALLEST_SHARE: f64 = 0.02;
-/// Smallest terminal radius in the G-norm: 0.03° of angle.
-const SMALLEST_RADIUS: f64 = 5e-3;
+/// Share of a limit that stands for an empty set in the optimisation, which needs balls with an inside. No plan within it is certified.
+const EMPTY: f64 = 1e-3;
 
 impl Sets {
     /// # Errors
@@ -73,10 +78,13 @@ impl Sets {
                 let robust = Robust {
                     settings: *settings,
                     design: design.clone(),
+                    dynamics: Dynamics::new(settings),
+                    age: 0,
+                    share: 1.0,
                     rate: vec![settings.limit_rate; n + 1],
                     moment: vec![settings.limit_moment; n],
                 };
-                (Kind::Robust(Box::new(robust)), SMALLEST_RADIUS)
+                (Kind::Robust(Box::new(robust)), None)
             }
             Constraints::Paper => {
                 let paper = design.paper.ok_or(DesignError::NotReal { name: "feedback" })?;
@@ -87,7 +95,7 @@ impl Sets {
                         return Err(DesignError::EmptySet { name, value });
                     }
                 }
-                (Kind::Paper { x_tube, u_tube, inertia_ratio: design.inertia_ratio }, epsilon)
+                (Kind::Paper { x_tube, u_tube, inertia_ratio: design.inertia_ratio }, Some(epsilon))
             }
         };
         let references = vec![Reference::default(); n + 1];
@@ -104,10 +112,55 @@ impl Sets {
         Bounds { rate, input, terminal: self.terminal_radius }
     }
 
-    /// To be called when the references are new.
-    pub(super) fn renew(&mut self) {
-        if let Kind::Robust(robust) = &self.kind {
-            self.terminal_radius = robust.terminal_radius(&self.references[self.references.len() - 1]);
+    /// The robust set for a nominal motion that began at the measured state so many feedback ticks ago, with this share of the tightening.
+    pub(super) fn begin(&mut self, age: usize, share: f64) {
+        if let Kind::Robust(robust) = &mut self.kind {
+            (robust.age, robust.share) = (age, share);
+        }
+    }
+
+    /// What a plan leaves of the limits beyond what is reserved, as shares of them; `None` if it does not keep the conditions of the theorem (docs/guarantee.md),
+    /// which are those of the whole tightening.
+    pub(super) fn certify(&mut self, motion: &Motion<2>) -> Option<Margins> {
+        if !matches!(&self.kind, Kind::Robust(robust) if robust.design.counted >= 1.0 && robust.share >= 1.0) {
+            return None;
+        }
+        if mpc::Bounded::violated(self, motion, 0..0).is_some() {
+            return None;
+        }
+        let Self { kind: Kind::Robust(robust), body, references, .. } = self else { return None };
+        let n = motion.inputs.len();
+        let points = |k| Point::at(references, motion, k);
+        // The first state, which no optimisation can change.
+        let (first, second) = (points(0), points(1));
+        let rates = first.turned(body).1;
+        let bound = robust.rate_bound(0, norm_of_columns(&rates.rates_by_angles), &first, &second);
+        let inside = (0..=n).all(|k| {
+            let angle = references[k].angles.y + motion.states[k][0].y;
+            angle.abs() + robust.deviation(k).angle <= robust.settings.sideslip_domain
+        });
+        // Beyond the horizon a = −κ x̃_ω moves β by no more than |β̇|/κ.
+        let last = points(n);
+        let travelled = last.angles.y.abs() + last.rates.y.abs() / guarantee::BRAKING;
+        let ends_inside = travelled + robust.design.tightening.forever().angle <= robust.settings.sideslip_domain;
+        let kept = rates.rates.norm() <= bound * (1.0 + CHECK_SLACK);
+        (inside && ends_inside && kept).then(|| robust.margins(body, &first, &second))
+    }
+
+    /// See [`Margins`]; of the robust set only.
+    pub(super) fn margins(&mut self, motion: &Motion<2>) -> Margins {
+        let Self { kind: Kind::Robust(robust), body, references, .. } = self else { return Margins::default() };
+        robust.margins(body, &Point::at(references, motion, 0), &Point::at(references, motion, 1))
+    }
+
+    /// The largest deviations that the assumptions explain at `tick` ticks after the present optimisation, none for the paper's set.
+    pub(super) fn explained(&self, tick: usize) -> Option<(&guarantee::Deviation, &guarantee::Tightening)> {
+        match &self.kind {
+            Kind::Robust(robust) => {
+                let tightening = &robust.design.tightening;
+                Some((tightening.at(robust.age + tick), tightening))
+            }
+            Kind::Paper { .. } => None,
         }
     }
 
@@ -130,7 +183,8 @@ impl mpc::Constraints<2> for Sets {
         match &self.kind {
             Kind::Robust(robust) => {
                 let (rate, moment) = if self.follow {
-                    robust.bounds_about(k, &at, robust.moment_after(&angles, &rates, &a))
+                    let here = Point::new(angles, rates, a);
+                    robust.bounds_about(k, &at, &here, robust.moment_after(&here))
                 } else {
                     robust.bounds(k)
                 };
@@ -208,8 +262,17 @@ impl Bounded<2> for Sets {
     }
 
     fn terminal_radius(&self) -> Option<f64> {
-        Some(self.terminal_radius)
+        self.terminal_radius
     }
+}
+
+/// What the first interval of a plan leaves of the limits beyond what is reserved for the deviation from it, as shares of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Margins {
+    /// Of the rate limit, at the interval's end.
+    pub rate: f64,
+    /// Of the moment limit.
+    pub moment: f64,
 }
 
 /// One stage of a motion.
@@ -239,16 +302,14 @@ struct Anchor {
 }
 
 impl Point {
+    fn new(angles: Vector3<f64>, rates: Vector3<f64>, acceleration: Vector3<f64>) -> Self {
+        Self { angles, rates, size: rates.norm(), acceleration, turned: OnceCell::new() }
+    }
+
     fn at(references: &[Reference], motion: &Motion<2>, k: usize) -> Self {
         let Reference { angles, rates, accelerations } = &references[k];
-        let rates = rates + motion.states[k][1];
-        Self {
-            angles: angles + motion.states[k][0],
-            rates,
-            size: rates.norm(),
-            acceleration: motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input),
-            turned: OnceCell::new(),
-        }
+        let acceleration = motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input);
+        Self::new(angles + motion.states[k][0], rates + motion.states[k][1], acceleration)
     }
 
     /// W and what it makes of the motion, computed where it is needed first.
@@ -289,21 +350,28 @@ impl Sets {
 }
 
 impl Robust {
-    /// Those on ‖ω̃‖ and ‖m̃‖ at stage `k`.
+    /// Those on ‖ω̃‖ and ‖m̃‖ at stage `k`, with an inside.
     fn bounds(&self, k: usize) -> (f64, f64) {
-        (self.rate[k], self.moment.get(k).copied().unwrap_or(f64::INFINITY))
+        let Settings { limit_rate, limit_moment, .. } = self.settings;
+        let moment = self.moment.get(k).map_or(f64::INFINITY, |bound| bound.max(EMPTY * limit_moment));
+        (self.rate[k].max(EMPTY * limit_rate), moment)
     }
 
     /// The same about a motion that is linearised there, with ‖m̃‖ = `after` at the interval's end.
-    fn bounds_about(&self, k: usize, at: &Linearisation, after: f64) -> (f64, f64) {
-        let moment =
-            if k < self.moment.len() { self.moment_bound_about(k, &at.moment, after) } else { f64::INFINITY };
-        (self.rate_bound(k, at.rates.by_angles.norm()), moment)
+    fn bounds_about(&self, k: usize, at: &Linearisation, here: &Point, after: f64) -> (f64, f64) {
+        let Settings { limit_rate, limit_moment, .. } = self.settings;
+        let moment = if k < self.moment.len() {
+            self.moment_bound_about(k, &at.moment, here, after).max(EMPTY * limit_moment)
+        } else {
+            f64::INFINITY
+        };
+        (self.rate_bound(k, at.rates.by_angles.norm(), here, here).max(EMPTY * limit_rate), moment)
     }
 
     /// ‖m̃‖ at the end of an interval that begins so, with a held, N m.
-    fn moment_after(&self, angles: &Vector3<f64>, rates: &Vector3<f64>, a: &Vector3<f64>) -> f64 {
+    fn moment_after(&self, here: &Point) -> f64 {
         let Settings { body, period_optimisation: h, .. } = &self.settings;
+        let Point { angles, rates, acceleration: a, .. } = here;
         let angles = angles + (rates + a * (0.5 * h)) * *h;
         linearise::moment(body, &angles, &(rates + a * *h), a).norm()
     }
@@ -312,17 +380,17 @@ impl Robust {
     fn tighten(&mut self, body: &RigidBody, k: usize, here: &Point, next: &Point) -> (f64, f64) {
         let at = here.turned(body).0.linearise(body, &here.rates, &here.acceleration).moment;
         let after = &next.turned(body).1;
-        self.moment[k] = self.moment_bound_about(k, &at, after.moment(&here.acceleration).norm());
-        self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&after.rates_by_angles));
+        self.moment[k] = self.moment_bound_about(k, &at, here, after.moment(&here.acceleration).norm());
+        self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&after.rates_by_angles), next, here);
         (at.value.norm(), after.rates.norm())
     }
 
     fn anchor(&self, body: &RigidBody, here: &Point) -> Anchor {
         let motion = here.turned(body).1;
-        let disturbance = &self.design.tightening.disturbance;
-        let feedback = largest_over_box(&motion.moment_by_acceleration, disturbance);
+        let shape = &self.design.tightening.shape;
+        let feedback = largest_over_box(&motion.moment_by_acceleration, shape);
         // ‖∂W/∂α‖² and ‖∂W/∂β‖² are at most 2, and orthogonal to each other.
-        let feedback_by_angles = self.design.largest_inertia * SQRT_2 * disturbance.norm();
+        let feedback_by_angles = self.design.largest_inertia * SQRT_2 * shape.norm();
         let Point { angles, rates, size, .. } = *here;
         Anchor { angles, rates, size, motion, feedback, feedback_by_angles }
     }
@@ -347,65 +415,77 @@ impl Robust {
         let turn_within = (next.angles - here.angles).xy().norm();
         let after = moment + by_angles * turn_within + by_rates * (next.rates - here.rates).norm();
         let feedback = anchor.feedback + anchor.feedback_by_angles * turn;
-        let slopes = (by_angles, by_rates, *largest_inertia);
-        self.moment[k] = self.moment_bound(k, moment, after, feedback, slopes);
-        self.rate[k + 1] = self.rate_bound(k + 1, TURN_BY_ANGLES * next.size);
+        self.moment[k] = self.moment_bound(k, moment, after, feedback, (by_angles, by_rates), here);
+        self.rate[k + 1] = self.rate_bound(k + 1, TURN_BY_ANGLES * next.size, next, here);
         (moment, next.size)
     }
 
     /// [`Self::moment_bound`] about a moment that is linearised there.
-    fn moment_bound_about(&self, k: usize, at: &Linear, after: f64) -> f64 {
-        let feedback = largest_over_box(&at.by_acceleration, &self.design.tightening.disturbance);
-        let slopes = (at.by_angles.norm(), at.by_rates.norm(), along(at));
-        self.moment_bound(k, at.value.norm(), after, feedback, slopes)
+    fn moment_bound_about(&self, k: usize, at: &Linear, here: &Point, after: f64) -> f64 {
+        let feedback = largest_over_box(&at.by_acceleration, &self.design.tightening.shape);
+        let slopes = (at.by_angles.norm(), at.by_rates.norm());
+        self.moment_bound(k, at.value.norm(), after, feedback, slopes, here)
     }
 
-    /// What ‖ω̃‖ may be at prediction step k so that ‖ω‖ keeps its limit whatever the error dynamics do, where ∂ω/∂(α, β) has this norm.
-    fn rate_bound(&self, k: usize, by_angles: f64) -> f64 {
+    /// Feedback ticks from the beginning of the nominal motion to prediction step `k`.
+    fn tick(&self, k: usize) -> usize {
+        self.age + k * self.design.ratio
+    }
+
+    fn deviation(&self, k: usize) -> &guarantee::Deviation {
+        self.design.tightening.at(self.tick(k))
+    }
+
+    /// What ‖ω̃‖ may be at prediction step k so that ‖ω‖ keeps its limit there and in the intervals before and after, whatever the error dynamics do,
+    /// where ∂ω/∂(α, β) has this norm. `before` is the point before.
+    fn rate_bound(&self, k: usize, by_angles: f64, here: &Point, before: &Point) -> f64 {
+        let Settings { limit_rate, period_optimisation: h, sideslip_domain, horizon, .. } = self.settings;
         let tightening = &self.design.tightening;
-        let Reach { angle, rate, .. } = tightening.at_stage[k];
-        // ω = R⁻¹ x_ω with ‖R⁻¹‖ = 1
-        let deviation = (rate + by_angles * angle) * tightening.norm;
-        let noise = tightening.noise_at_stage[k];
-        // Normal errors count along ω̃ only.
-        let noise = noise.rate + by_angles * SQRT_2 * noise.angle;
-        let limit = self.settings.limit_rate;
-        (limit - deviation - noise).max(SMALLEST_SHARE * limit)
+        let tick = self.tick(k);
+        // Between two steps the deviation may lie above the line between its bounds at both.
+        let bulge = |tick: usize| {
+            let (angle, rate) = tightening.bulge(tick);
+            rate + by_angles * angle
+        };
+        let bulge = bulge(tick).max(if k == 0 { 0.0 } else { bulge(tick - self.design.ratio) });
+        // So may ‖ω̃‖, by h²/8 times its second derivative.
+        let a = here.acceleration.norm().max(before.acceleration.norm());
+        let size = here.size.max(before.size) + h * a;
+        let curved = 0.125 * h * h * Dynamics::rate_curvature(size, a);
+        let loss = guarantee::rate_loss(tightening.at(tick), by_angles, here.size) + bulge + curved;
+        let bound = limit_rate - self.share * loss;
+        if k == horizon { bound.min(self.design.assessment.terminal_rate * sideslip_domain.cos()) } else { bound }
     }
 
     /// What ‖m̃‖ may be at the start of prediction interval k so that ‖m‖ keeps its limit at each of its feedback ticks. With a held,
-    /// ‖m̃‖ moves from `here` to `after` within the interval; `feedback` is the largest ‖I R⁻¹ δ‖ over the disturbances, and `slopes` are
-    /// ‖∂m/∂(α, β)‖, ‖∂m/∂x_ω‖ and [`along`].
-    fn moment_bound(&self, k: usize, here: f64, after: f64, feedback: f64, slopes: (f64, f64, f64)) -> f64 {
+    /// ‖m̃‖ moves from `value` to `after` within the interval; `feedback` is the largest ‖I R⁻¹ s‖ over the corners s of the shape, and `slopes` are
+    /// ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖.
+    fn moment_bound(
+        &self,
+        k: usize,
+        value: f64,
+        after: f64,
+        feedback: f64,
+        slopes: (f64, f64),
+        here: &Point,
+    ) -> f64 {
+        let Settings { limit_moment, period_optimisation: h, .. } = self.settings;
         let tightening = &self.design.tightening;
-        let reach = tightening.within_stage[k];
-        let limit = self.settings.limit_moment;
-        // I R⁻¹ K o for disturbances in a box, and for the inertia error, which acts along m.
-        let feedback = reach.feedback * (feedback + tightening.inertia * limit);
-        // The cancellation of f sees the deviation too.
-        let drift = (slopes.0 * reach.angle + slopes.1 * reach.rate) * tightening.norm;
-        let noise = tightening.noise_within_stage[k];
-        let noise = slopes.2 * noise.feedback + slopes.0 * SQRT_2 * noise.angle + slopes.1 * noise.rate;
-        let within = (after - here).max(0.0);
-        (limit - feedback - drift - noise - within).max(SMALLEST_SHARE * limit)
+        let a = here.acceleration.norm();
+        let size = here.size + h * a;
+        let deviation = tightening.within(self.tick(k));
+        let loss =
+            guarantee::moment_loss(&self.dynamics, tightening, deviation, feedback, slopes, (size, a));
+        let within = (after - value).max(0.0) + 0.125 * h * h * self.dynamics.moment_curvature(size, a);
+        limit_moment - self.share * loss - within
     }
 
-    /// ε by the argument of (12)–(13), with the bounds of this set and the reference at the end of the horizon.
-    fn terminal_radius(&self, end: &Reference) -> f64 {
-        let n = self.settings.horizon;
-        let at = linearise::linearise(&self.settings.body, &end.angles, &end.rates, &end.accelerations);
-        let moment = at.moment.value.norm();
-        let rate = self.rate_bound(n, at.rates.by_angles.norm()) - at.rates.value.norm();
-        let moment = self.moment_bound_about(n - 1, &at.moment, moment) - moment;
-        let gain = self.settings.terminal.k1.hypot(self.settings.terminal.k2);
-        let radius = self.design.terminal_scale * rate.min(moment / (self.design.largest_inertia * gain));
-        radius.max(SMALLEST_RADIUS)
+    /// Of the first interval.
+    fn margins(&mut self, body: &RigidBody, first: &Point, second: &Point) -> Margins {
+        let (moment, rate) = self.tighten(body, 0, first, second);
+        let Settings { limit_rate, limit_moment, .. } = self.settings;
+        Margins { rate: (self.rate[1] - rate) / limit_rate, moment: (self.moment[0] - moment) / limit_moment }
     }
-}
-
-/// ‖(∂m/∂a)ᵀ m/‖m‖‖: what normal errors of a with the same size about each axis do to ‖m‖.
-fn along(moment: &Linear) -> f64 {
-    moment.by_acceleration.tr_mul(&moment.value.try_normalize(0.0).unwrap_or_default()).norm()
 }
 
 /// ‖y‖ ≤ bound in terms of the tracking error and v = a − Θ̈_r.

@@ -410,6 +410,18 @@ impl<const O: usize> Optimiser<O> {
         false
     }
 
+    /// The optimum without constraints, where there is none with them.
+    pub fn without_constraints<B: Bounded<O>>(
+        &mut self,
+        bounded: &B,
+        start: &State<O>,
+        affine: &[State<O>],
+    ) -> Report {
+        self.solution.multipliers.clear();
+        self.unconstrained.solve(start, affine, &mut self.solution.motion);
+        self.report(bounded, &Sample { start, affine, deadline: None }, Status::Fallback, 0)
+    }
+
     /// The report of a fallback: of the plan that is followed instead of an optimum.
     pub fn fall_back<B: Bounded<O>>(
         &mut self,

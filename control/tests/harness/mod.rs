@@ -3,7 +3,7 @@
 
 pub mod platform;
 
-use control::crmpc::{Constraints, Memory, Settings, Status};
+use control::crmpc::{Constraints, Memory, Settings, Standing, Status};
 use control::lqr::LqrSettings;
 use control::{Controller, Crmpc, Lqr, Measurement};
 use nalgebra::Vector3;
@@ -43,6 +43,17 @@ pub struct Outcome {
     pub rate: f64,
     /// Largest ‖m‖ over its limit.
     pub moment: f64,
+}
+
+/// What a run of CRMPC shows of itself besides.
+#[derive(Clone, Debug)]
+pub struct Kept {
+    /// Samples at which no optimum was found.
+    pub fallbacks: u32,
+    /// Share of the ticks at which the guarantee was in force.
+    pub in_force: f64,
+    /// Whether ‖ω‖ was beyond its limit at a tick at which, or before which, the guarantee was in force.
+    pub broken: bool,
 }
 
 /// The loop over the whole scenario (50 s); `observe` sees memory, tick and measurement after each update.
@@ -86,14 +97,21 @@ pub fn simulate<C: Controller>(
     }
 }
 
-/// One CRMPC run from the start with a new controller: the outcome and the number of fallbacks.
-pub fn run(settings: &Settings, inertia_scale: f64, disturbance: Disturbance) -> (Outcome, u32) {
+/// One CRMPC run from the start with a new controller.
+pub fn run(settings: &Settings, inertia_scale: f64, disturbance: Disturbance) -> (Outcome, Kept) {
     let mut memory = Memory::default();
     let mut controller = Crmpc::new(*settings).unwrap();
-    let outcome = simulate(&mut controller, &mut memory, inertia_scale, disturbance, |memory, _, _| {
+    let (mut ticks, mut in_force, mut broken, mut before) = (0u32, 0u32, false, false);
+    let outcome = simulate(&mut controller, &mut memory, inertia_scale, disturbance, |memory, _, measured| {
         assert_ne!(memory.report.status, Status::None);
+        let now = memory.standing == Standing::InForce;
+        ticks += 1;
+        in_force += u32::from(now);
+        broken |= before && measured.rates.norm() > settings.limit_rate;
+        before = now;
     });
-    (outcome, memory.report.fallbacks)
+    let in_force = f64::from(in_force) / f64::from(ticks);
+    (outcome, Kept { fallbacks: memory.report.fallbacks, in_force, broken })
 }
 
 /// A run to do: a name for messages, the vehicle's inertia and the disturbance.

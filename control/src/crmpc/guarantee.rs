@@ -1,0 +1,517 @@
+//! What the guarantee of the robust set rests on: how far the vehicle can be from the plan, and whether enough of the limits is left then.
+//!
+//! The theorem, its assumptions and its proof are in docs/guarantee.md; the numbers of its lemmas stand beside the lines that compute them.
+
+use super::design::{InitialState, Settings};
+use crate::error::DesignError;
+use crate::sampled::{Reach, SampledError};
+use nalgebra::Vector3;
+use std::f64::consts::SQRT_2;
+
+/// Largest deviation of the vehicle from the plan at a feedback tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deviation {
+    /// ‖Θ − Θ̃‖, rad.
+    pub angle: f64,
+    /// ‖x_ω − x̃_ω‖, rad/s.
+    pub rate: f64,
+    /// The same of the state that the law acts on, rad.
+    pub seen_angle: f64,
+    /// The same of the state that the law acts on, rad/s.
+    pub seen_rate: f64,
+    /// Size of the box that K o is in beside the ball below, times [`Tightening::shape`], rad/s².
+    pub feedback: f64,
+    /// Radius of a ball that K o is in as well, rad/s².
+    pub feedback_norm: f64,
+    /// Moment that K o asks for to make up for the inertia error, N m.
+    pub feedback_moment: f64,
+}
+
+impl Deviation {
+    /// The larger of each.
+    fn or(&self, other: &Self) -> Self {
+        Self {
+            angle: self.angle.max(other.angle),
+            rate: self.rate.max(other.rate),
+            seen_angle: self.seen_angle.max(other.seen_angle),
+            seen_rate: self.seen_rate.max(other.seen_rate),
+            feedback: self.feedback.max(other.feedback),
+            feedback_norm: self.feedback_norm.max(other.feedback_norm),
+            feedback_moment: self.feedback_moment.max(other.feedback_moment),
+        }
+    }
+}
+
+/// How the robust set is tightened, by feedback ticks since the nominal motion began at the measured state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tightening {
+    /// Deviation at each tick; the last one holds for ever.
+    at: Vec<Deviation>,
+    /// The largest within the optimisation period that begins at each tick.
+    within: Vec<Deviation>,
+    /// By how much the deviation of angle and rate between the ends of that period can exceed what lies on the line between them: rad, rad/s.
+    bulge: Vec<(f64, f64)>,
+    /// Bound on the disturbance of each axis over its size.
+    pub shape: Vector3<f64>,
+    /// Bound on the norm of all that drives the deviation, rad/s².
+    pub norm: f64,
+}
+
+impl Tightening {
+    fn place(&self, tick: usize) -> usize {
+        tick.min(self.at.len() - 1)
+    }
+
+    /// The deviation so many feedback ticks after the nominal motion began.
+    pub fn at(&self, tick: usize) -> &Deviation {
+        &self.at[self.place(tick)]
+    }
+
+    /// The largest deviation at the feedback ticks of the optimisation period that begins with this one.
+    pub fn within(&self, tick: usize) -> &Deviation {
+        &self.within[self.place(tick)]
+    }
+
+    /// See the field: of angle (rad) and rate (rad/s).
+    pub fn bulge(&self, tick: usize) -> (f64, f64) {
+        self.bulge[self.place(tick)]
+    }
+
+    /// The deviation that is never exceeded.
+    pub fn forever(&self) -> &Deviation {
+        self.at(usize::MAX)
+    }
+}
+
+/// Bounds that depend on |sin β| ≤ s alone.
+///
+/// With e₁, e₂, e₃ turned by α, Ẇ x_ω = [s x₂ (2 s x₁ + x₃), −c x₂ (2 s x₁ + x₃), c x₁ (s x₁ + x₃)], s = sin β, c = cos β, x = x_ω.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Geometry {
+    /// ‖Ẇ x‖ ≤ `drift` ‖x‖².
+    pub drift: f64,
+    /// ‖∂(Ẇ x)/∂x‖ ≤ `drift_by_rates` ‖x‖.
+    pub drift_by_rates: f64,
+    /// ‖R‖ = sec β (Lemma 1).
+    pub r: f64,
+}
+
+/// Bound on ‖∂²(W y)/∂(α, β)²‖ over ‖y‖.
+const CURVATURE: f64 = 3.162_277_660_168_379_5;
+/// ‖W(Θ + o) − W(Θ)‖ over ‖o‖: ∂W/∂α and ∂W/∂β are orthogonal and no longer than √2 (Frobenius).
+const TURN: f64 = SQRT_2;
+/// Bound on the mixed second derivative of Ẇ x by angles and rates over ‖x‖: Ẇ x = ∂W x α̇ + ∂W x β̇ takes one derivative of W more.
+const DRIFT_MIXED: f64 = 2.0 * CURVATURE;
+/// Bound on the second derivative of Ẇ x by the angles over ‖x‖², from the third derivatives of W.
+const DRIFT_BY_ANGLES_TWICE: f64 = 8.0;
+/// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s.
+pub(super) const BRAKING: f64 = 0.02;
+
+impl Geometry {
+    /// For |β| ≤ `sideslip` (rad, below π/2).
+    pub fn new(sideslip: f64) -> Self {
+        let (s, c) = sideslip.sin_cos();
+        let (s2, c2) = (s * s, c * c);
+        // ‖Ẇ x‖² = x₂² (2 s x₁ + x₃)² + c² x₁² (s x₁ + x₃)² ≤ A u (1 − u) + E u² with u = x₁² + x₃² for ‖x‖ = 1.
+        let a = 1.0 + 4.0 * s2;
+        let e = c2 * (0.5 * (s + (1.0 + s2).sqrt())).powi(2);
+        let square = if 2.0 * e < a { a * a / (4.0 * (a - e)) } else { e };
+        // The rows of its derivative: [2 s x₂, 2 s x₁ + x₃, x₂] and c [2 s x₁ + x₃, 0, x₁], squared and added up.
+        let trace = (1.0 + c2) * a + c2;
+        let determinant = c2 * (1.0 + c2);
+        let by_rates = (0.5 * (trace + (trace * trace - 4.0 * determinant).sqrt())).max(a);
+        Self { drift: square.sqrt(), drift_by_rates: by_rates.sqrt(), r: 1.0 / c }
+    }
+}
+
+/// What bounds the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain ‖ω‖ ≤ ω̄, ‖m‖ ≤ M̄, |β| ≤ β̄.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Dynamics {
+    pub geometry: Geometry,
+    /// Largest and smallest moment of inertia, kg m².
+    pub largest: f64,
+    pub smallest: f64,
+    /// Bound on ‖x_ω‖, rad/s.
+    pub rate: f64,
+    /// Bound on ‖F‖, rad/s².
+    acceleration: f64,
+    /// Bound on ‖∂F/∂x_ω‖, 1/s.
+    by_rates: f64,
+    /// Bound on ‖∂F/∂(α, β)‖, 1/s².
+    by_angles: f64,
+    /// Bound on ‖d²F/dt²‖ along the predicted motion with m held, rad/s⁴.
+    jerk: f64,
+}
+
+impl Dynamics {
+    pub(super) fn new(s: &Settings) -> Self {
+        let eigenvalues = s.body.inertia.symmetric_eigenvalues();
+        let (smallest, largest) = (eigenvalues.min(), eigenvalues.max());
+        let geometry = Geometry::new(s.sideslip_domain);
+        let Geometry { drift, drift_by_rates, r } = geometry;
+        let spread = (largest - smallest) / smallest;
+        let rate = r * s.limit_rate;
+        // ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖², its derivative √2 (I_max − I_min) ‖ω‖.
+        let spin = s.limit_moment / smallest + 0.5 * spread * s.limit_rate.powi(2);
+        let acceleration = r * (spin + drift * rate * rate);
+        let by_rates = r * (drift_by_rates * rate + SQRT_2 * spread * s.limit_rate);
+        // ∂R = −R ∂W R; ∂(Ẇ x) by the angles takes second derivatives of W.
+        let of_r = TURN * r * r;
+        let by_angles = of_r * (spin + drift * rate * rate)
+            + r * (CURVATURE * rate * rate + SQRT_2 * spread * s.limit_rate * TURN * rate);
+        // F_xx [a, a] + 2 F_xθ [a, x] + F_θθ [x, x] + F_θ a, the second derivatives as the first ones with one derivative of R or W more.
+        let second = 2.0 * (by_rates / rate);
+        let mixed = of_r * by_rates + r * (DRIFT_MIXED + 4.0 * spread) * rate;
+        let angles_twice = 2.0 * of_r * by_angles
+            + (CURVATURE * r * r + 2.0 * of_r * of_r) * (spin + drift * rate * rate)
+            + r * (DRIFT_BY_ANGLES_TWICE + 12.0 * spread) * rate * rate;
+        let jerk = second * acceleration * acceleration
+            + 2.0 * mixed * acceleration * rate
+            + angles_twice * rate * rate
+            + by_angles * acceleration;
+        Self { geometry, largest, smallest, rate, acceleration, by_rates, by_angles, jerk }
+    }
+
+    /// By how much F can differ from the acceleration that the law meant between two ticks, rad/s², where the motion is driven off its prediction
+    /// by `drive` (rad/s²) and began with errors of the angles and rates (rad, rad/s); without what [`Self::swing`] counts.
+    fn mismatch(&self, s: &Settings, drive: f64, angle_error: f64, rate_error: f64) -> f64 {
+        let elapsed = s.delay + s.period_feedback;
+        // Gronwall's inequality: the mismatch itself drives the motion off.
+        let growth = ((self.by_rates + self.by_angles * elapsed) * elapsed).exp();
+        let off_rate = (drive * elapsed + rate_error) * growth;
+        let off_angle = (0.5 * drive * elapsed * elapsed + angle_error + rate_error * elapsed) * growth;
+        let tau = s.period_feedback;
+        self.by_rates * off_rate + self.by_angles * off_angle + self.jerk * tau * tau / 8.0
+    }
+
+    /// The law cancels f at the predicted middle of the interval in which its moment acts. So what F does of first order in time adds up to
+    /// nothing over the interval in the rate, and in the angle to τ³ ‖dF/dt‖/12. Over τ, rad/s.
+    fn swing(&self, s: &Settings) -> f64 {
+        let slope = self.by_rates * self.acceleration + self.by_angles * self.rate;
+        slope * s.period_feedback.powi(2) / 12.0
+    }
+}
+
+/// What is left of the limits at rest and beyond the horizon.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Assessment {
+    /// Share of the rate limit that is left for the motion beyond the horizon.
+    pub rate_left: f64,
+    /// Share of the moment limit that is left once a constant corner of Δ̄, errors and delay are borne, at the attitude that needs most.
+    pub moment_left: f64,
+    /// Largest ‖x̃_ω‖ with which the horizon may end, rad/s: from there the motion brakes, and keeps every limit for ever.
+    pub terminal_rate: f64,
+}
+
+impl Assessment {
+    /// Whether the guarantee can be given.
+    pub fn holds(&self) -> bool {
+        self.terminal_rate >= SMALLEST_TERMINAL_RATE
+    }
+}
+
+/// The horizon may end with at least this ‖x̃_ω‖, or else there is no room to move at all: 0.2°/s.
+const SMALLEST_TERMINAL_RATE: f64 = 3.5e-3;
+
+/// Tightening and assessment of `settings`.
+///
+/// # Errors
+/// The gain and its spectral radius if it does not stabilise; the gain that an invariant set cannot be made for.
+pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignError> {
+    let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
+    let unstable = || DesignError::Unstable {
+        k1: s.feedback.k1,
+        k2: s.feedback.k2,
+        period: s.period_feedback,
+        radius: error.spectral_radius(),
+    };
+    let steps = error.settling().ok_or_else(unstable)?;
+    let ratio = (s.period_optimisation / s.period_feedback).round().max(1.0) as usize;
+    let dynamics = Dynamics::new(s);
+    let parts = Parts::new(s, &dynamics);
+    let at: Vec<Deviation> = match s.initial_state {
+        InitialState::Measured | InitialState::Nominal => {
+            let all = error.reach(steps).into_iter().zip(error.errors(steps)).zip(error.shifts(steps));
+            all.map(|((reach, errors), shifts)| parts.deviation(s, &reach, &errors, &shifts)).collect()
+        }
+        InitialState::Tube => {
+            // Everything counts as one disturbance of each axis.
+            let set = error.invariant_set(parts.lateral(s)).ok_or(DesignError::NotReal { name: "feedback" })?;
+            vec![parts.deviation_in_set(s, &set.reach())]
+        }
+    };
+    let last = at.len() - 1;
+    let within = (0..at.len())
+        .map(|n| (n..n + ratio).fold(Deviation::default(), |largest, n| largest.or(&at[n.min(last)])))
+        .collect();
+    let bulge = (0..at.len())
+        .map(|n| {
+            let tick = |i: usize| &at[(n + i).min(last)];
+            let between = |value: fn(&Deviation) -> f64| {
+                let (from, to) = (value(tick(0)), value(tick(ratio)));
+                let above = |i: usize| value(tick(i)) - (from + (to - from) * i as f64 / ratio as f64);
+                (1..ratio).map(above).fold(0.0, f64::max)
+            };
+            (between(|d| d.angle), between(|d| d.rate))
+        })
+        .collect();
+    let tightening = Tightening { at, within, bulge, shape: parts.shape, norm: parts.norm };
+    let assessment = assess(s, &dynamics, &tightening);
+    Ok((tightening, assessment))
+}
+
+/// What moves the angle alone within a period, over the size of the disturbance of each axis, s².
+pub(super) fn lateral(s: &Settings) -> f64 {
+    Parts::new(s, &Dynamics::new(s)).lateral(s)
+}
+
+/// These settings with this share of the disturbance bound and the errors.
+pub(super) fn counting(s: &Settings, share: f64) -> Settings {
+    Settings {
+        disturbance_bound: share * s.disturbance_bound,
+        angle_error: share * s.angle_error,
+        rate_error: share * s.rate_error,
+        ..*s
+    }
+}
+
+/// What drives the deviation, by the ways in which it adds up.
+struct Parts {
+    /// Bound on each component of Δ over its size, which is Δ̄ but for `tube`.
+    shape: Vector3<f64>,
+    /// Relative error of the moment: I⁻¹ becomes I⁻¹/(1 ± ι).
+    inertia: f64,
+    /// The mismatch of the cancellation alone, rad/s².
+    mismatch: f64,
+    /// [`Dynamics::swing`].
+    swing: f64,
+    /// Bound on the norm of everything, rad/s².
+    norm: f64,
+    /// How the moment that the inertia error asks for grows while the vehicle turns, 1/s.
+    turning: f64,
+}
+
+impl Parts {
+    fn new(s: &Settings, dynamics: &Dynamics) -> Self {
+        let Dynamics { geometry, smallest, largest, rate, .. } = dynamics;
+        let inertia = s.inertia_error / (1.0 - s.inertia_error);
+        let of_inertia = inertia * s.limit_moment * geometry.r / smallest;
+        let root3 = 3.0_f64.sqrt();
+        let drive = root3 * s.disturbance_bound + of_inertia;
+        let mismatch = dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error);
+        // In `tube` each axis has its share of all.
+        let shape = match s.initial_state {
+            InitialState::Tube => {
+                let pulse = (s.feedback.k1 * s.delay + s.feedback.k2).abs();
+                Vector3::repeat(s.disturbance_bound + mismatch + pulse * s.rate_error)
+                    + per_axis(s, geometry) * (inertia * s.limit_moment)
+            }
+            InitialState::Measured | InitialState::Nominal => Vector3::repeat(1.0),
+        };
+        // ‖I (W − W′) R′ I⁻¹‖ for angles that lie `age` apart.
+        let turning = largest / smallest * TURN * geometry.r * rate;
+        Self { shape, inertia, mismatch, swing: dynamics.swing(s), norm: drive + mismatch, turning }
+    }
+
+    /// `reach` is per unit of disturbance, `errors` per unit of the error of the rate, `shifts` per unit of the rate at which angles are shifted.
+    fn deviation(&self, s: &Settings, reach: &Reach, errors: &Reach, shifts: &Reach) -> Deviation {
+        let root3 = 3.0_f64.sqrt();
+        // The error of the angles moves no faster than that of the rates is large.
+        let errors = errors.plus(shifts).times(s.rate_error);
+        let swing = shifts.times(self.swing);
+        let tau = s.period_feedback;
+        // Between two ticks an angle is off its line by no more than this.
+        let between = tau * tau / 8.0 * (self.norm * (1.0 + reach.feedback) + root3 * errors.feedback);
+        Deviation {
+            angle: reach.angle * self.norm + root3 * (errors.angle + s.angle_error) + swing.angle + between,
+            rate: reach.rate * self.norm + root3 * errors.rate + swing.rate,
+            seen_angle: reach.seen_angle * self.norm + root3 * errors.seen_angle + swing.seen_angle,
+            seen_rate: reach.seen_rate * self.norm + root3 * errors.seen_rate + swing.seen_rate,
+            feedback: reach.feedback * s.disturbance_bound + errors.feedback,
+            feedback_norm: reach.feedback * self.mismatch + swing.feedback,
+            feedback_moment: self.inertia
+                * s.limit_moment
+                * (reach.feedback + self.turning * (reach.feedback_age + s.delay * reach.feedback)),
+        }
+    }
+
+    /// The same in an invariant set per unit of `shape`.
+    fn deviation_in_set(&self, s: &Settings, reach: &Reach) -> Deviation {
+        let norm = self.shape.norm();
+        let root3 = 3.0_f64.sqrt();
+        let own = Vector3::new(s.rate_error * s.delay, s.rate_error, 0.0) * root3;
+        let tau = s.period_feedback;
+        let between = tau * tau / 8.0 * norm * (1.0 + reach.feedback);
+        let unseen = Vector3::new(0.5 * s.delay * s.delay, s.delay, 0.0) * norm;
+        Deviation {
+            angle: reach.angle * norm + unseen.x + root3 * s.angle_error + between,
+            rate: reach.rate * norm + unseen.y,
+            seen_angle: reach.angle * norm + own.x,
+            seen_rate: reach.rate * norm + own.y,
+            feedback: reach.feedback,
+            feedback_norm: root3 * (s.feedback.k1 * s.delay + s.feedback.k2).abs() * s.rate_error,
+            feedback_moment: 0.0,
+        }
+    }
+
+    /// What moves the angle alone within a period, per unit of `shape`, s²: a disturbance that changes within it, and changes of the angle's error.
+    fn lateral(&self, s: &Settings) -> f64 {
+        let tau = s.period_feedback;
+        0.25 * tau * tau + tau * (s.rate_error + self.swing) / self.shape.min().max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Largest length of each row of R I⁻¹ for |α| ≤ π and |β| ≤ β̄, 1/(kg m²), from R = [−p tan β + y, q, −p cos β − y sin β] with orthogonal p, q, y.
+fn per_axis(s: &Settings, geometry: &Geometry) -> Vector3<f64> {
+    let inverse = s.body.inverse.symmetric_eigenvalues().max();
+    Vector3::new(geometry.r, 1.0, 1.0) * inverse
+}
+
+/// What is left at rest and for the motion beyond the horizon, at whatever attitude.
+fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessment {
+    let forever = tightening.forever();
+    let left = |x: f64| {
+        let of_rates = s.limit_rate - rate_loss(forever, TURN_OF_RATES * x, x);
+        let a = BRAKING * x;
+        let slopes = dynamics.slopes(x, a);
+        let feedback = bearing(s, &tightening.shape);
+        let loss = moment_loss(dynamics, tightening, forever, feedback, slopes, (x, a));
+        (of_rates - x, s.limit_moment - loss - dynamics.nominal_moment(x, a))
+    };
+    let (rate, moment) = left(0.0);
+    let (mut low, mut high) = (0.0, s.limit_rate);
+    if rate > 0.0 && moment > 0.0 {
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            let (rate, moment) = left(middle);
+            if rate > 0.0 && moment > 0.0 { low = middle } else { high = middle }
+        }
+    }
+    Assessment { rate_left: rate / s.limit_rate, moment_left: moment / s.limit_moment, terminal_rate: low }
+}
+
+use crate::linearise::TURN_BY_ANGLES as TURN_OF_RATES;
+
+/// Largest ‖I W s‖ over the corners s of the box `shape` at any α and |β| ≤ β̄, N m s²: ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy² y_y² with the larger
+/// eigenvalue λ of I² in the plane of symmetry, for y = W s, which α turns in that plane; y_x² + y_z² = cos²β (s₁ sin β + s₃)² + s₂².
+fn bearing(s: &Settings, shape: &Vector3<f64>) -> f64 {
+    let square = s.body.inertia * s.body.inertia;
+    let largest = s.body.inertia.symmetric_eigenvalues().max();
+    if square[(0, 1)] != 0.0 || square[(1, 2)] != 0.0 {
+        return largest * shape.norm();
+    }
+    let (xx, zz, xz, yy) = (square[(0, 0)], square[(2, 2)], square[(0, 2)], square[(1, 1)]);
+    let plane = 0.5 * (xx + zz) + (0.25 * (xx - zz).powi(2) + xz * xz).sqrt();
+    let sine = s.sideslip_domain.sin().min(0.5);
+    let across = shape.y.powi(2) + (1.0 - sine * sine) * (shape.x * sine + shape.z).powi(2).max(shape.z.powi(2));
+    let bound = yy * shape.norm_squared() + (plane - yy).max(0.0) * across.min(shape.norm_squared());
+    bound.sqrt().min(largest * shape.norm())
+}
+
+/// How much of the rate limit the deviation takes at a stage with ‖∂ω/∂(α, β)‖ = `by_angles` and ‖x̃_ω‖ = `size`, rad/s:
+/// ‖W (x̃_ω + o_ω)‖ ≤ ‖W̃ x̃_ω‖ + ‖(W − W̃) x̃_ω‖ + ‖o_ω‖.
+pub(super) fn rate_loss(deviation: &Deviation, by_angles: f64, size: f64) -> f64 {
+    let Deviation { angle, rate, .. } = *deviation;
+    rate + by_angles * angle + 0.5 * CURVATURE * size * angle * angle
+}
+
+/// How much of the moment limit it takes: `feedback` is the largest ‖I W s‖ over the corners of the shape at the stage, `slopes` are ‖∂m/∂(α, β)‖ and
+/// ‖∂m/∂x_ω‖ there, `sizes` are ‖x̃_ω‖ and ‖a‖. N m.
+///
+/// m(x̃ + ô, a + K ô) = m(x̃, a) + I W K ô + ∂m ô + what is of second order in ô.
+pub(super) fn moment_loss(
+    dynamics: &Dynamics,
+    tightening: &Tightening,
+    deviation: &Deviation,
+    feedback: f64,
+    slopes: (f64, f64),
+    sizes: (f64, f64),
+) -> f64 {
+    let Deviation { seen_angle: angle, seen_rate: rate, .. } = *deviation;
+    let largest = dynamics.largest;
+    let spread = largest - dynamics.smallest;
+    let (x, a) = (sizes.0 + rate, sizes.1);
+    let by_feedback =
+        deviation.feedback * feedback + deviation.feedback_norm * largest + deviation.feedback_moment;
+    let drift = slopes.0 * angle + slopes.1 * rate;
+    // I (W − W̃) K ô; then the second derivatives of I W a, and of I Ẇ x + ω × I ω by rates, by both, and by angles.
+    let second = largest * TURN * angle * deviation.feedback * tightening.shape.norm()
+        + 0.5 * largest * CURVATURE * a * angle * angle
+        + (largest * dynamics.geometry.drift + 0.5 * spread) * rate * rate
+        + (largest * DRIFT_MIXED + 4.0 * spread) * x * angle * rate
+        + 0.5 * (largest * DRIFT_BY_ANGLES_TWICE + 12.0 * spread) * x * x * angle * angle;
+    by_feedback + drift + second
+}
+
+impl Dynamics {
+    /// Bounds on ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a at any attitude of the domain.
+    fn slopes(&self, x: f64, a: f64) -> (f64, f64) {
+        let Self { largest, smallest, geometry, .. } = self;
+        let gyroscopic = SQRT_2 * (largest - smallest);
+        (
+            largest * (TURN_OF_RATES * a + CURVATURE * x * x) + TURN_OF_RATES * gyroscopic * x * x,
+            (largest * geometry.drift_by_rates + gyroscopic) * x,
+        )
+    }
+
+    /// Bound on ‖m‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a, N m.
+    fn nominal_moment(&self, x: f64, a: f64) -> f64 {
+        let Self { largest, smallest, geometry, .. } = self;
+        largest * (a + geometry.drift * x * x) + 0.5 * (largest - smallest) * x * x
+    }
+
+    /// Bound on ‖d²m/dt²‖ of a nominal motion with a held and such sizes, N m/s².
+    pub(super) fn moment_curvature(&self, x: f64, a: f64) -> f64 {
+        let Self { largest, smallest, geometry, .. } = self;
+        let spread = largest - smallest;
+        // I Ẅ a: ∂²W [x, x] a + ∂W [a] a. The rest as in `moment_loss`, with ẋ_ω = a and Θ̈ = a.
+        largest * (CURVATURE * x * x * a + TURN * a * a)
+            + 2.0 * (largest * geometry.drift + 0.5 * spread) * a * a
+            + 2.0 * (largest * DRIFT_MIXED + 4.0 * spread) * x * x * a
+            + (largest * DRIFT_BY_ANGLES_TWICE + 12.0 * spread) * x.powi(4)
+            + (largest * CURVATURE + TURN * SQRT_2 * spread) * x * x * a
+    }
+
+    /// Bound on ‖d²ω/dt²‖ of a nominal motion with a held and such sizes, rad/s³: 2 Ẇ a + ∂²W [x, x] x + ∂W [a] x.
+    pub(super) fn rate_curvature(x: f64, a: f64) -> f64 {
+        3.0 * TURN * x * a + CURVATURE * x.powi(3)
+    }
+}
+
+/// The largest value of a setting between 0 and `tried` for which the design holds, the others as they are; `None` if not even 0 does.
+fn largest(tried: f64, with: impl Fn(f64) -> Settings) -> Option<f64> {
+    let holds = |value: f64| tighten(&with(value)).is_ok_and(|(_, assessment)| assessment.holds());
+    if !holds(0.0) {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, tried);
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if holds(middle) { low = middle } else { high = middle }
+    }
+    Some(low)
+}
+
+/// Share of Δ̄, the errors and the delay together that the design holds for, at most 1.
+pub(super) fn largest_share(s: &Settings) -> Option<f64> {
+    largest(1.0, |share| counting(s, share))
+}
+
+/// Why the guarantee cannot be given, and what would be accepted.
+pub(super) fn refusal(s: &Settings, assessment: &Assessment) -> DesignError {
+    let error_share = largest(1.0, |share| Settings {
+        angle_error: share * s.angle_error,
+        rate_error: share * s.rate_error,
+        ..*s
+    });
+    let errors = (s.rate_error > 0.0 || s.angle_error > 0.0).then_some(error_share).flatten();
+    DesignError::NoGuarantee {
+        moment_left: assessment.moment_left,
+        rate_left: assessment.rate_left,
+        limit_moment: s.limit_moment,
+        limit_rate: s.limit_rate,
+        disturbance: largest(s.disturbance_bound, |disturbance_bound| Settings { disturbance_bound, ..*s }),
+        delay: (s.delay > 0.0).then(|| largest(s.delay, |delay| Settings { delay, ..*s })).flatten(),
+        errors: errors.map(|share| (share * s.angle_error, share * s.rate_error)),
+    }
+}
