@@ -99,7 +99,6 @@ pub struct Crmpc {
     // Scratch of one optimisation.
     affine: Vec<State<2>>,
     previous: Motion<2>,
-    multipliers: Vec<[f64; 2]>,
 }
 
 /// Shares of the tightening that are tried where no plan is certified.
@@ -154,7 +153,6 @@ impl Crmpc {
             optimiser,
             affine: vec![[Vector3::zeros(); 2]; n],
             previous: Motion::new(n),
-            multipliers: Vec::with_capacity(n),
         })
     }
 
@@ -220,7 +218,7 @@ impl Crmpc {
             let mut certified = self.sets.certify(self.optimiser.motion());
             if certified.is_none() && !refused {
                 // The bounds were those about the previous plan; now about this one.
-                report = self.solve_again(&start);
+                report = self.settle(&start);
                 iterations += report.iterations;
                 if report.status != Status::Fallback {
                     certified = self.sets.certify(self.optimiser.motion());
@@ -273,14 +271,10 @@ impl Crmpc {
         self.optimiser.optimise(&mut self.sets, &error, &self.affine, previous)
     }
 
-    /// The same with the bounds about the optimum that was found last.
-    fn solve_again(&mut self, start: &Vector6<f64>) -> mpc::Report {
+    /// The same with the bounds about itself, from the optimum that was found last.
+    fn settle(&mut self, start: &Vector6<f64>) -> mpc::Report {
         let error = error(start, &self.sets.references[0]);
-        self.previous.clone_from(self.optimiser.motion());
-        self.multipliers.clear();
-        self.multipliers.extend(self.optimiser.multipliers());
-        let previous = Some((&self.previous, &self.multipliers[..]));
-        self.optimiser.optimise(&mut self.sets, &error, &self.affine, previous)
+        self.optimiser.settle(&mut self.sets, &error, &self.affine)
     }
 
     /// Takes the optimum over as the plan.

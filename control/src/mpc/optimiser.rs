@@ -255,6 +255,23 @@ impl<const O: usize> Optimiser<O> {
         self.report(bounded, &sample, status, search.iterations)
     }
 
+    /// The optimum with the bounds about itself, from the one that was found last with those about another motion.
+    pub fn settle<B: Bounded<O>>(&mut self, bounded: &mut B, start: &State<O>, affine: &[State<O>]) -> Report {
+        let budget = self.settings.time_budget;
+        let deadline = (budget > 0.0).then(|| Instant::now() + Duration::from_secs_f64(budget));
+        let sample = Sample { start, affine, deadline };
+        let mut search = Search { warm: true, ..Search::default() };
+        self.about.clone_from(&self.solution.motion);
+        bounded.follow(true);
+        let settled = self.settings.method == Method::Riccati
+            && self.settings.nonlinearity == Nonlinearity::Exact
+            && self.over_whole_horizon(bounded, &sample, &mut search);
+        bounded.follow(false);
+        bounded.tighten(&self.solution.motion, 0..self.layout.horizon);
+        let status = if settled { Status::Constrained } else { Status::Fallback };
+        self.report(bounded, &sample, status, search.iterations)
+    }
+
     /// Takes the previous plan and its multipliers as first guess where they are active in what is to be solved.
     fn begin_at(&mut self, start: &State<O>, affine: &[State<O>], active: &[[f64; 2]], search: &mut Search) {
         let range = search.window.clone().unwrap_or(0..self.layout.horizon);
