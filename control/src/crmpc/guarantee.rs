@@ -11,7 +11,7 @@ use std::f64::consts::SQRT_2;
 /// Largest deviation of the vehicle from the plan at a feedback tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
-    /// ‖Θ − Θ̃‖, rad.
+    /// Of angle of attack and sideslip, ‖(α, β) − (α̃, β̃)‖; the bank angle changes neither ω nor m. rad.
     pub angle: f64,
     /// ‖x_ω − x̃_ω‖, rad/s.
     pub rate: f64,
@@ -53,6 +53,8 @@ pub struct Tightening {
     bulge: Vec<(f64, f64)>,
     /// Bound on the disturbance of each axis over its size.
     pub shape: Vector3<f64>,
+    /// Largest ‖I W s‖ over the corners s of the shape at any attitude of the domain, N m s² (times the size of the box: N m).
+    pub bearing: f64,
     /// Bound on the norm of all that drives the deviation, rad/s².
     pub norm: f64,
 }
@@ -99,13 +101,13 @@ pub struct Geometry {
 /// Bound on ‖∂²(W y)/∂(α, β)²‖ over ‖y‖.
 const CURVATURE: f64 = 3.162_277_660_168_379_5;
 /// ‖W(Θ + o) − W(Θ)‖ over ‖o‖: ∂W/∂α and ∂W/∂β are orthogonal and no longer than √2 (Frobenius).
-const TURN: f64 = SQRT_2;
+pub(super) const TURN: f64 = SQRT_2;
 /// Bound on the mixed second derivative of Ẇ x by angles and rates over ‖x‖: Ẇ x = ∂W x α̇ + ∂W x β̇ takes one derivative of W more.
 const DRIFT_MIXED: f64 = 2.0 * CURVATURE;
 /// Bound on the second derivative of Ẇ x by the angles over ‖x‖², from the third derivatives of W.
 const DRIFT_BY_ANGLES_TWICE: f64 = 8.0;
 /// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s.
-pub(super) const BRAKING: f64 = 0.02;
+pub(super) const BRAKING: f64 = 0.01;
 
 impl Geometry {
     /// For |β| ≤ `sideslip` (rad, below π/2).
@@ -255,7 +257,8 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
             (between(|d| d.angle), between(|d| d.rate))
         })
         .collect();
-    let tightening = Tightening { at, within, bulge, shape: parts.shape, norm: parts.norm };
+    let bearing = bearing(s, &parts.shape);
+    let tightening = Tightening { at, within, bulge, shape: parts.shape, bearing, norm: parts.norm };
     let assessment = assess(s, &dynamics, &tightening);
     Ok((tightening, assessment))
 }
@@ -287,6 +290,8 @@ struct Parts {
     swing: f64,
     /// Bound on the norm of everything, rad/s².
     norm: f64,
+    /// The same of two axes.
+    norm_of_two: f64,
     /// How the moment that the inertia error asks for grows while the vehicle turns, 1/s.
     turning: f64,
 }
@@ -310,7 +315,7 @@ impl Parts {
         };
         // ‖I (W − W′) R′ I⁻¹‖ for angles that lie `age` apart.
         let turning = largest / smallest * TURN * geometry.r * rate;
-        Self { shape, inertia, mismatch, swing: dynamics.swing(s), norm: drive + mismatch, turning }
+        Self { shape, inertia, mismatch, swing: dynamics.swing(s), norm: drive + mismatch, norm_of_two: SQRT_2 * s.disturbance_bound + of_inertia + mismatch, turning }
     }
 
     /// `reach` is per unit of disturbance, `errors` per unit of the error of the rate, `shifts` per unit of the rate at which angles are shifted.
@@ -323,9 +328,9 @@ impl Parts {
         // Between two ticks an angle is off its line by no more than this.
         let between = tau * tau / 8.0 * (self.norm * (1.0 + reach.feedback) + root3 * errors.feedback);
         Deviation {
-            angle: reach.angle * self.norm + root3 * (errors.angle + s.angle_error) + swing.angle + between,
+            angle: reach.angle * self.norm_of_two + SQRT_2 * (errors.angle + s.angle_error) + swing.angle + between,
             rate: reach.rate * self.norm + root3 * errors.rate + swing.rate,
-            seen_angle: reach.seen_angle * self.norm + root3 * errors.seen_angle + swing.seen_angle,
+            seen_angle: reach.seen_angle * self.norm_of_two + SQRT_2 * errors.seen_angle + swing.seen_angle,
             seen_rate: reach.seen_rate * self.norm + root3 * errors.seen_rate + swing.seen_rate,
             feedback: reach.feedback * s.disturbance_bound + errors.feedback,
             feedback_norm: reach.feedback * self.mismatch + swing.feedback,
@@ -337,17 +342,15 @@ impl Parts {
 
     /// The same in an invariant set per unit of `shape`.
     fn deviation_in_set(&self, s: &Settings, reach: &Reach) -> Deviation {
-        let norm = self.shape.norm();
+        let (norm, of_two) = (self.shape.norm(), self.shape.xy().norm());
         let root3 = 3.0_f64.sqrt();
-        let own = Vector3::new(s.rate_error * s.delay, s.rate_error, 0.0) * root3;
         let tau = s.period_feedback;
         let between = tau * tau / 8.0 * norm * (1.0 + reach.feedback);
-        let unseen = Vector3::new(0.5 * s.delay * s.delay, s.delay, 0.0) * norm;
         Deviation {
-            angle: reach.angle * norm + unseen.x + root3 * s.angle_error + between,
-            rate: reach.rate * norm + unseen.y,
-            seen_angle: reach.angle * norm + own.x,
-            seen_rate: reach.rate * norm + own.y,
+            angle: (reach.angle + 0.5 * s.delay * s.delay) * of_two + SQRT_2 * s.angle_error + between,
+            rate: (reach.rate + s.delay) * norm,
+            seen_angle: reach.angle * of_two + SQRT_2 * s.delay * s.rate_error,
+            seen_rate: reach.rate * norm + root3 * s.rate_error,
             feedback: reach.feedback,
             feedback_norm: root3 * (s.feedback.k1 * s.delay + s.feedback.k2).abs() * s.rate_error,
             feedback_moment: 0.0,
@@ -374,8 +377,8 @@ fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessm
         let of_rates = s.limit_rate - rate_loss(forever, TURN_OF_RATES * x, x);
         let a = BRAKING * x;
         let slopes = dynamics.slopes(x, a);
-        let feedback = bearing(s, &tightening.shape);
-        let loss = moment_loss(dynamics, tightening, forever, feedback, slopes, (x, a));
+        let feedback = tightening.bearing;
+        let loss = moment_loss(dynamics, tightening, forever, (feedback, 0.0), slopes, (x, a));
         (of_rates - x, s.limit_moment - loss - dynamics.nominal_moment(x, a))
     };
     let (rate, moment) = left(0.0);
@@ -415,15 +418,15 @@ pub(super) fn rate_loss(deviation: &Deviation, by_angles: f64, size: f64) -> f64
     rate + by_angles * angle + 0.5 * CURVATURE * size * angle * angle
 }
 
-/// How much of the moment limit it takes: `feedback` is the largest ‖I W s‖ over the corners of the shape at the stage, `slopes` are ‖∂m/∂(α, β)‖ and
-/// ‖∂m/∂x_ω‖ there, `sizes` are ‖x̃_ω‖ and ‖a‖. N m.
+/// How much of the moment limit it takes: `feedback` is the largest ‖I W s‖ over the corners of the shape at the stage and how much that grows with
+/// the angles at most (N m s², N m s²/rad), `slopes` are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖ there, `sizes` are ‖x̃_ω‖ and ‖a‖. N m.
 ///
 /// m(x̃ + ô, a + K ô) = m(x̃, a) + I W K ô + ∂m ô + what is of second order in ô.
 pub(super) fn moment_loss(
     dynamics: &Dynamics,
     tightening: &Tightening,
     deviation: &Deviation,
-    feedback: f64,
+    feedback: (f64, f64),
     slopes: (f64, f64),
     sizes: (f64, f64),
 ) -> f64 {
@@ -431,12 +434,12 @@ pub(super) fn moment_loss(
     let largest = dynamics.largest;
     let spread = largest - dynamics.smallest;
     let (x, a) = (sizes.0 + rate, sizes.1);
+    let feedback = (feedback.0 + feedback.1 * angle).min(tightening.bearing);
     let by_feedback =
         deviation.feedback * feedback + deviation.feedback_norm * largest + deviation.feedback_moment;
     let drift = slopes.0 * angle + slopes.1 * rate;
-    // I (W − W̃) K ô; then the second derivatives of I W a, and of I Ẇ x + ω × I ω by rates, by both, and by angles.
-    let second = largest * TURN * angle * deviation.feedback * tightening.shape.norm()
-        + 0.5 * largest * CURVATURE * a * angle * angle
+    // The second derivatives of I W a, and of I Ẇ x + ω × I ω by rates, by both, and by angles.
+    let second = 0.5 * largest * CURVATURE * a * angle * angle
         + (largest * dynamics.geometry.drift + 0.5 * spread) * rate * rate
         + (largest * DRIFT_MIXED + 4.0 * spread) * x * angle * rate
         + 0.5 * (largest * DRIFT_BY_ANGLES_TWICE + 12.0 * spread) * x * x * angle * angle;

@@ -425,7 +425,7 @@ impl Crmpc {
         let r = 1.0 / self.settings.sideslip_domain.cos();
         let ball = bounds.feedback_norm + bounds.feedback_moment * r / self.design.smallest_inertia;
         let within = |i: usize| feedback[i].abs() <= (tightening.shape[i] * bounds.feedback + ball) * slack + 1e-12;
-        angles.norm() <= bounds.seen_angle * slack + 1e-12
+        angles.xy().norm() <= bounds.seen_angle * slack + 1e-12
             && rates.norm() <= bounds.seen_rate * slack + 1e-12
             && (0..3).all(within)
     }

@@ -202,11 +202,6 @@ impl mpc::Constraints<2> for Sets {
     }
 
     fn squares(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> (f64, f64) {
-        if self.follow {
-            // The bounds need the derivatives.
-            let Balls { state, input } = self.balls(k, state, input);
-            return (state.value.norm_squared(), input.value.norm_squared());
-        }
         let [angles, rates, a] = self.nominal(k, state, input);
         let kinematics = InverseKinematics::at(&angles);
         let (state, input) = match &self.kind {
@@ -229,8 +224,8 @@ impl Bounded<2> for Sets {
     }
 
     fn tighten(&mut self, motion: &Motion<2>, of: Range<usize>) {
-        let Self { kind, body, references, follow, .. } = self;
-        if let (Kind::Robust(robust), false) = (kind, *follow) {
+        let Self { kind, body, references, .. } = self;
+        if let Kind::Robust(robust) = kind {
             let mut here = Point::at(references, motion, of.start);
             for k in of {
                 let next = Point::at(references, motion, k + 1);
@@ -439,7 +434,7 @@ impl Robust {
     /// What ‖ω̃‖ may be at prediction step k so that ‖ω‖ keeps its limit there and in the intervals before and after, whatever the error dynamics do,
     /// where ∂ω/∂(α, β) has this norm. `before` is the point before.
     fn rate_bound(&self, k: usize, by_angles: f64, here: &Point, before: &Point) -> f64 {
-        let Settings { limit_rate, period_optimisation: h, sideslip_domain, horizon, .. } = self.settings;
+        let Settings { limit_rate, period_optimisation: h, horizon, .. } = self.settings;
         let tightening = &self.design.tightening;
         let tick = self.tick(k);
         // Between two steps the deviation may lie above the line between its bounds at both.
@@ -454,7 +449,8 @@ impl Robust {
         let curved = 0.125 * h * h * Dynamics::rate_curvature(size, a);
         let loss = guarantee::rate_loss(tightening.at(tick), by_angles, here.size) + bulge + curved;
         let bound = limit_rate - self.share * loss;
-        if k == horizon { bound.min(self.design.assessment.terminal_rate * sideslip_domain.cos()) } else { bound }
+        // ‖x̃_ω‖ ≤ sec β ‖ω̃‖
+        if k == horizon { bound.min(self.design.assessment.terminal_rate * here.angles.y.cos()) } else { bound }
     }
 
     /// What ‖m̃‖ may be at the start of prediction interval k so that ‖m‖ keeps its limit at each of its feedback ticks. With a held,
@@ -474,8 +470,9 @@ impl Robust {
         let a = here.acceleration.norm();
         let size = here.size + h * a;
         let deviation = tightening.within(self.tick(k));
+        let by_angles = self.design.largest_inertia * guarantee::TURN * tightening.shape.norm();
         let loss =
-            guarantee::moment_loss(&self.dynamics, tightening, deviation, feedback, slopes, (size, a));
+            guarantee::moment_loss(&self.dynamics, tightening, deviation, (feedback, by_angles), slopes, (size, a));
         let within = (after - value).max(0.0) + 0.125 * h * h * self.dynamics.moment_curvature(size, a);
         limit_moment - self.share * loss - within
     }

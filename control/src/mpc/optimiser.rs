@@ -66,8 +66,9 @@ impl SolverSettings {
 
 /// The constraints of a controller. Their bounds may depend on the motion, and are then those about a motion that was given before.
 pub trait Bounded<const O: usize>: Constraints<O> {
-    /// Whether the bounds are from now on those about the motion that is evaluated, rather than those of the last [`Self::tighten`], which
-    /// then has nothing to do. Their own derivatives are left out. Nothing to do for bounds that do not depend on the motion.
+    /// Whether the bounds of [`Constraints::balls`] are from now on those about the motion that is evaluated, rather than those of the last
+    /// [`Self::tighten`], which those of [`Constraints::squares`] stay. Their own derivatives are left out. Nothing to do for bounds that do
+    /// not depend on the motion.
     fn follow(&mut self, _follow: bool) {}
 
     /// Sets the bounds of the intervals `of` about `motion`: of the state at the end of each, and of its input.
@@ -237,7 +238,9 @@ impl<const O: usize> Optimiser<O> {
                     self.begin_at(start, affine, active, &mut search);
                 }
                 self.about.states[0] = *start;
+                bounded.follow(self.settings.nonlinearity == Nonlinearity::Exact);
                 status = self.solve(bounded, &sample, &mut search);
+                bounded.follow(false);
             }
             None if self.settled_by_riccati(bounded, &sample, &mut search) => status = Status::Constrained,
             None => {
@@ -328,6 +331,7 @@ impl<const O: usize> Optimiser<O> {
         if sample.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
             return Status::Fallback;
         }
+        bounded.follow(false);
         bounded.tighten(&self.about, 0..self.layout.horizon);
         self.frozen.set(bounded, &self.about);
         let end = self.layout.end(bounded.terminal_radius());
