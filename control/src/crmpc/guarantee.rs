@@ -133,6 +133,8 @@ pub(super) struct Dynamics {
     /// Largest and smallest moment of inertia, kg m².
     pub largest: f64,
     pub smallest: f64,
+    /// ‖∂(ω × I ω)/∂ω‖ ≤ `gyroscopic` ‖ω‖ (Frobenius), kg m².
+    pub gyroscopic: f64,
     /// Bound on ‖x_ω‖, rad/s.
     pub rate: f64,
     /// Bound on ‖F‖, rad/s².
@@ -153,14 +155,15 @@ impl Dynamics {
         let Geometry { drift, drift_by_rates, r } = geometry;
         let spread = (largest - smallest) / smallest;
         let rate = r * s.limit_rate;
-        // ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖², its derivative √2 (I_max − I_min) ‖ω‖.
+        let (gyroscopic, spinning) = gyroscopic(s);
+        // ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
         let spin = s.limit_moment / smallest + 0.5 * spread * s.limit_rate.powi(2);
         let acceleration = r * (spin + drift * rate * rate);
-        let by_rates = r * (drift_by_rates * rate + SQRT_2 * spread * s.limit_rate);
+        let by_rates = r * (drift_by_rates * rate + spinning * s.limit_rate);
         // ∂R = −R ∂W R; ∂(Ẇ x) by the angles takes second derivatives of W.
         let of_r = TURN * r * r;
         let by_angles = of_r * (spin + drift * rate * rate)
-            + r * (CURVATURE * rate * rate + SQRT_2 * spread * s.limit_rate * TURN * rate);
+            + r * (CURVATURE * rate * rate + spinning * s.limit_rate * TURN * rate);
         // F_xx [a, a] + 2 F_xθ [a, x] + F_θθ [x, x] + F_θ a, the second derivatives as the first ones with one derivative of R or W more.
         let second = 2.0 * (by_rates / rate);
         let mixed = of_r * by_rates + r * (DRIFT_MIXED + 4.0 * spread) * rate;
@@ -171,19 +174,21 @@ impl Dynamics {
             + 2.0 * mixed * acceleration * rate
             + angles_twice * rate * rate
             + by_angles * acceleration;
-        Self { geometry, largest, smallest, rate, acceleration, by_rates, by_angles, jerk }
+        Self { geometry, largest, smallest, gyroscopic, rate, acceleration, by_rates, by_angles, jerk }
     }
 
-    /// By how much F can differ from the acceleration that the law meant between two ticks, rad/s², where the motion is driven off its prediction
-    /// by `drive` (rad/s²) and began with errors of the angles and rates (rad, rad/s); without what [`Self::swing`] counts.
-    fn mismatch(&self, s: &Settings, drive: f64, angle_error: f64, rate_error: f64) -> f64 {
-        let elapsed = s.delay + s.period_feedback;
+    /// How far F is from the acceleration that the law meant, on average over a period (rad/s²), and by how much it varies within one, where the
+    /// motion is driven off its prediction by `drive` (rad/s²) and began with errors of the angles and rates (rad, rad/s). Without what
+    /// [`Self::swing`] counts.
+    fn mismatch(&self, s: &Settings, drive: f64, angle_error: f64, rate_error: f64) -> (f64, f64) {
+        let tau = s.period_feedback;
+        let elapsed = s.delay + tau;
         // Gronwall's inequality: the mismatch itself drives the motion off.
         let growth = ((self.by_rates + self.by_angles * elapsed) * elapsed).exp();
-        let off_rate = (drive * elapsed + rate_error) * growth;
+        let off_rate = (drive * (elapsed - 0.5 * tau) + rate_error) * growth;
         let off_angle = (0.5 * drive * elapsed * elapsed + angle_error + rate_error * elapsed) * growth;
-        let tau = s.period_feedback;
-        self.by_rates * off_rate + self.by_angles * off_angle + self.jerk * tau * tau / 8.0
+        let mean = self.by_rates * off_rate + self.by_angles * off_angle + self.jerk * tau * tau / 24.0;
+        (mean, self.by_rates * drive * tau * growth + self.jerk * tau * tau / 8.0)
     }
 
     /// The law cancels f at the predicted middle of the interval in which its moment acts. So what F does of first order in time adds up to
@@ -192,6 +197,21 @@ impl Dynamics {
         let slope = self.by_rates * self.acceleration + self.by_angles * self.rate;
         slope * s.period_feedback.powi(2) / 12.0
     }
+}
+
+/// Bounds on ‖∂(ω × I ω)/∂ω‖ over ‖ω‖ and on that of I⁻¹ (ω × I ω). In principal axes the rows hold a_i ω_j and a_i ω_k with
+/// a = [I₃ − I₂, I₁ − I₃, I₂ − I₁], so that each ω² meets two of the squares a_i².
+fn gyroscopic(s: &Settings) -> (f64, f64) {
+    let mut inertia: [f64; 3] = s.body.inertia.symmetric_eigenvalues().into();
+    inertia.sort_by(f64::total_cmp);
+    let [first, second, third] = inertia;
+    let rows = [third - second, third - first, second - first];
+    let of_two = |values: [f64; 3]| {
+        let squares = values.map(|value| value * value);
+        let smallest = squares.into_iter().fold(f64::INFINITY, f64::min);
+        (squares.iter().sum::<f64>() - smallest).sqrt()
+    };
+    (of_two(rows), of_two([rows[0] / first, rows[1] / second, rows[2] / third]))
 }
 
 /// What is left of the limits at rest and beyond the horizon.
@@ -303,7 +323,9 @@ impl Parts {
         let of_inertia = inertia * s.limit_moment * geometry.r / smallest;
         let root3 = 3.0_f64.sqrt();
         let drive = root3 * s.disturbance_bound + of_inertia;
-        let mismatch = dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error);
+        let (mismatch, varying) = dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error);
+        // |∫ g (e − ē)| ≤ ¼ τ ½ (range of g) (range of e) for the response g to a pulse, which is linear within a period.
+        let swing = dynamics.swing(s) + 0.125 * s.period_feedback * varying;
         // In `tube` each axis has its share of all.
         let shape = match s.initial_state {
             InitialState::Tube => {
@@ -315,7 +337,7 @@ impl Parts {
         };
         // ‖I (W − W′) R′ I⁻¹‖ for angles that lie `age` apart.
         let turning = largest / smallest * TURN * geometry.r * rate;
-        Self { shape, inertia, mismatch, swing: dynamics.swing(s), norm: drive + mismatch, norm_of_two: SQRT_2 * s.disturbance_bound + of_inertia + mismatch, turning }
+        Self { shape, inertia, mismatch, swing, norm: drive + mismatch, norm_of_two: SQRT_2 * s.disturbance_bound + of_inertia + mismatch, turning }
     }
 
     /// `reach` is per unit of disturbance, `errors` per unit of the error of the rate, `shifts` per unit of the rate at which angles are shifted.
@@ -449,8 +471,7 @@ pub(super) fn moment_loss(
 impl Dynamics {
     /// Bounds on ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a at any attitude of the domain.
     fn slopes(&self, x: f64, a: f64) -> (f64, f64) {
-        let Self { largest, smallest, geometry, .. } = self;
-        let gyroscopic = SQRT_2 * (largest - smallest);
+        let Self { largest, gyroscopic, geometry, .. } = self;
         (
             largest * (TURN_OF_RATES * a + CURVATURE * x * x) + TURN_OF_RATES * gyroscopic * x * x,
             (largest * geometry.drift_by_rates + gyroscopic) * x,

@@ -202,37 +202,28 @@ impl Crmpc {
         self.keep(memory, &start, report.iterations)
     }
 
-    /// A plan that keeps the conditions of the theorem (docs/guarantee.md): the optimum, or else the previous plan as it is, which keeps them if it did
-    /// before and the vehicle is no further from it than the assumptions explain. Without either, what violates the limits least.
+    /// A plan that keeps the conditions of the theorem (docs/guarantee.md): the optimum from the measured state, or from where the previous plan put the
+    /// nominal motion, or else the previous plan as it is, which keeps them if it did before and the vehicle is no further from it than the
+    /// assumptions explain. Without any, what violates the limits least.
     fn plan_robustly(&mut self, memory: &mut Memory, measured: &Vector6<f64>, first: bool) -> mpc::Report {
-        let refused = self.design.counted < 1.0;
         let assured = memory.standing == Standing::InForce;
-        // The nominal motion goes on where it is for as long as the guarantee is in force.
-        let goes_on = self.settings.initial_state == InitialState::Nominal && assured;
-        let (start, age) = if goes_on { (memory.plan.states[0], memory.age) } else { (*measured, 0) };
-
-        self.sets.begin(age as usize, 1.0);
-        let mut report = self.solve(memory, &start, first);
-        let mut iterations = report.iterations;
-        if report.status != Status::Fallback {
-            let mut certified = self.sets.certify(self.optimiser.motion());
-            if certified.is_none() && !refused {
-                // The bounds were those about the previous plan; now about this one.
-                report = self.settle(&start);
-                iterations += report.iterations;
-                if report.status != Status::Fallback {
-                    certified = self.sets.certify(self.optimiser.motion());
-                }
-            }
-            if report.status != Status::Fallback && (certified.is_some() || !assured) {
+        let goes_on = (memory.plan.states[0], memory.age);
+        let starts = match self.settings.initial_state {
+            InitialState::Nominal if assured => [Some(goes_on), None],
+            InitialState::Measured if assured => [Some((*measured, 0)), Some(goes_on)],
+            _ => [Some((*measured, 0)), None],
+        };
+        let mut iterations = 0;
+        for (start, age) in starts.into_iter().flatten() {
+            self.sets.begin(age as usize, 1.0);
+            let (report, margins) = self.certified(memory, &start, first);
+            iterations += report.iterations;
+            let solved = report.status != Status::Fallback;
+            if margins.is_some() || solved && !assured {
                 self.follow_optimum(memory, &start);
                 memory.age = age;
-                memory.margins = certified.unwrap_or_else(|| self.sets.margins(self.optimiser.motion()));
-                memory.standing = match certified {
-                    Some(_) => Standing::InForce,
-                    None if refused => Standing::Refused,
-                    None => Standing::Uncertified,
-                };
+                memory.margins = margins.unwrap_or_else(|| self.sets.margins(self.optimiser.motion()));
+                memory.standing = if margins.is_some() { Standing::InForce } else { self.without_guarantee() };
                 return mpc::Report { iterations, ..report };
             }
         }
@@ -242,8 +233,44 @@ impl Crmpc {
             memory.margins = self.sets.margins(&self.previous);
             return report;
         }
-        memory.standing = if refused { Standing::Refused } else { Standing::Uncertified };
+        self.violate_least(memory, measured, iterations)
+    }
+
+    /// The optimum from `start`, with its margins if it keeps the conditions of the theorem.
+    fn certified(
+        &mut self,
+        memory: &Memory,
+        start: &Vector6<f64>,
+        first: bool,
+    ) -> (mpc::Report, Option<Margins>) {
+        let report = self.solve(memory, start, first);
+        if report.status == Status::Fallback {
+            return (report, None);
+        }
+        let margins = self.sets.certify(self.optimiser.motion());
+        if margins.is_some() || self.design.counted < 1.0 {
+            return (report, margins);
+        }
+        // Some of the bounds were those about the previous plan; now about this one.
+        let settled = self.settle(start);
+        let iterations = report.iterations + settled.iterations;
+        let margins = match settled.status {
+            Status::Fallback => None,
+            _ => self.sets.certify(self.optimiser.motion()),
+        };
+        (mpc::Report { iterations, ..settled }, margins)
+    }
+
+    /// The optimum with less of the tightening, or without constraints.
+    fn violate_least(
+        &mut self,
+        memory: &mut Memory,
+        measured: &Vector6<f64>,
+        mut iterations: u32,
+    ) -> mpc::Report {
+        memory.standing = self.without_guarantee();
         memory.age = 0;
+        let mut report = mpc::Report::default();
         for share in LESS {
             self.sets.begin(0, share);
             report = self.solve(memory, measured, true);
@@ -252,13 +279,17 @@ impl Crmpc {
                 break;
             }
         }
-        let error = error(measured, &self.sets.references[0]);
         if report.status == Status::Fallback {
+            let error = error(measured, &self.sets.references[0]);
             report = self.optimiser.without_constraints(&self.sets, &error, &self.affine);
         }
         self.follow_optimum(memory, measured);
         memory.margins = self.sets.margins(self.optimiser.motion());
         mpc::Report { iterations, ..report }
+    }
+
+    fn without_guarantee(&self) -> Standing {
+        if self.design.counted < 1.0 { Standing::Refused } else { Standing::Uncertified }
     }
 
     /// The optimum from `start` with the bounds about the previous plan; without one (`first`) about itself.

@@ -83,7 +83,7 @@ pub trait Bounded<const O: usize>: Constraints<O> {
 }
 
 /// How an optimisation ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Report {
     /// Which way led to the optimum; [`Status::Fallback`] if none did.
     pub status: Status,
