@@ -270,9 +270,20 @@ impl Plan {
         self.probes.ports.iter().position(|known| *known == port)
     }
 
+    /// Items of the enumeration that stands at this place among a sample's values; none if it is of another type.
+    fn items(&self, place: usize) -> Vec<(String, i32)> {
+        let port = self.probes.ports[place];
+        match &self.fmus[port.component].description.variables[port.variable].kind {
+            Kind::Enumeration { items } => items.clone(),
+            _ => Vec::new(),
+        }
+    }
+
     /// An empty sum of the figures of merit.
     pub fn merit(&self, limits: Limits) -> Merit {
-        Merit::new(self.places, limits, self.clock.ticks() + 1)
+        let statuses =
+            self.places.guarantee.and_then(|signals| signals.status).map(|place| self.items(place));
+        Merit::new(self.places, limits, self.clock.ticks() + 1).with_statuses(statuses.unwrap_or_default())
     }
 
     /// Instantiates the units and sets their parameters.

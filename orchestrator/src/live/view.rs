@@ -315,7 +315,7 @@ mod tests {
                 solver_time: Some(12),
                 solver_solves: Some(13),
                 solver_fallbacks: Some(14),
-                every: 1,
+                ..Places::default()
             },
             limits: Limits { rate: Some(5_f64.to_radians()), moment: Some(1e5) },
             status: Some(Shown { place: 15, items: vec![("optimal".into(), 1)], ..Shown::default() }),
