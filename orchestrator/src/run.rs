@@ -159,6 +159,10 @@ impl Plan {
         if options.live {
             live::check_terminal()?;
         }
+        let step = self.clock.step();
+        for warning in delay::warnings(&self.parts(), &self.settings, &self.loops, step) {
+            tracing::warn!("{warning}");
+        }
         let experiment = &self.experiment;
         let stem = experiment.source.path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy());
         let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(stem.as_ref()));
