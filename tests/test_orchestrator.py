@@ -18,6 +18,12 @@ KEYS = {
     "solver_ms_p99",
     "solver_ms_max",
     "fallbacks",
+    "guarantee_share",
+    "guarantee_lost_at",
+    "guarantee_status",
+    "guarantee_rate_margin_min",
+    "guarantee_moment_margin_min",
+    "guarantee_broken",
     "real_time_factor",
 }
 

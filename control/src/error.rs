@@ -87,6 +87,14 @@ pub enum DesignError {
         /// First value no longer allowed.
         high: f64,
     },
+    /// The delay that a prediction makes up for is out of its range.
+    #[error("delay = {value} s must lie between 0 and {longest} s")]
+    Delay {
+        /// Its value, s.
+        value: f64,
+        /// Largest allowed value, s.
+        longest: f64,
+    },
     /// The two rates do not fit.
     #[error(
         "period.optimisation = {optimisation} s must be a whole multiple of period.feedback = {feedback} s"

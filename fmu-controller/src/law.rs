@@ -17,6 +17,8 @@ pub(crate) struct Vehicle {
     pub(crate) limit_moment: f64,
     /// Whether the commanded moment is scaled into its limit.
     pub(crate) saturation: bool,
+    /// Time from a measurement until the moment that it leads to acts, s. The law sees the state predicted over it.
+    pub(crate) delay: f64,
 }
 
 impl Vehicle {

@@ -3,6 +3,7 @@
 use crate::law::Law;
 use crate::reference::PROFILES;
 use crate::unit::Unit;
+use control::delay;
 use fmi2_export::table::{Description, Real, Table, discrete_output, input, output, parameter};
 use model_description::DefaultExperiment;
 use model_description::unit;
@@ -172,6 +173,10 @@ fn vehicle<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
     let rate = parameter("limit.rate", "Limit on the norm of the body rates").real();
     let moment = parameter("limit.moment", "Limit on the norm of the control moment").real();
     let saturation = parameter("saturation", "Whether the commanded moment is scaled into limit.moment");
+    let delay = parameter(
+        "delay",
+        "Time from a measurement until the moment that it leads to acts on the vehicle; the law predicts the state over it",
+    );
     table
         .real(moment_of_inertia("inertia.Ixx", "Roll moment of inertia").min(1.0), |m| {
             &mut m.parameters.inertia.Ixx
@@ -189,6 +194,9 @@ fn vehicle<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
         .real(rate.unit(unit::angular_rate()).min(1e-6).nominal(0.1), |m| &mut m.parameters.limit_rate)
         .real(moment.unit(unit::moment()).min(1e-3).nominal(1e5), |m| &mut m.parameters.limit_moment)
         .boolean(saturation, |m| &mut m.parameters.saturation)
+        .real(delay.real().unit(unit::time()).min(0.0).max(delay::LONGEST).nominal(0.1), |m| {
+            &mut m.parameters.delay
+        })
 }
 
 /// The parameter of laws that use the moment that the actuators give.

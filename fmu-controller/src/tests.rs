@@ -9,6 +9,10 @@ use fmi2_export::{Context, Failure, Inputs, Model, describe};
 use model_description::ModelDescription;
 use model_description::variable::Causality;
 use nalgebra::Vector3;
+use vehicle::Scenario;
+use vehicle::disturbance::Disturbance;
+use vehicle::plant::{Plant, State};
+use vehicle::reference::Reference;
 
 /// Inputs that stay as they are.
 struct Held;
@@ -78,8 +82,9 @@ fn a_tick_evaluated_with_other_inputs_leaves_no_trace() {
     assert_eq!(once.output.moment, twice.output.moment);
 }
 
-fn assert_any_communication_steps_give_the_same_moments<L: Law>() {
-    let mut reference: Unit<L> = ready(|_| ());
+fn assert_any_communication_steps_give_the_same_moments<L: Law>(delay: f64) {
+    let start = || ready(|unit: &mut Unit<L>| unit.parameters.delay = delay);
+    let mut reference = start();
     let expected: Vec<_> = (0..10_u32)
         .map(|k| {
             step(&mut reference, f64::from(k) * 0.2, f64::from(k + 1) * 0.2);
@@ -87,7 +92,7 @@ fn assert_any_communication_steps_give_the_same_moments<L: Law>() {
         })
         .collect();
     for parts in [1, 3, 5, 10] {
-        let mut unit: Unit<L> = ready(|_| ());
+        let mut unit = start();
         for (k, expected) in (0..10_u32).zip(&expected) {
             let at = |part: u32| (f64::from(k) + f64::from(part) / f64::from(parts)) * 0.2;
             for part in 0..parts {
@@ -100,9 +105,11 @@ fn assert_any_communication_steps_give_the_same_moments<L: Law>() {
 
 #[test]
 fn any_communication_steps_give_the_same_moments() {
-    assert_any_communication_steps_give_the_same_moments::<CrmpcLaw>();
-    assert_any_communication_steps_give_the_same_moments::<DlmpcLaw>();
-    assert_any_communication_steps_give_the_same_moments::<TvsmcLaw<tvsmc::SotvsmcDo>>();
+    for delay in [0.0, 0.117] {
+        assert_any_communication_steps_give_the_same_moments::<CrmpcLaw>(delay);
+        assert_any_communication_steps_give_the_same_moments::<DlmpcLaw>(delay);
+        assert_any_communication_steps_give_the_same_moments::<TvsmcLaw<tvsmc::SotvsmcDo>>(delay);
+    }
 }
 
 #[test]
@@ -190,4 +197,56 @@ fn sliding_modes_scale_into_the_limit_themselves() {
     });
     unit.calculate(0.0).unwrap();
     assert!((unit.output.moment.norm() - 1e4).abs() < 1e-6);
+}
+
+/// The states at the ticks of a loop with saturation, from `start` (s), and the delay (s) that the law knows and the plant has.
+fn saturated_loop(start: f64, delay: f64, ticks: u32) -> Vec<State> {
+    let mut unit: Lqr = Lqr::new();
+    (unit.parameters.saturation, unit.parameters.delay) = (true, delay);
+    unit.initialize(&Context { start_time: start, ..context() }).unwrap();
+    let mut config = Scenario::crmpc2022().config(0.01);
+    (config.inertia_scale, config.disturbance, config.moment_delay) = (1.0, Disturbance::default(), delay);
+    let mut plant = Plant::new(&config, start).unwrap();
+    let mut go = |k: u32| {
+        let [from, to] = [k, k + 1].map(|k| start + 0.04 * f64::from(k));
+        (unit.input.measured.angles, unit.input.measured.rates) = (plant.angles(), plant.rates());
+        unit.calculate(from).unwrap();
+        plant.advance(from, to, unit.output.moment).unwrap();
+        unit.step(from, to, &Held, &mut |text| panic!("{text}")).unwrap();
+        plant.state
+    };
+    (0..ticks).map(&mut go).collect()
+}
+
+#[test]
+fn oracle_a_known_delay_shifts_the_loop_and_does_nothing_else_even_in_saturation() {
+    // The vehicle is at rest until the first command acts.
+    for periods in [1, 3] {
+        let delay = 0.04 * f64::from(periods);
+        let late = saturated_loop(0.0, delay, 500);
+        let direct = saturated_loop(delay, 0.0, 450);
+        for (late, direct) in late[periods as usize..].iter().zip(&direct) {
+            assert!((late - direct).amax() < 1e-11, "{delay} s");
+        }
+    }
+}
+
+#[test]
+fn an_external_reference_counts_when_the_moment_acts() {
+    let mut unit: Lqr = ready(|unit: &mut Lqr| {
+        unit.parameters.reference.profile = 7;
+        unit.parameters.delay = 0.1;
+    });
+    unit.input.reference = Reference { angles: unit.input.measured.angles, ..Reference::default() };
+    unit.calculate(0.0).unwrap();
+    assert_eq!(unit.output.moment, Vector3::zeros(), "at rest on the reference");
+    unit.input.reference.accelerations.x = 0.01;
+    unit.calculate(0.0).unwrap();
+    assert!(unit.output.moment.y > 0.0, "the acceleration is not taken for unknown");
+}
+
+#[test]
+fn a_delay_out_of_range_is_refused_by_name() {
+    let text = refusal::<Lqr>(|unit| unit.parameters.delay = 1.1);
+    assert!(text.contains("delay = 1.1 s"), "{text}");
 }

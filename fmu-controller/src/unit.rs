@@ -5,6 +5,7 @@ use crate::reference::{self, Source};
 use crate::table;
 use crate::ticks::{self, Ticked};
 use control::controller::{Controller, Measurement};
+use control::delay::Delayed;
 use control::schedule::Sampled;
 use fmi2_export::{Context, Description, Failure, Inputs, Model};
 use nalgebra::Vector3;
@@ -13,7 +14,7 @@ use vehicle::Scenario;
 use vehicle::dynamics::Inertia;
 use vehicle::reference::Reference;
 
-type Memory<L> = <<L as Law>::Controller as Controller>::Memory;
+type Memory<L> = <Delayed<<L as Law>::Controller> as Controller>::Memory;
 
 /// A controller as a unit.
 #[derive(Serialize, Deserialize)]
@@ -28,7 +29,7 @@ pub struct Unit<L: Law> {
     /// From initialization on.
     sampled: Option<Sampled<Memory<L>>>,
     #[serde(skip)]
-    controller: Option<L::Controller>,
+    controller: Option<Delayed<L::Controller>>,
 }
 
 /// Parameters of every controller.
@@ -39,6 +40,7 @@ pub(crate) struct Parameters {
     pub(crate) limit_rate: f64,
     pub(crate) limit_moment: f64,
     pub(crate) saturation: bool,
+    pub(crate) delay: f64,
     /// Whether the input `achieved_moment` is fed; declared by laws that use it.
     pub(crate) achieved_moment_used: bool,
 }
@@ -60,7 +62,7 @@ pub(crate) struct Output {
 
 /// What works together at a tick.
 struct Parts<'a, L: Law> {
-    controller: &'a mut L::Controller,
+    controller: &'a mut Delayed<L::Controller>,
     sampled: &'a mut Sampled<Memory<L>>,
     input: &'a Input,
     source: &'a Source,
@@ -77,10 +79,17 @@ impl<L: Law> Unit<L> {
         }
     }
 
-    fn design(&self) -> Result<L::Controller, Failure> {
-        let Parameters { inertia, limit_rate, limit_moment, saturation, .. } = self.parameters;
+    fn vehicle(&self) -> Result<Vehicle, Failure> {
+        let Parameters { inertia, limit_rate, limit_moment, saturation, delay, .. } = self.parameters;
         let body = inertia.body(1.0).map_err(|error| Failure::Error(error.to_string()))?;
-        self.law.design(&Vehicle { body, limit_rate, limit_moment, saturation })
+        Ok(Vehicle { body, limit_rate, limit_moment, saturation, delay })
+    }
+
+    fn design(&self) -> Result<Delayed<L::Controller>, Failure> {
+        let vehicle = self.vehicle()?;
+        let law = self.law.design(&vehicle)?;
+        let delayed = Delayed::new(law, vehicle.body, vehicle.delay, vehicle.saturates_at());
+        delayed.map_err(|error| Failure::Error(error.to_string()))
     }
 }
 
@@ -96,6 +105,8 @@ impl<L: Law> Ticked for Unit<L> {
         let measured =
             Measurement { achieved_moment: used.then_some(input.achieved_moment), ..input.measured };
         let now = sampled.next_time(controller.period());
+        // Of an external reference the law takes the present value for that of the time at which its moment acts.
+        let known = now + controller.predictor().delay();
         let external = match source {
             Source::External => input.reference,
             Source::Profile(_) => Reference::default(),
@@ -104,7 +115,7 @@ impl<L: Law> Ticked for Unit<L> {
         for (i, part) in [external.angles, external.rates, external.accelerations].iter().enumerate() {
             mark[3 * i..3 * i + 3].copy_from_slice(part.as_slice());
         }
-        sampled.evaluate(controller, &measured, mark, &|time| source.at(time, now, &external));
+        sampled.evaluate(controller, &measured, mark, &|time| source.at(time, known, &external));
         if sampled.in_force().0.iter().all(|value| value.is_finite()) {
             return Ok(());
         }
@@ -116,7 +127,7 @@ impl<L: Law> Ticked for Unit<L> {
     fn commit(&mut self) -> Result<Option<&'static str>, Failure> {
         let Parts { sampled, .. } = self.parts()?;
         sampled.commit();
-        Ok(sampled.last_change(L::warning))
+        Ok(sampled.last_change(|before, after| L::warning(&before.inner, &after.inner)))
     }
 }
 
@@ -134,6 +145,7 @@ impl<L: Law> Model for Unit<L> {
                 limit_rate: scenario.limit_rate,
                 limit_moment: scenario.limit_moment,
                 saturation: false,
+                delay: 0.0,
                 achieved_moment_used: false,
             },
             input: Input {
@@ -166,13 +178,11 @@ impl<L: Law> Model for Unit<L> {
         if sampled.is_due(time, controller.period()) {
             self.evaluate()?;
         }
-        let Some(sampled) = &self.sampled else { return Ok(()) };
+        let (Some(controller), Some(sampled)) = (&self.controller, &self.sampled) else { return Ok(()) };
         let (moment, memory) = sampled.in_force();
-        self.law.show(memory);
-        let limit = self.parameters.limit_moment;
-        let excess = if self.parameters.saturation { moment.norm() / limit } else { 0.0 };
+        self.law.show(&memory.inner);
         self.output = Output {
-            moment: if excess > 1.0 { moment / excess } else { moment },
+            moment: controller.saturated(moment),
             reference: self.source.at(time, time, &self.input.reference),
         };
         Ok(())

@@ -43,7 +43,7 @@ pub(crate) const KINDS: [(Kind, &str, &str); 7] = [
 
 /// How the control moment comes about: the items in the order of their enumeration values 1, 2, with name and description.
 pub(crate) const ACTUATIONS: [(&str, &str); 2] = [
-    ("moment", "the input moment acts as it comes"),
+    ("moment", "the input moment acts, after actuation.delay"),
     ("surfacesAndJets", "the inputs surface and jet command eight aerodynamic surfaces and ten jets"),
 ];
 
@@ -88,6 +88,7 @@ pub(crate) struct Parameters {
     pub(crate) earth_rate: f64,
     /// Number of the item of [`ACTUATIONS`], from 1.
     pub(crate) actuation: i32,
+    pub(crate) moment_delay: f64,
     pub(crate) flight: Flight,
     pub(crate) density_scale: f64,
     pub(crate) aerodynamics_scale: f64,
@@ -133,6 +134,7 @@ impl Default for Parameters {
             kinematics: 1,
             earth_rate: 0.0,
             actuation: 1,
+            moment_delay: 0.0,
             flight: tvsmc.flight.unwrap_or(Flight { altitude: 0.0, mach: 0.0 }),
             density_scale: 1.0,
             aerodynamics_scale: 1.0,
@@ -210,6 +212,7 @@ impl Parameters {
             kinematics: item(self.kinematics, &KINEMATICS).map_or(Kinematics::Printed, |item| item.0),
             earth_rate: self.earth_rate,
             actuators: self.actuators()?,
+            moment_delay: self.moment_delay,
             calibration: self.calibrates.then_some(self.sequence),
             surroundings: self.surroundings,
             sensors: self.sensors(),

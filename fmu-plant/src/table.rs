@@ -17,6 +17,7 @@ use vehicle::atmosphere;
 use vehicle::effectors::{Effectors, JETS, SURFACES};
 use vehicle::kinematics::Trajectory;
 use vehicle::plant::BETA_LIMIT;
+use vehicle::transport;
 
 const ANGLES: [(&str, &str); 3] =
     [("alpha", "angle of attack"), ("beta", "sideslip angle"), ("sigma", "bank angle")];
@@ -89,7 +90,7 @@ pub(crate) fn description() -> Description<ReentryPlant> {
     let step = parameter("integrator.step", "Longest step of the Runge-Kutta integration in co-simulation");
     let table = table
         .real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| &mut m.parameters.step);
-    let table = sensors::all(kinematics(actuation(table)));
+    let table = delay(sensors::all(kinematics(actuation(table))));
     Description {
         name: "ReentryPlant",
         description: "Attitude motion of a re-entry vehicle under moments and bounded disturbances",
@@ -322,6 +323,12 @@ fn actuation(table: Plant) -> Plant {
         .real(aerodynamics.real().min(0.0).max(10.0).nominal(1.0), |m| &mut m.parameters.aerodynamics_scale)
         .boolean(duty, |m| &mut m.parameters.jet_duty)
         .boolean(symmetric, |m| &mut m.parameters.jet_symmetric)
+}
+
+fn delay(table: Plant) -> Plant {
+    let text = "Time after which the input moment acts, held over each step; co-simulation with actuation = moment only";
+    let delay = parameter("actuation.delay", text).real().unit(unit::time());
+    table.real(delay.min(0.0).max(transport::LONGEST).nominal(0.1), |m| &mut m.parameters.moment_delay)
 }
 
 fn inertia(table: Plant) -> Plant {

@@ -239,6 +239,14 @@ fn at_a_communication_point() -> ReentryPlant {
     unit
 }
 
+/// In co-simulation, under a moment that was commanded before.
+fn under_a_delayed_moment() -> ReentryPlant {
+    let mut unit = delayed(0.01);
+    unit.input.moment = Vector3::new(3e4, -2e4, 1e4);
+    step(&mut unit, 0.0, 0.02).unwrap();
+    unit
+}
+
 fn known_positions() -> impl Iterator<Item = usize> {
     (0..69).filter(|&position| Known::of(position).is_some())
 }
@@ -278,7 +286,7 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
         .map(in_model_exchange)
         .chain([false, true].map(actuated_in_model_exchange))
         .chain([(1, 1), (3, 2), (7, 2)].map(|(kind, kinematics)| along_a_trajectory(kind, kinematics)))
-        .chain([at_a_communication_point()]);
+        .chain([at_a_communication_point(), under_a_delayed_moment()]);
     for (case, mut unit) in units.enumerate() {
         for known in known_positions() {
             let by = match known {
@@ -781,4 +789,54 @@ fn outputs_need_no_start_and_inputs_have_one() {
             variable.name
         );
     }
+}
+
+fn delayed(delay: f64) -> ReentryPlant {
+    started(|unit| unit.parameters.moment_delay = delay)
+}
+
+#[test]
+fn oracle_a_delayed_moment_is_shown_when_it_acts() {
+    let mut unit = delayed(0.1);
+    let pitch = |k: u32| Vector3::new(0.0, 1e4 * f64::from(k + 1), 0.0);
+    for k in 0..20_u32 {
+        let time = 0.04 * f64::from(k);
+        unit.input.moment = pitch(k);
+        // 0.1 s are two and a half steps.
+        let acts = if k < 3 { Vector3::zeros() } else { pitch(k - 3) };
+        assert_eq!(outputs(&mut unit, time).applied_moment, acts, "{k}");
+        step(&mut unit, time, time + 0.04).unwrap();
+    }
+}
+
+#[test]
+fn moments_under_way_are_part_of_the_saved_state() {
+    let mut unit = delayed(0.117);
+    let mut restored: Option<ReentryPlant> = None;
+    for k in 0..20_u32 {
+        let time = 0.04 * f64::from(k);
+        for unit in std::iter::once(&mut unit).chain(restored.as_mut()) {
+            unit.input.moment = Vector3::new(1e4 * time.sin(), -1e4 * time.cos(), 5e3);
+            step(unit, time, time + 0.04).unwrap();
+        }
+        if k == 7 {
+            restored = Some(serde_json::from_str(&serde_json::to_string(&unit).unwrap()).unwrap());
+        }
+    }
+    assert_eq!(outputs(&mut unit, 0.8), outputs(&mut restored.unwrap(), 0.8));
+}
+
+#[test]
+fn a_delay_is_refused_by_name_where_it_cannot_work() {
+    let text = |failure: Failure| failure.to_string();
+    let in_model_exchange = text(delayed(0.1).new_discrete_states(0.0).unwrap_err());
+    assert!(in_model_exchange.contains("actuation.delay") && in_model_exchange.contains("co-simulation"));
+    assert!(delayed(0.0).new_discrete_states(0.0).is_ok());
+    let ramp = text(delayed(0.1).step(0.0, 0.04, &Ramp(1e5), &mut |_| {}).unwrap_err());
+    assert!(ramp.contains("actuation.delay") && ramp.contains("derivatives"), "{ramp}");
+    let mut actuated = ReentryPlant::new();
+    actuated.parameters.moment_delay = 0.1;
+    actuate(&mut actuated);
+    let actuated = text(actuated.initialize(&CONTEXT).unwrap_err());
+    assert!(actuated.contains("actuation.delay"), "{actuated}");
 }

@@ -66,6 +66,11 @@ impl Clock {
     }
 }
 
+/// A time (s) for a text, without what rounding left in its last digits.
+pub(crate) fn rounded(time: f64) -> f64 {
+    (time * 1e9).round() / 1e9
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

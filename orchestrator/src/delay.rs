@@ -5,7 +5,10 @@
 //! value of the point before: one of its steps of delay. An output that depends on states alone is never late. A loop in
 //! which every output is direct is algebraic: no order of calls solves it.
 
+use crate::clock;
+use crate::description::Kind;
 use crate::experiment::Coupling;
+use crate::settings::{Setting, SettingValue};
 use crate::wiring::{Part, Wire};
 use std::collections::BTreeSet;
 
@@ -178,10 +181,60 @@ fn follow(
     None
 }
 
+/// The parameter by which a component says which delay of its loop its law counts on, s.
+const COUNTED_ON: &str = "delay";
+/// The parameter by which a component says how much later than commanded its actuators act, s.
+const TRANSPORT: &str = "actuation.delay";
+
+/// One warning for each component whose law counts on another delay than its feedback loop has. The loop's delay is its ticks
+/// times `step` (s), and the transport delays of the other components on it. Of several loops the one with the longest delay counts.
+pub fn warnings(parts: &[Part], settings: &[Vec<Setting>], loops: &[FeedbackLoop], step: f64) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (component, part) in parts.iter().enumerate() {
+        let Some(counted_on) = duration(COUNTED_ON, parts[component], &settings[component]) else { continue };
+        let own = loops.iter().filter(|feedback| feedback.components.contains(&component));
+        let delays = own.map(|feedback| {
+            let others = feedback.components.iter().filter(|other| **other != component);
+            let transport: f64 =
+                others.filter_map(|&other| duration(TRANSPORT, parts[other], &settings[other])).sum();
+            (feedback.ticks as f64 * step + transport, feedback)
+        });
+        let Some((delay, longest)) = delays.max_by(|(a, _), (b, _)| a.total_cmp(b)) else { continue };
+        if (delay - counted_on).abs() <= 1e-9 * delay.abs().max(counted_on.abs()) {
+            continue;
+        }
+        let names: Vec<&str> = longest
+            .components
+            .iter()
+            .chain(longest.components.first())
+            .map(|&index| parts[index].name)
+            .collect();
+        let (name, delay) = (part.name, clock::rounded(delay));
+        warnings.push(format!(
+            "{name}.{COUNTED_ON} = {counted_on} s, but the loop {} has a delay of {delay} s: set {name}.{COUNTED_ON} = {delay}",
+            names.join(" -> ")
+        ));
+    }
+    warnings
+}
+
+/// Value of a real parameter in s, from the experiment or else its start value; `None` if there is no such parameter.
+fn duration(name: &str, part: Part, settings: &[Setting]) -> Option<f64> {
+    let (_, variable) = part.description.find(name)?;
+    let is_duration = matches!(&variable.kind, Kind::Real { unit: Some(unit), .. } if unit == "s");
+    if !is_duration || variable.causality != "parameter" {
+        return None;
+    }
+    match settings.iter().find(|setting| setting.name == name).map(|setting| &setting.value) {
+        Some(SettingValue::Real(value)) => Some(*value),
+        _ => variable.start.as_ref()?.trim().parse().ok(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::{Kind, ModelDescription, Variable};
+    use crate::description::{ModelDescription, Variable};
     use crate::experiment::Scaling;
     use crate::wiring::{Carrier, Port};
 
@@ -247,6 +300,83 @@ mod tests {
         assert_eq!(ticks(&units, &[1; 3], &wires[..3], Coupling::Jacobi), [2]);
         assert_eq!(ticks(&units, &[1; 3], &wires, Coupling::GaussSeidel), [0, 0]);
         assert!(ticks(&units, &[1; 3], &wires[..2], Coupling::Jacobi).is_empty());
+    }
+
+    /// Adds a real parameter in s.
+    fn with_duration(mut unit: ModelDescription, name: &str, unit_name: &str) -> ModelDescription {
+        let kind = Kind::Real { unit: Some(unit_name.into()), display_unit: None, min: Some(0.0), max: None };
+        let start = Some("0".to_string());
+        let causality = "parameter".to_string();
+        let variable = Variable { name: name.into(), causality, kind, start, ..unit.variables[0].clone() };
+        unit.variables.push(variable);
+        unit
+    }
+
+    /// Warnings of controller and plant with these values of `delay` and `actuation.delay`, steps of 0.04 s.
+    fn warned(counted_on: Option<f64>, transport: Option<f64>, coupling: Coupling) -> Vec<String> {
+        let controller = with_duration(unit(&[Some(true)]), "delay", "s");
+        let plant = with_duration(unit(&[Some(false)]), "actuation.delay", "s");
+        let parts = [
+            Part { name: "controller", description: &controller },
+            Part { name: "plant", description: &plant },
+        ];
+        let setting = |name: &str, value: Option<f64>| {
+            let real = |value| Setting { name: name.into(), reference: 0, value: SettingValue::Real(value) };
+            value.map(real).into_iter().collect::<Vec<_>>()
+        };
+        let settings = [setting("delay", counted_on), setting("actuation.delay", transport)];
+        let loops = feedback_loops(&parts, &[1, 1], &[wire((0, 1), 1), wire((1, 1), 0)], coupling);
+        warnings(&parts, &settings, &loops, 0.04)
+    }
+
+    #[test]
+    fn oracle_a_law_that_counts_on_its_loops_delay_is_not_warned_of() {
+        assert!(warned(None, None, Coupling::GaussSeidel).is_empty());
+        assert!(warned(Some(0.04), None, Coupling::Jacobi).is_empty());
+        assert!(warned(Some(0.02), Some(0.02), Coupling::GaussSeidel).is_empty());
+        assert!(warned(Some(0.07), Some(0.03), Coupling::Jacobi).is_empty());
+        assert!(warned(Some(0.04 * (1.0 + 1e-12)), None, Coupling::Jacobi).is_empty());
+    }
+
+    #[test]
+    fn oracle_a_law_that_counts_on_another_delay_is_told_the_right_one() {
+        let told = |counted_on, delay| {
+            let expected = format!(
+                "controller.delay = {counted_on} s, but the loop controller -> plant -> controller has a delay of \
+                 {delay} s: set controller.delay = {delay}"
+            );
+            vec![expected]
+        };
+        assert_eq!(warned(None, None, Coupling::Jacobi), told("0", "0.04"));
+        assert_eq!(warned(Some(0.04), None, Coupling::GaussSeidel), told("0.04", "0"));
+        assert_eq!(warned(Some(0.04), Some(0.02), Coupling::Jacobi), told("0.04", "0.06"));
+        assert_eq!(warned(Some(0.0400001), None, Coupling::Jacobi), told("0.0400001", "0.04"));
+    }
+
+    #[test]
+    fn the_longest_loop_counts_and_what_is_on_no_loop_does_not() {
+        // 0 -> 1 -> 0 with one tick in between, 0 -> 2 -> 0 with none; 3 is on no loop.
+        let law = with_duration(unit(&[Some(true)]), "delay", "s");
+        let (direct, state) = (unit(&[Some(true)]), unit(&[Some(false)]));
+        let units = [law.clone(), direct, state, law];
+        let parts: Vec<Part> = units.iter().map(|description| Part { name: "c", description }).collect();
+        let wires = [wire((0, 1), 1), wire((1, 1), 0), wire((0, 1), 2), wire((2, 1), 0), wire((2, 1), 3)];
+        let loops = feedback_loops(&parts, &[1; 4], &wires, Coupling::GaussSeidel);
+        let none = [const { Vec::new() }; 4];
+        let warnings = warnings(&parts, &none, &loops, 0.5);
+        assert_eq!(
+            warnings,
+            ["c.delay = 0 s, but the loop c -> c -> c has a delay of 0.5 s: set c.delay = 0.5"]
+        );
+    }
+
+    #[test]
+    fn a_parameter_that_is_no_duration_means_something_else() {
+        let law = with_duration(unit(&[Some(true)]), "delay", "1");
+        let parts = ["a", "b"].map(|name| Part { name, description: &law });
+        let loops = feedback_loops(&parts, &[1, 1], &[wire((0, 1), 1), wire((1, 1), 0)], Coupling::Jacobi);
+        assert_eq!(loops.len(), 1);
+        assert!(warnings(&parts, &[Vec::new(), Vec::new()], &loops, 0.04).is_empty());
     }
 
     #[test]

@@ -37,6 +37,7 @@
 //! moment = "controller.moment"      # .x .y .z
 //! limit = "controller.limit"        # parameters .rate and .moment
 //! solver = "controller.solver"      # .time .solves .fallbacks
+//! guarantee = "controller.guarantee"   # .inForce .status .rateMargin .momentMargin
 //! every = 1                         # means are of every n-th communication point, largest values of all
 //! ```
 
@@ -197,6 +198,8 @@ pub struct Roles {
     pub limit: Option<String>,
     /// Statistics of the controller's solver.
     pub solver: Option<String>,
+    /// What the controller says of its guarantee to keep the limits.
+    pub guarantee: Option<String>,
     /// The means are of every so many communication points, from the first on.
     #[serde(default = "one")]
     pub every: u32,
@@ -211,6 +214,7 @@ impl Default for Roles {
             moment: None,
             limit: None,
             solver: None,
+            guarantee: None,
             every: 1,
         }
     }

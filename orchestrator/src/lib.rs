@@ -16,6 +16,7 @@ pub mod error;
 pub mod experiment;
 pub mod figure;
 pub mod fmu;
+pub mod guarantee;
 pub mod inspect;
 pub mod interrupt;
 pub mod list;

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::experiment::Roles;
+use crate::guarantee::{self, Course};
 use crate::master::{Observer, Sample};
 use crate::names;
 use crate::realtime::report::RealTime;
@@ -43,6 +44,8 @@ pub struct Places {
     pub solver_solves: Option<usize>,
     /// Number of fallbacks so far.
     pub solver_fallbacks: Option<usize>,
+    /// What the controller says of its guarantee.
+    pub guarantee: Option<guarantee::Signals>,
     /// The means are of every so many communication points.
     pub every: u64,
 }
@@ -58,6 +61,7 @@ impl Default for Places {
             solver_time: None,
             solver_solves: None,
             solver_fallbacks: None,
+            guarantee: None,
             every: 1,
         }
     }
@@ -74,6 +78,9 @@ pub struct Limits {
 
 /// Where the solver's variables are, unless the experiment says otherwise.
 pub(crate) const SOLVER: &str = "controller.solver";
+
+/// Where the controller says whether its guarantee is in force, unless the experiment says otherwise.
+pub(crate) const GUARANTEE: &str = "controller.guarantee";
 
 const ANGLES: [&str; 3] = ["alpha", "beta", "sigma"];
 const RATES: [&str; 3] = ["p", "q", "r"];
@@ -124,6 +131,12 @@ pub fn places(
     places.solver_time = solver("time")?;
     places.solver_solves = solver("solves")?;
     places.solver_fallbacks = solver("fallbacks")?;
+    let mut guarantee = |name| {
+        single("guarantee", &roles.guarantee, GUARANTEE, name).map(|port| port.map(|port| probes.place(port)))
+    };
+    let (in_force, status) = (guarantee("inForce")?, guarantee("status")?);
+    let margins = [guarantee("rateMargin")?, guarantee("momentMargin")?];
+    places.guarantee = in_force.map(|in_force| guarantee::Signals { in_force, status, margins });
     let limit = |name| single("limit", &roles.limit, "controller.limit", name);
     Ok((places, [limit("rate")?, limit("moment")?]))
 }
@@ -164,6 +177,18 @@ pub struct Metrics {
     pub solves: Option<u64>,
     /// How often the controller fell back.
     pub fallbacks: Option<u64>,
+    /// Share of the communication points at which the controller's guarantee was in force.
+    pub guarantee_share: Option<f64>,
+    /// First time at which it was no longer in force, s; null if it was never lost.
+    pub guarantee_lost_at: Option<f64>,
+    /// Status when it was first lost; if it never was, the last one.
+    pub guarantee_status: Option<String>,
+    /// Smallest share of the rate's limit that was left beyond what is reserved, while it was in force.
+    pub guarantee_rate_margin_min: Option<f64>,
+    /// The same of the moment's limit.
+    pub guarantee_moment_margin_min: Option<f64>,
+    /// Whether a limit was exceeded while it was in force, which is a defect.
+    pub guarantee_broken: Option<bool>,
     /// Simulated time over elapsed time.
     pub real_time_factor: Option<f64>,
     /// Elapsed time, s.
@@ -193,11 +218,15 @@ pub struct Merit {
     solves: f64,
     solver_seconds: Vec<f64>,
     fallbacks: Option<f64>,
+    guarantee: Option<Course>,
+    /// Names of the guarantee's statuses.
+    statuses: Vec<(String, i32)>,
     samples: u64,
     completed: bool,
 }
 
-fn norm_squared(values: &[f64], places: [usize; 3]) -> f64 {
+/// Square of a vector's length.
+pub(crate) fn norm_squared(values: &[f64], places: [usize; 3]) -> f64 {
     places.iter().map(|&place| values[place] * values[place]).sum()
 }
 
@@ -214,9 +243,17 @@ impl Merit {
             solves: 0.0,
             solver_seconds: Vec::with_capacity(capacity),
             fallbacks: None,
+            guarantee: Course::new(places, limits),
+            statuses: Vec::new(),
             samples: 0,
             completed: false,
         }
+    }
+
+    /// Gives the statuses of the guarantee their names.
+    #[must_use]
+    pub fn with_statuses(self, statuses: Vec<(String, i32)>) -> Self {
+        Self { statuses, ..self }
     }
 
     /// Duration of each solution, s, in the order of time.
@@ -236,6 +273,11 @@ impl Merit {
         let mean = times.iter().sum::<f64>() / times.len() as f64;
         let max_rate = rate.map(|_| self.largest[0].sqrt());
         let max_moment_ratio = moment.and(self.limits.moment).map(|limit| self.largest[1].sqrt() / limit);
+        let guarantee = self.guarantee.as_ref();
+        let status = |value: f64| {
+            let item = self.statuses.iter().find(|(_, item)| f64::from(*item) == value);
+            item.map_or_else(|| value.to_string(), |(name, _)| name.clone())
+        };
         let max_rate_ratio = max_rate.zip(self.limits.rate).map(|(rate, limit)| rate / limit);
         Metrics {
             ems_deg: attitude.and(reference).and_then(|_| root_mean(self.sums[0])).map(f64::to_degrees),
@@ -250,6 +292,12 @@ impl Merit {
             solver_ms_max: milliseconds(times.last()),
             solves: self.places.solver_solves.map(|_| self.solves as u64),
             fallbacks: self.fallbacks.map(|count| count as u64),
+            guarantee_share: guarantee.and_then(Course::share),
+            guarantee_lost_at: guarantee.and_then(|course| course.lost).map(|loss| loss.time),
+            guarantee_status: guarantee.and_then(Course::status).map(status),
+            guarantee_rate_margin_min: guarantee.and_then(|course| course.margins[0]),
+            guarantee_moment_margin_min: guarantee.and_then(|course| course.margins[1]),
+            guarantee_broken: guarantee.filter(|course| course.is_checked()).map(|course| course.broken),
             real_time_factor: (wall > 0.0).then(|| simulated / wall),
             wall_s: wall,
             loop_delay_s: loop_delay,
@@ -293,6 +341,9 @@ impl Observer for Merit {
             self.solves = values[solves];
         }
         self.fallbacks = self.places.solver_fallbacks.map(|place| values[place]);
+        if let Some(course) = &mut self.guarantee {
+            course.observe(sample)?;
+        }
         self.samples += 1;
         self.completed |= last;
         Ok(())
@@ -302,6 +353,7 @@ impl Observer for Merit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::{Kind, ModelDescription, Variable};
 
     fn merit() -> Merit {
         let places = Places {
@@ -312,14 +364,15 @@ mod tests {
             solver_time: Some(12),
             solver_solves: Some(13),
             solver_fallbacks: Some(14),
-            every: 1,
+            ..Places::default()
         };
         Merit::new(places, Limits { rate: Some(0.1), moment: Some(10.0) }, 3)
     }
 
     fn feed(merit: &mut Merit, rows: &[[f64; 15]]) {
         for (tick, row) in rows.iter().enumerate() {
-            let sample = Sample { tick: tick as u64, time: 0.0, last: tick + 1 == rows.len(), values: row };
+            let sample =
+                Sample { tick: tick as u64, time: tick as f64, last: tick + 1 == rows.len(), values: row };
             merit.observe(&sample).unwrap();
         }
     }
@@ -388,5 +441,66 @@ mod tests {
         for key in ["solver_ms_max", "fallbacks", "real_time_factor"] {
             assert!(json.as_object().unwrap()[key].is_null(), "{key}");
         }
+        for what in ["share", "lost_at", "status", "rate_margin_min", "moment_margin_min", "broken"] {
+            let key = format!("guarantee_{what}");
+            assert!(json.as_object().unwrap()[&key].is_null(), "{key}");
+        }
+    }
+
+    #[test]
+    fn the_guarantee_is_among_the_figures_of_merit() {
+        let signals = guarantee::Signals { in_force: 0, status: Some(1), margins: [Some(2), Some(3)] };
+        let places = Places { moment: Some([4, 5, 6]), guarantee: Some(signals), ..Places::default() };
+        let limits = Limits { rate: None, moment: Some(10.0) };
+        let statuses = vec![("inForce".to_string(), 1), ("exceeded".to_string(), 5)];
+        let mut merit = Merit::new(places, limits, 4).with_statuses(statuses);
+        let mut rows = [[0.0; 15]; 4];
+        rows[0][..5].copy_from_slice(&[1.0, 1.0, 0.25, 0.5, 11.0]);
+        rows[1][..5].copy_from_slice(&[1.0, 1.0, 0.5, 0.125, 1.0]);
+        rows[2][..5].copy_from_slice(&[0.0, 5.0, 0.0, 0.0, 1.0]);
+        rows[3][..5].copy_from_slice(&[0.0, 2.0, 0.0, 0.0, 1.0]);
+        feed(&mut merit, &rows);
+        let metrics = merit.metrics(1.0, 1.0, None);
+        assert_eq!((metrics.guarantee_share, metrics.guarantee_lost_at), (Some(0.5), Some(2.0)));
+        assert_eq!(metrics.guarantee_status.as_deref(), Some("exceeded"));
+        assert_eq!(metrics.guarantee_rate_margin_min, Some(0.25));
+        assert_eq!(metrics.guarantee_moment_margin_min, Some(0.125));
+        assert_eq!(metrics.guarantee_broken, Some(true));
+    }
+
+    /// Places in a component `law` and a component `controller` with these variables.
+    fn places_with(names: &[&str], roles: &Roles) -> Result<Places, Error> {
+        let variables = names.iter().enumerate().map(|(reference, name)| Variable {
+            name: (*name).into(),
+            reference: reference as u32,
+            description: String::new(),
+            causality: "output".into(),
+            variability: "discrete".into(),
+            kind: Kind::Boolean,
+            start: None,
+        });
+        let description = ModelDescription { variables: variables.collect(), ..ModelDescription::default() };
+        let parts = ["controller", "law"].map(|name| Part { name, description: &description });
+        places(roles, &parts, &mut Probes::default()).map(|(places, _)| places)
+    }
+
+    #[test]
+    fn a_guarantee_is_used_where_there_is_one_and_wanted_where_it_is_named() {
+        let names = ["x.inForce", "x.status", "x.rateMargin", "x.momentMargin"];
+        let by_default = names.map(|name| name.replace('x', "guarantee"));
+        let by_default: Vec<&str> = by_default.iter().map(String::as_str).collect();
+        let none = Roles::default();
+        let all = guarantee::Signals { in_force: 0, status: Some(1), margins: [Some(2), Some(3)] };
+        assert_eq!(places_with(&by_default, &none).unwrap().guarantee, Some(all));
+        let bare = guarantee::Signals { in_force: 0, status: None, margins: [None; 2] };
+        assert_eq!(places_with(&by_default[..1], &none).unwrap().guarantee, Some(bare));
+        assert_eq!(places_with(&names, &none).unwrap().guarantee, None);
+        let named = Roles { guarantee: Some("law.x".into()), ..Roles::default() };
+        assert_eq!(places_with(&names, &named).unwrap().guarantee, Some(all));
+        let message = places_with(&names[..3], &named).unwrap_err().to_string();
+        assert!(
+            message.contains("[metrics] guarantee: there is no variable \"law.x.momentMargin\""),
+            "{message}"
+        );
     }
 }

@@ -1,6 +1,8 @@
 //! What a run says for itself on standard output.
 
+use crate::clock;
 use crate::experiment::Coupling;
+use crate::metrics::Metrics;
 use crate::run::{Plan, Report};
 use crate::study::reproduce;
 use std::io::{self, Write};
@@ -55,6 +57,9 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
     }
     if let Some(fallbacks) = metrics.fallbacks {
         line("solver fallbacks", format!("{fallbacks}"))?;
+    }
+    if let Some(guarantee) = guarantee(metrics) {
+        line("guarantee", guarantee)?;
     }
     if report.loops.is_empty() {
         line("loop delay", "no feedback loop".into())?;
@@ -142,4 +147,75 @@ fn against(ratio: f64, limit: &str) -> String {
     // What is not a number is not within a limit.
     let verdict = if ratio <= 1.0 { "within" } else { "EXCEEDS" };
     format!("   {verdict} its limit {limit}: {:.1} %", ratio * 100.0)
+}
+
+/// What became of the controller's guarantee, if it gives one.
+fn guarantee(metrics: &Metrics) -> Option<String> {
+    let share = metrics.guarantee_share?;
+    let status = metrics.guarantee_status.as_ref().map_or(String::new(), |status| format!(" ({status})"));
+    let margins = margins([metrics.guarantee_rate_margin_min, metrics.guarantee_moment_margin_min]);
+    let course = match metrics.guarantee_lost_at.map(clock::rounded) {
+        _ if share == 0.0 => format!("never in force{status}"),
+        Some(time) => {
+            format!("in force at {:.1} % of the ticks, lost at t = {time} s{status}", share * 100.0)
+        }
+        None if share < 1.0 => {
+            format!("in force at {:.1} % of the ticks, never lost{margins}", share * 100.0)
+        }
+        None => format!("in force throughout{margins}"),
+    };
+    let broken = metrics.guarantee_broken == Some(true);
+    Some(course + if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" })
+}
+
+/// Margins of rate and moment as a part of a sentence.
+pub(crate) fn margins(margins: [Option<f64>; 2]) -> String {
+    let known =
+        margins.into_iter().zip(["rate", "moment"]).filter_map(|(margin, name)| Some((margin?, name)));
+    let texts: Vec<String> =
+        known.map(|(margin, name)| format!("{:.1} % ({name})", margin * 100.0)).collect();
+    if texts.is_empty() { String::new() } else { format!(", margins {}", texts.join(", ")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_guarantee_is_told_in_one_line() {
+        assert_eq!(guarantee(&Metrics::default()), None);
+        let mut metrics = Metrics {
+            guarantee_share: Some(1.0),
+            guarantee_status: Some("inForce".into()),
+            guarantee_rate_margin_min: Some(0.031),
+            guarantee_moment_margin_min: Some(0.012),
+            guarantee_broken: Some(false),
+            ..Metrics::default()
+        };
+        let told = |metrics: &Metrics| guarantee(metrics).unwrap();
+        assert_eq!(told(&metrics), "in force throughout, margins 3.1 % (rate), 1.2 % (moment)");
+        metrics.guarantee_broken = Some(true);
+        assert_eq!(
+            told(&metrics),
+            "in force throughout, margins 3.1 % (rate), 1.2 % (moment); \
+             DEFECT: a limit was EXCEEDED while it was in force"
+        );
+        metrics.guarantee_broken = None;
+        metrics.guarantee_share = Some(0.972);
+        assert_eq!(
+            told(&metrics),
+            "in force at 97.2 % of the ticks, never lost, margins 3.1 % (rate), 1.2 % (moment)"
+        );
+        (metrics.guarantee_lost_at, metrics.guarantee_status) =
+            (Some(310.0 * 0.04 + 1e-14), Some("exceeded".into()));
+        assert_eq!(told(&metrics), "in force at 97.2 % of the ticks, lost at t = 12.4 s (exceeded)");
+        let never = Metrics {
+            guarantee_share: Some(0.0),
+            guarantee_status: Some("refused".into()),
+            ..Metrics::default()
+        };
+        assert_eq!(told(&never), "never in force (refused)");
+        let bare = Metrics { guarantee_share: Some(1.0), ..Metrics::default() };
+        assert_eq!(told(&bare), "in force throughout");
+    }
 }

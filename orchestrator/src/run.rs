@@ -159,6 +159,10 @@ impl Plan {
         if options.live {
             live::check_terminal()?;
         }
+        let step = self.clock.step();
+        for warning in delay::warnings(&self.parts(), &self.settings, &self.loops, step) {
+            tracing::warn!("{warning}");
+        }
         let experiment = &self.experiment;
         let stem = experiment.source.path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy());
         let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(stem.as_ref()));
@@ -270,9 +274,20 @@ impl Plan {
         self.probes.ports.iter().position(|known| *known == port)
     }
 
+    /// Items of the enumeration that stands at this place among a sample's values; none if it is of another type.
+    fn items(&self, place: usize) -> Vec<(String, i32)> {
+        let port = self.probes.ports[place];
+        match &self.fmus[port.component].description.variables[port.variable].kind {
+            Kind::Enumeration { items } => items.clone(),
+            _ => Vec::new(),
+        }
+    }
+
     /// An empty sum of the figures of merit.
     pub fn merit(&self, limits: Limits) -> Merit {
-        Merit::new(self.places, limits, self.clock.ticks() + 1)
+        let statuses =
+            self.places.guarantee.and_then(|signals| signals.status).map(|place| self.items(place));
+        Merit::new(self.places, limits, self.clock.ticks() + 1).with_statuses(statuses.unwrap_or_default())
     }
 
     /// Instantiates the units and sets their parameters.

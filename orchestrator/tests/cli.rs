@@ -163,6 +163,58 @@ fn couplings_and_orders_that_delay_the_loop_say_so() {
 }
 
 #[test]
+fn a_law_that_counts_on_another_delay_is_warned_of_in_one_line() {
+    let bench = Bench::new();
+    let warnings = |arguments: &[&str]| {
+        let (code, _, errors) = bench.run(&[&["--quiet"], arguments].concat());
+        assert_eq!(code, 0, "{errors}");
+        errors
+    };
+    let jacobi = ["--coupling", "jacobi", "--set", "gain.delay=1.25", "--set", "plant.actuation.delay=0.25"];
+    let errors = warnings(&jacobi);
+    // The plant has a parameter of this name, too, and counts on nothing.
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    let told =
+        "plant.delay = 0 s, but the loop gain -> plant -> gain has a delay of 1 s: set plant.delay = 1";
+    assert!(errors.contains(told), "{errors}");
+    assert_eq!(warnings(&[&jacobi[..], &["--set", "plant.delay=1"]].concat()), "");
+    assert_eq!(warnings(&[]), "");
+    let errors = warnings(&["--set", "gain.delay=0.5"]);
+    assert!(
+        errors.contains("gain.delay = 0.5 s, but the loop gain -> plant -> gain has a delay of 0 s"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn oracle_a_guarantee_is_summed_up_and_told() {
+    let bench = Bench::with(&format!("{LOOP}[metrics]\nguarantee = \"gain.guarantee\"\n"));
+    let guarantee = |largest: &str| {
+        let (code, summary, errors) =
+            bench.run(&["--set", "gain.gain=0.5", "--set", &format!("gain.largest={largest}")]);
+        assert_eq!(code, 0, "{errors}");
+        let line = summary.lines().find(|line| line.starts_with("  guarantee ")).unwrap().to_string();
+        (line, bench.json("out/loop/metrics.json"))
+    };
+    // Its input is 1, 1.5, 2.25, 3.375; margins of 1 - input/largest, and half of that.
+    let (line, metrics) = guarantee("2");
+    assert_eq!(line, "  guarantee         in force at 50.0 % of the ticks, lost at t = 2 s (exceeded)");
+    assert_eq!((&metrics["guarantee_share"], &metrics["guarantee_lost_at"]), (&0.5.into(), &2.0.into()));
+    assert_eq!(metrics["guarantee_rate_margin_min"], 0.25);
+    assert_eq!(metrics["guarantee_moment_margin_min"], 0.125);
+    // No limits are known.
+    assert!(metrics["guarantee_broken"].is_null());
+    let (line, metrics) = guarantee("3.75");
+    assert_eq!(line, "  guarantee         in force throughout, margins 10.0 % (rate), 5.0 % (moment)");
+    assert!(metrics["guarantee_lost_at"].is_null());
+    assert_eq!(guarantee("0.5").0, "  guarantee         never in force (exceeded)");
+    let (_, summary, _) = Bench::new().run(&[]);
+    assert!(!summary.contains("guarantee"), "{summary}");
+    let message = Bench::with(&format!("{LOOP}[metrics]\nguarantee = \"gain.fail\"\n")).refusal(&[]);
+    assert!(message.contains("[metrics] guarantee: there is no variable \"gain.fail.inForce\""), "{message}");
+}
+
+#[test]
 fn a_failing_unit_ends_the_run_with_its_own_words_and_keeps_the_results() {
     let bench = Bench::new();
     // fmi2Discard, fmi2Error, and fmi2Fatal, after which not even fmi2FreeInstance may be called.
@@ -244,7 +296,7 @@ fn every_missed_deadline_is_counted_and_what_was_done_is_said() {
 fn a_slow_unit_is_named() {
     let bench = Bench::new();
     // 20 ms from tick to tick, and a step of the plant takes 50 ms.
-    let (code, summary, errors) = bench.run(&["--real-time", "50", "--set", "plant.delay=0.05"]);
+    let (code, summary, errors) = bench.run(&["--real-time", "50", "--set", "plant.pause=0.05"]);
     assert_eq!(code, 0, "{errors}");
     let worst = summary.lines().find(|line| line.contains("worst miss")).unwrap();
     assert!(worst.contains("longest step since the last wait: plant, "), "{worst}");

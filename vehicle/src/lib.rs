@@ -19,6 +19,7 @@ pub mod sensor_data;
 pub mod sensors;
 pub mod table;
 pub mod time;
+pub mod transport;
 pub mod triad;
 
 pub use error::Error;

@@ -14,6 +14,7 @@ use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
 use crate::platform::Surroundings;
 use crate::sensors::{self, Sensors};
 use crate::time::tolerance;
+use crate::transport::Transport;
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, SMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
@@ -103,7 +104,7 @@ pub fn partial_derivatives(body: &RigidBody, kinematics: Kinematics, state: &Sta
 /// What acts on the vehicle from outside at any time. Commands to the actuators are taken at instants and stand apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Input {
-    /// Control moment about the body axes, N m. Acts as it comes, unless there are actuators.
+    /// Control moment about the body axes, N m. Acts as it comes, unless there are actuators or it is delayed.
     pub moment: Vector3<f64>,
     /// Further moment about the body axes, N m.
     pub disturbance_moment: Vector3<f64>,
@@ -146,6 +147,9 @@ pub struct Config {
     pub earth_rate: f64,
     /// Surfaces and jets that make the control moment; without them it is an input.
     pub actuators: Option<actuators::Config>,
+    /// Time (s, from 0 to [`crate::transport::LONGEST`]) after which the input moment acts; zero with actuators. A delayed
+    /// moment is taken at the beginning of each communication step.
+    pub moment_delay: f64,
     /// A prescribed motion from the initial angles on, in place of the dynamics.
     pub calibration: Option<Sequence>,
     /// What the sensors feel.
@@ -170,6 +174,8 @@ pub struct Held {
     acts: bool,
     /// What the actuators do.
     drive: Drive,
+    /// The moment that acts if the input moment is delayed, N m.
+    delayed: Option<Vector3<f64>>,
 }
 
 impl Held {
@@ -194,6 +200,7 @@ pub struct Plant {
     earth_rate: f64,
     disturbance: Disturbance,
     actuators: Option<Actuators>,
+    transport: Option<Transport>,
     calibration: Option<Calibration>,
     surroundings: Surroundings,
     sensors: Option<Sensors>,
@@ -232,6 +239,14 @@ impl Plant {
         if !config.earth_rate.is_finite() {
             return refuse("trajectory.earthRate", "is not finite".into());
         }
+        let transport = Transport::new(config.moment_delay)?;
+        if config.actuators.is_some() && transport.is_some() {
+            let problem = format!(
+                "= {} s delays an input moment, and there is none with actuators",
+                config.moment_delay
+            );
+            return refuse("actuation.delay", problem);
+        }
         config.disturbance.check()?;
         config.surroundings.check()?;
         let initial = angles(&config.initial);
@@ -246,6 +261,7 @@ impl Plant {
             earth_rate: config.earth_rate,
             disturbance: config.disturbance.clone(),
             actuators: config.actuators.as_ref().map(Actuators::new).transpose()?,
+            transport,
             calibration: config.calibration.map(|sequence| Calibration { sequence, initial }),
             surroundings: config.surroundings,
             sensors: config.sensors.as_ref().map(|sensors| Sensors::new(sensors, start_time)).transpose()?,
@@ -291,7 +307,8 @@ impl Plant {
         let jump = self.disturbance.next_change(self.start_time, time);
         let rest = self.actuators.is_some().then(|| time + self.time_left(held).min());
         let sample = self.sensors.as_ref().map(|sensors| sensors.next_sample(time));
-        jump.into_iter().chain(rest).chain(sample).min_by(f64::total_cmp)
+        let arrival = self.transport.as_ref().and_then(|transport| transport.next_arrival(time));
+        jump.into_iter().chain(rest).chain(sample).chain(arrival).min_by(f64::total_cmp)
     }
 
     /// What holds from `time` (s) on if commands are taken then: the disturbance is drawn from the present state and `input`
@@ -304,15 +321,16 @@ impl Plant {
     fn drawn(&self, time: f64, input: &Input, drive: Drive) -> Held {
         let tick = self.disturbance.tick(self.start_time, time);
         let acts = self.disturbance.acts(time);
+        let delayed = self.transport.as_ref().map(|transport| transport.moment(time));
         match self.held {
             Some(held) if held.tick == tick && time > held.since + tolerance(time) => {
-                Held { acts, drive, ..held }
+                Held { acts, drive, delayed, ..held }
             }
             _ => {
                 let (angles, rates) = (self.angles(), self.rates());
-                let moment = self.control_moment(input, &drive, 0.0);
+                let moment = self.control_moment(input, delayed, &drive, 0.0);
                 let view = View { body: &self.body, kinematics: self.kinematics, angles, rates, moment };
-                Held { tick, since: time, sample: self.disturbance.sample(tick, &view), acts, drive }
+                Held { tick, since: time, sample: self.disturbance.sample(tick, &view), acts, drive, delayed }
             }
         }
     }
@@ -355,15 +373,22 @@ impl Plant {
     }
 
     /// The control moment (N m) at the time `elapsed` (s) after the present one; until then the drive stays as it is.
-    fn control_moment(&self, input: &Input, drive: &Drive, elapsed: f64) -> Vector3<f64> {
-        self.actuators
-            .as_ref()
-            .map_or(input.moment, |all| all.moment(drive, &(self.deflections + all.rates(drive) * elapsed)))
+    fn control_moment(
+        &self,
+        input: &Input,
+        delayed: Option<Vector3<f64>>,
+        drive: &Drive,
+        elapsed: f64,
+    ) -> Vector3<f64> {
+        self.actuators.as_ref().map_or_else(
+            || delayed.unwrap_or(input.moment),
+            |all| all.moment(drive, &(self.deflections + all.rates(drive) * elapsed)),
+        )
     }
 
     /// The control moment (N m) that acts now.
     pub fn applied_moment(&self, input: &Input, held: &Held) -> Vector3<f64> {
-        self.control_moment(input, &held.drive, 0.0)
+        self.control_moment(input, held.delayed, &held.drive, 0.0)
     }
 
     /// Rates of the deflections, rad/s: the rate limit either way, or zero.
@@ -373,9 +398,10 @@ impl Plant {
 
     /// Partial derivatives of [`Plant::applied_moment`]: by the input moment (3 × 3) and by the deflections (3 × 8).
     pub fn applied_moment_by_moment_and_deflections(&self) -> (Matrix3<f64>, SMatrix<f64, 3, SURFACES>) {
-        self.actuators.as_ref().map_or((Matrix3::identity(), SMatrix::zeros()), |all| {
-            (Matrix3::zeros(), *all.moment_by_deflections())
-        })
+        let at_once = if self.transport.is_some() { Matrix3::zeros() } else { Matrix3::identity() };
+        self.actuators
+            .as_ref()
+            .map_or((at_once, SMatrix::zeros()), |all| (Matrix3::zeros(), *all.moment_by_deflections()))
     }
 
     /// Partial derivative of the moment that acts by the commands to the jets, when they are taken (3 × 10).
@@ -394,7 +420,7 @@ impl Plant {
     /// At `time`, which is `elapsed` after the time of the deflections.
     fn load(&self, time: f64, input: &Input, held: &Held, elapsed: f64) -> Load {
         Load {
-            moment: self.control_moment(input, &held.drive, elapsed)
+            moment: self.control_moment(input, held.delayed, &held.drive, elapsed)
                 + self.disturbance_moment(time, input, held),
             delta: held.delta(),
             turn_rate: self.turn_rate(input),
@@ -439,12 +465,14 @@ impl Plant {
         self.advance_with(from, to, &Command::default(), |_| moment.into())
     }
 
-    /// From `from` to `to` (s) under an input that is a function of time; `command` is taken at `from`. The interval is cut where
-    /// the disturbance jumps and where a deflection comes to rest, and every piece is integrated in equal steps, so the end is
-    /// met exactly. Deflections are linear in time within a piece.
+    /// From `from` to `to` (s) under an input that is a function of time; `command` is taken at `from`, and so is the moment if
+    /// it is delayed. The interval is cut where the disturbance jumps, where a deflection comes to rest and where a delayed
+    /// moment arrives, and every piece is integrated in equal steps, so the end is met exactly. Deflections are linear in time
+    /// within a piece.
     ///
     /// # Errors
-    /// If the attitude becomes singular or a value is not finite; the state is then the last good one.
+    /// If the attitude becomes singular or a value is not finite; the state is then the last good one. If a delayed moment is not
+    /// held over the interval, or too many of its changes are under way.
     pub fn advance_with(
         &mut self,
         from: f64,
@@ -452,6 +480,14 @@ impl Plant {
         command: &Command,
         mut input: impl FnMut(f64) -> Input,
     ) -> Result<(), Error> {
+        if let Some(transport) = self.transport.as_mut().filter(|_| from < to) {
+            let begin = input(from).moment;
+            transport.command(from, begin)?;
+            // A cubic, the highest order of input derivatives, with four equal values is constant.
+            for part in [1.0 / 3.0, 2.0 / 3.0, 1.0] {
+                transport.check_held(&begin, &input(from + part * (to - from)).moment)?;
+            }
+        }
         let mut time = from;
         let mut before = None;
         while time < to {

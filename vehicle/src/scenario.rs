@@ -89,6 +89,7 @@ impl Scenario {
             kinematics: Kinematics::Printed,
             earth_rate: 0.0,
             actuators: None,
+            moment_delay: 0.0,
             calibration: None,
             surroundings: Surroundings::default(),
             sensors: None,

@@ -438,3 +438,70 @@ fn noise_does_not_depend_on_actuators() {
     assert_eq!(with, without);
     assert!(with.amax() > 0.0);
 }
+
+#[test]
+fn oracle_a_delayed_moment_acts_that_much_later() {
+    // The same moments given without delay to a plant whose steps begin where they arrive.
+    for delay in [1e-3, 0.04, 0.1, 0.117, 0.12, 1.0] {
+        for config in kinds() {
+            let mut delayed = Plant::new(&Config { moment_delay: delay, ..config.clone() }, 0.0).unwrap();
+            let mut direct = Plant::new(&config, 0.0).unwrap();
+            let (mut reached, mut arrived) = (0.0, 0);
+            let acting = |arrived: u32| if arrived == 0 { Vector3::zeros() } else { moment(arrived - 1) };
+            for k in 0..100 {
+                let to = 0.04 * f64::from(k + 1);
+                delayed.advance(0.04 * f64::from(k), to, moment(k)).unwrap();
+                while 0.04 * f64::from(arrived) + delay < to + 1e-9 {
+                    let arrival = 0.04 * f64::from(arrived) + delay;
+                    direct.advance(reached, arrival, acting(arrived)).unwrap();
+                    (reached, arrived) = (arrival, arrived + 1);
+                }
+                direct.advance(reached, to, acting(arrived)).unwrap();
+                reached = reached.max(to);
+                let kind = config.disturbance.kind;
+                assert!((delayed.state - direct.state).amax() < 1e-11, "{delay} s, {kind:?}, {k}");
+                let input = moment(k + 1).into();
+                let held = delayed.in_force(to, &input, &Command::default());
+                assert_eq!(
+                    delayed.applied_moment(&input, &held),
+                    acting(arrived),
+                    "{delay} s, {kind:?}, {k}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_delayed_moment_arrives_within_a_step_however_long() {
+    let config = Config { moment_delay: 0.117, ..undisturbed(TUMBLING.into(), 0.001) };
+    let [mut long, mut short] = [0, 1].map(|_| Plant::new(&config, 0.0).unwrap());
+    for k in 0..4 {
+        long.advance(f64::from(k), f64::from(k + 1), moment(k)).unwrap();
+        for i in 0..100 {
+            let at = |i: i32| f64::from(k) + 0.01 * f64::from(i);
+            short.advance(at(i), at(i + 1), moment(k)).unwrap();
+        }
+        assert!((long.state - short.state).amax() < 1e-13, "{k}: {}", long.state - short.state);
+    }
+}
+
+#[test]
+fn a_delay_that_cannot_work_is_refused_by_name() {
+    for moment_delay in [-0.1, 1.1, f64::NAN] {
+        let text = Plant::new(&Config { moment_delay, ..config() }, 0.0).unwrap_err().to_string();
+        assert!(text.contains("actuation.delay"), "{text}");
+    }
+    let with_actuators = Config { moment_delay: 0.1, ..actuated(State::zeros(), JetMode::OnOff) };
+    let text = Plant::new(&with_actuators, 0.0).unwrap_err().to_string();
+    assert!(text.contains("actuation.delay") && text.contains("actuators"), "{text}");
+    let mut plant = Plant::new(&Config { moment_delay: 0.1, ..config() }, 0.0).unwrap();
+    let courses: [fn(f64) -> f64; 2] = [|t| t, |t| t * (t - 0.04)];
+    for course in courses {
+        let input = |time: f64| Vector3::new(0.0, 1e4 * course(time), 0.0).into();
+        let text = plant.advance_with(0.0, 0.04, &Command::default(), input).unwrap_err().to_string();
+        assert!(text.contains("actuation.delay") && text.contains("derivatives"), "{text}");
+    }
+    let error = plant.advance(0.0, 0.04, Vector3::repeat(f64::NAN)).unwrap_err();
+    assert!(matches!(error, Error::NotFinite { what: "moment", .. }), "{error}");
+}

@@ -8,6 +8,7 @@ pub mod scene;
 pub mod view;
 
 use crate::error::Error;
+use crate::guarantee::Course;
 use crate::interrupt::{Interrupt, Request};
 use crate::master::{Observer, Sample};
 use crate::realtime::pacer::Tally;
@@ -36,12 +37,16 @@ pub struct Snapshot {
     pub values: Vec<f64>,
     /// How the pacing is doing, if the run is paced.
     pub tally: Option<Tally>,
+    /// What became of the controller's guarantee, if it gives one.
+    pub guarantee: Option<Course>,
 }
 
 /// The view, for as long as this lives. The terminal is as before when it is dropped, also by a panic.
 pub struct Live {
     snapshot: Arc<Mutex<Snapshot>>,
     tally: Option<Rc<Cell<Tally>>>,
+    /// Followed at every communication point, as the view does not see them all.
+    guarantee: Option<Course>,
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<io::Result<()>>>,
 }
@@ -72,7 +77,8 @@ impl Live {
     ) -> Result<Self, Error> {
         check_terminal()?;
         let snapshot = Arc::new(Mutex::new(Snapshot { values: vec![0.0; values], ..Snapshot::default() }));
-        let mut live = Self { snapshot, tally, over: Arc::default(), thread: None };
+        let guarantee = Course::new(scene.places, scene.limits);
+        let mut live = Self { snapshot, tally, guarantee, over: Arc::default(), thread: None };
         log::hold();
         let terminal = ratatui::try_init()?;
         let (shared, over) = (Arc::clone(&live.snapshot), Arc::clone(&live.over));
@@ -88,11 +94,15 @@ impl Live {
 
 impl Observer for Live {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        if let Some(course) = &mut self.guarantee {
+            course.observe(sample)?;
+        }
         // The run does not wait for the view: what cannot be left now is left at the next communication point.
         if let Ok(mut snapshot) = self.snapshot.try_lock() {
             snapshot.time = Some(sample.time);
             snapshot.values.copy_from_slice(sample.values);
             snapshot.tally = self.tally.as_ref().map(|tally| tally.get());
+            snapshot.guarantee = self.guarantee;
         }
         Ok(())
     }
@@ -161,6 +171,8 @@ fn request(key: KeyEvent) -> Option<Request> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::guarantee::Signals;
+    use crate::metrics::{Limits, Places};
 
     #[test]
     fn q_and_control_c_end_the_run() {
@@ -175,16 +187,26 @@ mod tests {
     #[test]
     fn the_run_does_not_wait_while_the_view_reads() {
         let snapshot = Arc::new(Mutex::new(Snapshot { values: vec![0.0], ..Snapshot::default() }));
-        let mut live =
-            Live { snapshot: Arc::clone(&snapshot), tally: None, over: Arc::default(), thread: None };
-        let sample = |time| Sample { tick: 0, time, last: false, values: &[7.0] };
+        let signals = Signals { in_force: 0, status: None, margins: [None; 2] };
+        let places = Places { guarantee: Some(signals), ..Places::default() };
+        let mut live = Live {
+            snapshot: Arc::clone(&snapshot),
+            tally: None,
+            guarantee: Course::new(places, Limits::default()),
+            over: Arc::default(),
+            thread: None,
+        };
+        let sample = |time, values| Sample { tick: 0, time, last: false, values };
         let reading = snapshot.lock().unwrap();
-        live.observe(&sample(1.0)).unwrap();
+        live.observe(&sample(1.0, &[7.0])).unwrap();
+        live.observe(&sample(1.5, &[0.0])).unwrap();
         assert_eq!(reading.time, None);
         drop(reading);
-        live.observe(&sample(2.0)).unwrap();
+        live.observe(&sample(2.0, &[7.0])).unwrap();
         let left = snapshot.lock().unwrap().clone();
         assert_eq!((left.time, left.values[0]), (Some(2.0), 7.0));
+        // A loss is remembered that the view did not see.
+        assert_eq!(left.guarantee.unwrap().lost.unwrap().time, 1.5);
         // Without a view there is no terminal to give back.
         std::mem::forget(live);
     }

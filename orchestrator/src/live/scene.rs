@@ -24,6 +24,8 @@ pub struct Scene {
     pub status: Option<Shown>,
     /// Its number of iterations.
     pub iterations: Option<usize>,
+    /// Status of the controller's guarantee.
+    pub guarantee: Option<Shown>,
     /// The recorded variables.
     pub recorded: Vec<Shown>,
 }
@@ -56,7 +58,11 @@ impl Shown {
 
     /// The value with its unit, or the name of its item.
     pub fn text(&self, values: &[f64]) -> String {
-        let value = values.get(self.place).copied().unwrap_or(f64::NAN);
+        self.text_of(values.get(self.place).copied().unwrap_or(f64::NAN))
+    }
+
+    /// The same for any value of the variable.
+    pub fn text_of(&self, value: f64) -> String {
         match self.items.iter().find(|(_, item)| f64::from(*item) == value) {
             Some((name, _)) => name.clone(),
             None if value == value.trunc() && value.abs() < 1e6 => format!("{value} {}", self.unit),
@@ -73,6 +79,8 @@ impl Scene {
         let solver = experiment.metrics.solver.as_deref().unwrap_or(metrics::SOLVER);
         let status = Shown::find(&format!("{solver}.status"), plan, probes);
         let iterations = Shown::find(&format!("{solver}.iterations"), plan, probes);
+        let guarantee = experiment.metrics.guarantee.as_deref().unwrap_or(metrics::GUARANTEE);
+        let guarantee = Shown::find(&format!("{guarantee}.status"), plan, probes);
         let recorded =
             plan.columns.iter().filter_map(|column| Shown::find(&column.name, plan, probes)).collect();
         Self {
@@ -84,6 +92,7 @@ impl Scene {
             limits: Limits::default(),
             status,
             iterations: iterations.map(|shown| shown.place),
+            guarantee,
             recorded,
         }
     }

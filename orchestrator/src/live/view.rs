@@ -2,7 +2,9 @@
 
 use super::Snapshot;
 use super::scene::Scene;
+use crate::clock;
 use crate::realtime::pacer::Tally;
+use crate::report;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
@@ -87,6 +89,7 @@ pub fn draw(frame: &mut Frame, state: &State) {
     let bars = bars(state);
     let mut lines = Vec::new();
     lines.extend(solver(state));
+    lines.extend(guarantee(state));
     lines.extend(state.now.tally.iter().flat_map(|tally| deadlines(state, tally)));
     let heights = [2, numbers.len() as u16, bars.len() as u16, lines.len() as u16, 1];
     let [head, middle, number_area, bar_area, line_area, foot] = Layout::vertical([
@@ -256,6 +259,28 @@ fn solver(state: &State) -> Option<Line<'static>> {
     (!parts.is_empty()).then(|| Line::from(format!("{:<10} {}", "solver", parts.join(", "))))
 }
 
+/// Whether the limits are guaranteed at present; red once that was lost or broken.
+fn guarantee(state: &State) -> Option<Line<'static>> {
+    let course = state.now.guarantee?;
+    let status = |value: f64| {
+        let shown = state.scene.guarantee.as_ref();
+        shown.map_or(String::new(), |shown| format!(" ({})", shown.text_of(value)))
+    };
+    let now = if course.is_in_force(&state.now.values) {
+        format!("in force{}", report::margins(course.margins_at(&state.now.values)))
+    } else {
+        format!("not in force{}", course.status_now().map_or(String::new(), status))
+    };
+    let lost = course.lost.map_or(String::new(), |loss| {
+        let reason = loss.status.map_or(String::new(), status);
+        format!("; lost at t = {} s{reason}", clock::rounded(loss.time))
+    });
+    let broken = if course.broken { "; DEFECT: a limit was EXCEEDED in force" } else { "" };
+    let text = Span::raw(now + &lost + broken);
+    let text = if course.lost.is_some() || course.broken { text.light_red() } else { text };
+    Some(Line::from(vec![Span::raw(format!("{:<10} ", "guarantee")), text]))
+}
+
 fn deadlines(state: &State, tally: &Tally) -> Vec<Line<'static>> {
     let milliseconds = |duration: Duration| duration.as_secs_f64() * 1e3;
     let count = format!("{} of {} missed", tally.misses, tally.deadlines);
@@ -286,6 +311,8 @@ fn deadlines(state: &State, tally: &Tally) -> Vec<Line<'static>> {
 mod tests {
     use super::super::scene::Shown;
     use super::*;
+    use crate::guarantee::{Course, Signals};
+    use crate::master::{Observer, Sample};
     use crate::metrics::{Limits, Places};
     use crate::realtime::pacer::{Miss, Step};
     use ratatui::Terminal;
@@ -315,11 +342,12 @@ mod tests {
                 solver_time: Some(12),
                 solver_solves: Some(13),
                 solver_fallbacks: Some(14),
-                every: 1,
+                ..Places::default()
             },
             limits: Limits { rate: Some(5_f64.to_radians()), moment: Some(1e5) },
             status: Some(Shown { place: 15, items: vec![("optimal".into(), 1)], ..Shown::default() }),
             iterations: Some(16),
+            guarantee: None,
             recorded: Vec::new(),
         }
     }
@@ -337,7 +365,7 @@ mod tests {
         };
         let lag = Duration::from_micros(60);
         let tally = Tally { deadlines: 500, misses: 1, last: Some(miss), lag, slipped: Duration::ZERO };
-        Snapshot { time: Some(time), values, tally: Some(tally) }
+        Snapshot { time: Some(time), values, tally: Some(tally), guarantee: None }
     }
 
     #[test]
@@ -383,6 +411,37 @@ mod tests {
     }
 
     #[test]
+    fn the_guarantee_has_a_line_that_turns_red_when_it_is_lost() {
+        let items = [("inForce", 1), ("none", 2), ("exceeded", 5)].map(|(name, item)| (name.into(), item));
+        let signals = Signals { in_force: 0, status: Some(1), margins: [Some(2), Some(3)] };
+        let places = Places { guarantee: Some(signals), ..Places::default() };
+        let guarantee = Some(Shown { place: 1, items: items.to_vec(), ..Shown::default() });
+        let mut state = State::new(Scene { span: [0.0, 1.0], places, guarantee, ..Scene::default() });
+        let mut course = Course::new(places, Limits::default()).unwrap();
+        let mut told = |time: f64, values: [f64; 4]| {
+            course.observe(&Sample { tick: 0, time, last: false, values: &values }).unwrap();
+            let snapshot = Snapshot {
+                time: Some(time),
+                values: values.to_vec(),
+                guarantee: Some(course),
+                ..Snapshot::default()
+            };
+            state.see_after(&snapshot, Duration::ZERO);
+            let line = super::guarantee(&state).unwrap();
+            let is_red = line.spans[1].style.fg == Some(Color::LightRed);
+            assert_eq!(picture(&state, 100, 10)[8], line.to_string());
+            (line.to_string(), is_red)
+        };
+        assert_eq!(told(0.0, [0.0, 2.0, 0.0, 0.0]), ("guarantee  not in force (none)".into(), false));
+        let line = "guarantee  in force, margins 3.1 % (rate), 1.2 % (moment)";
+        assert_eq!(told(0.04, [1.0, 1.0, 0.031, 0.012]), (line.into(), false));
+        let line = "guarantee  not in force (exceeded); lost at t = 0.12 s (exceeded)";
+        assert_eq!(told(3.0 * 0.04, [0.0, 5.0, 0.0, 0.0]), (line.into(), true));
+        let line = "guarantee  in force, margins 2.0 % (rate), 1.0 % (moment); lost at t = 0.12 s (exceeded)";
+        assert_eq!(told(0.16, [1.0, 1.0, 0.02, 0.01]), (line.into(), true));
+    }
+
+    #[test]
     fn without_variables_that_have_a_role_what_is_recorded_is_shown() {
         let shown = |name: &str, place, unit: &str| Shown {
             name: name.into(),
@@ -395,7 +454,7 @@ mod tests {
             State::new(Scene { title: "loop".into(), span: [0.0, 3.0], recorded, ..Scene::default() });
         let before = picture(&state, 60, 10);
         assert!(before[3].contains("gain.output") && before[3].contains("NaN"), "{before:#?}");
-        let snapshot = Snapshot { time: Some(3.0), values: vec![0.125, 7.0], tally: None };
+        let snapshot = Snapshot { time: Some(3.0), values: vec![0.125, 7.0], ..Snapshot::default() };
         state.see_after(&snapshot, Duration::from_secs(1));
         let after = picture(&state, 60, 10);
         assert!(after[1].starts_with("t = 3.00 s of 3 s, 3.00 times real time"), "{after:#?}");

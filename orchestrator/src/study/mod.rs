@@ -92,6 +92,7 @@
 //! runs = ["lqr"]
 //! metrics = [
 //!     { of = "ems_deg", label = "EMS, deg" },
+//!     { of = "guarantee_share", label = "guarantee in force, % of the ticks", factor = 100.0 },   # as metrics.json has it
 //!     { of = "parameter.controller.disturbance.bound", label = "bound, deg/s²", factor = 57.29577951308232 },   # factor: optional
 //! ]
 //!

@@ -44,7 +44,7 @@ impl RunResult {
 /// A number that every member of a run has.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Metric {
-    /// A figure of merit, by its name in `metrics.json`.
+    /// A figure of merit, by its name in `metrics.json`; 1 or 0 for yes or no.
     Merit(String),
     /// Mean time spent in a component per step, µs: `step_us.COMPONENT`.
     StepTime(String),
@@ -119,7 +119,9 @@ impl Metric {
         let within = |id: &String| member.within.get(id);
         match self {
             Self::Merit(name) => {
-                serde_json::to_value(&member.metrics).ok().and_then(|all| all.get(name)?.as_f64())
+                let all = serde_json::to_value(&member.metrics).ok()?;
+                let value = all.get(name)?;
+                value.as_f64().or_else(|| value.as_bool().map(|yes| f64::from(u8::from(yes))))
             }
             // Of the run, not of its members.
             Self::Parameter(..) => None,
@@ -222,5 +224,30 @@ impl Results<'_> {
             Quantity::Named(name) if is_reference(self.study, quantity) => self.numbers(name),
             _ => self.study.values.number(quantity).map(|number| Numbers(vec![number])),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_guarantee_is_asked_for_as_any_figure_of_merit_is() {
+        let metrics = Metrics {
+            guarantee_share: Some(0.75),
+            guarantee_lost_at: Some(12.4),
+            guarantee_broken: Some(true),
+            ..Metrics::default()
+        };
+        let (value, within, measures) = (None, BTreeMap::new(), BTreeMap::new());
+        let mut member = Member { value, metrics, within, measures };
+        let number = |name: &str, member: &Member| Metric::Merit(format!("guarantee_{name}")).of(member);
+        assert_eq!(number("share", &member), Some(0.75));
+        assert_eq!(number("lost_at", &member), Some(12.4));
+        assert_eq!(number("broken", &member), Some(1.0));
+        member.metrics.guarantee_broken = Some(false);
+        assert_eq!(number("broken", &member), Some(0.0));
+        member.metrics = Metrics::default();
+        assert!(["share", "lost_at", "broken"].iter().all(|name| number(name, &member).is_none()));
     }
 }

@@ -1,6 +1,7 @@
 /* A small FMI 2.0 co-simulation unit, to try the orchestrator on a library that is not ours: it keeps the pointer to the
    callbacks, wants memory from its environment, and logs with printf arguments.
-   Output 1 = gain * input (direct), output 2 = integral of the input. It fails, and is slow, as its parameters say. */
+   Output 1 = gain * input (direct), output 2 = integral of the input. It fails, and is slow, as its parameters say. It guarantees something as long
+   as the input is at most the parameter "largest". The parameters "delay" and "actuation.delay" do nothing. */
 #define _POSIX_C_SOURCE 199309L
 #include <stddef.h>
 #include <time.h>
@@ -16,7 +17,7 @@ typedef struct {
 typedef struct {
     const Callbacks *callbacks;
     const char *name;
-    double input, state, gain, fail_time, delay;
+    double input, state, gain, fail_time, pause, delay, transport, largest;
     int fail_status, flag, kind, count;
     char text[64];
 } Unit;
@@ -39,6 +40,7 @@ void *fmi2Instantiate(const char *name, int type, const char *guid, const char *
     unit->fail_time = 1e9;
     unit->fail_status = ERROR;
     unit->kind = 1;
+    unit->largest = 1000.0;
     return name ? unit : NULL;
 }
 
@@ -65,7 +67,12 @@ int fmi2GetReal(Unit *unit, const unsigned *references, size_t n, double *values
         case 2: values[i] = unit->state; break;
         case 3: values[i] = unit->gain; break;
         case 4: values[i] = unit->fail_time; break;
-        case 12: values[i] = unit->delay; break;
+        case 12: values[i] = unit->pause; break;
+        case 13: values[i] = unit->delay; break;
+        case 14: values[i] = unit->transport; break;
+        case 15: values[i] = unit->largest; break;
+        case 18: values[i] = 1.0 - unit->input / unit->largest; break;
+        case 19: values[i] = 0.5 * (1.0 - unit->input / unit->largest); break;
         default: return complain(unit, ERROR, "no such real:", references[i]);
         }
     }
@@ -78,7 +85,10 @@ int fmi2SetReal(Unit *unit, const unsigned *references, size_t n, const double *
         case 0: unit->input = values[i]; break;
         case 3: unit->gain = values[i]; break;
         case 4: unit->fail_time = values[i]; break;
-        case 12: unit->delay = values[i]; break;
+        case 12: unit->pause = values[i]; break;
+        case 13: unit->delay = values[i]; break;
+        case 14: unit->transport = values[i]; break;
+        case 15: unit->largest = values[i]; break;
         default: return complain(unit, ERROR, "real cannot be set:", references[i]);
         }
     }
@@ -86,8 +96,14 @@ int fmi2SetReal(Unit *unit, const unsigned *references, size_t n, const double *
 }
 
 int fmi2GetInteger(Unit *unit, const unsigned *references, size_t n, int *values) {
-    for (size_t i = 0; i < n; i++)
-        values[i] = references[i] == 5 ? unit->fail_status : references[i] == 7 ? unit->kind : unit->count;
+    for (size_t i = 0; i < n; i++) {
+        switch (references[i]) {
+        case 5: values[i] = unit->fail_status; break;
+        case 7: values[i] = unit->kind; break;
+        case 17: values[i] = unit->input <= unit->largest ? 1 : 2; break;
+        default: values[i] = unit->count;
+        }
+    }
     return OK;
 }
 
@@ -98,7 +114,7 @@ int fmi2SetInteger(Unit *unit, const unsigned *references, size_t n, const int *
 }
 
 int fmi2GetBoolean(Unit *unit, const unsigned *references, size_t n, int *values) {
-    for (size_t i = 0; i < n; i++) values[i] = references ? unit->flag : 0;
+    for (size_t i = 0; i < n; i++) values[i] = references[i] == 16 ? unit->input <= unit->largest : unit->flag;
     return OK;
 }
 
@@ -116,8 +132,8 @@ int fmi2SetString(Unit *unit, const unsigned *references, size_t n, const char *
 int fmi2DoStep(Unit *unit, double time, double step, int no_set_state) {
     (void)no_set_state;
     if (time >= unit->fail_time - 1e-9) return complain(unit, unit->fail_status, "out of propellant at", time);
-    struct timespec delay = {(time_t)unit->delay, (long)(1e9 * (unit->delay - (double)(time_t)unit->delay))};
-    nanosleep(&delay, NULL);
+    struct timespec pause = {(time_t)unit->pause, (long)(1e9 * (unit->pause - (double)(time_t)unit->pause))};
+    nanosleep(&pause, NULL);
     unit->state += step * unit->input;
     unit->count += 1;
     return OK;

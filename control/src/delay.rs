@@ -1,0 +1,185 @@
+//! A known delay between a measurement and the moment that it leads to, made up for by prediction.
+//!
+//! The command of the tick at time t acts over [t + delay, t + delay + period). What acts on the vehicle before, over
+//! [t, t + delay), was commanded earlier and is known. So the state at t + delay can be computed from the measured one by the
+//! nominal equations of motion, and the law is asked for the moment of that state and that time. Without disturbances and with
+//! the right inertia the loop then moves as the one without delay does, only later by the delay.
+//!
+//! This is the prediction of the Smith predictor for a model in state-space form, as in Z. Artstein, "Linear systems with
+//! delayed controls: a reduction", IEEE Transactions on Automatic Control 27 (1982), with the nonlinear equations of motion in
+//! place of the linear ones.
+
+use crate::controller::{Controller, Measurement, ReferenceAt};
+use crate::error::DesignError;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::dynamics::RigidBody;
+use vehicle::integrator::{equal_steps, rk4};
+use vehicle::kinematics::Kinematics;
+use vehicle::plant::{self, Load};
+use vehicle::time::TOLERANCE;
+
+/// Longest delay, s.
+pub const LONGEST: f64 = 1.0;
+/// Most commands that can be under way at a time.
+pub const UNDER_WAY: usize = 10_000;
+/// Longest step of the prediction, s.
+const STEP: f64 = 0.01;
+
+/// Scales a moment (N m) into ‖m‖ ≤ `limit` (N m, infinite for none) and keeps its direction.
+pub fn saturated(moment: Vector3<f64>, limit: f64) -> Vector3<f64> {
+    let excess = moment.norm() / limit;
+    if excess > 1.0 { moment / excess } else { moment }
+}
+
+/// Computes the state after the delay from the measured one and the moments that act until then.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Predictor {
+    body: RigidBody,
+    delay: f64,
+    period: f64,
+    count: usize,
+}
+
+impl Predictor {
+    /// For a vehicle that is believed to be `body`, and for commands every `period` (s) that act after `delay` (s, any number).
+    ///
+    /// # Errors
+    /// Refuses a delay that is negative, or longer than [`LONGEST`] or than [`UNDER_WAY`] periods.
+    pub fn new(body: RigidBody, delay: f64, period: f64) -> Result<Self, DesignError> {
+        let longest = LONGEST.min(UNDER_WAY as f64 * period);
+        if !(0.0..=longest).contains(&delay) {
+            return Err(DesignError::Delay { value: delay, longest });
+        }
+        // A whole multiple of the period may be off by rounding.
+        let count = (delay / period * (1.0 - TOLERANCE)).ceil() as usize;
+        Ok(Self { body, delay, period, count })
+    }
+
+    /// Time from a measurement to the moment that it leads to, s.
+    pub fn delay(&self) -> f64 {
+        self.delay
+    }
+
+    /// Number of commands that determine the motion over the delay.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The state after the delay. `under_way` ends with the last [`Predictor::count`] moments that were commanded before this
+    /// tick, oldest first, N m; those that are missing are zero. The achieved moment is passed on as it is.
+    pub fn predict(&self, under_way: &[Vector3<f64>], measured: &Measurement) -> Measurement {
+        let mut state = plant::state(&measured.angles, &measured.rates);
+        for age in (1..=self.count).rev() {
+            let moment = under_way.len().checked_sub(age).map_or_else(Vector3::zeros, |i| under_way[i]);
+            let load = Load { moment, ..Load::default() };
+            // The newest command, of age 1, acts for the last period of the delay.
+            let begin = (self.delay - age as f64 * self.period).max(0.0);
+            let end = self.delay - (age - 1) as f64 * self.period;
+            let mut f = |_: f64, state: &plant::State| {
+                plant::derivative(&self.body, Kinematics::Printed, state, &load)
+            };
+            let steps = equal_steps(end - begin, STEP);
+            let h = (end - begin) / steps as f64;
+            for k in 0..steps {
+                state = rk4(&mut f, k as f64 * h, &state, h);
+            }
+        }
+        Measurement { angles: plant::angles(&state), rates: plant::rates(&state), ..*measured }
+    }
+}
+
+/// What a controller with prediction carries from tick to tick.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Memory<M> {
+    /// Memory of the law.
+    pub inner: M,
+    /// Commands that have not acted to their end yet, oldest first, N m. Zero until there were as many ticks.
+    pub under_way: Vec<Vector3<f64>>,
+}
+
+impl<M: Clone> Clone for Memory<M> {
+    fn clone(&self) -> Self {
+        Self { inner: self.inner.clone(), under_way: self.under_way.clone() }
+    }
+
+    // The derived version would allocate at every tick.
+    fn clone_from(&mut self, source: &Self) {
+        self.inner.clone_from(&source.inner);
+        self.under_way.clone_from(&source.under_way);
+    }
+}
+
+/// A controller whose moments act later than its measurements by a known delay. Asks the law behind it for the moment of the
+/// predicted state, at the time at which that moment acts. Without delay it is that law, bit for bit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Delayed<C> {
+    inner: C,
+    predictor: Predictor,
+    moment_limit: f64,
+}
+
+impl<C: Controller> Delayed<C> {
+    /// Puts a delay (s) in front of `inner`. `body` is the vehicle as the law believes it to be. `moment_limit` (N m) is the
+    /// limit that commands are scaled into behind the controller, infinite for none: the prediction counts what is left of them.
+    ///
+    /// # Errors
+    /// Refuses what [`Predictor::new`] refuses, and a limit that is not positive.
+    pub fn new(inner: C, body: RigidBody, delay: f64, moment_limit: f64) -> Result<Self, DesignError> {
+        if moment_limit.is_nan() || moment_limit <= 0.0 {
+            return Err(DesignError::NotPositive { name: "limit.moment", value: moment_limit });
+        }
+        let predictor = Predictor::new(body, delay, inner.period())?;
+        Ok(Self { inner, predictor, moment_limit })
+    }
+
+    /// What is left of a command (N m) behind the controller.
+    pub fn saturated(&self, moment: Vector3<f64>) -> Vector3<f64> {
+        saturated(moment, self.moment_limit)
+    }
+
+    /// The law.
+    pub fn inner(&self) -> &C {
+        &self.inner
+    }
+
+    /// What computes the state that the law sees.
+    pub fn predictor(&self) -> &Predictor {
+        &self.predictor
+    }
+}
+
+impl<C: Controller> Controller for Delayed<C> {
+    type Memory = Memory<C::Memory>;
+
+    fn period(&self) -> f64 {
+        self.inner.period()
+    }
+
+    fn memory(&self) -> Self::Memory {
+        Memory { inner: self.inner.memory(), under_way: vec![Vector3::zeros(); self.predictor.count] }
+    }
+
+    fn update(
+        &mut self,
+        memory: &mut Self::Memory,
+        tick: u64,
+        time: f64,
+        measured: &Measurement,
+        reference: ReferenceAt,
+    ) -> Vector3<f64> {
+        let Memory { inner, under_way } = memory;
+        if self.predictor.count == 0 {
+            return self.inner.update(inner, tick, time, measured, reference);
+        }
+        let predicted = self.predictor.predict(under_way, measured);
+        let moment = self.inner.update(inner, tick, time + self.predictor.delay, &predicted, reference);
+        // A memory by default has no room yet.
+        under_way.resize(self.predictor.count, Vector3::zeros());
+        under_way.rotate_left(1);
+        if let Some(newest) = under_way.last_mut() {
+            *newest = saturated(moment, self.moment_limit);
+        }
+        moment
+    }
+}

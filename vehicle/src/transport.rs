@@ -1,0 +1,198 @@
+//! Transport delay of the commanded moment: what is commanded at t acts from t + delay on, and is held until the next change
+//! arrives. Before the first command no moment acts.
+
+use crate::error::Error;
+use crate::time::tolerance;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// Longest delay, s.
+pub const LONGEST: f64 = 1.0;
+/// Most changes of the command that can be under way at a time.
+pub const UNDER_WAY: usize = 10_000;
+/// Name of the delay in messages.
+const NAME: &str = "actuation.delay";
+
+/// A command that differs from the one before it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Change {
+    /// When it was given, s.
+    time: f64,
+    /// N m.
+    moment: Vector3<f64>,
+}
+
+/// The commands that are under way, and the one in force.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Transport {
+    /// s.
+    delay: f64,
+    /// Oldest first. All but the first are under way.
+    changes: VecDeque<Change>,
+}
+
+impl Transport {
+    /// With a delay in s; `None` if it is zero.
+    ///
+    /// # Errors
+    /// Refuses a delay that is negative or longer than [`LONGEST`].
+    pub fn new(delay: f64) -> Result<Option<Self>, Error> {
+        if !(0.0..=LONGEST).contains(&delay) {
+            let problem = format!("= {delay} s must lie between 0 and {LONGEST} s");
+            return Err(Error::Parameter { name: NAME, problem });
+        }
+        Ok((delay > 0.0).then(|| Self { delay, changes: VecDeque::new() }))
+    }
+
+    /// Whether what was commanded at `commanded` (s) acts at `time` (s). Instants that differ by rounding are one, but a
+    /// command never acts at the instant at which it is given.
+    fn acts(&self, commanded: f64, time: f64) -> bool {
+        commanded + self.delay <= time + tolerance(time).min(0.5 * self.delay)
+    }
+
+    /// Number of the changes that have arrived at `time` (s).
+    fn arrived(&self, time: f64) -> usize {
+        self.changes.partition_point(|change| self.acts(change.time, time))
+    }
+
+    /// Takes the moment (N m) that is commanded from `time` (s) on, in place of one that was given at the same time.
+    ///
+    /// # Errors
+    /// If it is not finite, or more than [`UNDER_WAY`] changes would be under way.
+    pub fn command(&mut self, time: f64, moment: Vector3<f64>) -> Result<(), Error> {
+        if !moment.iter().all(|value| value.is_finite()) {
+            return Err(Error::NotFinite { time, what: "moment" });
+        }
+        while self.changes.back().is_some_and(|change| change.time >= time) {
+            self.changes.pop_back();
+        }
+        if self.changes.back().map_or_else(Vector3::zeros, |change| change.moment) == moment {
+            return Ok(());
+        }
+        let past = self.arrived(time).saturating_sub(1);
+        self.changes.drain(..past);
+        if self.changes.len() - self.arrived(time) >= UNDER_WAY {
+            let problem = format!(
+                "= {} s at t = {time} s: the moment changed more than {UNDER_WAY} times within it; use longer communication steps or a shorter delay",
+                self.delay
+            );
+            return Err(Error::Parameter { name: NAME, problem });
+        }
+        self.changes.push_back(Change { time, moment });
+        Ok(())
+    }
+
+    /// Checks that the moment is held over a communication step, given its values at the beginning and later in it.
+    ///
+    /// # Errors
+    /// If it is not held.
+    pub fn check_held(&self, begin: &Vector3<f64>, later: &Vector3<f64>) -> Result<(), Error> {
+        if begin == later {
+            return Ok(());
+        }
+        let problem = format!(
+            "= {} s delays a moment that is held over each communication step; give its inputs no derivatives",
+            self.delay
+        );
+        Err(Error::Parameter { name: NAME, problem })
+    }
+
+    /// The moment (N m) that acts at `time` (s).
+    pub fn moment(&self, time: f64) -> Vector3<f64> {
+        self.arrived(time).checked_sub(1).map_or_else(Vector3::zeros, |last| self.changes[last].moment)
+    }
+
+    /// When the next change arrives after `time` (s), if one is under way.
+    pub fn next_arrival(&self, time: f64) -> Option<f64> {
+        self.changes.get(self.arrived(time)).map(|change| change.time + self.delay)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pitch(moment: f64) -> Vector3<f64> {
+        Vector3::new(0.0, moment, 0.0)
+    }
+
+    fn transport(delay: f64) -> Transport {
+        Transport::new(delay).unwrap().unwrap()
+    }
+
+    #[test]
+    fn commands_act_after_the_delay_and_nothing_before_them() {
+        let mut transport = transport(0.1);
+        for k in 0..100 {
+            let time = 0.04 * f64::from(k);
+            transport.command(time, pitch(f64::from(k + 1))).unwrap();
+            for (offset, arrived) in [(0.0, k - 3), (0.019, k - 3), (0.021, k - 2), (0.039, k - 2)] {
+                let expected = f64::from((arrived + 1).max(0));
+                assert_eq!(transport.moment(time + offset).y, expected, "{k}, {offset}");
+            }
+            let next = 0.04 * f64::from((k - 2).max(0)) + 0.1;
+            assert!((transport.next_arrival(time).unwrap() - next).abs() < 1e-12);
+            assert!(transport.changes.len() <= 4);
+        }
+    }
+
+    #[test]
+    fn ticks_that_differ_by_rounding_are_one() {
+        let mut transport = transport(0.12);
+        let (mut commanded, mut expected) = (0.0, 0.0);
+        for k in 0..1000 {
+            transport.command(commanded, pitch(f64::from(k + 1))).unwrap();
+            for time in [0.04 * f64::from(k), commanded] {
+                assert_eq!(transport.moment(time).y, expected, "{time}");
+            }
+            commanded += 0.04;
+            expected = f64::from((k - 1).max(0));
+        }
+    }
+
+    #[test]
+    fn a_command_never_acts_when_it_is_given_however_short_the_delay() {
+        for delay in [1e-12, 1e-9, 1e-6] {
+            let mut transport = transport(delay);
+            transport.command(2.0, pitch(1.0)).unwrap();
+            assert_eq!(transport.moment(2.0), Vector3::zeros(), "{delay}");
+            assert!(transport.next_arrival(2.0).unwrap() > 2.0);
+            assert_eq!(transport.moment(2.0 + delay), pitch(1.0), "{delay}");
+            assert_eq!(transport.next_arrival(2.0 + delay), None);
+        }
+    }
+
+    #[test]
+    fn what_is_commanded_again_takes_no_room_and_what_replaces_it_counts() {
+        let mut transport = transport(0.5);
+        for k in 0..100_000 {
+            transport.command(1e-5 * f64::from(k), pitch(7.0)).unwrap();
+        }
+        assert_eq!(transport.changes.len(), 1);
+        transport.command(1.0, pitch(8.0)).unwrap();
+        transport.command(1.0, pitch(9.0)).unwrap();
+        assert_eq!(transport.moment(1.5), pitch(9.0));
+        transport.command(1.0, pitch(7.0)).unwrap();
+        assert_eq!(transport.next_arrival(1.0), None, "taken back");
+    }
+
+    #[test]
+    fn too_many_changes_are_refused_with_the_parameters_name() {
+        let mut transport = transport(1.0);
+        let mut last = Ok(());
+        let mut count = 0;
+        while last.is_ok() && count < 1_000_000 {
+            last = transport.command(1e-5 * f64::from(count), pitch(f64::from(count)));
+            count += 1;
+        }
+        let text = last.unwrap_err().to_string();
+        assert!(text.contains("actuation.delay") && text.contains("10000"), "{text}");
+        // The first is zero, which is no change.
+        assert_eq!(count as usize, UNDER_WAY + 2);
+        for delay in [-0.1, 1.1, f64::NAN] {
+            assert!(Transport::new(delay).unwrap_err().to_string().contains("actuation.delay"));
+        }
+        assert_eq!(Transport::new(0.0).unwrap(), None);
+    }
+}
