@@ -247,7 +247,8 @@ impl Crmpc {
         if report.status == Status::Fallback {
             return (report, None);
         }
-        let margins = self.sets.certify(self.optimiser.motion());
+        let checked = matches!(report.status, Status::Unconstrained);
+        let margins = self.sets.certify(self.optimiser.motion(), checked);
         if margins.is_some() || self.design.counted < 1.0 {
             return (report, margins);
         }
@@ -256,7 +257,7 @@ impl Crmpc {
         let iterations = report.iterations + settled.iterations;
         let margins = match settled.status {
             Status::Fallback => None,
-            _ => self.sets.certify(self.optimiser.motion()),
+            _ => self.sets.certify(self.optimiser.motion(), false),
         };
         (mpc::Report { iterations, ..settled }, margins)
     }

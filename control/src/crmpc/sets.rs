@@ -121,17 +121,19 @@ impl Sets {
 
     /// What a plan leaves of the limits beyond what is reserved, as shares of them; `None` if it does not keep the conditions of the theorem (docs/guarantee.md),
     /// which are those of the whole tightening.
-    pub(super) fn certify(&mut self, motion: &Motion<2>) -> Option<Margins> {
+    ///
+    /// `checked`: [`mpc::Bounded::violated`] has found nothing in it already.
+    pub(super) fn certify(&mut self, motion: &Motion<2>, checked: bool) -> Option<Margins> {
         if !matches!(&self.kind, Kind::Robust(robust) if robust.design.counted >= 1.0 && robust.share >= 1.0) {
             return None;
         }
-        if mpc::Bounded::violated(self, motion, 0..0).is_some() {
+        if !checked && mpc::Bounded::violated(self, motion, 0..0).is_some() {
             return None;
         }
         let Self { kind: Kind::Robust(robust), body, references, .. } = self else { return None };
         let n = motion.inputs.len();
         let points = |k| Point::at(references, motion, k);
-        // The first state, which no optimisation can change.
+        // The first state, which no optimisation can change, and the last one, beyond which the motion brakes.
         let (first, second) = (points(0), points(1));
         let rates = first.turned(body).1;
         let bound = robust.rate_bound(0, norm_of_columns(&rates.rates_by_angles), &first, &second);
