@@ -4,7 +4,9 @@ use crate::law::{Law, Vehicle};
 use crate::solver::{self, SolverOutputs, SolverParameters};
 use crate::table::{self, ANGLES, enumeration, item, number, sampled_inputs, vector};
 use crate::unit::Unit;
-use control::crmpc::{Constraints, Crmpc, InitialState, Memory, Settings};
+use control::crmpc::{
+    Constraints, Crmpc, Guarantee, InitialState, Memory, ObserverSettings, Settings, Standing,
+};
 use control::sampled::Gain;
 use fmi2_export::table::{discrete_output, parameter};
 use fmi2_export::{Failure, Table};
@@ -29,6 +31,9 @@ pub struct CrmpcLaw {
     inertia_error: f64,
     angle_error: f64,
     rate_error: f64,
+    guarantee: i32,
+    sideslip_domain: f64,
+    observer: ObserverSettings,
     sideslip_bound: f64,
     reference_rate: f64,
     reference_acceleration: f64,
@@ -41,6 +46,12 @@ pub struct CrmpcLaw {
 struct Shown {
     angles: Vector3<f64>,
     rates: Vector3<f64>,
+    in_force: bool,
+    /// Item number of [`STANDINGS`].
+    standing: i32,
+    rate_margin: f64,
+    moment_margin: f64,
+    disturbance: Vector3<f64>,
     solver: SolverOutputs,
 }
 
@@ -56,6 +67,18 @@ const INITIAL_STATES: [(InitialState, &str, &str); 3] = [
         "nominal",
         "it starts where the previous plan put it, the first at the measured state",
     ),
+];
+
+const GUARANTEES: [(Guarantee, &str, &str); 2] = [
+    (Guarantee::Required, "required", "settings for which the robust set cannot be guaranteed are refused"),
+    (Guarantee::BestEffort, "bestEffort", "they run all the same, without guarantee"),
+];
+const STANDINGS: [(Standing, &str, &str); 5] = [
+    (Standing::None, "none", "no optimisation yet, or sets that guarantee nothing"),
+    (Standing::InForce, "inForce", "the limits are kept for as long as the assumptions hold"),
+    (Standing::Refused, "refused", "the design does not hold for the settings: best effort"),
+    (Standing::Uncertified, "uncertified", "no plan has been found that keeps the conditions of the guarantee"),
+    (Standing::Exceeded, "exceeded", "the vehicle is further from the plan than the assumptions explain"),
 ];
 
 impl Default for CrmpcLaw {
@@ -76,6 +99,9 @@ impl Default for CrmpcLaw {
             inertia_error: s.inertia_error,
             angle_error: s.angle_error,
             rate_error: s.rate_error,
+            guarantee: number(&GUARANTEES, &s.guarantee),
+            sideslip_domain: s.sideslip_domain,
+            observer: s.observer,
             sideslip_bound: s.sideslip_bound,
             reference_rate: s.reference_rate,
             reference_acceleration: s.reference_acceleration,
@@ -94,7 +120,7 @@ impl Law for CrmpcLaw {
     const DOCUMENTATION: &'static str = concat!(include_str!("crmpc.html"), include_str!("wiring.html"));
 
     fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
-        outputs(bounds(gains(schedule(table))))
+        outputs(guarantee(bounds(gains(schedule(table)))))
     }
 
     #[allow(private_interfaces)]
@@ -117,6 +143,10 @@ impl Law for CrmpcLaw {
             inertia_error: self.inertia_error,
             angle_error: self.angle_error,
             rate_error: self.rate_error,
+            delay: vehicle.delay,
+            sideslip_domain: self.sideslip_domain,
+            guarantee: item(&GUARANTEES, self.guarantee),
+            observer: self.observer,
             sideslip_bound: self.sideslip_bound,
             reference_rate: self.reference_rate,
             reference_acceleration: self.reference_acceleration,
@@ -129,12 +159,28 @@ impl Law for CrmpcLaw {
         self.shown = Shown {
             angles: memory.nominal.fixed_rows::<3>(0).into(),
             rates: memory.nominal.fixed_rows::<3>(3).into(),
+            in_force: memory.standing == Standing::InForce,
+            standing: number(&STANDINGS, &memory.standing),
+            rate_margin: memory.margins.rate,
+            moment_margin: memory.margins.moment,
+            disturbance: memory.observed.disturbance,
             solver: SolverOutputs::from(&memory.report),
         };
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
-        solver::warning(&before.report, &after.report)
+        match (before.standing, after.standing) {
+            (Standing::InForce, Standing::Exceeded) => Some(
+                "the guarantee is no longer in force: the vehicle is further from the plan than disturbance.bound, inertia.error, estimation.* and delay explain",
+            ),
+            (Standing::None | Standing::InForce, Standing::Uncertified) => {
+                Some("the guarantee is not in force: no plan keeps its conditions from the present state")
+            }
+            (Standing::None, Standing::Refused) => {
+                Some("constraints = robust cannot be guaranteed with these settings; it runs as best effort")
+            }
+            _ => solver::warning(&before.report, &after.report),
+        }
     }
 }
 
@@ -209,13 +255,13 @@ fn bounds(table: Controller) -> Controller {
     let inertia = parameter("inertia.error", "Relative inertia error that the robust set is tightened for");
     let angle_error = parameter(
         "estimation.angleError",
-        "Bound on the error of each angle given that the robust set is tightened for; it changes slowly",
+        "Bound on the error of each angle given that the robust set is tightened for; it changes no faster than estimation.rateError",
     );
     let rate_error = parameter(
         "estimation.rateError",
-        "Bound on the error of each rate given that the robust set is tightened for; white from tick to tick",
+        "Bound on the error of the derivative of each angle, as it follows from what is given, that the robust set is tightened for",
     );
-    let sideslip = parameter("bound.sideslip", "Sideslip angle up to which the bounds of the design hold");
+    let sideslip = parameter("bound.sideslip", "Sideslip angle up to which the bounds of the paper's design hold");
     let rate =
         parameter("bound.referenceRate", "Bound on the reference's rate in the paper's terminal set (13)");
     let acceleration = parameter(
@@ -238,6 +284,34 @@ fn bounds(table: Controller) -> Controller {
         .real(rate_error.real().unit(unit::angular_rate()).min(0.0).nominal(0.005), |m| &mut m.law.rate_error)
 }
 
+fn guarantee(table: Controller) -> Controller {
+    let policy = "What happens where the robust set cannot be guaranteed";
+    let sideslip = parameter("guarantee.sideslip", "Sideslip angle up to which the guarantee is given");
+    let active = parameter(
+        "observer.active",
+        "Whether the robust set's reference is shifted by what the observed disturbance does to the vehicle",
+    );
+    let time = parameter("observer.timeConstant", "Time constant of the disturbance observer's filter");
+    let stiffness =
+        parameter("observer.stiffness", "Observed disturbance over the shift of the reference's angles");
+    table
+        .enumeration(
+            parameter("guarantee.policy", policy),
+            enumeration("GuaranteePolicy", policy, &GUARANTEES),
+            |m| &mut m.law.guarantee,
+        )
+        .real(sideslip.real().unit(unit::angle()).min(0.0).max(0.8).nominal(0.3), |m| {
+            &mut m.law.sideslip_domain
+        })
+        .boolean(active, |m| &mut m.law.observer.active)
+        .real(time.real().unit(unit::time()).min(1e-3).max(100.0).nominal(0.2), |m| {
+            &mut m.law.observer.time_constant
+        })
+        .real(stiffness.real().unit(unit::gain_angle()).min(1e-3).max(1e3).nominal(2.5), |m| {
+            &mut m.law.observer.stiffness
+        })
+}
+
 fn outputs(table: Controller) -> Controller {
     let sampled = |name: &str, text: &str| discrete_output(name, text).depends_on(sampled_inputs());
     let nominal = |axis: &str, meaning: &str| {
@@ -250,5 +324,30 @@ fn outputs(table: Controller) -> Controller {
     };
     let table = vector(table, ANGLES, nominal, |m| &mut m.law.shown.angles);
     let table = vector(table, ANGLES, rate, |m| &mut m.law.shown.rates);
+    let standing = "Whether the guarantee of the robust set is in force at the last tick, and why not";
+    let margin = |name: &str, limit: &str| {
+        let text = format!("What the plan leaves of the {limit} in its first interval beyond what is reserved, over the limit");
+        sampled(&format!("guarantee.{name}"), &text).real()
+    };
+    let observed = |axis: &str, meaning: &str| {
+        let text = format!("Observed disturbance of the second derivative of the {meaning}");
+        sampled(&format!("disturbanceEstimate.{axis}"), &text)
+            .real()
+            .unit(unit::angular_acceleration())
+            .nominal(0.03)
+    };
+    let table = table
+        .boolean(
+            sampled("guarantee.inForce", "Whether the guarantee of the robust set is in force at the last tick"),
+            |m| &mut m.law.shown.in_force,
+        )
+        .enumeration(
+            sampled("guarantee.status", standing),
+            enumeration("GuaranteeStatus", standing, &STANDINGS),
+            |m| &mut m.law.shown.standing,
+        )
+        .real(margin("rateMargin", "rate limit"), |m| &mut m.law.shown.rate_margin)
+        .real(margin("momentMargin", "moment limit"), |m| &mut m.law.shown.moment_margin);
+    let table = vector(table, ANGLES, observed, |m| &mut m.law.shown.disturbance);
     solver::outputs(table, |law| &mut law.shown.solver)
 }
