@@ -19,11 +19,12 @@ fn assert_robust(cases: &[Case]) -> f64 {
 fn assert_keeps_limits(settings: &Settings, cases: &[Case]) -> f64 {
     let outcomes =
         in_parallel(cases, |case| harness::run(settings, case.inertia_scale, case.disturbance.clone()));
-    for (case, (outcome, fallbacks)) in cases.iter().zip(&outcomes) {
+    for (case, (outcome, kept)) in cases.iter().zip(&outcomes) {
         let name = &case.name;
         assert!(outcome.rate <= 1.0, "{name}: rate {} of its limit", outcome.rate);
         assert!(outcome.moment <= 1.0, "{name}: moment {} of its limit", outcome.moment);
-        assert_eq!(*fallbacks, 0, "{name}");
+        assert_eq!(kept.fallbacks, 0, "{name}");
+        assert!(kept.in_force >= 1.0 && !kept.broken, "{name}: {kept:?}");
     }
     outcomes.iter().map(|(outcome, _)| outcome.ems_deg).fold(0.0, f64::max)
 }
@@ -71,11 +72,11 @@ fn robust_with_a_free_initial_state_keeps_both_limits() {
 fn paper_set_tracks_better_and_violates_both_limits() {
     // (6) is an outer set: it implies neither ‖ω‖ ≤ 5°/s nor ‖m‖ ≤ 1.356e5 N m (docs/errata.md).
     for case in white(1..=3, 0.04) {
-        let (outcome, fallbacks) =
+        let (outcome, kept) =
             harness::run(&settings(Constraints::Paper), case.inertia_scale, case.disturbance);
         assert!(outcome.ems_deg <= 1.85, "{}: {outcome:?}", case.name);
         assert!(outcome.rate > 1.0 && outcome.moment > 1.5, "{}: {outcome:?}", case.name);
-        assert_eq!(fallbacks, 0, "{}", case.name);
+        assert_eq!((kept.fallbacks, kept.in_force), (0, 0.0), "{}", case.name);
     }
 }
 
@@ -104,7 +105,7 @@ fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_se
             for i in 0..3 {
                 let o = Vector2::new(measured.angles[i], angle_rates[i])
                     - Vector2::new(memory.nominal[i], memory.nominal[3 + i]);
-                let bound = design.tightening.disturbance[i];
+                let bound = design.tightening.shape[i];
                 let size = normals.iter().map(|normal| normal.dot(&o).abs() / bound).fold(0.0, f64::max);
                 assert!(size <= 1.0 + 1e-6, "tick {tick}: {size}");
                 largest = largest.max(size);

@@ -2,8 +2,11 @@
 //! Tolerances are half a unit of the last digit that is printed.
 
 use control::DesignError;
-use control::crmpc::{Design, InitialState, PaperConstants, Settings, step_response_peak, terminal_weight};
-use control::sampled::{Gain, Reach, SampledError};
+use control::crmpc::{
+    Constraints, Design, Guarantee, PaperConstants, Settings, held_terminal_weight,
+    step_response_peak, terminal_weight,
+};
+use control::sampled::{Gain, SampledError};
 use control::settings::Published;
 use nalgebra::{Matrix2, Vector2};
 use vehicle::scenario::Scenario;
@@ -45,13 +48,14 @@ fn published_terminal_weight_satisfies_15_with_equality() {
         assert_eq!(residual, Matrix2::zeros());
         assert_eq!(terminal_weight(settings.terminal, p, settings.q[i]), g);
     }
-    assert_eq!(Design::new(&settings).unwrap().g, [g; 3]);
+    let paper = Settings { constraints: Constraints::Paper, ..settings };
+    assert_eq!(Design::new(&paper).unwrap().g, [g; 3]);
 }
 
 #[test]
 fn oracle_terminal_law_never_leaves_a_ball_in_the_norm_of_g_but_a_euclidean_one() {
     // (12) and (14): d/dt ‖E‖²_G = Eᵀ (AᵀG + GA) E is never positive; d/dt ‖E‖² = Eᵀ (Aᵀ + A) E can be.
-    let settings = settings();
+    let settings = Settings { constraints: Constraints::Paper, ..settings() };
     let a = Matrix2::new(0.0, 1.0, settings.terminal.k1, settings.terminal.k2);
     for g in Design::new(&settings).unwrap().g {
         assert!((a.transpose() * g + g * a).symmetric_eigenvalues().max() < 0.0);
@@ -177,11 +181,22 @@ const PUBLISHED_CASES: [(f64, f64, [f64; 3]); 3] = [
 
 #[test]
 fn oracle_sampled_bounds() {
-    // L1 norms under zero-order hold, by an independent calculation (docs/errata.md).
+    // L1 norms under zero-order hold, by an independent calculation (docs/errata.md). A disturbance that may change at any time reaches as far or a little
+    // further: where a response changes its sign within a period.
     for (k, period, expected) in PUBLISHED_CASES {
+        let mut impulse = Simulation::new(gain(k), period);
+        impulse.advance(&[1.0]);
+        let mut held = [0.0; 3];
+        for _ in 0..2000 {
+            for (sum, output) in held.iter_mut().zip(impulse.outputs()) {
+                *sum += output.abs();
+            }
+            impulse.advance(&[0.0]);
+        }
         let reach = SampledError::new(gain(k), period).reach_forever().unwrap();
-        for (value, expected) in [reach.angle, reach.rate, reach.feedback].into_iter().zip(expected) {
-            assert_digits(value, expected, 4);
+        for (i, value) in [reach.angle, reach.rate, reach.feedback].into_iter().enumerate() {
+            assert_digits(held[i], expected[i], 4);
+            assert!(value >= held[i] * (1.0 - 1e-12) && value <= 1.1 * held[i], "K {k}: {value} {}", held[i]);
         }
     }
 }
@@ -201,28 +216,36 @@ fn oracle_marginal_gain_is_refused_with_its_spectral_radius() {
 
 #[test]
 fn oracle_bang_bang_disturbance_reaches_the_sampled_bounds() {
+    // It changes its sign at any of the parts of a period. Against disturbances that may change at any time that is one part in a thousand less.
+    const PARTS: usize = 40;
     for (k, period, _) in PUBLISHED_CASES {
-        let n = 300;
+        let n = 60;
         let reach = SampledError::new(gain(k), period).reach(n);
-        let mut impulse = Simulation::new(gain(k), period);
-        impulse.advance(&[1.0]);
-        let mut response = Vec::new();
-        for _ in 0..n {
-            response.push(impulse.outputs());
-            impulse.advance(&[0.0]);
-        }
+        // Responses to a pulse in each part of a period, at the ends of the periods after it.
+        let responses: Vec<Vec<[f64; 3]>> = (0..PARTS)
+            .map(|part| {
+                let mut impulse = Simulation::new(gain(k), period);
+                impulse.advance(&std::array::from_fn::<f64, PARTS, _>(|i| if i == part { 1.0 } else { 0.0 }));
+                let respond = |_| {
+                    let outputs = impulse.outputs();
+                    impulse.advance(&[0.0]);
+                    outputs
+                };
+                (0..n).map(respond).collect()
+            })
+            .collect();
         for output in 0..3 {
             for steps in [1, 2, 5, 20, n] {
                 let mut worst = Simulation::new(gain(k), period);
                 for j in (0..steps).rev() {
-                    worst.advance(&[response[j][output].signum()]);
+                    worst.advance(&std::array::from_fn::<f64, PARTS, _>(|part| {
+                        responses[part][j][output].signum()
+                    }));
                 }
                 let bound = [reach[steps].angle, reach[steps].rate, reach[steps].feedback][output];
                 let reached = worst.outputs()[output];
-                assert!(
-                    (reached - bound).abs() < 1e-12,
-                    "K {k}, {steps} steps, output {output}: {reached} {bound}"
-                );
+                assert!(reached <= bound * (1.0 + 1e-12), "K {k}, {steps} steps, output {output}");
+                assert!(reached >= bound * (1.0 - 2e-3), "K {k}, {steps} steps, output {output}: {reached} {bound}");
             }
         }
     }
@@ -293,7 +316,7 @@ mod properties {
             disturbances in prop::collection::vec(prop_oneof![Just(1.0), Just(-1.0)], 1..200),
         ) {
             let (k, period, _) = PUBLISHED_CASES[case];
-            let set = SampledError::new(gain(k), period).invariant_set().unwrap();
+            let set = SampledError::new(gain(k), period).invariant_set(0.0).unwrap();
             let normals = set.normals();
             let size = |o: &Vector2<f64>| normals.iter().map(|normal| normal.dot(o).abs()).fold(0.0, f64::max);
             // From anywhere on its border.
@@ -315,7 +338,7 @@ mod properties {
 fn oracle_invariant_set_holds_what_can_be_reached_and_is_less_than_half_larger() {
     for (k, period, _) in PUBLISHED_CASES {
         let error = SampledError::new(gain(k), period);
-        let (set, least) = (error.invariant_set().unwrap().reach(), error.reach_forever().unwrap());
+        let (set, least) = (error.invariant_set(0.0).unwrap().reach(), error.reach_forever().unwrap());
         let pairs = [(set.angle, least.angle), (set.rate, least.rate), (set.feedback, least.feedback)];
         for (of_set, least) in pairs {
             assert!(of_set >= least * (1.0 - 1e-12), "K {k}, period {period}: {of_set} {least}");
@@ -325,31 +348,55 @@ fn oracle_invariant_set_holds_what_can_be_reached_and_is_less_than_half_larger()
 }
 
 #[test]
-fn oracle_errors_of_measurement_count_until_the_next_plan() {
-    let (angle_error, rate_error) = (4e-3, 3e-3);
+fn oracle_errors_of_the_rate_ask_for_moment_at_once() {
+    // In the first interval K ô holds k₂ e of the newest error, and (k₂ + τ k₁) e of the first one, a tick after the plan began.
+    let rate_error = 1e-3;
     let exact = settings();
-    let noisy = Settings { angle_error, rate_error, ..exact };
-    let [exact, noisy] = [exact, noisy].map(|settings| Design::new(&settings).unwrap().tightening);
-    assert_eq!(
-        (&exact.at_stage, &exact.within_stage, exact.norm),
-        (&noisy.at_stage, &noisy.within_stage, noisy.norm)
-    );
-    assert!(
-        exact.noise_at_stage.iter().chain(&exact.noise_within_stage).all(|noise| *noise == Reach::default())
-    );
+    let noisy = Settings { rate_error, guarantee: Guarantee::BestEffort, disturbance_bound: 0.0, ..exact };
+    let exact = Settings { disturbance_bound: 0.0, ..exact };
+    let [exact, noisy] = [exact, noisy].map(|settings| Design::new(&settings).unwrap());
+    assert_eq!(noisy.counted, 1.0);
+    let more = noisy.tightening.at(1).feedback - exact.tightening.at(1).feedback;
+    // The angle may have been off by τ e as well, by the change of its own error.
+    let expected = rate_error * (5.0 + 5.2 + 0.2);
+    assert!((more - expected).abs() < 1e-9 * expected, "{more} {expected}");
+}
 
-    // At the first state the vehicle is off by the error itself. One tick later that has become (−τ e₀, −e₀), and a new error
-    // comes: K (o + e) = (k₂ + τ k₁) e₀ + k₂ e₁ up to signs, the largest within the first interval.
-    let size = rate_error / 10f64.to_radians().cos();
-    assert!((noisy.noise_at_stage[0].rate - size).abs() < 1e-15);
-    let feedback = noisy.noise_within_stage[0].feedback;
-    assert!((feedback - size * 5.2f64.hypot(5.0)).abs() < 1e-12, "{feedback}");
-    assert_eq!(noisy.noise_within_stage[1], Reach::default());
-    assert!(noisy.noise_at_stage.iter().all(|noise| noise.angle >= angle_error));
+#[test]
+fn oracle_sampled_terminal_weight_decreases_where_the_continuous_one_does_not() {
+    // (11c) with the cost and the law held for h: ΦᵀGΦ − G + h (P + K̃ᵀQK̃). The printed G leaves eigenvalues of +1.6 and +50.
+    let settings = settings();
+    let Settings { terminal, period_optimisation: h, p, q, .. } = settings;
+    let held = SampledError::new(terminal, h);
+    let p = Vector2::new(p[0], p[3]);
+    let load = (Matrix2::from_diagonal(&p) + terminal.row().transpose() * terminal.row() * q[0]) * h;
+    let rest = |g: &Matrix2<f64>| held.transition().transpose() * g * held.transition() - g + load;
+    let printed = rest(&terminal_weight(terminal, p, q[0])).symmetric_eigenvalues();
+    assert!((printed.min() - 1.6).abs() < 0.05 && (printed.max() - 50.0).abs() < 0.5, "{printed}");
+    let g = held_terminal_weight(&held, terminal, p, q[0]);
+    assert!(rest(&g).amax() < 1e-10, "{}", rest(&g));
+    let expected = Matrix2::new(116.7, 55.0, 55.0, 61.2);
+    assert!((g - expected).amax() < 0.05, "{g}");
+    assert_eq!(Design::new(&settings).unwrap().g, [g; 3]);
+}
 
-    let nominal = Settings { angle_error, rate_error, initial_state: InitialState::Nominal, ..settings() };
-    let grown = Design::new(&nominal).unwrap().tightening;
-    assert_eq!(grown.noise_within_stage[0], grown.noise_within_stage[99], "never reset by a plan");
+#[test]
+fn a_terminal_gain_that_is_not_stable_when_held_is_refused_by_name() {
+    let settings = Settings { terminal: gain(-30.0), ..settings() };
+    let text = Design::new(&settings).unwrap_err().to_string();
+    assert!(text.contains("terminal gain") && text.contains("held for 0.2 s"), "{text}");
+}
+
+#[test]
+fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
+    let settings = Settings { disturbance_bound: 2.5f64.to_radians(), ..settings() };
+    let error = Design::new(&settings).unwrap_err();
+    let DesignError::NoGuarantee { moment_left, disturbance: Some(largest), .. } = error else { panic!("{error}") };
+    assert!(moment_left < 0.0 && error.to_string().contains("disturbance.bound"), "{error}");
+    Design::new(&Settings { disturbance_bound: largest, ..settings }).unwrap();
+    Design::new(&Settings { disturbance_bound: 1.01 * largest, ..settings }).unwrap_err();
+    let counted = Design::new(&Settings { guarantee: Guarantee::BestEffort, ..settings }).unwrap().counted;
+    assert!((counted * settings.disturbance_bound / largest - 1.0).abs() < 1e-6, "{counted}");
 }
 
 #[test]

@@ -276,7 +276,7 @@ fn an_infeasible_problem_is_recognised_within_the_iteration_limit() {
 #[test]
 fn oracle_riccati_and_cone_agree_where_the_start_is_free_within_a_set() {
     use control::sampled::{Gain, SampledError};
-    let set = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04).invariant_set().unwrap();
+    let set = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04).invariant_set(0.0).unwrap();
     let normals: [Vec<SVector<f64, 2>>; 3] =
         [0.03, 0.05, 0.1].map(|bound| set.normals().iter().map(|normal| normal / bound).collect());
     let mut solvers = Solvers::new(published(), Some(normals.clone()));

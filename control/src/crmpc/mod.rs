@@ -121,7 +121,7 @@ impl Crmpc {
         let Settings { horizon: n, period_optimisation: h, p, q, .. } = settings;
         let start = (settings.initial_state == InitialState::Tube).then(|| {
             let normals = design.invariant.as_ref().map(InvariantSet::normals).unwrap_or_default();
-            let disturbance = start_box(&settings, &design);
+            let disturbance = design.tightening.shape;
             std::array::from_fn(|i| {
                 normals.iter().map(|n| n / disturbance[i].max(SMALLEST_DISTURBANCE)).collect()
             })
@@ -467,14 +467,6 @@ impl Crmpc {
         let Settings { limit_rate, rate_error, angle_error, .. } = self.settings;
         let of_rates = 3.0_f64.sqrt() * rate_error;
         (limit_rate + of_rates + linearise::TURN_BY_ANGLES * 1.5 * limit_rate * angle_error) * (1.0 + 1e-9)
-    }
-}
-
-/// Sizes of the box that the start's set is made for, per axis, rad/s².
-fn start_box(settings: &Settings, design: &Design) -> Vector3<f64> {
-    match settings.constraints {
-        Constraints::Robust => design.tightening.shape,
-        Constraints::Paper => Vector3::repeat(settings.disturbance_bound),
     }
 }
 
