@@ -20,6 +20,8 @@ pub enum Status {
     Cone,
     /// No solver succeeded: the shifted previous plan with the terminal law.
     Fallback,
+    /// No optimum was found that keeps the conditions of the guarantee: the previous plan as it is, which keeps them.
+    Kept,
 }
 
 /// What the optimisation reports.

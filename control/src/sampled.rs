@@ -85,6 +85,18 @@ impl Reach {
         }
     }
 
+    /// The larger of each.
+    pub fn or(&self, other: &Self) -> Self {
+        Self {
+            angle: self.angle.max(other.angle),
+            rate: self.rate.max(other.rate),
+            seen_angle: self.seen_angle.max(other.seen_angle),
+            seen_rate: self.seen_rate.max(other.seen_rate),
+            feedback: self.feedback.max(other.feedback),
+            feedback_age: self.feedback_age.max(other.feedback_age),
+        }
+    }
+
     /// Every bound times `size`.
     pub fn times(&self, size: f64) -> Self {
         Self {
@@ -120,6 +132,7 @@ const EXPLICIT: usize = 30;
 pub struct InvariantSet {
     generators: Vec<Vector2<f64>>,
     gain: Gain,
+    latency: f64,
 }
 
 impl InvariantSet {
@@ -134,13 +147,16 @@ impl InvariantSet {
         across.map(|normal| normal / self.support(&normal)).collect()
     }
 
-    /// Its largest angle, rate and feedback.
+    /// Its largest angle, rate and feedback, and what happens besides while a command is under way.
     pub fn reach(&self) -> Reach {
+        let (angle, rate) = (self.support(&Vector2::x()), self.support(&Vector2::y()));
         Reach {
-            angle: self.support(&Vector2::x()),
-            rate: self.support(&Vector2::y()),
+            angle: angle + 0.5 * self.latency * self.latency,
+            rate: rate + self.latency,
+            seen_angle: angle,
+            seen_rate: rate,
             feedback: self.support(&self.gain.row().transpose()),
-            ..Reach::default()
+            feedback_age: 0.0,
         }
     }
 }
@@ -290,7 +306,7 @@ impl SampledError {
         for i in 0..2 {
             generators.push(vectors[i] * ((rest[i].abs() + shift[i].abs()) / (1.0 - eigenvalues[i].abs())));
         }
-        Some(InvariantSet { generators, gain: self.gain })
+        Some(InvariantSet { generators, gain: self.gain, latency: self.latency })
     }
 
     /// Sampling period, s.
@@ -318,19 +334,25 @@ mod tests {
         // Support functions: h(Φᵀn) + |nᵀΓ| ≤ h(n) for every facet of the set.
         for (k, period) in [(-5.0, 0.04), (-5.0, 0.2), (-10.0, 0.04), (-4.5, 0.1)] {
             let error = SampledError::new(Gain { k1: k, k2: k }, period);
-            let set = error.invariant_set(0.0).unwrap();
+            let lateral = 0.25 * period * period;
+            let set = error.invariant_set(lateral).unwrap();
             let normals = set.normals();
             assert!(normals.len() > EXPLICIT);
             for normal in normals {
                 assert!((set.support(&normal) - 1.0).abs() < 1e-12);
-                let after = set.support(&(error.phi.transpose() * normal)) + normal.dot(&error.gamma).abs();
+                let driven = normal.dot(&error.gamma).abs() + lateral * normal.x.abs();
+                let after = set.support(&(error.phi.transpose() * normal)) + driven;
                 assert!(after <= 1.0 + 1e-12, "K = {k} at {period} s: {after}");
             }
-            let (set, reach) = (set.reach(), error.reach_forever().unwrap());
-            for (outer, exact) in
-                [(set.angle, reach.angle), (set.rate, reach.rate), (set.feedback, reach.feedback)]
-            {
-                assert!(outer >= exact * (1.0 - 1e-12) && outer < 1.25 * exact, "{outer} {exact}");
+            // Without shifts it is that of held disturbances, which reach no further than those that change at any time.
+            let (set, held) = (set.reach(), error.invariant_set(0.0).unwrap().reach());
+            let reach = error.reach_forever().unwrap();
+            for (outer, held, exact) in [
+                (set.angle, held.angle, reach.angle),
+                (set.rate, held.rate, reach.rate),
+                (set.feedback, held.feedback, reach.feedback),
+            ] {
+                assert!(outer >= exact * (1.0 - 1e-12) && held < 1.25 * exact, "{outer} {held} {exact}");
             }
         }
     }
@@ -405,7 +427,7 @@ mod tests {
                         let fresh = if free > 0.0 && free < latency { Vector2::new(free, 1.0) } else { Vector2::zeros() };
                         if n > 0 {
                             seen = error.phi * seen;
-                            if (latency..latency + period).contains(&free) {
+                            if free > 0.0 && (latency..latency + period).contains(&free) {
                                 seen = Vector2::new(free, 1.0);
                             }
                         }

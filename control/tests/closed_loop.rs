@@ -105,7 +105,7 @@ fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_se
             for i in 0..3 {
                 let o = Vector2::new(measured.angles[i], angle_rates[i])
                     - Vector2::new(memory.nominal[i], memory.nominal[3 + i]);
-                let bound = design.tightening.shape[i];
+                let bound = settings.disturbance_bound;
                 let size = normals.iter().map(|normal| normal.dot(&o).abs() / bound).fold(0.0, f64::max);
                 assert!(size <= 1.0 + 1e-6, "tick {tick}: {size}");
                 largest = largest.max(size);
@@ -166,6 +166,8 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
         let rate_slack = largest(&deviations(Disturbance::default()), [3, 4, 5]);
         assert!(slack < 0.01 * reach.angle * bound && rate_slack < 0.01 * reach.rate * bound);
 
+        // What else drives the deviation, docs/guarantee.md; the vehicle's inertia is the one believed here.
+        let bound = bound + design.tightening.mismatch;
         for kind in [Kind::Constant, Kind::Square, Kind::AlongRate] {
             let direction = Vector3::new(1.0, -1.0, 1.0);
             let deviations = deviations(Disturbance { direction, square_period: 10.0, ..disturbance(kind) });
@@ -176,7 +178,7 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
                 assert!(rate > 1.9 * paper.rate_tube, "{constraints:?}: {rate}");
             }
             if kind == Kind::Constant {
-                let last = deviations.last().unwrap() / bound;
+                let last = deviations.last().unwrap() / settings(constraints).disturbance_bound;
                 for i in 0..3 {
                     let settled = direction[i] / feedback.k1.abs();
                     assert!((last[i] - settled).abs() < 1e-4 * settled.abs(), "{constraints:?}: {last}");

@@ -338,7 +338,8 @@ mod properties {
 fn oracle_invariant_set_holds_what_can_be_reached_and_is_less_than_half_larger() {
     for (k, period, _) in PUBLISHED_CASES {
         let error = SampledError::new(gain(k), period);
-        let (set, least) = (error.invariant_set(0.0).unwrap().reach(), error.reach_forever().unwrap());
+        let set = error.invariant_set(0.25 * period * period).unwrap().reach();
+        let least = error.reach_forever().unwrap();
         let pairs = [(set.angle, least.angle), (set.rate, least.rate), (set.feedback, least.feedback)];
         for (of_set, least) in pairs {
             assert!(of_set >= least * (1.0 - 1e-12), "K {k}, period {period}: {of_set} {least}");

@@ -2,7 +2,7 @@
 
 mod harness;
 
-use control::crmpc::{Constraints, InitialState, Memory, Plan, Report, Settings, Status};
+use control::crmpc::{Constraints, InitialState, Memory, Plan, Report, Settings, Standing, Status};
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::schedule::Sampled;
 use control::{Controller, Crmpc, Measurement};
@@ -103,9 +103,14 @@ fn exits_lead_to_the_optimum_of_the_whole_horizon() {
             prop_assume!(status_whole == Status::Cone);
             prop_assert_ne!(status, Status::Fallback);
             counts[usize::from(status == Status::Constrained)].update(|count| count + 1);
-            prop_assert!((cost - cost_whole).abs() <= 1e-6 * cost_whole, "{cost} {cost_whole}");
+            // Bounds that depend on the motion leave more than one optimum that satisfies its own.
+            let (of_cost, of_moment) = match constraints {
+                Constraints::Robust => (1e-4, 1e-2),
+                Constraints::Paper => (1e-6, 1e-4),
+            };
+            prop_assert!((cost - cost_whole).abs() <= of_cost * cost_whole, "{cost} {cost_whole}");
             let difference = (moment - moment_whole).norm() / limit;
-            prop_assert!(difference < 1e-4, "{status:?}: {difference}");
+            prop_assert!(difference < of_moment, "{status:?}: {difference}");
             Ok(())
         };
         let config = ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() };
@@ -141,11 +146,12 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
     // Chai 2022, (28): û = u + f(x), and (29): û^m = û* + K O_e; the print has B O_e, which has six components.
     let mut controller = controller(Constraints::Robust);
     let Settings { body, feedback, .. } = settings(Constraints::Robust);
+    let mut inside = 0;
     for sample in recorded(Constraints::Robust).iter().step_by(10) {
         let (mut memory, _) = sample.update(&mut controller);
         let tick = sample.tick + 1;
-        let angles = sample.measured.angles + Vector3::new(0.01, -0.02, 0.03);
-        let rates = sample.measured.rates + Vector3::new(-0.02, 0.01, 0.005);
+        let angles = sample.measured.angles + Vector3::new(0.001, -0.002, 0.003);
+        let rates = sample.measured.rates + Vector3::new(-0.002, 0.001, 0.0005);
         let time = tick as f64 * controller.period();
         let moment = controller.update(
             &mut memory,
@@ -155,15 +161,23 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
             &reference(),
         );
 
-        let r = kinematics::r(&angles);
-        let angle_rates = r * rates;
-        let input = r * body.inverse * moment + body.drift(&angles, &angle_rates);
+        let angle_rates = kinematics::r(&angles) * rates;
         let nominal = memory.nominal;
         let (angle, rate) = (angles - nominal.fixed_rows::<3>(0), angle_rates - nominal.fixed_rows::<3>(3));
         let expected = memory.plan.accelerations[0] + angle * feedback.k1 + rate * feedback.k2;
+        // Where that acceleration takes the state by the middle of the period (docs/guarantee.md).
+        let half = 0.5 * controller.period();
+        let middle = angles + angle_rates * half + expected * (0.5 * half * half);
+        if moment.norm() > (1.0 - 1e-12) * settings(Constraints::Robust).limit_moment {
+            continue;
+        }
+        inside += 1;
+        let input = kinematics::r(&middle) * body.inverse * moment
+            + body.drift(&middle, &(angle_rates + expected * half));
         assert!((input - expected).norm() < 1e-13, "tick {tick}: {input} {expected}");
-        assert!(angle.norm() > 0.03, "tick {tick}: no deviation");
+        assert!(angle.norm() > 1e-4, "tick {tick}: no deviation");
     }
+    assert!(inside > 10, "{inside}");
 }
 
 #[test]
@@ -215,7 +229,9 @@ fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins(
                 memory.report.cost
             });
             let context = format!("{constraints:?}, {initial_state:?}: {cost} {cost_cone}");
-            assert!((cost - cost_cone).abs() <= 1e-6 * cost_cone, "{context}");
+            // As above.
+            let tolerance = if constraints == Constraints::Robust { 1e-4 } else { 1e-6 };
+            assert!((cost - cost_cone).abs() <= tolerance * cost_cone, "{context}");
         }
     }
 }
@@ -242,32 +258,31 @@ fn every_way_to_the_optimum_shows_that_it_is_one() {
     }
 }
 
-/// (31) written out again: the plan before without its first interval, then one interval under (14).
-fn assert_is_shifted(after: &Plan, before: &Plan, end: &Reference, settings: &Settings) {
+/// (31) written out again: the plan before without its first interval, then one under the acceleration `last` of the state before.
+fn assert_is_shifted(after: &Plan, before: &Plan, settings: &Settings, last: impl Fn(f64, f64, usize) -> f64) {
     let n = settings.horizon;
     assert_eq!(after.states[..n], before.states[1..]);
     assert_eq!(after.accelerations[..n - 1], before.accelerations[1..]);
     let h = settings.period_optimisation;
-    let last = before.states[n];
+    let end = before.states[n];
     for i in 0..3 {
-        let (angle, rate) = (last[i] - end.angles[i], last[3 + i] - end.rates[i]);
-        let a = settings.terminal.k1 * angle + settings.terminal.k2 * rate + end.accelerations[i];
+        let a = last(end[i], end[3 + i], i);
         assert!((after.accelerations[n - 1][i] - a).abs() < 1e-14);
-        assert!((after.states[n][3 + i] - (last[3 + i] + h * a)).abs() < 1e-14);
-        assert!((after.states[n][i] - (last[i] + h * last[3 + i] + 0.5 * h * h * a)).abs() < 1e-14);
+        assert!((after.states[n][3 + i] - (end[3 + i] + h * a)).abs() < 1e-14);
+        assert!((after.states[n][i] - (end[i] + h * end[3 + i] + 0.5 * h * h * a)).abs() < 1e-14);
     }
 }
 
 #[test]
 fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
-    let settings = settings(Constraints::Robust);
+    let settings = settings(Constraints::Paper);
     let mut failing =
         Crmpc::new(Settings { solver: SolverSettings { max_iterations: 1, ..settings.solver }, ..settings })
             .unwrap();
-    let recorded = recorded(Constraints::Robust);
+    let recorded = recorded(Constraints::Paper);
     let constrained = |sample: &&Recorded| {
         sample.tick > 0
-            && sample.update(&mut controller(Constraints::Robust)).0.report.status == Status::Constrained
+            && sample.update(&mut controller(Constraints::Paper)).0.report.status == Status::Constrained
     };
     let samples: Vec<_> = recorded.iter().filter(constrained).take(3).collect();
     assert_eq!(samples.len(), 3);
@@ -279,7 +294,13 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
         let time = sample.tick as f64 * settings.period_feedback;
         let h = settings.period_optimisation;
         let at = |k: usize| reference()(time + k as f64 * h);
-        assert_is_shifted(&after.plan, &sample.before.plan, &at(settings.horizon - 1), &settings);
+        let end = at(settings.horizon - 1);
+        assert_is_shifted(&after.plan, &sample.before.plan, &settings, |angle, rate, i| {
+            // (14)
+            settings.terminal.k1 * (angle - end.angles[i])
+                + settings.terminal.k2 * (rate - end.rates[i])
+                + end.accelerations[i]
+        });
 
         // That it is no optimum shows.
         assert!(after.report.residual > 1e-3, "{}", after.report.residual);
@@ -302,9 +323,13 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
         }
         assert!((after.report.cost - cost).abs() < 1e-9 * cost, "{} {cost}", after.report.cost);
 
-        // (20) about the shifted plan: R I⁻¹ m = u = K O_e + ũ, ũ = a − f(x).
+        // (20) about the shifted plan: R I⁻¹ m = u = K O_e + ũ, ũ = a − f(x); the limit is kept.
         let Measurement { angles, rates, .. } = sample.measured;
         let angle_rates = kinematics::r(&angles) * rates;
+        assert!(moment.norm() <= settings.limit_moment * (1.0 + 1e-12));
+        if moment.norm() > settings.limit_moment * (1.0 - 1e-12) {
+            continue;
+        }
         let u = kinematics::r(&angles) * (settings.body.inverse * moment);
         let nominal = &after.plan.states[0];
         let acceleration = u + settings.body.drift(&angles, &angle_rates);
@@ -314,6 +339,27 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
             assert!((acceleration[i] - after.plan.accelerations[0][i] - feedback).abs() < 1e-12);
         }
     }
+}
+
+#[test]
+fn the_robust_plan_is_kept_as_it_is_where_no_optimum_is_found() {
+    // Beyond the horizon the motion brakes, docs/guarantee.md, so that the guarantee stays in force.
+    let settings = settings(Constraints::Robust);
+    let solver = SolverSettings { max_iterations: 1, ..settings.solver };
+    let mut failing = Crmpc::new(Settings { solver, ..settings }).unwrap();
+    let mut found = 0;
+    for sample in recorded(Constraints::Robust).iter().skip(1) {
+        let (after, _) = sample.update(&mut failing);
+        if after.report.status != Status::Kept {
+            continue;
+        }
+        found += 1;
+        assert_is_shifted(&after.plan, &sample.before.plan, &settings, |_, rate, _| -0.01 * rate);
+        assert_eq!(after.standing, Standing::InForce, "tick {}", sample.tick);
+        assert_eq!(after.age, sample.before.age + 5);
+        assert!(after.margins.rate >= 0.0 && after.margins.moment >= 0.0, "{:?}", after.margins);
+    }
+    assert!(found > 20, "{found}");
 }
 
 /// A controller whose solver fails during some ticks.
@@ -356,12 +402,14 @@ fn run_failing(during: Range<u64>) -> (harness::Outcome, [u32; 2], Memory) {
         during: during.clone(),
     };
     let mut memory = Memory::default();
+    // Optimisations without an optimum, at which the plan was kept or given up.
     let mut fallbacks = [0, 0];
     let mut last = 0;
     let outcome =
         simulate(&mut controller, &mut memory, 1.05, disturbance(Kind::White), |memory, tick, _| {
-            fallbacks[usize::from(!during.contains(&tick))] += memory.report.fallbacks - last;
-            last = memory.report.fallbacks;
+            let without = matches!(memory.report.status, Status::Fallback | Status::Kept);
+            fallbacks[usize::from(!during.contains(&tick))] += u32::from(without && memory.report.solves > last);
+            last = memory.report.solves;
         });
     (outcome, fallbacks, memory)
 }
@@ -411,7 +459,7 @@ fn another_evaluation_of_a_tick_leaves_no_trace() {
         disturbed.evaluate(&mut disturbed_controller, measured, [0.0; 9], &reference);
         calm.evaluate(&mut calm_controller, measured, [0.0; 9], &reference);
         let ((moment, memory), (calm_moment, calm_memory)) = (disturbed.in_force(), calm.in_force());
-        assert_eq!(moment, calm_moment, "tick {tick}");
+        assert_eq!(moment, calm_moment, "tick {tick} {:?} {:?}", memory.report, calm_memory.report);
         assert_eq!(timeless(memory), timeless(calm_memory), "tick {tick}");
         disturbed.commit();
         calm.commit();

@@ -10,7 +10,7 @@ use fmi2_export::table::{discrete_output, parameter};
 use model_description::unit;
 use serde::{Deserialize, Serialize};
 
-const STATUSES: [(Status, &str, &str); 6] = [
+const STATUSES: [(Status, &str, &str); 7] = [
     (Status::None, "none", "no optimisation yet"),
     (
         Status::Unconstrained,
@@ -25,6 +25,7 @@ const STATUSES: [(Status, &str, &str); 6] = [
     (Status::Constrained, "constrained", "the optimum by the Riccati method"),
     (Status::Cone, "cone", "the optimum by the cone solver"),
     (Status::Fallback, "fallback", "the previous plan, shifted, with the terminal law"),
+    (Status::Kept, "kept", "the previous plan as it is, which keeps the conditions of the guarantee"),
 ];
 
 const METHODS: [(Method, &str, &str); 2] = [

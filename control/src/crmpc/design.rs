@@ -199,8 +199,6 @@ pub struct Design {
     pub counted: f64,
     /// Feedback ticks per optimisation.
     pub ratio: usize,
-    /// √λ_min(G), the smallest over the axes.
-    pub terminal_scale: f64,
     /// Largest eigenvalue of I, kg m².
     pub largest_inertia: f64,
     /// Smallest eigenvalue of I, kg m².
@@ -237,7 +235,6 @@ impl Design {
                 Constraints::Paper => terminal_weight(s.terminal, p, s.q[i]),
             }
         });
-        let terminal_scale = g.iter().map(smallest_eigenvalue).fold(f64::INFINITY, f64::min).sqrt();
         if held.settling().is_none() {
             let Gain { k1, k2 } = s.terminal;
             let radius = held.spectral_radius();
@@ -249,7 +246,7 @@ impl Design {
         let (counted, tightening, assessment) = robust(s)?;
         let invariant = error.invariant_set(guarantee::lateral(s));
         Ok(Self {
-            paper: paper_constants(s, terminal_scale, smallest_inertia, largest_inertia),
+            paper: paper_constants(s, smallest_inertia, largest_inertia),
             g,
             reach,
             invariant,
@@ -257,7 +254,6 @@ impl Design {
             assessment,
             counted,
             ratio,
-            terminal_scale,
             largest_inertia,
             smallest_inertia,
             inertia_ratio: largest_inertia / smallest_inertia,
@@ -337,7 +333,9 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
     Ok(ratio as usize)
 }
 
-fn paper_constants(s: &Settings, terminal_scale: f64, smallest: f64, largest: f64) -> Option<PaperConstants> {
+fn paper_constants(s: &Settings, smallest: f64, largest: f64) -> Option<PaperConstants> {
+    let weight = |i: usize| terminal_weight(s.terminal, Vector2::new(s.p[i], s.p[i + 3]), s.q[i]);
+    let terminal_scale = (0..3).map(|i| smallest_eigenvalue(&weight(i))).fold(f64::INFINITY, f64::min).sqrt();
     let root3 = 3.0_f64.sqrt();
     let r0 = (1.0 + s.sideslip_bound.tan()).sqrt();
     let r1 = s.limit_rate;

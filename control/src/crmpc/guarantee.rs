@@ -5,7 +5,6 @@
 use super::design::{InitialState, Settings};
 use crate::error::DesignError;
 use crate::sampled::{Reach, SampledError};
-use nalgebra::Vector3;
 use std::f64::consts::SQRT_2;
 
 /// Largest deviation of the vehicle from the plan at a feedback tick.
@@ -19,7 +18,7 @@ pub struct Deviation {
     pub seen_angle: f64,
     /// The same of the state that the law acts on, rad/s.
     pub seen_rate: f64,
-    /// Size of the box that K o is in beside the ball below, times [`Tightening::shape`], rad/s².
+    /// Size of the box that K o is in beside the ball below, rad/s².
     pub feedback: f64,
     /// Radius of a ball that K o is in as well, rad/s².
     pub feedback_norm: f64,
@@ -51,12 +50,12 @@ pub struct Tightening {
     within: Vec<Deviation>,
     /// By how much the deviation of angle and rate between the ends of that period can exceed what lies on the line between them: rad, rad/s.
     bulge: Vec<(f64, f64)>,
-    /// Bound on the disturbance of each axis over its size.
-    pub shape: Vector3<f64>,
-    /// Largest ‖I W s‖ over the corners s of the shape at any attitude of the domain, N m s² (times the size of the box: N m).
+    /// Largest ‖I W s‖ over the corners s of the unit box at any attitude of the domain, kg m².
     pub bearing: f64,
     /// Bound on the norm of all that drives the deviation, rad/s².
     pub norm: f64,
+    /// The part of it that F does between two ticks beyond what the law meant, rad/s².
+    pub mismatch: f64,
 }
 
 impl Tightening {
@@ -257,9 +256,11 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
             all.map(|((reach, errors), shifts)| parts.deviation(s, &reach, &errors, &shifts)).collect()
         }
         InitialState::Tube => {
-            // Everything counts as one disturbance of each axis.
-            let set = error.invariant_set(parts.lateral(s)).ok_or(DesignError::NotReal { name: "feedback" })?;
-            vec![parts.deviation_in_set(s, &set.reach())]
+            // Fully grown from the start: the plan may begin anywhere in the set that Δ cannot drive the deviation out of.
+            let last = |all: Vec<Reach>| all.last().copied().unwrap_or_default();
+            let set = error.invariant_set(lateral(s)).ok_or(DesignError::NotReal { name: "feedback" })?.reach();
+            let reach = last(error.reach(steps)).or(&set);
+            vec![parts.deviation(s, &reach, &last(error.errors(steps)), &last(error.shifts(steps)))]
         }
     };
     let last = at.len() - 1;
@@ -277,15 +278,15 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
             (between(|d| d.angle), between(|d| d.rate))
         })
         .collect();
-    let bearing = bearing(s, &parts.shape);
-    let tightening = Tightening { at, within, bulge, shape: parts.shape, bearing, norm: parts.norm };
+    let bearing = bearing(s);
+    let tightening = Tightening { at, within, bulge, bearing, norm: parts.norm, mismatch: parts.mismatch };
     let assessment = assess(s, &dynamics, &tightening);
     Ok((tightening, assessment))
 }
 
-/// What moves the angle alone within a period, over the size of the disturbance of each axis, s².
+/// How far a disturbance that changes within a period can shift the angle beyond what its mean does, over its bound, s².
 pub(super) fn lateral(s: &Settings) -> f64 {
-    Parts::new(s, &Dynamics::new(s)).lateral(s)
+    0.25 * s.period_feedback * s.period_feedback
 }
 
 /// These settings with this share of the disturbance bound and the errors.
@@ -300,8 +301,6 @@ pub(super) fn counting(s: &Settings, share: f64) -> Settings {
 
 /// What drives the deviation, by the ways in which it adds up.
 struct Parts {
-    /// Bound on each component of Δ over its size, which is Δ̄ but for `tube`.
-    shape: Vector3<f64>,
     /// Relative error of the moment: I⁻¹ becomes I⁻¹/(1 ± ι).
     inertia: f64,
     /// The mismatch of the cancellation alone, rad/s².
@@ -326,18 +325,9 @@ impl Parts {
         let (mismatch, varying) = dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error);
         // |∫ g (e − ē)| ≤ ¼ τ ½ (range of g) (range of e) for the response g to a pulse, which is linear within a period.
         let swing = dynamics.swing(s) + 0.125 * s.period_feedback * varying;
-        // In `tube` each axis has its share of all.
-        let shape = match s.initial_state {
-            InitialState::Tube => {
-                let pulse = (s.feedback.k1 * s.delay + s.feedback.k2).abs();
-                Vector3::repeat(s.disturbance_bound + mismatch + pulse * s.rate_error)
-                    + per_axis(s, geometry) * (inertia * s.limit_moment)
-            }
-            InitialState::Measured | InitialState::Nominal => Vector3::repeat(1.0),
-        };
         // ‖I (W − W′) R′ I⁻¹‖ for angles that lie `age` apart.
         let turning = largest / smallest * TURN * geometry.r * rate;
-        Self { shape, inertia, mismatch, swing, norm: drive + mismatch, norm_of_two: SQRT_2 * s.disturbance_bound + of_inertia + mismatch, turning }
+        Self { inertia, mismatch, swing, norm: drive + mismatch, norm_of_two: SQRT_2 * s.disturbance_bound + of_inertia + mismatch, turning }
     }
 
     /// `reach` is per unit of disturbance, `errors` per unit of the error of the rate, `shifts` per unit of the rate at which angles are shifted.
@@ -361,35 +351,6 @@ impl Parts {
                 * (reach.feedback + self.turning * (reach.feedback_age + s.delay * reach.feedback)),
         }
     }
-
-    /// The same in an invariant set per unit of `shape`.
-    fn deviation_in_set(&self, s: &Settings, reach: &Reach) -> Deviation {
-        let (norm, of_two) = (self.shape.norm(), self.shape.xy().norm());
-        let root3 = 3.0_f64.sqrt();
-        let tau = s.period_feedback;
-        let between = tau * tau / 8.0 * norm * (1.0 + reach.feedback);
-        Deviation {
-            angle: (reach.angle + 0.5 * s.delay * s.delay) * of_two + SQRT_2 * s.angle_error + between,
-            rate: (reach.rate + s.delay) * norm,
-            seen_angle: reach.angle * of_two + SQRT_2 * s.delay * s.rate_error,
-            seen_rate: reach.rate * norm + root3 * s.rate_error,
-            feedback: reach.feedback,
-            feedback_norm: root3 * (s.feedback.k1 * s.delay + s.feedback.k2).abs() * s.rate_error,
-            feedback_moment: 0.0,
-        }
-    }
-
-    /// What moves the angle alone within a period, per unit of `shape`, s²: a disturbance that changes within it, and changes of the angle's error.
-    fn lateral(&self, s: &Settings) -> f64 {
-        let tau = s.period_feedback;
-        0.25 * tau * tau + tau * (s.rate_error + self.swing) / self.shape.min().max(f64::MIN_POSITIVE)
-    }
-}
-
-/// Largest length of each row of R I⁻¹ for |α| ≤ π and |β| ≤ β̄, 1/(kg m²), from R = [−p tan β + y, q, −p cos β − y sin β] with orthogonal p, q, y.
-fn per_axis(s: &Settings, geometry: &Geometry) -> Vector3<f64> {
-    let inverse = s.body.inverse.symmetric_eigenvalues().max();
-    Vector3::new(geometry.r, 1.0, 1.0) * inverse
 }
 
 /// What is left at rest and for the motion beyond the horizon, at whatever attitude.
@@ -417,20 +378,20 @@ fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessm
 
 use crate::linearise::TURN_BY_ANGLES as TURN_OF_RATES;
 
-/// Largest ‖I W s‖ over the corners s of the box `shape` at any α and |β| ≤ β̄, N m s²: ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy² y_y² with the larger
+/// Largest ‖I W s‖ over the corners s of the unit box at any α and |β| ≤ β̄, kg m²: ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy² y_y² with the larger
 /// eigenvalue λ of I² in the plane of symmetry, for y = W s, which α turns in that plane; y_x² + y_z² = cos²β (s₁ sin β + s₃)² + s₂².
-fn bearing(s: &Settings, shape: &Vector3<f64>) -> f64 {
+fn bearing(s: &Settings) -> f64 {
     let square = s.body.inertia * s.body.inertia;
-    let largest = s.body.inertia.symmetric_eigenvalues().max();
+    let any = s.body.inertia.symmetric_eigenvalues().max() * 3.0_f64.sqrt();
     if square[(0, 1)] != 0.0 || square[(1, 2)] != 0.0 {
-        return largest * shape.norm();
+        return any;
     }
     let (xx, zz, xz, yy) = (square[(0, 0)], square[(2, 2)], square[(0, 2)], square[(1, 1)]);
     let plane = 0.5 * (xx + zz) + (0.25 * (xx - zz).powi(2) + xz * xz).sqrt();
+    // Grows with |sin β| up to one half.
     let sine = s.sideslip_domain.sin().min(0.5);
-    let across = shape.y.powi(2) + (1.0 - sine * sine) * (shape.x * sine + shape.z).powi(2).max(shape.z.powi(2));
-    let bound = yy * shape.norm_squared() + (plane - yy).max(0.0) * across.min(shape.norm_squared());
-    bound.sqrt().min(largest * shape.norm())
+    let across = 1.0 + (1.0 - sine * sine) * (1.0 + sine).powi(2);
+    (3.0 * yy + (plane - yy).max(0.0) * across).sqrt().min(any)
 }
 
 /// How much of the rate limit the deviation takes at a stage with ‖∂ω/∂(α, β)‖ = `by_angles` and ‖x̃_ω‖ = `size`, rad/s:
@@ -440,8 +401,8 @@ pub(super) fn rate_loss(deviation: &Deviation, by_angles: f64, size: f64) -> f64
     rate + by_angles * angle + 0.5 * CURVATURE * size * angle * angle
 }
 
-/// How much of the moment limit it takes: `feedback` is the largest ‖I W s‖ over the corners of the shape at the stage and how much that grows with
-/// the angles at most (N m s², N m s²/rad), `slopes` are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖ there, `sizes` are ‖x̃_ω‖ and ‖a‖. N m.
+/// How much of the moment limit it takes: `feedback` is the largest ‖I W s‖ over the corners of the unit box at the stage and how much that grows with
+/// the angles at most (kg m², kg m²/rad), `slopes` are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖ there, `sizes` are ‖x̃_ω‖ and ‖a‖. N m.
 ///
 /// m(x̃ + ô, a + K ô) = m(x̃, a) + I W K ô + ∂m ô + what is of second order in ô.
 pub(super) fn moment_loss(

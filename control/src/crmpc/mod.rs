@@ -101,10 +101,12 @@ pub struct Crmpc {
     previous: Motion<2>,
 }
 
+/// Share of the rate limit that the terminal law steers to at most where there is no optimum.
+const SHARE_OF_RATE: f64 = 0.8;
 /// Shares of the tightening that are tried where no plan is certified.
 const LESS: [f64; 2] = [0.5, 0.0];
 /// The first optimisation has converged when no state moves by more than this (rad, rad/s) between passes.
-const STANDSTILL: f64 = 1e-6;
+const STANDSTILL: f64 = 1e-8;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
 const ANGLE_SCALE: f64 = 0.1;
 /// Disturbance bound (rad/s²) that the invariant set has at least, so that it keeps an inside.
@@ -121,10 +123,8 @@ impl Crmpc {
         let Settings { horizon: n, period_optimisation: h, p, q, .. } = settings;
         let start = (settings.initial_state == InitialState::Tube).then(|| {
             let normals = design.invariant.as_ref().map(InvariantSet::normals).unwrap_or_default();
-            let disturbance = design.tightening.shape;
-            std::array::from_fn(|i| {
-                normals.iter().map(|n| n / disturbance[i].max(SMALLEST_DISTURBANCE)).collect()
-            })
+            let size = (design.counted * settings.disturbance_bound).max(SMALLEST_DISTURBANCE);
+            std::array::from_fn(|_| normals.iter().map(|n| n / size).collect())
         });
         let chain = Chain::new(h);
         // (10), sampled: Σ h (EᵀPE + vᵀQv) + E_NᵀG E_N
@@ -199,7 +199,7 @@ impl Crmpc {
         if first {
             self.follow_terminal_law(&mut memory.plan, start);
         }
-        self.keep(memory, &start, report.iterations)
+        self.keep(memory, &start, (Status::Fallback, report.iterations))
     }
 
     /// A plan that keeps the conditions of the theorem (docs/guarantee.md): the optimum from the measured state, or from where the previous plan put the
@@ -229,7 +229,7 @@ impl Crmpc {
         }
         if assured {
             self.sets.begin(memory.age as usize, 1.0);
-            let report = self.keep(memory, measured, iterations);
+            let report = self.keep(memory, measured, (Status::Kept, iterations));
             memory.margins = self.sets.margins(&self.previous);
             return report;
         }
@@ -247,46 +247,29 @@ impl Crmpc {
         if report.status == Status::Fallback {
             return (report, None);
         }
-        let checked = matches!(report.status, Status::Unconstrained);
-        let margins = self.sets.certify(self.optimiser.motion(), checked);
-        if margins.is_some() || self.design.counted < 1.0 {
-            return (report, margins);
-        }
-        // Some of the bounds were those about the previous plan; now about this one.
-        let settled = self.settle(start);
-        let iterations = report.iterations + settled.iterations;
-        let margins = match settled.status {
-            Status::Fallback => None,
-            _ => self.sets.certify(self.optimiser.motion(), false),
-        };
-        (mpc::Report { iterations, ..settled }, margins)
+        let checked = report.status == Status::Unconstrained;
+        (report, self.sets.certify(self.optimiser.motion(), checked))
     }
 
-    /// The optimum with less of the tightening, or without constraints.
-    fn violate_least(
-        &mut self,
-        memory: &mut Memory,
-        measured: &Vector6<f64>,
-        mut iterations: u32,
-    ) -> mpc::Report {
+    /// The optimum with less of the tightening, or the terminal law from the measured state, with as much of its moment as there is.
+    fn violate_least(&mut self, memory: &mut Memory, measured: &Vector6<f64>, tried: u32) -> mpc::Report {
         memory.standing = self.without_guarantee();
         memory.age = 0;
-        let mut report = mpc::Report::default();
+        let mut iterations = tried;
         for share in LESS {
             self.sets.begin(0, share);
-            report = self.solve(memory, measured, true);
+            let report = self.solve(memory, measured, true);
             iterations += report.iterations;
             if report.status != Status::Fallback {
-                break;
+                self.follow_optimum(memory, measured);
+                memory.margins = self.sets.margins(self.optimiser.motion());
+                return mpc::Report { iterations, ..report };
             }
         }
-        if report.status == Status::Fallback {
-            let error = error(measured, &self.sets.references[0]);
-            report = self.optimiser.without_constraints(&self.sets, &error, &self.affine);
-        }
-        self.follow_optimum(memory, measured);
-        memory.margins = self.sets.margins(self.optimiser.motion());
-        mpc::Report { iterations, ..report }
+        self.follow_terminal_law(&mut memory.plan, *measured);
+        let report = self.keep(memory, measured, (Status::Fallback, iterations));
+        memory.margins = self.sets.margins(&self.previous);
+        report
     }
 
     fn without_guarantee(&self) -> Standing {
@@ -303,12 +286,6 @@ impl Crmpc {
         self.optimiser.optimise(&mut self.sets, &error, &self.affine, previous)
     }
 
-    /// The same with the bounds about itself, from the optimum that was found last.
-    fn settle(&mut self, start: &Vector6<f64>) -> mpc::Report {
-        let error = error(start, &self.sets.references[0]);
-        self.optimiser.settle(&mut self.sets, &error, &self.affine)
-    }
-
     /// Takes the optimum over as the plan.
     fn follow_optimum(&mut self, memory: &mut Memory, start: &Vector6<f64>) {
         let start = (self.settings.initial_state != InitialState::Tube).then_some(*start);
@@ -319,11 +296,11 @@ impl Crmpc {
     }
 
     /// Keeps the plan that there is, and reports on it.
-    fn keep(&mut self, memory: &Memory, start: &Vector6<f64>, iterations: u32) -> mpc::Report {
+    fn keep(&mut self, memory: &Memory, start: &Vector6<f64>, ended: (Status, u32)) -> mpc::Report {
         let error = error(start, &self.sets.references[0]);
         memory.plan.errors(&self.sets.references, &mut self.previous);
         let Self { optimiser, sets, affine, previous, .. } = self;
-        optimiser.fall_back(sets, &error, affine, previous, iterations)
+        optimiser.fall_back(sets, &error, affine, previous, ended)
     }
 
     /// References at the prediction times, their angles shifted, and d_k = A x_r,k + B Θ̈_r,k − x_r,k+1.
@@ -363,10 +340,44 @@ impl Crmpc {
         angles * gain.k1 + rates * gain.k2 + reference.accelerations
     }
 
+    /// The same where the limits are near: the rates that it steers to, Θ̇_r − (k̃₁/k̃₂) E_θ, are limited, and so is the moment.
+    fn terminal_acceleration_within_limits(
+        &self,
+        state: &Vector6<f64>,
+        reference: &Reference,
+    ) -> Vector3<f64> {
+        let Settings { terminal: gain, limit_rate, .. } = &self.settings;
+        let (angles, rates) = split(state);
+        let wanted = reference.rates - (angles - reference.angles) * (gain.k1 / gain.k2);
+        let excess = wanted.norm() / (SHARE_OF_RATE * limit_rate);
+        let (wanted, wanted_acceleration) =
+            if excess > 1.0 { (wanted / excess, Vector3::zeros()) } else { (wanted, reference.accelerations) };
+        self.within_the_moment(state, (rates - wanted) * gain.k2 + wanted_acceleration)
+    }
+
+    /// The largest share of an acceleration whose moment is within the limit, none if even that of no acceleration is not.
+    fn within_the_moment(&self, state: &Vector6<f64>, acceleration: Vector3<f64>) -> Vector3<f64> {
+        let (angles, rates) = split(state);
+        let Settings { body, limit_moment, .. } = &self.settings;
+        let motion = linearise::InverseKinematics::at(&angles).motion(body, &rates);
+        if motion.moment(&acceleration).norm() <= *limit_moment {
+            return acceleration;
+        }
+        // ‖m‖² is a parabola in the share: its larger root.
+        let (slope, rest) = (motion.moment_by_acceleration * acceleration, motion.moment_at_rest);
+        let (square, mixed) = (slope.norm_squared(), slope.dot(&rest));
+        let discriminant = mixed * mixed - square * (rest.norm_squared() - limit_moment * limit_moment);
+        acceleration * ((discriminant.max(0.0).sqrt() - mixed) / square).max(0.0)
+    }
+
     fn follow_terminal_law(&self, plan: &mut Plan, start: Vector6<f64>) {
         plan.states[0] = start;
         for k in 0..self.settings.horizon {
-            plan.accelerations[k] = self.terminal_acceleration(&plan.states[k], &self.sets.references[k]);
+            let (state, reference) = (plan.states[k], &self.sets.references[k]);
+            plan.accelerations[k] = match self.settings.constraints {
+                Constraints::Robust => self.terminal_acceleration_within_limits(&state, reference),
+                Constraints::Paper => self.terminal_acceleration(&state, reference),
+            };
             plan.states[k + 1] =
                 plan::advance(&plan.states[k], &plan.accelerations[k], self.settings.period_optimisation);
         }
@@ -452,11 +463,11 @@ impl Crmpc {
 
     /// Whether the assumptions explain this deviation of the seen state from the nominal one, and this K ô, so many ticks after the optimisation.
     fn explains(&self, tick: u64, angles: &Vector3<f64>, rates: &Vector3<f64>, feedback: &Vector3<f64>) -> bool {
-        let Some((bounds, tightening)) = self.sets.explained(tick as usize) else { return false };
+        let Some(bounds) = self.sets.explained(tick as usize) else { return false };
         let slack = 1.0 + 1e-9;
         let r = 1.0 / self.settings.sideslip_domain.cos();
         let ball = bounds.feedback_norm + bounds.feedback_moment * r / self.design.smallest_inertia;
-        let within = |i: usize| feedback[i].abs() <= (tightening.shape[i] * bounds.feedback + ball) * slack + 1e-12;
+        let within = |i: usize| feedback[i].abs() <= (bounds.feedback + ball) * slack + 1e-12;
         angles.xy().norm() <= bounds.seen_angle * slack + 1e-12
             && rates.norm() <= bounds.seen_rate * slack + 1e-12
             && (0..3).all(within)

@@ -69,7 +69,10 @@ pub trait Bounded<const O: usize>: Constraints<O> {
     /// Whether the bounds of [`Constraints::balls`] are from now on those about the motion that is evaluated, rather than those of the last
     /// [`Self::tighten`], which those of [`Constraints::squares`] stay. Their own derivatives are left out. Nothing to do for bounds that do
     /// not depend on the motion.
-    fn follow(&mut self, _follow: bool) {}
+    /// Returns whether they do.
+    fn follow(&mut self, _follow: bool) -> bool {
+        false
+    }
 
     /// Sets the bounds of the intervals `of` about `motion`: of the state at the end of each, and of its input.
     fn tighten(&mut self, motion: &Motion<O>, of: Range<usize>);
@@ -238,9 +241,7 @@ impl<const O: usize> Optimiser<O> {
                     self.begin_at(start, affine, active, &mut search);
                 }
                 self.about.states[0] = *start;
-                bounded.follow(self.settings.nonlinearity == Nonlinearity::Exact);
-                status = self.solve(bounded, &sample, &mut search);
-                bounded.follow(false);
+                status = self.settle(bounded, &sample, &mut search, Self::solve);
             }
             None if self.settled_by_riccati(bounded, &sample, &mut search) => status = Status::Constrained,
             None => {
@@ -258,21 +259,28 @@ impl<const O: usize> Optimiser<O> {
         self.report(bounded, &sample, status, search.iterations)
     }
 
-    /// The optimum with the bounds about itself, from the one that was found last with those about another motion.
-    pub fn settle<B: Bounded<O>>(&mut self, bounded: &mut B, start: &State<O>, affine: &[State<O>]) -> Report {
-        let budget = self.settings.time_budget;
-        let deadline = (budget > 0.0).then(|| Instant::now() + Duration::from_secs_f64(budget));
-        let sample = Sample { start, affine, deadline };
-        let mut search = Search { warm: true, ..Search::default() };
-        self.about.clone_from(&self.solution.motion);
-        bounded.follow(true);
-        let settled = self.settings.method == Method::Riccati
-            && self.settings.nonlinearity == Nonlinearity::Exact
-            && self.over_whole_horizon(bounded, &sample, &mut search);
-        bounded.follow(false);
-        bounded.tighten(&self.solution.motion, 0..self.layout.horizon);
-        let status = if settled { Status::Constrained } else { Status::Fallback };
-        self.report(bounded, &sample, status, search.iterations)
+    /// The optimum with the bounds about itself: by the Riccati method with bounds that follow its iterates, until the optimum satisfies its own.
+    /// Bounds that do not depend on the motion are satisfied at once.
+    fn settle<B: Bounded<O>>(
+        &mut self,
+        bounded: &mut B,
+        sample: &Sample<O>,
+        search: &mut Search,
+        mut solve: impl FnMut(&mut Self, &mut B, &Sample<O>, &mut Search) -> Status,
+    ) -> Status {
+        let mut status = Status::Fallback;
+        for _ in 0..SETTLING_PASSES {
+            let follows = self.settings.nonlinearity == Nonlinearity::Exact && bounded.follow(true);
+            status = solve(self, bounded, sample, search);
+            bounded.follow(false);
+            if !follows || status != Status::Constrained || bounded.violated(&self.solution.motion, 0..0).is_none() {
+                break;
+            }
+            self.about.clone_from(&self.solution.motion);
+            search.warm = true;
+            search.window = None;
+        }
+        status
     }
 
     /// Takes the previous plan and its multipliers as first guess where they are active in what is to be solved.
@@ -305,11 +313,10 @@ impl<const O: usize> Optimiser<O> {
         self.about.clone_from(&self.solution.motion);
         // Without a plan the motion still moves far: a window of twice the length need not grow.
         search.window = search.window.take().map(|window| self.layout.widen(&window, window.len() / 2));
-        bounded.follow(true);
-        let settled = self.by_riccati(bounded, sample, search);
-        bounded.follow(false);
-        bounded.tighten(&self.solution.motion, 0..self.layout.horizon);
-        settled
+        let by_riccati = |this: &mut Self, bounded: &mut B, sample: &Sample<O>, search: &mut Search| {
+            if this.by_riccati(bounded, sample, search) { Status::Constrained } else { Status::Fallback }
+        };
+        self.settle(bounded, sample, search, by_riccati) == Status::Constrained
     }
 
     /// The optimum with the bounds about `about`, by the Riccati method if it is wanted.
@@ -431,31 +438,19 @@ impl<const O: usize> Optimiser<O> {
         false
     }
 
-    /// The optimum without constraints, where there is none with them.
-    pub fn without_constraints<B: Bounded<O>>(
-        &mut self,
-        bounded: &B,
-        start: &State<O>,
-        affine: &[State<O>],
-    ) -> Report {
-        self.solution.multipliers.clear();
-        self.unconstrained.solve(start, affine, &mut self.solution.motion);
-        self.report(bounded, &Sample { start, affine, deadline: None }, Status::Fallback, 0)
-    }
-
-    /// The report of a fallback: of the plan that is followed instead of an optimum.
+    /// The report of a plan that is followed instead of an optimum.
     pub fn fall_back<B: Bounded<O>>(
         &mut self,
         bounded: &B,
         start: &State<O>,
         affine: &[State<O>],
         plan: &Motion<O>,
-        iterations: u32,
+        (status, iterations): (Status, u32),
     ) -> Report {
         self.solution.motion.clone_from(plan);
         self.solution.multipliers.clear();
         let sample = Sample { start, affine, deadline: None };
-        self.report(bounded, &sample, Status::Fallback, iterations)
+        self.report(bounded, &sample, status, iterations)
     }
 
     fn report<B: Bounded<O>>(
@@ -467,7 +462,7 @@ impl<const O: usize> Optimiser<O> {
     ) -> Report {
         let exact = self.layout.problem(sample, self.layout.end(bounded.terminal_radius()), bounded);
         // By `Bounded::violated`; the other solvers give every ball a multiplier.
-        let checked = status != Status::Fallback;
+        let checked = !matches!(status, Status::Fallback | Status::Kept);
         Report { status, iterations, certificate: Certificate::of(&exact, &self.solution, checked) }
     }
 }
@@ -519,5 +514,7 @@ impl<const O: usize> Layout<O> {
 
 /// Intervals before and after those that are violated, which a window takes in.
 const MARGIN: usize = 3;
+/// Passes until an optimum satisfies the bounds about itself.
+const SETTLING_PASSES: usize = 3;
 /// Windows tried before the whole horizon.
 const WINDOWS: usize = 4;

@@ -250,6 +250,10 @@ impl<const O: usize> Riccati<O> {
         for (stage, input) in self.stages[..self.horizon].iter_mut().zip(&motion.inputs[first..]) {
             stage.input = *input;
         }
+        // Bounds on the last state may look at the input that follows.
+        let last = &mut self.stages[self.horizon];
+        last.input = motion.inputs.get(first + self.horizon).copied().unwrap_or_default();
+        last.d_input = Vector3::zeros();
         self.faces.clear();
         if let Start::Within(_, normals) = problem.start {
             for (axis, normals) in normals.iter().enumerate() {
