@@ -164,7 +164,8 @@ impl Dynamics {
         let of_r = TURN * r * r;
         let by_angles = of_r * (spin + drift * rate * rate)
             + r * (CURVATURE * rate * rate + spinning * s.limit_rate * TURN * rate);
-        // F_xx [a, a] + 2 F_xθ [a, x] + F_θθ [x, x] + F_θ a, the second derivatives as the first ones with one derivative of R or W more.
+        // F_xx [a, a] + 2 F_xθ [a, x] + F_θθ [x, x] + F_θ a + F_x ȧ with a = F and ȧ = F_x a + F_θ x, the second derivatives as the first
+        // ones with one derivative of R or W more.
         let second = 2.0 * (by_rates / rate);
         let mixed = of_r * by_rates + r * (DRIFT_MIXED + 4.0 * spread) * rate;
         let angles_twice = 2.0 * of_r * by_angles
@@ -173,7 +174,8 @@ impl Dynamics {
         let jerk = second * acceleration * acceleration
             + 2.0 * mixed * acceleration * rate
             + angles_twice * rate * rate
-            + by_angles * acceleration;
+            + by_angles * acceleration
+            + by_rates * (by_rates * acceleration + by_angles * rate);
         Self { geometry, largest, smallest, gyroscopic, rate, acceleration, by_rates, by_angles, jerk }
     }
 
@@ -419,6 +421,8 @@ use crate::linearise::TURN_BY_ANGLES as TURN_OF_RATES;
 
 /// Largest ‖I W s‖ over the corners s of the box `shape` at any α and |β| ≤ β̄, N m s²: ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy² y_y² with the larger
 /// eigenvalue λ of I² in the plane of symmetry, for y = W s, which α turns in that plane; y_x² + y_z² = cos²β (s₁ sin β + s₃)² + s₂².
+/// (1 − x²) (s₁ x + s₃)² with s₁, s₃ ≥ 0 grows from x = 0 to x = 2 s₁/(s₃ + √(s₃² + 8 s₁²)), where its derivative is zero, and falls beyond;
+/// it is smaller at −x.
 fn bearing(s: &Settings, shape: &Vector3<f64>) -> f64 {
     let square = s.body.inertia * s.body.inertia;
     let largest = s.body.inertia.symmetric_eigenvalues().max();
@@ -427,8 +431,10 @@ fn bearing(s: &Settings, shape: &Vector3<f64>) -> f64 {
     }
     let (xx, zz, xz, yy) = (square[(0, 0)], square[(2, 2)], square[(0, 2)], square[(1, 1)]);
     let plane = 0.5 * (xx + zz) + (0.25 * (xx - zz).powi(2) + xz * xz).sqrt();
-    let sine = s.sideslip_domain.sin().min(0.5);
-    let across = shape.y.powi(2) + (1.0 - sine * sine) * (shape.x * sine + shape.z).powi(2).max(shape.z.powi(2));
+    let peak = 2.0 * shape.x / (shape.z + (shape.z.powi(2) + 8.0 * shape.x.powi(2)).sqrt());
+    // `min` ignores the peak of an empty shape, which is no number.
+    let sine = s.sideslip_domain.sin().min(peak);
+    let across = shape.y.powi(2) + (1.0 - sine * sine) * (shape.x * sine + shape.z).powi(2);
     let bound = yy * shape.norm_squared() + (plane - yy).max(0.0) * across.min(shape.norm_squared());
     bound.sqrt().min(largest * shape.norm())
 }
