@@ -2,6 +2,10 @@
 //!
 //! The theorem, its assumptions and its proof are in docs/guarantee.md; the numbers of its lemmas stand beside the lines that compute them.
 
+mod lemmas;
+
+pub use lemmas::Lemmas;
+
 use super::design::{InitialState, Settings};
 use crate::error::DesignError;
 use crate::sampled::{Reach, SampledError};

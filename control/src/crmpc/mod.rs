@@ -14,6 +14,8 @@ pub use design::{
     Constraints, Design, Guarantee, InitialState, ObserverSettings, PaperConstants, Settings,
     held_terminal_weight, step_response_peak, terminal_weight,
 };
+#[doc(hidden)]
+pub use guarantee::Lemmas;
 pub use guarantee::{Assessment, Deviation, Geometry, Tightening};
 pub use observer::Observed;
 pub use plan::Plan;
