@@ -208,7 +208,10 @@ fn no_guarantee(error: &DesignError) -> String {
         ("rate", *rate_left, format!("limit.rate = {:.4} deg/s", limit_rate.to_degrees())),
     ] {
         if left <= 0.0 {
-            lacks.push(format!("the {what} that the worst disturbance takes exceeds {limit} by {:.1} %", -100.0 * left));
+            lacks.push(format!(
+                "the {what} that the worst disturbance takes exceeds {limit} by {:.1} %",
+                -100.0 * left
+            ));
         }
     }
     if lacks.is_empty() {

@@ -74,6 +74,7 @@ pub struct Reach {
 
 impl Reach {
     /// The sum of each.
+    #[must_use]
     pub fn plus(&self, other: &Self) -> Self {
         Self {
             angle: self.angle + other.angle,
@@ -86,6 +87,7 @@ impl Reach {
     }
 
     /// The larger of each.
+    #[must_use]
     pub fn or(&self, other: &Self) -> Self {
         Self {
             angle: self.angle.max(other.angle),
@@ -98,6 +100,7 @@ impl Reach {
     }
 
     /// Every bound times `size`.
+    #[must_use]
     pub fn times(&self, size: f64) -> Self {
         Self {
             angle: self.angle * size,
@@ -188,7 +191,8 @@ impl SampledError {
     /// A pulse at time v moves the vehicle freely, to [u; 1] after u seconds, until the first tick whose measurement was taken after v: then
     /// `latency` ≤ u < `latency` + `period`. From there on it fades by Φ. The bounds are the integrals of the absolute responses.
     pub fn reach(&self, steps: usize) -> Vec<Reach> {
-        let unseen = Reach { angle: 0.5 * self.latency * self.latency, rate: self.latency, ..Reach::default() };
+        let unseen =
+            Reach { angle: 0.5 * self.latency * self.latency, rate: self.latency, ..Reach::default() };
         let within = (self.latency, self.latency + self.period);
         let mut reach = unseen;
         let mut all = Vec::with_capacity(steps + 1);
@@ -358,11 +362,7 @@ mod tests {
     }
 
     /// Largest |angle|, |rate| and |K ô| at each tick over all signs of what `drive` gives for a source: by superposition the sum over the sources.
-    fn superposed(
-        steps: usize,
-        sources: usize,
-        respond: impl Fn(usize) -> Vec<[f64; 5]>,
-    ) -> Vec<[f64; 5]> {
+    fn superposed(steps: usize, sources: usize, respond: impl Fn(usize) -> Vec<[f64; 5]>) -> Vec<[f64; 5]> {
         let mut sums = vec![[0.0; 5]; steps + 1];
         for source in 0..sources {
             for (sum, value) in sums.iter_mut().zip(respond(source)) {
@@ -378,7 +378,10 @@ mod tests {
         for (n, (found, expected)) in found.iter().zip(expected).enumerate() {
             let Reach { angle, rate, seen_angle, seen_rate, feedback, .. } = *found;
             for (found, expected) in [angle, rate, seen_angle, seen_rate, feedback].iter().zip(expected) {
-                assert!((found - expected).abs() <= tolerance * (1.0 + expected), "tick {n}: {found} {expected}");
+                assert!(
+                    (found - expected).abs() <= tolerance * (1.0 + expected),
+                    "tick {n}: {found} {expected}"
+                );
             }
         }
     }
@@ -424,7 +427,11 @@ mod tests {
                         let time = f64::from(n) * period;
                         let free = (time - begins).max(0.0);
                         // Before a measurement has seen it, it moves freely.
-                        let fresh = if free > 0.0 && free < latency { Vector2::new(free, 1.0) } else { Vector2::zeros() };
+                        let fresh = if free > 0.0 && free < latency {
+                            Vector2::new(free, 1.0)
+                        } else {
+                            Vector2::zeros()
+                        };
                         if n > 0 {
                             seen = error.phi * seen;
                             if free > 0.0 && (latency..latency + period).contains(&free) {

@@ -3,8 +3,8 @@
 
 use control::DesignError;
 use control::crmpc::{
-    Constraints, Design, Guarantee, PaperConstants, Settings, held_terminal_weight,
-    step_response_peak, terminal_weight,
+    Constraints, Design, Guarantee, PaperConstants, Settings, held_terminal_weight, step_response_peak,
+    terminal_weight,
 };
 use control::sampled::{Gain, SampledError};
 use control::settings::Published;
@@ -245,7 +245,10 @@ fn oracle_bang_bang_disturbance_reaches_the_sampled_bounds() {
                 let bound = [reach[steps].angle, reach[steps].rate, reach[steps].feedback][output];
                 let reached = worst.outputs()[output];
                 assert!(reached <= bound * (1.0 + 1e-12), "K {k}, {steps} steps, output {output}");
-                assert!(reached >= bound * (1.0 - 2e-3), "K {k}, {steps} steps, output {output}: {reached} {bound}");
+                assert!(
+                    reached >= bound * (1.0 - 2e-3),
+                    "K {k}, {steps} steps, output {output}: {reached} {bound}"
+                );
             }
         }
     }
@@ -392,7 +395,9 @@ fn a_terminal_gain_that_is_not_stable_when_held_is_refused_by_name() {
 fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
     let settings = Settings { disturbance_bound: 2.5f64.to_radians(), ..settings() };
     let error = Design::new(&settings).unwrap_err();
-    let DesignError::NoGuarantee { moment_left, disturbance: Some(largest), .. } = error else { panic!("{error}") };
+    let DesignError::NoGuarantee { moment_left, disturbance: Some(largest), .. } = error else {
+        panic!("{error}")
+    };
     assert!(moment_left < 0.0 && error.to_string().contains("disturbance.bound"), "{error}");
     Design::new(&Settings { disturbance_bound: largest, ..settings }).unwrap();
     Design::new(&Settings { disturbance_bound: 1.01 * largest, ..settings }).unwrap_err();

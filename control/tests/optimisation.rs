@@ -259,7 +259,12 @@ fn every_way_to_the_optimum_shows_that_it_is_one() {
 }
 
 /// (31) written out again: the plan before without its first interval, then one under the acceleration `last` of the state before.
-fn assert_is_shifted(after: &Plan, before: &Plan, settings: &Settings, last: impl Fn(f64, f64, usize) -> f64) {
+fn assert_is_shifted(
+    after: &Plan,
+    before: &Plan,
+    settings: &Settings,
+    last: impl Fn(f64, f64, usize) -> f64,
+) {
     let n = settings.horizon;
     assert_eq!(after.states[..n], before.states[1..]);
     assert_eq!(after.accelerations[..n - 1], before.accelerations[1..]);
@@ -408,7 +413,8 @@ fn run_failing(during: Range<u64>) -> (harness::Outcome, [u32; 2], Memory) {
     let outcome =
         simulate(&mut controller, &mut memory, 1.05, disturbance(Kind::White), |memory, tick, _| {
             let without = matches!(memory.report.status, Status::Fallback | Status::Kept);
-            fallbacks[usize::from(!during.contains(&tick))] += u32::from(without && memory.report.solves > last);
+            fallbacks[usize::from(!during.contains(&tick))] +=
+                u32::from(without && memory.report.solves > last);
             last = memory.report.solves;
         });
     (outcome, fallbacks, memory)

@@ -77,7 +77,11 @@ const STANDINGS: [(Standing, &str, &str); 5] = [
     (Standing::None, "none", "no optimisation yet, or sets that guarantee nothing"),
     (Standing::InForce, "inForce", "the limits are kept for as long as the assumptions hold"),
     (Standing::Refused, "refused", "the design does not hold for the settings: best effort"),
-    (Standing::Uncertified, "uncertified", "no plan has been found that keeps the conditions of the guarantee"),
+    (
+        Standing::Uncertified,
+        "uncertified",
+        "no plan has been found that keeps the conditions of the guarantee",
+    ),
     (Standing::Exceeded, "exceeded", "the vehicle is further from the plan than the assumptions explain"),
 ];
 
@@ -261,7 +265,8 @@ fn bounds(table: Controller) -> Controller {
         "estimation.rateError",
         "Bound on the error of the derivative of each angle, as it follows from what is given, that the robust set is tightened for",
     );
-    let sideslip = parameter("bound.sideslip", "Sideslip angle up to which the bounds of the paper's design hold");
+    let sideslip =
+        parameter("bound.sideslip", "Sideslip angle up to which the bounds of the paper's design hold");
     let rate =
         parameter("bound.referenceRate", "Bound on the reference's rate in the paper's terminal set (13)");
     let acceleration = parameter(
@@ -326,7 +331,9 @@ fn outputs(table: Controller) -> Controller {
     let table = vector(table, ANGLES, rate, |m| &mut m.law.shown.rates);
     let standing = "Whether the guarantee of the robust set is in force at the last tick, and why not";
     let margin = |name: &str, limit: &str| {
-        let text = format!("What the plan leaves of the {limit} in its first interval beyond what is reserved, over the limit");
+        let text = format!(
+            "What the plan leaves of the {limit} in its first interval beyond what is reserved, over the limit"
+        );
         sampled(&format!("guarantee.{name}"), &text).real()
     };
     let observed = |axis: &str, meaning: &str| {
@@ -338,7 +345,10 @@ fn outputs(table: Controller) -> Controller {
     };
     let table = table
         .boolean(
-            sampled("guarantee.inForce", "Whether the guarantee of the robust set is in force at the last tick"),
+            sampled(
+                "guarantee.inForce",
+                "Whether the guarantee of the robust set is in force at the last tick",
+            ),
             |m| &mut m.law.shown.in_force,
         )
         .enumeration(

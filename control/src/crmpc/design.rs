@@ -1,8 +1,8 @@
 //! Offline design of CRMPC: every constant of Chai 2022 from the raw data, and the tightening of the `robust` set.
 
+use super::guarantee::{self, Assessment, Tightening};
 use crate::error::DesignError;
 use crate::mpc::SolverSettings;
-use super::guarantee::{self, Assessment, Tightening};
 use crate::sampled::{Gain, InvariantSet, Reach, SampledError};
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};

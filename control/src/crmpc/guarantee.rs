@@ -2,6 +2,10 @@
 //!
 //! The theorem, its assumptions and its proof are in docs/guarantee.md; the numbers of its lemmas stand beside the lines that compute them.
 
+mod lemmas;
+
+pub use lemmas::Lemmas;
+
 use super::design::{InitialState, Settings};
 use crate::error::DesignError;
 use crate::sampled::{Reach, SampledError};
@@ -163,7 +167,8 @@ impl Dynamics {
         let of_r = TURN * r * r;
         let by_angles = of_r * (spin + drift * rate * rate)
             + r * (CURVATURE * rate * rate + spinning * s.limit_rate * TURN * rate);
-        // F_xx [a, a] + 2 F_xθ [a, x] + F_θθ [x, x] + F_θ a, the second derivatives as the first ones with one derivative of R or W more.
+        // F_xx [a, a] + 2 F_xθ [a, x] + F_θθ [x, x] + F_θ a + F_x ȧ with a = F and ȧ = F_x a + F_θ x, the second derivatives as the first
+        // ones with one derivative of R or W more.
         let second = 2.0 * (by_rates / rate);
         let mixed = of_r * by_rates + r * (DRIFT_MIXED + 4.0 * spread) * rate;
         let angles_twice = 2.0 * of_r * by_angles
@@ -172,7 +177,8 @@ impl Dynamics {
         let jerk = second * acceleration * acceleration
             + 2.0 * mixed * acceleration * rate
             + angles_twice * rate * rate
-            + by_angles * acceleration;
+            + by_angles * acceleration
+            + by_rates * (by_rates * acceleration + by_angles * rate);
         Self { geometry, largest, smallest, gyroscopic, rate, acceleration, by_rates, by_angles, jerk }
     }
 
@@ -258,7 +264,8 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
         InitialState::Tube => {
             // Fully grown from the start: the plan may begin anywhere in the set that Δ cannot drive the deviation out of.
             let last = |all: Vec<Reach>| all.last().copied().unwrap_or_default();
-            let set = error.invariant_set(lateral(s)).ok_or(DesignError::NotReal { name: "feedback" })?.reach();
+            let set =
+                error.invariant_set(lateral(s)).ok_or(DesignError::NotReal { name: "feedback" })?.reach();
             let reach = last(error.reach(steps)).or(&set);
             vec![parts.deviation(s, &reach, &last(error.errors(steps)), &last(error.shifts(steps)))]
         }
@@ -327,7 +334,14 @@ impl Parts {
         let swing = dynamics.swing(s) + 0.125 * s.period_feedback * varying;
         // ‖I (W − W′) R′ I⁻¹‖ for angles that lie `age` apart.
         let turning = largest / smallest * TURN * geometry.r * rate;
-        Self { inertia, mismatch, swing, norm: drive + mismatch, norm_of_two: SQRT_2 * s.disturbance_bound + of_inertia + mismatch, turning }
+        Self {
+            inertia,
+            mismatch,
+            swing,
+            norm: drive + mismatch,
+            norm_of_two: SQRT_2 * s.disturbance_bound + of_inertia + mismatch,
+            turning,
+        }
     }
 
     /// `reach` is per unit of disturbance, `errors` per unit of the error of the rate, `shifts` per unit of the rate at which angles are shifted.
@@ -340,7 +354,10 @@ impl Parts {
         // Between two ticks an angle is off its line by no more than this.
         let between = tau * tau / 8.0 * (self.norm * (1.0 + reach.feedback) + root3 * errors.feedback);
         Deviation {
-            angle: reach.angle * self.norm_of_two + SQRT_2 * (errors.angle + s.angle_error) + swing.angle + between,
+            angle: reach.angle * self.norm_of_two
+                + SQRT_2 * (errors.angle + s.angle_error)
+                + swing.angle
+                + between,
             rate: reach.rate * self.norm + root3 * errors.rate + swing.rate,
             seen_angle: reach.seen_angle * self.norm_of_two + SQRT_2 * errors.seen_angle + swing.seen_angle,
             seen_rate: reach.seen_rate * self.norm + root3 * errors.seen_rate + swing.seen_rate,
@@ -388,7 +405,7 @@ fn bearing(s: &Settings) -> f64 {
     }
     let (xx, zz, xz, yy) = (square[(0, 0)], square[(2, 2)], square[(0, 2)], square[(1, 1)]);
     let plane = 0.5 * (xx + zz) + (0.25 * (xx - zz).powi(2) + xz * xz).sqrt();
-    // Grows with |sin β| up to one half.
+    // (1 − x²) (1 + x)² has its peak at one half.
     let sine = s.sideslip_domain.sin().min(0.5);
     let across = 1.0 + (1.0 - sine * sine) * (1.0 + sine).powi(2);
     (3.0 * yy + (plane - yy).max(0.0) * across).sqrt().min(any)

@@ -14,6 +14,8 @@ pub use design::{
     Constraints, Design, Guarantee, InitialState, ObserverSettings, PaperConstants, Settings,
     held_terminal_weight, step_response_peak, terminal_weight,
 };
+#[doc(hidden)]
+pub use guarantee::Lemmas;
 pub use guarantee::{Assessment, Deviation, Geometry, Tightening};
 pub use observer::Observed;
 pub use plan::Plan;
@@ -223,7 +225,8 @@ impl Crmpc {
                 self.follow_optimum(memory, &start);
                 memory.age = age;
                 memory.margins = margins.unwrap_or_else(|| self.sets.margins(self.optimiser.motion()));
-                memory.standing = if margins.is_some() { Standing::InForce } else { self.without_guarantee() };
+                memory.standing =
+                    if margins.is_some() { Standing::InForce } else { self.without_guarantee() };
                 return mpc::Report { iterations, ..report };
             }
         }
@@ -350,8 +353,11 @@ impl Crmpc {
         let (angles, rates) = split(state);
         let wanted = reference.rates - (angles - reference.angles) * (gain.k1 / gain.k2);
         let excess = wanted.norm() / (SHARE_OF_RATE * limit_rate);
-        let (wanted, wanted_acceleration) =
-            if excess > 1.0 { (wanted / excess, Vector3::zeros()) } else { (wanted, reference.accelerations) };
+        let (wanted, wanted_acceleration) = if excess > 1.0 {
+            (wanted / excess, Vector3::zeros())
+        } else {
+            (wanted, reference.accelerations)
+        };
         self.within_the_moment(state, (rates - wanted) * gain.k2 + wanted_acceleration)
     }
 
@@ -462,7 +468,13 @@ impl Crmpc {
     }
 
     /// Whether the assumptions explain this deviation of the seen state from the nominal one, and this K ô, so many ticks after the optimisation.
-    fn explains(&self, tick: u64, angles: &Vector3<f64>, rates: &Vector3<f64>, feedback: &Vector3<f64>) -> bool {
+    fn explains(
+        &self,
+        tick: u64,
+        angles: &Vector3<f64>,
+        rates: &Vector3<f64>,
+        feedback: &Vector3<f64>,
+    ) -> bool {
         let Some(bounds) = self.sets.explained(tick as usize) else { return false };
         let slack = 1.0 + 1e-9;
         let r = 1.0 / self.settings.sideslip_domain.cos();

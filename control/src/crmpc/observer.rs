@@ -37,7 +37,10 @@ impl Observed {
     /// What is added to the angles of the reference: under a constant Δ the vehicle comes to rest away from the nominal motion by Δ over a stiffness, so
     /// that the nominal motion must come to rest as far on the other side.
     pub(super) fn shift(&self, s: &Settings) -> Vector3<f64> {
-        if !s.observer.active || s.constraints != Constraints::Robust || s.initial_state == InitialState::Nominal {
+        if !s.observer.active
+            || s.constraints != Constraints::Robust
+            || s.initial_state == InitialState::Nominal
+        {
             return Vector3::zeros();
         }
         -self.disturbance / s.observer.stiffness

@@ -124,7 +124,8 @@ impl Sets {
     ///
     /// `checked`: [`mpc::Bounded::violated`] has found nothing in it already.
     pub(super) fn certify(&mut self, motion: &Motion<2>, checked: bool) -> Option<Margins> {
-        if !matches!(&self.kind, Kind::Robust(robust) if robust.design.counted >= 1.0 && robust.share >= 1.0) {
+        if !matches!(&self.kind, Kind::Robust(robust) if robust.design.counted >= 1.0 && robust.share >= 1.0)
+        {
             return None;
         }
         if !checked && mpc::Bounded::violated(self, motion, 0..0).is_some() {
@@ -144,14 +145,17 @@ impl Sets {
         // Beyond the horizon a = −κ x̃_ω moves β by no more than |β̇|/κ.
         let last = points(n);
         let travelled = last.angles.y.abs() + last.rates.y.abs() / guarantee::BRAKING;
-        let ends_inside = travelled + robust.design.tightening.forever().angle <= robust.settings.sideslip_domain;
+        let ends_inside =
+            travelled + robust.design.tightening.forever().angle <= robust.settings.sideslip_domain;
         let kept = rates.rates.norm() <= bound * (1.0 + CHECK_SLACK);
         (inside && ends_inside && kept).then(|| robust.margins(body, &first, &second))
     }
 
     /// See [`Margins`]; of the robust set only.
     pub(super) fn margins(&mut self, motion: &Motion<2>) -> Margins {
-        let Self { kind: Kind::Robust(robust), body, references, .. } = self else { return Margins::default() };
+        let Self { kind: Kind::Robust(robust), body, references, .. } = self else {
+            return Margins::default();
+        };
         robust.margins(body, &Point::at(references, motion, 0), &Point::at(references, motion, 1))
     }
 
@@ -449,7 +453,11 @@ impl Robust {
         let loss = guarantee::rate_loss(tightening.at(tick), by_angles, here.size) + bulge + curved;
         let bound = limit_rate - self.share * loss;
         // ‖x̃_ω‖ ≤ sec β ‖ω̃‖
-        if k == horizon { bound.min(self.design.assessment.terminal_rate * here.angles.y.cos()) } else { bound }
+        if k == horizon {
+            bound.min(self.design.assessment.terminal_rate * here.angles.y.cos())
+        } else {
+            bound
+        }
     }
 
     /// What ‖m̃‖ may be at the start of prediction interval k so that ‖m‖ keeps its limit at each of its feedback ticks. With a held,
@@ -470,8 +478,14 @@ impl Robust {
         let size = here.size + h * a;
         let deviation = tightening.within(self.tick(k));
         let by_angles = self.design.largest_inertia * guarantee::TURN * 3.0_f64.sqrt();
-        let loss =
-            guarantee::moment_loss(&self.dynamics, tightening, deviation, (feedback, by_angles), slopes, (size, a));
+        let loss = guarantee::moment_loss(
+            &self.dynamics,
+            tightening,
+            deviation,
+            (feedback, by_angles),
+            slopes,
+            (size, a),
+        );
         let within = (after - value).max(0.0) + 0.125 * h * h * self.dynamics.moment_curvature(size, a);
         limit_moment - self.share * loss - within
     }

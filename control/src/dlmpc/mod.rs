@@ -247,7 +247,8 @@ impl Dlmpc {
             self.track(&mut memory.plan, measured);
             memory.plan.errors(&self.rates.references, &mut self.previous);
             let Self { optimiser, rates, affine, previous, .. } = self;
-            report = optimiser.fall_back(rates, &start, affine, previous, (Status::Fallback, report.iterations));
+            report =
+                optimiser.fall_back(rates, &start, affine, previous, (Status::Fallback, report.iterations));
         } else {
             let motion = self.optimiser.motion();
             memory.plan.follow(motion, measured, &self.rates.references, self.settings.period_optimisation);

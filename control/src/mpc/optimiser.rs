@@ -273,7 +273,10 @@ impl<const O: usize> Optimiser<O> {
             let follows = self.settings.nonlinearity == Nonlinearity::Exact && bounded.follow(true);
             status = solve(self, bounded, sample, search);
             bounded.follow(false);
-            if !follows || status != Status::Constrained || bounded.violated(&self.solution.motion, 0..0).is_none() {
+            if !follows
+                || status != Status::Constrained
+                || bounded.violated(&self.solution.motion, 0..0).is_none()
+            {
                 break;
             }
             self.about.clone_from(&self.solution.motion);

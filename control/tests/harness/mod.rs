@@ -102,14 +102,15 @@ pub fn run(settings: &Settings, inertia_scale: f64, disturbance: Disturbance) ->
     let mut memory = Memory::default();
     let mut controller = Crmpc::new(*settings).unwrap();
     let (mut ticks, mut in_force, mut broken, mut before) = (0u32, 0u32, false, false);
-    let outcome = simulate(&mut controller, &mut memory, inertia_scale, disturbance, |memory, _, measured| {
-        assert_ne!(memory.report.status, Status::None);
-        let now = memory.standing == Standing::InForce;
-        ticks += 1;
-        in_force += u32::from(now);
-        broken |= before && measured.rates.norm() > settings.limit_rate;
-        before = now;
-    });
+    let outcome =
+        simulate(&mut controller, &mut memory, inertia_scale, disturbance, |memory, _, measured| {
+            assert_ne!(memory.report.status, Status::None);
+            let now = memory.standing == Standing::InForce;
+            ticks += 1;
+            in_force += u32::from(now);
+            broken |= before && measured.rates.norm() > settings.limit_rate;
+            before = now;
+        });
     let in_force = f64::from(in_force) / f64::from(ticks);
     (outcome, Kept { fallbacks: memory.report.fallbacks, in_force, broken })
 }

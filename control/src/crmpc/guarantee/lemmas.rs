@@ -1,0 +1,93 @@
+//! The numbers that the guarantee rests on, for the machine check of them.
+
+use super::super::design::Settings;
+use super::{
+    BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Dynamics, Parts, TURN, TURN_OF_RATES, bearing,
+    gyroscopic,
+};
+use std::f64::consts::SQRT_2;
+
+/// Every bound that the proof uses, as this crate computes it. Their meaning stands beside the lines that compute them.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct Lemmas {
+    pub drift: f64,
+    pub drift_by_rates: f64,
+    pub r: f64,
+    pub curvature: f64,
+    pub turn: f64,
+    pub turn_by_angles: f64,
+    pub drift_mixed: f64,
+    pub drift_by_angles_twice: f64,
+    /// Of ∂(ω × I ω)/∂ω, and of I⁻¹ times that.
+    pub gyroscopic: (f64, f64),
+    pub largest: f64,
+    pub smallest: f64,
+    pub rate: f64,
+    pub acceleration: f64,
+    pub by_rates: f64,
+    pub by_angles: f64,
+    pub jerk: f64,
+    pub mismatch: f64,
+    pub varying: f64,
+    /// With the share of `varying`.
+    pub swing: f64,
+    pub bearing: f64,
+    pub norm: f64,
+    pub norm_of_two: f64,
+    pub turning: f64,
+    pub braking: f64,
+    dynamics: Dynamics,
+}
+
+impl Lemmas {
+    /// Those of `s`.
+    pub fn new(s: &Settings) -> Self {
+        let dynamics = Dynamics::new(s);
+        let parts = Parts::new(s, &dynamics);
+        let Dynamics { geometry, largest, smallest, rate, acceleration, by_rates, by_angles, jerk, .. } =
+            dynamics;
+        let root3 = 3.0_f64.sqrt();
+        let drive = parts.norm - parts.mismatch;
+        let varying = dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error).1;
+        Self {
+            drift: geometry.drift,
+            drift_by_rates: geometry.drift_by_rates,
+            r: geometry.r,
+            curvature: CURVATURE,
+            turn: TURN,
+            turn_by_angles: TURN_OF_RATES,
+            drift_mixed: DRIFT_MIXED,
+            drift_by_angles_twice: DRIFT_BY_ANGLES_TWICE,
+            gyroscopic: gyroscopic(s),
+            largest,
+            smallest,
+            rate,
+            acceleration,
+            by_rates,
+            by_angles,
+            jerk,
+            mismatch: parts.mismatch,
+            varying,
+            swing: parts.swing,
+            bearing: bearing(s),
+            norm: parts.norm,
+            norm_of_two: parts.norm_of_two,
+            turning: parts.turning,
+            braking: BRAKING,
+            dynamics,
+        }
+    }
+
+    /// ‖∂m/∂(α, β)‖, ‖∂m/∂x_ω‖ and ‖m‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a.
+    pub fn moment(&self, x: f64, a: f64) -> [f64; 3] {
+        let (by_angles, by_rates) = self.dynamics.slopes(x, a);
+        [by_angles, by_rates, self.dynamics.nominal_moment(x, a)]
+    }
+
+    /// ‖d²m/dt²‖ and ‖d²ω/dt²‖ of a nominal motion with a held.
+    pub fn curvatures(&self, x: f64, a: f64) -> [f64; 2] {
+        [self.dynamics.moment_curvature(x, a), Dynamics::rate_curvature(x, a)]
+    }
+}

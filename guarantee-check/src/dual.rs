@@ -1,0 +1,129 @@
+//! Intervals with their derivatives by the coordinates of a box (forward differentiation).
+
+use crate::interval::Interval;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// What the formulas are written in: intervals, intervals with derivatives, or plain numbers.
+pub trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// A constant.
+    fn constant(value: f64) -> Self;
+
+    /// x².
+    #[must_use]
+    fn squared(self) -> Self;
+}
+
+impl Number for f64 {
+    fn constant(value: f64) -> Self {
+        value
+    }
+    fn squared(self) -> Self {
+        self * self
+    }
+}
+
+impl Number for Interval {
+    fn constant(value: f64) -> Self {
+        Self::point(value)
+    }
+    fn squared(self) -> Self {
+        self.square()
+    }
+}
+
+/// The values of a function on a box, and those of its N partial derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct Dual<const N: usize> {
+    /// Values.
+    pub value: Interval,
+    /// Partial derivatives.
+    pub slope: [Interval; N],
+}
+
+impl<const N: usize> Dual<N> {
+    /// A constant.
+    pub fn known(value: Interval) -> Self {
+        Self { value, slope: [Interval::ZERO; N] }
+    }
+
+    /// Coordinate `i` of a box.
+    pub fn coordinate(i: usize, value: Interval) -> Self {
+        let mut slope = [Interval::ZERO; N];
+        slope[i] = Interval::ONE;
+        Self { value, slope }
+    }
+}
+
+impl<const N: usize> Number for Dual<N> {
+    fn constant(value: f64) -> Self {
+        Self::known(Interval::point(value))
+    }
+    fn squared(self) -> Self {
+        let twice = self.value + self.value;
+        Self { value: self.value.square(), slope: self.slope.map(|slope| twice * slope) }
+    }
+}
+
+impl<const N: usize> Neg for Dual<N> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { value: -self.value, slope: self.slope.map(Neg::neg) }
+    }
+}
+
+impl<const N: usize> Add for Dual<N> {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self {
+            value: self.value + other.value,
+            slope: std::array::from_fn(|i| self.slope[i] + other.slope[i]),
+        }
+    }
+}
+
+impl<const N: usize> Sub for Dual<N> {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl<const N: usize> Mul for Dual<N> {
+    type Output = Self;
+    // The product rule.
+    #[allow(clippy::suspicious_arithmetic_impl)]
+    fn mul(self, other: Self) -> Self {
+        Self {
+            value: self.value * other.value,
+            slope: std::array::from_fn(|i| self.slope[i] * other.value + self.value * other.slope[i]),
+        }
+    }
+}
+
+impl<const N: usize> Div for Dual<N> {
+    type Output = Self;
+    // The quotient rule.
+    #[allow(clippy::suspicious_arithmetic_impl)]
+    fn div(self, other: Self) -> Self {
+        let value = self.value / other.value;
+        Self { value, slope: std::array::from_fn(|i| (self.slope[i] - value * other.slope[i]) / other.value) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oracle_derivatives_of_a_quotient() {
+        // x²/(x + y) at (2, 1): value 4/3, derivatives (x² + 2xy)/(x + y)² = 8/9 and −x²/(x + y)² = −4/9.
+        let [x, y] = [2.0, 1.0].map(Interval::point);
+        let (x, y) = (Dual::<2>::coordinate(0, x), Dual::coordinate(1, y));
+        let f = x.squared() / (x + y);
+        for (found, expected) in [(f.value, 4.0 / 3.0), (f.slope[0], 8.0 / 9.0), (f.slope[1], -4.0 / 9.0)] {
+            assert!(found.contains(expected) && found.width() < 1e-14, "{found:?} {expected}");
+        }
+    }
+}

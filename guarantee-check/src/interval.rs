@@ -1,0 +1,238 @@
+//! Interval arithmetic that is rounded outwards.
+//!
+//! An operation rounded to nearest is off by at most half a unit in the last place, so that the next number below and above the
+//! rounded result enclose the exact one. That needs no control of the processor's rounding and no particular processor.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// All real numbers from `low` to `high`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// Smallest number.
+    pub low: f64,
+    /// Largest number.
+    pub high: f64,
+}
+
+impl Interval {
+    /// Zero.
+    pub const ZERO: Self = Self::point(0.0);
+    /// One.
+    pub const ONE: Self = Self::point(1.0);
+    /// Every number: the result where nothing is known.
+    pub const ALL: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
+
+    /// The number `value` alone.
+    pub const fn point(value: f64) -> Self {
+        Self { low: value, high: value }
+    }
+
+    /// From `low` to `high`.
+    pub const fn new(low: f64, high: f64) -> Self {
+        Self { low, high }
+    }
+
+    /// Encloses the rounded ends of an exact result; [`Interval::ALL`] if they are no numbers.
+    fn outward(low: f64, high: f64) -> Self {
+        if low.is_nan() || high.is_nan() {
+            Self::ALL
+        } else {
+            Self { low: low.next_down(), high: high.next_up() }
+        }
+    }
+
+    /// A number within.
+    pub fn middle(self) -> f64 {
+        f64::midpoint(self.low, self.high)
+    }
+
+    /// Upper bound of `high − low`.
+    pub fn width(self) -> f64 {
+        (self.high - self.low).next_up()
+    }
+
+    /// x².
+    #[must_use]
+    pub fn square(self) -> Self {
+        let size = self.abs();
+        Self { low: (size * size).low.max(0.0), high: (size * size).high }
+    }
+
+    /// |x|.
+    #[must_use]
+    pub fn abs(self) -> Self {
+        if self.low >= 0.0 {
+            self
+        } else if self.high <= 0.0 {
+            -self
+        } else {
+            Self { low: 0.0, high: self.high.max(-self.low) }
+        }
+    }
+
+    /// √x of what is not negative in x.
+    #[must_use]
+    pub fn sqrt(self) -> Self {
+        let root = Self::outward(self.low.max(0.0).sqrt(), self.high.max(0.0).sqrt());
+        Self { low: root.low.max(0.0), high: root.high }
+    }
+
+    /// max(x, y).
+    #[must_use]
+    pub fn max(self, other: Self) -> Self {
+        Self { low: self.low.max(other.low), high: self.high.max(other.high) }
+    }
+
+    /// min(x, y).
+    #[must_use]
+    pub fn min(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.min(other.high) }
+    }
+
+    /// The smallest interval that contains both.
+    #[must_use]
+    pub fn hull(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    /// Whether `value` is one of its numbers.
+    pub fn contains(self, value: f64) -> bool {
+        self.low <= value && value <= self.high
+    }
+
+    /// eˣ for 0 ≤ x ≤ 1; [`Interval::ALL`] outside.
+    #[must_use]
+    pub fn exp(self) -> Self {
+        if !(self.low >= 0.0 && self.high <= 1.0) {
+            return Self::ALL;
+        }
+        // The remainder after xⁿ/n! is below that term for x ≤ 1 and n ≥ 2.
+        let (mut sum, mut term) = (Self::ONE, Self::ONE);
+        for n in 1..=20_u8 {
+            term = term * self / Self::from(f64::from(n));
+            sum = sum + term;
+        }
+        sum + Self::new(0.0, term.high)
+    }
+
+    /// sin x and cos x for 0 ≤ x ≤ 1; [`Interval::ALL`] outside.
+    pub fn sin_cos(self) -> (Self, Self) {
+        if !(self.low >= 0.0 && self.high <= 1.0) {
+            return (Self::ALL, Self::ALL);
+        }
+        // Both series alternate with falling terms, so that each remainder is smaller than the first term left out.
+        let square = self.square();
+        let (mut sine, mut cosine) = (Self::ZERO, Self::ZERO);
+        let (mut odd, mut even) = (self, Self::ONE);
+        for n in 1..=10_u8 {
+            (sine, cosine) = (sine + odd, cosine + even);
+            let n = 2.0 * f64::from(n);
+            even = -(even * square) / Self::from((n - 1.0) * n);
+            odd = -(odd * square) / Self::from(n * (n + 1.0));
+        }
+        let remainder = |term: Self| Self::new(-term.abs().high, term.abs().high);
+        (sine + remainder(odd), cosine + remainder(even))
+    }
+}
+
+impl From<f64> for Interval {
+    fn from(value: f64) -> Self {
+        Self::point(value)
+    }
+}
+
+impl Neg for Interval {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { low: -self.high, high: -self.low }
+    }
+}
+
+// Zero is passed through exactly, so that no numbers arise that are too small for fast arithmetic.
+impl Add for Interval {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        if self == Self::ZERO {
+            other
+        } else if other == Self::ZERO {
+            self
+        } else {
+            Self::outward(self.low + other.low, self.high + other.high)
+        }
+    }
+}
+
+impl Sub for Interval {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl Mul for Interval {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        if self == Self::ZERO || other == Self::ZERO {
+            return Self::ZERO;
+        }
+        if self == Self::ONE {
+            return other;
+        }
+        if other == Self::ONE {
+            return self;
+        }
+        let ends =
+            [self.low * other.low, self.low * other.high, self.high * other.low, self.high * other.high];
+        if ends.iter().any(|end| end.is_nan()) {
+            return Self::ALL;
+        }
+        let low = ends[0].min(ends[1]).min(ends[2].min(ends[3]));
+        let high = ends[0].max(ends[1]).max(ends[2].max(ends[3]));
+        Self::outward(low, high)
+    }
+}
+
+impl Div for Interval {
+    type Output = Self;
+    fn div(self, other: Self) -> Self {
+        if other.contains(0.0) {
+            return Self::ALL;
+        }
+        let inverse = Self::outward(1.0 / other.high, 1.0 / other.low);
+        self * inverse
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oracle_operations_enclose_exact_results() {
+        let (third, tenth) = (Interval::ONE / Interval::from(3.0), Interval::ONE / Interval::from(10.0));
+        // 3 · (1/3) = 1 and 0.3 − 3 · 0.1 = 0 as real numbers, though not as rounded ones.
+        assert!((third * Interval::from(3.0)).contains(1.0));
+        assert!(tenth.contains(0.1) && tenth.low < tenth.high && tenth.width() < 1e-16);
+        let zero = tenth + tenth + tenth - Interval::from(3.0) * tenth;
+        assert!(zero.contains(0.0) && zero.width() < 1e-15);
+        let mixed = Interval::new(-2.0, 3.0);
+        assert!(mixed.square().low == 0.0 && (mixed.square().high - 9.0).abs() < 1e-14);
+        assert_eq!(Interval::ONE / mixed, Interval::ALL);
+        assert!(Interval::from(2.0).sqrt().square().contains(2.0));
+    }
+
+    #[test]
+    fn oracle_series_enclose_the_functions() {
+        for i in 0..=100 {
+            let x = f64::from(i) / 100.0;
+            let (sine, cosine) = Interval::point(x).sin_cos();
+            let exp = Interval::point(x).exp();
+            for (found, expected) in [(sine, x.sin()), (cosine, x.cos()), (exp, x.exp())] {
+                assert!(
+                    found.low <= expected + 1e-15 && found.high >= expected - 1e-15 && found.width() < 1e-13
+                );
+            }
+            assert!((sine.square() + cosine.square()).contains(1.0));
+        }
+    }
+}

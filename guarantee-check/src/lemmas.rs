@@ -1,0 +1,309 @@
+//! The inequalities of the geometry and of the inertia, each by branch and bound over its whole domain.
+//!
+//! Directions are points of the cube's surface: what is checked is homogeneous in each vector, and even, so that three faces cover all directions of space
+//! and two those of the plane. The domain of β is that of u = tan(β/2). A symmetric multilinear map has its norm at equal arguments (Banach 1938),
+//! therefore ‖∂²W[o, x̂] v + ∂²W[o, v̂] x‖ ≤ b ‖o‖ ‖x‖ ‖v‖ for all x and v follows from that for x = v, and the same for third derivatives.
+
+use crate::dual::{Dual, Number};
+use crate::identity;
+use crate::interval::Interval;
+use crate::kinematics::{Turn, Vector, cross, dot, scaled, sine_cosine, square, sum, times, turned};
+use crate::search::{Effort, supremum};
+use control::crmpc::{Lemmas, Settings};
+use nalgebra::Matrix3;
+
+/// Relative rounding error that the bounds are allowed, as the controller allows it in its own checks.
+pub const ROUNDING: f64 = 1e-9;
+
+/// A bound held against what is known of the true value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// What is bounded, and how.
+    pub statement: String,
+    /// The bound that the proof uses.
+    pub bound: f64,
+    /// Encloses the smallest bound that would be true. The upper end is rounded outwards; the lower end of what [`crate::dynamics`] checks comes from a
+    /// search in plain floating-point numbers and only tells how tight the bound is.
+    pub truth: Interval,
+}
+
+impl Finding {
+    /// Whether the bound is certain to be true.
+    pub fn holds(&self) -> bool {
+        self.truth.high <= self.bound * (1.0 + ROUNDING)
+    }
+
+    /// Whether the bound is certain to be false.
+    pub fn fails(&self) -> bool {
+        self.truth.low > self.bound * (1.0 + ROUNDING)
+    }
+
+    /// By how much the bound could be smaller with certainty, over the bound.
+    pub fn margin(&self) -> f64 {
+        1.0 - self.truth.high / self.bound
+    }
+}
+
+/// The enclosures that branch and bound has found: what the bounds of the dynamics are checked with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Suprema {
+    /// Of ‖Ẇ x‖.
+    pub drift: Interval,
+    /// Of ‖∂²W[o, o′] y‖.
+    pub curvature: Interval,
+    /// Of ‖∂W[o] y‖.
+    pub turn: Interval,
+    /// Of ‖∂²W[o, v̂] x + ∂²W[o, x̂] v‖.
+    pub mixed: Interval,
+    /// Of ‖∂³W[o, o, x̂] x‖.
+    pub twice: Interval,
+    /// Of ‖ω × I ω‖, kg m².
+    pub spin: Interval,
+    /// Of ‖I⁻¹ (ω × I ω)‖.
+    pub spin_inverse: Interval,
+    /// Of ‖I y‖, kg m².
+    pub largest: Interval,
+    /// Of ‖I⁻¹ y‖, 1/(kg m²).
+    pub inverse: Interval,
+    /// Of ‖R y‖.
+    pub r: Interval,
+    /// Of ‖I W s‖ over the corners of the unit box.
+    pub bearing: Interval,
+}
+
+/// A direction of the plane on side `chart` < 2 of the square.
+fn plane<const N: usize>(chart: usize, a: Dual<N>) -> [Dual<N>; 2] {
+    let one = Dual::constant(1.0);
+    if chart == 0 { [one, a] } else { [a, one] }
+}
+
+/// A direction of space on face `chart` < 3 of the cube.
+fn space<const N: usize>(chart: usize, a: Dual<N>, b: Dual<N>) -> Vector<Dual<N>> {
+    let one = Dual::constant(1.0);
+    match chart {
+        0 => [one, a, b],
+        1 => [a, one, b],
+        _ => [a, b, one],
+    }
+}
+
+fn length<const N: usize>(o: &[Dual<N>; 2]) -> Dual<N> {
+    o[0].squared() + o[1].squared()
+}
+
+const SIDE: Interval = Interval::new(-1.0, 1.0);
+
+/// The search of one inequality at a time.
+struct Search {
+    /// tan(β/2) of the domain.
+    u: Interval,
+    gap: f64,
+    boxes: usize,
+    findings: Vec<Finding>,
+}
+
+impl Search {
+    /// Notes that √f ≤ `bound` is to hold in `charts` charts of `sides`; gives the enclosure of the largest √f. `scale` is the unit of `bound`.
+    fn check<const N: usize>(
+        &mut self,
+        statement: &str,
+        bound: f64,
+        scale: f64,
+        charts: usize,
+        sides: [Interval; N],
+        f: impl Fn(usize, &[Dual<N>; N]) -> Dual<N>,
+    ) -> Interval {
+        let goal = (bound / scale).powi(2) * (1.0 + ROUNDING);
+        let effort = Effort { gap: self.gap, goal, boxes: self.boxes };
+        let truth = supremum(&f, charts, sides, effort).sqrt() * Interval::from(scale);
+        self.findings.push(Finding { statement: statement.into(), bound, truth });
+        truth
+    }
+}
+
+fn turn<const N: usize>(u: Dual<N>) -> Turn<Dual<N>> {
+    let (sine, cosine) = sine_cosine(u);
+    Turn::new(sine, cosine)
+}
+
+/// tan(β/2) for |β| ≤ `sideslip`.
+pub fn half_angles(sideslip: f64) -> Interval {
+    let (sine, cosine) = Interval::point(sideslip).sin_cos();
+    let u = (sine / (Interval::ONE + cosine)).high;
+    Interval::new(-u, u)
+}
+
+/// The rows of I over `scale`, for the inertia exactly as the settings hold it.
+pub fn rows(inertia: &Matrix3<f64>, scale: f64) -> [Vector<Interval>; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|j| Interval::from(inertia[(i, j)]) / Interval::from(scale)))
+}
+
+/// The inverse by cofactors: columns are vector products of rows over the determinant.
+pub fn inverse(rows: &[Vector<Interval>; 3]) -> [Vector<Interval>; 3] {
+    let columns = [cross(&rows[1], &rows[2]), cross(&rows[2], &rows[0]), cross(&rows[0], &rows[1])];
+    let determinant = dot(&rows[0], &columns[0]);
+    std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i] / determinant))
+}
+
+fn known<const N: usize>(rows: &[Vector<Interval>; 3]) -> [Vector<Dual<N>>; 3] {
+    rows.map(|row| row.map(Dual::known))
+}
+
+/// The rows of ∂(ω × I ω)/∂ω: columns e × I ω + ω × I e.
+fn gyroscopic<const N: usize>(
+    inertia: &[Vector<Dual<N>>; 3],
+    omega: &Vector<Dual<N>>,
+) -> [Vector<Dual<N>>; 3] {
+    let momentum = times(inertia, omega);
+    std::array::from_fn(|j| {
+        let unit: Vector<Dual<N>> = std::array::from_fn(|i| Dual::constant(if i == j { 1.0 } else { 0.0 }));
+        sum(cross(&unit, &momentum), cross(omega, &times(inertia, &unit)))
+    })
+}
+
+/// Checks the bounds of the geometry and of the inertia. `gap` is the relative width of the enclosures that is aimed for.
+pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema) {
+    let u = half_angles(s.sideslip_domain);
+    let mut search = Search { u, gap, boxes: 4_000_000, findings: Vec::new() };
+    let (drift, curvature, turn, mixed, twice) = geometry(&mut search, lemmas);
+    let r = lemma1(&mut search, lemmas, s.sideslip_domain);
+    let (spin, spin_inverse, largest, inverse) = inertia(&mut search, s, lemmas);
+    let bearing = bearing(&mut search, s, lemmas);
+    let suprema =
+        Suprema { drift, curvature, turn, mixed, twice, spin, spin_inverse, largest, inverse, r, bearing };
+    (search.findings, suprema)
+}
+
+fn geometry(search: &mut Search, lemmas: &Lemmas) -> (Interval, Interval, Interval, Interval, Interval) {
+    let u = search.u;
+    let three = [u, SIDE, SIDE];
+    let drift =
+        search.check("‖Ẇ x‖ ≤ b ‖x‖²", lemmas.drift, 1.0, 3, three, |chart, &[u, a, b]| {
+            let x = space(chart, a, b);
+            square(&turn(u).drift(&x)) / square(&x).squared()
+        });
+    search.check(
+        "‖∂(Ẇ x)/∂x‖ ≤ b ‖x‖ (Frobenius)",
+        lemmas.drift_by_rates,
+        1.0,
+        3,
+        three,
+        |chart, &[u, a, b]| {
+            let (x, turn) = (space(chart, a, b), turn(u));
+            let column = |j: usize| {
+                let unit: Vector<Dual<3>> =
+                    std::array::from_fn(|i| Dual::constant(if i == j { 1.0 } else { 0.0 }));
+                square(&sum(turn.along(&[[x[0], x[1]]], &unit), turn.along(&[[unit[0], unit[1]]], &x)))
+            };
+            (column(0) + column(1) + column(2)) / square(&x)
+        },
+    );
+    let statement = "‖∂²(W y)/∂(α, β)²‖ ≤ b ‖y‖ (Frobenius)";
+    let curvature = search.check(statement, lemmas.curvature, 1.0, 3, three, |chart, &[u, a, b]| {
+        let (y, turn) = (space(chart, a, b), turn(u));
+        let of = |i, j| square(&turn.derivative(i, j, &y));
+        (of(2, 0) + of(1, 1) + of(1, 1) + of(0, 2)) / square(&y)
+    });
+    let statement = "‖∂(W y)/∂(α, β)‖ ≤ b ‖y‖ (Frobenius)";
+    search.check(statement, lemmas.turn_by_angles, 1.0, 3, three, |chart, &[u, a, b]| {
+        let (y, turn) = (space(chart, a, b), turn(u));
+        (square(&turn.derivative(1, 0, &y)) + square(&turn.derivative(0, 1, &y))) / square(&y)
+    });
+    let four = [u, SIDE, SIDE, SIDE];
+    let statement = "‖∂W[o]‖ ≤ b ‖o‖";
+    let by_turn = search.check(statement, lemmas.turn, 1.0, 6, four, |chart, &[u, o, a, b]| {
+        let (o, y) = (plane(chart % 2, o), space(chart / 2, a, b));
+        square(&turn(u).along(&[o], &y)) / (length(&o) * square(&y))
+    });
+    let statement = "‖∂²(Ẇ x)/∂(α, β)∂x‖ ≤ b ‖x‖";
+    let mixed = search.check(statement, lemmas.drift_mixed, 1.0, 6, four, |chart, &[u, o, a, b]| {
+        let (o, x) = (plane(chart % 2, o), space(chart / 2, a, b));
+        let value = turn(u).along(&[o, [x[0], x[1]]], &x);
+        Dual::constant(4.0) * square(&value) / (length(&o) * square(&x).squared())
+    });
+    let statement = "‖∂²(Ẇ x)/∂(α, β)²‖ ≤ b ‖x‖²";
+    let twice =
+        search.check(statement, lemmas.drift_by_angles_twice, 1.0, 6, four, |chart, &[u, o, a, b]| {
+            let (o, x) = (plane(chart % 2, o), space(chart / 2, a, b));
+            let value = turn(u).along(&[o, o, [x[0], x[1]]], &x);
+            square(&value) / (length(&o) * square(&x)).squared()
+        });
+    (drift, curvature, by_turn, mixed, twice)
+}
+
+/// ‖W‖ and ‖R‖.
+fn lemma1(search: &mut Search, lemmas: &Lemmas, sideslip: f64) -> Interval {
+    let proven = identity::lemma1();
+    let (one, r) = if proven {
+        (Interval::ONE, Interval::ONE / Interval::point(sideslip).sin_cos().1)
+    } else {
+        (Interval::ALL, Interval::ALL)
+    };
+    search
+        .findings
+        .push(Finding { statement: "‖W‖ ≤ b (exact identity)".into(), bound: 1.0, truth: one });
+    search
+        .findings
+        .push(Finding { statement: "‖R‖ ≤ b (exact identity)".into(), bound: lemmas.r, truth: r });
+    r
+}
+
+fn inertia(search: &mut Search, s: &Settings, lemmas: &Lemmas) -> (Interval, Interval, Interval, Interval) {
+    // Over the largest moment of inertia, so that all numbers are near one.
+    let unit = lemmas.largest;
+    let rows = rows(&s.body.inertia, unit);
+    let inverse = known::<2>(&inverse(&rows));
+    let rows = known::<2>(&rows);
+    let two = [SIDE, SIDE];
+    let largest = search.check("‖I y‖ ≤ b ‖y‖", lemmas.largest, unit, 3, two, |chart, &[a, b]| {
+        let y = space(chart, a, b);
+        square(&times(&rows, &y)) / square(&y)
+    });
+    let statement = "‖I⁻¹ y‖ ≤ b ‖y‖";
+    let of_inverse = search.check(statement, 1.0 / lemmas.smallest, 1.0 / unit, 3, two, |chart, &[a, b]| {
+        let y = space(chart, a, b);
+        square(&times(&inverse, &y)) / square(&y)
+    });
+    let statement = "‖∂(ω × I ω)/∂ω‖ ≤ b ‖ω‖ (Frobenius)";
+    search.check(statement, lemmas.gyroscopic.0, unit, 3, two, |chart, &[a, b]| {
+        let omega = space(chart, a, b);
+        let [x, y, z] = gyroscopic(&rows, &omega);
+        (square(&x) + square(&y) + square(&z)) / square(&omega)
+    });
+    let statement = "‖∂(I⁻¹ (ω × I ω))/∂ω‖ ≤ b ‖ω‖ (Frobenius)";
+    search.check(statement, lemmas.gyroscopic.1, 1.0, 3, two, |chart, &[a, b]| {
+        let omega = space(chart, a, b);
+        let [x, y, z] = gyroscopic(&rows, &omega).map(|column| square(&times(&inverse, &column)));
+        (x + y + z) / square(&omega)
+    });
+    let spread = lemmas.largest - lemmas.smallest;
+    let gyroscopic_moment = |omega: &Vector<Dual<2>>| cross(omega, &times(&rows, omega));
+    let statement = "‖ω × I ω‖ ≤ b ‖ω‖²";
+    let spin = search.check(statement, 0.5 * spread, unit, 3, two, |chart, &[a, b]| {
+        let omega = space(chart, a, b);
+        square(&gyroscopic_moment(&omega)) / square(&omega).squared()
+    });
+    let statement = "‖I⁻¹ (ω × I ω)‖ ≤ b ‖ω‖²";
+    let bound = 0.5 * spread / lemmas.smallest;
+    let spin_inverse = search.check(statement, bound, 1.0, 3, two, |chart, &[a, b]| {
+        let omega = space(chart, a, b);
+        square(&times(&inverse, &gyroscopic_moment(&omega))) / square(&omega).squared()
+    });
+    (spin, spin_inverse, largest, of_inverse)
+}
+
+fn bearing(search: &mut Search, s: &Settings, lemmas: &Lemmas) -> Interval {
+    let unit = lemmas.largest;
+    let rows = known::<2>(&rows(&s.body.inertia, unit));
+    // Two charts of α, which are half a turn apart, and four corners up to their common sign.
+    let sides = [search.u, SIDE];
+    let statement = "‖I W s‖ ≤ b over the corners s of the unit box";
+    search.check(statement, lemmas.bearing, unit, 8, sides, |chart, &[u, v]| {
+        let one = Dual::constant(1.0);
+        let sign = |bit: usize| Dual::constant(if chart & bit == 0 { 1.0 } else { -1.0 });
+        let corner = [one, sign(1), sign(2)];
+        let (sine, cosine) = sine_cosine(v);
+        let y = turn(u).along(&[], &corner);
+        square(&times(&rows, &turned(sign(4) * sine, sign(4) * cosine, &scaled(one, y))))
+    })
+}

@@ -1,0 +1,229 @@
+//! The sums over all sampling instants: how far disturbances and errors can drive the deviation, and the terminal weight.
+//!
+//! Φⁿ is Φʳ (Φᵇ)ᵐ with n = m b + r and ‖Φᵇ‖ ≤ ½ in the norm of the largest row sum, so that the width of the intervals fades with the power, and what is
+//! left out after n periods is bounded by a geometric series.
+
+use crate::interval::Interval;
+use control::crmpc::{Settings, held_terminal_weight, terminal_weight};
+use control::sampled::{Gain, SampledError};
+use nalgebra::{Matrix2, Vector2};
+
+type Matrix = [[Interval; 2]; 2];
+type Pair = [Interval; 2];
+
+fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
+}
+
+fn applied(a: &Matrix, x: &Pair) -> Pair {
+    a.map(|row| along(&row, x))
+}
+
+fn along(row: &Pair, x: &Pair) -> Interval {
+    row[0] * x[0] + row[1] * x[1]
+}
+
+fn transposed(a: &Matrix) -> Matrix {
+    [[a[0][0], a[1][0]], [a[0][1], a[1][1]]]
+}
+
+/// The largest row sum of the sizes.
+fn norm(a: &Matrix) -> Interval {
+    (a[0][0].abs() + a[0][1].abs()).max(a[1][0].abs() + a[1][1].abs())
+}
+
+/// ∫ |c₀ + c₁ u| du from `low` over `width`: where the sign changes, the two triangles are (a² + b²)/(|a| + |b|) of half the width.
+fn integral_of_size([c1, c0]: &Pair, low: Interval, width: Interval) -> Interval {
+    let (a, b) = (*c0 + *c1 * low, *c0 + *c1 * (low + width));
+    let half = Interval::from(0.5) * width;
+    let all = (a.abs() + b.abs()) * half;
+    if (a.low >= 0.0 && b.low >= 0.0) || (a.high <= 0.0 && b.high <= 0.0) {
+        all
+    } else if (a.low > 0.0 && b.high < 0.0) || (a.high < 0.0 && b.low > 0.0) {
+        (a.square() + b.square()) / (a.abs() + b.abs()) * half
+    } else {
+        Interval::new(((a + b).abs() * half).low, all.high)
+    }
+}
+
+/// Sampled error dynamics of one axis.
+pub struct Axis {
+    gain: Pair,
+    period: Interval,
+    latency: Interval,
+    /// Φⁿ for n < b.
+    powers: Vec<Matrix>,
+    /// Φᵇ.
+    block: Matrix,
+}
+
+/// Bounds on what a drive can do by the end of some period: angle, rate, both as the law sees them, feedback, and the feedback times its age.
+pub type Bounds = [Interval; 6];
+
+/// b is at most this: stable dynamics that fade more slowly are refused.
+const LONGEST_BLOCK: usize = 4000;
+
+fn step(gain: Gain, period: f64) -> Matrix {
+    let (h, k1, k2) = (Interval::from(period), Interval::from(gain.k1), Interval::from(gain.k2));
+    let half = Interval::from(0.5) * h.square();
+    [[Interval::ONE + half * k1, h + half * k2], [h * k1, Interval::ONE + h * k2]]
+}
+
+impl Axis {
+    /// `None` if no power of Φ is certain to halve every vector.
+    pub fn new(gain: Gain, period: f64, latency: f64) -> Option<Self> {
+        let phi = step(gain, period);
+        let unit = [[Interval::ONE, Interval::ZERO], [Interval::ZERO, Interval::ONE]];
+        let (mut powers, mut next) = (vec![unit], phi);
+        while norm(&next).high > 0.5 {
+            if powers.len() >= LONGEST_BLOCK {
+                return None;
+            }
+            powers.push(next);
+            next = product(&next, &phi);
+        }
+        Some(Self {
+            gain: [gain.k1, gain.k2].map(Interval::from),
+            period: Interval::from(period),
+            latency: Interval::from(latency),
+            powers,
+            block: next,
+        })
+    }
+
+    /// Φⁿ for n < `count`.
+    fn transitions(&self, count: usize) -> impl Iterator<Item = Matrix> + '_ {
+        let mut block = [[Interval::ONE, Interval::ZERO], [Interval::ZERO, Interval::ONE]];
+        (0..count).map(move |n| {
+            let within = n % self.powers.len();
+            if n > 0 && within == 0 {
+                block = product(&block, &self.block);
+            }
+            product(&self.powers[within], &block)
+        })
+    }
+
+    /// Upper bounds of Σ ‖Φⁿ‖ and of Σ (n − `from`) ‖Φⁿ‖ over all n ≥ `from`.
+    fn tails(&self, from: usize) -> (Interval, Interval) {
+        let at = self.transitions(from + 1).last().map_or(Interval::ALL, |power| norm(&power));
+        let of_block = self.powers.iter().fold(Interval::ZERO, |sum, power| sum + norm(power));
+        let first = at * of_block;
+        let rest = Interval::ONE - Interval::from(norm(&self.block).high);
+        let length = Interval::from(self.powers.len() as f64);
+        (first / rest, first * length / rest.square())
+    }
+
+    /// What any |Δ| ≤ 1 can do within 0, 1, …, `steps` periods, and at last for ever.
+    pub fn reach(&self, steps: usize) -> Vec<Bounds> {
+        let unseen = [Interval::from(0.5) * self.latency.square(), self.latency];
+        let (mut seen, mut feedback, mut age) = ([Interval::ZERO; 2], Interval::ZERO, Interval::ZERO);
+        let mut all = Vec::with_capacity(steps + 2);
+        let bounds = |seen: &Pair, feedback: Interval, age: Interval| {
+            [seen[0] + unseen[0], seen[1] + unseen[1], seen[0], seen[1], feedback, age]
+        };
+        all.push(bounds(&seen, feedback, age));
+        let end = self.latency + self.period;
+        for (n, power) in self.transitions(steps).enumerate() {
+            let size = |row: &Pair| integral_of_size(row, self.latency, self.period);
+            seen = std::array::from_fn(|i| seen[i] + size(&power[i]));
+            let fed = size(&applied(&transposed(&power), &self.gain));
+            feedback = feedback + fed;
+            age = age + fed * (end + Interval::from(n as f64) * self.period);
+            all.push(bounds(&seen, feedback, age));
+        }
+        // ‖Φⁿ [u, 1]‖ ≤ ‖Φⁿ‖ max(u, 1).
+        let scale = self.period * end.max(Interval::ONE);
+        let (tail, moment) = self.tails(steps);
+        let (tail, moment) = (tail * scale, moment * scale * self.period);
+        let gain = self.gain[0].abs() + self.gain[1].abs();
+        let old = end + Interval::from(steps as f64) * self.period;
+        let more = |value: Interval, by: Interval| value + Interval::new(0.0, by.high);
+        let seen = seen.map(|seen| more(seen, tail));
+        all.push(bounds(&seen, more(feedback, gain * tail), more(age, gain * (tail * old + moment))));
+        all
+    }
+
+    /// Σ |Φʲ x| and Σ |K Φʲ x| over j < 0, 1, …, `steps`, and at last over all j.
+    fn series(&self, x: &Pair, steps: usize) -> Vec<[Interval; 3]> {
+        let mut sum = [Interval::ZERO; 3];
+        let mut all = vec![sum];
+        for power in self.transitions(steps) {
+            let value = applied(&power, x);
+            let sizes = [value[0].abs(), value[1].abs(), along(&self.gain, &value).abs()];
+            sum = std::array::from_fn(|i| sum[i] + sizes[i]);
+            all.push(sum);
+        }
+        let tail = self.tails(steps).0 * x[0].abs().max(x[1].abs());
+        let gain = self.gain[0].abs() + self.gain[1].abs();
+        let tails = [tail, tail, gain * tail];
+        all.push(std::array::from_fn(|i| sum[i] + Interval::new(0.0, tails[i].high)));
+        all
+    }
+
+    /// What errors of the rate of up to 1 at every tick can do, as [`Self::reach`].
+    pub fn errors(&self, steps: usize) -> Vec<Bounds> {
+        let newest = [self.latency, Interval::ONE];
+        let half = Interval::from(0.5) * self.period.square();
+        let held = along(&self.gain, &newest);
+        let sums = self.series(&[half * held, self.period * held], steps);
+        // −Φⁿ⁻¹ A A_d e₀.
+        let first = [self.latency + self.period, Interval::ONE];
+        let fed = held.abs();
+        let bounds = |sum: &[Interval; 3], first: &[Interval; 3]| {
+            let own = [sum[0] + first[0], sum[1] + first[1]];
+            let feedback = sum[2] + first[2] + fed;
+            [own[0], own[1], own[0] + newest[0], own[1] + newest[1], feedback, Interval::ZERO]
+        };
+        let mut all = Vec::with_capacity(steps + 2);
+        all.push([newest[0], newest[1], Interval::ZERO, Interval::ZERO, Interval::ZERO, Interval::ZERO]);
+        let mut largest = [Interval::ZERO; 3];
+        for (n, power) in self.transitions(steps).enumerate() {
+            let value = applied(&power, &first);
+            let sizes = [value[0].abs(), value[1].abs(), along(&self.gain, &value).abs()];
+            all.push(bounds(&sums[n], &sizes));
+            largest = sizes;
+        }
+        // From the last period on, no power of Φ makes the first error larger than this: ‖Φᵐᵇ⁺ʳ‖ ≤ ‖Φʳ‖.
+        let after = self.powers.iter().fold(Interval::ZERO, |most, power| most.max(norm(power)));
+        let faded = after * largest[0].max(largest[1]);
+        let gain = self.gain[0].abs() + self.gain[1].abs();
+        all.push(bounds(&sums[steps + 1], &[faded, faded, gain * faded]));
+        all
+    }
+
+    /// What shifts of the angle by up to the period at every tick can do, as [`Self::reach`].
+    pub fn shifts(&self, steps: usize) -> Vec<Bounds> {
+        let sums = self.series(&[self.period, Interval::ZERO], steps);
+        sums.into_iter()
+            .map(|[angle, rate, feedback]| [angle, rate, angle, rate, feedback, Interval::ZERO])
+            .collect()
+    }
+}
+
+/// Largest eigenvalue of Φᵀ G Φ − G + h (P + K̃ᵀ Q K̃) per axis with the sampled terminal law: (11c) of Chai 2022 demands that it is not positive.
+///
+/// The first is that of the robust set's G, the second that of the printed G, which belongs to the continuous law.
+pub fn terminal_decrease(s: &Settings) -> [[Interval; 2]; 3] {
+    let held = SampledError::new(s.terminal, s.period_optimisation);
+    std::array::from_fn(|axis| {
+        let p = Vector2::new(s.p[axis], s.p[axis + 3]);
+        let q = s.q[axis];
+        [held_terminal_weight(&held, s.terminal, p, q), terminal_weight(s.terminal, p, q)]
+            .map(|weight| decrease(s, &weight, p, q))
+    })
+}
+
+fn decrease(s: &Settings, weight: &Matrix2<f64>, p: Vector2<f64>, q: f64) -> Interval {
+    let phi = step(s.terminal, s.period_optimisation);
+    let gain = [s.terminal.k1, s.terminal.k2].map(Interval::from);
+    let g: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| Interval::from(weight[(i, j)])));
+    let after = product(&transposed(&phi), &product(&g, &phi));
+    let h = Interval::from(s.period_optimisation);
+    let of = |i: usize, j: usize| {
+        let diagonal = if i == j { Interval::from(p[i]) } else { Interval::ZERO };
+        after[i][j] - g[i][j] + h * (diagonal + Interval::from(q) * gain[i] * gain[j])
+    };
+    let (a, b, d) = (of(0, 0), of(0, 1).hull(of(1, 0)), of(1, 1));
+    let half = Interval::from(0.5);
+    half * (a + d) + ((half * (a - d)).square() + b.square()).sqrt()
+}
