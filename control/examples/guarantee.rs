@@ -1,29 +1,47 @@
-//! What the design of the robust set leaves of the limits, for the published settings with other gains and delays.
+//! What the robust set can guarantee for the published vehicle and limits, by gains, delay and errors of measurement:
 //!
 //! ```text
 //! cargo run --release -p control --example guarantee
 //! ```
+//!
+//! prints the largest bound of the disturbance that is accepted, and what is left of the moment at the published one.
 
 use control::crmpc::{Design, Guarantee, Settings};
 use control::sampled::Gain;
 
 fn main() {
+    println!("    K        delay   errors, deg and deg/s   largest bound, deg/s2   left of the moment at 2 deg/s2");
     for (k1, k2) in [(-5.0, -5.0), (-4.0, -4.5), (-3.0, -4.0), (-2.0, -4.0), (-2.0, -3.0), (-1.0, -2.0)] {
         for delay in [0.0, 0.04, 0.117] {
-            for rate_error_deg in [0.0, 0.1, 0.2] {
+            for error_deg in [0.0, 0.05, 0.1, 0.2] {
+                let error = f64::to_radians(error_deg);
                 let settings = Settings {
                     feedback: Gain { k1, k2 },
                     delay,
-                    rate_error: f64::to_radians(rate_error_deg),
-                    angle_error: f64::to_radians(rate_error_deg),
+                    rate_error: error,
+                    angle_error: error,
+                    guarantee: Guarantee::BestEffort,
                     ..Settings::published()
                 };
-                let text = match Design::new(&Settings { guarantee: Guarantee::Required, ..settings }) {
-                    Ok(design) => format!("{:?}", design.assessment),
-                    Err(error) => error.to_string(),
-                };
-                println!("{k1} {k2} {delay} {rate_error_deg}: {text}");
+                print(&settings, error_deg);
             }
         }
     }
+}
+
+fn print(settings: &Settings, error_deg: f64) {
+    let design = |disturbance_bound: f64| Design::new(&Settings { disturbance_bound, ..*settings });
+    let left = design(settings.disturbance_bound).map_or(f64::NAN, |design| design.assessment.moment_left);
+    let holds = |bound: f64| design(bound).is_ok_and(|design| design.assessment.holds());
+    let (mut low, mut high) = (0.0, 0.1);
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if holds(middle) { low = middle } else { high = middle }
+    }
+    let Settings { feedback: Gain { k1, k2 }, delay, .. } = settings;
+    println!(
+        "[{k1:4}, {k2:4}] {delay:6.3} {error_deg:16.2} {:26.3} {:30.1} %",
+        low.to_degrees(),
+        100.0 * left
+    );
 }

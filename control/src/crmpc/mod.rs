@@ -179,12 +179,25 @@ impl Crmpc {
         } else {
             self.shift(&mut memory.plan);
             memory.age = memory.age.saturating_add(self.design.ratio as u32);
+            self.look_at_the_deviation(memory, &measured);
         }
         let report = match self.settings.constraints {
             Constraints::Robust => self.plan_robustly(memory, &measured, first),
             Constraints::Paper => self.plan_as_printed(memory, &measured, first),
         };
         memory.report.record(&report, clock);
+    }
+
+    /// A plan that the vehicle is further from than the assumptions explain is of no use any more.
+    fn look_at_the_deviation(&mut self, memory: &mut Memory, measured: &Vector6<f64>) {
+        let (angles, rates) = split(&(measured - memory.plan.states[0]));
+        let gain = self.settings.feedback;
+        self.sets.begin(memory.age as usize, 1.0);
+        if memory.standing == Standing::InForce
+            && !self.explains(0, &angles, &rates, &(angles * gain.k1 + rates * gain.k2))
+        {
+            memory.standing = Standing::Exceeded;
+        }
     }
 
     /// The optimum within the paper's sets, or the shifted previous plan (31).
