@@ -40,6 +40,8 @@ const fn erroneous(name: &'static str, gain: (f64, f64), delay: f64, errors: (f6
     Loop { name, gain, delay, errors, estimator: false }
 }
 
+/// A flight with more fallbacks than this gets a line of its own.
+const MANY: u32 = 20;
 /// Errors of the estimator, deg and deg/s.
 const ESTIMATED: (f64, f64) = (0.25, 0.2);
 
@@ -96,13 +98,28 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |i: usize| arguments.get(i).and_then(|text| text.parse::<u64>().ok());
     let (Some(first), Some(count)) = (number(2), number(3)) else {
-        eprintln!("usage: worst_case random LOOP FIRST COUNT | worst_case search LOOP FIRST COUNT EVALUATIONS");
+        eprintln!(
+            "usage: worst_case random LOOP FIRST COUNT | worst_case search LOOP FIRST COUNT EVALUATIONS"
+        );
         std::process::exit(2);
     };
     let seeds: Vec<u64> = (first..first + count).collect();
     println!(
-        "{:17} {:>10} {:>6} {:>8} {:>8} {:>8} {:>7} {:>9} {:>5} {:>6} {:>9} {:>9} {:>9}",
-        "", "bound", "runs", "rate", "moment", "at all", "broken", "withdrawn", "lost", "fallb.", "in force", "mean EMS", "max EMS"
+        "{:17} {:>10} {:>6} {:>7} {:>8} {:>8} {:>8} {:>7} {:>9} {:>5} {:>6} {:>9} {:>9} {:>9}",
+        "",
+        "bound",
+        "runs",
+        "assumed",
+        "rate",
+        "moment",
+        "at all",
+        "broken",
+        "withdrawn",
+        "lost",
+        "fallb.",
+        "in force",
+        "mean EMS",
+        "max EMS"
     );
     for each in LOOPS.iter().filter(|each| arguments[1] == "all" || arguments[1] == each.name) {
         let Some(settings) = each.settings() else {
@@ -114,7 +131,7 @@ fn main() {
             _ => {
                 let shown = in_parallel(&seeds, |&seed| each.random_flight(settings, seed).fly());
                 for (seed, shown) in seeds.iter().zip(&shown) {
-                    if shown.defective() || shown.fallbacks > 0 {
+                    if shown.defective() || shown.fallbacks > MANY {
                         let Flight { disturbance, sight, .. } = each.random_flight(settings, *seed);
                         println!("  {} seed {seed}, {disturbance:?}, {sight:?}: {shown:?}", each.name);
                     }
@@ -134,14 +151,15 @@ fn report(name: &str, settings: &Settings, seeds: &[u64], all: &[Shown]) {
         places.map_or(0, |(seed, _)| *seed)
     };
     println!(
-        "{name:17} {:10.4} {:6} {:8.4} {:8.4} {:8.4} {:7} {:9} {:5} {:6} {:7.2} % {:8.3}° {:8.3}°  errors up to {:.3}°, {:.3}°/s; worst seeds {} and {}",
+        "{name:17} {:10.4} {:6} {:7} {:8.4} {:8.4} {:8.4} {:7} {:9} {:5} {:6} {:7.2} % {:8.3}° {:8.3}°  errors up to {:.3}°, {:.3}°/s; worst seeds {} and {}",
         settings.disturbance_bound.to_degrees(),
         all.len(),
+        count(|s| s.assumed),
         largest(|s| s.rate),
         largest(|s| s.moment),
         largest(|s| s.rate_at_all),
         count(|s| s.broken),
-        count(|s| s.withdrawn.is_some()),
+        count(|s| s.assumed && s.withdrawn.is_some()),
         count(|s| s.lost),
         all.iter().map(|s| s.fallbacks).sum::<u32>(),
         100.0 * mean(|s| s.in_force),
@@ -216,7 +234,10 @@ fn search(each: &Loop, settings: Settings, seeds: &[u64], evaluations: usize) {
         (flights, defects, fallbacks, worst.1)
     });
     for (seed, (flights, defects, fallbacks, worst)) in seeds.iter().zip(&results) {
-        println!("  {} search {seed}: {flights} flights, {defects} defects, {fallbacks} fallbacks, worst {worst:?}", each.name);
+        println!(
+            "  {} search {seed}: {flights} flights, {defects} defects, {fallbacks} fallbacks, worst {worst:?}",
+            each.name
+        );
     }
     let flights: u32 = results.iter().map(|result| result.0).sum();
     let worst: Vec<Shown> = results.iter().map(|result| result.3).collect();

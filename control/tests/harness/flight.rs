@@ -3,9 +3,11 @@
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
 use super::{CHECK, platform};
-use control::crmpc::{Crmpc, Settings, Standing};
+use control::crmpc::{Crmpc, InitialState, Memory, Settings, Standing};
 use control::delay::Delayed;
+use control::error::DesignError;
 use control::estimation::{self, Alignment, Estimator, mems_corrections};
+use control::sampled::Gain;
 use control::{Controller, Measurement};
 use nalgebra::Vector3;
 use vehicle::dynamics::RigidBody;
@@ -13,7 +15,7 @@ use vehicle::integrator::rk4;
 use vehicle::kinematics::{self, Kinematics};
 use vehicle::noise::uniform;
 use vehicle::plant::{self, Load, State};
-use vehicle::reference::Profile;
+use vehicle::reference::{Profile, Reference};
 use vehicle::scenario::Scenario;
 use vehicle::sensors::Sensors;
 use vehicle::transport::Transport;
@@ -133,9 +135,7 @@ impl Progress {
                 self.now
             }
             Course::AlongRate(sign) => signs(&(r * vehicle.rates())) * *sign,
-            Course::AlongMoment(sign) => {
-                signs(&(r * vehicle.body.inverse * vehicle.moment(time))) * *sign
-            }
+            Course::AlongMoment(sign) => signs(&(r * vehicle.body.inverse * vehicle.moment(time))) * *sign,
             Course::Segments(segments) => {
                 let current = segments.iter().find(|(until, _)| time < *until).or(segments.last());
                 current.map_or_else(Vector3::zeros, |(_, value)| *value)
@@ -198,8 +198,10 @@ pub struct Shown {
     pub rate_at_all: f64,
     /// Whether one of both exceeded its limit under guarantee.
     pub broken: bool,
-    /// When the guarantee ended although the assumptions held, s.
+    /// When the guarantee ended, s.
     pub withdrawn: Option<f64>,
+    /// Whether the errors of angles and rates kept to their bounds, as the guarantee assumes.
+    pub assumed: bool,
     /// Whether the attitude was lost.
     pub lost: bool,
     /// Optimisations without an optimum.
@@ -215,7 +217,7 @@ pub struct Shown {
 impl Shown {
     /// Whether the guarantee failed.
     pub fn defective(&self) -> bool {
-        self.broken || self.withdrawn.is_some() || self.lost
+        self.assumed && (self.broken || self.withdrawn.is_some()) || self.lost
     }
 }
 
@@ -243,6 +245,7 @@ impl Flight {
         let random = &mut Random::new(seed);
         let mut flight = Self::new(settings);
         flight.seed = seed;
+        flight.duration = 25.0;
         flight.inertia_scale = match random.below(3) {
             0 => 1.0 - settings.inertia_error,
             1 => 1.0 + settings.inertia_error,
@@ -254,7 +257,9 @@ impl Flight {
             0 => flight.reference_start = random.between(0.0, 50.0),
             1 => flight.reference = Self::random_sine(random),
             _ => {
-                let steady = |random: &mut Random| degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([5.0, 3.0, 8.0]));
+                let steady = |random: &mut Random| {
+                    degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([5.0, 3.0, 8.0]))
+                };
                 flight.reference = Profile::step(steady(random), steady(random), random.between(1.0, 20.0));
             }
         }
@@ -272,12 +277,19 @@ impl Flight {
 
     fn random_sine(random: &mut Random) -> Profile {
         let mean = degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([5.0, 2.0, 20.0]));
-        let amplitude = random.vector().component_mul(&degrees([3.0, 3.0, 6.0]));
+        // A sideslip that moves costs many optimisations.
+        let sideslip = if random.below(12) == 0 { 3.0 } else { 0.0 };
+        let amplitude = random.vector().component_mul(&degrees([3.0, sideslip, 6.0]));
         Profile::sine(mean, amplitude, random.between(0.1, 0.8), random.between(0.0, 6.3))
     }
 
     /// Flies it.
     pub fn fly(&self) -> Shown {
+        self.fly_seen(|_, _, _, _| {})
+    }
+
+    /// Flies it; `observe` sees memory, tick, measurement and reference after each update.
+    pub fn fly_seen(&self, mut observe: impl FnMut(&Memory, u64, &Measurement, &Reference)) -> Shown {
         let s = &self.settings;
         let law = Crmpc::new(*s).unwrap();
         let mut controller = Delayed::new(law, s.body, s.delay, s.limit_moment).unwrap();
@@ -299,6 +311,7 @@ impl Flight {
             shown.lost |= off.norm() > LOST;
             let moment = controller.update(&mut memory, tick, time, &measured, &reference);
             vehicle.command(time, moment);
+            observe(&memory.inner, tick, &measured, &reference(time));
             let now = memory.inner.standing == Standing::InForce;
             if before && !now && shown.withdrawn.is_none() {
                 shown.withdrawn = Some(time);
@@ -329,6 +342,7 @@ impl Flight {
             in_force: in_force as f64 / ticks as f64,
             ems_deg: (error / ticks as f64).sqrt().to_degrees(),
             errors: eyes.largest,
+            assumed: eyes.within_bounds(),
             ..shown
         }
     }
@@ -399,6 +413,9 @@ struct Eyes {
     angle_error: Vector3<f64>,
     estimation: Option<(Sensors, Estimator, estimation::Memory)>,
     largest: (f64, f64),
+    /// Error of the angles at the last tick, rad, and the largest change of one of them from tick to tick, rad.
+    last: Option<Vector3<f64>>,
+    largest_change: f64,
 }
 
 impl Eyes {
@@ -428,6 +445,8 @@ impl Eyes {
             angle_error: Vector3::zeros(),
             estimation,
             largest: (0.0, 0.0),
+            last: None,
+            largest_change: 0.0,
         };
         eyes.sample(0.0, &Vehicle::new(flight));
         eyes
@@ -439,7 +458,8 @@ impl Eyes {
             let truth = platform::Truth { time, angles: vehicle.angles(), rates: vehicle.rates() };
             sensors.take(time, &platform::felt(&truth));
             let sample = sensors.arrived();
-            let line = estimation::Line { sample: sample.number, time: sample.time, readings: sample.readings };
+            let line =
+                estimation::Line { sample: sample.number, time: sample.time, readings: sample.readings };
             estimator.update(memory, time, &line);
         }
     }
@@ -463,8 +483,91 @@ impl Eyes {
         }
         let of_rates = kinematics::r(&measured.angles) * measured.rates - angle_rates;
         let (angle, rate) = &mut self.largest;
-        *angle = angle.max((measured.angles - angles).amax());
+        let of_angles = measured.angles - angles;
+        *angle = angle.max(of_angles.amax());
         *rate = rate.max(of_rates.amax());
+        let change = self.last.map_or(0.0, |last| (of_angles - last).amax());
+        self.largest_change = self.largest_change.max(change);
+        self.last = Some(of_angles);
         measured
     }
+
+    /// Whether the errors have kept to the bounds of the settings.
+    fn within_bounds(&self) -> bool {
+        let (angle, rate, period) = self.bounds;
+        let within = |value: f64, bound: f64| value <= bound * (1.0 + SLACK) + 1e-12;
+        within(self.largest.0, angle)
+            && within(self.largest.1, rate)
+            && within(self.largest_change, rate * period)
+    }
+}
+
+/// What became of some settings.
+#[derive(Clone, Debug)]
+pub enum Tried {
+    /// Accepted, and flown.
+    Flown(Shown),
+    /// Refused for want of a guarantee. The message names so many bounds, of which these are not accepted.
+    Refused {
+        /// Number of bounds named.
+        bounds: usize,
+        /// What is said of the settings with the bound.
+        not_accepted: Vec<String>,
+    },
+    /// Refused for another reason.
+    Invalid(String),
+}
+
+/// Settings with anything that a user may set drawn at random.
+pub fn random_settings(seed: u64) -> Settings {
+    let random = &mut Random::new(seed);
+    let half = |random: &mut Random, high: f64| {
+        if random.below(2) == 0 { 0.0 } else { random.between(0.0, high) }
+    };
+    let published = Settings::published();
+    let period_feedback = [0.02, 0.04, 0.05, 0.1][random.below(4)];
+    let initial_states = [InitialState::Measured, InitialState::Nominal, InitialState::Tube];
+    Settings {
+        feedback: Gain { k1: random.between(-10.0, -0.5), k2: random.between(-10.0, -1.0) },
+        delay: half(random, 0.15),
+        angle_error: half(random, 0.2).to_radians(),
+        rate_error: half(random, 0.2).to_radians(),
+        disturbance_bound: random.between(0.0, 4.0).to_radians(),
+        inertia_error: random.between(0.0, 0.1),
+        horizon: 20 + random.below(81),
+        period_feedback,
+        // At most 0.3 s, so that the terminal law is stable.
+        period_optimisation: period_feedback * (1 + random.below((0.3 / period_feedback) as usize)) as f64,
+        limit_rate: published.limit_rate * random.between(0.5, 2.0),
+        limit_moment: published.limit_moment * random.between(0.5, 3.0),
+        initial_state: initial_states[random.below(3)],
+        ..published
+    }
+}
+
+/// Flies the settings for 15 s if the design accepts them, or else tries each bound that its refusal names.
+pub fn tried(settings: Settings, seed: u64) -> Tried {
+    let error = match Crmpc::new(settings) {
+        Ok(_) => return Tried::Flown(Flight { duration: 15.0, ..Flight::random(settings, seed) }.fly()),
+        Err(error) => error,
+    };
+    let DesignError::NoGuarantee { disturbance, errors, delay, .. } = error else {
+        return Tried::Invalid(error.to_string());
+    };
+    // As the message prints them.
+    let down = |value: f64| (value * 1e4).floor() / 1e4;
+    let down_angle = |value: f64| down(value.to_degrees()).to_radians();
+    let with = [
+        disturbance.map(|bound| Settings { disturbance_bound: down_angle(bound), ..settings }),
+        errors.map(|(angle, rate)| Settings {
+            angle_error: down_angle(angle),
+            rate_error: down_angle(rate),
+            ..settings
+        }),
+        delay.map(|delay| Settings { delay: down(delay), ..settings }),
+    ];
+    let named: Vec<Settings> = with.into_iter().flatten().collect();
+    let refusal = |settings: &Settings| Crmpc::new(*settings).err();
+    let not_accepted = named.iter().filter_map(refusal).map(|refusal| format!("{error}; then {refusal}"));
+    Tried::Refused { bounds: named.len(), not_accepted: not_accepted.collect() }
 }
