@@ -20,7 +20,7 @@ fn main() {
         std::process::exit(2);
     };
     let seeds: Vec<u64> = (first..first + count).collect();
-    let outcomes = in_parallel(&seeds, |&seed| tried(random_settings(seed), seed));
+    let outcomes = in_parallel(&seeds, |&seed| tried(&random_settings(seed), seed));
     let (mut flown, mut defects, mut fallbacks, mut refused, mut named, mut broken) = (0, 0, 0, 0, 0, 0);
     let (mut rate, mut moment) = (0.0f64, 0.0f64);
     for (seed, outcome) in seeds.iter().zip(outcomes) {

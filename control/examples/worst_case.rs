@@ -83,7 +83,7 @@ impl Loop {
         holds(low).then(|| with(low))
     }
 
-    fn random_flight(&self, settings: Settings, seed: u64) -> Flight {
+    fn random_flight(&self, settings: &Settings, seed: u64) -> Flight {
         let mut flight = Flight::random(settings, seed);
         if self.estimator {
             flight.sight = Sight::Estimator(seed);
@@ -126,19 +126,18 @@ fn main() {
             println!("{}: refused at every disturbance bound", each.name);
             continue;
         };
-        match arguments[0].as_str() {
-            "search" => search(each, settings, &seeds, number(4).unwrap_or(1000) as usize),
-            _ => {
-                let shown = in_parallel(&seeds, |&seed| each.random_flight(settings, seed).fly());
-                for (seed, shown) in seeds.iter().zip(&shown) {
-                    if shown.defective() || shown.fallbacks > MANY {
-                        let Flight { disturbance, sight, .. } = each.random_flight(settings, *seed);
-                        println!("  {} seed {seed}, {disturbance:?}, {sight:?}: {shown:?}", each.name);
-                    }
-                }
-                report(each.name, &settings, &seeds, &shown);
+        if arguments[0] == "search" {
+            search(each, &settings, &seeds, number(4).unwrap_or(1000) as usize);
+            continue;
+        }
+        let shown = in_parallel(&seeds, |&seed| each.random_flight(&settings, seed).fly());
+        for (seed, shown) in seeds.iter().zip(&shown) {
+            if shown.defective() || shown.fallbacks > MANY {
+                let Flight { disturbance, sight, .. } = each.random_flight(&settings, *seed);
+                println!("  {} seed {seed}, {disturbance:?}, {sight:?}: {shown:?}", each.name);
             }
         }
+        report(each.name, &settings, &seeds, &shown);
     }
 }
 
@@ -209,7 +208,7 @@ fn badness(shown: &Shown) -> f64 {
     shown.rate.max(shown.moment) + f64::from(u8::from(shown.defective()))
 }
 
-fn search(each: &Loop, settings: Settings, seeds: &[u64], evaluations: usize) {
+fn search(each: &Loop, settings: &Settings, seeds: &[u64], evaluations: usize) {
     let results = in_parallel(seeds, |&seed| {
         let random = &mut Random::new(seed);
         let mut flight = each.random_flight(settings, seed);
@@ -242,5 +241,5 @@ fn search(each: &Loop, settings: Settings, seeds: &[u64], evaluations: usize) {
     let flights: u32 = results.iter().map(|result| result.0).sum();
     let worst: Vec<Shown> = results.iter().map(|result| result.3).collect();
     println!("  {flights} flights; the worst of each search:");
-    report(each.name, &settings, seeds, &worst);
+    report(each.name, settings, seeds, &worst);
 }

@@ -10,7 +10,7 @@ use harness::{in_parallel, settings};
 use nalgebra::Vector3;
 
 /// Disturbances of every kind, with both inertia errors, from the start of Chai 2022.
-fn flights(settings: Settings, sights: &[Sight]) -> Vec<Flight> {
+fn flights(settings: &Settings, sights: &[Sight]) -> Vec<Flight> {
     let corner = Vector3::new(1.0, -1.0, 1.0);
     let courses = [
         Course::White,
@@ -49,17 +49,17 @@ fn soft() -> Settings {
 
 #[test]
 fn guarantee_is_kept_without_delay_and_errors() {
-    assert_kept(&flights(settings(Constraints::Robust), &[Sight::Exact]));
+    assert_kept(&flights(&settings(Constraints::Robust), &[Sight::Exact]));
 }
 
 #[test]
 fn guarantee_is_kept_with_a_delay_of_one_period() {
-    assert_kept(&flights(Settings { delay: 0.04, ..settings(Constraints::Robust) }, &[Sight::Exact]));
+    assert_kept(&flights(&Settings { delay: 0.04, ..settings(Constraints::Robust) }, &[Sight::Exact]));
 }
 
 #[test]
 fn guarantee_is_kept_with_a_long_delay_and_a_soft_gain() {
-    assert_kept(&flights(Settings { delay: 0.117, ..soft() }, &[Sight::Exact]));
+    assert_kept(&flights(&Settings { delay: 0.117, ..soft() }, &[Sight::Exact]));
 }
 
 /// Errors of every kind, within their bounds.
@@ -71,7 +71,7 @@ fn erroneous() -> [Sight; 4] {
 #[test]
 fn guarantee_is_kept_with_erroneous_measurements() {
     let error = f64::to_radians(0.03);
-    assert_kept(&flights(Settings { angle_error: error, rate_error: error, ..soft() }, &erroneous()));
+    assert_kept(&flights(&Settings { angle_error: error, rate_error: error, ..soft() }, &erroneous()));
 }
 
 #[test]
@@ -85,13 +85,13 @@ fn guarantee_is_kept_with_large_errors_a_delay_and_less_disturbance() {
         ..settings(Constraints::Robust)
     };
     assert!(Design::new(&settings).is_ok());
-    assert_kept(&flights(settings, &erroneous()));
+    assert_kept(&flights(&settings, &erroneous()));
 }
 
 #[test]
 fn guarantee_is_kept_from_random_starts_along_random_references() {
     let flights: Vec<Flight> = (1..=24)
-        .map(|seed| Flight { duration: 15.0, ..Flight::random(settings(Constraints::Robust), seed) })
+        .map(|seed| Flight { duration: 15.0, ..Flight::random(&settings(Constraints::Robust), seed) })
         .collect();
     let mut in_force = 0.0;
     for (flight, shown) in flights.iter().zip(in_parallel(&flights, Flight::fly)) {
@@ -105,7 +105,8 @@ fn guarantee_is_kept_from_random_starts_along_random_references() {
 fn accepted_settings_keep_the_guarantee_and_refused_ones_name_bounds_that_are_accepted() {
     let seeds: Vec<u64> = (1..=60).collect();
     let (mut flown, mut named) = (0, 0);
-    for (seed, outcome) in seeds.iter().zip(in_parallel(&seeds, |&seed| tried(random_settings(seed), seed))) {
+    for (seed, outcome) in seeds.iter().zip(in_parallel(&seeds, |&seed| tried(&random_settings(seed), seed)))
+    {
         match outcome {
             Tried::Flown(shown) => {
                 flown += 1;

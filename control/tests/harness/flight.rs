@@ -190,8 +190,13 @@ pub struct Flight {
 /// What a flight shows. Limits are those of the settings.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shown {
-    /// Largest ‖ω‖ over its limit within the periods that began under guarantee, looked at every [`CHECK`].
+    /// Largest ‖ω‖ over its limit within the periods that began under guarantee, looked at every [`CHECK`], once the delay has passed since
+    /// the guarantee began: until then moments act that were commanded without it.
     pub rate: f64,
+    /// The same while that delay passes.
+    pub rate_before: f64,
+    /// When it was that large, s.
+    pub rate_time: f64,
     /// Largest ‖m‖ over its limit that was commanded under guarantee.
     pub moment: f64,
     /// Largest ‖ω‖ over its limit at all.
@@ -223,10 +228,10 @@ impl Shown {
 
 impl Flight {
     /// From the start of Chai 2022 along its reference, without disturbance or errors.
-    pub fn new(settings: Settings) -> Self {
+    pub fn new(settings: &Settings) -> Self {
         let scenario = Scenario::crmpc2022();
         Self {
-            settings,
+            settings: *settings,
             inertia_scale: 1.0,
             angles: scenario.initial_angles,
             rates: scenario.initial_rates,
@@ -241,7 +246,7 @@ impl Flight {
     }
 
     /// Any disturbance, inertia, start and reference, and errors of any course if the settings have any.
-    pub fn random(settings: Settings, seed: u64) -> Self {
+    pub fn random(settings: &Settings, seed: u64) -> Self {
         let random = &mut Random::new(seed);
         let mut flight = Self::new(settings);
         flight.seed = seed;
@@ -302,7 +307,7 @@ impl Flight {
         let (ticks, checks) = ((self.duration / period).round() as u64, (period / CHECK).round() as u64);
         let holds = (self.hold / CHECK).round() as u64;
         let (mut shown, mut error, mut in_force, mut before) = (Shown::default(), 0.0, 0, false);
-        let mut delta = Vector3::zeros();
+        let (mut delta, mut since) = (Vector3::zeros(), 0.0);
         for tick in 0..ticks {
             let time = tick as f64 * period;
             let measured = eyes.look(time, &vehicle);
@@ -313,6 +318,9 @@ impl Flight {
             vehicle.command(time, moment);
             observe(&memory.inner, tick, &measured, &reference(time));
             let now = memory.inner.standing == Standing::InForce;
+            if now && !before {
+                since = time;
+            }
             if before && !now && shown.withdrawn.is_none() {
                 shown.withdrawn = Some(time);
             }
@@ -331,8 +339,10 @@ impl Flight {
                 eyes.sample(at(i + 1), &vehicle);
                 let rate = vehicle.rates().norm() / s.limit_rate;
                 shown.rate_at_all = shown.rate_at_all.max(rate);
-                if now {
-                    shown.rate = shown.rate.max(rate);
+                if now && at(i + 1) < since + s.delay {
+                    shown.rate_before = shown.rate_before.max(rate);
+                } else if now && rate > shown.rate {
+                    (shown.rate, shown.rate_time) = (rate, at(i + 1));
                 }
             }
         }
@@ -546,10 +556,9 @@ pub fn random_settings(seed: u64) -> Settings {
 }
 
 /// Flies the settings for 15 s if the design accepts them, or else tries each bound that its refusal names.
-pub fn tried(settings: Settings, seed: u64) -> Tried {
-    let error = match Crmpc::new(settings) {
-        Ok(_) => return Tried::Flown(Flight { duration: 15.0, ..Flight::random(settings, seed) }.fly()),
-        Err(error) => error,
+pub fn tried(settings: &Settings, seed: u64) -> Tried {
+    let Err(error) = Crmpc::new(*settings) else {
+        return Tried::Flown(Flight { duration: 15.0, ..Flight::random(settings, seed) }.fly());
     };
     let DesignError::NoGuarantee { disturbance, errors, delay, .. } = error else {
         return Tried::Invalid(error.to_string());
@@ -558,13 +567,13 @@ pub fn tried(settings: Settings, seed: u64) -> Tried {
     let down = |value: f64| (value * 1e4).floor() / 1e4;
     let down_angle = |value: f64| down(value.to_degrees()).to_radians();
     let with = [
-        disturbance.map(|bound| Settings { disturbance_bound: down_angle(bound), ..settings }),
+        disturbance.map(|bound| Settings { disturbance_bound: down_angle(bound), ..*settings }),
         errors.map(|(angle, rate)| Settings {
             angle_error: down_angle(angle),
             rate_error: down_angle(rate),
-            ..settings
+            ..*settings
         }),
-        delay.map(|delay| Settings { delay: down(delay), ..settings }),
+        delay.map(|delay| Settings { delay: down(delay), ..*settings }),
     ];
     let named: Vec<Settings> = with.into_iter().flatten().collect();
     let refusal = |settings: &Settings| Crmpc::new(*settings).err();
