@@ -437,7 +437,7 @@ impl Robust {
     /// What ‖ω̃‖ may be at prediction step k so that ‖ω‖ keeps its limit there and in the intervals before and after, whatever the error dynamics do,
     /// where ∂ω/∂(α, β) has this norm. `before` is the point before.
     fn rate_bound(&self, k: usize, by_angles: f64, here: &Point, before: &Point) -> f64 {
-        let Settings { limit_rate, period_optimisation: h, horizon, .. } = self.settings;
+        let Settings { limit_rate, limit_moment, period_optimisation: h, horizon, .. } = self.settings;
         let tightening = &self.design.tightening;
         let tick = self.tick(k);
         // Between two steps the deviation may lie above the line between its bounds at both.
@@ -446,9 +446,11 @@ impl Robust {
             rate + by_angles * angle
         };
         let bulge = bulge(tick).max(if k == 0 { 0.0 } else { bulge(tick - self.design.ratio) });
-        // So may ‖ω̃‖, by h²/8 times its second derivative.
-        let a = here.acceleration.norm().max(before.acceleration.norm());
-        let size = here.size.max(before.size) + h * a;
+        // So may ‖ω̃‖, by h²/8 times its second derivative. The optimisation knows no point before, so that both accelerations count as one that
+        // is rarely exceeded; the bound is then the same for it and for the check of its result.
+        let typical = limit_moment / self.design.largest_inertia;
+        let a = here.acceleration.norm().max(before.acceleration.norm()).max(typical);
+        let size = here.size + 2.0 * h * a;
         let curved = 0.125 * h * h * Dynamics::rate_curvature(size, a);
         let loss = guarantee::rate_loss(tightening.at(tick), by_angles, here.size) + bulge + curved;
         let bound = limit_rate - self.share * loss;

@@ -1,6 +1,7 @@
 //! A closed loop of the scenario of Chai 2022 in one process, for tests, the campaign example and the benchmark.
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
+pub mod flight;
 pub mod platform;
 
 use control::crmpc::{Constraints, Memory, Settings, Standing, Status};

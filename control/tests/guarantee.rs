@@ -1,0 +1,123 @@
+//! The guarantee of the robust set in closed loops: in force throughout, and kept. The examples `worst_case` and `random_settings` look for
+//! its limits with many more flights.
+
+mod harness;
+
+use control::crmpc::{Constraints, Design, Settings};
+use control::sampled::Gain;
+use harness::flight::{Course, Flight, Shown, Sight, Tried, random_settings, tried};
+use harness::{in_parallel, settings};
+use nalgebra::Vector3;
+
+/// Disturbances of every kind, with both inertia errors, from the start of Chai 2022.
+fn flights(settings: &Settings, sights: &[Sight]) -> Vec<Flight> {
+    let corner = Vector3::new(1.0, -1.0, 1.0);
+    let courses = [
+        Course::White,
+        Course::Constant(corner),
+        Course::Square(2.5, corner),
+        Course::Switching(1.0),
+        Course::AlongRate(1.0),
+        Course::AlongMoment(-1.0),
+    ];
+    let mut flights = Vec::new();
+    for (i, disturbance) in courses.into_iter().enumerate() {
+        flights.push(Flight {
+            disturbance,
+            inertia_scale: harness::INERTIA_SCALES[i % 2],
+            hold: [0.04, harness::CHECK][i / 2 % 2],
+            sight: sights[i % sights.len()].clone(),
+            seed: i as u64,
+            duration: 30.0,
+            ..Flight::new(settings)
+        });
+    }
+    flights
+}
+
+fn assert_kept(flights: &[Flight]) {
+    let shown: Vec<Shown> = in_parallel(flights, Flight::fly);
+    for (Flight { disturbance, sight, .. }, shown) in flights.iter().zip(shown) {
+        assert!(shown.assumed && !shown.defective(), "{disturbance:?}, {sight:?}: {shown:?}");
+        assert!(shown.in_force == 1.0, "{disturbance:?}, {sight:?}: {shown:?}");
+    }
+}
+
+fn soft() -> Settings {
+    Settings { feedback: Gain { k1: -2.0, k2: -4.0 }, ..settings(Constraints::Robust) }
+}
+
+#[test]
+fn guarantee_is_kept_without_delay_and_errors() {
+    assert_kept(&flights(&settings(Constraints::Robust), &[Sight::Exact]));
+}
+
+#[test]
+fn guarantee_is_kept_with_a_delay_of_one_period() {
+    assert_kept(&flights(&Settings { delay: 0.04, ..settings(Constraints::Robust) }, &[Sight::Exact]));
+}
+
+#[test]
+fn guarantee_is_kept_with_a_long_delay_and_a_soft_gain() {
+    assert_kept(&flights(&Settings { delay: 0.117, ..soft() }, &[Sight::Exact]));
+}
+
+/// Errors of every kind, within their bounds.
+fn erroneous() -> [Sight; 4] {
+    let courses = [Course::White, Course::Switching(0.2), Course::AlongRate(-1.0), Course::AlongMoment(1.0)];
+    courses.map(Sight::Errors)
+}
+
+#[test]
+fn guarantee_is_kept_with_erroneous_measurements() {
+    let error = f64::to_radians(0.03);
+    assert_kept(&flights(&Settings { angle_error: error, rate_error: error, ..soft() }, &erroneous()));
+}
+
+#[test]
+fn guarantee_is_kept_with_large_errors_a_delay_and_less_disturbance() {
+    let settings = Settings {
+        feedback: Gain { k1: -2.0, k2: -3.0 },
+        angle_error: f64::to_radians(0.25),
+        rate_error: f64::to_radians(0.2),
+        delay: 0.04,
+        disturbance_bound: f64::to_radians(0.6),
+        ..settings(Constraints::Robust)
+    };
+    assert!(Design::new(&settings).is_ok());
+    assert_kept(&flights(&settings, &erroneous()));
+}
+
+#[test]
+fn guarantee_is_kept_from_random_starts_along_random_references() {
+    let flights: Vec<Flight> = (1..=24)
+        .map(|seed| Flight { duration: 15.0, ..Flight::random(&settings(Constraints::Robust), seed) })
+        .collect();
+    let mut in_force = 0.0;
+    for (flight, shown) in flights.iter().zip(in_parallel(&flights, Flight::fly)) {
+        assert!(!shown.defective(), "seed {}: {shown:?}", flight.seed);
+        in_force += shown.in_force / flights.len() as f64;
+    }
+    assert!(in_force > 0.8, "{in_force}");
+}
+
+#[test]
+fn accepted_settings_keep_the_guarantee_and_refused_ones_name_bounds_that_are_accepted() {
+    let seeds: Vec<u64> = (1..=60).collect();
+    let (mut flown, mut named) = (0, 0);
+    for (seed, outcome) in seeds.iter().zip(in_parallel(&seeds, |&seed| tried(&random_settings(seed), seed)))
+    {
+        match outcome {
+            Tried::Flown(shown) => {
+                flown += 1;
+                assert!(!shown.defective(), "seed {seed}: {shown:?}");
+            }
+            Tried::Refused { bounds, not_accepted } => {
+                named += bounds;
+                assert!(not_accepted.is_empty(), "seed {seed}: {not_accepted:?}");
+            }
+            Tried::Invalid(_) => {}
+        }
+    }
+    assert!(flown >= 10 && named >= 10, "{flown} flown, {named} bounds named");
+}

@@ -1,0 +1,582 @@
+//! Flights of CRMPC under the robust set that test its guarantee: bounded disturbances of any course, delayed moments, erroneous
+//! measurements or an estimator in the loop, any start and any reference.
+#![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
+
+use super::{CHECK, platform};
+use control::crmpc::{Crmpc, InitialState, Memory, Settings, Standing};
+use control::delay::Delayed;
+use control::error::DesignError;
+use control::estimation::{self, Alignment, Estimator, mems_corrections};
+use control::sampled::Gain;
+use control::{Controller, Measurement};
+use nalgebra::Vector3;
+use vehicle::dynamics::RigidBody;
+use vehicle::integrator::rk4;
+use vehicle::kinematics::{self, Kinematics};
+use vehicle::noise::uniform;
+use vehicle::plant::{self, Load, State};
+use vehicle::reference::{Profile, Reference};
+use vehicle::scenario::Scenario;
+use vehicle::sensors::Sensors;
+use vehicle::transport::Transport;
+
+/// Attitude errors above this count as a lost attitude, rad.
+const LOST: f64 = 30.0 * std::f64::consts::PI / 180.0;
+/// Relative slack for rounding when limits are checked.
+const SLACK: f64 = 1e-9;
+
+/// Random numbers, the same for the same seed.
+#[derive(Clone, Debug)]
+pub struct Random {
+    seed: u64,
+    drawn: i64,
+}
+
+impl Random {
+    /// The sequence of this seed.
+    pub fn new(seed: u64) -> Self {
+        Self { seed, drawn: 0 }
+    }
+
+    /// Uniform in [low, high).
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.drawn += 1;
+        let [value] = uniform(self.seed, self.drawn);
+        low + (high - low) * 0.5 * (value + 1.0)
+    }
+
+    /// A whole number below `count`.
+    pub fn below(&mut self, count: usize) -> usize {
+        (self.between(0.0, count as f64) as usize).min(count - 1)
+    }
+
+    /// Each component uniform in [−1, 1).
+    pub fn vector(&mut self) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| self.between(-1.0, 1.0))
+    }
+
+    /// A corner of the box [−1, 1]³.
+    pub fn corner(&mut self) -> Vector3<f64> {
+        signs(&self.vector())
+    }
+
+    /// A vector of this length in any direction.
+    pub fn direction(&mut self, length: f64) -> Vector3<f64> {
+        self.vector().try_normalize(1e-6).unwrap_or_else(Vector3::x) * length
+    }
+}
+
+/// A course of a vector in the box [−1, 1]³ over time: of the disturbance or of the errors, each over its bound.
+#[derive(Clone, Debug)]
+pub enum Course {
+    /// Constant.
+    Constant(Vector3<f64>),
+    /// Drawn anew each time it is asked for.
+    White,
+    /// Its sign changes every half period (s).
+    Square(f64, Vector3<f64>),
+    /// A new corner of the box after random times of up to this long (s).
+    Switching(f64),
+    /// The corner along x_ω, times this sign.
+    AlongRate(f64),
+    /// The corner along the acceleration that the acting moment makes, times this sign.
+    AlongMoment(f64),
+    /// Values one after the other, each until its time (s); the last one stays.
+    Segments(Vec<(f64, Vector3<f64>)>),
+}
+
+impl Course {
+    /// Any but segments.
+    pub fn random(random: &mut Random) -> Self {
+        let sign = if random.below(2) == 0 { 1.0 } else { -1.0 };
+        let period = 10.0_f64.powf(random.between(-1.1, 1.4));
+        match random.below(8) {
+            0 => Self::White,
+            1 => Self::Constant(random.corner()),
+            2 => Self::Constant(random.vector()),
+            3 => Self::Square(period, random.corner()),
+            4 => Self::Square(period, random.vector()),
+            5 => Self::Switching(period),
+            6 => Self::AlongRate(sign),
+            _ => Self::AlongMoment(sign),
+        }
+    }
+}
+
+/// A course in progress.
+#[derive(Clone, Debug)]
+struct Progress {
+    course: Course,
+    random: Random,
+    now: Vector3<f64>,
+    until: f64,
+}
+
+impl Progress {
+    fn new(course: &Course, seed: u64) -> Self {
+        Self { course: course.clone(), random: Random::new(seed), now: Vector3::zeros(), until: 0.0 }
+    }
+
+    /// The value at `time` (s), which must not decrease.
+    fn at(&mut self, time: f64, vehicle: &Vehicle) -> Vector3<f64> {
+        let r = kinematics::r(&vehicle.angles());
+        match &self.course {
+            Course::Constant(value) => *value,
+            Course::White => self.random.vector(),
+            Course::Square(period, value) => {
+                let half = (2.0 * (time + 1e-9) / period).floor() as i64;
+                if half % 2 == 0 { *value } else { -*value }
+            }
+            Course::Switching(longest) => {
+                if time >= self.until {
+                    self.now = self.random.corner();
+                    self.until = time + self.random.between(0.0, *longest);
+                }
+                self.now
+            }
+            Course::AlongRate(sign) => signs(&(r * vehicle.rates())) * *sign,
+            Course::AlongMoment(sign) => signs(&(r * vehicle.body.inverse * vehicle.moment(time))) * *sign,
+            Course::Segments(segments) => {
+                let current = segments.iter().find(|(until, _)| time < *until).or(segments.last());
+                current.map_or_else(Vector3::zeros, |(_, value)| *value)
+            }
+        }
+    }
+}
+
+fn signs(vector: &Vector3<f64>) -> Vector3<f64> {
+    vector.map(|component| if component < 0.0 { -1.0 } else { 1.0 })
+}
+
+/// What the controller sees of the motion.
+#[derive(Clone, Debug)]
+pub enum Sight {
+    /// The true state.
+    Exact,
+    /// Angles and x_ω with errors that follow this course within the bounds of the settings. The errors of the angles move towards it no
+    /// faster than the bound on the errors of the rates.
+    Errors(Course),
+    /// What the estimator makes of the typical MEMS sensors with noise of this seed.
+    Estimator(u64),
+}
+
+/// A flight to do.
+#[derive(Clone, Debug)]
+pub struct Flight {
+    /// Settings of the controller: with the delay, the errors and the disturbance bound that are in force.
+    pub settings: Settings,
+    /// Vehicle's inertia over the one the controller knows.
+    pub inertia_scale: f64,
+    /// Θ at the start, rad.
+    pub angles: Vector3<f64>,
+    /// ω at the start, rad/s.
+    pub rates: Vector3<f64>,
+    /// The reference.
+    pub reference: Profile,
+    /// Time of the reference at the start, s.
+    pub reference_start: f64,
+    /// Δ over its bound.
+    pub disturbance: Course,
+    /// Time over which Δ is held, s: a whole multiple of [`CHECK`].
+    pub hold: f64,
+    /// What the controller sees.
+    pub sight: Sight,
+    /// Seed of whatever is drawn on the way.
+    pub seed: u64,
+    /// s.
+    pub duration: f64,
+}
+
+/// What a flight shows. Limits are those of the settings.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Shown {
+    /// Largest ‖ω‖ over its limit within the periods that began under guarantee, looked at every [`CHECK`], once the delay has passed since
+    /// the guarantee began: until then moments act that were commanded without it.
+    pub rate: f64,
+    /// The same while that delay passes.
+    pub rate_before: f64,
+    /// When it was that large, s.
+    pub rate_time: f64,
+    /// Largest ‖m‖ over its limit that was commanded under guarantee.
+    pub moment: f64,
+    /// Largest ‖ω‖ over its limit at all.
+    pub rate_at_all: f64,
+    /// Whether one of both exceeded its limit under guarantee.
+    pub broken: bool,
+    /// When the guarantee ended, s.
+    pub withdrawn: Option<f64>,
+    /// Whether the errors of angles and rates kept to their bounds, as the guarantee assumes.
+    pub assumed: bool,
+    /// Whether the attitude was lost.
+    pub lost: bool,
+    /// Optimisations without an optimum.
+    pub fallbacks: u32,
+    /// Share of the ticks under guarantee.
+    pub in_force: f64,
+    /// Root mean square over the ticks of ‖Θ − Θ_r‖, deg.
+    pub ems_deg: f64,
+    /// Largest error of an angle (rad) and of a component of x_ω (rad/s) that the controller saw.
+    pub errors: (f64, f64),
+}
+
+impl Shown {
+    /// Whether the guarantee failed.
+    pub fn defective(&self) -> bool {
+        self.assumed && (self.broken || self.withdrawn.is_some()) || self.lost
+    }
+}
+
+impl Flight {
+    /// From the start of Chai 2022 along its reference, without disturbance or errors.
+    pub fn new(settings: &Settings) -> Self {
+        let scenario = Scenario::crmpc2022();
+        Self {
+            settings: *settings,
+            inertia_scale: 1.0,
+            angles: scenario.initial_angles,
+            rates: scenario.initial_rates,
+            reference: scenario.reference,
+            reference_start: 0.0,
+            disturbance: Course::Constant(Vector3::zeros()),
+            hold: 0.04,
+            sight: Sight::Exact,
+            seed: 0,
+            duration: scenario.duration,
+        }
+    }
+
+    /// Any disturbance, inertia, start and reference, and errors of any course if the settings have any.
+    pub fn random(settings: &Settings, seed: u64) -> Self {
+        let random = &mut Random::new(seed);
+        let mut flight = Self::new(settings);
+        flight.seed = seed;
+        flight.duration = 25.0;
+        flight.inertia_scale = match random.below(3) {
+            0 => 1.0 - settings.inertia_error,
+            1 => 1.0 + settings.inertia_error,
+            _ => 1.0 + settings.inertia_error * random.between(-1.0, 1.0),
+        };
+        flight.disturbance = Course::random(random);
+        flight.hold = if random.below(2) == 0 { 0.04 } else { 0.01 };
+        match random.below(3) {
+            0 => flight.reference_start = random.between(0.0, 50.0),
+            1 => flight.reference = Self::random_sine(random),
+            _ => {
+                let steady = |random: &mut Random| {
+                    degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([5.0, 3.0, 8.0]))
+                };
+                flight.reference = Profile::step(steady(random), steady(random), random.between(1.0, 20.0));
+            }
+        }
+        if random.below(4) > 0 {
+            let first = flight.reference.at(flight.reference_start).angles;
+            flight.angles = first + random.vector().component_mul(&degrees([10.0, 8.0, 12.0]));
+            let length = random.between(0.0, 0.7) * settings.limit_rate;
+            flight.rates = random.direction(length);
+        }
+        if settings.rate_error > 0.0 || settings.angle_error > 0.0 {
+            flight.sight = Sight::Errors(Course::random(random));
+        }
+        flight
+    }
+
+    fn random_sine(random: &mut Random) -> Profile {
+        let mean = degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([5.0, 2.0, 20.0]));
+        // A sideslip that moves costs many optimisations.
+        let sideslip = if random.below(12) == 0 { 3.0 } else { 0.0 };
+        let amplitude = random.vector().component_mul(&degrees([3.0, sideslip, 6.0]));
+        Profile::sine(mean, amplitude, random.between(0.1, 0.8), random.between(0.0, 6.3))
+    }
+
+    /// Flies it.
+    pub fn fly(&self) -> Shown {
+        self.fly_seen(|_, _, _, _| {})
+    }
+
+    /// Flies it; `observe` sees memory, tick, measurement and reference after each update.
+    pub fn fly_seen(&self, mut observe: impl FnMut(&Memory, u64, &Measurement, &Reference)) -> Shown {
+        let s = &self.settings;
+        let law = Crmpc::new(*s).unwrap();
+        let mut controller = Delayed::new(law, s.body, s.delay, s.limit_moment).unwrap();
+        let mut memory = controller.memory();
+        let mut vehicle = Vehicle::new(self);
+        let mut disturbance = Progress::new(&self.disturbance, self.seed);
+        let mut eyes = Eyes::new(self);
+        let reference = |time: f64| self.reference.at(self.reference_start + time);
+        let period = s.period_feedback;
+        let (ticks, checks) = ((self.duration / period).round() as u64, (period / CHECK).round() as u64);
+        let holds = (self.hold / CHECK).round() as u64;
+        let (mut shown, mut error, mut in_force, mut before) = (Shown::default(), 0.0, 0, false);
+        let (mut delta, mut since) = (Vector3::zeros(), 0.0);
+        for tick in 0..ticks {
+            let time = tick as f64 * period;
+            let measured = eyes.look(time, &vehicle);
+            let off = vehicle.angles() - reference(time).angles;
+            error += off.norm_squared();
+            shown.lost |= off.norm() > LOST;
+            let moment = controller.update(&mut memory, tick, time, &measured, &reference);
+            vehicle.command(time, moment);
+            observe(&memory.inner, tick, &measured, &reference(time));
+            let now = memory.inner.standing == Standing::InForce;
+            if now && !before {
+                since = time;
+            }
+            if before && !now && shown.withdrawn.is_none() {
+                shown.withdrawn = Some(time);
+            }
+            before = now;
+            in_force += u64::from(now);
+            if now {
+                shown.moment = shown.moment.max(moment.norm() / s.limit_moment);
+            }
+            for i in 0..checks {
+                let at = |i: u64| time + i as f64 * CHECK;
+                let check = tick * checks + i;
+                if check % holds == 0 {
+                    delta = disturbance.at(at(i), &vehicle) * s.disturbance_bound;
+                }
+                vehicle.advance(at(i), at(i + 1), &delta);
+                eyes.sample(at(i + 1), &vehicle);
+                let rate = vehicle.rates().norm() / s.limit_rate;
+                shown.rate_at_all = shown.rate_at_all.max(rate);
+                if now && at(i + 1) < since + s.delay {
+                    shown.rate_before = shown.rate_before.max(rate);
+                } else if now && rate > shown.rate {
+                    (shown.rate, shown.rate_time) = (rate, at(i + 1));
+                }
+            }
+        }
+        shown.broken = !(shown.rate <= 1.0 + SLACK && shown.moment <= 1.0 + SLACK);
+        Shown {
+            fallbacks: memory.inner.report.fallbacks,
+            in_force: in_force as f64 / ticks as f64,
+            ems_deg: (error / ticks as f64).sqrt().to_degrees(),
+            errors: eyes.largest,
+            assumed: eyes.within_bounds(),
+            ..shown
+        }
+    }
+}
+
+fn degrees(values: [f64; 3]) -> Vector3<f64> {
+    Vector3::from(values).map(f64::to_radians)
+}
+
+/// The plant with a disturbance that is given to it from step to step.
+struct Vehicle {
+    body: RigidBody,
+    state: State,
+    commanded: Vector3<f64>,
+    transport: Option<Transport>,
+}
+
+impl Vehicle {
+    fn new(flight: &Flight) -> Self {
+        let Settings { body, delay, .. } = &flight.settings;
+        Self {
+            body: RigidBody::new(body.inertia * flight.inertia_scale).unwrap(),
+            state: plant::state(&flight.angles, &flight.rates),
+            commanded: Vector3::zeros(),
+            transport: Transport::new(*delay).unwrap(),
+        }
+    }
+
+    fn angles(&self) -> Vector3<f64> {
+        plant::angles(&self.state)
+    }
+
+    fn rates(&self) -> Vector3<f64> {
+        plant::rates(&self.state)
+    }
+
+    fn command(&mut self, time: f64, moment: Vector3<f64>) {
+        self.commanded = moment;
+        if let Some(transport) = &mut self.transport {
+            transport.command(time, moment).unwrap();
+        }
+    }
+
+    /// The moment that acts, N m.
+    fn moment(&self, time: f64) -> Vector3<f64> {
+        self.transport.as_ref().map_or(self.commanded, |transport| transport.moment(time))
+    }
+
+    fn advance(&mut self, from: f64, to: f64, delta: &Vector3<f64>) {
+        let mut time = from;
+        while time < to {
+            let arrival = self.transport.as_ref().and_then(|transport| transport.next_arrival(time));
+            let end = arrival.filter(|&arrival| arrival > time && arrival < to - 1e-9).unwrap_or(to);
+            let load = Load { moment: self.moment(time), delta: *delta, ..Load::default() };
+            let mut f =
+                |_: f64, state: &State| plant::derivative(&self.body, Kinematics::Printed, state, &load);
+            self.state = rk4(&mut f, time, &self.state, end - time);
+            time = end;
+        }
+    }
+}
+
+/// What makes measurements of the motion.
+struct Eyes {
+    errors: Option<Progress>,
+    /// Bounds on the errors of angles (rad) and rates (rad/s), and the time between measurements (s).
+    bounds: (f64, f64, f64),
+    angle_error: Vector3<f64>,
+    estimation: Option<(Sensors, Estimator, estimation::Memory)>,
+    largest: (f64, f64),
+    /// Error of the angles at the last tick, rad, and the largest change of one of them from tick to tick, rad.
+    last: Option<Vector3<f64>>,
+    largest_change: f64,
+}
+
+impl Eyes {
+    fn new(flight: &Flight) -> Self {
+        let Settings { angle_error, rate_error, period_feedback, .. } = flight.settings;
+        let errors = match &flight.sight {
+            Sight::Errors(course) => Some(Progress::new(course, flight.seed.wrapping_add(1 << 32))),
+            Sight::Exact | Sight::Estimator(_) => None,
+        };
+        let estimation = match flight.sight {
+            Sight::Estimator(seed) => {
+                let settings = estimation::Settings {
+                    corrections: mems_corrections(),
+                    alignment: Alignment::Given,
+                    initial: flight.angles,
+                    ..estimation::Settings::default()
+                };
+                let estimator = Estimator::new(settings).unwrap();
+                let memory = estimator.memory();
+                Some((Sensors::new(&platform::mems(seed), 0.0).unwrap(), estimator, memory))
+            }
+            Sight::Exact | Sight::Errors(_) => None,
+        };
+        let mut eyes = Self {
+            errors,
+            bounds: (angle_error, rate_error, period_feedback),
+            angle_error: Vector3::zeros(),
+            estimation,
+            largest: (0.0, 0.0),
+            last: None,
+            largest_change: 0.0,
+        };
+        eyes.sample(0.0, &Vehicle::new(flight));
+        eyes
+    }
+
+    /// Takes a sample of the sensors.
+    fn sample(&mut self, time: f64, vehicle: &Vehicle) {
+        if let Some((sensors, estimator, memory)) = &mut self.estimation {
+            let truth = platform::Truth { time, angles: vehicle.angles(), rates: vehicle.rates() };
+            sensors.take(time, &platform::felt(&truth));
+            let sample = sensors.arrived();
+            let line =
+                estimation::Line { sample: sample.number, time: sample.time, readings: sample.readings };
+            estimator.update(memory, time, &line);
+        }
+    }
+
+    /// What the controller sees at a tick.
+    fn look(&mut self, time: f64, vehicle: &Vehicle) -> Measurement {
+        let (angles, rates) = (vehicle.angles(), vehicle.rates());
+        let angle_rates = kinematics::r(&angles) * rates;
+        let (angle_bound, rate_bound, period) = self.bounds;
+        let mut measured = Measurement { angles, rates, ..Measurement::default() };
+        if let Some(errors) = &mut self.errors {
+            let error = errors.at(time, vehicle);
+            let way = error * angle_bound - self.angle_error;
+            self.angle_error += way.map(|way| way.clamp(-rate_bound * period, rate_bound * period));
+            measured.angles = angles + self.angle_error;
+            measured.rates = kinematics::r_inverse(&measured.angles) * (angle_rates + error * rate_bound);
+        }
+        if let Some((_, _, memory)) = &self.estimation {
+            measured.angles = memory.estimate.angles;
+            measured.rates = memory.estimate.rates;
+        }
+        let of_rates = kinematics::r(&measured.angles) * measured.rates - angle_rates;
+        let (angle, rate) = &mut self.largest;
+        let of_angles = measured.angles - angles;
+        *angle = angle.max(of_angles.amax());
+        *rate = rate.max(of_rates.amax());
+        let change = self.last.map_or(0.0, |last| (of_angles - last).amax());
+        self.largest_change = self.largest_change.max(change);
+        self.last = Some(of_angles);
+        measured
+    }
+
+    /// Whether the errors have kept to the bounds of the settings.
+    fn within_bounds(&self) -> bool {
+        let (angle, rate, period) = self.bounds;
+        let within = |value: f64, bound: f64| value <= bound * (1.0 + SLACK) + 1e-12;
+        within(self.largest.0, angle)
+            && within(self.largest.1, rate)
+            && within(self.largest_change, rate * period)
+    }
+}
+
+/// What became of some settings.
+#[derive(Clone, Debug)]
+pub enum Tried {
+    /// Accepted, and flown.
+    Flown(Shown),
+    /// Refused for want of a guarantee. The message names so many bounds, of which these are not accepted.
+    Refused {
+        /// Number of bounds named.
+        bounds: usize,
+        /// What is said of the settings with the bound.
+        not_accepted: Vec<String>,
+    },
+    /// Refused for another reason.
+    Invalid(String),
+}
+
+/// Settings with anything that a user may set drawn at random.
+pub fn random_settings(seed: u64) -> Settings {
+    let random = &mut Random::new(seed);
+    let half = |random: &mut Random, high: f64| {
+        if random.below(2) == 0 { 0.0 } else { random.between(0.0, high) }
+    };
+    let published = Settings::published();
+    let period_feedback = [0.02, 0.04, 0.05, 0.1][random.below(4)];
+    let initial_states = [InitialState::Measured, InitialState::Nominal, InitialState::Tube];
+    Settings {
+        feedback: Gain { k1: random.between(-10.0, -0.5), k2: random.between(-10.0, -1.0) },
+        delay: half(random, 0.15),
+        angle_error: half(random, 0.2).to_radians(),
+        rate_error: half(random, 0.2).to_radians(),
+        disturbance_bound: random.between(0.0, 4.0).to_radians(),
+        inertia_error: random.between(0.0, 0.1),
+        horizon: 20 + random.below(81),
+        period_feedback,
+        // At most 0.3 s, so that the terminal law is stable.
+        period_optimisation: period_feedback * (1 + random.below((0.3 / period_feedback) as usize)) as f64,
+        limit_rate: published.limit_rate * random.between(0.5, 2.0),
+        limit_moment: published.limit_moment * random.between(0.5, 3.0),
+        initial_state: initial_states[random.below(3)],
+        ..published
+    }
+}
+
+/// Flies the settings for 15 s if the design accepts them, or else tries each bound that its refusal names.
+pub fn tried(settings: &Settings, seed: u64) -> Tried {
+    let Err(error) = Crmpc::new(*settings) else {
+        return Tried::Flown(Flight { duration: 15.0, ..Flight::random(settings, seed) }.fly());
+    };
+    let DesignError::NoGuarantee { disturbance, errors, delay, .. } = error else {
+        return Tried::Invalid(error.to_string());
+    };
+    // As the message prints them.
+    let down = |value: f64| (value * 1e4).floor() / 1e4;
+    let down_angle = |value: f64| down(value.to_degrees()).to_radians();
+    let with = [
+        disturbance.map(|bound| Settings { disturbance_bound: down_angle(bound), ..*settings }),
+        errors.map(|(angle, rate)| Settings {
+            angle_error: down_angle(angle),
+            rate_error: down_angle(rate),
+            ..*settings
+        }),
+        delay.map(|delay| Settings { delay: down(delay), ..*settings }),
+    ];
+    let named: Vec<Settings> = with.into_iter().flatten().collect();
+    let refusal = |settings: &Settings| Crmpc::new(*settings).err();
+    let not_accepted = named.iter().filter_map(refusal).map(|refusal| format!("{error}; then {refusal}"));
+    Tried::Refused { bounds: named.len(), not_accepted: not_accepted.collect() }
+}
