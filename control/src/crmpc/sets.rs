@@ -63,8 +63,12 @@ struct Robust {
     moment: Vec<f64>,
 }
 
-/// Relative slack when constraints are checked, for rounding.
-const CHECK_SLACK: f64 = 1e-9;
+/// Relative slack when the paper's constraints are checked, for rounding.
+const ROUNDING: f64 = 1e-9;
+/// Relative slack when those of the robust set are checked, for what a solver leaves.
+const CHECK_SLACK: f64 = 1e-6;
+/// Share of the limits that the robust set leaves for that slack.
+const RESERVE: f64 = 2e-6;
 /// Share of a limit that stands for an empty set in the optimisation, which needs balls with an inside. No plan within it is certified.
 const EMPTY: f64 = 1e-3;
 
@@ -324,7 +328,8 @@ impl Sets {
     /// Whether the input of interval `k` or the state at its end violates its constraint, with the bounds about themselves or smaller
     /// ones. `anchor` is a stage not far away.
     fn violates(&mut self, k: usize, here: &Point, next: &Point, anchor: &mut Option<Anchor>) -> bool {
-        let exceeds = |value: f64, bound: f64| value > bound * (1.0 + CHECK_SLACK);
+        let slack = if matches!(self.kind, Kind::Robust(_)) { CHECK_SLACK } else { ROUNDING };
+        let exceeds = |value: f64, bound: f64| value > bound * (1.0 + slack);
         let body = &self.body;
         match &mut self.kind {
             Kind::Paper { x_tube, u_tube, inertia_ratio } => {
@@ -453,7 +458,7 @@ impl Robust {
         let size = here.size + 2.0 * h * a;
         let curved = 0.125 * h * h * Dynamics::rate_curvature(size, a);
         let loss = guarantee::rate_loss(tightening.at(tick), by_angles, here.size) + bulge + curved;
-        let bound = limit_rate - self.share * loss;
+        let bound = limit_rate * (1.0 - RESERVE) - self.share * loss;
         // ‖x̃_ω‖ ≤ sec β ‖ω̃‖
         if k == horizon {
             bound.min(self.design.assessment.terminal_rate * here.angles.y.cos())
@@ -489,7 +494,7 @@ impl Robust {
             (size, a),
         );
         let within = (after - value).max(0.0) + 0.125 * h * h * self.dynamics.moment_curvature(size, a);
-        limit_moment - self.share * loss - within
+        limit_moment * (1.0 - RESERVE) - self.share * loss - within
     }
 
     /// Of the first interval.

@@ -259,7 +259,8 @@ impl<const O: usize> Optimiser<O> {
         self.report(bounded, &sample, status, search.iterations)
     }
 
-    /// The optimum with the bounds about itself: by the Riccati method with bounds that follow its iterates, until the optimum satisfies its own.
+    /// The optimum with the bounds about itself: with bounds that follow the iterates of the Riccati method, and are set anew about the cone solver's optimum,
+    /// until the optimum satisfies its own.
     /// Bounds that do not depend on the motion are satisfied at once.
     fn settle<B: Bounded<O>>(
         &mut self,
