@@ -417,7 +417,7 @@ mod tests {
             let latency = f64::from(late) * pulse;
             let error = SampledError::delayed(Gain { k1: -5.0, k2: -5.0 }, period, latency);
             let steps = 8_u32;
-            let sources = (late + steps as i32 * fine) as usize;
+            let sources = usize::try_from(late + steps.cast_signed() * fine).unwrap();
             // Source i acts from −latency + i·pulse on.
             let expected = superposed(steps as usize, sources, |source| {
                 let begins = (source as f64 + 0.5) * pulse - latency;
