@@ -433,14 +433,20 @@ fn a_solver_that_fails_for_a_while_costs_no_limit() {
 
 #[test]
 fn a_solver_that_fails_from_the_start_is_outlived() {
-    // Without a plan there is nothing to shift: the terminal law alone, which knows no limit on the rate.
-    for during in [0..5, 0..u64::MAX] {
-        let (outcome, [inside, outside], memory) = run_failing(during.clone());
-        assert!(inside > 0 && outside < 25, "{during:?}: {inside} fallbacks inside, {outside} outside");
-        assert!(outcome.moment <= 1.0 + 1e-12, "{during:?}: {outcome:?}");
-        assert!(outcome.ems_deg < 2.5, "{during:?}: {outcome:?}");
-        assert_eq!(memory.report.status, Status::Unconstrained, "{during:?}");
-    }
+    // Without a plan there is nothing to keep: the terminal law alone.
+    let during = 0..5;
+    let (outcome, [inside, outside], memory) = run_failing(during.clone());
+    assert!(inside > 0 && outside < 25, "{inside} fallbacks inside, {outside} outside");
+    assert!(outcome.moment <= 1.0 + 1e-12 && outcome.ems_deg < 2.5, "{outcome:?}");
+    assert_eq!(memory.report.status, Status::Unconstrained);
+}
+
+#[test]
+fn a_solver_that_never_works_costs_no_limit() {
+    // The last certified plan is kept, and beyond its end the motion rests: safe, but without tracking.
+    let (outcome, [inside, outside], _) = run_failing(0..u64::MAX);
+    assert!(inside > 0 && outside == 0, "{inside} fallbacks inside, {outside} outside");
+    assert!(outcome.rate <= 1.0 && outcome.moment <= 1.0 + 1e-12, "{outcome:?}");
 }
 
 #[test]

@@ -33,7 +33,8 @@ fn ready<M: Model>(change: impl FnOnce(&mut M)) -> M {
 }
 
 fn step<M: Model>(unit: &mut M, from: f64, to: f64) {
-    unit.step(from, to, &Held, &mut |text| panic!("{text}")).unwrap();
+    // Inputs that jump are no motion that CRMPC's assumptions explain.
+    unit.step(from, to, &Held, &mut |text| assert!(text.contains("the guarantee is"), "{text}")).unwrap();
     unit.calculate(to).unwrap();
 }
 

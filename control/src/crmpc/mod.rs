@@ -234,7 +234,9 @@ impl Crmpc {
             let (report, margins) = self.certified(memory, &start, first);
             iterations += report.iterations;
             let solved = report.status != Status::Fallback;
-            if margins.is_some() || solved && !assured {
+            // The cone solver alone is there for comparison: its optimum, of linearised constraints, is taken without guarantee.
+            let taken = !assured || self.settings.solver.method == mpc::Method::Cone;
+            if margins.is_some() || solved && taken {
                 self.follow_optimum(memory, &start);
                 memory.age = age;
                 memory.margins = margins.unwrap_or_else(|| self.sets.margins(self.optimiser.motion()));

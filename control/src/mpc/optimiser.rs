@@ -519,6 +519,6 @@ impl<const O: usize> Layout<O> {
 /// Intervals before and after those that are violated, which a window takes in.
 const MARGIN: usize = 3;
 /// Passes until an optimum satisfies the bounds about itself.
-const SETTLING_PASSES: usize = 3;
+const SETTLING_PASSES: usize = 8;
 /// Windows tried before the whole horizon.
 const WINDOWS: usize = 4;
