@@ -24,7 +24,9 @@ pub use sets::{Bounds, Margins};
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
 use crate::linearise;
-use crate::mpc::{self, Chain, Cost, Layout, Motion, Optimiser, State, per_axis};
+use crate::mpc::{
+    self, Chain, Cost, Layout, Method, Motion, Nonlinearity, Optimiser, SolverSettings, State, per_axis,
+};
 use crate::sampled::InvariantSet;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -234,8 +236,9 @@ impl Crmpc {
             let (report, margins) = self.certified(memory, &start, first);
             iterations += report.iterations;
             let solved = report.status != Status::Fallback;
-            // The cone solver alone is there for comparison: its optimum, of linearised constraints, is taken without guarantee.
-            let taken = !assured || self.settings.solver.method == mpc::Method::Cone;
+            // Linearised constraints are there for comparison: their optimum is taken without guarantee.
+            let SolverSettings { method, nonlinearity, .. } = self.settings.solver;
+            let taken = !assured || method == Method::Cone || nonlinearity == Nonlinearity::Frozen;
             if margins.is_some() || solved && taken {
                 self.follow_optimum(memory, &start);
                 memory.age = age;
