@@ -259,9 +259,8 @@ impl<const O: usize> Optimiser<O> {
         self.report(bounded, &sample, status, search.iterations)
     }
 
-    /// The optimum with the bounds about itself: with bounds that follow the iterates of the Riccati method, and are set anew about the cone solver's optimum,
-    /// until the optimum satisfies its own.
-    /// Bounds that do not depend on the motion are satisfied at once.
+    /// The optimum with the bounds about itself: they follow the iterates of the Riccati method, and are set anew about the cone solver's
+    /// optimum until that satisfies its own. One pass is enough for bounds that do not depend on the motion.
     fn settle<B: Bounded<O>>(
         &mut self,
         bounded: &mut B,
@@ -275,7 +274,7 @@ impl<const O: usize> Optimiser<O> {
             status = solve(self, bounded, sample, search);
             bounded.follow(false);
             if !follows
-                || status != Status::Constrained
+                || status == Status::Fallback
                 || bounded.violated(&self.solution.motion, 0..0).is_none()
             {
                 break;
