@@ -24,9 +24,7 @@ pub use sets::{Bounds, Margins};
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
 use crate::linearise;
-use crate::mpc::{
-    self, Chain, Cost, Layout, Method, Motion, Nonlinearity, Optimiser, SolverSettings, State, per_axis,
-};
+use crate::mpc::{self, Chain, Cost, Layout, Motion, Nonlinearity, Optimiser, State, per_axis};
 use crate::sampled::InvariantSet;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -237,8 +235,7 @@ impl Crmpc {
             iterations += report.iterations;
             let solved = report.status != Status::Fallback;
             // Linearised constraints are there for comparison: their optimum is taken without guarantee.
-            let SolverSettings { method, nonlinearity, .. } = self.settings.solver;
-            let taken = !assured || method == Method::Cone || nonlinearity == Nonlinearity::Frozen;
+            let taken = !assured || self.settings.solver.nonlinearity == Nonlinearity::Frozen;
             if margins.is_some() || solved && taken {
                 self.follow_optimum(memory, &start);
                 memory.age = age;
