@@ -6,7 +6,7 @@
 //!
 //! prints the largest bound of the disturbance that is accepted, and what is left of the moment at the published one.
 
-use control::crmpc::{Design, Guarantee, Settings};
+use control::crmpc::{Constraints, Design, Guarantee, Settings};
 use control::sampled::Gain;
 
 fn main() {
@@ -23,7 +23,7 @@ fn main() {
                     rate_error: error,
                     angle_error: error,
                     guarantee: Guarantee::BestEffort,
-                    ..Settings::published()
+                    ..Settings::new(Constraints::Robust)
                 };
                 print(&settings, error_deg);
             }

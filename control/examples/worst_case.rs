@@ -13,7 +13,7 @@
 mod harness;
 
 use cmaes::{CMAESOptions, DVector};
-use control::crmpc::{Design, Settings};
+use control::crmpc::{Constraints, Design, Settings};
 use control::sampled::Gain;
 use harness::flight::{Course, Flight, Random, Shown, Sight};
 use harness::in_parallel;
@@ -68,7 +68,7 @@ impl Loop {
             delay: self.delay,
             angle_error: self.errors.0.to_radians(),
             rate_error: self.errors.1.to_radians(),
-            ..Settings::published()
+            ..Settings::new(Constraints::Robust)
         };
         let with = |disturbance_bound| Settings { disturbance_bound, ..settings };
         let holds = |bound| Design::new(&with(bound)).is_ok();

@@ -4,7 +4,6 @@ use crate::crmpc::{Constraints, Guarantee, InitialState, ObserverSettings, Setti
 use crate::mpc::SolverSettings;
 use crate::sampled::Gain;
 use serde::Deserialize;
-use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
 
 #[derive(Deserialize)]
@@ -54,6 +53,7 @@ struct Bounds {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Robust {
+    feedback: Gain,
     sideslip_deg: f64,
     observer_time_constant: f64,
     observer_stiffness: f64,
@@ -93,30 +93,28 @@ fn embedded() -> File {
 }
 
 impl Settings {
-    /// Chai 2022, section 5.1, with its vehicle at the nominal inertia.
+    /// Chai 2022, section 5.1, with its vehicle at the nominal inertia and measured initial state. With the robust set, K is ours.
     #[allow(clippy::missing_panics_doc)]
-    pub fn published() -> Self {
+    pub fn new(constraints: Constraints) -> Self {
         let scenario = Scenario::crmpc2022();
         // Cannot fail: the scenario's own tests read its inertia.
         let body = scenario.inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
-        Self::crmpc2022(&scenario, body)
-    }
-
-    /// Chai 2022, section 5.1, for the vehicle and limits of `scenario`; robust set, measured initial state.
-    pub fn crmpc2022(scenario: &Scenario, body: RigidBody) -> Self {
         let File { weights, schedule, gains, bounds, guarantee, solver, .. } = embedded();
         Self {
             body,
             limit_rate: scenario.limit_rate,
             limit_moment: scenario.limit_moment,
-            constraints: Constraints::Robust,
+            constraints,
             initial_state: InitialState::Measured,
             horizon: schedule.horizon,
             period_optimisation: schedule.period_optimisation,
             period_feedback: schedule.period_feedback,
             p: weights.p,
             q: weights.q,
-            feedback: gains.feedback,
+            feedback: match constraints {
+                Constraints::Robust => guarantee.feedback,
+                Constraints::Paper => gains.feedback,
+            },
             terminal: gains.terminal,
             tube: gains.tube,
             disturbance_bound: scenario.disturbance.bound,

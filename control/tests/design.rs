@@ -9,12 +9,9 @@ use control::crmpc::{
 use control::sampled::{Gain, SampledError};
 use control::settings::Published;
 use nalgebra::{Matrix2, Vector2};
-use vehicle::scenario::Scenario;
 
 fn settings() -> Settings {
-    let scenario = Scenario::crmpc2022();
-    let body = scenario.inertia.body(1.0).unwrap();
-    Settings::crmpc2022(&scenario, body)
+    Settings::new(Constraints::Paper)
 }
 
 fn constants(settings: &Settings) -> PaperConstants {
@@ -369,7 +366,7 @@ fn oracle_errors_of_the_rate_ask_for_moment_at_once() {
 #[test]
 fn oracle_sampled_terminal_weight_decreases_where_the_continuous_one_does_not() {
     // (11c) with the cost and the law held for h: ΦᵀGΦ − G + h (P + K̃ᵀQK̃). The printed G leaves eigenvalues of +1.6 and +50.
-    let settings = settings();
+    let settings = Settings::new(Constraints::Robust);
     let Settings { terminal, period_optimisation: h, p, q, .. } = settings;
     let held = SampledError::new(terminal, h);
     let p = Vector2::new(p[0], p[3]);
@@ -393,7 +390,7 @@ fn a_terminal_gain_that_is_not_stable_when_held_is_refused_by_name() {
 
 #[test]
 fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
-    let settings = Settings { disturbance_bound: 2.5f64.to_radians(), ..settings() };
+    let settings = Settings { disturbance_bound: 2.5f64.to_radians(), ..Settings::new(Constraints::Robust) };
     let error = Design::new(&settings).unwrap_err();
     let DesignError::NoGuarantee { moment_left, disturbance: Some(largest), .. } = error else {
         panic!("{error}")

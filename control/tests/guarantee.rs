@@ -37,9 +37,14 @@ fn flights(settings: &Settings, sights: &[Sight]) -> Vec<Flight> {
 
 fn assert_kept(flights: &[Flight]) {
     let shown: Vec<Shown> = in_parallel(flights, Flight::fly);
-    for (Flight { disturbance, sight, .. }, shown) in flights.iter().zip(shown) {
+    for (Flight { disturbance, sight, settings, duration, .. }, shown) in flights.iter().zip(shown) {
         assert!(shown.assumed && !shown.defective(), "{disturbance:?}, {sight:?}: {shown:?}");
-        assert!(shown.in_force == 1.0, "{disturbance:?}, {sight:?}: {shown:?}");
+        // From the instant on at which the first command acts.
+        let before = (settings.delay / settings.period_feedback).ceil() * settings.period_feedback;
+        assert!(
+            (shown.in_force - (1.0 - before / duration)).abs() < 1e-12,
+            "{disturbance:?}, {sight:?}: {shown:?}"
+        );
     }
 }
 

@@ -340,24 +340,33 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
 }
 
 #[test]
-fn the_robust_plan_is_kept_as_it_is_where_no_optimum_is_found() {
-    // Beyond the horizon the motion brakes, docs/guarantee.md, so that the guarantee stays in force.
+fn the_robust_plan_is_kept_where_no_optimum_is_found() {
+    // Beyond the horizon the motion brakes, docs/guarantee.md, so that the guarantee stays in force. The plan moves towards the optimum without
+    // constraints only as far as that is certified.
     let settings = settings(Constraints::Robust);
     let solver = SolverSettings { max_iterations: 1, ..settings.solver };
     let mut failing = Crmpc::new(Settings { solver, ..settings }).unwrap();
-    let mut found = 0;
+    let (mut shifted, mut moved) = (0, 0);
     for sample in recorded(Constraints::Robust).iter().skip(1) {
         let (after, _) = sample.update(&mut failing);
         if after.report.status != Status::Kept {
             continue;
         }
-        found += 1;
-        assert_is_shifted(&after.plan, &sample.before.plan, &settings, |_, rate, _| -0.01 * rate);
+        let before = &sample.before.plan;
+        if after.plan.accelerations[0] == before.accelerations[1] {
+            shifted += 1;
+            assert_is_shifted(&after.plan, before, &settings, |_, rate, i| {
+                -rate * if i == 1 { before.braking } else { 0.01 }
+            });
+        } else {
+            moved += 1;
+            assert_eq!(after.plan.states[0], before.states[1]);
+        }
         assert_eq!(after.standing, Standing::InForce, "tick {}", sample.tick);
         assert_eq!(after.age, sample.before.age + 5);
         assert!(after.margins.rate >= 0.0 && after.margins.moment >= 0.0, "{:?}", after.margins);
     }
-    assert!(found > 20, "{found}");
+    assert!(shifted > 20 && moved > 0, "{shifted} {moved}");
 }
 
 /// A controller whose solver fails during some ticks.
@@ -426,20 +435,14 @@ fn a_solver_that_fails_for_a_while_costs_no_limit() {
 
 #[test]
 fn a_solver_that_fails_from_the_start_is_outlived() {
-    // Without a plan there is nothing to keep: the terminal law alone.
-    let during = 0..5;
-    let (outcome, [inside, outside], memory) = run_failing(during.clone());
-    assert!(inside > 0 && outside < 25, "{inside} fallbacks inside, {outside} outside");
-    assert!(outcome.moment <= 1.0 + 1e-12 && outcome.ems_deg < 2.5, "{outcome:?}");
-    assert_eq!(memory.report.status, Status::Unconstrained);
-}
-
-#[test]
-fn a_solver_that_never_works_costs_no_limit() {
-    // The last certified plan is kept, and beyond its end the motion rests: safe, but without tracking.
-    let (outcome, [inside, outside], _) = run_failing(0..u64::MAX);
-    assert!(inside > 0 && outside == 0, "{inside} fallbacks inside, {outside} outside");
-    assert!(outcome.rate <= 1.0 && outcome.moment <= 1.0 + 1e-12, "{outcome:?}");
+    // Without a plan there is nothing to keep: the terminal law alone. With one, it is led to the reference without a solver.
+    for during in [0..5, 0..u64::MAX] {
+        let (outcome, [inside, outside], memory) = run_failing(during.clone());
+        assert!(inside > 0 && outside < 25, "{during:?}: {inside} fallbacks inside, {outside} outside");
+        assert!(outcome.rate <= 1.0 && outcome.moment <= 1.0 + 1e-12, "{during:?}: {outcome:?}");
+        assert!(outcome.ems_deg < 2.5, "{during:?}: {outcome:?}");
+        assert_eq!(memory.report.status, Status::Unconstrained, "{during:?}");
+    }
 }
 
 #[test]

@@ -209,7 +209,7 @@ fn oracle_riccati_and_cone_agree_on_the_cost_of_5500_random_problems() {
 
 /// The problem of Chai 2022, section 5.1, with a terminal ball.
 fn published() -> Shape {
-    let settings = control::crmpc::Settings::published();
+    let settings = control::crmpc::Settings::new(control::crmpc::Constraints::Robust);
     let h = settings.period_optimisation;
     let g = control::crmpc::terminal_weight(settings.terminal, nalgebra::Vector2::new(50.0, 50.0), 10.0);
     let cost = Cost {

@@ -73,8 +73,9 @@ const GUARANTEES: [(Guarantee, &str, &str); 2] = [
     (Guarantee::Required, "required", "settings for which the robust set cannot be guaranteed are refused"),
     (Guarantee::BestEffort, "bestEffort", "they run all the same, without guarantee"),
 ];
-const STANDINGS: [(Standing, &str, &str); 5] = [
+const STANDINGS: [(Standing, &str, &str); 6] = [
     (Standing::None, "none", "no optimisation yet, or sets that guarantee nothing"),
+    (Standing::Pending, "pending", "a plan is certified, but its first command has not acted yet"),
     (Standing::InForce, "inForce", "the limits are kept for as long as the assumptions hold"),
     (Standing::Refused, "refused", "the design does not hold for the settings: best effort"),
     (
@@ -87,7 +88,7 @@ const STANDINGS: [(Standing, &str, &str); 5] = [
 
 impl Default for CrmpcLaw {
     fn default() -> Self {
-        let s = Settings::published();
+        let s = Settings::new(Constraints::Robust);
         Self {
             constraints: number(&CONSTRAINTS, &s.constraints),
             initial_state: number(&INITIAL_STATES, &s.initial_state),
@@ -173,11 +174,13 @@ impl Law for CrmpcLaw {
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
+        // Said the first time only; `guarantee.status` shows the others.
+        let ends = after.ended == 1 && before.ended == 0;
         match (before.standing, after.standing) {
-            (Standing::InForce, Standing::Exceeded) => Some(
+            (_, Standing::Exceeded) if ends => Some(
                 "the guarantee is no longer in force: the vehicle is further from the plan than disturbance.bound, inertia.error, estimation.* and delay explain",
             ),
-            (Standing::None | Standing::InForce, Standing::Uncertified) => {
+            (Standing::None, Standing::Uncertified) => {
                 Some("the guarantee is not in force: no plan keeps its conditions from the present state")
             }
             (Standing::None, Standing::Refused) => {

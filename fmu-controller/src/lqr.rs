@@ -3,7 +3,7 @@
 use crate::law::{Law, Vehicle};
 use crate::table;
 use crate::unit::Unit;
-use control::crmpc::Settings;
+use control::crmpc::{Constraints, Settings};
 use control::lqr::{Lqr, LqrSettings};
 use fmi2_export::{Failure, Table};
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ pub struct LqrLaw {
 
 impl Default for LqrLaw {
     fn default() -> Self {
-        let Settings { p, q, period_feedback, .. } = Settings::published();
+        let Settings { p, q, period_feedback, .. } = Settings::new(Constraints::Robust);
         Self { p, q, period: period_feedback }
     }
 }

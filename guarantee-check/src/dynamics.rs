@@ -343,7 +343,7 @@ mod tests {
 
     #[test]
     fn oracle_the_same_dynamics_as_those_of_the_vehicle() {
-        let s = Settings::published();
+        let s = Settings::new(control::crmpc::Constraints::Robust);
         let body = Body::new(&s);
         let (angles, x, m) = ([0.3, -0.2], [0.05, -0.07, 0.04], [1e5, -5e4, 7e4]);
         let held = angles.map(Series::constant);

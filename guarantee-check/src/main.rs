@@ -5,7 +5,7 @@
 //! ```
 
 use clap::Parser;
-use control::crmpc::Settings;
+use control::crmpc::{Constraints, Settings};
 use control::sampled::Gain;
 use guarantee_check::Report;
 use std::process::ExitCode;
@@ -50,7 +50,7 @@ struct Arguments {
 
 impl Arguments {
     fn settings(&self) -> Result<Settings, String> {
-        let mut s = Settings::published();
+        let mut s = Settings::new(Constraints::Robust);
         let degrees = |value: Option<f64>, otherwise: f64| value.map_or(otherwise, f64::to_radians);
         s.feedback = Gain { k1: self.k1.unwrap_or(s.feedback.k1), k2: self.k2.unwrap_or(s.feedback.k2) };
         s.delay = self.delay.unwrap_or(s.delay);

@@ -1,6 +1,6 @@
 //! The check for published and other settings, and that it can fail.
 
-use control::crmpc::{Guarantee, InitialState, Lemmas, Settings};
+use control::crmpc::{Constraints, Guarantee, InitialState, Lemmas, Settings};
 use control::sampled::Gain;
 use guarantee_check::lemmas::{self, Finding};
 use guarantee_check::{Report, assessment, dynamics};
@@ -9,7 +9,7 @@ use vehicle::dynamics::Inertia;
 const GAP: f64 = 3e-3;
 
 fn with(k1: f64, k2: f64, delay: f64) -> Settings {
-    Settings { feedback: Gain { k1, k2 }, delay, ..Settings::published() }
+    Settings { feedback: Gain { k1, k2 }, delay, ..Settings::new(Constraints::Robust) }
 }
 
 fn assert_all(findings: &[Finding]) {
@@ -20,7 +20,7 @@ fn assert_all(findings: &[Finding]) {
 
 #[test]
 fn every_bound_holds_for_the_published_settings_and_with_a_delay() {
-    for settings in [Settings::published(), with(-3.0, -4.0, 0.04), with(-2.0, -4.0, 0.04)] {
+    for settings in [Settings::new(Constraints::Robust), with(-3.0, -4.0, 0.04), with(-2.0, -4.0, 0.04)] {
         let report = Report::new(&settings, GAP).unwrap();
         for (_, findings) in report.sections() {
             assert!(!findings.is_empty());
@@ -45,7 +45,7 @@ fn bounds_of_the_geometry_hold_in_the_widest_domain_and_for_another_vehicle() {
         sideslip_domain: 0.799,
         body: inertia.body(1.0).unwrap(),
         guarantee: Guarantee::BestEffort,
-        ..Settings::published()
+        ..Settings::new(Constraints::Robust)
     };
     for initial_state in [InitialState::Measured, InitialState::Tube] {
         let settings = Settings { initial_state, ..settings };
@@ -58,7 +58,7 @@ fn bounds_of_the_geometry_hold_in_the_widest_domain_and_for_another_vehicle() {
 
 #[test]
 fn bounds_that_are_too_small_are_found_false() {
-    let settings = Settings::published();
+    let settings = Settings::new(Constraints::Robust);
     let mut bounds = Lemmas::new(&settings);
     // The first two are attained; the others have margins of 2.4 % and 1.3 %.
     bounds.drift_by_rates *= 0.99;
@@ -83,7 +83,7 @@ fn bounds_that_are_too_small_are_found_false() {
 
 #[test]
 fn a_terminal_rate_that_is_too_large_is_found_false() {
-    let settings = Settings::published();
+    let settings = Settings::new(Constraints::Robust);
     let design = control::crmpc::Design::new(&settings).unwrap();
     let rate = design.assessment.terminal_rate;
     let at =
@@ -95,7 +95,7 @@ fn a_terminal_rate_that_is_too_large_is_found_false() {
 
 #[test]
 fn published_terminal_weight_does_not_decrease_with_the_sampled_law() {
-    let report = Report::new(&Settings::published(), 0.1).unwrap();
+    let report = Report::new(&Settings::new(Constraints::Robust), 0.1).unwrap();
     assert_all(&report.terminal);
     for printed in report.printed_terminal {
         assert!(printed.low > 50.0 && printed.high < 50.1, "{printed:?}");

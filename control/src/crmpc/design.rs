@@ -7,6 +7,7 @@ use crate::sampled::{Gain, InvariantSet, Reach, SampledError};
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
+use vehicle::time::TOLERANCE;
 
 /// Which sets the optimisation keeps the nominal motion in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -199,6 +200,8 @@ pub struct Design {
     pub counted: f64,
     /// Feedback ticks per optimisation.
     pub ratio: usize,
+    /// Feedback ticks that begin before a command of the first one acts.
+    pub delay_ticks: u32,
     /// Largest eigenvalue of I, kg m².
     pub largest_inertia: f64,
     /// Smallest eigenvalue of I, kg m².
@@ -254,6 +257,7 @@ impl Design {
             assessment,
             counted,
             ratio,
+            delay_ticks: (s.delay / s.period_feedback * (1.0 - TOLERANCE)).ceil() as u32,
             largest_inertia,
             smallest_inertia,
             inertia_ratio: largest_inertia / smallest_inertia,

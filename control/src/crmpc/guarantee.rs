@@ -9,6 +9,7 @@ pub use lemmas::Lemmas;
 use super::design::{InitialState, Settings};
 use crate::error::DesignError;
 use crate::sampled::{Reach, SampledError};
+use nalgebra::Vector3;
 use std::f64::consts::SQRT_2;
 
 /// Largest deviation of the vehicle from the plan at a feedback tick.
@@ -109,7 +110,7 @@ pub(super) const TURN: f64 = SQRT_2;
 const DRIFT_MIXED: f64 = 2.0 * CURVATURE;
 /// Bound on the second derivative of Ẇ x by the angles over ‖x‖², from the third derivatives of W.
 const DRIFT_BY_ANGLES_TWICE: f64 = 8.0;
-/// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s.
+/// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; the sideslip at least. See [`braking`].
 pub(super) const BRAKING: f64 = 0.01;
 
 impl Geometry {
@@ -370,17 +371,39 @@ impl Parts {
     }
 }
 
+/// What is left of the limits (rad/s, N m) beyond a motion with ‖x̃_ω‖ ≤ `x` and ‖a‖ ≤ `a`, with the deviation that is never exceeded, at whatever attitude.
+fn left(s: &Settings, dynamics: &Dynamics, tightening: &Tightening, x: f64, a: f64) -> (f64, f64) {
+    let forever = tightening.forever();
+    let of_rates = s.limit_rate - rate_loss(forever, TURN_OF_RATES * x, x);
+    let slopes = dynamics.slopes(x, a);
+    let loss = moment_loss(dynamics, tightening, forever, (tightening.bearing, 0.0), slopes, (x, a));
+    (of_rates - x, s.limit_moment - loss - dynamics.nominal_moment(x, a))
+}
+
+/// The rate κ (1/s) at which the sideslip has to brake beyond a horizon that ends with the angle `sideslip` and the rates `rates`: β travels |β̇|/κ more, and
+/// all keeps its limits meanwhile. `None` if it cannot.
+pub(super) fn braking(
+    s: &Settings,
+    dynamics: &Dynamics,
+    tightening: &Tightening,
+    sideslip: f64,
+    rates: &Vector3<f64>,
+) -> Option<f64> {
+    let room = s.sideslip_domain - tightening.forever().angle - sideslip.abs();
+    let by_room = if rates.y == 0.0 { 0.0 } else { rates.y.abs() / room };
+    // A κ beyond 1/h would turn the motion round.
+    if room < 0.0 || by_room * s.period_optimisation > 1.0 {
+        return None;
+    }
+    let braking = by_room.max(BRAKING);
+    let acceleration = rates.component_mul(&Vector3::new(BRAKING, braking, BRAKING));
+    let (rate, moment) = left(s, dynamics, tightening, rates.norm(), acceleration.norm());
+    (rate >= 0.0 && moment >= 0.0).then_some(braking)
+}
+
 /// What is left at rest and for the motion beyond the horizon, at whatever attitude.
 fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessment {
-    let forever = tightening.forever();
-    let left = |x: f64| {
-        let of_rates = s.limit_rate - rate_loss(forever, TURN_OF_RATES * x, x);
-        let a = BRAKING * x;
-        let slopes = dynamics.slopes(x, a);
-        let feedback = tightening.bearing;
-        let loss = moment_loss(dynamics, tightening, forever, (feedback, 0.0), slopes, (x, a));
-        (of_rates - x, s.limit_moment - loss - dynamics.nominal_moment(x, a))
-    };
+    let left = |x: f64| left(s, dynamics, tightening, x, BRAKING * x);
     let (rate, moment) = left(0.0);
     let (mut low, mut high) = (0.0, s.limit_rate);
     if rate > 0.0 && moment > 0.0 {

@@ -28,7 +28,7 @@ use crate::mpc::{self, Chain, Cost, Layout, Motion, Nonlinearity, Optimiser, Sta
 use crate::sampled::InvariantSet;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
-use sets::Sets;
+use sets::{Certified, Sets};
 use std::time::Instant;
 use vehicle::kinematics;
 use vehicle::reference::Reference;
@@ -50,16 +50,22 @@ pub struct Memory {
     pub margins: Margins,
     /// Feedback ticks from the beginning of the nominal motion to that of the plan in force.
     pub age: u32,
+    /// Feedback ticks until a guarantee that is pending is in force.
+    pub pending: u32,
+    /// How often the guarantee has ended.
+    pub ended: u32,
     /// What is known of the disturbance.
     pub observed: Observed,
 }
 
-/// Whether the guarantee of the robust set is in force at a tick: ‖ω‖ and ‖m‖ keep their limits for as long as the assumptions hold.
+/// Whether the guarantee of the robust set is in force at a tick: ‖ω‖ and ‖m‖ keep their limits from now on for as long as the assumptions hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Standing {
     /// No optimisation yet, or sets that guarantee nothing.
     #[default]
     None,
+    /// A plan is certified, and the guarantee is in force once the delay has passed: until then moments act that were commanded without it.
+    Pending,
     /// In force.
     InForce,
     /// The design does not hold for the settings, so that all is best effort.
@@ -68,6 +74,13 @@ pub enum Standing {
     Uncertified,
     /// The vehicle is further from the plan than the assumptions explain.
     Exceeded,
+}
+
+impl Memory {
+    /// Whether the plan in force is certified, and the vehicle no further from it than the assumptions explain.
+    pub fn assured(&self) -> bool {
+        matches!(self.standing, Standing::Pending | Standing::InForce)
+    }
 }
 
 impl Clone for Memory {
@@ -79,7 +92,8 @@ impl Clone for Memory {
 
     // The derived version would allocate a new plan at every tick.
     fn clone_from(&mut self, source: &Self) {
-        let Self { plan, started, report, nominal, standing, margins, age, observed } = source;
+        let Self { plan, started, report, nominal, standing, margins, age, pending, ended, observed } =
+            source;
         self.plan.clone_from(plan);
         self.started = *started;
         self.report = *report;
@@ -87,6 +101,8 @@ impl Clone for Memory {
         self.standing = *standing;
         self.margins = *margins;
         self.age = *age;
+        self.pending = *pending;
+        self.ended = *ended;
         self.observed = *observed;
     }
 }
@@ -107,6 +123,8 @@ pub struct Crmpc {
 const SHARE_OF_RATE: f64 = 0.8;
 /// Shares of the tightening that are tried where no plan is certified.
 const LESS: [f64; 2] = [0.5, 0.0];
+/// Ways from a plan that is kept towards the optimum without constraints that are tried, each half as long as the one before.
+const HALVINGS: usize = 6;
 /// The first optimisation has converged when no state moves by more than this (rad, rad/s) between passes.
 const STANDSTILL: f64 = 1e-8;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
@@ -193,9 +211,7 @@ impl Crmpc {
         let (angles, rates) = split(&(measured - memory.plan.states[0]));
         let gain = self.settings.feedback;
         self.sets.begin(memory.age as usize, 1.0);
-        if memory.standing == Standing::InForce
-            && !self.explains(0, &angles, &rates, &(angles * gain.k1 + rates * gain.k2))
-        {
+        if memory.assured() && !self.explains(0, &angles, &rates, &(angles * gain.k1 + rates * gain.k2)) {
             memory.standing = Standing::Exceeded;
         }
     }
@@ -221,7 +237,7 @@ impl Crmpc {
     /// nominal motion, or else the previous plan as it is, which keeps them if it did before and the vehicle is no further from it than the
     /// assumptions explain. Without any, what violates the limits least.
     fn plan_robustly(&mut self, memory: &mut Memory, measured: &Vector6<f64>, first: bool) -> mpc::Report {
-        let assured = memory.standing == Standing::InForce;
+        let assured = memory.assured();
         let goes_on = (memory.plan.states[0], memory.age);
         let starts = match self.settings.initial_state {
             InitialState::Nominal if assured => [Some(goes_on), None],
@@ -231,27 +247,56 @@ impl Crmpc {
         let mut iterations = 0;
         for (start, age) in starts.into_iter().flatten() {
             self.sets.begin(age as usize, 1.0);
-            let (report, margins) = self.certified(memory, &start, first);
+            let (report, certified) = self.certified(memory, &start, first);
             iterations += report.iterations;
             let solved = report.status != Status::Fallback;
             // Linearised constraints are there for comparison: their optimum is taken without guarantee.
             let taken = !assured || self.settings.solver.nonlinearity == Nonlinearity::Frozen;
-            if margins.is_some() || solved && taken {
+            if certified.is_some() || solved && taken {
                 self.follow_optimum(memory, &start);
                 memory.age = age;
-                memory.margins = margins.unwrap_or_else(|| self.sets.margins(self.optimiser.motion()));
-                memory.standing =
-                    if margins.is_some() { Standing::InForce } else { self.without_guarantee() };
+                self.take_over(memory, certified);
                 return mpc::Report { iterations, ..report };
             }
         }
         if assured {
-            self.sets.begin(memory.age as usize, 1.0);
+            self.go_towards_the_optimum(memory);
             let report = self.keep(memory, measured, (Status::Kept, iterations));
             memory.margins = self.sets.margins(&self.previous);
             return report;
         }
         self.violate_least(memory, measured, iterations)
+    }
+
+    /// Follows the motion that has just become the plan, under guarantee if it is certified.
+    fn take_over(&mut self, memory: &mut Memory, certified: Option<Certified>) {
+        let Some(Certified { margins, braking }) = certified else {
+            memory.margins = self.sets.margins(self.optimiser.motion());
+            memory.standing = self.without_guarantee();
+            return;
+        };
+        (memory.margins, memory.plan.braking) = (margins, braking);
+        if !memory.assured() {
+            memory.standing = Standing::Pending;
+            memory.pending = self.design.delay_ticks;
+        }
+    }
+
+    /// Moves the certified plan as far towards the optimum without constraints as is certified, so that a plan that is kept again and again still leads to
+    /// the reference.
+    fn go_towards_the_optimum(&mut self, memory: &mut Memory) {
+        self.sets.begin(memory.age as usize, 1.0);
+        memory.plan.errors(&self.sets.references, &mut self.previous);
+        let (start, mut share) = (memory.plan.states[0], 1.0);
+        for _ in 0..HALVINGS {
+            self.optimiser.mix(&self.previous, share, &self.affine);
+            if let Some(certified) = self.sets.certify(self.optimiser.motion(), false) {
+                self.follow_optimum(memory, &start);
+                self.take_over(memory, Some(certified));
+                return;
+            }
+            share *= 0.5;
+        }
     }
 
     /// The optimum from `start`, with its margins if it keeps the conditions of the theorem.
@@ -260,7 +305,7 @@ impl Crmpc {
         memory: &Memory,
         start: &Vector6<f64>,
         first: bool,
-    ) -> (mpc::Report, Option<Margins>) {
+    ) -> (mpc::Report, Option<Certified>) {
         let report = self.solve(memory, start, first);
         if report.status == Status::Fallback {
             return (report, None);
@@ -343,7 +388,10 @@ impl Crmpc {
         plan.multipliers.rotate_left(1);
         plan.multipliers[n - 1] = [0.0; 2];
         let a = match self.settings.constraints {
-            Constraints::Robust => last.fixed_rows::<3>(3) * -guarantee::BRAKING,
+            Constraints::Robust => {
+                let braking = Vector3::new(guarantee::BRAKING, plan.braking, guarantee::BRAKING);
+                -last.fixed_rows::<3>(3).component_mul(&braking)
+            }
             Constraints::Paper => self.terminal_acceleration(&last, &self.sets.references[n - 1]),
         };
         plan.accelerations[n - 1] = a;
@@ -426,6 +474,8 @@ impl Controller for Crmpc {
     ) -> Vector3<f64> {
         let angle_rates = kinematics::r(&measured.angles) * measured.rates;
         let within = tick % self.design.ratio as u64;
+        let assured = memory.assured();
+        memory.pending = memory.pending.saturating_sub(1);
         memory.observed.observe(&self.settings, &angle_rates);
         if within == 0 {
             self.optimise(memory, time, join(&measured.angles, &angle_rates), reference);
@@ -449,8 +499,11 @@ impl Controller for Crmpc {
         if robust {
             let explained = self.explains(within, &off_angles, &off_rates, &(commanded - a));
             let kept = excess <= 1.0 + 1e-9 && measured.rates.norm() <= self.rate_shown();
-            if memory.standing == Standing::InForce && !(explained && kept) {
+            if memory.assured() && !(explained && kept) {
                 memory.standing = Standing::Exceeded;
+            }
+            if memory.standing == Standing::Pending && memory.pending == 0 {
+                memory.standing = Standing::InForce;
             }
         }
         // Without a solution nothing keeps the moment within its limit.
@@ -465,6 +518,7 @@ impl Controller for Crmpc {
             };
             memory.observed.remember(&angle_rates, &acceleration);
         }
+        memory.ended += u32::from(assured && !memory.assured());
         moment
     }
 }

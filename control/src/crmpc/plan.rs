@@ -14,6 +14,8 @@ pub struct Plan {
     pub accelerations: Vec<Vector3<f64>>,
     /// Multipliers of the balls on the state at each interval's end and on its input, from which the next optimisation begins.
     pub multipliers: Vec<[f64; 2]>,
+    /// κ of β̈ = −κ β̇ beyond the horizon, 1/s; with the robust set.
+    pub braking: f64,
 }
 
 impl Clone for Plan {
@@ -22,6 +24,7 @@ impl Clone for Plan {
             states: self.states.clone(),
             accelerations: self.accelerations.clone(),
             multipliers: self.multipliers.clone(),
+            braking: self.braking,
         }
     }
 
@@ -30,6 +33,7 @@ impl Clone for Plan {
         self.states.clone_from(&source.states);
         self.accelerations.clone_from(&source.accelerations);
         self.multipliers.clone_from(&source.multipliers);
+        self.braking = source.braking;
     }
 }
 
@@ -40,6 +44,7 @@ impl Plan {
             states: vec![Vector6::zeros(); horizon + 1],
             accelerations: vec![Vector3::zeros(); horizon],
             multipliers: vec![[0.0; 2]; horizon],
+            braking: 0.0,
         }
     }
 

@@ -123,11 +123,11 @@ impl Sets {
         }
     }
 
-    /// What a plan leaves of the limits beyond what is reserved, as shares of them; `None` if it does not keep the conditions of the theorem (docs/guarantee.md),
+    /// What holds of a plan that is followed; `None` if it does not keep the conditions of the theorem (docs/guarantee.md),
     /// which are those of the whole tightening.
     ///
     /// `checked`: [`mpc::Bounded::violated`] has found nothing in it already.
-    pub(super) fn certify(&mut self, motion: &Motion<2>, checked: bool) -> Option<Margins> {
+    pub(super) fn certify(&mut self, motion: &Motion<2>, checked: bool) -> Option<Certified> {
         if !matches!(&self.kind, Kind::Robust(robust) if robust.design.counted >= 1.0 && robust.share >= 1.0)
         {
             return None;
@@ -146,13 +146,13 @@ impl Sets {
             let angle = references[k].angles.y + motion.states[k][0].y;
             angle.abs() + robust.deviation(k).angle <= robust.settings.sideslip_domain
         });
-        // Beyond the horizon a = −κ x̃_ω moves β by no more than |β̇|/κ.
+        if !inside || rates.rates.norm() > bound * (1.0 + CHECK_SLACK) {
+            return None;
+        }
         let last = points(n);
-        let travelled = last.angles.y.abs() + last.rates.y.abs() / guarantee::BRAKING;
-        let ends_inside =
-            travelled + robust.design.tightening.forever().angle <= robust.settings.sideslip_domain;
-        let kept = rates.rates.norm() <= bound * (1.0 + CHECK_SLACK);
-        (inside && ends_inside && kept).then(|| robust.margins(body, &first, &second))
+        let Robust { settings, dynamics, design, .. } = &**robust;
+        let braking = guarantee::braking(settings, dynamics, &design.tightening, last.angles.y, &last.rates)?;
+        Some(Certified { margins: robust.margins(body, &first, &second), braking })
     }
 
     /// See [`Margins`]; of the robust set only.
@@ -267,6 +267,14 @@ impl Bounded<2> for Sets {
     fn terminal_radius(&self) -> Option<f64> {
         self.terminal_radius
     }
+}
+
+/// What holds of a plan that keeps the conditions of the theorem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Certified {
+    pub margins: Margins,
+    /// See [`super::Plan::braking`].
+    pub braking: f64,
 }
 
 /// What the first interval of a plan leaves of the limits beyond what is reserved for the deviation from it, as shares of them.
@@ -461,7 +469,7 @@ impl Robust {
         let bound = limit_rate * (1.0 - RESERVE) - self.share * loss;
         // ‖x̃_ω‖ ≤ sec β ‖ω̃‖
         if k == horizon {
-            bound.min(self.design.assessment.terminal_rate * here.angles.y.cos())
+            bound.min(self.design.assessment.terminal_rate * here.angles.y.cos() * (1.0 - RESERVE))
         } else {
             bound
         }
@@ -537,12 +545,9 @@ mod tests {
     use proptest::prelude::*;
     use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
     use std::cell::Cell;
-    use vehicle::scenario::Scenario;
 
     fn robust() -> Sets {
-        let scenario = Scenario::crmpc2022();
-        let body = scenario.inertia.body(1.0).unwrap();
-        let settings = Settings { constraints: Constraints::Robust, ..Settings::crmpc2022(&scenario, body) };
+        let settings = Settings::new(Constraints::Robust);
         Sets::new(&settings, &Design::new(&settings).unwrap()).unwrap()
     }
 

@@ -441,6 +441,14 @@ impl<const O: usize> Optimiser<O> {
         false
     }
 
+    /// Leaves `plan` in [`Self::motion`], moved by this share of the way to the optimum without constraints from its start.
+    pub fn mix(&mut self, plan: &Motion<O>, share: f64, affine: &[State<O>]) {
+        let Solution { motion, multipliers } = &mut self.solution;
+        self.unconstrained.solve(&plan.states[0], affine, motion);
+        multipliers.clear();
+        motion.mix(plan, share);
+    }
+
     /// The report of a plan that is followed instead of an optimum.
     pub fn fall_back<B: Bounded<O>>(
         &mut self,

@@ -297,6 +297,17 @@ impl<const O: usize> Motion<O> {
         Self { states: vec![zero_state(); horizon + 1], inputs: vec![Vector3::zeros(); horizon] }
     }
 
+    /// Keeps this share of the motion, and takes the rest from `other`.
+    pub fn mix(&mut self, other: &Self, share: f64) {
+        let mixed = |here: &mut Vector3<f64>, there: &Vector3<f64>| *here = *there + (*here - there) * share;
+        for (here, there) in self.states.iter_mut().flatten().zip(other.states.iter().flatten()) {
+            mixed(here, there);
+        }
+        for (here, there) in self.inputs.iter_mut().zip(&other.inputs) {
+            mixed(here, there);
+        }
+    }
+
     /// Largest difference of any component of any state.
     pub fn distance(&self, other: &Self) -> f64 {
         let states = self.states.iter().flatten().zip(other.states.iter().flatten());

@@ -3,7 +3,7 @@
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
 use super::{CHECK, platform};
-use control::crmpc::{Crmpc, InitialState, Memory, Settings, Standing};
+use control::crmpc::{Constraints, Crmpc, InitialState, Memory, Settings, Standing};
 use control::delay::Delayed;
 use control::error::DesignError;
 use control::estimation::{self, Alignment, Estimator, mems_corrections};
@@ -190,11 +190,8 @@ pub struct Flight {
 /// What a flight shows. Limits are those of the settings.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shown {
-    /// Largest ‖ω‖ over its limit within the periods that began under guarantee, looked at every [`CHECK`], once the delay has passed since
-    /// the guarantee began: until then moments act that were commanded without it.
+    /// Largest ‖ω‖ over its limit within the periods that began under guarantee, looked at every [`CHECK`].
     pub rate: f64,
-    /// The same while that delay passes.
-    pub rate_before: f64,
     /// When it was that large, s.
     pub rate_time: f64,
     /// Largest ‖m‖ over its limit that was commanded under guarantee.
@@ -307,7 +304,7 @@ impl Flight {
         let (ticks, checks) = ((self.duration / period).round() as u64, (period / CHECK).round() as u64);
         let holds = (self.hold / CHECK).round() as u64;
         let (mut shown, mut error, mut in_force, mut before) = (Shown::default(), 0.0, 0, false);
-        let (mut delta, mut since) = (Vector3::zeros(), 0.0);
+        let mut delta = Vector3::zeros();
         for tick in 0..ticks {
             let time = tick as f64 * period;
             let measured = eyes.look(time, &vehicle);
@@ -318,9 +315,6 @@ impl Flight {
             vehicle.command(time, moment);
             observe(&memory.inner, tick, &measured, &reference(time));
             let now = memory.inner.standing == Standing::InForce;
-            if now && !before {
-                since = time;
-            }
             if before && !now && shown.withdrawn.is_none() {
                 shown.withdrawn = Some(time);
             }
@@ -339,9 +333,7 @@ impl Flight {
                 eyes.sample(at(i + 1), &vehicle);
                 let rate = vehicle.rates().norm() / s.limit_rate;
                 shown.rate_at_all = shown.rate_at_all.max(rate);
-                if now && at(i + 1) < since + s.delay {
-                    shown.rate_before = shown.rate_before.max(rate);
-                } else if now && rate > shown.rate {
+                if now && rate > shown.rate {
                     (shown.rate, shown.rate_time) = (rate, at(i + 1));
                 }
             }
@@ -534,7 +526,7 @@ pub fn random_settings(seed: u64) -> Settings {
     let half = |random: &mut Random, high: f64| {
         if random.below(2) == 0 { 0.0 } else { random.between(0.0, high) }
     };
-    let published = Settings::published();
+    let published = Settings::new(Constraints::Robust);
     let period_feedback = [0.02, 0.04, 0.05, 0.1][random.below(4)];
     let initial_states = [InitialState::Measured, InitialState::Nominal, InitialState::Tube];
     Settings {

@@ -17,9 +17,7 @@ pub const CHECK: f64 = 0.01;
 
 /// Settings of Chai 2022 with these sets.
 pub fn settings(constraints: Constraints) -> Settings {
-    let scenario = Scenario::crmpc2022();
-    let body = scenario.inertia.body(1.0).unwrap();
-    Settings { constraints, ..Settings::crmpc2022(&scenario, body) }
+    Settings::new(constraints)
 }
 
 /// The regulator of the comparison, with the weights of CRMPC.
