@@ -51,10 +51,10 @@ impl Deviation {
 pub struct Tightening {
     /// Deviation at each tick; the last one holds for ever.
     at: Vec<Deviation>,
-    /// The largest within the optimisation period that begins at each tick.
-    within: Vec<Deviation>,
-    /// By how much the deviation of angle and rate between the ends of that period can exceed what lies on the line between them: rad, rad/s.
-    bulge: Vec<(f64, f64)>,
+    /// What the largest within the optimisation period that begins at each tick takes of the moment.
+    moment: Vec<MomentLoss>,
+    /// What it takes of the rate at each tick, and before and after until the next one of the plan's steps.
+    rate: Vec<RateLoss>,
     /// Largest ‖I W s‖ over the corners s of the unit box at any attitude of the domain, kg m².
     pub bearing: f64,
     /// Bound on the norm of all that drives the deviation, rad/s².
@@ -73,14 +73,14 @@ impl Tightening {
         &self.at[self.place(tick)]
     }
 
-    /// The largest deviation at the feedback ticks of the optimisation period that begins with this one.
-    pub fn within(&self, tick: usize) -> &Deviation {
-        &self.within[self.place(tick)]
+    /// What the largest deviation at the feedback ticks of the optimisation period that begins with this one takes of the moment.
+    pub(super) fn moment_loss(&self, tick: usize) -> &MomentLoss {
+        &self.moment[self.place(tick)]
     }
 
-    /// See the field: of angle (rad) and rate (rad/s).
-    pub fn bulge(&self, tick: usize) -> (f64, f64) {
-        self.bulge[self.place(tick)]
+    /// What it takes of the rate at this tick and until the steps of the plan before and after it.
+    pub(super) fn rate_loss(&self, tick: usize) -> &RateLoss {
+        &self.rate[self.place(tick)]
     }
 
     /// The deviation that is never exceeded.
@@ -149,6 +149,8 @@ pub(super) struct Dynamics {
     by_angles: f64,
     /// Bound on ‖d²F/dt²‖ along the predicted motion with m held, rad/s⁴.
     jerk: f64,
+    /// Of [`Self::moment_curvature`], by ‖a‖², ‖x_ω‖² ‖a‖ and ‖x_ω‖⁴.
+    curvature: [f64; 3],
 }
 
 impl Dynamics {
@@ -180,7 +182,27 @@ impl Dynamics {
             + angles_twice * rate * rate
             + by_angles * acceleration
             + by_rates * (by_rates * acceleration + by_angles * rate);
-        Self { geometry, largest, smallest, gyroscopic, rate, acceleration, by_rates, by_angles, jerk }
+        // I Ẅ a: ∂²W [x, x] a + ∂W [a] a. The rest as in `MomentLoss`, with ẋ_ω = a and Θ̈ = a.
+        let twisted = largest - smallest;
+        let curvature = [
+            largest * TURN + 2.0 * (largest * drift + 0.5 * twisted),
+            2.0 * largest * CURVATURE
+                + 2.0 * (largest * DRIFT_MIXED + 4.0 * twisted)
+                + TURN * SQRT_2 * twisted,
+            largest * DRIFT_BY_ANGLES_TWICE + 12.0 * twisted,
+        ];
+        Self {
+            geometry,
+            largest,
+            smallest,
+            gyroscopic,
+            rate,
+            acceleration,
+            by_rates,
+            by_angles,
+            jerk,
+            curvature,
+        }
     }
 
     /// How far F is from the acceleration that the law meant, on average over a period (rad/s²), and by how much it varies within one, where the
@@ -272,22 +294,28 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
         }
     };
     let last = at.len() - 1;
-    let within = (0..at.len())
-        .map(|n| (n..n + ratio).fold(Deviation::default(), |largest, n| largest.or(&at[n.min(last)])))
-        .collect();
-    let bulge = (0..at.len())
-        .map(|n| {
-            let tick = |i: usize| &at[(n + i).min(last)];
-            let between = |value: fn(&Deviation) -> f64| {
-                let (from, to) = (value(tick(0)), value(tick(ratio)));
-                let above = |i: usize| value(tick(i)) - (from + (to - from) * i as f64 / ratio as f64);
-                (1..ratio).map(above).fold(0.0, f64::max)
-            };
-            (between(|d| d.angle), between(|d| d.rate))
-        })
-        .collect();
     let bearing = bearing(s);
-    let tightening = Tightening { at, within, bulge, bearing, norm: parts.norm, mismatch: parts.mismatch };
+    let moment = (0..at.len()).map(|n| {
+        let within = (n..n + ratio).fold(Deviation::default(), |largest, n| largest.or(&at[n.min(last)]));
+        MomentLoss::new(&dynamics, &within, bearing)
+    });
+    // Between the ends of an optimisation period the deviation can exceed what lies on the line between them by so much.
+    let bulge = |n: usize, value: fn(&Deviation) -> f64| {
+        let tick = |i: usize| value(&at[(n + i).min(last)]);
+        let (from, to) = (tick(0), tick(ratio));
+        let above = |i: usize| tick(i) - (from + (to - from) * i as f64 / ratio as f64);
+        (1..ratio).map(above).fold(0.0, f64::max)
+    };
+    let rate = (0..at.len()).map(|n| {
+        let with_bulge = |value: fn(&Deviation) -> f64| {
+            let before = n.checked_sub(ratio).map_or(0.0, |before| bulge(before, value));
+            value(&at[n]) + before.max(bulge(n, value))
+        };
+        let Deviation { angle, .. } = at[n];
+        RateLoss { by_angles: with_bulge(|d| d.angle), ..RateLoss::new(angle, with_bulge(|d| d.rate)) }
+    });
+    let (moment, rate) = (moment.collect(), rate.collect());
+    let tightening = Tightening { moment, rate, bearing, norm: parts.norm, mismatch: parts.mismatch, at };
     let assessment = assess(s, &dynamics, &tightening);
     Ok((tightening, assessment))
 }
@@ -373,10 +401,10 @@ impl Parts {
 
 /// What is left of the limits (rad/s, N m) beyond a motion with ‖x̃_ω‖ ≤ `x` and ‖a‖ ≤ `a`, with the deviation that is never exceeded, at whatever attitude.
 fn left(s: &Settings, dynamics: &Dynamics, tightening: &Tightening, x: f64, a: f64) -> (f64, f64) {
-    let forever = tightening.forever();
-    let of_rates = s.limit_rate - rate_loss(forever, TURN_OF_RATES * x, x);
-    let slopes = dynamics.slopes(x, a);
-    let loss = moment_loss(dynamics, tightening, forever, (tightening.bearing, 0.0), slopes, (x, a));
+    let Deviation { angle, rate, .. } = *tightening.forever();
+    let of_rates = s.limit_rate - RateLoss::new(angle, rate).at(TURN_OF_RATES * x, x);
+    let loss =
+        tightening.moment_loss(usize::MAX).at((tightening.bearing, 0.0), dynamics.slopes(x, a), (x, a));
     (of_rates - x, s.limit_moment - loss - dynamics.nominal_moment(x, a))
 }
 
@@ -434,39 +462,73 @@ fn bearing(s: &Settings) -> f64 {
     (3.0 * yy + (plane - yy).max(0.0) * across).sqrt().min(any)
 }
 
-/// How much of the rate limit the deviation takes at a stage with ‖∂ω/∂(α, β)‖ = `by_angles` and ‖x̃_ω‖ = `size`, rad/s:
-/// ‖W (x̃_ω + o_ω)‖ ≤ ‖W̃ x̃_ω‖ + ‖(W − W̃) x̃_ω‖ + ‖o_ω‖.
-pub(super) fn rate_loss(deviation: &Deviation, by_angles: f64, size: f64) -> f64 {
-    let Deviation { angle, rate, .. } = *deviation;
-    rate + by_angles * angle + 0.5 * CURVATURE * size * angle * angle
+/// How much of the rate limit a deviation takes, rad/s: ‖W (x̃_ω + o_ω)‖ ≤ ‖W̃ x̃_ω‖ + ‖(W − W̃) x̃_ω‖ + ‖o_ω‖.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct RateLoss {
+    constant: f64,
+    by_angles: f64,
+    by_size: f64,
 }
 
-/// How much of the moment limit it takes: `feedback` is the largest ‖I W s‖ over the corners of the unit box at the stage and how much that grows with
-/// the angles at most (kg m², kg m²/rad), `slopes` are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖ there, `sizes` are ‖x̃_ω‖ and ‖a‖. N m.
-///
-/// m(x̃ + ô, a + K ô) = m(x̃, a) + I W K ô + ∂m ô + what is of second order in ô.
-pub(super) fn moment_loss(
-    dynamics: &Dynamics,
-    tightening: &Tightening,
-    deviation: &Deviation,
-    feedback: (f64, f64),
-    slopes: (f64, f64),
-    sizes: (f64, f64),
-) -> f64 {
-    let Deviation { seen_angle: angle, seen_rate: rate, .. } = *deviation;
-    let largest = dynamics.largest;
-    let spread = largest - dynamics.smallest;
-    let (x, a) = (sizes.0 + rate, sizes.1);
-    let feedback = (feedback.0 + feedback.1 * angle).min(tightening.bearing);
-    let by_feedback =
-        deviation.feedback * feedback + deviation.feedback_norm * largest + deviation.feedback_moment;
-    let drift = slopes.0 * angle + slopes.1 * rate;
-    // The second derivatives of I W a, and of I Ẇ x + ω × I ω by rates, by both, and by angles.
-    let second = 0.5 * largest * CURVATURE * a * angle * angle
-        + (largest * dynamics.geometry.drift + 0.5 * spread) * rate * rate
-        + (largest * DRIFT_MIXED + 4.0 * spread) * x * angle * rate
-        + 0.5 * (largest * DRIFT_BY_ANGLES_TWICE + 12.0 * spread) * x * x * angle * angle;
-    by_feedback + drift + second
+impl RateLoss {
+    fn new(angle: f64, rate: f64) -> Self {
+        Self { constant: rate, by_angles: angle, by_size: 0.5 * CURVATURE * angle * angle }
+    }
+
+    /// At a stage with ‖∂ω/∂(α, β)‖ = `by_angles` and ‖x̃_ω‖ = `size`, rad/s.
+    #[inline]
+    pub(super) fn at(&self, by_angles: f64, size: f64) -> f64 {
+        self.constant + by_angles * self.by_angles + size * self.by_size
+    }
+}
+
+/// How much of the moment limit a deviation takes, N m: m(x̃ + ô, a + K ô) = m(x̃, a) + I W K ô + ∂m ô + what is of second order in ô.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct MomentLoss {
+    angle: f64,
+    rate: f64,
+    feedback: f64,
+    bearing: f64,
+    constant: f64,
+    by_acceleration: f64,
+    by_size: f64,
+    by_size_squared: f64,
+}
+
+impl MomentLoss {
+    /// `bearing` is that of [`Tightening`].
+    fn new(dynamics: &Dynamics, deviation: &Deviation, bearing: f64) -> Self {
+        let Deviation {
+            seen_angle: angle, seen_rate: rate, feedback, feedback_norm, feedback_moment, ..
+        } = *deviation;
+        let largest = dynamics.largest;
+        let spread = largest - dynamics.smallest;
+        // The second derivatives of I W a, and of I Ẇ x + ω × I ω by rates, by both, and by angles.
+        let by_rates_twice = (largest * dynamics.geometry.drift + 0.5 * spread) * rate * rate;
+        Self {
+            angle,
+            rate,
+            feedback,
+            bearing,
+            constant: feedback_norm * largest + feedback_moment + by_rates_twice,
+            by_acceleration: 0.5 * largest * CURVATURE * angle * angle,
+            by_size: (largest * DRIFT_MIXED + 4.0 * spread) * angle * rate,
+            by_size_squared: 0.5 * (largest * DRIFT_BY_ANGLES_TWICE + 12.0 * spread) * angle * angle,
+        }
+    }
+
+    /// `feedback` is the largest ‖I W s‖ over the corners of the unit box at the stage and how much that grows with the angles at most (kg m², kg m²/rad),
+    /// `slopes` are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖ there, `sizes` are ‖x̃_ω‖ and ‖a‖.
+    #[inline]
+    pub(super) fn at(&self, feedback: (f64, f64), slopes: (f64, f64), sizes: (f64, f64)) -> f64 {
+        let (x, a) = (sizes.0 + self.rate, sizes.1);
+        self.feedback * (feedback.0 + feedback.1 * self.angle).min(self.bearing)
+            + self.constant
+            + slopes.0 * self.angle
+            + slopes.1 * self.rate
+            + self.by_acceleration * a
+            + (self.by_size + self.by_size_squared * x) * x
+    }
 }
 
 impl Dynamics {
@@ -486,15 +548,10 @@ impl Dynamics {
     }
 
     /// Bound on ‖d²m/dt²‖ of a nominal motion with a held and such sizes, N m/s².
+    #[inline]
     pub(super) fn moment_curvature(&self, x: f64, a: f64) -> f64 {
-        let Self { largest, smallest, geometry, .. } = self;
-        let spread = largest - smallest;
-        // I Ẅ a: ∂²W [x, x] a + ∂W [a] a. The rest as in `moment_loss`, with ẋ_ω = a and Θ̈ = a.
-        largest * (CURVATURE * x * x * a + TURN * a * a)
-            + 2.0 * (largest * geometry.drift + 0.5 * spread) * a * a
-            + 2.0 * (largest * DRIFT_MIXED + 4.0 * spread) * x * x * a
-            + (largest * DRIFT_BY_ANGLES_TWICE + 12.0 * spread) * x.powi(4)
-            + (largest * CURVATURE + TURN * SQRT_2 * spread) * x * x * a
+        let [aa, xxa, xxxx] = self.curvature;
+        aa * a * a + x * x * (xxa * a + xxxx * x * x)
     }
 
     /// Bound on ‖d²ω/dt²‖ of a nominal motion with a held and such sizes, rad/s³: 2 Ẇ a + ∂²W [x, x] x + ∂W [a] x.

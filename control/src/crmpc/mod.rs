@@ -310,8 +310,7 @@ impl Crmpc {
         if report.status == Status::Fallback {
             return (report, None);
         }
-        let checked = report.status == Status::Unconstrained;
-        (report, self.sets.certify(self.optimiser.motion(), checked))
+        (report, self.sets.certify(self.optimiser.motion(), report.settled))
     }
 
     /// The optimum with less of the tightening, or the terminal law from the measured state, with as much of its moment as there is.

@@ -61,14 +61,15 @@ struct Robust {
     rate: Vec<f64>,
     /// On ‖m̃‖ of each interval, N m. Negative where nothing is left.
     moment: Vec<f64>,
+    /// The same for later.
+    remembered: (Vec<f64>, Vec<f64>),
 }
 
 /// Relative slack when the paper's constraints are checked, for rounding.
 const ROUNDING: f64 = 1e-9;
-/// Relative slack when those of the robust set are checked, for what a solver leaves.
-const CHECK_SLACK: f64 = 1e-6;
-/// Share of the limits that the robust set leaves for that slack.
-const RESERVE: f64 = 2e-6;
+/// Share of the limits that the robust set leaves, and relative slack when its constraints are checked: an optimum's bounds are those about
+/// a motion nearby.
+const RESERVE: f64 = 1e-3;
 /// Share of a limit that stands for an empty set in the optimisation, which needs balls with an inside. No plan within it is certified.
 const EMPTY: f64 = 1e-3;
 
@@ -87,6 +88,7 @@ impl Sets {
                     share: 1.0,
                     rate: vec![settings.limit_rate; n + 1],
                     moment: vec![settings.limit_moment; n],
+                    remembered: (vec![0.0; n + 1], vec![0.0; n]),
                 };
                 (Kind::Robust(Box::new(robust)), None)
             }
@@ -140,13 +142,13 @@ impl Sets {
         let points = |k| Point::at(references, motion, k);
         // The first state, which no optimisation can change, and the last one, beyond which the motion brakes.
         let (first, second) = (points(0), points(1));
-        let rates = first.turned(body).1;
+        let rates = first.motion(body);
         let bound = robust.rate_bound(0, norm_of_columns(&rates.rates_by_angles), &first, &second);
         let inside = (0..=n).all(|k| {
             let angle = references[k].angles.y + motion.states[k][0].y;
             angle.abs() + robust.deviation(k).angle <= robust.settings.sideslip_domain
         });
-        if !inside || rates.rates.norm() > bound * (1.0 + CHECK_SLACK) {
+        if !inside || rates.rates.norm() > bound * (1.0 + RESERVE) {
             return None;
         }
         let last = points(n);
@@ -225,10 +227,18 @@ impl mpc::Constraints<2> for Sets {
 }
 
 impl Bounded<2> for Sets {
-    fn follow(&mut self, follow: bool) -> bool {
-        // The paper's bounds are constant.
-        self.follow = follow && matches!(self.kind, Kind::Robust(_));
-        self.follow
+    fn follow(&mut self, follow: bool) {
+        self.follow = follow;
+    }
+
+    fn unsettled(&mut self, motion: &Motion<2>, of: Range<usize>) -> Option<Range<usize>> {
+        let Kind::Robust(robust) = &mut self.kind else { return None };
+        robust.exchange();
+        let unsettled = self.violated_in(motion, of);
+        if let Kind::Robust(robust) = &mut self.kind {
+            robust.exchange();
+        }
+        unsettled
     }
 
     fn tighten(&mut self, motion: &Motion<2>, of: Range<usize>) {
@@ -245,23 +255,12 @@ impl Bounded<2> for Sets {
 
     fn violated(&mut self, motion: &Motion<2>, skip: Range<usize>) -> Option<Range<usize>> {
         let n = motion.inputs.len();
-        let mut violated: Option<Range<usize>> = None;
-        for range in [0..skip.start, skip.end.min(n)..n] {
-            if range.is_empty() {
-                continue;
-            }
-            let mut here = Point::at(&self.references, motion, range.start);
-            let mut anchor = None;
-            for k in range {
-                let next = Point::at(&self.references, motion, k + 1);
-                if self.violates(k, &here, &next, &mut anchor) {
-                    let first = violated.map_or(k, |range| range.start);
-                    violated = Some(first..k + 1);
-                }
-                here = next;
-            }
+        let before = self.violated_in(motion, 0..skip.start);
+        let after = self.violated_in(motion, skip.end.min(n)..n);
+        match (before, after) {
+            (Some(before), Some(after)) => Some(before.start..after.end),
+            (before, after) => before.or(after),
         }
-        violated
     }
 
     fn terminal_radius(&self) -> Option<f64> {
@@ -295,7 +294,9 @@ struct Point {
     size: f64,
     /// a; zero at the last stage.
     acceleration: Vector3<f64>,
-    turned: OnceCell<(InverseKinematics, BodyMotion)>,
+    /// ‖a‖.
+    pull: f64,
+    turned: OnceCell<InverseKinematics>,
 }
 
 /// A stage whose kinematics are known.
@@ -314,7 +315,8 @@ struct Anchor {
 
 impl Point {
     fn new(angles: Vector3<f64>, rates: Vector3<f64>, acceleration: Vector3<f64>) -> Self {
-        Self { angles, rates, size: rates.norm(), acceleration, turned: OnceCell::new() }
+        let (size, pull) = (rates.norm(), acceleration.norm());
+        Self { angles, rates, size, acceleration, pull, turned: OnceCell::new() }
     }
 
     fn at(references: &[Reference], motion: &Motion<2>, k: usize) -> Self {
@@ -323,27 +325,44 @@ impl Point {
         Self::new(angles + motion.states[k][0], rates + motion.states[k][1], acceleration)
     }
 
-    /// W and what it makes of the motion, computed where it is needed first.
-    fn turned(&self, body: &RigidBody) -> &(InverseKinematics, BodyMotion) {
-        self.turned.get_or_init(|| {
-            let kinematics = InverseKinematics::at(&self.angles);
-            (kinematics, kinematics.motion(body, &self.rates))
-        })
+    /// W, computed where it is needed first.
+    fn turned(&self) -> &InverseKinematics {
+        self.turned.get_or_init(|| InverseKinematics::at(&self.angles))
+    }
+
+    fn motion(&self, body: &RigidBody) -> BodyMotion {
+        self.turned().motion(body, &self.rates)
     }
 }
 
 impl Sets {
+    /// Those of the intervals `of` that `motion` violates, from the first to the last; sets their bounds about it.
+    fn violated_in(&mut self, motion: &Motion<2>, of: Range<usize>) -> Option<Range<usize>> {
+        let mut violated: Option<Range<usize>> = None;
+        let mut here = Point::at(&self.references, motion, of.start);
+        let mut anchor = None;
+        for k in of {
+            let next = Point::at(&self.references, motion, k + 1);
+            if self.violates(k, &here, &next, &mut anchor) {
+                let first = violated.map_or(k, |range| range.start);
+                violated = Some(first..k + 1);
+            }
+            here = next;
+        }
+        violated
+    }
+
     /// Whether the input of interval `k` or the state at its end violates its constraint, with the bounds about themselves or smaller
     /// ones. `anchor` is a stage not far away.
     fn violates(&mut self, k: usize, here: &Point, next: &Point, anchor: &mut Option<Anchor>) -> bool {
-        let slack = if matches!(self.kind, Kind::Robust(_)) { CHECK_SLACK } else { ROUNDING };
+        let slack = if matches!(self.kind, Kind::Robust(_)) { RESERVE } else { ROUNDING };
         let exceeds = |value: f64, bound: f64| value > bound * (1.0 + slack);
         let body = &self.body;
         match &mut self.kind {
             Kind::Paper { x_tube, u_tube, inertia_ratio } => {
-                let Point { angles, rates, size, acceleration, .. } = here;
-                let bound = linearise::input_bound(angles.y, *size, acceleration.norm(), *inertia_ratio);
-                let input = || here.turned(body).0.input(body, rates, acceleration).norm();
+                let Point { angles, rates, size, acceleration, pull, .. } = here;
+                let bound = linearise::input_bound(angles.y, *size, *pull, *inertia_ratio);
+                let input = || here.turned().input(body, rates, acceleration).norm();
                 exceeds(next.size, *x_tube) || exceeds(bound, *u_tube) && exceeds(input(), *u_tube)
             }
             Kind::Robust(robust) => {
@@ -362,6 +381,13 @@ impl Sets {
 }
 
 impl Robust {
+    /// Exchanges the bounds for those that are remembered.
+    fn exchange(&mut self) {
+        let Self { rate, moment, remembered, .. } = self;
+        std::mem::swap(rate, &mut remembered.0);
+        std::mem::swap(moment, &mut remembered.1);
+    }
+
     /// Those on ‖ω̃‖ and ‖m̃‖ at stage `k`, with an inside.
     fn bounds(&self, k: usize) -> (f64, f64) {
         let Settings { limit_rate, limit_moment, .. } = self.settings;
@@ -390,15 +416,15 @@ impl Robust {
 
     /// Sets the bounds of interval `k`. Returns ‖m̃‖ of the interval and ‖ω̃‖ at its end.
     fn tighten(&mut self, body: &RigidBody, k: usize, here: &Point, next: &Point) -> (f64, f64) {
-        let at = here.turned(body).0.linearise(body, &here.rates, &here.acceleration).moment;
-        let after = &next.turned(body).1;
+        let at = here.turned().linearise(body, &here.rates, &here.acceleration).moment;
+        let after = next.motion(body);
         self.moment[k] = self.moment_bound_about(k, &at, here, after.moment(&here.acceleration).norm());
         self.rate[k + 1] = self.rate_bound(k + 1, norm_of_columns(&after.rates_by_angles), next, here);
         (at.value.norm(), after.rates.norm())
     }
 
     fn anchor(&self, body: &RigidBody, here: &Point) -> Anchor {
-        let motion = here.turned(body).1;
+        let motion = here.motion(body);
         let feedback = largest_over_box(&motion.moment_by_acceleration);
         // ‖∂W/∂α‖² and ‖∂W/∂β‖² are at most 2, and orthogonal to each other.
         let feedback_by_angles = self.design.largest_inertia * SQRT_2 * 3.0_f64.sqrt();
@@ -418,7 +444,7 @@ impl Robust {
         let Design { largest_inertia, inertia_ratio, .. } = &self.design;
         let a = &here.acceleration;
         let size = next.size.max(here.size).max(anchor.size);
-        let slopes = MomentSlopeBounds::new(size, a.norm(), *inertia_ratio);
+        let slopes = MomentSlopeBounds::new(size, here.pull, *inertia_ratio);
         let (by_angles, by_rates) = (largest_inertia * slopes.by_angles, largest_inertia * slopes.by_rates);
         let turn = (here.angles - anchor.angles).xy().norm();
         let moment =
@@ -451,21 +477,13 @@ impl Robust {
     /// where ∂ω/∂(α, β) has this norm. `before` is the point before.
     fn rate_bound(&self, k: usize, by_angles: f64, here: &Point, before: &Point) -> f64 {
         let Settings { limit_rate, limit_moment, period_optimisation: h, horizon, .. } = self.settings;
-        let tightening = &self.design.tightening;
-        let tick = self.tick(k);
-        // Between two steps the deviation may lie above the line between its bounds at both.
-        let bulge = |tick: usize| {
-            let (angle, rate) = tightening.bulge(tick);
-            rate + by_angles * angle
-        };
-        let bulge = bulge(tick).max(if k == 0 { 0.0 } else { bulge(tick - self.design.ratio) });
-        // So may ‖ω̃‖, by h²/8 times its second derivative. The optimisation knows no point before, so that both accelerations count as one that
+        // Between two steps ‖ω̃‖ may exceed both by h²/8 times its second derivative. The optimisation knows no point before, so that both accelerations count as one that
         // is rarely exceeded; the bound is then the same for it and for the check of its result.
         let typical = limit_moment / self.design.largest_inertia;
-        let a = here.acceleration.norm().max(before.acceleration.norm()).max(typical);
+        let a = here.pull.max(before.pull).max(typical);
         let size = here.size + 2.0 * h * a;
         let curved = 0.125 * h * h * Dynamics::rate_curvature(size, a);
-        let loss = guarantee::rate_loss(tightening.at(tick), by_angles, here.size) + bulge + curved;
+        let loss = self.design.tightening.rate_loss(self.tick(k)).at(by_angles, here.size) + curved;
         let bound = limit_rate * (1.0 - RESERVE) - self.share * loss;
         // ‖x̃_ω‖ ≤ sec β ‖ω̃‖
         if k == horizon {
@@ -488,19 +506,11 @@ impl Robust {
         here: &Point,
     ) -> f64 {
         let Settings { limit_moment, period_optimisation: h, .. } = self.settings;
-        let tightening = &self.design.tightening;
-        let a = here.acceleration.norm();
+        let a = here.pull;
         let size = here.size + h * a;
-        let deviation = tightening.within(self.tick(k));
         let by_angles = self.design.largest_inertia * guarantee::TURN * 3.0_f64.sqrt();
-        let loss = guarantee::moment_loss(
-            &self.dynamics,
-            tightening,
-            deviation,
-            (feedback, by_angles),
-            slopes,
-            (size, a),
-        );
+        let loss = self.design.tightening.moment_loss(self.tick(k));
+        let loss = loss.at((feedback, by_angles), slopes, (size, a));
         let within = (after - value).max(0.0) + 0.125 * h * h * self.dynamics.moment_curvature(size, a);
         limit_moment * (1.0 - RESERVE) - self.share * loss - within
     }
@@ -509,7 +519,11 @@ impl Robust {
     fn margins(&mut self, body: &RigidBody, first: &Point, second: &Point) -> Margins {
         let (moment, rate) = self.tighten(body, 0, first, second);
         let Settings { limit_rate, limit_moment, .. } = self.settings;
-        Margins { rate: (self.rate[1] - rate) / limit_rate, moment: (self.moment[0] - moment) / limit_moment }
+        let left = |bound: f64, value: f64, limit: f64| (bound - value) / limit + RESERVE;
+        Margins {
+            rate: left(self.rate[1], rate, limit_rate),
+            moment: left(self.moment[0], moment, limit_moment),
+        }
     }
 }
 
@@ -597,7 +611,7 @@ mod tests {
             let checked = sets.bounds();
             sets.tighten(&motion, 0..n);
             let exact = sets.bounds();
-            let limit = (1.0 + CHECK_SLACK).powi(2);
+            let limit = (1.0 + RESERVE).powi(2);
             let violates = |&k: &usize| {
                 let input = motion.inputs.get(k + 1).copied().unwrap_or_default();
                 sets.squares(k + 1, &motion.states[k + 1], &input).0 > limit

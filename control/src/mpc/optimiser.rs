@@ -69,10 +69,7 @@ pub trait Bounded<const O: usize>: Constraints<O> {
     /// Whether the bounds of [`Constraints::balls`] are from now on those about the motion that is evaluated, rather than those of the last
     /// [`Self::tighten`], which those of [`Constraints::squares`] stay. Their own derivatives are left out. Nothing to do for bounds that do
     /// not depend on the motion.
-    /// Returns whether they do.
-    fn follow(&mut self, _follow: bool) -> bool {
-        false
-    }
+    fn follow(&mut self, _follow: bool) {}
 
     /// Sets the bounds of the intervals `of` about `motion`: of the state at the end of each, and of its input.
     fn tighten(&mut self, motion: &Motion<O>, of: Range<usize>);
@@ -80,6 +77,12 @@ pub trait Bounded<const O: usize>: Constraints<O> {
     /// Sets the bounds of all intervals about `motion` but those in `skip`. Those that it violates, from the first to the last; the
     /// terminal ball is not looked at.
     fn violated(&mut self, motion: &Motion<O>, skip: Range<usize>) -> Option<Range<usize>>;
+
+    /// Those of the intervals `of` that `motion` violates with the bounds about itself, from the first to the last. The bounds stay as they are. Nothing
+    /// to do for bounds that do not depend on the motion.
+    fn unsettled(&mut self, _motion: &Motion<O>, _of: Range<usize>) -> Option<Range<usize>> {
+        None
+    }
 
     /// ε of the terminal ball.
     fn terminal_radius(&self) -> Option<f64>;
@@ -94,6 +97,8 @@ pub struct Report {
     pub iterations: u32,
     /// What shows it to be the optimum.
     pub certificate: Certificate,
+    /// Whether it is known to keep the bounds about itself.
+    pub settled: bool,
 }
 
 /// What the structure of a controller's problem is.
@@ -132,6 +137,8 @@ struct Search {
     /// Whether the multipliers are those of a similar problem.
     warm: bool,
     iterations: u32,
+    /// Whether the optimum keeps the bounds about itself.
+    settled: bool,
 }
 
 /// All solvers of one controller, with their scratch.
@@ -225,7 +232,7 @@ impl<const O: usize> Optimiser<O> {
                 (Some(multiplier), None) => {
                     multipliers.terminal = multiplier;
                     let status = if outside.is_some() { Status::TerminalBall } else { Status::Unconstrained };
-                    return self.report(bounded, &sample, status, 0);
+                    return Report { settled: true, ..self.report(bounded, &sample, status, 0) };
                 }
                 (_, violated) => search.window = layout.window(violated, outside.is_some()),
             }
@@ -241,7 +248,7 @@ impl<const O: usize> Optimiser<O> {
                     self.begin_at(start, affine, active, &mut search);
                 }
                 self.about.states[0] = *start;
-                status = self.settle(bounded, &sample, &mut search, Self::solve);
+                status = self.settle(bounded, &sample, &mut search, false, Self::solve);
             }
             None if self.settled_by_riccati(bounded, &sample, &mut search) => status = Status::Constrained,
             None => {
@@ -256,32 +263,44 @@ impl<const O: usize> Optimiser<O> {
                 }
             }
         }
-        self.report(bounded, &sample, status, search.iterations)
+        Report { settled: search.settled, ..self.report(bounded, &sample, status, search.iterations) }
     }
 
-    /// The optimum with the bounds about itself: they follow the iterates of the Riccati method, and are set anew about the cone solver's
-    /// optimum until that satisfies its own. One pass is enough for bounds that do not depend on the motion.
+    /// The optimum with the bounds about itself: those about the previous plan, or those that `follow` the iterates of the Riccati method, are set anew
+    /// about the optimum until it satisfies its own. One pass is enough for bounds that do not depend on the motion.
     fn settle<B: Bounded<O>>(
         &mut self,
         bounded: &mut B,
         sample: &Sample<O>,
         search: &mut Search,
+        follow: bool,
         mut solve: impl FnMut(&mut Self, &mut B, &Sample<O>, &mut Search) -> Status,
     ) -> Status {
         let mut status = Status::Fallback;
         for _ in 0..SETTLING_PASSES {
-            let follows = self.settings.nonlinearity == Nonlinearity::Exact && bounded.follow(true);
+            bounded.follow(follow);
+
             status = solve(self, bounded, sample, search);
             bounded.follow(false);
-            if !follows
-                || status == Status::Fallback
-                || bounded.violated(&self.solution.motion, 0..0).is_none()
-            {
+            // Linearised balls would have to be linearised anew as well.
+            if status == Status::Fallback || self.settings.nonlinearity == Nonlinearity::Frozen {
                 break;
             }
+            if follow {
+                bounded.tighten(&self.solution.motion, 0..self.layout.horizon);
+            }
+            // The intervals outside a window have been looked at.
+            let solved = search.window.clone().unwrap_or(0..self.layout.horizon);
+            let Some(unsettled) = bounded.unsettled(&self.solution.motion, solved) else {
+                search.settled = true;
+                break;
+            };
             self.about.clone_from(&self.solution.motion);
             search.warm = true;
-            search.window = None;
+            search.window = search
+                .window
+                .take()
+                .map(|window| window.start.min(unsettled.start)..window.end.max(unsettled.end));
         }
         status
     }
@@ -319,7 +338,7 @@ impl<const O: usize> Optimiser<O> {
         let by_riccati = |this: &mut Self, bounded: &mut B, sample: &Sample<O>, search: &mut Search| {
             if this.by_riccati(bounded, sample, search) { Status::Constrained } else { Status::Fallback }
         };
-        self.settle(bounded, sample, search, by_riccati) == Status::Constrained
+        self.settle(bounded, sample, search, true, by_riccati) == Status::Constrained
     }
 
     /// The optimum with the bounds about `about`, by the Riccati method if it is wanted.
@@ -341,6 +360,7 @@ impl<const O: usize> Optimiser<O> {
         if sample.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
             return Status::Fallback;
         }
+        search.window = None;
         bounded.follow(false);
         bounded.tighten(&self.about, 0..self.layout.horizon);
         self.frozen.set(bounded, &self.about);
@@ -357,6 +377,7 @@ impl<const O: usize> Optimiser<O> {
         sample: &Sample<O>,
         search: &mut Search,
     ) -> bool {
+        search.window = None;
         if !search.warm {
             self.solution.multipliers.clear();
         }
@@ -474,7 +495,8 @@ impl<const O: usize> Optimiser<O> {
         let exact = self.layout.problem(sample, self.layout.end(bounded.terminal_radius()), bounded);
         // By `Bounded::violated`; the other solvers give every ball a multiplier.
         let checked = !matches!(status, Status::Fallback | Status::Kept);
-        Report { status, iterations, certificate: Certificate::of(&exact, &self.solution, checked) }
+        let certificate = Certificate::of(&exact, &self.solution, checked);
+        Report { status, iterations, certificate, settled: false }
     }
 }
 
