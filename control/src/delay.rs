@@ -1,5 +1,8 @@
 //! A known delay between a measurement and the moment that it leads to, made up for by prediction.
 //!
+//! A measurement may also be old already when it arrives, by the delay of a filter. The state is then predicted over both, and the law is asked
+//! for the moment of the time at which it acts.
+//!
 //! The command of the tick at time t acts over [t + delay, t + delay + period). What acts on the vehicle before, over
 //! [t, t + delay), was commanded earlier and is known. So the state at t + delay can be computed from the measured one by the
 //! nominal equations of motion, and the law is asked for the moment of that state and that time. Without disturbances and with
@@ -25,6 +28,27 @@ pub const LONGEST: f64 = 1.0;
 pub const UNDER_WAY: usize = 10_000;
 /// Longest step of the prediction, s.
 const STEP: f64 = 0.01;
+
+/// What lies between the instant that a measurement tells of and the moment that it leads to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Latency {
+    /// How old a measurement is when the law gets it, s.
+    pub measurement: f64,
+    /// How much later the command acts, s.
+    pub action: f64,
+}
+
+impl Latency {
+    /// Of the command alone, s.
+    pub fn of_action(action: f64) -> Self {
+        Self { measurement: 0.0, action }
+    }
+
+    /// Both, s.
+    pub fn total(&self) -> f64 {
+        self.measurement + self.action
+    }
+}
 
 /// Scales a moment (N m) into ‖m‖ ≤ `limit` (N m, infinite for none) and keeps its direction.
 pub fn saturated(moment: Vector3<f64>, limit: f64) -> Vector3<f64> {
@@ -116,21 +140,35 @@ impl<M: Clone> Clone for Memory<M> {
 pub struct Delayed<C> {
     inner: C,
     predictor: Predictor,
+    latency: Latency,
     moment_limit: f64,
 }
 
 impl<C: Controller> Delayed<C> {
-    /// Puts a delay (s) in front of `inner`. `body` is the vehicle as the law believes it to be. `moment_limit` (N m) is the
+    /// Puts a delay in front of `inner`. `body` is the vehicle as the law believes it to be. `moment_limit` (N m) is the
     /// limit that commands are scaled into behind the controller, infinite for none: the prediction counts what is left of them.
     ///
     /// # Errors
-    /// Refuses what [`Predictor::new`] refuses, and a limit that is not positive.
-    pub fn new(inner: C, body: RigidBody, delay: f64, moment_limit: f64) -> Result<Self, DesignError> {
+    /// Refuses what [`Predictor::new`] refuses, either part of the latency if it is negative, and a limit that is not positive.
+    pub fn new(inner: C, body: RigidBody, latency: Latency, moment_limit: f64) -> Result<Self, DesignError> {
         if moment_limit.is_nan() || moment_limit <= 0.0 {
             return Err(DesignError::NotPositive { name: "limit.moment", value: moment_limit });
         }
-        let predictor = Predictor::new(body, delay, inner.period())?;
-        Ok(Self { inner, predictor, moment_limit })
+        let Latency { measurement, action } = latency;
+        if !(0.0..=LONGEST).contains(&measurement) {
+            let name = "measurement.age";
+            return Err(DesignError::OutOfRange { name, value: measurement, low: 0.0, high: LONGEST });
+        }
+        if !(0.0..=LONGEST).contains(&action) {
+            return Err(DesignError::Delay { value: action, longest: LONGEST });
+        }
+        let predictor = Predictor::new(body, latency.total(), inner.period())?;
+        Ok(Self { inner, predictor, latency, moment_limit })
+    }
+
+    /// How much later than its tick a command acts, s.
+    pub fn acts_after(&self) -> f64 {
+        self.latency.action
     }
 
     /// What is left of a command (N m) behind the controller.
@@ -173,7 +211,7 @@ impl<C: Controller> Controller for Delayed<C> {
             return self.inner.update(inner, tick, time, measured, reference);
         }
         let predicted = self.predictor.predict(under_way, measured);
-        let moment = self.inner.update(inner, tick, time + self.predictor.delay, &predicted, reference);
+        let moment = self.inner.update(inner, tick, time + self.latency.action, &predicted, reference);
         // A memory by default has no room yet.
         under_way.resize(self.predictor.count, Vector3::zeros());
         under_way.rotate_left(1);

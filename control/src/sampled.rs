@@ -229,14 +229,17 @@ impl SampledError {
         (radius <= LARGEST_RADIUS).then(|| (60.0 / -radius.max(0.5).ln()).ceil() as usize)
     }
 
-    /// What errors of the measured rate can do within 0, 1, …, `steps` periods, per unit of their bound; they may be anything within it at every
-    /// tick. The motion begins at the measured state.
-    ///
-    /// With e = (0, e_rate) the predicted state is off by A_d e (A_d: `latency`), and so
+    /// What errors of the measured angle and of the measured rate can do within 0, 1, …, `steps` periods, per unit of their bound; they may be anything
+    /// within it at every tick. The motion begins at the measured state.
+    pub fn errors(&self, steps: usize) -> [Vec<Reach>; 2] {
+        [Vector2::new(1.0, 0.0), Vector2::new(self.latency, 1.0)]
+            .map(|newest| self.errors_along(newest, steps))
+    }
+
+    /// With an error e of the measurement the predicted state is off by `newest` = A_d e (A_d: `latency`), and so
     /// ô_n = A_d e_n + Σ_{0<j<n} Φ^{n−1−j} Γ K A_d e_j − Φ^{n−1} A A_d e_0. The vehicle itself deviates by o_n = ô_n − A_d e_n.
-    pub fn errors(&self, steps: usize) -> Vec<Reach> {
-        let Self { gain, period, latency, phi, gamma } = *self;
-        let newest = Vector2::new(latency, 1.0);
+    fn errors_along(&self, newest: Vector2<f64>, steps: usize) -> Vec<Reach> {
+        let Self { gain, period, phi, gamma, .. } = *self;
         let feedback = |deviation: &Vector2<f64>| (gain.row() * deviation).x.abs();
         let (mut sum, mut sum_feedback) = (Vector2::zeros(), 0.0);
         let mut older = gamma * (gain.row() * newest).x;
@@ -387,12 +390,13 @@ mod tests {
     }
 
     #[test]
-    fn oracle_errors_of_the_rate_add_up_as_in_a_simulation() {
-        for latency in [0.0, 0.05] {
+    fn oracle_errors_of_measurement_add_up_as_in_a_simulation() {
+        for (of, latency) in [(0, 0.0), (0, 0.05), (1, 0.0), (1, 0.05)] {
             let error = SampledError::delayed(Gain { k1: -5.0, k2: -4.0 }, 0.04, latency);
             let steps = 12;
             let expected = superposed(steps, steps + 1, |at| {
-                let off = |n: usize| Vector2::new(latency, 1.0) * if n == at { 1.0 } else { 0.0 };
+                let error_of_state = [Vector2::x(), Vector2::new(latency, 1.0)][of];
+                let off = |n: usize| error_of_state * if n == at { 1.0 } else { 0.0 };
                 let mut deviation = -off(0);
                 (0..=steps)
                     .map(|n| {
@@ -404,7 +408,7 @@ mod tests {
                     })
                     .collect()
             });
-            assert_agree(&error.errors(steps), &expected, 1e-12);
+            assert_agree(&error.errors(steps)[of], &expected, 1e-12);
         }
     }
 

@@ -4,7 +4,7 @@ mod harness;
 
 use control::controller::ReferenceAt;
 use control::crmpc::{Constraints, Settings};
-use control::delay::{Memory, Predictor, saturated};
+use control::delay::{Latency, Memory, Predictor, saturated};
 use control::lqr::LqrSettings;
 use control::schedule::Sampled;
 use control::{Controller, Crmpc, Delayed, DesignError, Lqr, Measurement};
@@ -19,7 +19,7 @@ use vehicle::scenario::Scenario;
 const DELAYS: [f64; 5] = [0.04, 0.1, 0.117, 0.12, 0.003];
 
 fn delayed<C: Controller>(inner: C, delay: f64) -> Delayed<C> {
-    Delayed::new(inner, settings(Constraints::Robust).body, delay, f64::INFINITY).unwrap()
+    Delayed::new(inner, settings(Constraints::Robust).body, Latency::of_action(delay), f64::INFINITY).unwrap()
 }
 
 /// A plant on which commands act `delay` (s) after they are given.
@@ -129,7 +129,7 @@ fn oracle_saturated_commands_are_predicted_as_they_act() {
     let limit = 5e4;
     let late = || Late { moment_limit: limit, ..Late::undisturbed(0.1) };
     let body = settings(Constraints::Robust).body;
-    let knowing = largest_error(late(), Delayed::new(lqr(), body, 0.1, limit).unwrap());
+    let knowing = largest_error(late(), Delayed::new(lqr(), body, Latency::of_action(0.1), limit).unwrap());
     let unknowing = largest_error(late(), delayed(lqr(), 0.1));
     assert!(knowing < 1e-9 && unknowing > 1e-3, "{knowing:e}, {unknowing:e}");
 }
@@ -293,14 +293,29 @@ fn the_law_is_told_the_time_at_which_its_moment_acts() {
 }
 
 #[test]
+fn an_old_measurement_is_predicted_to_now_and_the_reference_is_that_of_now() {
+    let latency = Latency { measurement: 0.08, action: 0.0 };
+    let body = settings(Constraints::Robust).body;
+    let mut controller = Delayed::new(Probe::default(), body, latency, f64::INFINITY).unwrap();
+    let measured = Measurement { rates: Vector3::new(0.0, 0.1, 0.0), ..Measurement::default() };
+    controller.update(&mut Memory::default(), 50, 2.0, &measured, &|_| Reference::default());
+    let (time, told) = controller.inner().told.unwrap();
+    assert_eq!((time, controller.acts_after()), (2.0, 0.0));
+    assert!((told.angles - Vector3::new(0.008, 0.0, 0.0)).amax() < 1e-15, "{told:?}");
+}
+
+#[test]
 fn what_cannot_work_is_refused() {
     let body = settings(Constraints::Robust).body;
     for delay in [-0.01, 1.01, f64::NAN, f64::INFINITY] {
-        let refusal = Delayed::new(lqr(), body, delay, f64::INFINITY).map(|_| ());
+        let refusal = Delayed::new(lqr(), body, Latency::of_action(delay), f64::INFINITY).map(|_| ());
         assert!(matches!(refusal, Err(DesignError::Delay { longest: 1.0, .. })), "{delay}: {refusal:?}");
     }
+    let old =
+        Delayed::new(lqr(), body, Latency { measurement: -0.01, action: 0.1 }, f64::INFINITY).map(|_| ());
+    assert!(matches!(old, Err(DesignError::OutOfRange { name: "measurement.age", .. })), "{old:?}");
     assert!(Predictor::new(body, 0.9, 1e-4).is_ok() && Predictor::new(body, 0.9, 1e-5).is_err());
     for limit in [0.0, -1.0, f64::NAN] {
-        assert!(Delayed::new(lqr(), body, 0.1, limit).is_err(), "{limit}");
+        assert!(Delayed::new(lqr(), body, Latency::of_action(0.1), limit).is_err(), "{limit}");
     }
 }

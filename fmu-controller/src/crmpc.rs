@@ -148,7 +148,7 @@ impl Law for CrmpcLaw {
             inertia_error: self.inertia_error,
             angle_error: self.angle_error,
             rate_error: self.rate_error,
-            delay: vehicle.delay,
+            delay: vehicle.latency.total(),
             sideslip_domain: self.sideslip_domain,
             guarantee: item(&GUARANTEES, self.guarantee),
             observer: self.observer,
@@ -178,7 +178,7 @@ impl Law for CrmpcLaw {
         let ends = after.ended == 1 && before.ended == 0;
         match (before.standing, after.standing) {
             (_, Standing::Exceeded) if ends => Some(
-                "the guarantee is no longer in force: the vehicle is further from the plan than disturbance.bound, inertia.error, estimation.* and delay explain",
+                "the guarantee is no longer in force: the vehicle is further from the plan than disturbance.bound, inertia.error, estimation.*, measurement.age and delay explain",
             ),
             (Standing::None, Standing::Uncertified) => {
                 Some("the guarantee is not in force: no plan keeps its conditions from the present state")

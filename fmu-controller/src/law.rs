@@ -2,6 +2,7 @@
 
 use crate::unit::Unit;
 use control::Controller;
+use control::delay::Latency;
 use fmi2_export::{Failure, Table};
 use serde::{Serialize, de::DeserializeOwned};
 use vehicle::dynamics::RigidBody;
@@ -17,8 +18,8 @@ pub(crate) struct Vehicle {
     pub(crate) limit_moment: f64,
     /// Whether the commanded moment is scaled into its limit.
     pub(crate) saturation: bool,
-    /// Time from a measurement until the moment that it leads to acts, s. The law sees the state predicted over it.
-    pub(crate) delay: f64,
+    /// What lies between the instant that a measurement tells of and the moment that it leads to. The law sees the state predicted over it.
+    pub(crate) latency: Latency,
 }
 
 impl Vehicle {

@@ -175,7 +175,11 @@ fn vehicle<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
     let saturation = parameter("saturation", "Whether the commanded moment is scaled into limit.moment");
     let delay = parameter(
         "delay",
-        "Time from a measurement until the moment that it leads to acts on the vehicle; the law predicts the state over it",
+        "Time from a tick until the moment that it leads to acts on the vehicle; the law predicts the state over it",
+    );
+    let age = parameter(
+        "measurement.age",
+        "How old a measurement is when it arrives, by the delay of an estimator's filter for instance; the law predicts the state over it",
     );
     table
         .real(moment_of_inertia("inertia.Ixx", "Roll moment of inertia").min(1.0), |m| {
@@ -195,7 +199,10 @@ fn vehicle<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
         .real(moment.unit(unit::moment()).min(1e-3).nominal(1e5), |m| &mut m.parameters.limit_moment)
         .boolean(saturation, |m| &mut m.parameters.saturation)
         .real(delay.real().unit(unit::time()).min(0.0).max(delay::LONGEST).nominal(0.1), |m| {
-            &mut m.parameters.delay
+            &mut m.parameters.latency.action
+        })
+        .real(age.real().unit(unit::time()).min(0.0).max(delay::LONGEST).nominal(0.1), |m| {
+            &mut m.parameters.latency.measurement
         })
 }
 

@@ -84,7 +84,7 @@ fn a_tick_evaluated_with_other_inputs_leaves_no_trace() {
 }
 
 fn assert_any_communication_steps_give_the_same_moments<L: Law>(delay: f64) {
-    let start = || ready(|unit: &mut Unit<L>| unit.parameters.delay = delay);
+    let start = || ready(|unit: &mut Unit<L>| unit.parameters.latency.action = delay);
     let mut reference = start();
     let expected: Vec<_> = (0..10_u32)
         .map(|k| {
@@ -204,7 +204,7 @@ fn sliding_modes_scale_into_the_limit_themselves() {
 /// The states at the ticks of a loop with saturation, from `start` (s), and the delay (s) that the law knows and the plant has.
 fn saturated_loop(start: f64, delay: f64, ticks: u32) -> Vec<State> {
     let mut unit: Lqr = Lqr::new();
-    (unit.parameters.saturation, unit.parameters.delay) = (true, delay);
+    (unit.parameters.saturation, unit.parameters.latency.action) = (true, delay);
     unit.initialize(&Context { start_time: start, ..context() }).unwrap();
     let mut config = Scenario::crmpc2022().config(0.01);
     (config.inertia_scale, config.disturbance, config.moment_delay) = (1.0, Disturbance::default(), delay);
@@ -237,7 +237,7 @@ fn oracle_a_known_delay_shifts_the_loop_and_does_nothing_else_even_in_saturation
 fn an_external_reference_counts_when_the_moment_acts() {
     let mut unit: Lqr = ready(|unit: &mut Lqr| {
         unit.parameters.reference.profile = 7;
-        unit.parameters.delay = 0.1;
+        unit.parameters.latency.action = 0.1;
     });
     unit.input.reference = Reference { angles: unit.input.measured.angles, ..Reference::default() };
     unit.calculate(0.0).unwrap();
@@ -249,6 +249,6 @@ fn an_external_reference_counts_when_the_moment_acts() {
 
 #[test]
 fn a_delay_out_of_range_is_refused_by_name() {
-    let text = refusal::<Lqr>(|unit| unit.parameters.delay = 1.1);
+    let text = refusal::<Lqr>(|unit| unit.parameters.latency.action = 1.1);
     assert!(text.contains("delay = 1.1 s"), "{text}");
 }

@@ -5,7 +5,7 @@ use crate::reference::{self, Source};
 use crate::table;
 use crate::ticks::{self, Ticked};
 use control::controller::{Controller, Measurement};
-use control::delay::Delayed;
+use control::delay::{Delayed, Latency};
 use control::schedule::Sampled;
 use fmi2_export::{Context, Description, Failure, Inputs, Model};
 use nalgebra::Vector3;
@@ -40,7 +40,7 @@ pub(crate) struct Parameters {
     pub(crate) limit_rate: f64,
     pub(crate) limit_moment: f64,
     pub(crate) saturation: bool,
-    pub(crate) delay: f64,
+    pub(crate) latency: Latency,
     /// Whether the input `achieved_moment` is fed; declared by laws that use it.
     pub(crate) achieved_moment_used: bool,
 }
@@ -80,15 +80,15 @@ impl<L: Law> Unit<L> {
     }
 
     fn vehicle(&self) -> Result<Vehicle, Failure> {
-        let Parameters { inertia, limit_rate, limit_moment, saturation, delay, .. } = self.parameters;
+        let Parameters { inertia, limit_rate, limit_moment, saturation, latency, .. } = self.parameters;
         let body = inertia.body(1.0).map_err(|error| Failure::Error(error.to_string()))?;
-        Ok(Vehicle { body, limit_rate, limit_moment, saturation, delay })
+        Ok(Vehicle { body, limit_rate, limit_moment, saturation, latency })
     }
 
     fn design(&self) -> Result<Delayed<L::Controller>, Failure> {
         let vehicle = self.vehicle()?;
         let law = self.law.design(&vehicle)?;
-        let delayed = Delayed::new(law, vehicle.body, vehicle.delay, vehicle.saturates_at());
+        let delayed = Delayed::new(law, vehicle.body, vehicle.latency, vehicle.saturates_at());
         delayed.map_err(|error| Failure::Error(error.to_string()))
     }
 }
@@ -106,7 +106,7 @@ impl<L: Law> Ticked for Unit<L> {
             Measurement { achieved_moment: used.then_some(input.achieved_moment), ..input.measured };
         let now = sampled.next_time(controller.period());
         // Of an external reference the law takes the present value for that of the time at which its moment acts.
-        let known = now + controller.predictor().delay();
+        let known = now + controller.acts_after();
         let external = match source {
             Source::External => input.reference,
             Source::Profile(_) => Reference::default(),
@@ -145,7 +145,7 @@ impl<L: Law> Model for Unit<L> {
                 limit_rate: scenario.limit_rate,
                 limit_moment: scenario.limit_moment,
                 saturation: false,
-                delay: 0.0,
+                latency: Latency::default(),
                 achieved_moment_used: false,
             },
             input: Input {

@@ -59,16 +59,22 @@ fn values(deviation: &Deviation) -> [f64; 7] {
     [angle, rate, seen_angle, seen_rate, feedback, feedback_norm, feedback_moment]
 }
 
-fn deviation(s: &Settings, drive: &Drive, reach: &Bounds, errors: &Bounds, shifts: &Bounds) -> Deviations {
+fn deviation(
+    s: &Settings,
+    drive: &Drive,
+    reach: &Bounds,
+    errors: [&Bounds; 2],
+    shifts: &Bounds,
+) -> Deviations {
     let number = Interval::from;
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
     let [rate_error, angle_error, tau, delay] =
         [s.rate_error, s.angle_error, s.period_feedback, s.delay].map(number);
-    let errors: Bounds = std::array::from_fn(|i| (errors[i] + shifts[i]) * rate_error);
+    let errors: Bounds = std::array::from_fn(|i| errors[0][i] * angle_error + errors[1][i] * rate_error);
     let swing = shifts.map(|shift| shift * drive.swing);
     let between = tau.square() / number(8.0) * (drive.norm * (Interval::ONE + reach[4]) + root3 * errors[4]);
     [
-        reach[0] * drive.norm_of_two + root2 * (errors[0] + angle_error) + swing[0] + between,
+        reach[0] * drive.norm_of_two + root2 * errors[0] + swing[0] + between,
         reach[1] * drive.norm + root3 * errors[1] + swing[1],
         reach[2] * drive.norm_of_two + root2 * errors[2] + swing[2],
         reach[3] * drive.norm + root3 * errors[3] + swing[3],
@@ -130,8 +136,9 @@ pub fn check(
     let axis = Axis::new(s.feedback, s.period_feedback, s.delay)?;
     let drive = drive(s, lemmas);
     let (reach, errors, shifts) = (axis.reach(steps), axis.errors(steps), axis.shifts(steps));
-    let all: Vec<Deviations> =
-        (0..reach.len()).map(|n| deviation(s, &drive, &reach[n], &errors[n], &shifts[n])).collect();
+    let all: Vec<Deviations> = (0..reach.len())
+        .map(|n| deviation(s, &drive, &reach[n], [&errors[0][n], &errors[1][n]], &shifts[n]))
+        .collect();
     let forever = all.last()?;
 
     let mut findings = Vec::new();

@@ -160,14 +160,19 @@ impl Axis {
         all
     }
 
-    /// What errors of the rate of up to 1 at every tick can do, as [`Self::reach`].
-    pub fn errors(&self, steps: usize) -> Vec<Bounds> {
-        let newest = [self.latency, Interval::ONE];
+    /// What errors of the angle and of the rate of up to 1 at every tick can do, as [`Self::reach`].
+    pub fn errors(&self, steps: usize) -> [Vec<Bounds>; 2] {
+        [[Interval::ONE, Interval::ZERO], [self.latency, Interval::ONE]]
+            .map(|newest| self.errors_along(&newest, steps))
+    }
+
+    /// The predicted state is off by `newest`.
+    fn errors_along(&self, newest: &Pair, steps: usize) -> Vec<Bounds> {
         let half = Interval::from(0.5) * self.period.square();
-        let held = along(&self.gain, &newest);
+        let held = along(&self.gain, newest);
         let sums = self.series(&[half * held, self.period * held], steps);
         // −Φⁿ⁻¹ A A_d e₀.
-        let first = [self.latency + self.period, Interval::ONE];
+        let first = [newest[0] + self.period * newest[1], newest[1]];
         let fed = held.abs();
         let bounds = |sum: &[Interval; 3], first: &[Interval; 3]| {
             let own = [sum[0] + first[0], sum[1] + first[1]];

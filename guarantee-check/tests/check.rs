@@ -20,7 +20,8 @@ fn assert_all(findings: &[Finding]) {
 
 #[test]
 fn every_bound_holds_for_the_published_settings_and_with_a_delay() {
-    for settings in [Settings::new(Constraints::Robust), with(-3.0, -4.0, 0.04), with(-2.0, -4.0, 0.04)] {
+    let delayed = [with(-3.0, -4.0, 0.04), with(-2.0, -4.0, 0.04), with(-2.0, -4.0, 0.116)];
+    for settings in [Settings::new(Constraints::Robust), with(-5.0, -5.0, 0.0)].into_iter().chain(delayed) {
         let report = Report::new(&settings, GAP).unwrap();
         for (_, findings) in report.sections() {
             assert!(!findings.is_empty());

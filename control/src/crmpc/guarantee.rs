@@ -281,8 +281,10 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     let parts = Parts::new(s, &dynamics);
     let at: Vec<Deviation> = match s.initial_state {
         InitialState::Measured | InitialState::Nominal => {
-            let all = error.reach(steps).into_iter().zip(error.errors(steps)).zip(error.shifts(steps));
-            all.map(|((reach, errors), shifts)| parts.deviation(s, &reach, &errors, &shifts)).collect()
+            let [of_angles, of_rates] = error.errors(steps);
+            let all =
+                error.reach(steps).into_iter().zip(of_angles.iter().zip(&of_rates)).zip(error.shifts(steps));
+            all.map(|((reach, errors), shifts)| parts.deviation(s, &reach, errors, &shifts)).collect()
         }
         InitialState::Tube => {
             // Fully grown from the start: the plan may begin anywhere in the set that Δ cannot drive the deviation out of.
@@ -290,7 +292,8 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
             let set =
                 error.invariant_set(lateral(s)).ok_or(DesignError::NotReal { name: "feedback" })?.reach();
             let reach = last(error.reach(steps)).or(&set);
-            vec![parts.deviation(s, &reach, &last(error.errors(steps)), &last(error.shifts(steps)))]
+            let [of_angles, of_rates] = error.errors(steps).map(last);
+            vec![parts.deviation(s, &reach, (&of_angles, &of_rates), &last(error.shifts(steps)))]
         }
     };
     let last = at.len() - 1;
@@ -373,20 +376,16 @@ impl Parts {
         }
     }
 
-    /// `reach` is per unit of disturbance, `errors` per unit of the error of the rate, `shifts` per unit of the rate at which angles are shifted.
-    fn deviation(&self, s: &Settings, reach: &Reach, errors: &Reach, shifts: &Reach) -> Deviation {
+    /// `reach` is per unit of disturbance, `errors` per unit of the errors of angle and rate, `shifts` per unit of the rate at which angles are shifted.
+    fn deviation(&self, s: &Settings, reach: &Reach, errors: (&Reach, &Reach), shifts: &Reach) -> Deviation {
         let root3 = 3.0_f64.sqrt();
-        // The error of the angles moves no faster than that of the rates is large.
-        let errors = errors.plus(shifts).times(s.rate_error);
+        let errors = errors.0.times(s.angle_error).plus(&errors.1.times(s.rate_error));
         let swing = shifts.times(self.swing);
         let tau = s.period_feedback;
         // Between two ticks an angle is off its line by no more than this.
         let between = tau * tau / 8.0 * (self.norm * (1.0 + reach.feedback) + root3 * errors.feedback);
         Deviation {
-            angle: reach.angle * self.norm_of_two
-                + SQRT_2 * (errors.angle + s.angle_error)
-                + swing.angle
-                + between,
+            angle: reach.angle * self.norm_of_two + SQRT_2 * errors.angle + swing.angle + between,
             rate: reach.rate * self.norm + root3 * errors.rate + swing.rate,
             seen_angle: reach.seen_angle * self.norm_of_two + SQRT_2 * errors.seen_angle + swing.seen_angle,
             seen_rate: reach.seen_rate * self.norm + root3 * errors.seen_rate + swing.seen_rate,

@@ -4,7 +4,7 @@
 
 use super::{CHECK, platform};
 use control::crmpc::{Constraints, Crmpc, InitialState, Memory, Settings, Standing};
-use control::delay::Delayed;
+use control::delay::{Delayed, Latency};
 use control::error::DesignError;
 use control::estimation::{self, Alignment, Estimator, mems_corrections};
 use control::sampled::Gain;
@@ -153,8 +153,7 @@ fn signs(vector: &Vector3<f64>) -> Vector3<f64> {
 pub enum Sight {
     /// The true state.
     Exact,
-    /// Angles and x_ω with errors that follow this course within the bounds of the settings. The errors of the angles move towards it no
-    /// faster than the bound on the errors of the rates.
+    /// Angles and x_ω with errors that follow this course within the bounds of the settings.
     Errors(Course),
     /// What the estimator makes of the typical MEMS sensors with noise of this seed.
     Estimator(u64),
@@ -181,6 +180,8 @@ pub struct Flight {
     pub hold: f64,
     /// What the controller sees.
     pub sight: Sight,
+    /// How old that is, s: a part of the delay of the settings.
+    pub age: f64,
     /// Seed of whatever is drawn on the way.
     pub seed: u64,
     /// s.
@@ -237,6 +238,7 @@ impl Flight {
             disturbance: Course::Constant(Vector3::zeros()),
             hold: 0.04,
             sight: Sight::Exact,
+            age: 0.0,
             seed: 0,
             duration: scenario.duration,
         }
@@ -294,7 +296,8 @@ impl Flight {
     pub fn fly_seen(&self, mut observe: impl FnMut(&Memory, u64, &Measurement, &Reference)) -> Shown {
         let s = &self.settings;
         let law = Crmpc::new(*s).unwrap();
-        let mut controller = Delayed::new(law, s.body, s.delay, s.limit_moment).unwrap();
+        let latency = Latency { measurement: self.age, action: s.delay - self.age };
+        let mut controller = Delayed::new(law, s.body, latency, s.limit_moment).unwrap();
         let mut memory = controller.memory();
         let mut vehicle = Vehicle::new(self);
         let mut disturbance = Progress::new(&self.disturbance, self.seed);
@@ -369,7 +372,7 @@ impl Vehicle {
             body: RigidBody::new(body.inertia * flight.inertia_scale).unwrap(),
             state: plant::state(&flight.angles, &flight.rates),
             commanded: Vector3::zeros(),
-            transport: Transport::new(*delay).unwrap(),
+            transport: Transport::new(delay - flight.age).unwrap(),
         }
     }
 
@@ -410,19 +413,17 @@ impl Vehicle {
 /// What makes measurements of the motion.
 struct Eyes {
     errors: Option<Progress>,
-    /// Bounds on the errors of angles (rad) and rates (rad/s), and the time between measurements (s).
-    bounds: (f64, f64, f64),
-    angle_error: Vector3<f64>,
+    /// Bounds on the errors of angles (rad) and rates (rad/s).
+    bounds: (f64, f64),
     estimation: Option<(Sensors, Estimator, estimation::Memory)>,
     largest: (f64, f64),
-    /// Error of the angles at the last tick, rad, and the largest change of one of them from tick to tick, rad.
-    last: Option<Vector3<f64>>,
-    largest_change: f64,
+    /// Angles and rates at the checks since the instant that a measurement of now tells of; empty if that is now.
+    past: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
 impl Eyes {
     fn new(flight: &Flight) -> Self {
-        let Settings { angle_error, rate_error, period_feedback, .. } = flight.settings;
+        let Settings { angle_error, rate_error, .. } = flight.settings;
         let errors = match &flight.sight {
             Sight::Errors(course) => Some(Progress::new(course, flight.seed.wrapping_add(1 << 32))),
             Sight::Exact | Sight::Estimator(_) => None,
@@ -433,6 +434,7 @@ impl Eyes {
                     corrections: mems_corrections(),
                     alignment: Alignment::Given,
                     initial: flight.angles,
+                    prediction: flight.age == 0.0,
                     ..estimation::Settings::default()
                 };
                 let estimator = Estimator::new(settings).unwrap();
@@ -443,19 +445,30 @@ impl Eyes {
         };
         let mut eyes = Self {
             errors,
-            bounds: (angle_error, rate_error, period_feedback),
-            angle_error: Vector3::zeros(),
+            bounds: (angle_error, rate_error),
             estimation,
             largest: (0.0, 0.0),
-            last: None,
-            largest_change: 0.0,
+            past: Vec::new(),
         };
-        eyes.sample(0.0, &Vehicle::new(flight));
+        let (vehicle, steps) = (Vehicle::new(flight), (flight.age / CHECK).round() as usize);
+        if steps > 0 {
+            eyes.past = vec![(vehicle.angles(), vehicle.rates()); steps + 1];
+        }
+        eyes.sample(0.0, &vehicle);
         eyes
+    }
+
+    /// Angles and rates that a measurement of now tells of.
+    fn past(&self, vehicle: &Vehicle) -> (Vector3<f64>, Vector3<f64>) {
+        self.past.first().copied().unwrap_or_else(|| (vehicle.angles(), vehicle.rates()))
     }
 
     /// Takes a sample of the sensors.
     fn sample(&mut self, time: f64, vehicle: &Vehicle) {
+        if !self.past.is_empty() {
+            self.past.remove(0);
+            self.past.push((vehicle.angles(), vehicle.rates()));
+        }
         if let Some((sensors, estimator, memory)) = &mut self.estimation {
             let truth = platform::Truth { time, angles: vehicle.angles(), rates: vehicle.rates() };
             sensors.take(time, &platform::felt(&truth));
@@ -468,15 +481,13 @@ impl Eyes {
 
     /// What the controller sees at a tick.
     fn look(&mut self, time: f64, vehicle: &Vehicle) -> Measurement {
-        let (angles, rates) = (vehicle.angles(), vehicle.rates());
+        let (angles, rates) = self.past(vehicle);
         let angle_rates = kinematics::r(&angles) * rates;
-        let (angle_bound, rate_bound, period) = self.bounds;
+        let (angle_bound, rate_bound) = self.bounds;
         let mut measured = Measurement { angles, rates, ..Measurement::default() };
         if let Some(errors) = &mut self.errors {
             let error = errors.at(time, vehicle);
-            let way = error * angle_bound - self.angle_error;
-            self.angle_error += way.map(|way| way.clamp(-rate_bound * period, rate_bound * period));
-            measured.angles = angles + self.angle_error;
+            measured.angles = angles + error * angle_bound;
             measured.rates = kinematics::r_inverse(&measured.angles) * (angle_rates + error * rate_bound);
         }
         if let Some((_, _, memory)) = &self.estimation {
@@ -488,19 +499,21 @@ impl Eyes {
         let of_angles = measured.angles - angles;
         *angle = angle.max(of_angles.amax());
         *rate = rate.max(of_rates.amax());
-        let change = self.last.map_or(0.0, |last| (of_angles - last).amax());
-        self.largest_change = self.largest_change.max(change);
-        self.last = Some(of_angles);
+        if std::env::var("EYES").is_ok() {
+            let a = angle_rates;
+            println!(
+                "E {time:.2} {} {} {} {} {} {} {} {} {}",
+                of_angles.x, of_angles.y, of_angles.z, of_rates.x, of_rates.y, of_rates.z, a.x, a.y, a.z
+            );
+        }
         measured
     }
 
     /// Whether the errors have kept to the bounds of the settings.
     fn within_bounds(&self) -> bool {
-        let (angle, rate, period) = self.bounds;
+        let (angle, rate) = self.bounds;
         let within = |value: f64, bound: f64| value <= bound * (1.0 + SLACK) + 1e-12;
-        within(self.largest.0, angle)
-            && within(self.largest.1, rate)
-            && within(self.largest_change, rate * period)
+        within(self.largest.0, angle) && within(self.largest.1, rate)
     }
 }
 

@@ -1,0 +1,67 @@
+//! The check for the settings of every experiment that claims the guarantee, as its file has them.
+
+use control::crmpc::{Constraints, Settings};
+use guarantee_check::Report;
+use std::path::Path;
+use toml::Value;
+
+const GAP: f64 = 3e-3;
+
+/// A value in SI units.
+fn quantity(value: &Value) -> f64 {
+    match value {
+        Value::Float(number) => *number,
+        Value::Integer(number) => f64::from(i32::try_from(*number).unwrap()),
+        Value::String(text) => {
+            let (number, unit) = text.split_once(' ').unwrap();
+            assert!(unit.starts_with("deg"), "{text}");
+            number.parse::<f64>().unwrap().to_radians()
+        }
+        other => panic!("{other}"),
+    }
+}
+
+/// The settings of the component `controller`.
+fn settings(experiment: &str) -> Settings {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../orchestrator/experiments/crmpc-2022");
+    let text = std::fs::read_to_string(folder.join(experiment)).unwrap();
+    let table: toml::Table = text.parse().unwrap();
+    let mut s = Settings::new(Constraints::Robust);
+    for (name, value) in table["components"]["controller"]["parameters"].as_table().unwrap() {
+        match name.as_str() {
+            "feedback.k1" => s.feedback.k1 = quantity(value),
+            "feedback.k2" => s.feedback.k2 = quantity(value),
+            "delay" | "measurement.age" => s.delay += quantity(value),
+            "disturbance.bound" => s.disturbance_bound = quantity(value),
+            "estimation.angleError" => s.angle_error = quantity(value),
+            "estimation.rateError" => s.rate_error = quantity(value),
+            "inertia.error" => s.inertia_error = quantity(value),
+            "limit.rate" => s.limit_rate = quantity(value),
+            "limit.moment" => s.limit_moment = quantity(value),
+            "constraints" => assert_eq!(value.as_str(), Some("robust")),
+            "initialState" => assert_eq!(value.as_str(), Some("measured")),
+            "horizon" => assert_eq!(value.as_integer(), i64::try_from(s.horizon).ok()),
+            "period.feedback" => s.period_feedback = quantity(value),
+            "period.optimisation" => s.period_optimisation = quantity(value),
+            // What the bounds do not depend on.
+            _ => {
+                let free = ["reference.", "weight.", "terminal.", "tube.", "inertia.I", "saturation"];
+                assert!(free.iter().any(|prefix| name.starts_with(prefix)), "{name}");
+            }
+        }
+    }
+    s
+}
+
+#[test]
+fn every_bound_holds_for_the_experiments() {
+    for experiment in ["crmpc-robust.toml", "estimator.toml"] {
+        let report = Report::new(&settings(experiment), GAP).unwrap();
+        for (_, findings) in report.sections() {
+            for finding in findings {
+                assert!(finding.holds(), "{experiment}: {finding:?}");
+            }
+        }
+        assert!(report.holds(), "{experiment}");
+    }
+}
