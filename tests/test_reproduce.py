@@ -96,12 +96,44 @@ def test_crmpc_needs_a_third_less_effort_than_dlmpc_with_the_printed_gains(resul
 
 def test_the_loop_with_estimator_is_stable_and_the_robust_set_keeps_its_limits(results):
     # As many seeds as are run here; of the whole study 100.
-    assert all(len(metric(results, run, "cms")) == MEMBERS for run in ["crmpc-counted-est", "lqr-est"])
+    assert all(len(metric(results, run, "cms")) == MEMBERS for run in ["crmpc-guaranteed-est", "lqr-est"])
     checks = claim(results, "sensors, filter")["checks"]
     assert len(checks) == 4 and all(check["held"] == check["of"] for check in checks)
-    for run in ["crmpc-counted-est", "crmpc-robust-est"]:
+    for run in ["crmpc-guaranteed-est", "crmpc-robust-est"]:
         assert max(metric(results, run, "max_rate_deg_s")) < 5.0 and max(metric(results, run, "max_moment_ratio")) < 1.0
         assert max(metric(results, run, "fallbacks")) == 0
+    # From the second tick on, when the first command acts.
+    assert min(metric(results, "crmpc-guaranteed-est", "guarantee_share")) > 0.999
+
+
+def test_the_map_of_the_guarantee(results):
+    """Where the design accepts, the guarantee is in force and kept; further disturbance, error or delay is refused."""
+    accepted = {}
+    for run, result in results["runs"].items():
+        if not run.startswith("map-"):
+            continue
+        metrics = result["members"][0]["metrics"]
+        accepted[run[4:]] = metrics["guarantee_share"] > 0.9
+        assert metrics["guarantee_broken"] is False
+        assert metrics["max_rate_deg_s"] <= 5.0 and metrics["max_moment_ratio"] <= 1.0 + 1e-12
+        # The delay that is known, the errors that are counted, and what is lost of the first ticks.
+        assert accepted[run[4:]] or metrics["guarantee_share"] == 0.0
+    assert len(accepted) == 45
+    for delay in ["000", "040", "117"]:
+        for error, largest in [("e0", 20), ("e1", 10), ("e2", 5)]:
+            bounds = [bound for bound in [5, 10, 15, 20, 25] if accepted[f"{delay}-{error}-b{bound:02}"]]
+            assert bounds == [bound for bound in [5, 10, 15, 20, 25] if bound <= (10 if (delay, error) == ("000", "e2") else largest)]
+
+
+def test_prediction_makes_up_for_a_delay(results):
+    """What a delay costs in effort and beyond the limits, known and not."""
+    for law in ["robust", "paper", "dlmpc", "lqr"]:
+        known, unknown = (
+            results["runs"][f"delay-200-{law}{way}"]["members"][0]["metrics"] for way in ["-predicted", ""]
+        )
+        without = results["runs"][f"delay-000-{law}"]["members"][0]["metrics"]
+        assert known["cms"] < 1.1 * without["cms"] and unknown["cms"] > 1.35 * without["cms"], law
+        assert known["max_rate_deg_s"] < 1.03 * without["max_rate_deg_s"], law
 
 
 def test_oracle_crmpc_comes_near_the_clairvoyant_optimum_of_its_sets(results):
@@ -138,7 +170,7 @@ def test_exits_change_the_time_and_not_the_motion(results):
 
 def test_parameters_are_shown_in_the_unit_of_their_heading(report):
     page = (report[1] / "report.html").read_text()
-    row = page.split("What counting the errors of measurement costs")[1].split("errors counted, estimator")[1]
+    row = page.split("Where the guarantee can be given")[1].split("errors 0.2 deg, 0.2 deg/s; disturbance 2.0 deg/s²")[1]
     # 0.2 deg/s and 2 deg/s2, which the unit holds in rad.
     assert re.findall(r"<td[^>]*>([^<]*)</td>", row)[:2] == ["0.2", "2"]
 

@@ -61,6 +61,8 @@ pub struct Tightening {
     pub norm: f64,
     /// The part of it that F does between two ticks beyond what the law meant, rad/s².
     pub mismatch: f64,
+    /// What the observer of the disturbance shows at most, each component, rad/s²: Δ̄, the inertia's part, the mismatch and the errors of the rates.
+    pub observable: f64,
 }
 
 impl Tightening {
@@ -318,7 +320,12 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
         RateLoss { by_angles: with_bulge(|d| d.angle), ..RateLoss::new(angle, with_bulge(|d| d.rate)) }
     });
     let (moment, rate) = (moment.collect(), rate.collect());
-    let tightening = Tightening { moment, rate, bearing, norm: parts.norm, mismatch: parts.mismatch, at };
+    // A filter of first order makes of the differences of errors no more than this.
+    let observable = s.disturbance_bound
+        + (parts.norm - 3.0_f64.sqrt() * s.disturbance_bound)
+        + 2.0 * s.rate_error / s.observer.time_constant;
+    let tightening =
+        Tightening { moment, rate, bearing, norm: parts.norm, mismatch: parts.mismatch, observable, at };
     let assessment = assess(s, &dynamics, &tightening);
     Ok((tightening, assessment))
 }

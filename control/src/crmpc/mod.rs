@@ -189,7 +189,12 @@ impl Crmpc {
     /// One optimisation at `time` from the measured state (Θ, x_ω): leaves the plan and the report in `memory`.
     fn optimise(&mut self, memory: &mut Memory, time: f64, measured: Vector6<f64>, reference: ReferenceAt) {
         let clock = Instant::now();
-        self.preview(time, reference, memory.observed.shift(&self.settings));
+        let shift = if memory.assured() || !memory.started {
+            memory.observed.shift(&self.settings)
+        } else {
+            Vector3::zeros()
+        };
+        self.preview(time, reference, shift);
         let first = !memory.started;
         if first {
             memory.plan.resize(self.settings.horizon);
@@ -238,6 +243,9 @@ impl Crmpc {
     /// assumptions explain. Without any, what violates the limits least.
     fn plan_robustly(&mut self, memory: &mut Memory, measured: &Vector6<f64>, first: bool) -> mpc::Report {
         let assured = memory.assured();
+        if !self.credible(memory) {
+            return self.violate_least(memory, measured, 0);
+        }
         let goes_on = (memory.plan.states[0], memory.age);
         let starts = match self.settings.initial_state {
             InitialState::Nominal if assured => [Some(goes_on), None],
@@ -272,7 +280,7 @@ impl Crmpc {
     fn take_over(&mut self, memory: &mut Memory, certified: Option<Certified>) {
         let Some(Certified { margins, braking }) = certified else {
             memory.margins = self.sets.margins(self.optimiser.motion());
-            memory.standing = self.without_guarantee();
+            memory.standing = self.without_guarantee(memory);
             return;
         };
         (memory.margins, memory.plan.braking) = (margins, braking);
@@ -315,7 +323,7 @@ impl Crmpc {
 
     /// The optimum with less of the tightening, or the terminal law from the measured state, with as much of its moment as there is.
     fn violate_least(&mut self, memory: &mut Memory, measured: &Vector6<f64>, tried: u32) -> mpc::Report {
-        memory.standing = self.without_guarantee();
+        memory.standing = self.without_guarantee(memory);
         memory.age = 0;
         let mut iterations = tried;
         for share in LESS {
@@ -334,8 +342,20 @@ impl Crmpc {
         report
     }
 
-    fn without_guarantee(&self) -> Standing {
-        if self.design.counted < 1.0 { Standing::Refused } else { Standing::Uncertified }
+    /// Whether the disturbance that is observed is one that the assumptions explain.
+    fn credible(&self, memory: &Memory) -> bool {
+        memory.observed.disturbance.amax() <= self.design.tightening.observable
+    }
+
+    /// What is said of a plan that is not certified.
+    fn without_guarantee(&self, memory: &Memory) -> Standing {
+        if self.design.counted < 1.0 {
+            Standing::Refused
+        } else if self.credible(memory) {
+            Standing::Uncertified
+        } else {
+            Standing::Exceeded
+        }
     }
 
     /// The optimum from `start` with the bounds about the previous plan; without one (`first`) about itself.
@@ -486,9 +506,12 @@ impl Controller for Crmpc {
         let (nominal_angles, nominal_rates) = split(&memory.nominal);
         let (off_angles, off_rates) = (measured.angles - nominal_angles, angle_rates - nominal_rates);
         let gain = self.settings.feedback;
-        let commanded = a + off_angles * gain.k1 + off_rates * gain.k2;
-        let Settings { body, limit_moment, .. } = &self.settings;
         let robust = self.settings.constraints == Constraints::Robust;
+        // Without guarantee the disturbance is made up for at once: no plan keeps moment back for it.
+        let compensates = robust && self.settings.observer.active && !memory.assured();
+        let against = if compensates { -memory.observed.disturbance } else { Vector3::zeros() };
+        let commanded = a + off_angles * gain.k1 + off_rates * gain.k2 + against;
+        let Settings { body, limit_moment, .. } = &self.settings;
         let moment = if robust {
             self.moment_over_the_period(&measured.angles, &angle_rates, &commanded)
         } else {
@@ -497,6 +520,7 @@ impl Controller for Crmpc {
         let excess = moment.norm() / limit_moment;
         if robust {
             let explained = self.explains(within, &off_angles, &off_rates, &(commanded - a));
+            let explained = explained && self.credible(memory);
             let kept = excess <= 1.0 + 1e-9 && measured.rates.norm() <= self.rate_shown();
             if memory.assured() && !(explained && kept) {
                 memory.standing = Standing::Exceeded;

@@ -4,6 +4,9 @@ use super::design::{Constraints, InitialState, Settings};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+/// The largest estimate over the bound of the disturbance.
+const BEYOND: f64 = 2.0;
+
 /// An estimate of Δ, and what the next one is made from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Observed {
@@ -15,7 +18,7 @@ pub struct Observed {
 
 impl Observed {
     /// Takes in the rates x_ω at a tick: what they changed by beyond the commanded acceleration is Δ, on average over the period. Filtered by
-    /// a lag of first order, and limited to what Δ can be.
+    /// a lag of first order, and limited to twice what Δ should be.
     pub(super) fn observe(&mut self, s: &Settings, rates: &Vector3<f64>) {
         if s.constraints != Constraints::Robust {
             return;
@@ -24,7 +27,7 @@ impl Observed {
             let residual = (rates - before) / s.period_feedback - commanded;
             let weight = -(-s.period_feedback / s.observer.time_constant).exp_m1();
             self.disturbance += (residual - self.disturbance) * weight;
-            let bound = s.disturbance_bound;
+            let bound = BEYOND * s.disturbance_bound;
             self.disturbance.apply(|value| *value = value.clamp(-bound, bound));
         }
     }

@@ -34,7 +34,7 @@ pub fn disturbance(kind: Kind) -> Disturbance {
 /// What one run shows.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// Root mean square over the ticks of ‖Θ − Θ_r‖, deg: the EMS of the paper.
+    /// Root mean square over the ticks of ‖Θ − Θ_r‖, deg: the EMS of the paper. Infinite, as all, where the attitude was lost.
     pub ems_deg: f64,
     /// Root mean square over the ticks of ‖m‖ over its limit: the CMS of the paper.
     pub cms: f64,
@@ -84,7 +84,11 @@ pub fn simulate<C: Controller>(
         largest_moment = largest_moment.max(moment.norm());
         for i in 0..checks {
             let at = |i: u32| time + f64::from(i) * CHECK;
-            plant.advance(at(i), at(i + 1), moment).unwrap();
+            // Beyond the singularity of the angles the attitude is lost.
+            if plant.advance(at(i), at(i + 1), moment).is_err() {
+                let lost = f64::INFINITY;
+                return Outcome { ems_deg: lost, cms: lost, rate: lost, moment: lost };
+            }
             largest_rate = largest_rate.max(plant.rates().norm());
         }
     }

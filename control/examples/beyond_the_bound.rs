@@ -1,0 +1,89 @@
+//! What CRMPC's robust set does where the disturbance exceeds its bound, beside an LQR whose moment is scaled into the limit as well:
+//!
+//! ```text
+//! cargo run --release -p control --example beyond_the_bound
+//! ```
+//!
+//! prints a line for each size and family of disturbances: of the three mean and largest EMS, the largest ‖ω‖ over its limit, and how many of the
+//! runs lost the attitude.
+
+#[path = "../tests/harness/mod.rs"]
+mod harness;
+
+use control::controller::ReferenceAt;
+use control::crmpc::{Constraints, Guarantee, Settings};
+use control::delay::saturated;
+use control::{Controller, Lqr, Measurement};
+use harness::{
+    Case, Kept, Outcome, adversaries, constant, in_parallel, lqr, run, settings, simulate, square,
+};
+use nalgebra::Vector3;
+
+/// Runs with an EMS above this count as lost, deg.
+const LOST: f64 = 20.0;
+
+/// An LQR with the moment that there is.
+struct Saturated(Lqr, f64);
+
+impl Controller for Saturated {
+    type Memory = ();
+
+    fn period(&self) -> f64 {
+        self.0.period()
+    }
+
+    fn memory(&self) {}
+
+    fn update(
+        &mut self,
+        memory: &mut (),
+        tick: u64,
+        time: f64,
+        measured: &Measurement,
+        reference: ReferenceAt,
+    ) -> Vector3<f64> {
+        saturated(self.0.update(memory, tick, time, measured, reference), self.1)
+    }
+}
+
+fn main() {
+    let published = settings(Constraints::Robust);
+    println!(
+        "{:5} {:14} {:>27} {:>27} {:>27}",
+        "", "", "CRMPC, bound as it was", "CRMPC, best effort", "LQR"
+    );
+    for scale in [1.0, 1.2, 1.4, 1.7, 2.0] {
+        let bound = scale * published.disturbance_bound;
+        let told = Settings { disturbance_bound: bound, guarantee: Guarantee::BestEffort, ..published };
+        let families = [
+            ("constant", constant()),
+            ("square waves", square(&[1.0, 4.0, 20.0])),
+            ("adversaries", adversaries(0.04)),
+        ];
+        for (name, cases) in families {
+            let larger = |case: &Case| {
+                let mut disturbance = case.disturbance.clone();
+                disturbance.bound = bound;
+                disturbance
+            };
+            let robust = |settings: &Settings| {
+                in_parallel(&cases, |case| run(settings, case.inertia_scale, larger(case)))
+            };
+            let regulated = in_parallel(&cases, |case| {
+                let mut law = Saturated(lqr(), published.limit_moment);
+                let outcome = simulate(&mut law, &mut (), case.inertia_scale, larger(case), |(), _, _| {});
+                (outcome, Kept { fallbacks: 0, in_force: 0.0, broken: false })
+            });
+            let shown = [robust(&published), robust(&told), regulated].map(|all| shown(&all));
+            println!("{scale:5} {name:14} {} {} {}", shown[0], shown[1], shown[2]);
+        }
+    }
+}
+
+fn shown(all: &[(Outcome, Kept)]) -> String {
+    let mean = all.iter().map(|(outcome, _)| outcome.ems_deg).sum::<f64>() / all.len() as f64;
+    let largest = all.iter().map(|(outcome, _)| outcome.ems_deg).fold(0.0, f64::max);
+    let rate = all.iter().map(|(outcome, _)| outcome.rate).fold(0.0, f64::max);
+    let lost = all.iter().filter(|(outcome, _)| outcome.ems_deg > LOST).count();
+    format!("{mean:6.2}° {largest:6.2}° {rate:7.3} {lost:3}")
+}
