@@ -92,7 +92,7 @@ fn estimated() -> Settings {
         angle_error: f64::to_radians(0.25),
         rate_error: f64::to_radians(0.25),
         delay: 0.04,
-        disturbance_bound: f64::to_radians(0.5),
+        disturbance_bound: f64::to_radians(0.4),
         ..settings(Constraints::Robust)
     }
 }
