@@ -72,5 +72,5 @@ def test_the_notebook_runs(tmp_path):
     (tmp_path / "target").symlink_to(TARGET)
     NotebookClient(notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(tmp_path / "scripts" / "examples")}}).execute()
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    assert "CRMPC: EMS 1.98" in outputs[0]["text"]
+    assert "CRMPC: EMS 1.979" in outputs[0]["text"]
     assert sum("image/png" in output.get("data", {}) for output in outputs) == 2
