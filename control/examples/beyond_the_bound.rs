@@ -74,8 +74,16 @@ fn main() {
                 let outcome = simulate(&mut law, &mut (), case.inertia_scale, larger(case), |(), _, _| {});
                 (outcome, Kept { fallbacks: 0, in_force: 0.0, broken: false })
             });
-            let shown = [robust(&published), robust(&told), regulated].map(|all| shown(&all));
-            println!("{scale:5} {name:14} {} {} {}", shown[0], shown[1], shown[2]);
+            let crmpc = [robust(&published), robust(&told)];
+            let only = crmpc.each_ref().map(|all| {
+                let pairs = all.iter().zip(&regulated);
+                pairs.filter(|((crmpc, _), (lqr, _))| crmpc.ems_deg > LOST && lqr.ems_deg <= LOST).count()
+            });
+            let [published, told] = crmpc.map(|all| shown(&all));
+            println!(
+                "{scale:5} {name:14} {published} {told} {}  lost by CRMPC alone: {only:?}",
+                shown(&regulated)
+            );
         }
     }
 }
