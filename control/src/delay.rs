@@ -50,6 +50,12 @@ impl Latency {
     }
 }
 
+/// Number of ticks that begin within a delay (s).
+pub fn ticks(delay: f64, period: f64) -> usize {
+    // A whole multiple of the period may be off by rounding.
+    (delay / period * (1.0 - TOLERANCE)).ceil() as usize
+}
+
 /// Scales a moment (N m) into ‖m‖ ≤ `limit` (N m, infinite for none) and keeps its direction.
 pub fn saturated(moment: Vector3<f64>, limit: f64) -> Vector3<f64> {
     let excess = moment.norm() / limit;
@@ -75,9 +81,7 @@ impl Predictor {
         if !(0.0..=longest).contains(&delay) {
             return Err(DesignError::Delay { value: delay, longest });
         }
-        // A whole multiple of the period may be off by rounding.
-        let count = (delay / period * (1.0 - TOLERANCE)).ceil() as usize;
-        Ok(Self { body, delay, period, count })
+        Ok(Self { body, delay, period, count: ticks(delay, period) })
     }
 
     /// Time from a measurement to the moment that it leads to, s.

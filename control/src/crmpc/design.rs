@@ -1,13 +1,13 @@
 //! Offline design of CRMPC: every constant of Chai 2022 from the raw data, and the tightening of the `robust` set.
 
 use super::guarantee::{self, Assessment, Tightening};
+use crate::delay;
 use crate::error::DesignError;
 use crate::mpc::SolverSettings;
 use crate::sampled::{Gain, InvariantSet, Reach, SampledError};
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
-use vehicle::time::TOLERANCE;
 
 /// Which sets the optimisation keeps the nominal motion in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -257,7 +257,7 @@ impl Design {
             assessment,
             counted,
             ratio,
-            delay_ticks: (s.delay / s.period_feedback * (1.0 - TOLERANCE)).ceil() as u32,
+            delay_ticks: delay::ticks(s.delay, s.period_feedback) as u32,
             largest_inertia,
             smallest_inertia,
             inertia_ratio: largest_inertia / smallest_inertia,

@@ -213,12 +213,16 @@ impl Dynamics {
     fn mismatch(&self, s: &Settings, drive: f64, angle_error: f64, rate_error: f64) -> (f64, f64) {
         let tau = s.period_feedback;
         let elapsed = s.delay + tau;
-        // Gronwall's inequality: the mismatch itself drives the motion off.
-        let growth = ((self.by_rates + self.by_angles * elapsed) * elapsed).exp();
+        let growth = self.growth(elapsed);
         let off_rate = (drive * (elapsed - 0.5 * tau) + rate_error) * growth;
         let off_angle = (0.5 * drive * elapsed * elapsed + angle_error + rate_error * elapsed) * growth;
         let mean = self.by_rates * off_rate + self.by_angles * off_angle + self.jerk * tau * tau / 24.0;
         (mean, self.by_rates * drive * tau * growth + self.jerk * tau * tau / 8.0)
+    }
+
+    /// How far apart two motions are after a time (s) over how far they are driven apart: the mismatch itself drives them (Gronwall's inequality).
+    fn growth(&self, elapsed: f64) -> f64 {
+        ((self.by_rates + self.by_angles * elapsed) * elapsed).exp()
     }
 
     /// The law cancels f at the predicted middle of the interval in which its moment acts. So what F does of first order in time adds up to
@@ -316,14 +320,15 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
             let before = n.checked_sub(ratio).map_or(0.0, |before| bulge(before, value));
             value(&at[n]) + before.max(bulge(n, value))
         };
-        let Deviation { angle, .. } = at[n];
-        RateLoss { by_angles: with_bulge(|d| d.angle), ..RateLoss::new(angle, with_bulge(|d| d.rate)) }
+        RateLoss::new(with_bulge(|d| d.angle), with_bulge(|d| d.rate))
     });
     let (moment, rate) = (moment.collect(), rate.collect());
-    // A filter of first order makes of the differences of errors no more than this.
-    let observable = s.disturbance_bound
-        + (parts.norm - 3.0_f64.sqrt() * s.disturbance_bound)
-        + 2.0 * s.rate_error / s.observer.time_constant;
+    // The observer looks at predicted rates, of which each prediction is off by its own error. A filter of first order makes no more than this of the
+    // differences of errors.
+    let predicted = 3.0_f64.sqrt() * s.rate_error + dynamics.by_angles * s.delay * SQRT_2 * s.angle_error;
+    let observable = (s.disturbance_bound + parts.norm - 3.0_f64.sqrt() * s.disturbance_bound
+        + 2.0 * predicted / s.observer.time_constant)
+        * dynamics.growth(s.delay + s.period_feedback);
     let tightening =
         Tightening { moment, rate, bearing, norm: parts.norm, mismatch: parts.mismatch, observable, at };
     let assessment = assess(s, &dynamics, &tightening);

@@ -123,7 +123,7 @@ pub struct Crmpc {
 const SHARE_OF_RATE: f64 = 0.8;
 /// Shares of the tightening that are tried where no plan is certified.
 const LESS: [f64; 2] = [0.5, 0.0];
-/// Ways from a plan that is kept towards the optimum without constraints that are tried, each half as long as the one before.
+/// Ways from a plan that is kept towards the optimum without constraints that are tried: a half, and each half as long as the one before.
 const HALVINGS: usize = 6;
 /// The first optimisation has converged when no state moves by more than this (rad, rad/s) between passes.
 const STANDSTILL: f64 = 1e-8;
@@ -189,11 +189,8 @@ impl Crmpc {
     /// One optimisation at `time` from the measured state (Θ, x_ω): leaves the plan and the report in `memory`.
     fn optimise(&mut self, memory: &mut Memory, time: f64, measured: Vector6<f64>, reference: ReferenceAt) {
         let clock = Instant::now();
-        let shift = if memory.assured() || !memory.started {
-            memory.observed.shift(&self.settings)
-        } else {
-            Vector3::zeros()
-        };
+        // Without guarantee the command makes up for it instead.
+        let shift = if memory.assured() { memory.observed.shift(&self.settings) } else { Vector3::zeros() };
         self.preview(time, reference, shift);
         let first = !memory.started;
         if first {
@@ -295,15 +292,15 @@ impl Crmpc {
     fn go_towards_the_optimum(&mut self, memory: &mut Memory) {
         self.sets.begin(memory.age as usize, 1.0);
         memory.plan.errors(&self.sets.references, &mut self.previous);
-        let (start, mut share) = (memory.plan.states[0], 1.0);
+        self.optimiser.without_constraints(&self.previous.states[0], &self.affine);
         for _ in 0..HALVINGS {
-            self.optimiser.mix(&self.previous, share, &self.affine);
+            self.optimiser.halve_the_way_to(&self.previous);
             if let Some(certified) = self.sets.certify(self.optimiser.motion(), false) {
+                let start = memory.plan.states[0];
                 self.follow_optimum(memory, &start);
                 self.take_over(memory, Some(certified));
                 return;
             }
-            share *= 0.5;
         }
     }
 

@@ -231,10 +231,10 @@ impl Bounded<2> for Sets {
         self.follow = follow;
     }
 
-    fn unsettled(&mut self, motion: &Motion<2>, of: Range<usize>) -> Option<Range<usize>> {
-        let Kind::Robust(robust) = &mut self.kind else { return None };
+    fn unsettled(&mut self, motion: &Motion<2>, of: Range<usize>) -> bool {
+        let Kind::Robust(robust) = &mut self.kind else { return false };
         robust.exchange();
-        let unsettled = self.violated_in(motion, of);
+        let unsettled = self.violated_in(motion, of).is_some();
         if let Kind::Robust(robust) = &mut self.kind {
             robust.exchange();
         }

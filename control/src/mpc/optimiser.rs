@@ -78,10 +78,10 @@ pub trait Bounded<const O: usize>: Constraints<O> {
     /// terminal ball is not looked at.
     fn violated(&mut self, motion: &Motion<O>, skip: Range<usize>) -> Option<Range<usize>>;
 
-    /// Those of the intervals `of` that `motion` violates with the bounds about itself, from the first to the last. The bounds stay as they are. Nothing
-    /// to do for bounds that do not depend on the motion.
-    fn unsettled(&mut self, _motion: &Motion<O>, _of: Range<usize>) -> Option<Range<usize>> {
-        None
+    /// Whether `motion` violates one of the intervals `of` with the bounds about itself. The bounds stay as they are. Nothing to do for bounds that
+    /// do not depend on the motion.
+    fn unsettled(&mut self, _motion: &Motion<O>, _of: Range<usize>) -> bool {
+        false
     }
 
     /// ε of the terminal ball.
@@ -279,7 +279,6 @@ impl<const O: usize> Optimiser<O> {
         let mut status = Status::Fallback;
         for _ in 0..SETTLING_PASSES {
             bounded.follow(follow);
-
             status = solve(self, bounded, sample, search);
             bounded.follow(false);
             // Linearised balls would have to be linearised anew as well.
@@ -291,16 +290,12 @@ impl<const O: usize> Optimiser<O> {
             }
             // The intervals outside a window have been looked at.
             let solved = search.window.clone().unwrap_or(0..self.layout.horizon);
-            let Some(unsettled) = bounded.unsettled(&self.solution.motion, solved) else {
-                search.settled = true;
+            search.settled = !bounded.unsettled(&self.solution.motion, solved);
+            if search.settled {
                 break;
-            };
+            }
             self.about.clone_from(&self.solution.motion);
             search.warm = true;
-            search.window = search
-                .window
-                .take()
-                .map(|window| window.start.min(unsettled.start)..window.end.max(unsettled.end));
         }
         status
     }
@@ -462,12 +457,16 @@ impl<const O: usize> Optimiser<O> {
         false
     }
 
-    /// Leaves `plan` in [`Self::motion`], moved by this share of the way to the optimum without constraints from its start.
-    pub fn mix(&mut self, plan: &Motion<O>, share: f64, affine: &[State<O>]) {
+    /// Leaves the optimum without constraints in [`Self::motion`].
+    pub fn without_constraints(&mut self, start: &State<O>, affine: &[State<O>]) {
         let Solution { motion, multipliers } = &mut self.solution;
-        self.unconstrained.solve(&plan.states[0], affine, motion);
+        self.unconstrained.solve(start, affine, motion);
         multipliers.clear();
-        motion.mix(plan, share);
+    }
+
+    /// Moves [`Self::motion`] half of the way to `plan`.
+    pub fn halve_the_way_to(&mut self, plan: &Motion<O>) {
+        self.solution.motion.halve_the_way_to(plan);
     }
 
     /// The report of a plan that is followed instead of an optimum.

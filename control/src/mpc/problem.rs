@@ -297,14 +297,12 @@ impl<const O: usize> Motion<O> {
         Self { states: vec![zero_state(); horizon + 1], inputs: vec![Vector3::zeros(); horizon] }
     }
 
-    /// Keeps this share of the motion, and takes the rest from `other`.
-    pub fn mix(&mut self, other: &Self, share: f64) {
-        let mixed = |here: &mut Vector3<f64>, there: &Vector3<f64>| *here = *there + (*here - there) * share;
-        for (here, there) in self.states.iter_mut().flatten().zip(other.states.iter().flatten()) {
-            mixed(here, there);
-        }
-        for (here, there) in self.inputs.iter_mut().zip(&other.inputs) {
-            mixed(here, there);
+    /// Half of the way to `other`.
+    pub fn halve_the_way_to(&mut self, other: &Self) {
+        let here = self.states.iter_mut().flatten().chain(&mut self.inputs);
+        let there = other.states.iter().flatten().chain(&other.inputs);
+        for (here, there) in here.zip(there) {
+            *here = (*here + there) * 0.5;
         }
     }
 
