@@ -67,8 +67,8 @@ struct Robust {
 
 /// Relative slack when the paper's constraints are checked, for rounding.
 const ROUNDING: f64 = 1e-9;
-/// Share of the limits that the robust set leaves, and relative slack when its constraints are checked: an optimum's bounds are those about
-/// a motion nearby.
+/// Share of the limits that the robust set's bounds leave, and that the check of a motion takes: an optimum's bounds are those about a motion
+/// nearby.
 const RESERVE: f64 = 1e-3;
 /// Share of a limit that stands for an empty set in the optimisation, which needs balls with an inside. No plan within it is certified.
 const EMPTY: f64 = 1e-3;
@@ -148,7 +148,7 @@ impl Sets {
             let angle = references[k].angles.y + motion.states[k][0].y;
             angle.abs() + robust.deviation(k).angle <= robust.settings.sideslip_domain
         });
-        if !inside || rates.rates.norm() > bound * (1.0 + RESERVE) {
+        if !inside || rates.rates.norm() > bound + robust.reserves().0 {
             return None;
         }
         let last = points(n);
@@ -336,33 +336,38 @@ impl Point {
 }
 
 impl Sets {
-    /// Those of the intervals `of` that `motion` violates, from the first to the last; sets their bounds about it.
+    /// Those of the intervals `of` that `motion` violates, from the first to the last; sets the bounds of all others about it.
     fn violated_in(&mut self, motion: &Motion<2>, of: Range<usize>) -> Option<Range<usize>> {
-        let mut violated: Option<Range<usize>> = None;
-        let mut here = Point::at(&self.references, motion, of.start);
         let mut anchor = None;
-        for k in of {
+        let mut here = Point::at(&self.references, motion, of.start);
+        let first = of.clone().find(|&k| {
             let next = Point::at(&self.references, motion, k + 1);
-            if self.violates(k, &here, &next, &mut anchor) {
-                let first = violated.map_or(k, |range| range.start);
-                violated = Some(first..k + 1);
-            }
+            let violates = self.violates(k, &here, &next, &mut anchor);
             here = next;
-        }
-        violated
+            violates
+        })?;
+        // From the other end, as what is violated in between need not be looked at.
+        let mut anchor = None;
+        let mut next = Point::at(&self.references, motion, of.end);
+        let last = (first + 1..of.end).rev().find(|&k| {
+            let here = Point::at(&self.references, motion, k);
+            let violates = self.violates(k, &here, &next, &mut anchor);
+            next = here;
+            violates
+        });
+        Some(first..last.unwrap_or(first) + 1)
     }
 
     /// Whether the input of interval `k` or the state at its end violates its constraint, with the bounds about themselves or smaller
     /// ones. `anchor` is a stage not far away.
     fn violates(&mut self, k: usize, here: &Point, next: &Point, anchor: &mut Option<Anchor>) -> bool {
-        let slack = if matches!(self.kind, Kind::Robust(_)) { RESERVE } else { ROUNDING };
-        let exceeds = |value: f64, bound: f64| value > bound * (1.0 + slack);
         let body = &self.body;
         match &mut self.kind {
             Kind::Paper { x_tube, u_tube, inertia_ratio } => {
                 let Point { angles, rates, size, acceleration, pull, .. } = here;
                 let bound = linearise::input_bound(angles.y, *size, *pull, *inertia_ratio);
                 let input = || here.turned().input(body, rates, acceleration).norm();
+                let exceeds = |value: f64, bound: f64| value > bound * (1.0 + ROUNDING);
                 exceeds(next.size, *x_tube) || exceeds(bound, *u_tube) && exceeds(input(), *u_tube)
             }
             Kind::Robust(robust) => {
@@ -374,7 +379,8 @@ impl Sets {
                     return false;
                 }
                 let (moment, rates) = robust.tighten(body, k, here, next);
-                exceeds(rates, robust.rate[k + 1]) || exceeds(moment, robust.moment[k])
+                let (of_rate, of_moment) = robust.reserves();
+                rates > robust.rate[k + 1] + of_rate || moment > robust.moment[k] + of_moment
             }
         }
     }
@@ -386,6 +392,11 @@ impl Robust {
         let Self { rate, moment, remembered, .. } = self;
         std::mem::swap(rate, &mut remembered.0);
         std::mem::swap(moment, &mut remembered.1);
+    }
+
+    /// What the bounds on ‖ω̃‖ and ‖m̃‖ leave of the limits.
+    fn reserves(&self) -> (f64, f64) {
+        (RESERVE * self.settings.limit_rate, RESERVE * self.settings.limit_moment)
     }
 
     /// Those on ‖ω̃‖ and ‖m̃‖ at stage `k`, with an inside.
@@ -477,6 +488,7 @@ impl Robust {
     /// where ∂ω/∂(α, β) has this norm. `before` is the point before.
     fn rate_bound(&self, k: usize, by_angles: f64, here: &Point, before: &Point) -> f64 {
         let Settings { limit_rate, limit_moment, period_optimisation: h, horizon, .. } = self.settings;
+        let reserve = self.reserves().0;
         // Between two steps ‖ω̃‖ may exceed both by h²/8 times its second derivative. The optimisation knows no point before, so that both accelerations count as one that
         // is rarely exceeded; the bound is then the same for it and for the check of its result.
         let typical = limit_moment / self.design.largest_inertia;
@@ -484,10 +496,10 @@ impl Robust {
         let size = here.size + 2.0 * h * a;
         let curved = 0.125 * h * h * Dynamics::rate_curvature(size, a);
         let loss = self.design.tightening.rate_loss(self.tick(k)).at(by_angles, here.size) + curved;
-        let bound = limit_rate * (1.0 - RESERVE) - self.share * loss;
+        let bound = limit_rate - reserve - self.share * loss;
         // ‖x̃_ω‖ ≤ sec β ‖ω̃‖
         if k == horizon {
-            bound.min(self.design.assessment.terminal_rate * here.angles.y.cos() * (1.0 - RESERVE))
+            bound.min(self.design.assessment.terminal_rate * here.angles.y.cos() - reserve)
         } else {
             bound
         }
@@ -512,7 +524,7 @@ impl Robust {
         let loss = self.design.tightening.moment_loss(self.tick(k));
         let loss = loss.at((feedback, by_angles), slopes, (size, a));
         let within = (after - value).max(0.0) + 0.125 * h * h * self.dynamics.moment_curvature(size, a);
-        limit_moment * (1.0 - RESERVE) - self.share * loss - within
+        limit_moment - self.reserves().1 - self.share * loss - within
     }
 
     /// Of the first interval.
@@ -611,16 +623,22 @@ mod tests {
             let checked = sets.bounds();
             sets.tighten(&motion, 0..n);
             let exact = sets.bounds();
-            let limit = (1.0 + RESERVE).powi(2);
+            let Kind::Robust(robust) = &sets.kind else { unreachable!() };
+            let (of_rate, of_moment) = robust.reserves();
             let violates = |&k: &usize| {
                 let input = motion.inputs.get(k + 1).copied().unwrap_or_default();
-                sets.squares(k + 1, &motion.states[k + 1], &input).0 > limit
-                    || sets.squares(k, &motion.states[k], &motion.inputs[k]).1 > limit
+                let rates =
+                    sets.squares(k + 1, &motion.states[k + 1], &input).0.sqrt() * robust.bounds(k + 1).0;
+                let moment =
+                    sets.squares(k, &motion.states[k], &motion.inputs[k]).1.sqrt() * robust.bounds(k).1;
+                rates > exact.rate[k + 1] + of_rate || moment > exact.input[k] + of_moment
             };
             let expected = (0..n).find(violates).zip((0..n).rfind(violates));
             count(&violations, found.is_some());
-            prop_assert_eq!(found, expected.map(|(first, last)| first..last + 1));
-            for k in 0..n {
+            let expected = expected.map(|(first, last)| first..last + 1);
+            prop_assert_eq!(&found, &expected);
+            // Those in between are left as they were.
+            for k in (0..n).filter(|k| !expected.as_ref().is_some_and(|range| range.contains(k))) {
                 prop_assert!(checked.rate[k + 1] <= exact.rate[k + 1] + 1e-12, "{}", k);
                 prop_assert!(checked.input[k] <= exact.input[k] + 1e-6, "{}", k);
                 count(&by_size, checked.input[k] < exact.input[k]);
@@ -629,7 +647,7 @@ mod tests {
         });
         // Both outcomes, and both ways to them.
         let least = |of: &Cell<[usize; 2]>| of.get().into_iter().min().unwrap();
-        assert!(least(&violations) > 40 && least(&by_size) > 4000, "{violations:?} {by_size:?}");
+        assert!(least(&violations) > 40 && least(&by_size) > 300, "{violations:?} {by_size:?}");
     }
 
     #[test]

@@ -300,12 +300,22 @@ impl<const O: usize> Optimiser<O> {
         status
     }
 
-    /// Takes the previous plan and its multipliers as first guess where they are active in what is to be solved.
+    /// Takes the previous plan and its multipliers as first guess where they are active in what is to be solved. A window then takes in what was active
+    /// just beyond its end, as it would have to grow otherwise.
     fn begin_at(&mut self, start: &State<O>, affine: &[State<O>], active: &[[f64; 2]], search: &mut Search) {
-        let range = search.window.clone().unwrap_or(0..self.layout.horizon);
-        let is_active = |&[state, input]: &[f64; 2]| state > 0.0 || input > 0.0;
-        if !active[range.clone()].iter().any(is_active) {
+        let n = self.layout.horizon;
+        let mut range = search.window.clone().unwrap_or(0..n);
+        let largest = active.iter().flatten().copied().fold(0.0, f64::max);
+        let more_than = |least: f64| move |&[state, input]: &[f64; 2]| state.max(input) > least;
+        if !active[range.clone()].iter().any(more_than(0.0)) {
             return;
+        }
+        let is_active = more_than(ACTIVE * largest);
+        while let Some(last) = active[range.end..(range.end + MARGIN).min(n)].iter().rposition(is_active) {
+            range.end += last + 1;
+        }
+        if let Some(window) = &mut search.window {
+            window.end = range.end;
         }
         let Self { unconstrained, about, solution, .. } = self;
         let Solution { motion, multipliers } = solution;
@@ -546,6 +556,8 @@ impl<const O: usize> Layout<O> {
 
 /// Intervals before and after those that are violated, which a window takes in.
 const MARGIN: usize = 3;
+/// A multiplier counts from this share of the largest on.
+const ACTIVE: f64 = 1e-3;
 /// Passes until an optimum satisfies the bounds about itself.
 const SETTLING_PASSES: usize = 8;
 /// Windows tried before the whole horizon.
