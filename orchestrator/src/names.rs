@@ -30,9 +30,12 @@ pub fn hint<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str> + Clone) -
     }
 }
 
-/// Whether `name` is meant by `pattern`: the same name, or everything that begins as the pattern does before a final `*`.
+/// Whether `name` is meant by `pattern`: the same name, or everything that begins and ends as the pattern does before and after a `*`.
 pub fn matches(pattern: &str, name: &str) -> bool {
-    pattern.strip_suffix('*').map_or(pattern == name, |prefix| name.starts_with(prefix))
+    match pattern.split_once('*') {
+        None => pattern == name,
+        Some((first, last)) => name.strip_prefix(first).is_some_and(|rest| rest.ends_with(last)),
+    }
 }
 
 /// Splits `component.variable` at the first dot.
@@ -66,5 +69,8 @@ mod tests {
         assert!(!matches("attitude.*", "attitudeRate.alpha"));
         assert!(!matches("attitude", "attitude.alpha"));
         assert!(matches("*", "anything"));
+        assert!(matches("delay-*-lqr", "delay-040-lqr"));
+        assert!(!matches("delay-*-lqr", "delay-040-lqr-predicted"));
+        assert!(!matches("ab*bc", "abc"));
     }
 }

@@ -3,8 +3,9 @@
 use super::part::Series;
 use super::results::{Metric, Results, RunResult};
 use super::signal::Signal;
-use super::{Figure, Panel, Run, Scaled};
+use super::{Across, Axis, Figure, Panel, Run, Scaled, Through};
 use crate::figure::{self, Color, Curve, Legend, Shape};
+use toml::Spanned;
 
 /// Columns of a histogram per decade.
 const COLUMNS_PER_DECADE: f64 = 12.0;
@@ -36,6 +37,11 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
             let (x, y) = (numbers(&scatter.x)?.0, numbers(&scatter.y)?.0);
             debug_assert_eq!(x.len(), result.members.len());
             curves.push(Curve { name: run.label.clone(), color: run.color, shape: Shape::Dots, x, y });
+        }
+    } else if let Some(across) = &panel.across {
+        x_label = across.x.of.clone();
+        for line in &across.lines {
+            curves.push(through(across, line, results)?);
         }
     } else {
         let bands = if panel.spread { &runs[..] } else { &[] };
@@ -96,6 +102,21 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
         x_range: panel.x_range,
         curves,
     })
+}
+
+/// A line through the means of several runs.
+fn through(across: &Across, line: &Through, results: &Results) -> Result<Curve, String> {
+    let along = |axis: &Axis| {
+        let mean = |run: &Spanned<String>| {
+            let numbers = results.numbers(&format!("{}.{}", run.get_ref(), axis.of))?;
+            // A run without this metric leaves a gap.
+            Ok(if numbers.0.is_empty() { f64::NAN } else { numbers.mean() * axis.factor })
+        };
+        line.runs.iter().map(mean).collect::<Result<Vec<_>, String>>()
+    };
+    let (x, y) = (along(&across.x)?, along(&across.y)?);
+    let shape = if line.dashed { Shape::Dashed } else { Shape::Line };
+    Ok(Curve { name: line.label.clone(), color: line.color, shape, x, y })
 }
 
 /// What a panel draws of a run: signal, name, colour.

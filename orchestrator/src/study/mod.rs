@@ -60,7 +60,7 @@
 //! title = "…"
 //! caption = "…"
 //! columns = 2
-//! runs = ["lqr", "calm-*"]             # a final * stands for all that fit
+//! runs = ["lqr", "calm-*"]             # a * stands for all that fit
 //!
 //! [[figure.panel]]
 //! label = "roll rate p, deg/s"
@@ -71,8 +71,13 @@
 //! marks = [{ at = "time.printed", label = "printed mean" }]     # vertical lines
 //! x_range = [0.0, 25.0]                # part of the horizontal axis
 //! unit = { name = "kN m", factor = 1e-3 }                       # instead of the FMU's display unit
-//! # instead of signal: histogram = "solver_ms"  or  scatter = { x = "ems_deg", y = "cms" }  or nothing but points
+//! # instead of signal: histogram = "solver_ms"  or  scatter = { x = "ems_deg", y = "cms" }  or across  or nothing but points
 //! points = [{ x = 50.0, y = "ems.lqr", label = "printed", color = "#000000" }]
+//!
+//! [figure.panel.across]                # instead of signal: metrics of many runs against each other, as lines through them
+//! x = { of = "parameter.plant.actuation.delay", factor = 1e3 }
+//! y = { of = "ems_deg" }               # as metrics.json has it; factor: optional
+//! lines = [{ label = "LQR", color = "#000000", runs = ["delay-*-lqr"], dashed = true }]
 //!
 //! [[table]]
 //! id = "table-1"
@@ -324,7 +329,7 @@ fn ours() -> String {
     "Ours".into()
 }
 
-/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram` and `scatter` says what is drawn, or `points` alone.
+/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `scatter` and `across` says what is drawn, or `points` alone.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
@@ -351,6 +356,8 @@ pub struct Panel {
     pub histogram: Option<Histogram>,
     /// One dot for each value of `vary`.
     pub scatter: Option<Scatter>,
+    /// Lines through the metrics of several runs.
+    pub across: Option<Across>,
     /// Horizontal lines.
     #[serde(default)]
     pub bounds: Vec<Line>,
@@ -394,6 +401,44 @@ pub struct Scatter {
     pub x: String,
     /// Metric along the vertical axis.
     pub y: String,
+}
+
+/// Metrics of several runs against each other.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Across {
+    /// Along the horizontal axis.
+    pub x: Axis,
+    /// Along the vertical axis.
+    pub y: Axis,
+    /// One line for each of these.
+    pub lines: Vec<Through>,
+}
+
+/// A metric along an axis.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    /// The metric.
+    pub of: String,
+    /// The axis's unit for a value of 1.
+    #[serde(default = "unscaled")]
+    pub factor: f64,
+}
+
+/// A line through several runs: the mean of each run's metric.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Through {
+    /// Name in the legend.
+    pub label: String,
+    /// Its colour.
+    pub color: Color,
+    /// The runs, in their order.
+    pub runs: Vec<Spanned<String>>,
+    /// Whether it is dashed.
+    #[serde(default)]
+    pub dashed: bool,
 }
 
 /// A straight line across a panel.
@@ -577,7 +622,10 @@ impl Study {
     fn expand(&mut self) -> Result<(), Error> {
         let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
         let panels = self.figures.iter_mut().flat_map(|figure| {
-            let own = figure.panels.iter_mut().filter_map(|panel| panel.runs.as_mut());
+            let own = figure.panels.iter_mut().flat_map(|panel| {
+                let lines = panel.across.iter_mut().flat_map(|across| &mut across.lines);
+                lines.map(|line| &mut line.runs).chain(&mut panel.runs)
+            });
             own.chain([&mut figure.runs])
         });
         for names in panels.chain(self.overviews.iter_mut().map(|overview| &mut overview.runs)) {
@@ -711,19 +759,23 @@ impl Study {
         for figure in &self.figures {
             self.known(&figure.runs, "[[run]]", ids.iter().copied())?;
             for panel in &figure.panels {
-                self.known(panel.runs.iter().flatten(), "[[run]]", ids.iter().copied())?;
+                let through =
+                    panel.across.iter().flat_map(|across| &across.lines).flat_map(|line| &line.runs);
+                let named = panel.runs.iter().flatten().chain(through);
+                self.known(named, "[[run]]", ids.iter().copied())?;
                 let drawn = [
                     panel.signal.is_some(),
                     !panel.signals.is_empty(),
                     panel.histogram.is_some(),
                     panel.scatter.is_some(),
+                    panel.across.is_some(),
                 ];
                 let count = drawn.iter().filter(|is| **is).count();
                 if count != 1 && (count > 1 || panel.points.is_empty()) {
                     return Err(self.source.error(
                         &(0..0),
                         format!(
-                            "[[figure]] id = \"{}\", panel \"{}\": exactly one of signal, signals, histogram, scatter, or points alone",
+                            "[[figure]] id = \"{}\", panel \"{}\": exactly one of signal, signals, histogram, scatter, across, or points alone",
                             figure.id, panel.label
                         ),
                     ));

@@ -188,6 +188,13 @@ fn check(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Re
             }
         }
     }
+    for across in study.figures.iter().flat_map(|f| &f.panels).filter_map(|panel| panel.across.as_ref()) {
+        for run in across.lines.iter().flat_map(|line| &line.runs) {
+            for axis in [&across.x, &across.y] {
+                resolve(study, &format!("{}.{}", run.get_ref(), axis.of)).map_err(fault)?;
+            }
+        }
+    }
     preparations.iter().try_for_each(|preparation| preparation.check(opened))
 }
 
