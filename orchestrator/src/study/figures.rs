@@ -39,7 +39,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
             curves.push(Curve { name: run.label.clone(), color: run.color, shape: Shape::Dots, x, y });
         }
     } else if let Some(across) = &panel.across {
-        x_label = across.x.of.clone();
+        x_label.clone_from(&across.x.of);
         for line in &across.lines {
             curves.push(through(across, line, results)?);
         }
