@@ -47,18 +47,19 @@ fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<Te
         if entry.is_symlink() {
             return Err(refuse(format!("refused: entry \"{name}\" is a symbolic link")));
         }
+        // Of the temporary folder nobody knows: a fault is told by archive and entry.
+        let fault = |source: io::Error| refuse(format!("entry \"{name}\" cannot be unpacked: {source}"));
         let target = folder.path().join(&name);
         if name.ends_with('/') {
-            fs::create_dir_all(&target).map_err(Error::file(target))?;
+            fs::create_dir_all(&target).map_err(fault)?;
             continue;
         }
         if let Some(parent) = target.parent() {
-            fs::create_dir_all(parent).map_err(Error::file(parent))?;
+            fs::create_dir_all(parent).map_err(fault)?;
         }
-        let mut out = File::create_new(&target).map_err(Error::file(&target))?;
+        let mut out = File::create_new(&target).map_err(fault)?;
         // The sizes an archive declares are claims: count what really comes out.
-        let written = io::copy(&mut (&mut entry).take(left + 1), &mut out)
-            .map_err(|source| refuse(format!("entry \"{name}\" cannot be unpacked: {source}")))?;
+        let written = io::copy(&mut (&mut entry).take(left + 1), &mut out).map_err(fault)?;
         left = left.checked_sub(written).ok_or_else(|| {
             refuse(format!("refused: unpacks to more than {} MiB", size_limit.div_ceil(1 << 20)))
         })?;
@@ -76,8 +77,10 @@ pub fn unsafe_name(name: &str) -> Option<&'static str> {
         Some("uses backslashes; FMI wants forward slashes")
     } else if name.contains('\0') {
         Some("holds a zero byte")
-    } else if name.split('/').any(|part| part == ".." || part == ".") {
+    } else if name.split('/').any(|part| part == "..") {
         Some("leads out of the archive")
+    } else if name.ends_with("/.") || name == "." {
+        Some("is a folder that is called a file")
     } else {
         None
     }
@@ -113,8 +116,18 @@ mod tests {
     }
 
     #[test]
+    fn folders_and_files_may_begin_with_the_folder_itself() {
+        let file = archive(&[("./", b""), ("./modelDescription.xml", b"<x/>"), ("./binaries/./x", b"1")]);
+        let folder = unpack(file.path()).unwrap();
+        assert_eq!(fs::read(folder.path().join("modelDescription.xml")).unwrap(), b"<x/>");
+        assert_eq!(fs::read(folder.path().join("binaries/x")).unwrap(), b"1");
+        let twice = archive(&[("a", b"1"), ("./a", b"2")]);
+        assert!(refusal(&twice).contains("entry \"./a\" cannot be unpacked"));
+    }
+
+    #[test]
     fn paths_that_lead_outside_are_refused() {
-        for name in ["../evil", "a/../../evil", "/etc/evil", "C:/evil", "a\\..\\evil", "./a"] {
+        for name in ["../evil", "a/../../evil", "/etc/evil", "C:/evil", "a\\..\\evil", "a/."] {
             let message = refusal(&archive(&[(name, b"x")]));
             assert!(message.contains("refused: entry"), "{name}: {message}");
             assert_eq!(message.lines().count(), 1);

@@ -2,6 +2,7 @@
 //! input. (The reader in `fmi-rs` drops unit definitions and all types but the first.)
 
 use crate::quantity::UnitDefinition;
+use crate::xml::Element;
 use std::collections::BTreeMap;
 
 /// What an FMU says of itself.
@@ -31,6 +32,8 @@ pub struct ModelDescription {
     pub variables: Vec<Variable>,
     /// For each output that declares them: the variables it depends on at the same instant. Positions in `variables`.
     pub dependencies: BTreeMap<usize, Vec<usize>>,
+    /// Whether there is a `ModelStructure`, which FMI demands.
+    pub has_structure: bool,
 }
 
 /// An interface's model identifier and its capability flags.
@@ -130,10 +133,9 @@ impl ModelDescription {
     /// Reads the text of `modelDescription.xml`.
     ///
     /// # Errors
-    /// One line: what is wrong with the text.
+    /// One line: what is wrong with the text, and where.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let root: xml::Root = quick_xml::de::from_str(text).map_err(|error| error.to_string())?;
-        root.try_into()
+        read::description(&Element::parse(text)?)
     }
 
     /// The variable of this name, with its position.
@@ -147,396 +149,187 @@ impl ModelDescription {
     }
 }
 
-/// The file's elements and attributes.
-mod xml {
+/// Makes a description of the file's elements.
+mod read {
     use super::{DefaultExperiment, Interface, Kind, ModelDescription, Variable};
     use crate::quantity::UnitDefinition;
-    use serde::Deserialize;
+    use crate::xml::Element;
     use std::collections::BTreeMap;
 
-    #[derive(Deserialize)]
-    pub(super) struct Root {
-        #[serde(rename = "@fmiVersion")]
-        fmi_version: String,
-        #[serde(rename = "@modelName", default)]
-        model_name: String,
-        #[serde(rename = "@guid", default)]
-        guid: String,
-        #[serde(rename = "@description", default)]
-        description: String,
-        #[serde(rename = "@version", default)]
-        version: String,
-        #[serde(rename = "@generationTool", default)]
-        generation_tool: String,
-        #[serde(rename = "CoSimulation")]
-        co_simulation: Option<InterfaceElement>,
-        #[serde(rename = "ModelExchange")]
-        model_exchange: Option<InterfaceElement>,
-        #[serde(rename = "DefaultExperiment")]
-        default_experiment: Option<Experiment>,
-        #[serde(rename = "UnitDefinitions", default)]
-        units: Units,
-        #[serde(rename = "TypeDefinitions", default)]
-        types: Types,
-        #[serde(rename = "ModelVariables", default)]
-        variables: Variables,
-        #[serde(rename = "ModelStructure", default)]
-        structure: Structure,
-    }
+    /// The flags of an interface, in the order in which they are shown.
+    const FLAGS: [&str; 10] = [
+        "needsExecutionTool",
+        "canHandleVariableCommunicationStepSize",
+        "canInterpolateInputs",
+        "canRunAsynchronuously",
+        "canBeInstantiatedOnlyOncePerProcess",
+        "canNotUseMemoryManagementFunctions",
+        "canGetAndSetFMUstate",
+        "canSerializeFMUstate",
+        "providesDirectionalDerivative",
+        "completedIntegratorStepNotNeeded",
+    ];
+    /// What the standard calls the exponents of a base unit.
+    const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
-    #[derive(Deserialize)]
-    #[allow(clippy::struct_excessive_bools)] // FMI's own flags.
-    struct InterfaceElement {
-        #[serde(rename = "@modelIdentifier")]
-        model_identifier: String,
-        #[serde(rename = "@needsExecutionTool", default)]
-        needs_execution_tool: bool,
-        #[serde(rename = "@canHandleVariableCommunicationStepSize", default)]
-        variable_step: bool,
-        #[serde(rename = "@canInterpolateInputs", default)]
-        interpolate_inputs: bool,
-        #[serde(rename = "@maxOutputDerivativeOrder", default)]
-        output_derivative_order: u32,
-        #[serde(rename = "@canRunAsynchronuously", default)]
-        asynchronous: bool,
-        #[serde(rename = "@canBeInstantiatedOnlyOncePerProcess", default)]
-        only_once: bool,
-        #[serde(rename = "@canNotUseMemoryManagementFunctions", default)]
-        no_memory_functions: bool,
-        #[serde(rename = "@canGetAndSetFMUstate", default)]
-        state: bool,
-        #[serde(rename = "@canSerializeFMUstate", default)]
-        serialize: bool,
-        #[serde(rename = "@providesDirectionalDerivative", default)]
-        directional_derivative: bool,
-        #[serde(rename = "@completedIntegratorStepNotNeeded", default)]
-        no_completed_step: bool,
-    }
+    type Types<'a> = BTreeMap<&'a str, &'a Element>;
 
-    impl From<InterfaceElement> for Interface {
-        fn from(element: InterfaceElement) -> Self {
-            let flags = [
-                (element.needs_execution_tool, "needsExecutionTool"),
-                (element.variable_step, "canHandleVariableCommunicationStepSize"),
-                (element.interpolate_inputs, "canInterpolateInputs"),
-                (element.asynchronous, "canRunAsynchronuously"),
-                (element.only_once, "canBeInstantiatedOnlyOncePerProcess"),
-                (element.no_memory_functions, "canNotUseMemoryManagementFunctions"),
-                (element.state, "canGetAndSetFMUstate"),
-                (element.serialize, "canSerializeFMUstate"),
-                (element.directional_derivative, "providesDirectionalDerivative"),
-                (element.no_completed_step, "completedIntegratorStepNotNeeded"),
-            ];
-            let mut capabilities: Vec<String> =
-                flags.iter().filter(|(set, _)| *set).map(|(_, name)| (*name).to_string()).collect();
-            if element.output_derivative_order > 0 {
-                capabilities.push(format!("maxOutputDerivativeOrder={}", element.output_derivative_order));
-            }
-            Self { model_identifier: element.model_identifier, capabilities }
+    pub(super) fn description(root: &Element) -> Result<ModelDescription, String> {
+        if root.name != "fmiModelDescription" {
+            return Err(format!("is no FMI description: it begins with {}", root.title()));
         }
+        let fmi_version = root.required("fmiVersion")?.to_string();
+        if fmi_version != "2.0" && !fmi_version.starts_with("2.0.") {
+            return Err(format!("is an FMU for FMI {fmi_version}, this program runs FMI 2.0"));
+        }
+        let types = root.list("TypeDefinitions", "SimpleType");
+        let types: Types = types.filter_map(|of| Some((of.attribute("name")?, of))).collect();
+        let variables = root.list("ModelVariables", "ScalarVariable");
+        let variables = variables.map(|of| variable(of, &types)).collect::<Result<Vec<_>, _>>()?;
+        let text = |name: &str| root.attribute(name).unwrap_or_default().to_string();
+        let experiment = root.child("DefaultExperiment");
+        let proposed = |name: &str| experiment.map_or(Ok(None), |element| element.number(name));
+        let units = root.list("UnitDefinitions", "Unit");
+        Ok(ModelDescription {
+            model_name: text("modelName"),
+            guid: text("guid"),
+            description: text("description"),
+            version: text("version"),
+            generation_tool: text("generationTool"),
+            co_simulation: root.child("CoSimulation").map(interface).transpose()?,
+            model_exchange: root.child("ModelExchange").map(interface).transpose()?,
+            default_experiment: DefaultExperiment {
+                start: proposed("startTime")?,
+                stop: proposed("stopTime")?,
+                step: proposed("stepSize")?,
+                tolerance: proposed("tolerance")?,
+            },
+            units: units.map(unit).collect::<Result<_, _>>()?,
+            dependencies: dependencies(root, variables.len())?,
+            has_structure: root.child("ModelStructure").is_some(),
+            variables,
+            fmi_version,
+        })
     }
 
-    #[derive(Deserialize)]
-    struct Experiment {
-        #[serde(rename = "@startTime")]
-        start: Option<f64>,
-        #[serde(rename = "@stopTime")]
-        stop: Option<f64>,
-        #[serde(rename = "@stepSize")]
-        step: Option<f64>,
-        #[serde(rename = "@tolerance")]
-        tolerance: Option<f64>,
+    fn interface(element: &Element) -> Result<Interface, String> {
+        let mut capabilities = Vec::new();
+        for name in FLAGS {
+            if element.truth(name)? == Some(true) {
+                capabilities.push(name.to_string());
+            }
+        }
+        let order: Option<u32> = element.parsed("maxOutputDerivativeOrder", "a whole number from 0 on")?;
+        if let Some(order) = order.filter(|&order| order > 0) {
+            capabilities.push(format!("maxOutputDerivativeOrder={order}"));
+        }
+        Ok(Interface { model_identifier: element.required("modelIdentifier")?.to_string(), capabilities })
     }
 
-    #[derive(Default, Deserialize)]
-    struct Units {
-        #[serde(rename = "Unit", default)]
-        units: Vec<Unit>,
+    fn unit(element: &Element) -> Result<UnitDefinition, String> {
+        let scale = |element: &Element| -> Result<(f64, f64), String> {
+            Ok((element.number("factor")?.unwrap_or(1.0), element.number("offset")?.unwrap_or(0.0)))
+        };
+        let base = element.child("BaseUnit");
+        let (factor, offset) = base.map_or(Ok((1.0, 0.0)), scale)?;
+        let exponents = |base: &Element| -> Result<[i32; 8], String> {
+            let mut exponents = [0; 8];
+            for (exponent, name) in exponents.iter_mut().zip(BASE) {
+                *exponent = base.parsed(name, "a whole number")?.unwrap_or(0);
+            }
+            Ok(exponents)
+        };
+        let displays = element.children.iter().filter(|child| child.name == "DisplayUnit").map(|display| {
+            let (factor, offset) = scale(display)?;
+            Ok((display.required("name")?.to_string(), factor, offset))
+        });
+        Ok(UnitDefinition {
+            name: element.required("name")?.to_string(),
+            exponents: base.map(exponents).transpose()?,
+            factor,
+            offset,
+            displays: displays.collect::<Result<_, String>>()?,
+        })
     }
 
-    #[derive(Deserialize)]
-    struct Unit {
-        #[serde(rename = "@name")]
-        name: String,
-        #[serde(rename = "BaseUnit")]
-        base: Option<BaseUnit>,
-        #[serde(rename = "DisplayUnit", default)]
-        displays: Vec<DisplayUnit>,
-    }
-
-    #[derive(Deserialize)]
-    struct BaseUnit {
-        #[serde(rename = "@kg", default)]
-        kg: i32,
-        #[serde(rename = "@m", default)]
-        m: i32,
-        #[serde(rename = "@s", default)]
-        s: i32,
-        #[serde(rename = "@A", default)]
-        ampere: i32,
-        #[serde(rename = "@K", default)]
-        kelvin: i32,
-        #[serde(rename = "@mol", default)]
-        mol: i32,
-        #[serde(rename = "@cd", default)]
-        cd: i32,
-        #[serde(rename = "@rad", default)]
-        rad: i32,
-        #[serde(rename = "@factor", default = "one")]
-        factor: f64,
-        #[serde(rename = "@offset", default)]
-        offset: f64,
-    }
-
-    #[derive(Deserialize)]
-    struct DisplayUnit {
-        #[serde(rename = "@name")]
-        name: String,
-        #[serde(rename = "@factor", default = "one")]
-        factor: f64,
-        #[serde(rename = "@offset", default)]
-        offset: f64,
-    }
-
-    fn one() -> f64 {
-        1.0
-    }
-
-    #[derive(Default, Deserialize)]
-    struct Types {
-        #[serde(rename = "SimpleType", default)]
-        types: Vec<SimpleType>,
-    }
-
-    #[derive(Deserialize)]
-    struct SimpleType {
-        #[serde(rename = "@name")]
-        name: String,
-        #[serde(rename = "Real")]
-        real: Option<Real>,
-        #[serde(rename = "Integer")]
-        integer: Option<Integer>,
-        #[serde(rename = "Enumeration")]
-        enumeration: Option<Items>,
-    }
-
-    #[derive(Deserialize)]
-    struct Items {
-        #[serde(rename = "Item", default)]
-        items: Vec<Item>,
-    }
-
-    #[derive(Deserialize)]
-    struct Item {
-        #[serde(rename = "@name")]
-        name: String,
-        #[serde(rename = "@value")]
-        value: i32,
-    }
-
-    #[derive(Default, Deserialize)]
-    struct Variables {
-        #[serde(rename = "ScalarVariable", default)]
-        variables: Vec<ScalarVariable>,
-    }
-
-    #[derive(Deserialize)]
-    struct ScalarVariable {
-        #[serde(rename = "@name")]
-        name: String,
-        #[serde(rename = "@valueReference")]
-        reference: u32,
-        #[serde(rename = "@description", default)]
-        description: String,
-        #[serde(rename = "@causality", default = "local")]
-        causality: String,
-        #[serde(rename = "@variability", default = "continuous")]
-        variability: String,
-        #[serde(rename = "Real")]
-        real: Option<Real>,
-        #[serde(rename = "Integer")]
-        integer: Option<Integer>,
-        #[serde(rename = "Boolean")]
-        boolean: Option<Plain>,
-        #[serde(rename = "String")]
-        string: Option<Plain>,
-        #[serde(rename = "Enumeration")]
-        enumeration: Option<Plain>,
-    }
-
-    fn local() -> String {
-        "local".into()
-    }
-    fn continuous() -> String {
-        "continuous".into()
-    }
-
-    #[derive(Clone, Default, Deserialize)]
-    struct Real {
-        #[serde(rename = "@declaredType")]
-        declared_type: Option<String>,
-        #[serde(rename = "@unit")]
-        unit: Option<String>,
-        #[serde(rename = "@displayUnit")]
-        display_unit: Option<String>,
-        #[serde(rename = "@min")]
-        min: Option<f64>,
-        #[serde(rename = "@max")]
-        max: Option<f64>,
-        #[serde(rename = "@start")]
-        start: Option<String>,
-    }
-
-    #[derive(Clone, Default, Deserialize)]
-    struct Integer {
-        #[serde(rename = "@declaredType")]
-        declared_type: Option<String>,
-        #[serde(rename = "@min")]
-        min: Option<i32>,
-        #[serde(rename = "@max")]
-        max: Option<i32>,
-        #[serde(rename = "@start")]
-        start: Option<String>,
-    }
-
-    #[derive(Deserialize)]
-    struct Plain {
-        #[serde(rename = "@declaredType")]
-        declared_type: Option<String>,
-        #[serde(rename = "@start")]
-        start: Option<String>,
-    }
-
-    #[derive(Default, Deserialize)]
-    struct Structure {
-        #[serde(rename = "Outputs", default)]
-        outputs: Unknowns,
-    }
-
-    #[derive(Default, Deserialize)]
-    struct Unknowns {
-        #[serde(rename = "Unknown", default)]
-        unknowns: Vec<Unknown>,
-    }
-
-    #[derive(Deserialize)]
-    struct Unknown {
-        #[serde(rename = "@index")]
-        index: usize,
-        #[serde(rename = "@dependencies")]
-        dependencies: Option<String>,
-    }
-
-    impl ScalarVariable {
-        fn into_variable(self, types: &BTreeMap<&str, &SimpleType>) -> Result<Variable, String> {
-            let declared = |name: &Option<String>| name.as_deref().and_then(|name| types.get(name));
-            let (kind, start) = if let Some(own) = self.real {
-                let default = declared(&own.declared_type).and_then(|t| t.real.clone()).unwrap_or_default();
-                let kind = Kind::Real {
-                    unit: own.unit.or(default.unit),
-                    display_unit: own.display_unit.or(default.display_unit),
-                    min: own.min.or(default.min),
-                    max: own.max.or(default.max),
+    fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
+        let own = ["Real", "Integer", "Boolean", "String", "Enumeration"];
+        let own = own.iter().find_map(|kind| element.child(kind));
+        let own = own.ok_or_else(|| format!("{} has no type", element.title()))?;
+        // An attribute of its own goes before that of its type.
+        let declared = own.attribute("declaredType").and_then(|name| types.get(name)?.child(&own.name));
+        let text =
+            |name: &str| own.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string);
+        let kind = match own.name.as_str() {
+            "Real" => {
+                let bound = |name: &str| match own.number(name)? {
+                    None => declared.map_or(Ok(None), |declared| declared.number(name)),
+                    own => Ok(own),
                 };
-                (kind, own.start)
-            } else if let Some(own) = self.integer {
-                let default =
-                    declared(&own.declared_type).and_then(|t| t.integer.clone()).unwrap_or_default();
-                (Kind::Integer { min: own.min.or(default.min), max: own.max.or(default.max) }, own.start)
-            } else if let Some(own) = self.boolean {
-                (Kind::Boolean, own.start)
-            } else if let Some(own) = self.string {
-                (Kind::String, own.start)
-            } else if let Some(own) = self.enumeration {
-                let items =
-                    declared(&own.declared_type).and_then(|t| t.enumeration.as_ref()).ok_or_else(|| {
-                        format!("the enumeration variable \"{}\" has no type definition", self.name)
-                    })?;
-                let items = items.items.iter().map(|item| (item.name.clone(), item.value)).collect();
-                (Kind::Enumeration { items }, own.start)
-            } else {
-                return Err(format!("the variable \"{}\" has no type", self.name));
-            };
-            Ok(Variable {
-                name: self.name,
-                reference: self.reference,
-                description: self.description,
-                causality: self.causality,
-                variability: self.variability,
-                kind,
-                start,
-            })
-        }
+                let (min, max) = (bound("min")?, bound("max")?);
+                Kind::Real { unit: text("unit"), display_unit: text("displayUnit"), min, max }
+            }
+            "Integer" => {
+                let bound = |name: &str| match own.parsed(name, "a whole number")? {
+                    None => declared.map_or(Ok(None), |declared| declared.parsed(name, "a whole number")),
+                    own => Ok::<_, String>(own),
+                };
+                Kind::Integer { min: bound("min")?, max: bound("max")? }
+            }
+            "Boolean" => Kind::Boolean,
+            "String" => Kind::String,
+            _ => {
+                let declared =
+                    declared.ok_or_else(|| format!("{} has no type definition", element.title()))?;
+                let item = |item: &Element| {
+                    let value = item.parsed("value", "a whole number")?;
+                    let value = value.ok_or_else(|| format!("{} has no attribute value", item.title()))?;
+                    Ok((item.required("name")?.to_string(), value))
+                };
+                let items = declared.children.iter().filter(|child| child.name == "Item");
+                Kind::Enumeration { items: items.map(item).collect::<Result<_, String>>()? }
+            }
+        };
+        let reference = element.parsed("valueReference", "a whole number from 0 to 4294967295")?;
+        let or = |name: &str, default: &str| element.attribute(name).unwrap_or(default).to_string();
+        Ok(Variable {
+            name: element.required("name")?.to_string(),
+            reference: reference
+                .ok_or_else(|| format!("{} has no attribute valueReference", element.title()))?,
+            description: or("description", ""),
+            causality: or("causality", "local"),
+            variability: or("variability", "continuous"),
+            kind,
+            start: own.attribute("start").map(ToString::to_string),
+        })
     }
 
-    impl From<Unit> for UnitDefinition {
-        fn from(unit: Unit) -> Self {
-            let base = unit.base.map(|b| ([b.kg, b.m, b.s, b.ampere, b.kelvin, b.mol, b.cd, b.rad], b));
-            Self {
-                name: unit.name,
-                exponents: base.as_ref().map(|(exponents, _)| *exponents),
-                factor: base.as_ref().map_or(1.0, |(_, b)| b.factor),
-                offset: base.as_ref().map_or(0.0, |(_, b)| b.offset),
-                displays: unit.displays.into_iter().map(|d| (d.name, d.factor, d.offset)).collect(),
-            }
-        }
-    }
-
-    impl TryFrom<Root> for ModelDescription {
-        type Error = String;
-
-        fn try_from(root: Root) -> Result<Self, String> {
-            if root.fmi_version != "2.0" {
-                return Err(format!("is an FMU for FMI {}, this program runs FMI 2.0", root.fmi_version));
-            }
-            let types: BTreeMap<&str, &SimpleType> =
-                root.types.types.iter().map(|t| (t.name.as_str(), t)).collect();
-            let variables = root
-                .variables
-                .variables
-                .into_iter()
-                .map(|variable| variable.into_variable(&types))
-                .collect::<Result<Vec<_>, _>>()?;
-
-            // `index` counts from 1.
+    /// By the position of each output that declares them.
+    fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<usize>>, String> {
+        let unknowns = root.child("ModelStructure").into_iter().flat_map(|of| of.list("Outputs", "Unknown"));
+        let mut dependencies = BTreeMap::new();
+        for unknown in unknowns {
+            // An index counts from 1.
             let position = |index: usize| {
-                index
-                    .checked_sub(1)
-                    .filter(|&position| position < variables.len())
-                    .ok_or_else(|| format!("ModelStructure names variable {index} of {}", variables.len()))
+                let position = index.checked_sub(1).filter(|&position| position < variables);
+                position.ok_or_else(|| {
+                    format!("{} names variable {index} of {variables} of ModelStructure", unknown.title())
+                })
             };
-            let mut dependencies = BTreeMap::new();
-            for unknown in &root.structure.outputs.unknowns {
-                let output = position(unknown.index)?;
-                if let Some(text) = &unknown.dependencies {
-                    let known = text
-                        .split_whitespace()
-                        .map(|index| {
-                            index.parse().map_err(|_| format!("\"{index}\" is no index")).and_then(position)
-                        })
-                        .collect::<Result<Vec<_>, _>>()?;
-                    dependencies.insert(output, known);
-                }
+            let index = unknown.parsed("index", "a whole number from 1 on")?;
+            let output =
+                position(index.ok_or_else(|| format!("{} has no attribute index", unknown.title()))?)?;
+            if let Some(text) = unknown.attribute("dependencies") {
+                let parse = |text: &str| {
+                    let fault =
+                        || format!("\"{}\" in {} is no index", text.escape_default(), unknown.title());
+                    text.parse().map_err(|_| fault()).and_then(position)
+                };
+                dependencies
+                    .insert(output, text.split_whitespace().map(parse).collect::<Result<Vec<_>, _>>()?);
             }
-
-            let default_experiment = root.default_experiment.map_or_else(DefaultExperiment::default, |e| {
-                DefaultExperiment { start: e.start, stop: e.stop, step: e.step, tolerance: e.tolerance }
-            });
-            Ok(Self {
-                fmi_version: root.fmi_version,
-                model_name: root.model_name,
-                guid: root.guid,
-                description: root.description,
-                version: root.version,
-                generation_tool: root.generation_tool,
-                co_simulation: root.co_simulation.map(Into::into),
-                model_exchange: root.model_exchange.map(Into::into),
-                default_experiment,
-                units: root.units.units.into_iter().map(Into::into).collect(),
-                variables,
-                dependencies,
-            })
         }
+        Ok(dependencies)
     }
 }
 
@@ -569,6 +362,11 @@ mod tests {
 </fmiModelDescription>"#;
 
     #[test]
+    fn later_revisions_of_the_standard_are_read_too() {
+        assert!(ModelDescription::parse(&TEXT.replace("fmiVersion=\"2.0\"", "fmiVersion=\"2.0.1\"")).is_ok());
+    }
+
+    #[test]
     fn everything_needed_is_read() {
         let description = ModelDescription::parse(TEXT).unwrap();
         assert!(description.co_simulation.as_ref().unwrap().has("canHandleVariableCommunicationStepSize"));
@@ -590,8 +388,16 @@ mod tests {
         assert!(ModelDescription::parse(&other).unwrap_err().contains("FMI 3.0"));
         let index = TEXT.replace("index=\"4\"", "index=\"5\"");
         assert!(ModelDescription::parse(&index).unwrap_err().contains("variable 5 of 4"));
+        let reference = TEXT.replace("valueReference=\"9\"", "valueReference=\"-1\"");
+        let fault =
+            "valueReference = \"-1\" of the element ScalarVariable \"kind\" in line 19 is not a whole number";
+        assert!(ModelDescription::parse(&reference).unwrap_err().starts_with(fault));
+        let page = "<html><head/><body/></html>";
+        assert!(ModelDescription::parse(page).unwrap_err().contains("begins with the element html"));
+        let version = TEXT.replace("fmiVersion=\"2.0\"", "");
+        assert!(ModelDescription::parse(&version).unwrap_err().contains("no attribute fmiVersion"));
         let untyped = TEXT.replace("<Real/>", "");
-        assert!(ModelDescription::parse(&untyped).unwrap_err().contains("\"z\" has no type"));
+        assert!(ModelDescription::parse(&untyped).unwrap_err().contains("\"z\" in line 20 has no type"));
         assert!(ModelDescription::parse("<fmiModelDescription").is_err());
     }
 }

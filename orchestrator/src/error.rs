@@ -22,6 +22,14 @@ pub enum Error {
         /// What is wrong with it.
         message: String,
     },
+    /// An FMU has faults, which have been told.
+    #[error("{}: {count} {}", path.display(), if *count == 1 { "fault" } else { "faults" })]
+    Faults {
+        /// The archive.
+        path: PathBuf,
+        /// How many.
+        count: usize,
+    },
     /// A unit failed in a call.
     #[error("{component} failed at t = {time} s in {}: {}", failure.call, failure.message)]
     Unit {
@@ -31,6 +39,16 @@ pub enum Error {
         time: f64,
         /// The call and the unit's own words.
         failure: UnitFailure,
+    },
+    /// A unit ended the simulation, which FMI lets it do.
+    #[error("{component} ended the simulation at t = {time} s: {message}")]
+    Ended {
+        /// Name of the component in the experiment.
+        component: String,
+        /// The last communication point, s.
+        time: f64,
+        /// The unit's own words.
+        message: String,
     },
     /// A deadline was missed in a run that was to end then.
     #[error(
@@ -89,10 +107,16 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Experiment { .. } | Self::Fmu { .. } => 2,
+            // A case that ends early has no result to compare.
+            Self::Run { source, .. } if matches!(**source, Self::Ended { .. }) => 1,
             Self::Run { source, .. } => source.exit_code(),
-            Self::Interrupted { request: Request::Quit, .. } => 0,
+            Self::Interrupted { request: Request::Quit, .. } | Self::Ended { .. } => 0,
             Self::Interrupted { request: Request::Signal, .. } => 130,
-            Self::Unit { .. } | Self::Deadline { .. } | Self::File { .. } | Self::Output(_) => 1,
+            Self::Faults { .. }
+            | Self::Unit { .. }
+            | Self::Deadline { .. }
+            | Self::File { .. }
+            | Self::Output(_) => 1,
         }
     }
 
@@ -105,8 +129,17 @@ impl Error {
 /// A call to a unit that did not succeed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnitFailure {
+    /// Whether the unit ended the simulation by it, which is no fault.
+    pub ends: bool,
     /// The call, for example `doStep`.
     pub call: &'static str,
     /// What the unit said of it, or else its status.
     pub message: String,
+}
+
+impl UnitFailure {
+    /// A fault in this call.
+    pub fn new(call: &'static str, message: impl Into<String>) -> Self {
+        Self { ends: false, call, message: message.into() }
+    }
 }

@@ -10,6 +10,7 @@
 //! step = 0.04                       # communication step, s
 //! coupling = "gauss-seidel"         # default; or "jacobi"
 //! order = ["controller", "plant"]   # Gauss-Seidel: whose inputs are set first at each communication point
+//! on_invalid = "error"              # default; "warn" or "allow": a unit gives a value that is no number or outside its type
 //!
 //! [components.plant]
 //! fmu = "ReentryPlant.fmu"          # searched beside the experiment, in each --fmu-dir and in target/fmu
@@ -43,6 +44,7 @@
 
 use crate::error::Error;
 use crate::names;
+use crate::watch::OnInvalid;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -96,6 +98,9 @@ pub struct Simulation {
     /// Order of the components.
     #[serde(default)]
     pub order: Vec<String>,
+    /// What is done about values of a unit that are no numbers, or outside their type.
+    #[serde(default)]
+    pub on_invalid: OnInvalid,
 }
 
 /// How values are passed on at a communication point.
@@ -239,6 +244,9 @@ pub struct Overrides {
     /// Coupling at communication points.
     #[arg(long, value_enum)]
     pub coupling: Option<Coupling>,
+    /// What is done about a value that is no number or outside its type.
+    #[arg(long, value_enum)]
+    pub on_invalid: Option<OnInvalid>,
 }
 
 /// The file an experiment was read from.
@@ -304,6 +312,7 @@ impl Experiment {
         self.simulation.stop = overrides.stop.unwrap_or(self.simulation.stop);
         self.simulation.step = overrides.step.unwrap_or(self.simulation.step);
         self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
+        self.simulation.on_invalid = overrides.on_invalid.unwrap_or(self.simulation.on_invalid);
         for assignment in &overrides.set {
             let malformed = || {
                 Error::experiment(format!(

@@ -1,29 +1,24 @@
 //! Opens `.fmu` archives and makes co-simulation units of them. The only file of this crate with `unsafe`.
 //!
-//! The C types and the logger that expands `printf` arguments come from `fmi-rs`. The calls go through libloading, because
+//! The logger that expands `printf` arguments comes from `fmi-rs`. The calls go through libloading, because
 //! `fmi-rs` lets the callback structure go after fmi2Instantiate, while units of several exporters keep the pointer to it
-//! and crash when they log.
+//! and crash when they log; the C types are in [`fmi`], because those of `fmi-rs` take a status for an enumeration.
 
 #![allow(unsafe_code)]
 
 use crate::archive;
 use crate::description::ModelDescription;
 use crate::error::{Error, UnitFailure};
+use crate::faults;
+use crate::fmi::{self, Status};
 use crate::unit::{CoSimulationUnit, Outcome};
 use crate::xml;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
 use fmi_rs::fmi2::PLATFORM;
-use fmi_rs::fmi2::types::{
-    fmi2CallbackFunctions, fmi2Component, fmi2ComponentEnvironment, fmi2DoStepTYPE,
-    fmi2EnterInitializationModeTYPE, fmi2ExitInitializationModeTYPE, fmi2False, fmi2FreeInstanceTYPE,
-    fmi2GetBooleanTYPE, fmi2GetIntegerTYPE, fmi2GetRealStatusTYPE, fmi2GetRealTYPE, fmi2InstantiateTYPE,
-    fmi2SetBooleanTYPE, fmi2SetIntegerTYPE, fmi2SetRealTYPE, fmi2SetStringTYPE, fmi2SetupExperimentTYPE,
-    fmi2Status, fmi2StatusKind, fmi2String, fmi2TerminateTYPE, fmi2True, fmi2Type,
-};
 use libloading::Library;
-use object::{Object, ObjectSegment};
+use object::{Architecture, BinaryFormat, FileKind, Object, ObjectSegment};
 use std::cell::Cell;
-use std::ffi::{CStr, CString, c_void};
+use std::ffi::{CStr, CString, c_int, c_void};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -33,7 +28,7 @@ use url::Url;
 
 unsafe extern "C" {
     /// Puts a C function in front of the logger that expands the `printf` arguments of a message. Part of `fmi-rs`.
-    fn add_logger_proxy(functions: *mut fmi2CallbackFunctions);
+    fn add_logger_proxy(functions: *mut fmi::Callbacks);
     /// The C library's, for units that want memory from their environment.
     fn calloc(count: usize, size: usize) -> *mut c_void;
     /// Its counterpart.
@@ -74,15 +69,64 @@ impl Fmu {
 
     /// The platforms there are binaries for, in FMI's names.
     pub fn platforms(&self) -> Vec<String> {
-        let mut platforms: Vec<String> = std::fs::read_dir(self.folder.path().join("binaries"))
-            .into_iter()
-            .flatten()
-            .flatten()
-            .filter(|entry| entry.path().is_dir())
-            .map(|entry| entry.file_name().to_string_lossy().into_owned())
-            .collect();
-        platforms.sort();
-        platforms
+        let binaries = self.folder.path().join("binaries");
+        names_in(&binaries).into_iter().filter(|name| binaries.join(name).is_dir()).collect()
+    }
+
+    /// What is wrong with the archive, though it can be opened: one line for each fault of the description, and of the library for this platform.
+    pub fn faults(&self) -> Vec<String> {
+        let mut faults = faults::faults(&self.description);
+        if self.description.co_simulation.is_some() {
+            match self.load() {
+                Ok(functions) => faults.extend(functions.version_fault()),
+                Err(fault) => faults.push(fault),
+            }
+        }
+        faults
+    }
+
+    /// Loads the library.
+    ///
+    /// # Errors
+    /// One line: what is missing, or why it cannot be loaded. It names the entry of the archive.
+    fn load(&self) -> Result<Functions, String> {
+        let interface = self.description.co_simulation.as_ref().ok_or("offers no co-simulation")?;
+        let platforms = self.platforms();
+        if !platforms.iter().any(|platform| platform == PLATFORM) {
+            let offered = if platforms.is_empty() { "none".into() } else { platforms.join(", ") };
+            return Err(format!("has no binary for {PLATFORM}, only for: {offered}"));
+        }
+        let identifier = &interface.model_identifier;
+        // It becomes part of a path. FMI 2.0, section 2.2.7, wants a C identifier, but units with a hyphen in it run everywhere else.
+        if identifier.is_empty() || identifier.contains(['/', '\\', '.', ':', '\0']) {
+            return Err(format!(
+                "the model identifier \"{}\" is refused: it must be the name of a file without folder and ending",
+                identifier.escape_default()
+            ));
+        }
+        let folder = self.folder.path().join("binaries").join(PLATFORM);
+        let name = format!("{identifier}{SHARED_LIBRARY_EXTENSION}");
+        let (file, entry) = (folder.join(&name), format!("binaries/{PLATFORM}/{name}"));
+        if !file.is_file() {
+            let there = names_in(&folder);
+            let there = if there.is_empty() { "nothing".into() } else { there.join(", ") };
+            return Err(format!("has no {entry}, which its model identifier asks for; there is: {there}"));
+        }
+        if !self.is_sound.get() {
+            check_library(&file).map_err(|reason| format!("{entry} {reason}"))?;
+            self.is_sound.set(true);
+        }
+        Functions::load(&file).map_err(|error| {
+            let text = with_causes(&error);
+            let text = text.trim_start_matches("dlopen failed: ");
+            match text.split_once(": cannot open shared object file") {
+                Some((missing, _)) => format!("{entry} needs {missing}, which is not on this system"),
+                // Nobody knows the temporary folder.
+                None => {
+                    format!("{entry}: {}", text.replace(&format!("{}/", self.folder.path().display()), ""))
+                }
+            }
+        })
     }
 
     /// Loads the library and makes a co-simulation unit called `name`.
@@ -92,34 +136,11 @@ impl Fmu {
     /// FMU refuses.
     pub fn instantiate(&self, name: &str) -> Result<FmuUnit, Error> {
         let refuse = |message: String| Error::Fmu { path: self.path.clone(), message };
-        let interface = self
-            .description
-            .co_simulation
-            .as_ref()
-            .ok_or_else(|| refuse("offers no co-simulation".into()))?;
-        let platforms = self.platforms();
-        if !platforms.iter().any(|platform| platform == PLATFORM) {
-            let offered = if platforms.is_empty() { "none".into() } else { platforms.join(", ") };
-            return Err(refuse(format!("has no binary for {PLATFORM}, only for: {offered}")));
+        let is_first = !self.is_sound.get();
+        let functions = self.load().map_err(refuse)?;
+        if let Some(fault) = functions.version_fault().filter(|_| is_first) {
+            tracing::warn!("{}: {fault}", self.path.display());
         }
-        let identifier = &interface.model_identifier;
-        // It becomes part of a path: FMI 2.0, section 2.2.7, wants a C identifier.
-        if identifier.is_empty() || !identifier.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-            return Err(refuse(format!(
-                "the model identifier \"{}\" is refused",
-                identifier.escape_default()
-            )));
-        }
-        let file = format!("{identifier}{SHARED_LIBRARY_EXTENSION}");
-        let file = self.folder.path().join("binaries").join(PLATFORM).join(file);
-        if !self.is_sound.get() {
-            check_library(&file).map_err(|reason| {
-                let name = file.strip_prefix(self.folder.path()).unwrap_or(&file);
-                refuse(format!("{}: {reason}", name.display()))
-            })?;
-            self.is_sound.set(true);
-        }
-        let functions = Functions::load(&file).map_err(|error| refuse(with_causes(&error)))?;
 
         let text =
             |text: &str| CString::new(text).map_err(|_| refuse(format!("\"{text:?}\" holds a zero byte")));
@@ -133,13 +154,13 @@ impl Fmu {
             last: Mutex::default(),
             instantiates: AtomicBool::new(true),
         });
-        let memory = !interface.has("canNotUseMemoryManagementFunctions");
-        let mut callbacks = fmi2CallbackFunctions {
+        // Units that say they need no memory functions refuse to go without them all the same.
+        let mut callbacks = fmi::Callbacks {
             logger: receive_message,
-            allocateMemory: memory.then_some(calloc),
-            freeMemory: memory.then_some(free),
-            stepFinished: None,
-            componentEnvironment: Rc::as_ptr(&log).cast_mut().cast(),
+            allocate: Some(calloc),
+            free: Some(free),
+            step_finished: None,
+            environment: Rc::as_ptr(&log).cast_mut().cast(),
         };
         // SAFETY: the structure is valid; the call only exchanges the logger in it for one that expands the arguments.
         unsafe { add_logger_proxy(&raw mut callbacks) };
@@ -149,12 +170,12 @@ impl Fmu {
         let component = unsafe {
             (functions.instantiate)(
                 name_text.as_ptr(),
-                fmi2Type::CoSimulation,
+                fmi::CO_SIMULATION,
                 guid.as_ptr(),
                 resources.as_ptr(),
                 Rc::as_ptr(&callbacks),
-                fmi2False,
-                fmi2True,
+                fmi::FALSE,
+                fmi::TRUE,
             )
         };
         if component.is_null() {
@@ -167,13 +188,51 @@ impl Fmu {
     }
 }
 
-/// Whether everything is in a library file that will be mapped into memory: a program that touches what is missing is killed.
+/// What is in a folder, sorted; nothing if there is no such folder.
+fn names_in(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// Whether a library file is for this machine, and all there: a program that touches what is missing is killed.
 fn check_library(file: &Path) -> Result<(), String> {
-    let bytes = std::fs::read(file).map_err(|error| error.to_string())?;
+    let bytes = std::fs::read(file).map_err(|error| format!("cannot be read: {error}"))?;
     let fault = |error: object::Error| format!("is no sound library: {error}");
+    // The loader chooses among those in one file.
+    if matches!(FileKind::parse(&*bytes), Ok(FileKind::MachOFat32 | FileKind::MachOFat64)) {
+        return Ok(());
+    }
     let library = object::File::parse(&*bytes).map_err(fault)?;
+    let (own, wanted) = ((library.format(), library.architecture()), HOST);
+    if own != wanted {
+        return Err(format!(
+            "is for {:?} ({:?}), this program needs {:?} ({:?})",
+            own.1, own.0, wanted.1, wanted.0
+        ));
+    }
     library.segments().try_for_each(|segment| segment.data().map(drop)).map_err(fault)
 }
+
+/// What libraries for this machine are.
+const HOST: (BinaryFormat, Architecture) = (
+    if cfg!(windows) {
+        BinaryFormat::Pe
+    } else if cfg!(target_os = "macos") {
+        BinaryFormat::MachO
+    } else {
+        BinaryFormat::Elf
+    },
+    if cfg!(target_arch = "aarch64") {
+        Architecture::Aarch64
+    } else if cfg!(target_arch = "x86") {
+        Architecture::I386
+    } else {
+        Architecture::X86_64
+    },
+);
 
 /// An error and what caused it, in one line.
 fn with_causes(error: &dyn std::error::Error) -> String {
@@ -183,21 +242,24 @@ fn with_causes(error: &dyn std::error::Error) -> String {
 
 /// The functions this program calls, and the library they are in.
 struct Functions {
-    instantiate: fmi2InstantiateTYPE,
-    free_instance: fmi2FreeInstanceTYPE,
-    setup_experiment: fmi2SetupExperimentTYPE,
-    enter_initialization_mode: fmi2EnterInitializationModeTYPE,
-    exit_initialization_mode: fmi2ExitInitializationModeTYPE,
-    terminate: fmi2TerminateTYPE,
-    get_real: fmi2GetRealTYPE,
-    get_integer: fmi2GetIntegerTYPE,
-    get_boolean: fmi2GetBooleanTYPE,
-    set_real: fmi2SetRealTYPE,
-    set_integer: fmi2SetIntegerTYPE,
-    set_boolean: fmi2SetBooleanTYPE,
-    set_string: fmi2SetStringTYPE,
-    do_step: fmi2DoStepTYPE,
-    get_real_status: fmi2GetRealStatusTYPE,
+    instantiate: fmi::Instantiate,
+    free_instance: fmi::FreeInstance,
+    setup_experiment: fmi::SetupExperiment,
+    enter_initialization_mode: fmi::Plain,
+    exit_initialization_mode: fmi::Plain,
+    terminate: fmi::Plain,
+    get_real: fmi::Get<f64>,
+    get_integer: fmi::Get<i32>,
+    get_boolean: fmi::Get<i32>,
+    set_real: fmi::Set<f64>,
+    set_integer: fmi::Set<i32>,
+    set_boolean: fmi::Set<i32>,
+    set_string: fmi::Set<fmi::Text>,
+    do_step: fmi::DoStep,
+    get_real_status: fmi::GetStatus<f64>,
+    get_boolean_status: fmi::GetStatus<c_int>,
+    /// Not needed for anything, and missing in some units.
+    get_version: Option<fmi::GetText>,
     _library: Library,
 }
 
@@ -223,10 +285,32 @@ impl Functions {
                 set_string: *library.get(b"fmi2SetString\0")?,
                 do_step: *library.get(b"fmi2DoStep\0")?,
                 get_real_status: *library.get(b"fmi2GetRealStatus\0")?,
+                get_boolean_status: *library.get(b"fmi2GetBooleanStatus\0")?,
+                get_version: library.get(b"fmi2GetVersion\0").ok().map(|function| *function),
                 _library: library,
             })
         }
     }
+
+    /// What the library says of its version, if that is not that of the description.
+    fn version_fault(&self) -> Option<String> {
+        let Some(get_version) = self.get_version else {
+            return Some("its library has no fmi2GetVersion".into());
+        };
+        // SAFETY: the function has this type, and FMI lets it be called at any time.
+        let version = text_of(unsafe { get_version() });
+        let is_known = version == "2.0" || version.starts_with("2.0.");
+        (!is_known).then(|| format!("its library says that it is of FMI \"{}\"", version.escape_default()))
+    }
+}
+
+/// The text at `text`, which ends with a zero byte; an empty one if there is none.
+fn text_of(text: fmi::Text) -> String {
+    if text.is_null() {
+        return String::new();
+    }
+    // SAFETY: FMI passes texts that end with a zero byte.
+    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
 /// Passes an FMU's log messages on to `tracing`, and keeps the last one that tells of trouble.
@@ -242,12 +326,12 @@ impl Log {
         self.last.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    fn message(&self, status: fmi2Status, category: &str, message: &str) {
+    fn message(&self, status: Status, category: &str, message: &str) {
         let (component, message) = (&self.component, message.trim_end().replace('\n', " "));
         match status {
-            fmi2Status::Ok | fmi2Status::Pending => tracing::info!("{component}: [{category}] {message}"),
-            fmi2Status::Warning => tracing::warn!("{component}: [{category}] {message}"),
-            fmi2Status::Discard | fmi2Status::Error | fmi2Status::Fatal => {
+            Status::Ok | Status::Pending => tracing::info!("{component}: [{category}] {message}"),
+            Status::Warning => tracing::warn!("{component}: [{category}] {message}"),
+            Status::Discard | Status::Error | Status::Fatal | Status::Unknown(_) => {
                 if !self.instantiates.load(Ordering::Relaxed) {
                     tracing::error!("{component}: [{category}] {message}");
                 }
@@ -259,35 +343,28 @@ impl Log {
 
 /// The logger callback, behind the one that expands the arguments.
 unsafe extern "C" fn receive_message(
-    environment: fmi2ComponentEnvironment,
-    _instance: fmi2String,
-    status: fmi2Status,
-    category: fmi2String,
-    message: fmi2String,
+    environment: *mut c_void,
+    _instance: fmi::Text,
+    status: c_int,
+    category: fmi::Text,
+    message: fmi::Text,
 ) {
-    let text = |text: fmi2String| {
-        if text.is_null() {
-            return String::new();
-        }
-        // SAFETY: FMI passes texts that end with a zero byte.
-        unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
-    };
     // SAFETY: the environment is the `Log` given with the callbacks, which lives as long as the instance.
     if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
-        log.message(status, &text(category), &text(message));
+        log.message(status.into(), &text_of(category), &text_of(message));
     }
 }
 
 /// What must live as long as a unit's instance.
 struct Instance {
     functions: Functions,
-    _callbacks: Rc<fmi2CallbackFunctions>,
+    _callbacks: Rc<fmi::Callbacks>,
     log: Rc<Log>,
 }
 
 /// A unit made of an FMU.
 pub struct FmuUnit {
-    component: fmi2Component,
+    component: fmi::Component,
     instance: Rc<Instance>,
     fatal: bool,
     _folder: Rc<TempDir>,
@@ -295,35 +372,52 @@ pub struct FmuUnit {
 
 impl FmuUnit {
     #[inline]
-    fn check(&mut self, call: &'static str, status: fmi2Status) -> Outcome {
-        match status {
-            fmi2Status::Ok | fmi2Status::Warning => Ok(()),
-            _ => Err(self.failure(call, status)),
+    fn check(&mut self, call: &'static str, status: c_int) -> Outcome {
+        match Status::from(status) {
+            Status::Ok | Status::Warning => Ok(()),
+            status => Err(self.failure(call, status)),
         }
     }
 
     #[cold]
-    fn failure(&mut self, call: &'static str, status: fmi2Status) -> UnitFailure {
-        self.fatal |= status == fmi2Status::Fatal;
-        let mut message = self.instance.log.take().unwrap_or_else(|| "no message in its log".into());
-        if status == fmi2Status::Discard && call == "doStep" {
-            let mut time = 0.0;
-            // SAFETY: the instance is alive, and after fmi2Discard this call is allowed.
-            let status = unsafe {
-                (self.instance.functions.get_real_status)(
-                    self.component,
-                    fmi2StatusKind::LastSuccessfulTime,
-                    &raw mut time,
-                )
-            };
-            if status == fmi2Status::Ok {
-                message = format!("{message}; it got as far as t = {time} s");
-            }
+    fn failure(&mut self, call: &'static str, status: Status) -> UnitFailure {
+        self.fatal |= status == Status::Fatal;
+        let said = self.instance.log.take();
+        if status == Status::Discard && call == "doStep" {
+            return self.discarded(said);
         }
-        if status == fmi2Status::Pending {
-            message = "it wants to step asynchronously, which is not supported".into();
+        if status == Status::Pending {
+            let message = "it wants to step asynchronously, which is not supported";
+            return UnitFailure::new(call, format!("{message} ({status})"));
         }
-        UnitFailure { call, message: format!("{message} ({status:?})") }
+        let said = said.unwrap_or_else(|| "no message in its log".into());
+        UnitFailure::new(call, format!("{said} ({status})"))
+    }
+
+    /// Why a step was discarded: FMI 2.0, section 4.2.3, lets a unit end the simulation so.
+    fn discarded(&mut self, said: Option<String>) -> UnitFailure {
+        let Functions { get_real_status, get_boolean_status, .. } = self.instance.functions;
+        let (mut time, mut terminated) = (f64::NAN, fmi::FALSE);
+        // SAFETY: the instance is alive, and after fmi2Discard these calls are allowed.
+        let statuses = unsafe {
+            [
+                get_real_status(self.component, fmi::LAST_SUCCESSFUL_TIME, &raw mut time),
+                get_boolean_status(self.component, fmi::TERMINATED, &raw mut terminated),
+            ]
+        };
+        let [knows_time, knows_end] = statuses.map(|status| Status::from(status) == Status::Ok);
+        let ends = knows_end && terminated != fmi::FALSE;
+        let mut parts: Vec<String> = said.into_iter().collect();
+        if !ends && parts.is_empty() {
+            parts.push("no message in its log".into());
+        }
+        if knows_time && time.is_finite() {
+            parts.push(format!("it got as far as t = {time} s"));
+        }
+        UnitFailure {
+            ends,
+            ..UnitFailure::new("doStep", format!("{} ({})", parts.join("; "), Status::Discard))
+        }
     }
 }
 
@@ -382,10 +476,8 @@ impl CoSimulationUnit for FmuUnit {
     }
 
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
-        let text = CString::new(value).map_err(|_| UnitFailure {
-            call: "setString",
-            message: format!("the text {value:?} holds a zero byte"),
-        })?;
+        let text = CString::new(value)
+            .map_err(|_| UnitFailure::new("setString", format!("the text {value:?} holds a zero byte")))?;
         let (references, values) = ([reference], [text.as_ptr()]);
         call_with_values!(self, set_string, "setString", references, values.as_ptr(), values.len())
     }
@@ -393,7 +485,14 @@ impl CoSimulationUnit for FmuUnit {
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
         // SAFETY: the instance is alive.
         let status = unsafe {
-            (self.instance.functions.setup_experiment)(self.component, fmi2False, 0.0, start, fmi2True, stop)
+            (self.instance.functions.setup_experiment)(
+                self.component,
+                fmi::FALSE,
+                0.0,
+                start,
+                fmi::TRUE,
+                stop,
+            )
         };
         self.check("setupExperiment", status)?;
         // SAFETY: the instance is alive.
@@ -409,7 +508,7 @@ impl CoSimulationUnit for FmuUnit {
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
         // SAFETY: the instance is alive.
-        let status = unsafe { (self.instance.functions.do_step)(self.component, time, step, fmi2True) };
+        let status = unsafe { (self.instance.functions.do_step)(self.component, time, step, fmi::TRUE) };
         self.check("doStep", status)
     }
 

@@ -16,6 +16,21 @@ pub fn inspect(path: &Path, out: &mut impl Write) -> Result<(), Error> {
     Ok(())
 }
 
+/// Says what is wrong with an archive: its description and its library, which is loaded. Nothing is said of one in order.
+///
+/// # Errors
+/// If there are faults, if it is no FMU at all, or if the text cannot be written.
+pub fn check(path: &Path, out: &mut impl Write) -> Result<(), Error> {
+    let faults = Fmu::open(path)?.faults();
+    for fault in &faults {
+        writeln!(out, "{}: {fault}", path.display())?;
+    }
+    match faults.len() {
+        0 => Ok(()),
+        count => Err(Error::Faults { path: path.to_path_buf(), count }),
+    }
+}
+
 fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     let d = &fmu.description;
     writeln!(out, "{} (FMI {})", d.model_name, d.fmi_version)?;
@@ -54,17 +69,23 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
         let mut widths = [0; 6];
         for row in rows.iter().chain([&header]) {
             for (width, cell) in widths.iter_mut().zip(row) {
-                *width = cell.chars().count().max(*width);
+                *width = cell.chars().count().min(WIDEST).max(*width);
             }
         }
         for row in [&header].into_iter().chain(&rows) {
-            let cells: Vec<String> =
-                row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}")).collect();
+            // By hand, as the formatter refuses widths beyond 16 bits.
+            let pad = |(cell, width): (&String, usize)| {
+                format!("{cell}{}", " ".repeat(width.saturating_sub(cell.chars().count())))
+            };
+            let cells: Vec<String> = row.iter().zip(widths).map(pad).collect();
             writeln!(out, "  {}", cells.join("  ").trim_end())?;
         }
     }
     Ok(())
 }
+
+/// Cells that are longer move the rest of their row, and no other.
+const WIDEST: usize = 80;
 
 fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
     let mut start = variable.start.clone().unwrap_or_default();

@@ -106,6 +106,9 @@ enum Command {
     Inspect {
         /// The archive.
         fmu: PathBuf,
+        /// Say what is wrong with it, its library included, instead. Ends with 1 if anything is.
+        #[arg(long)]
+        check: bool,
     },
     /// List experiments, studies and FMUs.
     List {
@@ -173,6 +176,13 @@ fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
             }
             match report.ended {
                 None | Some(Error::Interrupted { request: Request::Quit, .. }) => Ok(()),
+                Some(error @ Error::Ended { .. }) => {
+                    // The summary has said so already.
+                    if quiet {
+                        tracing::warn!("{error}");
+                    }
+                    Ok(())
+                }
                 Some(error) => Err(error),
             }
         }
@@ -194,7 +204,8 @@ fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
             ssp::pack(&plan, &archive)?;
             report::packed(&plan, &archive, out).map_err(Error::from)
         }
-        Command::Inspect { fmu } => inspect::inspect(&fmu, out),
+        Command::Inspect { fmu, check: true } => inspect::check(&fmu, out),
+        Command::Inspect { fmu, check: false } => inspect::inspect(&fmu, out),
         Command::List { folder } => list::list(&folder, out),
     }
 }

@@ -391,7 +391,12 @@ impl Master {
 
     #[cold]
     fn error(&self, time: f64, (index, failure): (usize, UnitFailure)) -> Error {
-        Error::Unit { component: self.members[index].name.clone(), time, failure }
+        let component = self.members[index].name.clone();
+        if failure.ends {
+            Error::Ended { component, time, message: failure.message }
+        } else {
+            Error::Unit { component, time, failure }
+        }
     }
 }
 
@@ -462,7 +467,7 @@ mod tests {
         }
         fn do_step(&mut self, time: f64, step: f64) -> Outcome {
             if time >= self.fails_after {
-                return Err(UnitFailure { call: "doStep", message: "out of propellant".into() });
+                return Err(UnitFailure::new("doStep", "out of propellant"));
             }
             self.state += step * self.input;
             self.note(&format!("step {time}+{step}"));

@@ -5,6 +5,7 @@ use crate::delay::{self, FeedbackLoop};
 use crate::description::{Kind, ModelDescription};
 use crate::error::Error;
 use crate::experiment::{Coupling, Experiment};
+use crate::faults;
 use crate::fmu::Fmu;
 use crate::interrupt::Interrupt;
 use crate::live::scene::Scene;
@@ -21,6 +22,7 @@ use crate::recorder::Recorder;
 use crate::settings::{self, Setting};
 use crate::sidecar;
 use crate::unit::CoSimulationUnit;
+use crate::watch::Watched;
 use crate::wiring::{self, Column, Part, Port, Wire};
 use std::collections::BTreeMap;
 use std::fs;
@@ -114,7 +116,7 @@ impl Plan {
             let path = find_fmu(&experiment, name, fmu_dirs)?;
             let fmu = match opened.get(&path) {
                 Some(fmu) => Rc::clone(fmu),
-                None => Rc::new(Fmu::open(&path)?),
+                None => Rc::new(open(&path)?),
             };
             opened.insert(path, Rc::clone(&fmu));
             fmus.push(fmu);
@@ -231,7 +233,9 @@ impl Plan {
         }
         let ended = match outcome {
             Ok(()) => None,
-            Err(error @ (Error::Deadline { .. } | Error::Interrupted { .. })) => Some(error),
+            Err(error @ (Error::Deadline { .. } | Error::Interrupted { .. } | Error::Ended { .. })) => {
+                Some(error)
+            }
             Err(error) => {
                 tracing::warn!("the results until then are in {}", out.display());
                 return Err(error);
@@ -295,7 +299,10 @@ impl Plan {
         let every = periods(&self.experiment, &self.order);
         let mut members = Vec::new();
         for (index, name) in self.order.iter().enumerate() {
-            let mut unit: Box<dyn CoSimulationUnit> = Box::new(self.fmus[index].instantiate(name)?);
+            let fmu = &self.fmus[index];
+            let unit: Box<dyn CoSimulationUnit> = Box::new(fmu.instantiate(name)?);
+            let on_invalid = self.experiment.simulation.on_invalid;
+            let mut unit = Watched::around(unit, name, &fmu.description, on_invalid);
             settings::apply(&self.settings[index], unit.as_mut()).map_err(|failure| Error::Unit {
                 component: name.clone(),
                 time: self.clock.start(),
@@ -325,6 +332,20 @@ impl Plan {
         }
         Ok(all)
     }
+}
+
+/// Opens an archive, and says if something is wrong with its description.
+fn open(path: &Path) -> Result<Fmu, Error> {
+    let fmu = Fmu::open(path)?;
+    let faults = faults::faults(&fmu.description);
+    if let Some(first) = faults.first() {
+        let more = match faults.len() {
+            1 => String::new(),
+            count => format!(" ({} more: orchestrator inspect --check)", count - 1),
+        };
+        tracing::warn!("{}: {first}{more}", path.display());
+    }
+    Ok(fmu)
 }
 
 /// What must not go unsaid where there is no summary.

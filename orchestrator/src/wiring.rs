@@ -31,7 +31,8 @@ pub enum Carrier {
 }
 
 impl Carrier {
-    fn of(kind: &Kind) -> Option<Self> {
+    /// That of a type; nothing for texts, which do not travel.
+    pub fn of(kind: &Kind) -> Option<Self> {
         match kind {
             Kind::Real { .. } => Some(Self::Real),
             Kind::Integer { .. } | Kind::Enumeration { .. } => Some(Self::Integer),

@@ -4,6 +4,7 @@ use encoding_rs::{Encoding, UTF_8};
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 use std::collections::BTreeMap;
+use std::str::FromStr;
 
 /// The text of a file: in the encoding of its byte order mark, or else of its XML declaration, or else UTF-8.
 ///
@@ -38,6 +39,8 @@ fn declared_encoding(bytes: &[u8]) -> Option<String> {
 pub struct Element {
     /// Name without prefix.
     pub name: String,
+    /// Where it begins, counted from 1.
+    pub line: usize,
     /// Attributes, by name with prefix.
     attributes: BTreeMap<String, String>,
     /// Elements in it.
@@ -56,18 +59,21 @@ impl Element {
         let mut reader = Reader::from_str(text);
         // What is open, the document itself first.
         let mut open = vec![Self::default()];
+        let (mut line, mut counted) = (1, 0);
         loop {
-            let at = reader.buffer_position();
-            let fault = |what: &str| format!("{what} at byte {at}");
+            let at = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX).min(text.len());
+            line += text.get(counted..at).unwrap_or_default().matches('\n').count();
+            counted = at;
+            let fault = |what: &str| format!("{what} in line {line}");
             match reader.read_event().map_err(|error| fault(&error.to_string()))? {
                 Event::Start(start) => {
                     if open.len() > DEPTH {
                         return Err(fault(&format!("more than {DEPTH} elements within each other")));
                     }
-                    open.push(Self::new(&start).map_err(|error| fault(&error))?);
+                    open.push(Self::new(&start, line).map_err(|error| fault(&error))?);
                 }
                 Event::Empty(start) => {
-                    let element = Self::new(&start).map_err(|error| fault(&error))?;
+                    let element = Self::new(&start, line).map_err(|error| fault(&error))?;
                     if let Some(parent) = open.last_mut() {
                         parent.children.push(element);
                     }
@@ -85,7 +91,7 @@ impl Element {
             }
         }
         if open.len() > 1 {
-            return Err(format!("the element \"{}\" is not closed", open[open.len() - 1].name));
+            return Err(format!("{} is not closed", open[open.len() - 1].title()));
         }
         match open.pop().map(|document| document.children) {
             Some(mut roots) if roots.len() == 1 => Ok(roots.remove(0)),
@@ -93,7 +99,7 @@ impl Element {
         }
     }
 
-    fn new(start: &BytesStart) -> Result<Self, String> {
+    fn new(start: &BytesStart, line: usize) -> Result<Self, String> {
         let mut attributes = BTreeMap::new();
         for attribute in start.attributes() {
             let attribute = attribute.map_err(|error| error.to_string())?;
@@ -101,7 +107,13 @@ impl Element {
                 attribute.normalized_value(XmlVersion::Implicit1_0).map_err(|error| error.to_string())?;
             attributes.insert(attribute.key.as_ref().to_string(), value.into_owned());
         }
-        Ok(Self { name: start.local_name().as_ref().to_string(), attributes, children: Vec::new() })
+        Ok(Self { name: start.local_name().as_ref().to_string(), line, attributes, children: Vec::new() })
+    }
+
+    /// What it is called in messages: its kind, its name if it has one, and where it stands.
+    pub fn title(&self) -> String {
+        let own = self.attribute("name").map(|name| format!(" \"{}\"", shortened(name)));
+        format!("the element {}{} in line {}", self.name, own.unwrap_or_default(), self.line)
     }
 
     /// The attribute of this name.
@@ -114,7 +126,7 @@ impl Element {
     /// # Errors
     /// Names element and attribute.
     pub fn required(&self, name: &str) -> Result<&str, String> {
-        self.attribute(name).ok_or_else(|| format!("an element {} has no attribute {name}", self.name))
+        self.attribute(name).ok_or_else(|| format!("{} has no attribute {name}", self.title()))
     }
 
     /// The attribute of this name as a number, if it is there.
@@ -122,11 +134,34 @@ impl Element {
     /// # Errors
     /// If it is no number.
     pub fn number(&self, name: &str) -> Result<Option<f64>, String> {
-        let parse = |text: &str| {
-            let fault = || format!("{name} = \"{text}\" of an element {} is no number", self.name);
-            text.trim().parse().map_err(|_| fault())
-        };
+        self.parsed(name, "a number")
+    }
+
+    /// The attribute of this name as a truth value, if it is there.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn truth(&self, name: &str) -> Result<Option<bool>, String> {
+        match self.attribute(name).map(str::trim) {
+            None => Ok(None),
+            Some("true" | "1") => Ok(Some(true)),
+            Some("false" | "0") => Ok(Some(false)),
+            Some(_) => Err(self.refusal(name, "true or false")),
+        }
+    }
+
+    /// The attribute of this name as a `T`, which messages call `kind`, if it is there.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn parsed<T: FromStr>(&self, name: &str, kind: &str) -> Result<Option<T>, String> {
+        let parse = |text: &str| text.trim().parse().map_err(|_| self.refusal(name, kind));
         self.attribute(name).map(parse).transpose()
+    }
+
+    fn refusal(&self, name: &str, kind: &str) -> String {
+        let text = shortened(self.attribute(name).unwrap_or_default());
+        format!("{name} = \"{text}\" of {} is not {kind}", self.title())
     }
 
     /// The first element of this name in it.
@@ -138,6 +173,15 @@ impl Element {
     pub fn list<'a>(&'a self, list: &str, name: &'a str) -> impl Iterator<Item = &'a Self> {
         let children = self.child(list).map(|list| list.children.as_slice()).unwrap_or_default();
         children.iter().filter(move |child| child.name == name)
+    }
+}
+
+/// A text as messages show it.
+fn shortened(text: &str) -> String {
+    const LONGEST: usize = 60;
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", text[..end].escape_default()),
+        None => text.escape_default().to_string(),
     }
 }
 
@@ -171,6 +215,11 @@ mod tests {
         let numbers: Vec<_> = root.list("list", "b").map(|b| b.number("i").unwrap()).collect();
         assert_eq!(numbers, [Some(1.0), Some(2.0)]);
         assert!(root.required("m").unwrap_err().contains("attribute m"));
+        let lines = Element::parse("<a>\n<b name='x'\n n='-1'/>\n\n<c>\n</c></a>").unwrap();
+        assert_eq!((lines.children[0].line, lines.children[1].line), (2, 5));
+        let fault = lines.children[0].parsed::<u32>("n", "a whole number from 0 on").unwrap_err();
+        assert_eq!(fault, "n = \"-1\" of the element b \"x\" in line 2 is not a whole number from 0 on");
+        assert!(Element::parse("<a>\n<b></a>").unwrap_err().contains("line 2"));
     }
 
     #[test]

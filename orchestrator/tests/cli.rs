@@ -1,99 +1,12 @@
 //! The program as its users see it: exit codes, messages, files. Runs a unit in C that `cc` compiles here.
 
+mod bench;
+
+use bench::{Bench, LOOP};
 use std::fs;
-use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
-use zip::write::SimpleFileOptions;
-
-const LOOP: &str = r#"
-title = "gain and integrator"
-[simulation]
-stop = 3.0
-step = 1.0
-order = ["gain", "plant"]
-[components.gain]
-fmu = "Unit.fmu"
-[components.plant]
-fmu = "Unit.fmu"
-[[connections]]
-from = "plant.output.integral"
-to = "gain.input"
-[[connections]]
-from = "gain.output.direct"
-to = "plant.input"
-[record]
-variables = ["gain.output.direct", "plant.output.integral", "plant.steps"]
-"#;
-
-/// A folder with `Unit.fmu` and `loop.toml`.
-struct Bench {
-    folder: TempDir,
-}
-
-impl Bench {
-    fn new() -> Self {
-        Self::with(LOOP)
-    }
-
-    fn with(experiment: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/unit");
-        let library = folder.path().join("unit.so");
-        let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
-        let status = Command::new(compiler)
-            .args(["-shared", "-fPIC", "-O1", "-Wall", "-Werror", "-o"])
-            .arg(&library)
-            .arg(source.join("unit.c"))
-            .status()
-            .expect("a C compiler");
-        assert!(status.success());
-        let mut zip = zip::ZipWriter::new(fs::File::create(folder.path().join("Unit.fmu")).unwrap());
-        let mut add = |name: &str, content: &[u8]| {
-            zip.start_file(name, SimpleFileOptions::default()).unwrap();
-            zip.write_all(content).unwrap();
-        };
-        add("modelDescription.xml", &fs::read(source.join("modelDescription.xml")).unwrap());
-        add("binaries/linux64/unit.so", &fs::read(&library).unwrap());
-        zip.finish().unwrap();
-        fs::write(folder.path().join("loop.toml"), experiment).unwrap();
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_orchestrator"));
-        command.args(arguments).current_dir(self.folder.path()).env_remove("RUST_LOG");
-        command
-    }
-
-    fn call(&self, arguments: &[&str]) -> (i32, String, String) {
-        let Output { status, stdout, stderr } = self.command(arguments).output().unwrap();
-        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        (status.code().expect("no signal"), text(stdout), text(stderr))
-    }
-
-    fn run(&self, arguments: &[&str]) -> (i32, String, String) {
-        self.call(&[&["run", "loop.toml"], arguments].concat())
-    }
-
-    /// Refusal of an experiment: exit code 2, and one line.
-    fn refusal(&self, arguments: &[&str]) -> String {
-        let (code, _, errors) = self.run(arguments);
-        assert_eq!(code, 2, "{errors}");
-        assert_eq!(errors.lines().count(), 1, "{errors}");
-        errors
-    }
-
-    fn json(&self, name: &str) -> serde_json::Value {
-        serde_json::from_str(&fs::read_to_string(self.path(name)).unwrap()).unwrap()
-    }
-}
 
 fn refusal_of(from: &str, to: &str) -> String {
     let changed = LOOP.replace(from, to);

@@ -9,6 +9,7 @@ use crate::experiment::{
 };
 use crate::fmu::Fmu;
 use crate::run::Opened;
+use crate::watch::OnInvalid;
 use crate::wiring::{self, Part};
 use crate::xml::{self, Element};
 use percent_encoding::percent_decode_str;
@@ -59,6 +60,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let proposed = structure.components.iter().filter_map(|component| of(component).default_experiment.step);
     let step = overrides.step.or(proposed.reduce(f64::min));
     let simulation = Simulation {
+        on_invalid: OnInvalid::default(),
         start: time("startTime")?.unwrap_or(0.0),
         stop: stop.ok_or_else(|| refuse("has no stop time: give --stop".into()))?,
         step: step.ok_or_else(|| refuse("none of its FMUs proposes a step: give --step".into()))?,

@@ -1,10 +1,28 @@
 /* A small FMI 2.0 co-simulation unit, to try the orchestrator on a library that is not ours: it keeps the pointer to the
    callbacks, wants memory from its environment, and logs with printf arguments.
    Output 1 = gain * input (direct), output 2 = integral of the input. It fails, and is slow, as its parameters say. It guarantees something as long
-   as the input is at most the parameter "largest". The parameters "delay" and "actuation.delay" do nothing. */
+   as the input is at most the parameter "largest". The parameters "delay" and "actuation.delay" do nothing.
+   What it does wrong is chosen by the compiler's flags: -DENDS: a discarded step ends the simulation; -DVERSION: its version; -DDIRECT(value),
+   -DITEM(value), -DTRUTH(value): what becomes of output.direct, guarantee.status, guarantee.inForce after two steps. */
 #define _POSIX_C_SOURCE 199309L
 #include <stddef.h>
 #include <time.h>
+
+#ifndef ENDS
+#define ENDS 0
+#endif
+#ifndef VERSION
+#define VERSION "2.0"
+#endif
+#ifndef DIRECT
+#define DIRECT(value) (value)
+#endif
+#ifndef ITEM
+#define ITEM(value) (value)
+#endif
+#ifndef TRUTH
+#define TRUTH(value) (value)
+#endif
 
 typedef struct {
     void (*logger)(void *, const char *, int, const char *, const char *, ...);
@@ -28,6 +46,8 @@ static int complain(Unit *unit, int status, const char *what, double value) {
     unit->callbacks->logger(unit->callbacks->environment, unit->name, status, "trouble", "%s %g", what, value);
     return status;
 }
+
+const char *fmi2GetVersion(void) { return VERSION; }
 
 void *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources, const Callbacks *callbacks,
                       int visible, int logging) {
@@ -63,7 +83,10 @@ int fmi2GetReal(Unit *unit, const unsigned *references, size_t n, double *values
     for (size_t i = 0; i < n; i++) {
         switch (references[i]) {
         case 0: values[i] = unit->input; break;
-        case 1: values[i] = unit->gain * unit->input; break;
+        case 1:
+            values[i] = unit->gain * unit->input;
+            if (unit->count >= 2) values[i] = DIRECT(values[i]);
+            break;
         case 2: values[i] = unit->state; break;
         case 3: values[i] = unit->gain; break;
         case 4: values[i] = unit->fail_time; break;
@@ -100,7 +123,10 @@ int fmi2GetInteger(Unit *unit, const unsigned *references, size_t n, int *values
         switch (references[i]) {
         case 5: values[i] = unit->fail_status; break;
         case 7: values[i] = unit->kind; break;
-        case 17: values[i] = unit->input <= unit->largest ? 1 : 2; break;
+        case 17:
+            values[i] = unit->input <= unit->largest ? 1 : 2;
+            if (unit->count >= 2) values[i] = ITEM(values[i]);
+            break;
         default: values[i] = unit->count;
         }
     }
@@ -114,7 +140,10 @@ int fmi2SetInteger(Unit *unit, const unsigned *references, size_t n, const int *
 }
 
 int fmi2GetBoolean(Unit *unit, const unsigned *references, size_t n, int *values) {
-    for (size_t i = 0; i < n; i++) values[i] = references[i] == 16 ? unit->input <= unit->largest : unit->flag;
+    for (size_t i = 0; i < n; i++) {
+        values[i] = references[i] == 16 ? unit->input <= unit->largest : unit->flag;
+        if (references[i] == 16 && unit->count >= 2) values[i] = TRUTH(values[i]);
+    }
     return OK;
 }
 
@@ -141,5 +170,10 @@ int fmi2DoStep(Unit *unit, double time, double step, int no_set_state) {
 
 int fmi2GetRealStatus(Unit *unit, int kind, double *value) {
     *value = unit->fail_time + 0.5 * kind;
+    return OK;
+}
+
+int fmi2GetBooleanStatus(Unit *unit, int kind, int *value) {
+    *value = unit && kind == 3 && ENDS;
     return OK;
 }

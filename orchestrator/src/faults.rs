@@ -1,0 +1,177 @@
+//! What is wrong with a description that can be read all the same. Units run with most of it, but not everywhere, and not always as meant.
+
+use crate::description::{Kind, ModelDescription, Variable};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// `causality` of FMI 2.0, section 2.2.7.
+const CAUSALITIES: [&str; 6] =
+    ["parameter", "calculatedParameter", "input", "output", "local", "independent"];
+/// `variability` of the same section.
+const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
+
+/// One line for each fault, in the order of the file.
+pub fn faults(description: &ModelDescription) -> Vec<String> {
+    let mut faults = Vec::new();
+    if description.co_simulation.is_none() && description.model_exchange.is_none() {
+        faults.push("offers neither co-simulation nor model exchange".to_string());
+    }
+    if description.co_simulation.as_ref().is_some_and(|interface| interface.has("needsExecutionTool")) {
+        faults.push("needs the tool that made it on this machine (needsExecutionTool)".to_string());
+    }
+    if !description.has_structure {
+        faults.push("has no ModelStructure, which says what the outputs are".to_string());
+    }
+    let units: BTreeSet<&str> = description.units.iter().map(|unit| unit.name.as_str()).collect();
+    let (mut names, mut handles) = (BTreeSet::new(), BTreeMap::new());
+    for variable in &description.variables {
+        let name = &variable.name;
+        if !names.insert(name) {
+            faults.push(format!("two variables are called \"{name}\""));
+        }
+        // Other variables may share a reference as aliases; of two that are set, the later would win.
+        if matches!(variable.causality.as_str(), "input" | "parameter") {
+            let handle = (variable.reference, carrier(&variable.kind));
+            if let Some(other) = handles.insert(handle, name) {
+                faults.push(format!("\"{other}\" and \"{name}\" have the same value reference {}", handle.0));
+            }
+        }
+        of_variable(variable, &units, &mut faults);
+    }
+    faults
+}
+
+/// The calls by which a variable is set; references are unique within each.
+fn carrier(kind: &Kind) -> &'static str {
+    match kind {
+        Kind::Enumeration { .. } => "Integer",
+        other => other.name(),
+    }
+}
+
+fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<String>) {
+    let Variable { name, causality, variability, kind, .. } = variable;
+    if !CAUSALITIES.contains(&causality.as_str()) {
+        faults.push(format!("the causality \"{}\" of \"{name}\" is not known", causality.escape_default()));
+    }
+    if !VARIABILITIES.contains(&variability.as_str()) {
+        faults
+            .push(format!("the variability \"{}\" of \"{name}\" is not known", variability.escape_default()));
+    }
+    if let Kind::Real { unit: Some(unit), .. } = kind
+        && !units.contains(unit.as_str())
+    {
+        faults.push(format!("the unit \"{}\" of \"{name}\" is not defined", unit.escape_default()));
+    }
+    match kind {
+        Kind::Real { min: Some(min), max: Some(max), .. } if min > max => {
+            faults.push(format!("the smallest value of \"{name}\", {min}, is above its largest, {max}"));
+        }
+        Kind::Integer { min: Some(min), max: Some(max) } if min > max => {
+            faults.push(format!("the smallest value of \"{name}\", {min}, is above its largest, {max}"));
+        }
+        _ => {}
+    }
+    if let Some(fault) = variable.start.as_deref().and_then(|start| start_fault(start.trim(), kind)) {
+        let start = variable.start.as_deref().unwrap_or_default().escape_default();
+        faults.push(format!("the start value \"{start}\" of \"{name}\" {fault}"));
+    }
+}
+
+/// What is wrong with a start value.
+fn start_fault(start: &str, kind: &Kind) -> Option<String> {
+    let outside =
+        |below: bool, above: bool| (below || above).then(|| "is outside its min and max".to_string());
+    match kind {
+        Kind::Real { min, max, .. } => match start.parse::<f64>() {
+            Ok(value) if value.is_nan() => Some("is not a number".into()),
+            Ok(value) => outside(min.is_some_and(|min| value < min), max.is_some_and(|max| value > max)),
+            Err(_) => Some("is not a number".into()),
+        },
+        Kind::Integer { min, max } => match start.parse::<i32>() {
+            Ok(value) => outside(min.is_some_and(|min| value < min), max.is_some_and(|max| value > max)),
+            Err(_) => Some("is not a whole number of 32 bits".into()),
+        },
+        Kind::Boolean => {
+            (!matches!(start, "true" | "false" | "1" | "0")).then(|| "is neither true nor false".into())
+        }
+        Kind::Enumeration { items } => {
+            let known = start.parse::<i32>().is_ok_and(|value| items.iter().any(|item| item.1 == value));
+            (!known).then(|| "is no item of its type".into())
+        }
+        Kind::String => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = r#"<fmiModelDescription fmiVersion="2.0" modelName="a" guid="1">
+  <CoSimulation modelIdentifier="a"/>
+  <UnitDefinitions><Unit name="m"/></UnitDefinitions>
+  <TypeDefinitions><SimpleType name="K"><Enumeration><Item name="one" value="1"/></Enumeration></SimpleType></TypeDefinitions>
+  <ModelVariables>
+    <ScalarVariable name="x" valueReference="0" causality="input"><Real unit="m" min="0" max="2" start="1"/></ScalarVariable>
+    <ScalarVariable name="n" valueReference="0" causality="parameter" variability="fixed"><Integer start="1" min="0"/></ScalarVariable>
+    <ScalarVariable name="b" valueReference="0" causality="parameter" variability="fixed"><Boolean start="true"/></ScalarVariable>
+    <ScalarVariable name="k" valueReference="1" causality="parameter" variability="fixed"><Enumeration declaredType="K" start="1"/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure/>
+</fmiModelDescription>"#;
+
+    #[test]
+    fn each_fault_is_named_by_its_variable() {
+        let of = |text: &str| faults(&ModelDescription::parse(text).unwrap());
+        assert_eq!(of(GOOD), Vec::<String>::new());
+        for (from, to, fault) in [
+            (
+                "start=\"1\"/></ScalarVariable>\n    <ScalarVariable name=\"n\"",
+                "start=\"one\"/></ScalarVariable>\n    <ScalarVariable name=\"n\"",
+                "the start value \"one\" of \"x\" is not a number",
+            ),
+            (
+                "max=\"2\" start=\"1\"",
+                "max=\"2\" start=\"3\"",
+                "the start value \"3\" of \"x\" is outside its min and max",
+            ),
+            (
+                "min=\"0\" max=\"2\" start=\"1\"",
+                "min=\"3\" max=\"2\"",
+                "the smallest value of \"x\", 3, is above its largest, 2",
+            ),
+            (
+                "<Integer start=\"1\"",
+                "<Integer start=\"1.5\"",
+                "the start value \"1.5\" of \"n\" is not a whole number",
+            ),
+            (
+                "<Boolean start=\"true\"",
+                "<Boolean start=\"yes\"",
+                "the start value \"yes\" of \"b\" is neither true nor false",
+            ),
+            (
+                "declaredType=\"K\" start=\"1\"",
+                "declaredType=\"K\" start=\"2\"",
+                "the start value \"2\" of \"k\" is no item",
+            ),
+            (
+                "name=\"k\" valueReference=\"1\"",
+                "name=\"k\" valueReference=\"0\"",
+                "\"n\" and \"k\" have the same value reference 0",
+            ),
+            ("unit=\"m\" min", "unit=\"ell\" min", "the unit \"ell\" of \"x\" is not defined"),
+            ("causality=\"input\"", "causality=\"inptu\"", "the causality \"inptu\" of \"x\" is not known"),
+            ("<ModelStructure/>", "", "has no ModelStructure"),
+            (
+                "modelIdentifier=\"a\"",
+                "modelIdentifier=\"a\" needsExecutionTool=\"true\"",
+                "needs the tool that made it",
+            ),
+        ] {
+            let text = GOOD.replacen(from, to, 1);
+            assert_ne!(text, GOOD, "{from}");
+            let found = of(&text);
+            assert!(found.len() == 1 && found[0].starts_with(fault), "{fault}: {found:?}");
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! The types of FMI 2.0's C interface as the master meets them. What a unit gives back is taken as the integer that C passes: a unit may return
+//! anything, and a Rust enumeration must not hold what it has no item for.
+
+use std::ffi::{c_char, c_int, c_uint, c_void};
+
+/// fmi2True and fmi2False.
+pub const TRUE: c_int = 1;
+/// See [`TRUE`].
+pub const FALSE: c_int = 0;
+/// fmi2CoSimulation.
+pub const CO_SIMULATION: c_int = 1;
+/// fmi2LastSuccessfulTime.
+pub const LAST_SUCCESSFUL_TIME: c_int = 2;
+/// fmi2Terminated.
+pub const TERMINATED: c_int = 3;
+
+/// What a call returned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// fmi2OK.
+    Ok,
+    /// fmi2Warning.
+    Warning,
+    /// fmi2Discard.
+    Discard,
+    /// fmi2Error.
+    Error,
+    /// fmi2Fatal.
+    Fatal,
+    /// fmi2Pending.
+    Pending,
+    /// No status of FMI 2.0.
+    Unknown(c_int),
+}
+
+impl From<c_int> for Status {
+    fn from(code: c_int) -> Self {
+        match code {
+            0 => Self::Ok,
+            1 => Self::Warning,
+            2 => Self::Discard,
+            3 => Self::Error,
+            4 => Self::Fatal,
+            5 => Self::Pending,
+            other => Self::Unknown(other),
+        }
+    }
+}
+
+impl std::fmt::Display for Status {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Self::Unknown(code) => write!(f, "status {code}, which FMI 2.0 does not have"),
+            known => write!(f, "fmi2{}", if *known == Self::Ok { "OK".into() } else { format!("{known:?}") }),
+        }
+    }
+}
+
+/// fmi2Component.
+pub type Component = *mut c_void;
+/// The texts of C.
+pub type Text = *const c_char;
+/// The logger, once the `printf` arguments are in the message.
+pub type Logger = unsafe extern "C" fn(*mut c_void, Text, c_int, Text, Text);
+
+/// fmi2CallbackFunctions.
+#[repr(C)]
+pub struct Callbacks {
+    /// Gets the unit's messages.
+    pub logger: Logger,
+    /// Gives zeroed memory: how many, of what size.
+    pub allocate: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
+    /// Takes it back.
+    pub free: Option<unsafe extern "C" fn(*mut c_void)>,
+    /// For steps that are not waited for.
+    pub step_finished: Option<unsafe extern "C" fn(*mut c_void, c_int)>,
+    /// Passed to the callbacks as it is.
+    pub environment: *mut c_void,
+}
+
+/// fmi2GetVersion and fmi2GetTypesPlatform.
+pub type GetText = unsafe extern "C" fn() -> Text;
+/// fmi2Instantiate: name, type, GUID, resources, callbacks, visible, logging.
+pub type Instantiate =
+    unsafe extern "C" fn(Text, c_int, Text, Text, *const Callbacks, c_int, c_int) -> Component;
+/// fmi2FreeInstance.
+pub type FreeInstance = unsafe extern "C" fn(Component);
+/// fmi2SetupExperiment: tolerance and start and stop time, each but the start with whether it is given.
+pub type SetupExperiment = unsafe extern "C" fn(Component, c_int, f64, f64, c_int, f64) -> c_int;
+/// fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2Terminate.
+pub type Plain = unsafe extern "C" fn(Component) -> c_int;
+/// fmi2GetReal, fmi2GetInteger, fmi2GetBoolean: value references, how many, values.
+pub type Get<T> = unsafe extern "C" fn(Component, *const c_uint, usize, *mut T) -> c_int;
+/// fmi2SetReal, fmi2SetInteger, fmi2SetBoolean, fmi2SetString.
+pub type Set<T> = unsafe extern "C" fn(Component, *const c_uint, usize, *const T) -> c_int;
+/// fmi2DoStep: time, step, whether the state before will not be set again.
+pub type DoStep = unsafe extern "C" fn(Component, f64, f64, c_int) -> c_int;
+/// fmi2GetRealStatus, fmi2GetBooleanStatus: which, value.
+pub type GetStatus<T> = unsafe extern "C" fn(Component, c_int, *mut T) -> c_int;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_status_that_fmi_does_not_have_is_kept_as_a_number() {
+        assert_eq!(Status::from(2), Status::Discard);
+        assert_eq!(Status::from(-7).to_string(), "status -7, which FMI 2.0 does not have");
+        assert_eq!(
+            (Status::Ok.to_string(), Status::Fatal.to_string()),
+            ("fmi2OK".into(), "fmi2Fatal".into())
+        );
+    }
+}

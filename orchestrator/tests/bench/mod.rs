@@ -1,0 +1,125 @@
+//! A folder to run the program in, with a unit in C that `cc` compiles there. Each test program uses a part of it.
+
+#![allow(dead_code, unreachable_pub)]
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tempfile::TempDir;
+use zip::write::SimpleFileOptions;
+
+/// Two of the unit in a loop.
+pub const LOOP: &str = r#"
+title = "gain and integrator"
+[simulation]
+stop = 3.0
+step = 1.0
+order = ["gain", "plant"]
+[components.gain]
+fmu = "Unit.fmu"
+[components.plant]
+fmu = "Unit.fmu"
+[[connections]]
+from = "plant.output.integral"
+to = "gain.input"
+[[connections]]
+from = "gain.output.direct"
+to = "plant.input"
+[record]
+variables = ["gain.output.direct", "plant.output.integral", "plant.steps"]
+"#;
+
+/// How the unit in C is made.
+pub struct Recipe<'a> {
+    /// What the compiler is told besides, `-DENDS` for instance.
+    pub flags: &'a [&'a str],
+    /// What becomes of the text of its description.
+    pub description: &'a dyn Fn(String) -> String,
+    /// What becomes of its library.
+    pub library: &'a dyn Fn(Vec<u8>) -> Vec<u8>,
+    /// What comes before the name of an entry.
+    pub prefix: &'a str,
+    /// Name of the library.
+    pub name: &'a str,
+}
+
+impl Default for Recipe<'_> {
+    fn default() -> Self {
+        Self { flags: &[], description: &|text| text, library: &|bytes| bytes, prefix: "", name: "unit.so" }
+    }
+}
+
+/// A folder with `Unit.fmu` and `loop.toml`.
+pub struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        Self::with(LOOP)
+    }
+
+    pub fn with(experiment: &str) -> Self {
+        Self::made(experiment, &Recipe::default())
+    }
+
+    pub fn made(experiment: &str, recipe: &Recipe) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/unit");
+        let library = folder.path().join("unit.so");
+        let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
+        let status = Command::new(compiler)
+            .args(["-shared", "-fPIC", "-O1", "-Wall", "-Werror", "-o"])
+            .arg(&library)
+            .arg(source.join("unit.c"))
+            .args(recipe.flags)
+            .status()
+            .expect("a C compiler");
+        assert!(status.success());
+        let mut zip = zip::ZipWriter::new(fs::File::create(folder.path().join("Unit.fmu")).unwrap());
+        let mut add = |name: &str, content: &[u8]| {
+            zip.start_file(format!("{}{name}", recipe.prefix), SimpleFileOptions::default()).unwrap();
+            zip.write_all(content).unwrap();
+        };
+        let description = fs::read_to_string(source.join("modelDescription.xml")).unwrap();
+        add("modelDescription.xml", (recipe.description)(description).as_bytes());
+        let library = (recipe.library)(fs::read(&library).unwrap());
+        add(&format!("binaries/linux64/{}", recipe.name), &library);
+        zip.finish().unwrap();
+        fs::write(folder.path().join("loop.toml"), experiment).unwrap();
+        Self { folder }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_orchestrator"));
+        command.args(arguments).current_dir(self.folder.path()).env_remove("RUST_LOG");
+        command
+    }
+
+    pub fn call(&self, arguments: &[&str]) -> (i32, String, String) {
+        let Output { status, stdout, stderr } = self.command(arguments).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (status.code().expect("no signal"), text(stdout), text(stderr))
+    }
+
+    pub fn run(&self, arguments: &[&str]) -> (i32, String, String) {
+        self.call(&[&["run", "loop.toml"], arguments].concat())
+    }
+
+    /// Refusal of an experiment: exit code 2, and one line.
+    pub fn refusal(&self, arguments: &[&str]) -> String {
+        let (code, _, errors) = self.run(arguments);
+        assert_eq!(code, 2, "{errors}");
+        assert_eq!(errors.lines().count(), 1, "{errors}");
+        errors
+    }
+
+    pub fn json(&self, name: &str) -> serde_json::Value {
+        serde_json::from_str(&fs::read_to_string(self.path(name)).unwrap()).unwrap()
+    }
+}

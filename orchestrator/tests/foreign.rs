@@ -1,0 +1,218 @@
+//! Units of other makers, imitated by a unit in C: what they do differently runs, and what is wrong with them is told.
+
+mod bench;
+
+use bench::{Bench, LOOP, Recipe};
+use std::fs;
+use std::process::Command;
+
+/// One line on standard error, which names the archive and nothing of the temporary folder.
+fn told(errors: &str) -> &str {
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    assert!(errors.starts_with("error: Unit.fmu: ") || errors.contains("/Unit.fmu: "), "{errors}");
+    assert!(!errors.contains("/fmu-"), "{errors}");
+    errors.trim_end()
+}
+
+fn changed<'a>(from: &'a str, to: &'a str) -> impl Fn(String) -> String + 'a {
+    move |text| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    }
+}
+
+#[test]
+fn units_that_say_they_need_no_memory_functions_get_them_all_the_same() {
+    let description =
+        changed("modelIdentifier", "canNotUseMemoryManagementFunctions=\"true\" modelIdentifier");
+    let bench = Bench::made(LOOP, &Recipe { description: &description, ..Recipe::default() });
+    let (code, _, errors) = bench.run(&["--quiet"]);
+    assert_eq!((code, errors.as_str()), (0, ""));
+}
+
+#[test]
+fn identifiers_with_a_hyphen_folders_with_a_dot_and_later_revisions_run() {
+    let hyphen = changed("modelIdentifier=\"unit\"", "modelIdentifier=\"unit-7\"");
+    let revision = changed("fmiVersion=\"2.0\"", "fmiVersion=\"2.0.1\"");
+    for recipe in [
+        Recipe { description: &hyphen, name: "unit-7.so", ..Recipe::default() },
+        Recipe { description: &revision, ..Recipe::default() },
+        Recipe { prefix: "./", ..Recipe::default() },
+    ] {
+        let (code, _, errors) = Bench::made(LOOP, &recipe).run(&["--quiet"]);
+        assert_eq!((code, errors.as_str()), (0, ""));
+    }
+    for name in ["../unit", "a/b", "c:d", ""] {
+        let text = format!("modelIdentifier=\"{name}\"");
+        let description = changed("modelIdentifier=\"unit\"", &text);
+        let bench = Bench::made(LOOP, &Recipe { description: &description, ..Recipe::default() });
+        let (code, _, errors) = bench.run(&["--quiet"]);
+        assert_eq!(code, 2);
+        assert!(told(&errors).contains("must be the name of a file"), "{errors}");
+    }
+}
+
+#[test]
+fn a_unit_may_end_the_simulation() {
+    let bench = Bench::made(LOOP, &Recipe { flags: &["-DENDS=1"], ..Recipe::default() });
+    let fails = ["--set", "plant.fail.time=2", "--set", "plant.fail.status=2"];
+    let (code, summary, _) = bench.run(&fails);
+    assert_eq!(code, 0);
+    assert!(summary.contains("ended early       plant ended the simulation at t = 2 s: out of propellant at 2; it got as far as t = 3 s"), "{summary}");
+    assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(), 4);
+    assert_eq!(bench.json("out/loop/metrics.json")["completed"], false);
+    let (code, _, errors) = bench.run(&[&fails[..], &["--quiet"]].concat());
+    assert_eq!(code, 0);
+    assert!(errors.contains("plant ended the simulation at t = 2 s"), "{errors}");
+
+    // Without fmi2Terminated it is a failure, and says how far the unit got.
+    let (code, _, errors) = Bench::new().run(&fails);
+    assert_eq!(code, 1);
+    let last = "error: plant failed at t = 2 s in doStep: out of propellant at 2; it got as far as t = 3 s (fmi2Discard)";
+    assert_eq!(errors.lines().last(), Some(last));
+}
+
+#[test]
+fn a_status_that_does_not_exist_is_a_failure_of_that_call() {
+    // The logger is given it as well.
+    let description = changed(" min=\"2\" max=\"4\" start=\"3\"", " start=\"3\"");
+    let bench = Bench::made(LOOP, &Recipe { description: &description, ..Recipe::default() });
+    for status in ["-7", "42", "99"] {
+        let value = format!("plant.fail.status={status}");
+        let (code, _, errors) = bench.run(&["--quiet", "--set", "plant.fail.time=2", "--set", &value]);
+        assert_eq!(code, 1, "{errors}");
+        let last = format!(
+            "error: plant failed at t = 2 s in doStep: out of propellant at 2 (status {status}, which FMI 2.0 does not have)"
+        );
+        assert_eq!(errors.lines().last(), Some(last.as_str()));
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_library_is_told_by_its_entry() {
+    let of = |recipe: &Recipe| {
+        let bench = Bench::made(LOOP, recipe);
+        let (code, _, errors) = bench.run(&["--quiet"]);
+        assert_eq!(code, 2, "{errors}");
+        let (checked, text, _) = bench.call(&["inspect", "--check", "Unit.fmu"]);
+        let text = text.replace("Unit.fmu: ", "");
+        assert!(checked == 1 && errors.trim_end().ends_with(text.trim_end()), "{errors} {text}");
+        told(&errors).to_string()
+    };
+    let misnamed = of(&Recipe { name: "other.so", ..Recipe::default() });
+    assert!(
+        misnamed.ends_with(
+            "has no binaries/linux64/unit.so, which its model identifier asks for; there is: other.so"
+        ),
+        "{misnamed}"
+    );
+    // e_machine of ELF: 183 is AArch64.
+    let for_arm = |mut bytes: Vec<u8>| {
+        bytes[18..20].copy_from_slice(&[183, 0]);
+        bytes
+    };
+    let other = of(&Recipe { library: &for_arm, ..Recipe::default() });
+    assert!(other.contains("binaries/linux64/unit.so is for Aarch64 (Elf), this program needs"), "{other}");
+    let torn = of(&Recipe { library: &|bytes| bytes[..200].to_vec(), ..Recipe::default() });
+    assert!(torn.contains("binaries/linux64/unit.so is no sound library"), "{torn}");
+    let without = of(&Recipe { flags: &["-Dfmi2DoStep=step"], ..Recipe::default() });
+    assert!(without.contains("binaries/linux64/unit.so: undefined symbol: fmi2DoStep"), "{without}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let missing = folder.path().join("libnowhere.so");
+    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
+    let made = Command::new(compiler).args(["-shared", "-x", "c", "/dev/null", "-o"]).arg(&missing).status();
+    assert!(made.unwrap().success());
+    let path = format!("-L{}", folder.path().display());
+    let needing = of(&Recipe { flags: &["-Wl,--no-as-needed", &path, "-lnowhere"], ..Recipe::default() });
+    assert!(
+        needing.ends_with("binaries/linux64/unit.so needs libnowhere.so, which is not on this system"),
+        "{needing}"
+    );
+}
+
+#[test]
+fn what_is_wrong_with_a_description_is_told_by_element_and_line() {
+    for (from, to, fault) in [
+        (
+            "valueReference=\"9\"",
+            "valueReference=\"-1\"",
+            "valueReference = \"-1\" of the element ScalarVariable \"text\" in line 23 is not a whole number",
+        ),
+        ("fmiVersion=\"2.0\"", "", "the element fmiModelDescription in line 2 has no attribute fmiVersion"),
+        ("</ModelVariables>", "", "in line"),
+    ] {
+        let description = changed(from, to);
+        let bench = Bench::made(LOOP, &Recipe { description: &description, ..Recipe::default() });
+        let (code, _, errors) = bench.run(&["--quiet"]);
+        assert_eq!(code, 2, "{errors}");
+        assert!(told(&errors).contains(fault), "{errors}");
+    }
+}
+
+#[test]
+fn doubtful_units_are_warned_of_and_checked() {
+    let description = |text: String| {
+        let text = changed(
+            "\"flag\" valueReference=\"6\"",
+            "\"flag\" valueReference=\"6\" causality=\"paramter\"",
+        )(text);
+        let text = changed("causality=\"paramter\" causality=\"parameter\"", "causality=\"paramter\"")(text);
+        changed("<Real unit=\"m/s\"/>", "<Real unit=\"knots\" start=\"fast\"/>")(text)
+    };
+    let recipe = Recipe { description: &description, flags: &["-DVERSION=\"1.0\""], ..Recipe::default() };
+    let bench = Bench::made(LOOP, &recipe);
+    let (code, text, errors) = bench.call(&["inspect", "--check", "Unit.fmu"]);
+    let expected = "Unit.fmu: the causality \"paramter\" of \"flag\" is not known\n\
+                    Unit.fmu: the unit \"knots\" of \"speed\" is not defined\n\
+                    Unit.fmu: the start value \"fast\" of \"speed\" is not a number\n\
+                    Unit.fmu: its library says that it is of FMI \"1.0\"\n";
+    assert_eq!((code, text.as_str()), (1, expected));
+    assert_eq!(errors, "error: Unit.fmu: 4 faults\n");
+    let (code, _, errors) = bench.run(&["--quiet"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(errors.contains("\"flag\" is not known (2 more: orchestrator inspect --check)"), "{errors}");
+    assert!(errors.contains("its library says that it is of FMI \"1.0\""), "{errors}");
+
+    let (code, text, errors) = Bench::new().call(&["inspect", "--check", "Unit.fmu"]);
+    assert_eq!((code, text.as_str(), errors.as_str()), (0, "", ""));
+}
+
+#[test]
+fn names_of_any_length_are_shown() {
+    let long = format!("name=\"{}\"", "n".repeat(66_000));
+    let description = changed("name=\"speed\"", &long);
+    let bench = Bench::made(LOOP, &Recipe { description: &description, ..Recipe::default() });
+    let (code, text, errors) = bench.call(&["inspect", "Unit.fmu"]);
+    assert_eq!((code, errors.as_str()), (0, ""));
+    assert!(text.len() < 200_000, "{}", text.len());
+}
+
+#[test]
+fn values_that_are_none_end_the_run() {
+    let recorded = LOOP.replace("\"plant.steps\"]", "\"plant.steps\", \"plant.guarantee.*\"]");
+    for (flag, fault) in [
+        ("-DDIRECT(value)=0.0/0.0", "gain failed at t = 2 s in getReal: \"output.direct\" is NaN"),
+        ("-DDIRECT(value)=1e308*10", "gain failed at t = 2 s in getReal: \"output.direct\" is inf"),
+        (
+            "-DITEM(value)=7",
+            "plant failed at t = 2 s in getInteger: \"guarantee.status\" is 7, which is no item",
+        ),
+        (
+            "-DTRUTH(value)=3",
+            "plant failed at t = 2 s in getBoolean: \"guarantee.inForce\" is 3, which is neither",
+        ),
+    ] {
+        let bench = Bench::made(&recorded, &Recipe { flags: &[flag], ..Recipe::default() });
+        let (code, _, errors) = bench.run(&["--quiet"]);
+        assert_eq!(code, 1, "{flag}: {errors}");
+        assert!(errors.contains(fault), "{flag}: {errors}");
+        assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(), 3);
+        let (code, _, errors) = bench.run(&["--quiet", "--on-invalid", "warn"]);
+        assert_eq!(code, 0, "{flag}: {errors}");
+        let text = fault.split_once(": ").unwrap().1;
+        assert_eq!(errors.lines().filter(|line| line.contains(text)).count(), 1, "{flag}: {errors}");
+        let (code, _, errors) = bench.run(&["--quiet", "--on-invalid", "allow"]);
+        assert_eq!((code, errors.contains(text)), (0, false), "{flag}");
+    }
+}
