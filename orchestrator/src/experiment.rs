@@ -9,10 +9,10 @@
 //! stop = 50.0                       # s, a whole number of steps after start
 //! step = 0.04                       # communication step, s
 //! coupling = "gauss-seidel"         # default; or "jacobi"
-//! order = ["controller", "plant"]   # Gauss-Seidel: whose inputs are set first at each communication point
+//! order = ["controller", "plant"]   # Gauss-Seidel: whose inputs are set first at each communication point; others follow by name
 //!
 //! [components.plant]
-//! fmu = "ReentryPlant.fmu"          # searched beside the experiment, in each --fmu-dir and in target/fmu
+//! fmu = "ReentryPlant.fmu"          # searched beside the experiment, in each --fmu-dir, in target/fmu, in ORCHESTRATOR_PATH, beside the program
 //! every = 1                         # steps at every n-th communication point, default 1
 //! unconnected = ["disturbanceMoment.*", "surface*", "jet*", "trajectory.*"]   # inputs that stay at their start value
 //!
@@ -39,13 +39,14 @@
 //! solver = "controller.solver"      # .time .solves .fallbacks
 //! guarantee = "controller.guarantee"   # .inForce .status .rateMargin .momentMargin
 //! every = 1                         # means are of every n-th communication point, largest values of all
+//! lost_deg = 60.0                   # optional: further from its reference the attitude is lost, and the run ends
 //! ```
 
 use crate::error::Error;
 use crate::names;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::{Spanned, Value};
@@ -74,6 +75,12 @@ pub struct Experiment {
     /// Whether inputs may stay unconnected without being named; no key of an experiment file.
     #[serde(skip)]
     pub leaves_inputs_open: bool,
+    /// Parameters `component.parameter` that the command line sets.
+    #[serde(skip)]
+    pub assigned: BTreeSet<String>,
+    /// What the command line sets of no component.
+    #[serde(skip)]
+    pub unplaced: Vec<String>,
     /// The file and its text.
     #[serde(skip)]
     pub source: Source,
@@ -203,6 +210,8 @@ pub struct Roles {
     /// The means are of every so many communication points, from the first on.
     #[serde(default = "one")]
     pub every: u32,
+    /// The attitude is lost, and a run ends, where the angles' error is larger than this as a vector, deg.
+    pub lost_deg: Option<f64>,
 }
 
 impl Default for Roles {
@@ -216,6 +225,7 @@ impl Default for Roles {
             solver: None,
             guarantee: None,
             every: 1,
+            lost_deg: None,
         }
     }
 }
@@ -231,10 +241,10 @@ pub struct Overrides {
     #[arg(long = "set", value_name = "COMPONENT.PARAMETER=VALUE")]
     pub set: Vec<String>,
     /// Stop time, s.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub stop: Option<f64>,
     /// Communication step, s.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub step: Option<f64>,
     /// Coupling at communication points.
     #[arg(long, value_enum)]
@@ -299,7 +309,7 @@ impl Experiment {
     /// Applies what the command line says.
     ///
     /// # Errors
-    /// If an assignment is malformed or names no component.
+    /// If an assignment is malformed.
     pub fn apply(&mut self, overrides: &Overrides) -> Result<(), Error> {
         self.simulation.stop = overrides.stop.unwrap_or(self.simulation.stop);
         self.simulation.step = overrides.step.unwrap_or(self.simulation.step);
@@ -311,7 +321,10 @@ impl Experiment {
                 ))
             };
             let (target, value) = assignment.split_once('=').ok_or_else(malformed)?;
-            names::split(target.trim()).ok_or_else(malformed)?;
+            let target = target.trim();
+            if target.is_empty() {
+                return Err(malformed());
+            }
             // What is no TOML value is text: an enumeration's item needs no quotes within quotes.
             let value = value.trim();
             let value = toml::from_str::<BTreeMap<String, Value>>(&format!("x = {value}"))
@@ -319,8 +332,12 @@ impl Experiment {
                 .filter(|table| table.len() == 1)
                 .and_then(|mut table| table.remove("x"))
                 .unwrap_or_else(|| Value::String(value.to_string()));
-            self.set(target.trim(), value)
-                .map_err(|message| Error::experiment(format!("--set {assignment}: {message}")))?;
+            if self.set(target, value).is_ok() {
+                self.assigned.insert(target.to_string());
+            } else {
+                // The units know what is meant.
+                self.unplaced.push(target.to_string());
+            }
         }
         Ok(())
     }
@@ -432,7 +449,6 @@ variables = ["a.*"]
             parse(TEXT).unwrap().apply(&overrides).unwrap_err().to_string()
         };
         assert!(refusal("a.p").contains("wants component.parameter=value"));
-        assert!(refusal("a=1").contains("wants component.parameter=value"));
-        assert!(refusal("b.p=1").contains("there is no component \"b\""));
+        assert!(refusal("=1").contains("wants component.parameter=value"));
     }
 }

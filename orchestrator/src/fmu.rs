@@ -9,6 +9,7 @@
 use crate::archive;
 use crate::description::ModelDescription;
 use crate::error::{Error, UnitFailure};
+use crate::heard;
 use crate::unit::{CoSimulationUnit, Outcome};
 use crate::xml;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
@@ -246,7 +247,7 @@ impl Log {
         let (component, message) = (&self.component, message.trim_end().replace('\n', " "));
         match status {
             fmi2Status::Ok | fmi2Status::Pending => tracing::info!("{component}: [{category}] {message}"),
-            fmi2Status::Warning => tracing::warn!("{component}: [{category}] {message}"),
+            fmi2Status::Warning => heard::warn(&format!("{component}: [{category}] {message}")),
             fmi2Status::Discard | fmi2Status::Error | fmi2Status::Fatal => {
                 if !self.instantiates.load(Ordering::Relaxed) {
                     tracing::error!("{component}: [{category}] {message}");

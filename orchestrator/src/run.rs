@@ -6,6 +6,8 @@ use crate::description::{Kind, ModelDescription};
 use crate::error::Error;
 use crate::experiment::{Coupling, Experiment};
 use crate::fmu::Fmu;
+use crate::folder::Folder;
+use crate::heard;
 use crate::interrupt::Interrupt;
 use crate::live::scene::Scene;
 use crate::live::{self, Live};
@@ -18,6 +20,7 @@ use crate::realtime;
 use crate::realtime::priority::{Priority, Scheduling};
 use crate::realtime::timer::{self, Monotonic};
 use crate::recorder::Recorder;
+use crate::search;
 use crate::settings::{self, Setting};
 use crate::sidecar;
 use crate::unit::CoSimulationUnit;
@@ -39,6 +42,10 @@ pub struct Options {
     pub real_time: Option<realtime::Settings>,
     /// Show the run on the terminal while it goes on.
     pub live: bool,
+    /// Replace the results of an earlier run.
+    pub force: bool,
+    /// Who may end the run.
+    pub interrupt: Interrupt,
 }
 
 /// What a run leaves behind.
@@ -120,6 +127,9 @@ impl Plan {
             fmus.push(fmu);
         }
         let parts = parts(&order, &fmus);
+        if let Some(target) = experiment.unplaced.first() {
+            return Err(Error::experiment(format!("--set {target}: {}", whereabouts(target, &parts))));
+        }
         check_single_instances(&experiment, &order, &fmus)?;
 
         let wires = wiring::wires(&experiment, &parts)?;
@@ -127,6 +137,7 @@ impl Plan {
             .map(|index| settings::resolve(&experiment, &parts, index, &wires))
             .collect::<Result<Vec<_>, _>>()?;
         let columns = wiring::columns(&experiment, &parts)?;
+        check_size(&experiment, &clock, columns.len())?;
         let mut probes = Probes::default();
         let (places, limits) = metrics::places(&experiment.metrics, &parts, &mut probes)?;
         for column in &columns {
@@ -167,24 +178,31 @@ impl Plan {
         let stem = experiment.source.path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy());
         let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(stem.as_ref()));
 
+        Folder::check(&out, options.force)?;
+
+        let warnings = heard::collect();
+        heard::at(self.clock.start());
         let mut probes = self.probes.clone();
         let factor = options.real_time.map(|settings| settings.factor.get());
         let scene = options.live.then(|| Scene::new(self, self.places, factor, &mut probes));
         let (mut master, limits) = self.initialized_with(&probes)?;
         let parameters = self.parameters(&mut master)?;
 
-        let interrupt: Interrupt = master.interrupt().clone();
-        if options.real_time.is_some() || options.live {
-            interrupt.listen()?;
+        master.heed(&options.interrupt);
+        if let Some(request) = options.interrupt.asked() {
+            return Err(Error::Interrupted { time: self.clock.start(), request });
         }
-        fs::create_dir_all(&out).map_err(Error::file(&out))?;
+        let folder = Folder::take(&out)?;
+        // Another process may have been faster.
+        Folder::check(&out, options.force)?;
+        folder.clear()?;
         let columns: Vec<_> = self
             .columns
             .iter()
             .filter_map(|column| Some((column.name.as_str(), self.place(column.port)?, column.port.carrier)))
             .collect();
         let mut recorder = Recorder::create(&out.join("results.csv"), &columns, experiment.record.every)?;
-        let mut merit = self.merit(limits);
+        let mut merit = self.merit(limits).ending_when_lost();
         let mut curves = Curves::new(self.places, limits, self.clock.ticks());
         let silent = options.quiet || options.live;
         let mut progress =
@@ -194,20 +212,22 @@ impl Plan {
             timer::wake_up_sharply();
             master.pace(settings, Rc::new(Monotonic)).tally()
         });
-        let live =
-            scene.map(|scene| Live::start(Scene { limits, ..scene }, probes.ports.len(), tally, interrupt));
+        let live = scene.map(|scene| {
+            Live::start(Scene { limits, ..scene }, probes.ports.len(), tally, options.interrupt.clone())
+        });
         let mut live = live.transpose()?;
         // After the threads that draw, which are not to have it.
         let scheduling = Scheduling::request(options.real_time.and_then(|settings| settings.priority));
 
         let begin = Instant::now();
-        let mut observers: Vec<&mut dyn Observer> =
-            vec![&mut recorder, &mut merit, &mut curves, &mut progress];
+        let mut observers: Vec<&mut dyn Observer> = vec![&mut recorder, &mut curves, &mut progress];
         observers.extend(live.as_mut().map(|live| live as &mut dyn Observer));
+        // The last one, as it may end the run.
+        observers.push(&mut merit);
         let outcome = master.run(&mut observers);
         let wall = begin.elapsed().as_secs_f64();
         let priority = scheduling.priority.clone();
-        drop((scheduling, live, progress));
+        drop((scheduling, live, progress, warnings));
 
         recorder.finish()?;
         let reached = self.clock.step() * merit.metrics(0.0, 0.0, None).samples.saturating_sub(1) as f64;
@@ -231,7 +251,9 @@ impl Plan {
         }
         let ended = match outcome {
             Ok(()) => None,
-            Err(error @ (Error::Deadline { .. } | Error::Interrupted { .. })) => Some(error),
+            Err(error @ (Error::Deadline { .. } | Error::Interrupted { .. } | Error::Lost { .. })) => {
+                Some(error)
+            }
             Err(error) => {
                 tracing::warn!("the results until then are in {}", out.display());
                 return Err(error);
@@ -287,7 +309,9 @@ impl Plan {
     pub fn merit(&self, limits: Limits) -> Merit {
         let statuses =
             self.places.guarantee.and_then(|signals| signals.status).map(|place| self.items(place));
-        Merit::new(self.places, limits, self.clock.ticks() + 1).with_statuses(statuses.unwrap_or_default())
+        Merit::new(self.places, limits, self.clock.ticks() + 1)
+            .with_statuses(statuses.unwrap_or_default())
+            .with_loss(self.experiment.metrics.lost_deg)
     }
 
     /// Instantiates the units and sets their parameters.
@@ -340,8 +364,60 @@ fn warn(real_time: &realtime::report::RealTime, quiet: bool) {
     }
 }
 
+/// What to write for a parameter whose component is missing or wrong.
+fn whereabouts(target: &str, parts: &[Part]) -> String {
+    let of = |part: &Part| {
+        let known = part.description.names("parameter").chain(part.description.names("input"));
+        known.map(|name| format!("{}.{name}", part.name)).collect::<Vec<_>>()
+    };
+    let all: Vec<String> = parts.iter().flat_map(of).collect();
+    let meant: Vec<&str> = all
+        .iter()
+        .filter(|name| names::split(name).is_some_and(|(_, rest)| rest == target))
+        .map(String::as_str)
+        .collect();
+    if !meant.is_empty() {
+        return format!("of which component? Write {}", meant.join(" or "));
+    }
+    let component = names::split(target).map_or(target, |(component, _)| component);
+    let hint = match names::nearest(target, all.iter().map(String::as_str)) {
+        Some(name) => format!("; did you mean \"{name}\"?"),
+        None => names::hint(component, parts.iter().map(|part| part.name)),
+    };
+    format!("there is no component \"{component}\"{hint}")
+}
+
 fn parts<'a>(order: &'a [String], fmus: &'a [Rc<Fmu>]) -> Vec<Part<'a>> {
     order.iter().zip(fmus).map(|(name, fmu)| Part { name, description: &fmu.description }).collect()
+}
+
+/// Beyond so many steps the times of two steps are one: units take instants that are closer than 1e-9 of their size for the same.
+const MOST_STEPS: u64 = 1_000_000_000;
+/// A number in `results.csv`, bytes, about.
+const NUMBER: f64 = 20.0;
+/// A step of two small units takes no less, s.
+const QUICK: f64 = 1e-5;
+
+/// Refuses what no machine can run, and warns of results that fill a disk.
+fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<(), Error> {
+    let steps = clock.ticks();
+    let rows = steps as f64 / f64::from(experiment.record.every);
+    let gigabytes = rows * (columns + 1) as f64 * NUMBER / 1e9;
+    if steps > MOST_STEPS {
+        let message = format!(
+            "[simulation] {steps} steps of {} s: there can be {MOST_STEPS} at most. results.csv would take about \
+             {gigabytes:.0} GB and the run {:.0} h or more: take a longer step or an earlier stop",
+            clock.step(),
+            steps as f64 * QUICK / 3600.0
+        );
+        return Err(experiment.source.error(&(0..0), message));
+    }
+    if gigabytes > 10.0 {
+        tracing::warn!(
+            "results.csv will take about {gigabytes:.0} GB: [record] every = n writes every n-th step only"
+        );
+    }
+    Ok(())
 }
 
 /// Some FMUs can be used by one component only.
@@ -413,19 +489,25 @@ fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
     if order.is_empty() && (names.len() == 1 || experiment.simulation.coupling == Coupling::Jacobi) {
         return Ok(names.iter().map(ToString::to_string).collect());
     }
-    if let Some(name) = names.iter().find(|name| !order.iter().any(|other| other == *name)) {
-        return refuse(format!("[simulation] order does not name \"{name}\": name every component once"));
+    if order.is_empty() {
+        return refuse(format!(
+            "[simulation] there is no order: name the components in the order in which they get their inputs, those \
+             first that answer at once, for example order = [{}]",
+            names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+        ));
     }
-    Ok(order.clone())
+    // What is not named comes last, by name.
+    let others = names.iter().filter(|name| !order.iter().any(|other| other == *name));
+    Ok(order.iter().cloned().chain(others.map(ToString::to_string)).collect())
 }
 
-/// The archive of a component: beside the experiment, in the folders given, in `target/fmu`.
+/// The archive of a component: beside the experiment, in the folders given, where units are found from any folder.
 fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result<PathBuf, Error> {
     let written = &experiment.components[name].fmu;
     let beside = experiment.source.path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
     let mut folders = vec![if beside.as_os_str().is_empty() { PathBuf::from(".") } else { beside }];
     folders.extend(fmu_dirs.iter().cloned());
-    folders.push(PathBuf::from("target/fmu"));
+    folders.extend(search::units());
     if let Some(path) =
         folders.iter().map(|folder| folder.join(written.get_ref())).find(|path| path.is_file())
     {

@@ -92,7 +92,7 @@ pub fn sidecar(
 fn status(failure: Option<&Error>) -> String {
     match failure {
         None => "completed".into(),
-        Some(error @ Error::Interrupted { .. }) => error.to_string(),
+        Some(error @ (Error::Interrupted { .. } | Error::Lost { .. })) => error.to_string(),
         Some(error) => format!("failed: {error}"),
     }
 }

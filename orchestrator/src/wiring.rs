@@ -256,7 +256,8 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
             let text = pattern.get_ref();
             let refuse = |message| Err(experiment.source.error(&pattern.span(), message));
             let mut meant = inputs.iter().filter(|(_, name)| names::matches(text, name)).peekable();
-            if meant.peek().is_none() {
+            // All inputs may be none.
+            if meant.peek().is_none() && text != "*" {
                 let hint = names::hint(text, inputs.iter().map(|(_, name)| *name));
                 return refuse(format!("\"{}\" has no input \"{text}\"{hint}", part.name));
             }

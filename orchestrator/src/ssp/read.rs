@@ -12,7 +12,7 @@ use crate::run::Opened;
 use crate::wiring::{self, Part};
 use crate::xml::{self, Element};
 use percent_encoding::percent_decode_str;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use tempfile::TempDir;
@@ -88,6 +88,8 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         record: Record { variables: recorded.filter(texts).map(text_of).collect(), every: 1 },
         metrics: Roles::default(),
         leaves_inputs_open: true,
+        assigned: BTreeSet::new(),
+        unplaced: Vec::new(),
         source: Source { path: path.to_path_buf(), text },
     };
     let parts = parts(&structure.components, &opened, &structure.folder);

@@ -5,6 +5,7 @@ use super::signal::{Resolved, Signal};
 use super::{Run, Study};
 use crate::error::Error;
 use crate::experiment::Experiment;
+use crate::interrupt::Interrupt;
 use crate::master::{Observer, Sample};
 use crate::metrics::{Metrics, larger};
 use crate::run::{Opened, Plan};
@@ -195,8 +196,13 @@ impl<'a> Preparation<'a> {
     /// Runs the members with these numbers.
     ///
     /// # Errors
-    /// What a unit said.
-    pub fn execute(&self, range: Range<u32>, opened: &mut Opened) -> Result<Outcome, Error> {
+    /// What a unit said; that it was asked to end.
+    pub fn execute(
+        &self,
+        range: Range<u32>,
+        opened: &mut Opened,
+        interrupt: &Interrupt,
+    ) -> Result<Outcome, Error> {
         let mut outcome = Outcome::default();
         for number in range {
             let plan = self.plan(number, opened)?;
@@ -215,6 +221,7 @@ impl<'a> Preparation<'a> {
                 gauges.push(Gauge::new(measure, resolve(signals)?));
             }
             let (mut master, limits) = plan.initialized()?;
+            master.heed(interrupt);
             if number == 0 {
                 outcome.parameters = plan.parameters(&mut master)?;
             }
