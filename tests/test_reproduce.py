@@ -241,7 +241,7 @@ def test_a_signal_ends_it_and_keeps_what_is_finished(tmp_path):
 def test_a_part_in_which_a_bit_has_changed_is_run_again(report, tmp_path):
     out = tmp_path / "out"
     shutil.copytree(report[1] / "runs", out / "runs")
-    path = out / "runs" / "lqr" / "0000-0001.json"
+    path = out / "runs" / "lqr" / f"0000-{MEMBERS:04}.json"
     text = path.read_text()
     found = re.search(r'"ems_deg":(\d)', text)
     path.write_text(text[: found.start(1)] + str(int(found[1]) ^ 1) + text[found.end(1) :])
@@ -260,19 +260,23 @@ def test_texts_count_the_runs_that_there_are(report, results):
     assert "500 seeds" not in page and "{runs:" not in page
 
 
-def test_a_claim_without_its_numbers_is_not_judged(tmp_path):
+def test_a_claim_without_its_numbers_is_not_judged_and_a_seed_that_changes_nothing_is_told(tmp_path):
     study = tmp_path / "study"
     study.mkdir()
-    shutil.copy(EXPERIMENTS / "lqr.toml", study)
+    text = (EXPERIMENTS / "lqr.toml").read_text()
+    (study / "lqr.toml").write_text(text.replace("lost_deg = 60.0", "lost_deg = 2.0"))
     (study / "study.toml").write_text(
         """title = "one run"
 paper = "none"
 summary = "none"
+values = []
 [[run]]
 id = "lqr"
 label = "LQR"
 color = "#000000"
 experiment = "lqr.toml"
+set = { "plant.disturbance.kind" = "constant" }
+vary = { parameter = "plant.disturbance.seed", first = 1, count = 3 }
 [[claim]]
 says = "LQR solves fast."
 source = "nowhere"
@@ -287,7 +291,9 @@ right = 1.0
     assert finished.returncode == 0, finished.stderr
     assert "not judged" in finished.stdout
     (claim,) = json.loads((tmp_path / "out" / "results.json").read_text())["claims"]
-    assert claim["verdict"] == "not-judged" and claim["checks"][0]["label"] == "mean of 1"
+    assert claim["verdict"] == "not-judged" and claim["checks"][0]["label"] == "mean of 3"
+    assert "lqr: plant.disturbance.seed changes nothing, all 3 runs are the same" in finished.stdout
+    assert re.search(r"lqr: the attitude is lost in 3 of 3 runs, at t = \S+ s or later", finished.stdout)
 
 
 def test_a_changed_experiment_is_run_again(report, tmp_path):

@@ -131,6 +131,9 @@ pub struct Component {
     /// Values for parameters and for inputs without connection.
     #[serde(default)]
     pub parameters: BTreeMap<String, Spanned<Value>>,
+    /// Whether the command line exchanged the unit; no key of an experiment file.
+    #[serde(skip)]
+    pub is_exchanged: bool,
 }
 
 /// One line of wiring.
@@ -240,6 +243,10 @@ pub struct Overrides {
     /// Set a parameter: `plant.disturbance.seed=7`, `controller.constraints=paper`, `plant.disturbance.bound="1 deg/s2"`.
     #[arg(long = "set", value_name = "COMPONENT.PARAMETER=VALUE")]
     pub set: Vec<String>,
+    /// Exchange a component's unit: `controller=MyLaw.fmu`, a file or one that is found by its name. What the experiment sets,
+    /// records or leaves open of the former unit and the new one does not have is left out.
+    #[arg(long = "fmu", value_name = "COMPONENT=FMU")]
+    pub fmu: Vec<String>,
     /// Stop time, s.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub stop: Option<f64>,
@@ -314,6 +321,21 @@ impl Experiment {
         self.simulation.stop = overrides.stop.unwrap_or(self.simulation.stop);
         self.simulation.step = overrides.step.unwrap_or(self.simulation.step);
         self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
+        for assignment in &overrides.fmu {
+            let refuse = |message: String| Error::experiment(format!("--fmu {assignment}: {message}"));
+            let (name, fmu) = assignment
+                .split_once('=')
+                .ok_or_else(|| refuse("wants component=file, for example controller=MyLaw.fmu".into()))?;
+            let hint = names::hint(name, self.components.keys().map(String::as_str));
+            let component = self
+                .components
+                .get_mut(name)
+                .ok_or_else(|| refuse(format!("there is no component \"{name}\"{hint}")))?;
+            // A file is meant as seen from here, not from the experiment.
+            let file = Path::new(fmu).is_file().then(|| std::path::absolute(fmu).ok()).flatten();
+            let file = file.map_or_else(|| fmu.to_string(), |file| file.to_string_lossy().into_owned());
+            (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
+        }
         for assignment in &overrides.set {
             let malformed = || {
                 Error::experiment(format!(

@@ -9,6 +9,7 @@
 //! A [`study`] runs many experiments, draws [`figure`]s of them, and holds them against what a paper prints.
 
 pub mod archive;
+pub mod catalogue;
 pub mod clock;
 pub mod delay;
 pub mod description;

@@ -1,12 +1,13 @@
 //! The command line.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+use orchestrator::catalogue::Filter;
 use orchestrator::error::Error;
 use orchestrator::experiment::{Experiment, Overrides};
 use orchestrator::interrupt::{Interrupt, Request};
 use orchestrator::live::log::Messages;
 use orchestrator::realtime::{self, Factor, OnMiss};
-use orchestrator::run::{Options, Plan};
+use orchestrator::run::{Files, Options, Plan};
 use orchestrator::study::{Study, reproduce};
 use orchestrator::{inspect, list, report, search, ssp};
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
@@ -63,6 +64,8 @@ enum Command {
         /// Show the run on the terminal while it goes on; q ends it and keeps the results.
         #[arg(long, conflicts_with = "quiet")]
         live: bool,
+        #[command(flatten)]
+        files: Files,
         /// Replace the results of an earlier run in the folder; without it they are left alone and nothing is run.
         #[arg(long)]
         force: bool,
@@ -115,6 +118,16 @@ enum Command {
     Inspect {
         /// The archive.
         fmu: PathBuf,
+        #[command(flatten)]
+        filter: Filter,
+        /// As JSON, for other programs.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write a script that completes commands and options in a shell, for example `orchestrator completions bash`.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
     },
     /// List experiments, studies and FMUs.
     List {
@@ -170,6 +183,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             on_miss,
             priority,
             live,
+            files,
             force,
         } => {
             let experiment = search::experiment(&experiment)?;
@@ -187,6 +201,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 quiet,
                 real_time,
                 live,
+                files,
                 force,
                 interrupt: interrupt.clone(),
             })?;
@@ -231,7 +246,11 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             ssp::pack(&plan, &archive, interrupt)?;
             report::packed(&plan, &archive, out).map_err(Error::from)
         }
-        Command::Inspect { fmu } => inspect::inspect(&fmu, out),
+        Command::Inspect { fmu, filter, json } => inspect::inspect(&fmu, &filter, json, out),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Arguments::command(), "orchestrator", out);
+            Ok(())
+        }
         Command::List { folder } => list::list(folder.as_deref(), out),
     }
 }

@@ -205,7 +205,7 @@ pub struct Metrics {
     pub loop_delay_s: Option<f64>,
     /// Number of communication points that were reached.
     pub samples: u64,
-    /// Whether the run got to its stop time, with an attitude that was not lost.
+    /// Whether the run got to its stop time. A lost attitude ends a run, but not the runs of a study.
     pub completed: bool,
     /// First time at which the attitude was lost, s; null if it never was, or if the experiment does not say what that is.
     #[serde(default)]
@@ -340,7 +340,7 @@ impl Merit {
             wall_s: wall,
             loop_delay_s: loop_delay,
             samples: self.samples,
-            completed: self.completed && self.loss.at.is_none(),
+            completed: self.completed,
             lost_at: self.loss.at,
             step_us: BTreeMap::new(),
             real_time: None,
@@ -494,7 +494,7 @@ mod tests {
             let mut merit = merit().with_loss(Some(bound));
             feed(&mut merit, &[row(0.5), row(lost), row(2.0), row(0.0)]);
             let metrics = merit.metrics(1.0, 1.0, None);
-            assert_eq!((metrics.lost_at, metrics.completed), (Some(1.0), false));
+            assert_eq!((metrics.lost_at, metrics.completed), (Some(1.0), true));
         }
         let mut ending = merit().with_loss(Some(bound)).ending_when_lost();
         let sample = Sample { tick: 3, time: 0.1 + 0.2, last: false, values: &row(2.0) };

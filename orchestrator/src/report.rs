@@ -135,6 +135,9 @@ pub fn reproduction(report: &reproduce::Report, out: &mut impl Write) -> io::Res
         run + kept,
         report.elapsed
     )?;
+    for note in &report.notes {
+        writeln!(out, "  note: {note}")?;
+    }
     for (claim, verdict) in &report.verdicts {
         writeln!(out, "  {:<14} {claim}", verdict.text())?;
     }

@@ -31,6 +31,21 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Instant;
 
+/// Which files a run writes, and how.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub struct Files {
+    /// Write no results.csv.
+    #[arg(long)]
+    pub no_csv: bool,
+    /// Draw no plot.svg.
+    #[arg(long)]
+    pub no_plot: bool,
+    /// Head the columns of results.csv with name [unit], and write items of enumerations by name. Without it the header holds
+    /// the names alone and every cell is a number, as FMPy and NumPy read it; results.json has units and items.
+    #[arg(long, conflicts_with = "no_csv")]
+    pub labels: bool,
+}
+
 /// Where results go, and how much is said.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
@@ -42,6 +57,8 @@ pub struct Options {
     pub real_time: Option<realtime::Settings>,
     /// Show the run on the terminal while it goes on.
     pub live: bool,
+    /// Which files there are to be.
+    pub files: Files,
     /// Replace the results of an earlier run.
     pub force: bool,
     /// Who may end the run.
@@ -196,12 +213,8 @@ impl Plan {
         // Another process may have been faster.
         Folder::check(&out, options.force)?;
         folder.clear()?;
-        let columns: Vec<_> = self
-            .columns
-            .iter()
-            .filter_map(|column| Some((column.name.as_str(), self.place(column.port)?, column.port.carrier)))
-            .collect();
-        let mut recorder = Recorder::create(&out.join("results.csv"), &columns, experiment.record.every)?;
+        let mut recorder =
+            if options.files.no_csv { None } else { Some(self.recorder(&out, options.files.labels)?) };
         let mut merit = self.merit(limits).ending_when_lost();
         let mut curves = Curves::new(self.places, limits, self.clock.ticks());
         let silent = options.quiet || options.live;
@@ -220,7 +233,8 @@ impl Plan {
         let scheduling = Scheduling::request(options.real_time.and_then(|settings| settings.priority));
 
         let begin = Instant::now();
-        let mut observers: Vec<&mut dyn Observer> = vec![&mut recorder, &mut curves, &mut progress];
+        let mut observers: Vec<&mut dyn Observer> = vec![&mut curves, &mut progress];
+        observers.extend(recorder.as_mut().map(|recorder| recorder as &mut dyn Observer));
         observers.extend(live.as_mut().map(|live| live as &mut dyn Observer));
         // The last one, as it may end the run.
         observers.push(&mut merit);
@@ -229,12 +243,17 @@ impl Plan {
         let priority = scheduling.priority.clone();
         drop((scheduling, live, progress, warnings));
 
-        recorder.finish()?;
+        if let Some(recorder) = &mut recorder {
+            recorder.finish()?;
+        }
         let reached = self.clock.step() * merit.metrics(0.0, 0.0, None).samples.saturating_sub(1) as f64;
         let loop_delay =
             self.loops.iter().map(|l| l.ticks).max().map(|ticks| ticks as f64 * self.clock.step());
         let mut metrics = merit.metrics(wall, reached, loop_delay);
-        let mut files = vec!["results.csv", "results.json", "metrics.json"];
+        let mut files = vec!["results.json", "metrics.json"];
+        if recorder.is_some() {
+            files.insert(0, "results.csv");
+        }
         let sidecar = sidecar::sidecar(self, &parameters, options.real_time, outcome.as_ref().err());
         write_json(&out.join("results.json"), &sidecar)?;
         if let Some(pacer) = master.take_pacer() {
@@ -246,7 +265,7 @@ impl Plan {
             metrics.real_time = Some(real_time);
         }
         write_json(&out.join("metrics.json"), &metrics)?;
-        if curves.draw(&out.join("plot.svg"), &experiment.title)? {
+        if !options.files.no_plot && curves.draw(&out.join("plot.svg"), &experiment.title)? {
             files.push("plot.svg");
         }
         let ended = match outcome {
@@ -270,6 +289,28 @@ impl Plan {
             files,
             ended,
         })
+    }
+
+    /// The file of the recorded variables.
+    fn recorder(&self, out: &Path, labels: bool) -> Result<Recorder, Error> {
+        let mut columns = Vec::new();
+        let mut items = Vec::new();
+        for column in &self.columns {
+            let Some(place) = self.place(column.port) else { continue };
+            let kind = &self.fmus[column.port.component].description.variables[column.port.variable].kind;
+            let name = match kind {
+                Kind::Real { unit: Some(unit), .. } if labels => format!("{} [{unit}]", column.name),
+                _ => column.name.clone(),
+            };
+            columns.push((name, place, column.port.carrier));
+            items.push(self.items(place));
+        }
+        let columns: Vec<_> =
+            columns.iter().map(|(name, place, carrier)| (name.as_str(), *place, *carrier)).collect();
+        let path = out.join("results.csv");
+        let time = if labels { "time [s]" } else { "time" };
+        let recorder = Recorder::create(&path, time, &columns, self.experiment.record.every)?;
+        Ok(if labels { recorder.with_names(items) } else { recorder })
     }
 
     /// The units, initialized, and the limits that the experiment states.

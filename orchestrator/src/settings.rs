@@ -71,6 +71,10 @@ pub fn resolve(
                 experiment.source.error(&span, format!("\"{path}\": {message}"))
             }
         };
+        if component.is_exchanged && !is_assigned && part.description.find(name).is_none() {
+            tracing::warn!("{path}: {} has no such parameter, it is left out", part.description.model_name);
+            continue;
+        }
         let (position, variable) = part.description.find(name).ok_or_else(|| {
             let known: Vec<&str> =
                 part.description.names("parameter").chain(part.description.names("input")).collect();

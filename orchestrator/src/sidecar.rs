@@ -48,10 +48,17 @@ pub fn sidecar(
         .map(|column| {
             let variable = &parts[column.port.component].description.variables[column.port.variable];
             let unit = if let Kind::Real { unit, .. } = &variable.kind { unit.clone() } else { None };
+            let items = match &variable.kind {
+                Kind::Enumeration { items } => Some(
+                    items.iter().map(|(name, item)| (item.to_string(), name)).collect::<BTreeMap<_, _>>(),
+                ),
+                _ => None,
+            };
             json!({
                 "name": column.name,
                 "type": variable.kind.name(),
                 "unit": unit,
+                "items": items,
                 "description": variable.description,
             })
         })

@@ -527,6 +527,104 @@ fn usage_that_is_nearly_right_is_told_what_it_lacks() {
 }
 
 #[test]
+fn results_can_be_left_out_or_labelled() {
+    let bench = Bench::with(&LOOP.replace("\"plant.steps\"", "\"plant.steps\", \"gain.guarantee.status\""));
+    let (code, summary, errors) = bench.run(&["--no-csv", "--no-plot", "--out", "few"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(summary.contains("few: results.json, metrics.json\n"), "{summary}");
+    assert!(!bench.path("few/results.csv").exists() && !bench.path("few/plot.svg").exists());
+    let head = |arguments: &[&str]| {
+        assert_eq!(bench.run(arguments).0, 0);
+        let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+        rows.lines().take(2).map(String::from).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        head(&[]),
+        [
+            "time,gain.output.direct,plant.output.integral,plant.steps,gain.guarantee.status",
+            "0.0,2.0,1.0,0,1"
+        ]
+    );
+    let labelled = head(&["--labels"]);
+    let names = "time [s],gain.output.direct [m],plant.output.integral [m],plant.steps,gain.guarantee.status";
+    assert_eq!(labelled[0], names);
+    let item = labelled[1].rsplit(',').next().unwrap();
+    // Whichever way, the numbers have their names beside them.
+    let columns = &bench.json("out/loop/results.json")["columns"];
+    assert_eq!(columns[3]["items"]["1"], item, "{columns}");
+    assert!(columns[0]["items"].is_null() && columns[0]["unit"] == "m");
+}
+
+#[test]
+fn a_unit_is_exchanged_from_the_command_line() {
+    let experiment =
+        LOOP.replace("[components.plant]", "[components.gain.parameters]\ngain = 3.0\n[components.plant]");
+    let bench = Bench::with(&experiment);
+    // Another unit, that lacks what is set of the first.
+    let mut old = zip::ZipArchive::new(fs::File::open(bench.path("Unit.fmu")).unwrap()).unwrap();
+    fs::create_dir(bench.path("mine")).unwrap();
+    let mut zip = zip::ZipWriter::new(fs::File::create(bench.path("mine/My.fmu")).unwrap());
+    for index in 0..old.len() {
+        let mut entry = old.by_index(index).unwrap();
+        let name = entry.name().unwrap().into_owned();
+        let mut content = Vec::new();
+        std::io::Read::read_to_end(&mut entry, &mut content).unwrap();
+        if name == "modelDescription.xml" {
+            let text = String::from_utf8(content).unwrap();
+            content = text.replace("name=\"gain\"", "name=\"amplification\"").into_bytes();
+        }
+        zip.start_file(name, SimpleFileOptions::default()).unwrap();
+        zip.write_all(&content).unwrap();
+    }
+    zip.finish().unwrap();
+    let (code, _, errors) =
+        bench.run(&["--quiet", "--fmu", "gain=mine/My.fmu", "--set", "gain.amplification=0.5"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(errors.contains("gain.gain: ") && errors.contains("it is left out"), "{errors}");
+    let sidecar = bench.json("out/loop/results.json");
+    assert_eq!(sidecar["components"]["gain"]["fmu"], "My.fmu");
+    assert_eq!(sidecar["components"]["gain"]["set"]["amplification"], 0.5);
+    for (assignment, told) in [
+        ("gian=mine/My.fmu", "did you mean \"gain\""),
+        ("mine/My.fmu", "wants component=file"),
+        ("gain=mine/Me.fmu", "there is no file \"mine/Me.fmu\""),
+        ("gain=Unti.fmu", "did you mean \"Unit.fmu\""),
+    ] {
+        let message = bench.refusal(&["--fmu", assignment]);
+        assert!(message.contains(told), "{message}");
+    }
+}
+
+#[test]
+fn inspect_filters_and_speaks_json() {
+    let bench = Bench::new();
+    let (code, text, _) = bench.call(&["inspect", "Unit.fmu", "guarantee.*", "--json"]);
+    assert_eq!(code, 0);
+    let all: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let names: Vec<&str> =
+        all["variables"].as_array().unwrap().iter().map(|v| v["name"].as_str().unwrap()).collect();
+    assert_eq!(
+        names,
+        ["guarantee.inForce", "guarantee.status", "guarantee.rateMargin", "guarantee.momentMargin"]
+    );
+    assert_eq!(all["guid"], "{u-1}");
+    let (_, text, _) = bench.call(&["inspect", "Unit.fmu", "seed"]);
+    assert!(text.contains("noise.seed") && !text.contains("output.direct"), "{text}");
+    let (_, text, _) = bench.call(&["inspect", "Unit.fmu", "--causality", "input"]);
+    assert!(text.contains("input (1)") && !text.contains("parameter ("), "{text}");
+    let (code, _, errors) = bench.call(&["inspect", "Unit.fmu", "sed"]);
+    assert!(code == 2 && errors.contains("has no variable that fits \"sed\""), "{errors}");
+}
+
+#[test]
+fn shells_complete_commands() {
+    for shell in ["bash", "zsh", "fish"] {
+        let (code, text, _) = Bench::new().call(&["completions", shell]);
+        assert!(code == 0 && text.contains("reproduce") && text.contains("on-miss"), "{shell}");
+    }
+}
+
+#[test]
 fn steps_without_number_are_refused_with_what_they_would_take() {
     let bench = Bench::new();
     for (arguments, steps) in

@@ -124,6 +124,7 @@ impl Found {
             every: 1,
             unconnected: Vec::new(),
             parameters: self.parameters.iter().map(value).collect(),
+            is_exchanged: false,
         }
     }
 }

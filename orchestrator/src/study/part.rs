@@ -52,6 +52,22 @@ pub struct Member {
     pub measures: BTreeMap<String, Option<f64>>,
 }
 
+impl Member {
+    /// Whether this run came to the same as another one, but for the times it took.
+    pub fn moves_as(&self, other: &Self) -> bool {
+        let timeless = |metrics: &Metrics| Metrics {
+            solver_ms_mean: None,
+            solver_ms_p99: None,
+            solver_ms_max: None,
+            step_us: BTreeMap::new(),
+            ..metrics.clone()
+        };
+        timeless(&self.metrics) == timeless(&other.metrics)
+            && self.within == other.within
+            && self.measures == other.measures
+    }
+}
+
 /// How signals stood to a bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Inside {

@@ -7,6 +7,7 @@
 use super::part::{Outcome, Part, Preparation};
 use super::results::{Results, RunResult, resolve};
 use super::{Study, claims, figures, page};
+use crate::clock::rounded;
 use crate::error::Error;
 use crate::figure::{png, svg};
 use crate::folder::Folder;
@@ -61,6 +62,8 @@ pub struct Report {
     pub runs: usize,
     /// Elapsed time, s.
     pub elapsed: f64,
+    /// Runs that deserve a word: whose parameter changes nothing, or that lose the attitude.
+    pub notes: Vec<String>,
     /// Each claim with its verdict.
     pub verdicts: Vec<Judgement>,
     /// All files, relative to the folder.
@@ -169,9 +172,34 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
         parts: computed,
         runs: results.runs.iter().map(|run| run.members.len()).sum(),
         elapsed: begin.elapsed().as_secs_f64(),
+        notes: notes(&results),
         verdicts,
         files,
     })
+}
+
+/// Says which runs lose the attitude, and which vary a parameter without any effect, as the seed of a disturbance that is constant.
+fn notes(results: &Results) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (run, result) in results.study.runs.iter().zip(&results.runs) {
+        let (id, all) = (run.id.get_ref(), result.members.len());
+        let lost: Vec<f64> = result.members.iter().filter_map(|member| member.metrics.lost_at).collect();
+        if let Some(first) = lost.iter().copied().reduce(f64::min) {
+            let time = rounded(first);
+            notes.push(format!(
+                "{id}: the attitude is lost in {} of {all} runs, at t = {time} s or later",
+                lost.len()
+            ));
+        }
+        if let (Some(vary), Some((first, others))) = (&run.vary, result.members.split_first())
+            && !others.is_empty()
+            && others.iter().all(|other| other.moves_as(first))
+        {
+            let names = vary.parameter.all().join(" and ");
+            notes.push(format!("{id}: {names} changes nothing, all {all} runs are the same"));
+        }
+    }
+    notes
 }
 
 /// Name of a study: of its folder.
