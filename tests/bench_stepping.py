@@ -27,7 +27,7 @@ def orchestrator(path: Path, outputs: list[str], steps: int, folder: Path) -> No
         f'title = "x"\n[simulation]\nstop = {steps * STEP!r}\nstep = {STEP}\n[components.unit]\nfmu = "{path}"\n'
         f'unconnected = ["*"]\n[record]\nvariables = [{recorded}]\n'
     )
-    command = [program("orchestrator"), "run", experiment, "--out", folder / "out", "--quiet"]
+    command = [program("orchestrator"), "run", experiment, "--out", folder / "out", "--force", "--quiet"]
     subprocess.run(command, check=True)
 
 

@@ -42,7 +42,7 @@ def run(tmp_path, *arguments, change=lambda text: text):
     experiment.write_text(change((EXPERIMENTS / "lqr.toml").read_text()).replace("stop = 50.0", "stop = 4.0"))
     temporary = tmp_path / "temporary"
     temporary.mkdir(exist_ok=True)
-    command = [program("orchestrator"), "run", experiment, "--out", tmp_path / "out", "--quiet", *arguments]
+    command = [program("orchestrator"), "run", experiment, "--out", tmp_path / "out", "--force", "--quiet", *arguments]
     command += ["--fmu-dir", tmp_path / "fmu", "--fmu-dir", TARGET / "fmu"]
     environment = {"TMPDIR": str(temporary), "PATH": "/usr/bin:/bin"}
     finished = subprocess.run(command, capture_output=True, cwd=tmp_path, timeout=60, env=environment)

@@ -128,7 +128,7 @@ SIGNALS = [(source, name) for source, _, name in WIRES]
 def orchestrate(folder, text, *arguments):
     """Columns of the results by the variable's name, with the component."""
     (folder / "experiment.toml").write_text(text)
-    command = [program("orchestrator"), "run", "experiment.toml", "--out", "out", "--fmu-dir", TARGET / "fmu", "--quiet"]
+    command = [program("orchestrator"), "run", "experiment.toml", "--out", "out", "--fmu-dir", TARGET / "fmu", "--force", "--quiet"]
     done = subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=60, cwd=folder)
     assert done.returncode == 0, done.stderr
     return columns(folder / "out" / "results.csv")

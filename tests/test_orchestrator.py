@@ -147,6 +147,19 @@ def test_a_unit_that_fails_ends_the_run(orchestrate, tmp_path):
     assert "controller" in finished.stderr and "spectral radius" in finished.stderr
 
 
+def test_a_lost_attitude_ends_the_run(orchestrate, tmp_path):
+    path = changed(tmp_path, "lost_deg = 60.0", "lost_deg = 1.0", "lqr")
+    finished, out = orchestrate(path)
+    assert finished.returncode == 3, finished.stderr
+    found = re.search(r"attitude lost at t = (\S+) s: further than 1 deg", finished.stderr)
+    assert found and "attitude lost at" in finished.stdout
+    assert metrics(out)["lost_at"] == pytest.approx(float(found[1])) and metrics(out)["completed"] is False
+    assert json.loads((out / "results.json").read_text())["status"].startswith("attitude lost at t = ")
+    # The row at which it was lost is the last one.
+    last = (out / "results.csv").read_text().splitlines()[-1]
+    assert float(last.split(",")[0]) == metrics(out)["lost_at"]
+
+
 def test_usage():
     finished = subprocess.run([program("orchestrator"), "rum"], capture_output=True, text=True)
     assert finished.returncode == 2

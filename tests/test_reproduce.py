@@ -1,8 +1,10 @@
 """`orchestrator reproduce crmpc-2022`: the report of Chai 2022, section 5.2, with few members of each run."""
 
 import json
+import os
 import re
 import shutil
+import signal
 import subprocess
 import time
 import tomllib
@@ -211,7 +213,87 @@ def test_an_interruption_loses_no_finished_part(tmp_path):
     assert finished.returncode == 0, finished.stderr
     # The first parts, of one timed member each, are the same with one member.
     assert int(re.search(r"(\d+) kept from before", finished.stdout)[1]) >= 4
-    assert all(path.read_bytes() == content for path, content in kept.items() if path.name == "0000.json")
+    assert all(path.read_bytes() == content for path, content in kept.items() if path.name == "0000-0001.json")
+
+
+def test_a_signal_ends_it_and_keeps_what_is_finished(tmp_path):
+    out, temporary = tmp_path / "out", tmp_path / "tmp"
+    temporary.mkdir()
+    out.mkdir()
+    (out / "report.html").write_text("of an earlier run")
+    command = [program("orchestrator"), "reproduce", EXPERIMENTS, "--out", out, "--fmu-dir", TARGET / "fmu", "--quiet"]
+    environment = {**os.environ, "TMPDIR": str(temporary)}
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
+    deadline = time.monotonic() + 60
+    while len(list(out.glob("runs/*/*.json"))) < 3 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    # A second one must wait.
+    second = reproduce(EXPERIMENTS, out)
+    assert second.returncode == 2 and "another process is writing its results to" in second.stderr
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 143 and errors.count("\n") == 1, errors
+    assert re.search(r"ended by a signal \(SIGTERM\): \d+ of \d+ parts are finished", errors)
+    assert list(temporary.iterdir()) == [] and not (out / "report.html").exists()
+    assert not list(out.rglob("*.unfinished"))
+
+
+def test_a_part_in_which_a_bit_has_changed_is_run_again(report, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(report[1] / "runs", out / "runs")
+    path = out / "runs" / "lqr" / f"0000-{MEMBERS:04}.json"
+    text = path.read_text()
+    found = re.search(r'"ems_deg":(\d)', text)
+    path.write_text(text[: found.start(1)] + str(int(found[1]) ^ 1) + text[found.end(1) :])
+    finished = reproduce(EXPERIMENTS, out, "--members", str(MEMBERS))
+    assert finished.returncode == 0, finished.stderr
+    assert re.search(r" parts: 1 run now", finished.stdout) and "lqr" in finished.stderr
+    ours, theirs = (json.loads((folder / "results.json").read_text())["runs"]["lqr"] for folder in (out, report[1]))
+    assert ours["members"][1:] == theirs["members"][1:]
+    assert ours["members"][0]["metrics"]["ems_deg"] == theirs["members"][0]["metrics"]["ems_deg"]
+
+
+def test_texts_count_the_runs_that_there_are(report, results):
+    page = (report[1] / "report.html").read_text()
+    labels = [check["label"] for claim in results["claims"] for check in claim["checks"]]
+    assert f"K = −5, white noise, {MEMBERS} seeds: largest angle in deg" in labels
+    assert "500 seeds" not in page and "{runs:" not in page
+
+
+def test_a_claim_without_its_numbers_is_not_judged_and_a_seed_that_changes_nothing_is_told(tmp_path):
+    study = tmp_path / "study"
+    study.mkdir()
+    text = (EXPERIMENTS / "lqr.toml").read_text()
+    (study / "lqr.toml").write_text(text.replace("lost_deg = 60.0", "lost_deg = 2.0"))
+    (study / "study.toml").write_text(
+        """title = "one run"
+paper = "none"
+summary = "none"
+values = []
+[[run]]
+id = "lqr"
+label = "LQR"
+color = "#000000"
+experiment = "lqr.toml"
+set = { "plant.disturbance.kind" = "constant" }
+vary = { parameter = "plant.disturbance.seed", first = 1, count = 3 }
+[[claim]]
+says = "LQR solves fast."
+source = "nowhere"
+[[claim.check]]
+label = "mean of {runs:lqr}"
+left = "lqr.solver_ms_mean"
+relation = "below"
+right = 1.0
+"""
+    )
+    finished = reproduce(study, tmp_path / "out")
+    assert finished.returncode == 0, finished.stderr
+    assert "not judged" in finished.stdout
+    (claim,) = json.loads((tmp_path / "out" / "results.json").read_text())["claims"]
+    assert claim["verdict"] == "not-judged" and claim["checks"][0]["label"] == "mean of 3"
+    assert "lqr: plant.disturbance.seed changes nothing, all 3 runs are the same" in finished.stdout
+    assert re.search(r"lqr: the attitude is lost in 3 of 3 runs, at t = \S+ s or later", finished.stdout)
 
 
 def test_a_changed_experiment_is_run_again(report, tmp_path):

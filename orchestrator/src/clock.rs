@@ -31,7 +31,8 @@ impl Clock {
             // Ten digits after the point tell it from a whole number, and hide the rounding.
             let shown = format!("{exact:.10}");
             let shown = shown.trim_end_matches('0');
-            let (below, above) = (start + exact.floor() * step, start + exact.ceil() * step);
+            let (below, above) =
+                (rounded(start + exact.floor() * step), rounded(start + exact.ceil() * step));
             return Err(format!(
                 "stop = {stop} s is {shown} steps of {step} s after start = {start} s: \
                  choose a whole number of steps, {below} s or {above} s"
@@ -68,7 +69,9 @@ impl Clock {
 
 /// A time (s) for a text, without what rounding left in its last digits.
 pub(crate) fn rounded(time: f64) -> f64 {
-    (time * 1e9).round() / 1e9
+    // Of a large time fewer digits after the point are known.
+    let digits = if time.abs() < 1e5 { 1e9 } else { 1e4 };
+    (time * digits).round() / digits
 }
 
 #[cfg(test)]
@@ -94,6 +97,8 @@ mod tests {
             message.contains("50.01") && message.contains("0.04") && message.contains("50.04"),
             "{message}"
         );
+        let message = Clock::new(0.0, 0.35, 0.1).unwrap_err();
+        assert!(message.contains("0.3 s or 0.4 s"), "{message}");
         assert!(Clock::new(0.0, 1.0, 0.3).is_err());
         assert!(Clock::new(0.0, 0.3, 0.1).is_ok());
         assert!(Clock::new(1.0, 1.0, 0.1).is_err());

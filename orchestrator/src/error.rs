@@ -1,5 +1,6 @@
 //! The crate's one error type. A message names the culprit and what to do about it.
 
+use crate::clock::rounded;
 use crate::interrupt::Request;
 use std::path::PathBuf;
 
@@ -31,7 +32,7 @@ pub enum Error {
         count: usize,
     },
     /// A unit failed in a call.
-    #[error("{component} failed at t = {time} s in {}: {}", failure.call, failure.message)]
+    #[error("{component} failed at t = {} s in {}: {}", rounded(*time), failure.call, failure.message)]
     Unit {
         /// Name of the component in the experiment.
         component: String,
@@ -41,8 +42,8 @@ pub enum Error {
         failure: UnitFailure,
     },
     /// A unit ended the simulation, which FMI lets it do.
-    #[error("{component} ended the simulation at t = {time} s: {message}")]
-    Ended {
+    #[error("{component} ended the simulation at t = {} s: {message}", rounded(*time))]
+    EndedByUnit {
         /// Name of the component in the experiment.
         component: String,
         /// The last communication point, s.
@@ -52,7 +53,8 @@ pub enum Error {
     },
     /// A deadline was missed in a run that was to end then.
     #[error(
-        "{component} missed its deadline at t = {time} s by {late_ms:.3} ms, which was to end the run (--on-miss stop)"
+        "{component} missed its deadline at t = {} s by {late_ms:.3} ms, which was to end the run (--on-miss stop)",
+        rounded(*time)
     )]
     Deadline {
         /// Whose values came late.
@@ -62,14 +64,44 @@ pub enum Error {
         /// From the deadline to the values, ms.
         late_ms: f64,
     },
+    /// The attitude is further from its reference than the experiment allows.
+    #[error(
+        "attitude lost at t = {} s: further than {} deg from its reference ([metrics] lost_deg)",
+        rounded(*time),
+        rounded(*beyond_deg)
+    )]
+    Lost {
+        /// The first communication point at which it was, s.
+        time: f64,
+        /// What is allowed, deg.
+        beyond_deg: f64,
+    },
     /// A run was to end before its stop time.
-    #[error("ended by {} before t = {time} s", match request { Request::Quit => "the user", Request::Signal => "a signal" })]
+    #[error("ended by {request} before t = {} s", rounded(*time))]
     Interrupted {
         /// The first communication point that was not reached, s.
         time: f64,
         /// Who asked.
         request: Request,
     },
+    /// A study was to end before all its runs were there.
+    #[error(
+        "ended by {request}: {done} of {all} parts are finished and kept in {}; the same command goes on from there",
+        out.display()
+    )]
+    Unfinished {
+        /// Parts that are kept.
+        done: usize,
+        /// Parts there are.
+        all: usize,
+        /// Folder of the study's results.
+        out: PathBuf,
+        /// Who asked.
+        request: Request,
+    },
+    /// Work without results of its own was to end.
+    #[error("ended by {0}")]
+    Ended(Request),
     /// A run of a study failed.
     #[error("run {run}: {source}")]
     Run {
@@ -103,15 +135,19 @@ impl Error {
         move |source| Self::File { path, source }
     }
 
-    /// The process's exit code: 1 for a run that failed, 2 for bad usage or a bad experiment, 130 for one that a signal ended.
+    /// The process's exit code: 1 for a run that failed, 2 for bad usage or a bad experiment,
+    /// 3 for an attitude that was lost, 130 or 143 for one that a signal ended.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Experiment { .. } | Self::Fmu { .. } => 2,
             // A case that ends early has no result to compare.
-            Self::Run { source, .. } if matches!(**source, Self::Ended { .. }) => 1,
+            Self::Run { source, .. } if matches!(**source, Self::EndedByUnit { .. }) => 1,
             Self::Run { source, .. } => source.exit_code(),
-            Self::Interrupted { request: Request::Quit, .. } | Self::Ended { .. } => 0,
-            Self::Interrupted { request: Request::Signal, .. } => 130,
+            Self::Interrupted { request, .. } | Self::Unfinished { request, .. } | Self::Ended(request) => {
+                request.exit_code()
+            }
+            Self::EndedByUnit { .. } => 0,
+            Self::Lost { .. } => 3,
             Self::Faults { .. }
             | Self::Unit { .. }
             | Self::Deadline { .. }

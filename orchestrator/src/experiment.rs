@@ -9,11 +9,11 @@
 //! stop = 50.0                       # s, a whole number of steps after start
 //! step = 0.04                       # communication step, s
 //! coupling = "gauss-seidel"         # default; or "jacobi"
-//! order = ["controller", "plant"]   # Gauss-Seidel: whose inputs are set first at each communication point
+//! order = ["controller", "plant"]   # Gauss-Seidel: whose inputs are set first at each communication point; others follow by name
 //! on_invalid = "error"              # default; "warn" or "allow": a unit gives a value that is no number or outside its type
 //!
 //! [components.plant]
-//! fmu = "ReentryPlant.fmu"          # searched beside the experiment, in each --fmu-dir and in target/fmu
+//! fmu = "ReentryPlant.fmu"          # searched beside the experiment, in each --fmu-dir, in target/fmu, in ORCHESTRATOR_PATH, beside the program
 //! every = 1                         # steps at every n-th communication point, default 1
 //! unconnected = ["disturbanceMoment.*", "surface*", "jet*", "trajectory.*"]   # inputs that stay at their start value
 //!
@@ -40,6 +40,7 @@
 //! solver = "controller.solver"      # .time .solves .fallbacks
 //! guarantee = "controller.guarantee"   # .inForce .status .rateMargin .momentMargin
 //! every = 1                         # means are of every n-th communication point, largest values of all
+//! lost_deg = 60.0                   # optional: further from its reference the attitude is lost, and the run ends
 //! ```
 
 use crate::error::Error;
@@ -47,7 +48,7 @@ use crate::names;
 use crate::watch::OnInvalid;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::{Spanned, Value};
@@ -76,6 +77,12 @@ pub struct Experiment {
     /// Whether inputs may stay unconnected without being named; no key of an experiment file.
     #[serde(skip)]
     pub leaves_inputs_open: bool,
+    /// Parameters `component.parameter` that the command line sets.
+    #[serde(skip)]
+    pub assigned: BTreeSet<String>,
+    /// What the command line sets of no component.
+    #[serde(skip)]
+    pub unplaced: Vec<String>,
     /// The file and its text.
     #[serde(skip)]
     pub source: Source,
@@ -129,6 +136,9 @@ pub struct Component {
     /// Values for parameters and for inputs without connection.
     #[serde(default)]
     pub parameters: BTreeMap<String, Spanned<Value>>,
+    /// Whether the command line exchanged the unit; no key of an experiment file.
+    #[serde(skip)]
+    pub is_exchanged: bool,
 }
 
 /// One line of wiring.
@@ -208,6 +218,8 @@ pub struct Roles {
     /// The means are of every so many communication points, from the first on.
     #[serde(default = "one")]
     pub every: u32,
+    /// The attitude is lost, and a run ends, where the angles' error is larger than this as a vector, deg.
+    pub lost_deg: Option<f64>,
 }
 
 impl Default for Roles {
@@ -221,6 +233,7 @@ impl Default for Roles {
             solver: None,
             guarantee: None,
             every: 1,
+            lost_deg: None,
         }
     }
 }
@@ -235,11 +248,15 @@ pub struct Overrides {
     /// Set a parameter: `plant.disturbance.seed=7`, `controller.constraints=paper`, `plant.disturbance.bound="1 deg/s2"`.
     #[arg(long = "set", value_name = "COMPONENT.PARAMETER=VALUE")]
     pub set: Vec<String>,
+    /// Exchange a component's unit: `controller=MyLaw.fmu`, a file or one that is found by its name. What the experiment sets,
+    /// records or leaves open of the former unit and the new one does not have is left out.
+    #[arg(long = "fmu", value_name = "COMPONENT=FMU")]
+    pub fmu: Vec<String>,
     /// Stop time, s.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub stop: Option<f64>,
     /// Communication step, s.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub step: Option<f64>,
     /// Coupling at communication points.
     #[arg(long, value_enum)]
@@ -307,12 +324,27 @@ impl Experiment {
     /// Applies what the command line says.
     ///
     /// # Errors
-    /// If an assignment is malformed or names no component.
+    /// If an assignment is malformed.
     pub fn apply(&mut self, overrides: &Overrides) -> Result<(), Error> {
         self.simulation.stop = overrides.stop.unwrap_or(self.simulation.stop);
         self.simulation.step = overrides.step.unwrap_or(self.simulation.step);
         self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
         self.simulation.on_invalid = overrides.on_invalid.unwrap_or(self.simulation.on_invalid);
+        for assignment in &overrides.fmu {
+            let refuse = |message: String| Error::experiment(format!("--fmu {assignment}: {message}"));
+            let (name, fmu) = assignment
+                .split_once('=')
+                .ok_or_else(|| refuse("wants component=file, for example controller=MyLaw.fmu".into()))?;
+            let hint = names::hint(name, self.components.keys().map(String::as_str));
+            let component = self
+                .components
+                .get_mut(name)
+                .ok_or_else(|| refuse(format!("there is no component \"{name}\"{hint}")))?;
+            // A file is meant as seen from here, not from the experiment.
+            let file = Path::new(fmu).is_file().then(|| std::path::absolute(fmu).ok()).flatten();
+            let file = file.map_or_else(|| fmu.to_string(), |file| file.to_string_lossy().into_owned());
+            (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
+        }
         for assignment in &overrides.set {
             let malformed = || {
                 Error::experiment(format!(
@@ -320,7 +352,10 @@ impl Experiment {
                 ))
             };
             let (target, value) = assignment.split_once('=').ok_or_else(malformed)?;
-            names::split(target.trim()).ok_or_else(malformed)?;
+            let target = target.trim();
+            if target.is_empty() {
+                return Err(malformed());
+            }
             // What is no TOML value is text: an enumeration's item needs no quotes within quotes.
             let value = value.trim();
             let value = toml::from_str::<BTreeMap<String, Value>>(&format!("x = {value}"))
@@ -328,8 +363,12 @@ impl Experiment {
                 .filter(|table| table.len() == 1)
                 .and_then(|mut table| table.remove("x"))
                 .unwrap_or_else(|| Value::String(value.to_string()));
-            self.set(target.trim(), value)
-                .map_err(|message| Error::experiment(format!("--set {assignment}: {message}")))?;
+            if self.set(target, value).is_ok() {
+                self.assigned.insert(target.to_string());
+            } else {
+                // The units know what is meant.
+                self.unplaced.push(target.to_string());
+            }
         }
         Ok(())
     }
@@ -441,7 +480,6 @@ variables = ["a.*"]
             parse(TEXT).unwrap().apply(&overrides).unwrap_err().to_string()
         };
         assert!(refusal("a.p").contains("wants component.parameter=value"));
-        assert!(refusal("a=1").contains("wants component.parameter=value"));
-        assert!(refusal("b.p=1").contains("there is no component \"b\""));
+        assert!(refusal("=1").contains("wants component.parameter=value"));
     }
 }

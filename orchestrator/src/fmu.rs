@@ -11,6 +11,7 @@ use crate::description::ModelDescription;
 use crate::error::{Error, UnitFailure};
 use crate::faults;
 use crate::fmi::{self, Status};
+use crate::heard;
 use crate::unit::{CoSimulationUnit, Outcome};
 use crate::xml;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
@@ -330,7 +331,7 @@ impl Log {
         let (component, message) = (&self.component, message.trim_end().replace('\n', " "));
         match status {
             Status::Ok | Status::Pending => tracing::info!("{component}: [{category}] {message}"),
-            Status::Warning => tracing::warn!("{component}: [{category}] {message}"),
+            Status::Warning => heard::warn(&format!("{component}: [{category}] {message}")),
             Status::Discard | Status::Error | Status::Fatal | Status::Unknown(_) => {
                 if !self.instantiates.load(Ordering::Relaxed) {
                     tracing::error!("{component}: [{category}] {message}");

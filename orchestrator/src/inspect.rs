@@ -1,18 +1,24 @@
 //! Prints what an FMU says of itself.
 
+use crate::catalogue::{self, Filter};
 use crate::description::{Interface, Kind, ModelDescription, Variable};
 use crate::error::Error;
 use crate::fmu::Fmu;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Prints interfaces, platforms and variables of an archive.
+/// Prints interfaces, platforms and variables of an archive: those that the filter lets through.
 ///
 /// # Errors
-/// If it is no FMU, or the text cannot be written.
-pub fn inspect(path: &Path, out: &mut impl Write) -> Result<(), Error> {
-    let fmu = Fmu::open(path)?;
-    print(&fmu, out)?;
+/// If it is no FMU, if the filter lets nothing through, or the text cannot be written.
+pub fn inspect(path: &Path, filter: &Filter, as_json: bool, out: &mut impl Write) -> Result<(), Error> {
+    let mut fmu = Fmu::open(path)?;
+    filter.apply(&mut fmu.description)?;
+    if as_json {
+        catalogue::print(&fmu, out)?;
+    } else {
+        print(&fmu, out)?;
+    }
     Ok(())
 }
 

@@ -9,6 +9,7 @@
 //! A [`study`] runs many experiments, draws [`figure`]s of them, and holds them against what a paper prints.
 
 pub mod archive;
+pub mod catalogue;
 pub mod clock;
 pub mod delay;
 pub mod description;
@@ -18,7 +19,9 @@ pub mod faults;
 pub mod figure;
 pub mod fmi;
 pub mod fmu;
+pub mod folder;
 pub mod guarantee;
+pub mod heard;
 pub mod inspect;
 pub mod interrupt;
 pub mod list;
@@ -33,6 +36,7 @@ pub mod realtime;
 pub mod recorder;
 pub mod report;
 pub mod run;
+pub mod search;
 pub mod settings;
 pub mod sidecar;
 pub mod ssp;

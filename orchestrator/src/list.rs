@@ -3,32 +3,45 @@
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::fmu::Fmu;
+use crate::search::{self, files};
 use crate::study::Study;
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use walkdir::WalkDir;
+use std::{fs, iter};
 
-/// Prints the experiments and studies below a folder with their titles, and the FMUs below it and in `target/fmu`.
+/// Prints the experiments and studies below a folder with their titles, and the FMUs below it. Without a folder: those here,
+/// and all others that are found from here.
 ///
 /// # Errors
 /// If the folder is not there, or the text cannot be written.
-pub fn list(folder: &Path, out: &mut impl Write) -> Result<(), Error> {
-    if !folder.is_dir() {
+pub fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Error> {
+    if let Some(folder) = folder
+        && !folder.is_dir()
+    {
         return Err(Error::experiment(format!("{} is not a folder", folder.display())));
     }
+    let here = folder.unwrap_or(Path::new("."));
+    let find = |extension: &str, others: Vec<PathBuf>| {
+        let mut known = BTreeSet::new();
+        let all = iter::once(here.to_path_buf()).chain(others).flat_map(|root| files(&root, extension));
+        all.filter(|path| fs::canonicalize(path).is_ok_and(|path| known.insert(path))).collect::<Vec<_>>()
+    };
+    let elsewhere = if folder.is_none() { search::experiments() } else { Vec::new() };
+    let tables = find("toml", elsewhere);
     let mut rows: Vec<(PathBuf, String)> = Vec::new();
-    for path in files(folder, "toml") {
+    for path in &tables {
         // Other TOML files are no experiments; an experiment with a fault is shown with it.
-        let Ok(text) = std::fs::read_to_string(&path) else { continue };
-        if text.lines().any(|line| line.trim_start().starts_with("[components.")) {
+        let Ok(text) = fs::read_to_string(path) else { continue };
+        if search::is_experiment(&text) {
             let title =
-                Experiment::parse(&path, text).map_or_else(|error| format!("FAULT {error}"), |e| e.title);
-            rows.push((path, title));
+                Experiment::parse(path, text).map_or_else(|error| format!("FAULT {error}"), |e| e.title);
+            rows.push((path.clone(), title));
         }
     }
     print("experiments", &rows, out)?;
 
-    let studies: Vec<(PathBuf, String)> = files(folder, "toml")
+    let studies: Vec<(PathBuf, String)> = tables
         .into_iter()
         .filter(|path| path.file_name().is_some_and(|name| name == "study.toml"))
         .map(|path| {
@@ -38,9 +51,8 @@ pub fn list(folder: &Path, out: &mut impl Write) -> Result<(), Error> {
         .collect();
     print("studies", &studies, out)?;
 
-    let mut fmus = files(folder, "fmu");
-    fmus.extend(files(Path::new("target/fmu"), "fmu"));
-    let rows: Vec<(PathBuf, String)> = fmus
+    let others = if folder.is_none() { search::units() } else { vec![PathBuf::from("target/fmu")] };
+    let rows: Vec<(PathBuf, String)> = find("fmu", others)
         .into_iter()
         .map(|path| {
             let text = Fmu::open(&path).map_or_else(
@@ -51,22 +63,6 @@ pub fn list(folder: &Path, out: &mut impl Write) -> Result<(), Error> {
         })
         .collect();
     print("FMUs", &rows, out)
-}
-
-fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
-    WalkDir::new(folder)
-        .sort_by_file_name()
-        .into_iter()
-        .filter_entry(|entry| entry.depth() == 0 || !is_passed_over(&entry.file_name().to_string_lossy()))
-        .flatten()
-        .map(walkdir::DirEntry::into_path)
-        .filter(|path| path.is_file() && path.extension().is_some_and(|e| e == extension))
-        .collect()
-}
-
-/// Hidden folders and build folders are large and hold nothing to be run, but for `target/fmu`, which is asked for by name.
-fn is_passed_over(name: &str) -> bool {
-    name.starts_with('.') || name == "target"
 }
 
 fn print(what: &str, rows: &[(PathBuf, String)], out: &mut impl Write) -> Result<(), Error> {

@@ -1,14 +1,15 @@
 //! The command line.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+use orchestrator::catalogue::Filter;
 use orchestrator::error::Error;
 use orchestrator::experiment::{Experiment, Overrides};
-use orchestrator::interrupt::Request;
+use orchestrator::interrupt::{Interrupt, Request};
 use orchestrator::live::log::Messages;
 use orchestrator::realtime::{self, Factor, OnMiss};
-use orchestrator::run::{Options, Plan};
+use orchestrator::run::{Files, Options, Plan};
 use orchestrator::study::{Study, reproduce};
-use orchestrator::{inspect, list, report, ssp};
+use orchestrator::{inspect, list, report, search, ssp};
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -16,8 +17,11 @@ use tracing_subscriber::EnvFilter;
 
 /// Runs FMI 2.0 co-simulation experiments.
 ///
-/// Exit code 0: fine; 1: the run failed; 2: bad usage or a bad experiment; 130: ended by Ctrl-C. Log messages go to standard error; the
+/// Exit code 0: fine; 1: the run failed; 2: bad usage or a bad experiment; 3: the attitude was lost, as the experiment defines it;
+/// 130 or 143: ended by Ctrl-C or SIGTERM. Log messages go to standard error; the
 /// environment variable RUST_LOG chooses how many (error, warn, info, debug).
+///
+/// Experiments and FMUs are also found beside the program and in the folders of the environment variable ORCHESTRATOR_PATH.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -30,9 +34,9 @@ enum Command {
     /// Run an experiment and write results.csv, results.json, metrics.json and plot.svg.
     ///
     /// With --real-time the run keeps in step with the wall clock, and says how well in the summary, in metrics.json and in
-    /// realtime.svg. Ctrl-C then ends it and keeps the results.
+    /// realtime.svg. Ctrl-C and SIGTERM end a run and keep its results.
     Run {
-        /// Experiment file, or SSP archive.
+        /// Experiment: a file, an SSP archive, or the name of one that `list` shows.
         experiment: PathBuf,
         /// Folder for the results [default: out/<name of the experiment>].
         #[arg(long, value_name = "DIR")]
@@ -60,6 +64,11 @@ enum Command {
         /// Show the run on the terminal while it goes on; q ends it and keeps the results.
         #[arg(long, conflicts_with = "quiet")]
         live: bool,
+        #[command(flatten)]
+        files: Files,
+        /// Replace the results of an earlier run in the folder; without it they are left alone and nothing is run.
+        #[arg(long)]
+        force: bool,
     },
     /// Run a paper's comparison and write report.html, with figures, tables and a verdict on each claim.
     ///
@@ -77,7 +86,7 @@ enum Command {
         #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
         jobs: usize,
         /// At most so many values of the parameter that a run varies, for a quick look.
-        #[arg(long, value_name = "N")]
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
         members: Option<u32>,
         /// Run everything again, even what is finished.
         #[arg(long)]
@@ -88,7 +97,7 @@ enum Command {
     },
     /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs included.
     Pack {
-        /// Experiment file.
+        /// Experiment: a file, or the name of one that `list` shows.
         experiment: PathBuf,
         /// As an SSP archive, which is what there is.
         #[arg(long)]
@@ -101,20 +110,32 @@ enum Command {
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
         overrides: Overrides,
+        /// Replace the archive if there is one.
+        #[arg(long)]
+        force: bool,
     },
     /// Show the variables and capabilities of an FMU.
     Inspect {
         /// The archive.
         fmu: PathBuf,
-        /// Say what is wrong with it, its library included, instead. Ends with 1 if anything is.
+        #[command(flatten)]
+        filter: Filter,
+        /// As JSON, for other programs.
         #[arg(long)]
+        json: bool,
+        /// Say what is wrong with it, its library included, instead. Ends with 1 if anything is.
+        #[arg(long, conflicts_with_all = ["json", "pattern", "causality"])]
         check: bool,
+    },
+    /// Write a script that completes commands and options in a shell, for example `orchestrator completions bash`.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
     },
     /// List experiments, studies and FMUs.
     List {
-        /// Folder to look in.
-        #[arg(default_value = ".")]
-        folder: PathBuf,
+        /// Folder to look in [default: this one, and where experiments and FMUs are found from any folder].
+        folder: Option<PathBuf>,
     },
 }
 
@@ -132,7 +153,9 @@ fn main() -> ExitCode {
         .init();
 
     let mut out = BufWriter::new(stdout());
-    let outcome = execute(arguments.command, &mut out).and_then(|()| out.flush().map_err(Error::from));
+    let interrupt = Interrupt::default();
+    let outcome =
+        execute(arguments.command, &mut out, &interrupt).and_then(|()| out.flush().map_err(Error::from));
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if error.is_broken_pipe() => {
@@ -141,13 +164,17 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Err(error) => {
-            eprintln!("error: {error}");
+            // There is no one left to tell if it cannot be written.
+            let _ = writeln!(stderr(), "error: {error}");
             ExitCode::from(error.exit_code())
         }
     }
 }
 
-fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
+fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Error> {
+    if matches!(command, Command::Run { .. } | Command::Reproduce { .. } | Command::Pack { .. }) {
+        interrupt.listen()?;
+    }
     match command {
         Command::Run {
             experiment,
@@ -159,7 +186,10 @@ fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
             on_miss,
             priority,
             live,
+            files,
+            force,
         } => {
+            let experiment = search::experiment(&experiment)?;
             let plan = if experiment.extension().is_some_and(|extension| extension == "ssp") {
                 let mut loaded = ssp::load(&experiment, &overrides)?;
                 Plan::with(loaded.experiment, &fmu_dir, &mut loaded.opened)?
@@ -169,14 +199,22 @@ fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
                 Plan::new(experiment, &fmu_dir)?
             };
             let real_time = real_time.map(|factor| realtime::Settings { factor, on_miss, priority });
-            let report = plan.run(&Options { out: folder, quiet, real_time, live })?;
+            let report = plan.run(&Options {
+                out: folder,
+                quiet,
+                real_time,
+                live,
+                files,
+                force,
+                interrupt: interrupt.clone(),
+            })?;
             if !quiet {
                 report::summary(&report, out)?;
                 out.flush()?;
             }
             match report.ended {
                 None | Some(Error::Interrupted { request: Request::Quit, .. }) => Ok(()),
-                Some(error @ Error::Ended { .. }) => {
+                Some(error @ Error::EndedByUnit { .. }) => {
                     // The summary has said so already.
                     if quiet {
                         tracing::warn!("{error}");
@@ -187,25 +225,43 @@ fn execute(command: Command, out: &mut impl Write) -> Result<(), Error> {
             }
         }
         Command::Reproduce { study, out: folder, fmu_dir, jobs, members, fresh, quiet } => {
-            let study = Study::load(&reproduce::find(&study)?)?;
-            let options = reproduce::Options { out: folder, fmu_dirs: fmu_dir, jobs, members, fresh, quiet };
-            let report = reproduce::reproduce(study, &options)?;
+            let study = Study::load_with(&reproduce::find(&study)?, members)?;
+            let interrupt = interrupt.clone();
+            let options =
+                reproduce::Options { out: folder, fmu_dirs: fmu_dir, jobs, fresh, quiet, interrupt };
+            let report = reproduce::reproduce(&study, &options)?;
             if !quiet {
                 report::reproduction(&report, out)?;
             }
             Ok(())
         }
-        Command::Pack { experiment: path, ssp: _, out: archive, fmu_dir, overrides } => {
+        Command::Pack { experiment: path, ssp, out: archive, fmu_dir, overrides, force } => {
+            if !ssp {
+                return Err(Error::experiment(
+                    "pack wants the form of the archive, of which there is one: --ssp",
+                ));
+            }
+            let path = search::experiment(&path)?;
             let mut experiment = Experiment::load(&path)?;
             experiment.apply(&overrides)?;
             let archive = archive
                 .unwrap_or_else(|| PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("ssp"));
+            if archive.exists() && !force {
+                let path = archive.display();
+                return Err(Error::experiment(format!(
+                    "{path} is there already: --force replaces it, --out takes another name"
+                )));
+            }
             let plan = Plan::new(experiment, &fmu_dir)?;
-            ssp::pack(&plan, &archive)?;
+            ssp::pack(&plan, &archive, interrupt)?;
             report::packed(&plan, &archive, out).map_err(Error::from)
         }
-        Command::Inspect { fmu, check: true } => inspect::check(&fmu, out),
-        Command::Inspect { fmu, check: false } => inspect::inspect(&fmu, out),
-        Command::List { folder } => list::list(&folder, out),
+        Command::Inspect { fmu, check: true, .. } => inspect::check(&fmu, out),
+        Command::Inspect { fmu, filter, json, check: false } => inspect::inspect(&fmu, &filter, json, out),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Arguments::command(), "orchestrator", out);
+            Ok(())
+        }
+        Command::List { folder } => list::list(folder.as_deref(), out),
     }
 }

@@ -7,6 +7,7 @@
 use crate::clock::Clock;
 use crate::error::{Error, UnitFailure};
 use crate::experiment::{Coupling, Scaling};
+use crate::heard;
 use crate::interrupt::Interrupt;
 use crate::realtime::Settings;
 use crate::realtime::pacer::Pacer;
@@ -229,9 +230,9 @@ impl Master {
         Self { clock, coupling, members, inputs, probe, spent: Vec::new(), pacer: None, interrupt }
     }
 
-    /// Who may end the run from outside.
-    pub fn interrupt(&self) -> &Interrupt {
-        &self.interrupt
+    /// Who may end the run from outside; to be said before it is paced.
+    pub fn heed(&mut self, interrupt: &Interrupt) {
+        self.interrupt = interrupt.clone();
     }
 
     /// Runs in step with the timer from now on.
@@ -320,6 +321,7 @@ impl Master {
                 pacer.wait(tick);
             }
             let time = self.clock.time(tick);
+            heard::at(time);
             if let Some(request) = self.interrupt.asked() {
                 return Err(Error::Interrupted { time, request });
             }
@@ -393,7 +395,7 @@ impl Master {
     fn error(&self, time: f64, (index, failure): (usize, UnitFailure)) -> Error {
         let component = self.members[index].name.clone();
         if failure.ends {
-            Error::Ended { component, time, message: failure.message }
+            Error::EndedByUnit { component, time, message: failure.message }
         } else {
             Error::Unit { component, time, failure }
         }

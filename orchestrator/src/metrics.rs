@@ -137,6 +137,14 @@ pub fn places(
     let (in_force, status) = (guarantee("inForce")?, guarantee("status")?);
     let margins = [guarantee("rateMargin")?, guarantee("momentMargin")?];
     places.guarantee = in_force.map(|in_force| guarantee::Signals { in_force, status, margins });
+    if let Some(lost) = roles.lost_deg {
+        if lost.is_nan() || lost <= 0.0 {
+            return Err(Error::experiment(format!("[metrics] lost_deg = {lost}: above 0")));
+        }
+        if places.attitude.is_none() || places.reference.is_none() {
+            return Err(Error::experiment("[metrics] lost_deg: there is no attitude with a reference"));
+        }
+    }
     let limit = |name| single("limit", &roles.limit, "controller.limit", name);
     Ok((places, [limit("rate")?, limit("moment")?]))
 }
@@ -197,8 +205,11 @@ pub struct Metrics {
     pub loop_delay_s: Option<f64>,
     /// Number of communication points that were reached.
     pub samples: u64,
-    /// Whether the run got to its stop time.
+    /// Whether the run got to its stop time. A lost attitude ends a run, but not the runs of a study.
     pub completed: bool,
+    /// First time at which the attitude was lost, s; null if it never was, or if the experiment does not say what that is.
+    #[serde(default)]
+    pub lost_at: Option<f64>,
     /// Mean time spent in each component per step of its own, µs, where it was measured.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub step_us: BTreeMap<String, f64>,
@@ -223,6 +234,17 @@ pub struct Merit {
     statuses: Vec<(String, i32)>,
     samples: u64,
     completed: bool,
+    loss: Loss,
+}
+
+/// When an attitude is lost, and what becomes of the run then.
+#[derive(Clone, Copy, Debug, Default)]
+struct Loss {
+    /// Largest ‖Θ − Θ_r‖ that can be lived with, rad.
+    beyond: Option<f64>,
+    ends_run: bool,
+    /// When it was exceeded first, s.
+    at: Option<f64>,
 }
 
 /// Square of a vector's length.
@@ -233,7 +255,8 @@ pub(crate) fn norm_squared(values: &[f64], places: [usize; 3]) -> f64 {
 impl Merit {
     /// An empty sum. `points` is how many communication points there will be at most.
     pub fn new(places: Places, limits: Limits, points: u64) -> Self {
-        let capacity = if places.solver_time.is_some() { points as usize } else { 0 };
+        // Room for a usual run; a longer one takes more as it goes.
+        let capacity = if places.solver_time.is_some() { points.min(1 << 16) as usize } else { 0 };
         Self {
             places,
             limits,
@@ -247,7 +270,22 @@ impl Merit {
             statuses: Vec::new(),
             samples: 0,
             completed: false,
+            loss: Loss::default(),
         }
+    }
+
+    /// The attitude counts as lost where it is further from its reference than this, deg.
+    #[must_use]
+    pub fn with_loss(mut self, beyond_deg: Option<f64>) -> Self {
+        self.loss.beyond = beyond_deg.map(f64::to_radians);
+        self
+    }
+
+    /// A lost attitude ends the run.
+    #[must_use]
+    pub fn ending_when_lost(mut self) -> Self {
+        self.loss.ends_run = true;
+        self
     }
 
     /// Gives the statuses of the guarantee their names.
@@ -303,6 +341,7 @@ impl Merit {
             loop_delay_s: loop_delay,
             samples: self.samples,
             completed: self.completed,
+            lost_at: self.loss.at,
             step_us: BTreeMap::new(),
             real_time: None,
         }
@@ -346,6 +385,16 @@ impl Observer for Merit {
         }
         self.samples += 1;
         self.completed |= last;
+        // What is not a number is lost, too.
+        if let Some(beyond) = self.loss.beyond
+            && self.loss.at.is_none()
+            && (angle.is_nan() || angle > beyond * beyond)
+        {
+            self.loss.at = Some(sample.time);
+            if self.loss.ends_run {
+                return Err(Error::Lost { time: sample.time, beyond_deg: beyond.to_degrees() });
+            }
+        }
         Ok(())
     }
 }
@@ -427,6 +476,31 @@ mod tests {
         rows[1][6] = f64::NAN;
         feed(&mut merit, &rows);
         assert!(merit.metrics(1.0, 1.0, None).max_rate_deg_s.unwrap().is_nan());
+    }
+
+    #[test]
+    fn an_attitude_is_lost_beyond_its_bound_or_where_it_is_no_number() {
+        let row = |alpha: f64| {
+            let mut row = [0.0; 15];
+            row[0] = alpha;
+            row
+        };
+        let bound = 1.0_f64.to_degrees();
+        let mut kept = merit().with_loss(Some(bound));
+        feed(&mut kept, &[row(0.5), row(-1.0), row(1.0)]);
+        let metrics = kept.metrics(1.0, 1.0, None);
+        assert_eq!((metrics.lost_at, metrics.completed), (None, true));
+        for lost in [1.1, f64::NAN] {
+            let mut merit = merit().with_loss(Some(bound));
+            feed(&mut merit, &[row(0.5), row(lost), row(2.0), row(0.0)]);
+            let metrics = merit.metrics(1.0, 1.0, None);
+            assert_eq!((metrics.lost_at, metrics.completed), (Some(1.0), true));
+        }
+        let mut ending = merit().with_loss(Some(bound)).ending_when_lost();
+        let sample = Sample { tick: 3, time: 0.1 + 0.2, last: false, values: &row(2.0) };
+        let error = ending.observe(&sample).unwrap_err();
+        assert_eq!(error.exit_code(), 3);
+        assert!(error.to_string().starts_with("attitude lost at t = 0.3 s: further than 57.29"), "{error}");
     }
 
     #[test]

@@ -3,9 +3,15 @@
 use crate::error::Error;
 use crate::master::{Observer, Sample};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::{IsTerminal, stderr};
+use std::fmt::Arguments;
+use std::io::{IsTerminal, Write, stderr};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
+
+/// A plain line. If standard error cannot be written, there is no one to tell.
+fn tell(line: Arguments) {
+    let _ = writeln!(stderr(), "{line}");
+}
 
 /// A hidden bar unless standard error is a terminal and something is to be shown.
 fn bar(length: u64, quiet: bool, template: &str) -> ProgressBar {
@@ -29,7 +35,7 @@ impl Progress {
     /// plain line. `apart` draws it by a thread of its own, so that the run never waits for the terminal.
     pub fn new(title: &str, ticks: u64, quiet: bool, apart: bool) -> Self {
         if !stderr().is_terminal() && !quiet {
-            eprintln!("running {title}: {ticks} steps");
+            tell(format_args!("running {title}: {ticks} steps"));
         }
         let bar = bar(ticks, quiet, "{msg} [{bar:40}] {percent} %, {eta} left");
         bar.set_message(title.to_string());
@@ -74,7 +80,7 @@ impl Parts {
     pub fn new(title: &str, all: u64, done: u64, quiet: bool) -> Self {
         let quiet = quiet || done == all;
         if !stderr().is_terminal() && !quiet {
-            eprintln!("{title}: {} of {all} parts to run", all - done);
+            tell(format_args!("{title}: {} of {all} parts to run", all - done));
         }
         let bar = bar(all, quiet, "[{bar:40}] {pos} of {len} parts, {eta} left, {msg}");
         bar.set_position(done);
@@ -89,7 +95,7 @@ impl Parts {
         self.bar.set_message(what.to_string());
         let mut last = self.last_line.lock().unwrap_or_else(PoisonError::into_inner);
         if !self.quiet && !stderr().is_terminal() && last.elapsed() >= BETWEEN_LINES {
-            eprintln!("{} of {} parts done", self.bar.position(), self.all);
+            tell(format_args!("{} of {} parts done", self.bar.position(), self.all));
             *last = Instant::now();
         }
     }

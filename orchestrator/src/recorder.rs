@@ -13,34 +13,48 @@ pub struct Recorder {
     writer: csv::Writer<File>,
     /// For each column, which of the sample's values it shows, and how.
     columns: Vec<(usize, Carrier)>,
+    /// For each column, the names of an enumeration's items by which its values are told; none: by numbers.
+    items: Vec<Vec<(String, i32)>>,
     every: u64,
     record: csv::StringRecord,
     field: String,
 }
 
 impl Recorder {
-    /// Creates the file. `columns` are name, place among the sample's values and type; `every` is the number of ticks
+    /// Creates the file. `time` heads the column of times; `columns` are name, place among the sample's values and type; `every` is the number of ticks
     /// from row to row.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn create(path: &Path, columns: &[(&str, usize, Carrier)], every: u32) -> Result<Self, Error> {
+    pub fn create(
+        path: &Path,
+        time: &str,
+        columns: &[(&str, usize, Carrier)],
+        every: u32,
+    ) -> Result<Self, Error> {
         let file = File::create(path).map_err(Error::file(path))?;
         let writer = csv::WriterBuilder::new().buffer_capacity(1 << 16).from_writer(file);
         let mut recorder = Self {
             path: path.to_path_buf(),
             writer,
             columns: columns.iter().map(|(_, place, carrier)| (*place, *carrier)).collect(),
+            items: Vec::new(),
             every: u64::from(every),
             record: csv::StringRecord::new(),
             field: String::new(),
         };
-        recorder.record.push_field("time");
+        recorder.record.push_field(time);
         for (name, ..) in columns {
             recorder.record.push_field(name);
         }
         recorder.write()?;
         Ok(recorder)
+    }
+
+    /// Tells enumerations by the names of their items, which are given for each column.
+    #[must_use]
+    pub fn with_names(self, items: Vec<Vec<(String, i32)>>) -> Self {
+        Self { items, ..self }
     }
 
     fn write(&mut self) -> Result<(), Error> {
@@ -76,7 +90,12 @@ impl Observer for Recorder {
         self.push(sample.time, Carrier::Real);
         for index in 0..self.columns.len() {
             let (place, carrier) = self.columns[index];
-            self.push(sample.values[place], carrier);
+            let value = sample.values[place];
+            let mut items = self.items.get(index).into_iter().flatten();
+            match items.find(|(_, item)| f64::from(*item) == value) {
+                Some((name, _)) => self.record.push_field(name),
+                None => self.push(value, carrier),
+            }
         }
         self.write()
     }
@@ -91,7 +110,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("results.csv");
         let columns = [("a.x", 1, Carrier::Real), ("a.n", 0, Carrier::Integer)];
-        let mut recorder = Recorder::create(&path, &columns, 2).unwrap();
+        let mut recorder = Recorder::create(&path, "time", &columns, 2).unwrap();
         let values = [0.1 + 0.2, 1e-300, f64::MAX, -0.0, 5e-324];
         for (tick, value) in values.iter().enumerate() {
             let sample = Sample {

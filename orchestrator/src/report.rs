@@ -22,8 +22,8 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,
         "  {} s to {} s in {} steps of {} s, {coupling}: {}",
-        clock.start(),
-        clock.stop(),
+        clock::rounded(clock.start()),
+        clock::rounded(clock.stop()),
         clock.ticks(),
         clock.step(),
         report.order.join(", ")
@@ -74,7 +74,7 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
         let steps = match feedback.ticks {
             0 => "none".to_string(),
             1 => format!("{} s, 1 step", clock.step()),
-            n => format!("{} s, {n} steps", n as f64 * clock.step()),
+            n => format!("{} s, {n} steps", clock::rounded(n as f64 * clock.step())),
         };
         let reason = match (feedback.ticks, report.coupling) {
             (0, _) => "",
@@ -135,6 +135,9 @@ pub fn reproduction(report: &reproduce::Report, out: &mut impl Write) -> io::Res
         run + kept,
         report.elapsed
     )?;
+    for note in &report.notes {
+        writeln!(out, "  note: {note}")?;
+    }
     for (claim, verdict) in &report.verdicts {
         writeln!(out, "  {:<14} {claim}", verdict.text())?;
     }
@@ -144,8 +147,8 @@ pub fn reproduction(report: &reproduce::Report, out: &mut impl Write) -> io::Res
 
 /// How a value stands against its limit.
 fn against(ratio: f64, limit: &str) -> String {
-    // What is not a number is not within a limit.
-    let verdict = if ratio <= 1.0 { "within" } else { "EXCEEDS" };
+    // What is not a number is not within a limit. Limits are met up to rounding.
+    let verdict = if ratio <= 1.0 + 1e-9 { "within" } else { "EXCEEDS" };
     format!("   {verdict} its limit {limit}: {:.1} %", ratio * 100.0)
 }
 
@@ -180,6 +183,13 @@ pub(crate) fn margins(margins: [Option<f64>; 2]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_limit_is_met_up_to_rounding() {
+        assert_eq!(against(1.0000000000000004, "1 N m"), "   within its limit 1 N m: 100.0 %");
+        assert_eq!(against(1.001, "1 N m"), "   EXCEEDS its limit 1 N m: 100.1 %");
+        assert!(against(f64::NAN, "1 N m").contains("EXCEEDS"));
+    }
 
     #[test]
     fn a_guarantee_is_told_in_one_line() {

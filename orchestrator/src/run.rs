@@ -7,6 +7,8 @@ use crate::error::Error;
 use crate::experiment::{Coupling, Experiment};
 use crate::faults;
 use crate::fmu::Fmu;
+use crate::folder::Folder;
+use crate::heard;
 use crate::interrupt::Interrupt;
 use crate::live::scene::Scene;
 use crate::live::{self, Live};
@@ -19,6 +21,7 @@ use crate::realtime;
 use crate::realtime::priority::{Priority, Scheduling};
 use crate::realtime::timer::{self, Monotonic};
 use crate::recorder::Recorder;
+use crate::search;
 use crate::settings::{self, Setting};
 use crate::sidecar;
 use crate::unit::CoSimulationUnit;
@@ -29,6 +32,21 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Instant;
+
+/// Which files a run writes, and how.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub struct Files {
+    /// Write no results.csv.
+    #[arg(long)]
+    pub no_csv: bool,
+    /// Draw no plot.svg.
+    #[arg(long)]
+    pub no_plot: bool,
+    /// Head the columns of results.csv with name [unit], and write items of enumerations by name. Without it the header holds
+    /// the names alone and every cell is a number, as FMPy and NumPy read it; results.json has units and items.
+    #[arg(long, conflicts_with = "no_csv")]
+    pub labels: bool,
+}
 
 /// Where results go, and how much is said.
 #[derive(Clone, Debug, Default)]
@@ -41,6 +59,12 @@ pub struct Options {
     pub real_time: Option<realtime::Settings>,
     /// Show the run on the terminal while it goes on.
     pub live: bool,
+    /// Which files there are to be.
+    pub files: Files,
+    /// Replace the results of an earlier run.
+    pub force: bool,
+    /// Who may end the run.
+    pub interrupt: Interrupt,
 }
 
 /// What a run leaves behind.
@@ -122,6 +146,9 @@ impl Plan {
             fmus.push(fmu);
         }
         let parts = parts(&order, &fmus);
+        if let Some(target) = experiment.unplaced.first() {
+            return Err(Error::experiment(format!("--set {target}: {}", whereabouts(target, &parts))));
+        }
         check_single_instances(&experiment, &order, &fmus)?;
 
         let wires = wiring::wires(&experiment, &parts)?;
@@ -129,6 +156,7 @@ impl Plan {
             .map(|index| settings::resolve(&experiment, &parts, index, &wires))
             .collect::<Result<Vec<_>, _>>()?;
         let columns = wiring::columns(&experiment, &parts)?;
+        check_size(&experiment, &clock, columns.len())?;
         let mut probes = Probes::default();
         let (places, limits) = metrics::places(&experiment.metrics, &parts, &mut probes)?;
         for column in &columns {
@@ -169,24 +197,27 @@ impl Plan {
         let stem = experiment.source.path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy());
         let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(stem.as_ref()));
 
+        Folder::check(&out, options.force)?;
+
+        let warnings = heard::collect();
+        heard::at(self.clock.start());
         let mut probes = self.probes.clone();
         let factor = options.real_time.map(|settings| settings.factor.get());
         let scene = options.live.then(|| Scene::new(self, self.places, factor, &mut probes));
         let (mut master, limits) = self.initialized_with(&probes)?;
         let parameters = self.parameters(&mut master)?;
 
-        let interrupt: Interrupt = master.interrupt().clone();
-        if options.real_time.is_some() || options.live {
-            interrupt.listen()?;
+        master.heed(&options.interrupt);
+        if let Some(request) = options.interrupt.asked() {
+            return Err(Error::Interrupted { time: self.clock.start(), request });
         }
-        fs::create_dir_all(&out).map_err(Error::file(&out))?;
-        let columns: Vec<_> = self
-            .columns
-            .iter()
-            .filter_map(|column| Some((column.name.as_str(), self.place(column.port)?, column.port.carrier)))
-            .collect();
-        let mut recorder = Recorder::create(&out.join("results.csv"), &columns, experiment.record.every)?;
-        let mut merit = self.merit(limits);
+        let folder = Folder::take(&out)?;
+        // Another process may have been faster.
+        Folder::check(&out, options.force)?;
+        folder.clear()?;
+        let mut recorder =
+            if options.files.no_csv { None } else { Some(self.recorder(&out, options.files.labels)?) };
+        let mut merit = self.merit(limits).ending_when_lost();
         let mut curves = Curves::new(self.places, limits, self.clock.ticks());
         let silent = options.quiet || options.live;
         let mut progress =
@@ -196,27 +227,35 @@ impl Plan {
             timer::wake_up_sharply();
             master.pace(settings, Rc::new(Monotonic)).tally()
         });
-        let live =
-            scene.map(|scene| Live::start(Scene { limits, ..scene }, probes.ports.len(), tally, interrupt));
+        let live = scene.map(|scene| {
+            Live::start(Scene { limits, ..scene }, probes.ports.len(), tally, options.interrupt.clone())
+        });
         let mut live = live.transpose()?;
         // After the threads that draw, which are not to have it.
         let scheduling = Scheduling::request(options.real_time.and_then(|settings| settings.priority));
 
         let begin = Instant::now();
-        let mut observers: Vec<&mut dyn Observer> =
-            vec![&mut recorder, &mut merit, &mut curves, &mut progress];
+        let mut observers: Vec<&mut dyn Observer> = vec![&mut curves, &mut progress];
+        observers.extend(recorder.as_mut().map(|recorder| recorder as &mut dyn Observer));
         observers.extend(live.as_mut().map(|live| live as &mut dyn Observer));
+        // The last one, as it may end the run.
+        observers.push(&mut merit);
         let outcome = master.run(&mut observers);
         let wall = begin.elapsed().as_secs_f64();
         let priority = scheduling.priority.clone();
-        drop((scheduling, live, progress));
+        drop((scheduling, live, progress, warnings));
 
-        recorder.finish()?;
+        if let Some(recorder) = &mut recorder {
+            recorder.finish()?;
+        }
         let reached = self.clock.step() * merit.metrics(0.0, 0.0, None).samples.saturating_sub(1) as f64;
         let loop_delay =
             self.loops.iter().map(|l| l.ticks).max().map(|ticks| ticks as f64 * self.clock.step());
         let mut metrics = merit.metrics(wall, reached, loop_delay);
-        let mut files = vec!["results.csv", "results.json", "metrics.json"];
+        let mut files = vec!["results.json", "metrics.json"];
+        if recorder.is_some() {
+            files.insert(0, "results.csv");
+        }
         let sidecar = sidecar::sidecar(self, &parameters, options.real_time, outcome.as_ref().err());
         write_json(&out.join("results.json"), &sidecar)?;
         if let Some(pacer) = master.take_pacer() {
@@ -228,14 +267,17 @@ impl Plan {
             metrics.real_time = Some(real_time);
         }
         write_json(&out.join("metrics.json"), &metrics)?;
-        if curves.draw(&out.join("plot.svg"), &experiment.title)? {
+        if !options.files.no_plot && curves.draw(&out.join("plot.svg"), &experiment.title)? {
             files.push("plot.svg");
         }
         let ended = match outcome {
             Ok(()) => None,
-            Err(error @ (Error::Deadline { .. } | Error::Interrupted { .. } | Error::Ended { .. })) => {
-                Some(error)
-            }
+            Err(
+                error @ (Error::Deadline { .. }
+                | Error::Interrupted { .. }
+                | Error::EndedByUnit { .. }
+                | Error::Lost { .. }),
+            ) => Some(error),
             Err(error) => {
                 tracing::warn!("the results until then are in {}", out.display());
                 return Err(error);
@@ -252,6 +294,28 @@ impl Plan {
             files,
             ended,
         })
+    }
+
+    /// The file of the recorded variables.
+    fn recorder(&self, out: &Path, labels: bool) -> Result<Recorder, Error> {
+        let mut columns = Vec::new();
+        let mut items = Vec::new();
+        for column in &self.columns {
+            let Some(place) = self.place(column.port) else { continue };
+            let kind = &self.fmus[column.port.component].description.variables[column.port.variable].kind;
+            let name = match kind {
+                Kind::Real { unit: Some(unit), .. } if labels => format!("{} [{unit}]", column.name),
+                _ => column.name.clone(),
+            };
+            columns.push((name, place, column.port.carrier));
+            items.push(self.items(place));
+        }
+        let columns: Vec<_> =
+            columns.iter().map(|(name, place, carrier)| (name.as_str(), *place, *carrier)).collect();
+        let path = out.join("results.csv");
+        let time = if labels { "time [s]" } else { "time" };
+        let recorder = Recorder::create(&path, time, &columns, self.experiment.record.every)?;
+        Ok(if labels { recorder.with_names(items) } else { recorder })
     }
 
     /// The units, initialized, and the limits that the experiment states.
@@ -291,7 +355,9 @@ impl Plan {
     pub fn merit(&self, limits: Limits) -> Merit {
         let statuses =
             self.places.guarantee.and_then(|signals| signals.status).map(|place| self.items(place));
-        Merit::new(self.places, limits, self.clock.ticks() + 1).with_statuses(statuses.unwrap_or_default())
+        Merit::new(self.places, limits, self.clock.ticks() + 1)
+            .with_statuses(statuses.unwrap_or_default())
+            .with_loss(self.experiment.metrics.lost_deg)
     }
 
     /// Instantiates the units and sets their parameters.
@@ -361,8 +427,60 @@ fn warn(real_time: &realtime::report::RealTime, quiet: bool) {
     }
 }
 
+/// What to write for a parameter whose component is missing or wrong.
+fn whereabouts(target: &str, parts: &[Part]) -> String {
+    let of = |part: &Part| {
+        let known = part.description.names("parameter").chain(part.description.names("input"));
+        known.map(|name| format!("{}.{name}", part.name)).collect::<Vec<_>>()
+    };
+    let all: Vec<String> = parts.iter().flat_map(of).collect();
+    let meant: Vec<&str> = all
+        .iter()
+        .filter(|name| names::split(name).is_some_and(|(_, rest)| rest == target))
+        .map(String::as_str)
+        .collect();
+    if !meant.is_empty() {
+        return format!("of which component? Write {}", meant.join(" or "));
+    }
+    let component = names::split(target).map_or(target, |(component, _)| component);
+    let hint = match names::nearest(target, all.iter().map(String::as_str)) {
+        Some(name) => format!("; did you mean \"{name}\"?"),
+        None => names::hint(component, parts.iter().map(|part| part.name)),
+    };
+    format!("there is no component \"{component}\"{hint}")
+}
+
 fn parts<'a>(order: &'a [String], fmus: &'a [Rc<Fmu>]) -> Vec<Part<'a>> {
     order.iter().zip(fmus).map(|(name, fmu)| Part { name, description: &fmu.description }).collect()
+}
+
+/// Beyond so many steps the times of two steps are one: units take instants that are closer than 1e-9 of their size for the same.
+const MOST_STEPS: u64 = 1_000_000_000;
+/// A number in `results.csv`, bytes, about.
+const NUMBER: f64 = 20.0;
+/// A step of two small units takes no less, s.
+const QUICK: f64 = 1e-5;
+
+/// Refuses what no machine can run, and warns of results that fill a disk.
+fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<(), Error> {
+    let steps = clock.ticks();
+    let rows = steps as f64 / f64::from(experiment.record.every);
+    let gigabytes = rows * (columns + 1) as f64 * NUMBER / 1e9;
+    if steps > MOST_STEPS {
+        let message = format!(
+            "[simulation] {steps} steps of {} s: there can be {MOST_STEPS} at most. results.csv would take about \
+             {gigabytes:.0} GB and the run {:.0} h or more: take a longer step or an earlier stop",
+            clock.step(),
+            steps as f64 * QUICK / 3600.0
+        );
+        return Err(experiment.source.error(&(0..0), message));
+    }
+    if gigabytes > 10.0 {
+        tracing::warn!(
+            "results.csv will take about {gigabytes:.0} GB: [record] every = n writes every n-th step only"
+        );
+    }
+    Ok(())
 }
 
 /// Some FMUs can be used by one component only.
@@ -434,19 +552,25 @@ fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
     if order.is_empty() && (names.len() == 1 || experiment.simulation.coupling == Coupling::Jacobi) {
         return Ok(names.iter().map(ToString::to_string).collect());
     }
-    if let Some(name) = names.iter().find(|name| !order.iter().any(|other| other == *name)) {
-        return refuse(format!("[simulation] order does not name \"{name}\": name every component once"));
+    if order.is_empty() {
+        return refuse(format!(
+            "[simulation] there is no order: name the components in the order in which they get their inputs, those \
+             first that answer at once, for example order = [{}]",
+            names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+        ));
     }
-    Ok(order.clone())
+    // What is not named comes last, by name.
+    let others = names.iter().filter(|name| !order.iter().any(|other| other == *name));
+    Ok(order.iter().cloned().chain(others.map(ToString::to_string)).collect())
 }
 
-/// The archive of a component: beside the experiment, in the folders given, in `target/fmu`.
+/// The archive of a component: beside the experiment, in the folders given, where units are found from any folder.
 fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result<PathBuf, Error> {
     let written = &experiment.components[name].fmu;
     let beside = experiment.source.path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
     let mut folders = vec![if beside.as_os_str().is_empty() { PathBuf::from(".") } else { beside }];
     folders.extend(fmu_dirs.iter().cloned());
-    folders.push(PathBuf::from("target/fmu"));
+    folders.extend(search::units());
     if let Some(path) =
         folders.iter().map(|folder| folder.join(written.get_ref())).find(|path| path.is_file())
     {

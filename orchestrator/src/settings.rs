@@ -62,12 +62,28 @@ pub fn resolve(
     let mut settings = Vec::new();
     for (name, written) in &component.parameters {
         let span = written.span();
-        let refuse =
-            |message: String| experiment.source.error(&span, format!("\"{}.{name}\": {message}", part.name));
+        let path = format!("{}.{name}", part.name);
+        let is_assigned = experiment.assigned.contains(&path);
+        let refuse = |message: String| {
+            if is_assigned {
+                Error::experiment(format!("--set {path}: {message}"))
+            } else {
+                experiment.source.error(&span, format!("\"{path}\": {message}"))
+            }
+        };
+        if component.is_exchanged && !is_assigned && part.description.find(name).is_none() {
+            tracing::warn!("{path}: {} has no such parameter, it is left out", part.description.model_name);
+            continue;
+        }
         let (position, variable) = part.description.find(name).ok_or_else(|| {
             let known: Vec<&str> =
                 part.description.names("parameter").chain(part.description.names("input")).collect();
-            refuse(format!("there is no such parameter{}", names::hint(name, known.iter().copied())))
+            let hint = match names::nearest(name, known.iter().copied()) {
+                // As it has to be written there.
+                Some(near) if is_assigned => format!("; did you mean \"{}.{near}\"?", part.name),
+                _ => names::hint(name, known.iter().copied()),
+            };
+            refuse(format!("there is no such parameter{hint}"))
         })?;
         match variable.causality.as_str() {
             "input" if wires.iter().any(|w| w.to.component == index && w.to.variable == position) => {

@@ -48,10 +48,17 @@ pub fn sidecar(
         .map(|column| {
             let variable = &parts[column.port.component].description.variables[column.port.variable];
             let unit = if let Kind::Real { unit, .. } = &variable.kind { unit.clone() } else { None };
+            let items = match &variable.kind {
+                Kind::Enumeration { items } => Some(
+                    items.iter().map(|(name, item)| (item.to_string(), name)).collect::<BTreeMap<_, _>>(),
+                ),
+                _ => None,
+            };
             json!({
                 "name": column.name,
                 "type": variable.kind.name(),
                 "unit": unit,
+                "items": items,
                 "description": variable.description,
             })
         })
@@ -92,7 +99,9 @@ pub fn sidecar(
 fn status(failure: Option<&Error>) -> String {
     match failure {
         None => "completed".into(),
-        Some(error @ (Error::Interrupted { .. } | Error::Ended { .. })) => error.to_string(),
+        Some(error @ (Error::Interrupted { .. } | Error::EndedByUnit { .. } | Error::Lost { .. })) => {
+            error.to_string()
+        }
         Some(error) => format!("failed: {error}"),
     }
 }

@@ -257,7 +257,8 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
             let text = pattern.get_ref();
             let refuse = |message| Err(experiment.source.error(&pattern.span(), message));
             let mut meant = inputs.iter().filter(|(_, name)| names::matches(text, name)).peekable();
-            if meant.peek().is_none() {
+            // All inputs may be none.
+            if meant.peek().is_none() && text != "*" && !component.is_exchanged {
                 let hint = names::hint(text, inputs.iter().map(|(_, name)| *name));
                 return refuse(format!("\"{}\" has no input \"{text}\"{hint}", part.name));
             }
@@ -275,6 +276,10 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
                 && !component.unconnected.iter().any(|pattern| names::matches(pattern.get_ref(), name))
         };
         let open: Vec<&str> = inputs.iter().filter(open).map(|(_, name)| *name).collect();
+        if component.is_exchanged && !open.is_empty() {
+            tracing::warn!("inputs of \"{}\" stay at their start value: {}", part.name, open.join(", "));
+            continue;
+        }
         if !open.is_empty() {
             return Err(experiment.source.error(
                 &(0..0),
@@ -339,6 +344,14 @@ pub fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Column>, E
             }
         }
         if meant == 0 && columns.len() == before {
+            if experiment.components[part.name].is_exchanged {
+                tracing::warn!(
+                    "{}: {} has none, nothing is recorded",
+                    reference.text,
+                    part.description.model_name
+                );
+                continue;
+            }
             let known: Vec<&str> = part.description.variables.iter().map(|v| v.name.as_str()).collect();
             let hint = names::hint(reference.rest.trim_end_matches(".*"), known.iter().copied());
             return Err(

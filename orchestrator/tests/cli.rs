@@ -4,9 +4,16 @@ mod bench;
 
 use bench::{Bench, LOOP};
 use std::fs;
+use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
+use zip::write::SimpleFileOptions;
+
+/// Whether a line of the list shows this file with this title, among those of the project if the program was built there.
+fn lists(text: &str, file: &str, title: &str) -> bool {
+    text.lines().any(|line| line.contains(file) && line.ends_with(title))
+}
 
 fn refusal_of(from: &str, to: &str) -> String {
     let changed = LOOP.replace(from, to);
@@ -255,30 +262,313 @@ fn the_live_view_wants_a_terminal() {
     assert!(!bench.path("out").exists());
 }
 
+/// Starts the program, sends it a signal once `awaited` is there, and gives back its exit code.
 #[cfg(unix)]
-#[test]
-fn a_signal_ends_a_paced_run_and_keeps_its_results() {
-    let bench = Bench::new();
-    // A step takes ten hours.
+fn signalled(bench: &Bench, arguments: &[&str], signal: &str, awaited: &str) -> Option<i32> {
     let mut child = bench
-        .command(&["run", "loop.toml", "--real-time", "2.7e-5"])
+        .command(arguments)
+        .env("TMPDIR", bench.path("tmp"))
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    while !bench.path("out/loop/results.csv").exists() {
+    while !bench.path(awaited).exists() {
         std::thread::sleep(Duration::from_millis(10));
     }
-    let status = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let status = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
     assert!(status.success());
-    assert_eq!(child.wait().unwrap().code(), Some(130));
-    let status = bench.json("out/loop/results.json")["status"].as_str().unwrap().to_string();
-    assert!(status.starts_with("ended by a signal before t = "), "{status}");
-    assert!(
-        fs::read_to_string(bench.path("out/loop/results.csv"))
-            .unwrap()
-            .starts_with("time,gain.output.direct")
+    child.wait().unwrap().code()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_any_run_and_keeps_its_results() {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("tmp")).unwrap();
+    // A step takes ten hours, or as long as the unit does.
+    let paced = ["run", "loop.toml", "--force", "--real-time", "2.7e-5"];
+    let usual = ["run", "loop.toml", "--force", "--stop", "1000", "--set", "plant.pause=0.02"];
+    for (arguments, signal, code) in
+        [(&paced[..], "-INT", 130), (&paced, "-TERM", 143), (&usual, "-INT", 130), (&usual, "-TERM", 143)]
+    {
+        fs::create_dir_all(bench.path("out/loop")).unwrap();
+        for old in ["metrics.json", "plot.svg", "realtime.svg"] {
+            fs::write(bench.path("out/loop").join(old), "of an earlier run").unwrap();
+        }
+        assert_eq!(signalled(&bench, arguments, signal, "out/loop/results.csv"), Some(code));
+        let status = bench.json("out/loop/results.json")["status"].as_str().unwrap().to_string();
+        assert!(status.starts_with("ended by a signal (SIG"), "{status}");
+        assert!(status.contains(") before t = "), "{status}");
+        assert_eq!(bench.json("out/loop/metrics.json")["completed"], false);
+        let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+        assert!(rows.starts_with("time,gain.output.direct") && rows.ends_with('\n'), "{rows}");
+        assert!(rows.lines().all(|row| row.split(',').count() == 4), "{rows}");
+        assert_eq!(bench.path("out/loop/realtime.svg").exists(), arguments == paced);
+        assert!(!bench.path("out/loop/plot.svg").exists());
+        assert_eq!(fs::read_dir(bench.path("tmp")).unwrap().count(), 0);
+        fs::remove_file(bench.path("out/loop/results.csv")).unwrap();
+    }
+}
+
+#[test]
+fn results_of_an_earlier_run_are_replaced_only_if_that_is_asked_for() {
+    let bench = Bench::new();
+    let run = |arguments: &[&str]| bench.call(&[&["run", "loop.toml", "--quiet"], arguments].concat());
+    assert_eq!(run(&[]), (0, String::new(), String::new()));
+    let before = fs::read(bench.path("out/loop/results.csv")).unwrap();
+    let (code, _, errors) = run(&["--stop", "1"]);
+    assert_eq!(code, 2);
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    assert!(errors.contains("out/loop holds results of an earlier run"), "{errors}");
+    assert_eq!(fs::read(bench.path("out/loop/results.csv")).unwrap(), before);
+    assert_eq!(run(&["--stop", "1", "--force"]).0, 0);
+    assert_ne!(fs::read(bench.path("out/loop/results.csv")).unwrap(), before);
+    let (code, _, errors) = run(&["--out", "loop.toml"]);
+    assert!(code == 2 && errors.contains("--out loop.toml is a file"), "{errors}");
+
+    let pack = |arguments: &[&str]| bench.call(&[&["pack", "loop.toml", "--ssp"], arguments].concat());
+    assert_eq!(pack(&[]).0, 0);
+    let (code, _, errors) = pack(&[]);
+    assert!(code == 2 && errors.contains("loop.ssp is there already: --force replaces it"), "{errors}");
+    assert_eq!(pack(&["--force"]).0, 0);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_archive_that_cannot_be_written_leaves_nothing_behind() {
+    let bench = Bench::new();
+    // Noise makes the archive larger than any file in it.
+    let archive = fs::File::options().read(true).write(true).open(bench.path("Unit.fmu")).unwrap();
+    let mut zip = zip::ZipWriter::new_append(archive).unwrap();
+    let mut noise = 1_u32;
+    for name in 0..10 {
+        zip.start_file(format!("resources/{name}"), SimpleFileOptions::default()).unwrap();
+        let bytes = (0..20_000).map(|_| {
+            noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (noise >> 24) as u8
+        });
+        zip.write_all(&bytes.collect::<Vec<_>>()).unwrap();
+    }
+    zip.finish().unwrap();
+    // Files may not grow beyond 100 blocks, of 512 or 1024 bytes, as if the disk were full.
+    let script = "trap '' XFSZ; ulimit -f 100; exec \"$0\" pack loop.toml --ssp";
+    let output = Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_orchestrator")])
+        .current_dir(bench.folder.path())
+        .output()
+        .unwrap();
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    let there = fs::read_dir(bench.folder.path()).unwrap().flatten().map(|entry| entry.file_name());
+    assert!(there.into_iter().all(|name| !name.to_string_lossy().contains("ssp")), "{errors}");
+}
+
+#[cfg(unix)]
+#[test]
+fn two_processes_do_not_share_a_folder() {
+    let bench = Bench::new();
+    let mut child = bench
+        .command(&["run", "loop.toml", "--out", "shared", "--real-time", "2.7e-5"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while !bench.path("shared/results.csv").exists() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let message = bench.refusal(&["--out", "shared"]);
+    assert!(message.contains("another process is writing its results to shared"), "{message}");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(bench.run(&["--out", "shared"]).0, 0);
+}
+
+#[test]
+fn a_warning_is_told_once_with_first_time_and_count() {
+    let bench = Bench::new();
+    let (code, _, errors) = bench.run(&["--quiet", "--set", "plant.flag=true"]);
+    assert_eq!(code, 0);
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    assert!(errors.contains("plant: [trouble] runs hot at 7 (first at t = 1 s, 3 times)"), "{errors}");
+}
+
+#[test]
+fn experiments_and_units_are_found_from_any_folder() {
+    let bench = Bench::new();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = bench.command(arguments);
+        let output = command
+            .current_dir(elsewhere.path())
+            .env("ORCHESTRATOR_PATH", bench.folder.path())
+            .output()
+            .unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let (code, text, _) = run(&["list"]);
+    assert!(code == Some(0) && lists(&text, "loop.toml", "gain and integrator"), "{text}");
+    for (name, out) in [("loop", "a"), ("loop.toml", "b")] {
+        let (code, _, errors) = run(&["run", name, "--quiet", "--out", out]);
+        assert_eq!(code, Some(0), "{errors}");
+        assert!(elsewhere.path().join(out).join("results.csv").exists());
+    }
+    let (code, _, errors) = run(&["run", "lop"]);
+    assert!(code == Some(2) && errors.contains("there is no experiment \"lop\""), "{errors}");
+    assert!(errors.contains("did you mean \"loop\"?"), "{errors}");
+    let (code, _, errors) = run(&["run", "some/Unit.fmu"]);
+    assert!(code == Some(2) && errors.contains("is a unit, and units are run by an experiment"), "{errors}");
+    fs::create_dir(bench.path("more")).unwrap();
+    fs::copy(bench.path("loop.toml"), bench.path("more/loop.toml")).unwrap();
+    let (code, _, errors) = run(&["run", "loop"]);
+    assert!(code == Some(2) && errors.contains("several experiments are called loop: "), "{errors}");
+}
+
+#[test]
+fn usage_that_is_nearly_right_is_told_what_it_lacks() {
+    let bench = Bench::new();
+    assert!(bench.refusal(&["--stop", "-1"]).contains("stop = -1 s must be at least one step of 1 s"));
+    let (code, _, errors) = bench.call(&["pack", "loop.toml"]);
+    assert!(code == 2 && errors.contains("--ssp"), "{errors}");
+    let (code, _, errors) = bench.call(&["reproduce", "loop", "--members", "0"]);
+    assert!(code == 2 && errors.contains("--members"), "{errors}");
+    // A unit without inputs that are left: all of none stay unconnected.
+    let lonely = LOOP.replace(
+        "[components.plant]",
+        "[components.other]\nfmu = \"Unit.fmu\"\nunconnected = [\"*\"]\n[components.plant]",
     );
+    let bench = Bench::with(&lonely);
+    let (code, summary, errors) = bench.run(&[]);
+    assert_eq!(code, 0, "{errors}");
+    // What the order leaves out comes last.
+    assert!(summary.contains("gain, plant, other"), "{summary}");
+}
+
+#[test]
+fn results_can_be_left_out_or_labelled() {
+    let bench = Bench::with(&LOOP.replace("\"plant.steps\"", "\"plant.steps\", \"gain.guarantee.status\""));
+    let (code, summary, errors) = bench.run(&["--no-csv", "--no-plot", "--out", "few"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(summary.contains("few: results.json, metrics.json\n"), "{summary}");
+    assert!(!bench.path("few/results.csv").exists() && !bench.path("few/plot.svg").exists());
+    let head = |arguments: &[&str]| {
+        assert_eq!(bench.run(arguments).0, 0);
+        let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+        rows.lines().take(2).map(String::from).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        head(&[]),
+        [
+            "time,gain.output.direct,plant.output.integral,plant.steps,gain.guarantee.status",
+            "0.0,2.0,1.0,0,1"
+        ]
+    );
+    let labelled = head(&["--labels"]);
+    let names = "time [s],gain.output.direct [m],plant.output.integral [m],plant.steps,gain.guarantee.status";
+    assert_eq!(labelled[0], names);
+    let item = labelled[1].rsplit(',').next().unwrap();
+    // Whichever way, the numbers have their names beside them.
+    let columns = &bench.json("out/loop/results.json")["columns"];
+    assert_eq!(columns[3]["items"]["1"], item, "{columns}");
+    assert!(columns[0]["items"].is_null() && columns[0]["unit"] == "m");
+}
+
+#[test]
+fn a_unit_is_exchanged_from_the_command_line() {
+    let experiment =
+        LOOP.replace("[components.plant]", "[components.gain.parameters]\ngain = 3.0\n[components.plant]");
+    let bench = Bench::with(&experiment);
+    // Another unit, that lacks what is set of the first.
+    let mut old = zip::ZipArchive::new(fs::File::open(bench.path("Unit.fmu")).unwrap()).unwrap();
+    fs::create_dir(bench.path("mine")).unwrap();
+    let mut zip = zip::ZipWriter::new(fs::File::create(bench.path("mine/My.fmu")).unwrap());
+    for index in 0..old.len() {
+        let mut entry = old.by_index(index).unwrap();
+        let name = entry.name().unwrap().into_owned();
+        let mut content = Vec::new();
+        std::io::Read::read_to_end(&mut entry, &mut content).unwrap();
+        if name == "modelDescription.xml" {
+            let text = String::from_utf8(content).unwrap();
+            content = text.replace("name=\"gain\"", "name=\"amplification\"").into_bytes();
+        }
+        zip.start_file(name, SimpleFileOptions::default()).unwrap();
+        zip.write_all(&content).unwrap();
+    }
+    zip.finish().unwrap();
+    let (code, _, errors) =
+        bench.run(&["--quiet", "--fmu", "gain=mine/My.fmu", "--set", "gain.amplification=0.5"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(errors.contains("gain.gain: ") && errors.contains("it is left out"), "{errors}");
+    let sidecar = bench.json("out/loop/results.json");
+    assert_eq!(sidecar["components"]["gain"]["fmu"], "My.fmu");
+    assert_eq!(sidecar["components"]["gain"]["set"]["amplification"], 0.5);
+    for (assignment, told) in [
+        ("gian=mine/My.fmu", "did you mean \"gain\""),
+        ("mine/My.fmu", "wants component=file"),
+        ("gain=mine/Me.fmu", "there is no file \"mine/Me.fmu\""),
+        ("gain=Unti.fmu", "did you mean \"Unit.fmu\""),
+    ] {
+        let message = bench.refusal(&["--fmu", assignment]);
+        assert!(message.contains(told), "{message}");
+    }
+}
+
+#[test]
+fn inspect_filters_and_speaks_json() {
+    let bench = Bench::new();
+    let (code, text, _) = bench.call(&["inspect", "Unit.fmu", "guarantee.*", "--json"]);
+    assert_eq!(code, 0);
+    let all: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let names: Vec<&str> =
+        all["variables"].as_array().unwrap().iter().map(|v| v["name"].as_str().unwrap()).collect();
+    assert_eq!(
+        names,
+        ["guarantee.inForce", "guarantee.status", "guarantee.rateMargin", "guarantee.momentMargin"]
+    );
+    assert_eq!(all["guid"], "{u-1}");
+    let (_, text, _) = bench.call(&["inspect", "Unit.fmu", "seed"]);
+    assert!(text.contains("noise.seed") && !text.contains("output.direct"), "{text}");
+    let (_, text, _) = bench.call(&["inspect", "Unit.fmu", "--causality", "input"]);
+    assert!(text.contains("input (1)") && !text.contains("parameter ("), "{text}");
+    let (code, _, errors) = bench.call(&["inspect", "Unit.fmu", "sed"]);
+    assert!(code == 2 && errors.contains("has no variable that fits \"sed\""), "{errors}");
+}
+
+#[test]
+fn shells_complete_commands() {
+    for shell in ["bash", "zsh", "fish"] {
+        let (code, text, _) = Bench::new().call(&["completions", shell]);
+        assert!(code == 0 && text.contains("reproduce") && text.contains("on-miss"), "{shell}");
+    }
+}
+
+#[test]
+fn steps_without_number_are_refused_with_what_they_would_take() {
+    let bench = Bench::new();
+    for (arguments, steps) in
+        [(["--step", "1e-9"], "3000000000 steps"), (["--stop", "1e12"], "1000000000000 steps")]
+    {
+        let message = bench.refusal(&arguments);
+        assert!(message.contains(steps) && message.contains(" GB and the run "), "{message}");
+        assert!(!bench.path("out").exists());
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn standard_error_that_cannot_be_written_ends_no_run() {
+    let bench = Bench::new();
+    let run = |arguments: &[&str]| {
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let mut command = bench.command(&[&["run", "loop.toml", "--force"], arguments].concat());
+        command.stdout(Stdio::null()).stderr(full).status().unwrap().code()
+    };
+    assert_eq!(run(&[]), Some(0));
+    // With a warning.
+    assert_eq!(run(&["--set", "gain.delay=0.5"]), Some(0));
+    assert_eq!(run(&["--set", "gain.gian=0.5"]), Some(2));
+    assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(), 5);
 }
 
 #[test]
@@ -309,8 +599,11 @@ fn wrong_names_are_refused_with_place_and_remedy() {
     assert!(message.contains("loop.toml:8: ") && message.contains("did you mean \"Unit.fmu\""), "{message}");
     let message = refusal_of("[\"gain\", \"plant\"]", "[\"gain\", \"palnt\"]");
     assert!(message.contains("did you mean \"plant\""), "{message}");
-    let message = refusal_of("[\"gain\", \"plant\"]", "[\"gain\"]");
-    assert!(message.contains("does not name \"plant\""), "{message}");
+    let message = refusal_of("[\"gain\", \"plant\"]", "[]");
+    assert!(
+        message.contains("there is no order") && message.contains("order = [\"gain\", \"plant\"]"),
+        "{message}"
+    );
     let message = refusal_of("stop = 3.0", "stopp = 3.0");
     assert!(message.contains("loop.toml:4: ") && message.contains("`stop`"), "{message}");
 }
@@ -319,7 +612,10 @@ fn wrong_names_are_refused_with_place_and_remedy() {
 fn wrong_settings_are_refused() {
     let bench = Bench::new();
     for (setting, remedy) in [
-        ("gain.gian=1", "did you mean \"gain\""),
+        ("gain.gian=1", "did you mean \"gain.gain\""),
+        ("noise.seed=1", "of which component? Write gain.noise.seed or plant.noise.seed"),
+        ("palnt.gain=1", "did you mean \"plant.gain\""),
+        ("gain.seed=1", "did you mean \"gain.noise.seed\""),
         ("gain.kind=ruogh", "did you mean \"rough\""),
         ("gain.kind=2", "the name of an item (calm, rough)"),
         ("gain.gain=1 m/s", "measure different things"),
@@ -332,6 +628,7 @@ fn wrong_settings_are_refused() {
     ] {
         let message = bench.refusal(&["--set", setting]);
         assert!(message.contains(remedy), "{setting}: {message}");
+        assert!(message.starts_with("error: --set ") && !message.contains("loop.toml"), "{message}");
     }
     assert!(bench.refusal(&["--stop", "2.5"]).contains("2 s or 3 s"));
     let (code, _, errors) = bench.run(&["--set", "gain.text=hello", "--set", "gain.flag=true"]);
@@ -391,7 +688,7 @@ fn inspect_and_list_show_what_there_is() {
     }
     let (code, text, _) = bench.call(&["list"]);
     assert_eq!(code, 0);
-    assert!(text.contains("loop.toml  gain and integrator") && text.contains("Unit.fmu"), "{text}");
+    assert!(lists(&text, "loop.toml", "gain and integrator") && text.contains("Unit.fmu"), "{text}");
 }
 
 #[test]

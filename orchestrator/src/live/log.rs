@@ -11,14 +11,17 @@ pub struct Messages;
 
 impl Write for Messages {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match KEPT.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
-            Some(kept) => kept.write(bytes),
-            None => stderr().write(bytes),
+        if let Some(kept) = KEPT.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
+            return kept.write(bytes);
         }
+        // A message that cannot be written is lost; the run is not.
+        let _ = stderr().write_all(bytes);
+        Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        stderr().flush()
+        let _ = stderr().flush();
+        Ok(())
     }
 }
 

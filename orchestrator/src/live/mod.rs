@@ -162,7 +162,7 @@ fn request(key: KeyEvent) -> Option<Request> {
         return None;
     }
     match (key.code, key.modifiers.contains(KeyModifiers::CONTROL)) {
-        (KeyCode::Char('c'), true) => Some(Request::Signal),
+        (KeyCode::Char('c'), true) => Some(Request::INTERRUPT),
         (KeyCode::Char('q'), false) => Some(Request::Quit),
         _ => None,
     }
@@ -178,7 +178,7 @@ mod tests {
     fn q_and_control_c_end_the_run() {
         let key = |code, modifiers| request(KeyEvent::new(code, modifiers));
         assert_eq!(key(KeyCode::Char('q'), KeyModifiers::NONE), Some(Request::Quit));
-        assert_eq!(key(KeyCode::Char('c'), KeyModifiers::CONTROL), Some(Request::Signal));
+        assert_eq!(key(KeyCode::Char('c'), KeyModifiers::CONTROL), Some(Request::INTERRUPT));
         assert_eq!(key(KeyCode::Char('c'), KeyModifiers::NONE), None);
         let release = KeyEvent::new_with_kind(KeyCode::Char('q'), KeyModifiers::NONE, KeyEventKind::Release);
         assert_eq!(request(release), None);

@@ -13,7 +13,7 @@ use crate::watch::OnInvalid;
 use crate::wiring::{self, Part};
 use crate::xml::{self, Element};
 use percent_encoding::percent_decode_str;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use tempfile::TempDir;
@@ -90,6 +90,8 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         record: Record { variables: recorded.filter(texts).map(text_of).collect(), every: 1 },
         metrics: Roles::default(),
         leaves_inputs_open: true,
+        assigned: BTreeSet::new(),
+        unplaced: Vec::new(),
         source: Source { path: path.to_path_buf(), text },
     };
     let parts = parts(&structure.components, &opened, &structure.folder);
@@ -124,6 +126,7 @@ impl Found {
             every: 1,
             unconnected: Vec::new(),
             parameters: self.parameters.iter().map(value).collect(),
+            is_exchanged: false,
         }
     }
 }

@@ -4,14 +4,15 @@ use super::{FMU, STRUCTURE};
 use crate::description::{Kind, Variable};
 use crate::error::Error;
 use crate::experiment::Scaling;
+use crate::interrupt::Interrupt;
 use crate::run::Plan;
 use crate::settings::SettingValue;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 use std::collections::BTreeMap;
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::fs;
+use std::io::{self, Cursor, Write};
+use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
@@ -27,31 +28,36 @@ type Xml = Writer<Vec<u8>>;
 /// left out. The same experiment gives the same bytes.
 ///
 /// # Errors
-/// If a file cannot be read or written.
-pub fn pack(plan: &Plan, path: &Path) -> Result<(), Error> {
+/// If a file cannot be read or written, or if it is asked to end; then nothing is left behind.
+pub fn pack(plan: &Plan, path: &Path, interrupt: &Interrupt) -> Result<(), Error> {
+    let goes_on = || interrupt.asked().map_or(Ok(()), |request| Err(Error::Ended(request)));
     let mut entries: BTreeMap<String, Vec<u8>> = BTreeMap::new();
     for fmu in &plan.fmus {
         entries.insert(resource(&fmu.path), fs::read(&fmu.path).map_err(Error::file(&fmu.path))?);
     }
     let structure = structure(plan).map_err(Error::file(path))?;
-    // Written under another name first: nobody ever opens half an archive.
-    let partial = path.with_extension("ssp.part");
-    let write = || -> zip::result::ZipResult<()> {
-        let options = SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Deflated)
-            .last_modified_time(DateTime::default());
-        let mut archive = ZipWriter::new(BufWriter::new(File::create(&partial)?));
-        for (name, content) in
-            [(STRUCTURE, &structure)].into_iter().chain(entries.iter().map(|(n, c)| (n.as_str(), c)))
-        {
-            archive.start_file(name, options)?;
-            archive.write_all(content)?;
-        }
-        archive.finish()?.flush()?;
-        Ok(())
-    };
-    write().map_err(|error| Error::file(&partial)(error.into()))?;
-    fs::rename(&partial, path).map_err(Error::file(path))
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default());
+    // Made in memory: what cannot be written in the end needs no archive that is half one.
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let all = [(STRUCTURE, &structure)].into_iter().chain(entries.iter().map(|(n, c)| (n.as_str(), c)));
+    for (name, content) in all {
+        goes_on()?;
+        archive.start_file(name, options).map_err(|error| Error::file(path)(error.into()))?;
+        archive.write_all(content).map_err(Error::file(path))?;
+    }
+    let bytes = archive.finish().map_err(|error| Error::file(path)(error.into()))?.into_inner();
+    goes_on()?;
+    // Under another name first: nobody ever opens half an archive.
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(format!(".{}.part", std::process::id()));
+    let partial = PathBuf::from(partial);
+    fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path)).map_err(|error| {
+        // What is there of it is of no use, and may be what fills the disk.
+        let _ = fs::remove_file(&partial);
+        Error::file(path)(error)
+    })
 }
 
 fn resource(fmu: &Path) -> String {

@@ -15,6 +15,8 @@ pub enum Verdict {
     HoldsPartly,
     /// None does.
     DoesNotHold,
+    /// There is no run that could tell.
+    NotJudged,
 }
 
 impl Verdict {
@@ -24,11 +26,13 @@ impl Verdict {
             Self::Holds => "holds",
             Self::HoldsPartly => "holds partly",
             Self::DoesNotHold => "does not hold",
+            Self::NotJudged => "not judged",
         }
     }
 
     fn of(held: usize, all: usize) -> Self {
         match held {
+            _ if all == 0 => Self::NotJudged,
             0 => Self::DoesNotHold,
             _ if held == all => Self::Holds,
             _ => Self::HoldsPartly,
@@ -104,8 +108,11 @@ pub fn check(study: &Study) -> Result<(), String> {
 /// If a check names what is not there, or a run has no such quantity.
 pub fn judge(claim: &Claim, results: &Results) -> Result<Judged, String> {
     let checks = claim.checks.iter().map(|check| compare(check, results)).collect::<Result<Vec<_>, _>>()?;
+    let any_left_open = checks.iter().any(|check| check.verdict() == Verdict::NotJudged);
     let all = |verdict| checks.iter().all(|check| check.verdict() == verdict);
-    let verdict = if all(Verdict::Holds) {
+    let verdict = if any_left_open || checks.is_empty() {
+        Verdict::NotJudged
+    } else if all(Verdict::Holds) {
         Verdict::Holds
     } else if all(Verdict::DoesNotHold) {
         Verdict::DoesNotHold
@@ -119,12 +126,9 @@ fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
     let left = results.numbers(&check.left)?;
     let right = results.quantity(&check.right)?;
     let by = check.by.as_ref().map(|by| results.study.values.number(by)).transpose()?;
-    for (numbers, name) in [(&left, &check.left), (&right, &check.label)] {
-        if numbers.0.is_empty() {
-            return Err(format!("check \"{}\": {name} has no value", check.label));
-        }
-    }
-    let pairs = left.0.len().max(right.0.len());
+    // Without a number on either side there is nothing to compare.
+    let is_empty = left.0.is_empty() || right.0.is_empty();
+    let pairs = if is_empty { 0 } else { left.0.len().max(right.0.len()) };
     let at = |numbers: &Numbers, k: usize| numbers.0[k % numbers.0.len()];
     let difference: Vec<f64> = (0..pairs).map(|k| at(&left, k) / at(&right, k) - 1.0).collect();
     let margin = by.unwrap_or(0.0);
@@ -150,5 +154,6 @@ mod tests {
         assert_eq!(checked(3, 3).verdict(), Verdict::Holds);
         assert_eq!(checked(2, 3).verdict(), Verdict::HoldsPartly);
         assert_eq!(checked(0, 3).verdict(), Verdict::DoesNotHold);
+        assert_eq!(checked(0, 0).verdict(), Verdict::NotJudged);
     }
 }

@@ -102,7 +102,7 @@
 //! ]
 //!
 //! [[claim]]
-//! says = "in our words, what the paper claims"
+//! says = "in our words, what the paper claims"   # in every text {runs:ID} is the number of runs that were made of a [[run]]
 //! source = "section 5.2"
 //!
 //! [[claim.check]]
@@ -595,15 +595,59 @@ pub enum Relation {
     Above,
 }
 
+/// Begins a place in a study's texts that stands for the number of runs of an id.
+const COUNT: &str = "{runs:";
+
 impl Study {
     /// Reads a study and its files of values.
     ///
     /// # Errors
     /// If a file cannot be read, is no TOML, or names what is not there.
     pub fn load(path: &Path) -> Result<Self, Error> {
+        Self::load_with(path, None)
+    }
+
+    /// Reads a study with at most so many members of each run, and its files of values. `{runs:ID}` in its texts becomes the
+    /// number of runs that there are of ID.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with(path: &Path, members: Option<u32>) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| Error::experiment(format!("{}: {source}", path.display())))?;
         let source = Source { path: path.to_path_buf(), text };
+        let study = Self::read(source, members)?;
+        if !study.source.text.contains(COUNT) {
+            return Ok(study);
+        }
+        let text = study.counted()?;
+        Self::read(Source { path: path.to_path_buf(), text }, members)
+    }
+
+    /// The text with the numbers of runs in it.
+    fn counted(&self) -> Result<String, Error> {
+        let text = &self.source.text;
+        let mut counted = String::with_capacity(text.len());
+        let mut rest = text.as_str();
+        while let Some((before, after)) = rest.split_once(COUNT) {
+            let place = text.len() - after.len();
+            let fault = |message: String| self.source.error(&(place..place + 1), message);
+            let (id, end) = after
+                .split_once('}')
+                .ok_or_else(|| fault(format!("\"{COUNT}\" is not closed by a brace")))?;
+            let run = self.run(id).ok_or_else(|| {
+                let hint = names::hint(id, self.runs.iter().map(|run| run.id.get_ref().as_str()));
+                fault(format!("\"{COUNT}{id}}}\": there is no run \"{id}\"{hint}"))
+            })?;
+            counted.push_str(before);
+            counted.push_str(&run.vary.as_ref().map_or(1, |vary| vary.count).to_string());
+            rest = end;
+        }
+        counted.push_str(rest);
+        Ok(counted)
+    }
+
+    fn read(source: Source, members: Option<u32>) -> Result<Self, Error> {
         let mut study: Self = source.read()?;
         study.source = source;
         for grid in std::mem::take(&mut study.grids) {
@@ -615,6 +659,11 @@ impl Study {
             study.values.load(&study.beside(file))?;
         }
         study.check()?;
+        if let Some(limit) = members {
+            for vary in study.runs.iter_mut().filter_map(|run| run.vary.as_mut()) {
+                vary.count = vary.count.min(limit.max(1));
+            }
+        }
         Ok(study)
     }
 

@@ -180,11 +180,15 @@ fn class(verdict: Verdict) -> &'static str {
         Verdict::Holds => "verdict holds",
         Verdict::HoldsPartly => "verdict partly",
         Verdict::DoesNotHold => "verdict not",
+        Verdict::NotJudged => "verdict",
     }
 }
 
 fn because(check: &Check, checked: &Checked) -> Markup {
     let (held, all) = (checked.held, checked.difference.0.len());
+    if all == 0 {
+        return html! { span.verdict { (checked.verdict().text()) } " " (check.label) ": there is no such number" };
+    }
     let asked = match (check.relation, checked.by) {
         (Relation::Below, None) => "not above".to_string(),
         (Relation::Above, None) => "not below".to_string(),

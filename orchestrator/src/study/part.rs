@@ -5,6 +5,7 @@ use super::signal::{Resolved, Signal};
 use super::{Run, Study};
 use crate::error::Error;
 use crate::experiment::Experiment;
+use crate::interrupt::Interrupt;
 use crate::master::{Observer, Sample};
 use crate::metrics::{Metrics, larger};
 use crate::run::{Opened, Plan};
@@ -49,6 +50,22 @@ pub struct Member {
     pub within: BTreeMap<String, Inside>,
     /// The study's own numbers, by id; null where there is none.
     pub measures: BTreeMap<String, Option<f64>>,
+}
+
+impl Member {
+    /// Whether this run came to the same as another one, but for the times it took.
+    pub fn moves_as(&self, other: &Self) -> bool {
+        let timeless = |metrics: &Metrics| Metrics {
+            solver_ms_mean: None,
+            solver_ms_p99: None,
+            solver_ms_max: None,
+            step_us: BTreeMap::new(),
+            ..metrics.clone()
+        };
+        timeless(&self.metrics) == timeless(&other.metrics)
+            && self.within == other.within
+            && self.measures == other.measures
+    }
 }
 
 /// How signals stood to a bound.
@@ -195,8 +212,13 @@ impl<'a> Preparation<'a> {
     /// Runs the members with these numbers.
     ///
     /// # Errors
-    /// What a unit said.
-    pub fn execute(&self, range: Range<u32>, opened: &mut Opened) -> Result<Outcome, Error> {
+    /// What a unit said; that it was asked to end.
+    pub fn execute(
+        &self,
+        range: Range<u32>,
+        opened: &mut Opened,
+        interrupt: &Interrupt,
+    ) -> Result<Outcome, Error> {
         let mut outcome = Outcome::default();
         for number in range {
             let plan = self.plan(number, opened)?;
@@ -215,6 +237,7 @@ impl<'a> Preparation<'a> {
                 gauges.push(Gauge::new(measure, resolve(signals)?));
             }
             let (mut master, limits) = plan.initialized()?;
+            master.heed(interrupt);
             if number == 0 {
                 outcome.parameters = plan.parameters(&mut master)?;
             }

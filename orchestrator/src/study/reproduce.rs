@@ -7,10 +7,14 @@
 use super::part::{Outcome, Part, Preparation};
 use super::results::{Results, RunResult, resolve};
 use super::{Study, claims, figures, page};
+use crate::clock::rounded;
 use crate::error::Error;
 use crate::figure::{png, svg};
+use crate::folder::Folder;
+use crate::interrupt::Interrupt;
 use crate::progress::Parts;
 use crate::run::Opened;
+use crate::search;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -23,7 +27,7 @@ use std::time::Instant;
 /// Members of a run that make up one part.
 const MEMBERS_PER_PART: u32 = 25;
 /// To be raised when what a part leaves is no longer what it was.
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 
 /// How a study is reproduced.
 #[derive(Clone, Debug, Default)]
@@ -34,12 +38,12 @@ pub struct Options {
     pub fmu_dirs: Vec<PathBuf>,
     /// Threads; one for each core if 0.
     pub jobs: usize,
-    /// At most so many members of each run.
-    pub members: Option<u32>,
     /// Run everything again.
     pub fresh: bool,
     /// Show no progress.
     pub quiet: bool,
+    /// Who may end it.
+    pub interrupt: Interrupt,
 }
 
 /// A claim, in our words, and what becomes of it.
@@ -58,6 +62,8 @@ pub struct Report {
     pub runs: usize,
     /// Elapsed time, s.
     pub elapsed: f64,
+    /// Runs that deserve a word: whose parameter changes nothing, or that lose the attitude.
+    pub notes: Vec<String>,
     /// Each claim with its verdict.
     pub verdicts: Vec<Judgement>,
     /// All files, relative to the folder.
@@ -69,22 +75,20 @@ pub struct Report {
 /// # Errors
 /// If there is none.
 pub fn find(name: &Path) -> Result<PathBuf, Error> {
-    let below = Path::new("orchestrator/experiments");
-    let candidates =
-        [name.to_path_buf(), name.join("study.toml"), below.join(name), below.join(name).join("study.toml")];
+    let roots = search::experiments();
+    let mut candidates = vec![name.to_path_buf(), name.join("study.toml")];
+    candidates.extend(roots.iter().flat_map(|root| [root.join(name), root.join(name).join("study.toml")]));
     candidates.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {
-        let there: Vec<String> = fs::read_dir(below)
-            .into_iter()
-            .flatten()
-            .flatten()
+        let there: Vec<String> = roots
+            .iter()
+            .flat_map(|root| fs::read_dir(root).into_iter().flatten().flatten())
             .filter(|entry| entry.path().join("study.toml").is_file())
             .map(|entry| entry.file_name().to_string_lossy().into_owned())
             .collect();
         let hint = crate::names::hint(&name.to_string_lossy(), there.iter().map(String::as_str));
         Error::experiment(format!(
-            "there is no study \"{}\", neither as a file nor as a folder with a study.toml, here or in {}{hint}",
-            name.display(),
-            below.display()
+            "there is no study \"{}\", neither as a file nor as a folder with a study.toml, here or among the experiments{hint}",
+            name.display()
         ))
     })
 }
@@ -94,14 +98,8 @@ pub fn find(name: &Path) -> Result<PathBuf, Error> {
 /// # Errors
 /// Everything that is wrong with the study, before anything is run; what a unit said; files that cannot be written. What is
 /// finished by then is kept.
-pub fn reproduce(mut study: Study, options: &Options) -> Result<Report, Error> {
+pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
     let begin = Instant::now();
-    if let Some(limit) = options.members {
-        for vary in study.runs.iter_mut().filter_map(|run| run.vary.as_mut()) {
-            vary.count = vary.count.min(limit.max(1));
-        }
-    }
-    let study = &study;
     let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(name(study)));
     let preparations = study
         .runs
@@ -111,10 +109,15 @@ pub fn reproduce(mut study: Study, options: &Options) -> Result<Report, Error> {
     let mut opened = Opened::default();
     check(study, &preparations, &mut opened)?;
     let keys = keys(study, &preparations, &mut opened)?;
+    if out.join("metrics.json").exists() || (out.exists() && !out.is_dir()) {
+        let message = format!("{} holds other results: take another folder by --out", out.display());
+        return Err(Error::experiment(message));
+    }
+    let _folder = Folder::take(&out)?;
     let all = parts(study);
     let file = |part: &Part| {
         let id = study.runs[part.run].id.get_ref();
-        out.join("runs").join(id).join(format!("{:04}.json", part.range.start))
+        out.join("runs").join(id).join(format!("{:04}-{:04}.json", part.range.start, part.range.end))
     };
     let mut done: BTreeMap<(usize, u32), Outcome> = BTreeMap::new();
     if !options.fresh {
@@ -128,7 +131,18 @@ pub fn reproduce(mut study: Study, options: &Options) -> Result<Report, Error> {
         all.iter().filter(|part| !done.contains_key(&(part.run, part.range.start))).cloned().collect();
     let progress = Parts::new(&study.title, all.len() as u64, done.len() as u64, options.quiet);
 
-    let work = Work { study, preparations: &preparations, keys: &keys, file: &file, progress: &progress };
+    if !missing.is_empty() {
+        // An earlier report is none of what comes now, should that be ended.
+        for path in [out.join("report.html"), out.join("results.json")] {
+            if path.exists() {
+                fs::remove_file(&path).map_err(Error::file(&path))?;
+            }
+        }
+    }
+
+    let interrupt = &options.interrupt;
+    let work =
+        Work { study, preparations: &preparations, keys: &keys, file: &file, progress: &progress, interrupt };
     let is_timed = |part: &Part| study.runs[part.run].timed && part.range.start == 0;
     let (timed, others): (Vec<Part>, Vec<Part>) = missing.iter().cloned().partition(is_timed);
     let threads = match options.jobs {
@@ -139,6 +153,10 @@ pub fn reproduce(mut study: Study, options: &Options) -> Result<Report, Error> {
     // What is timed has the machine for itself.
     for (parts, threads) in [(timed, 1), (others, threads)] {
         done.extend(work.run(parts, threads)?);
+        if let Some(request) = interrupt.asked() {
+            progress.finish();
+            return Err(Error::Unfinished { done: done.len(), all: all.len(), out, request });
+        }
     }
     progress.finish();
 
@@ -154,9 +172,34 @@ pub fn reproduce(mut study: Study, options: &Options) -> Result<Report, Error> {
         parts: computed,
         runs: results.runs.iter().map(|run| run.members.len()).sum(),
         elapsed: begin.elapsed().as_secs_f64(),
+        notes: notes(&results),
         verdicts,
         files,
     })
+}
+
+/// Says which runs lose the attitude, and which vary a parameter without any effect, as the seed of a disturbance that is constant.
+fn notes(results: &Results) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (run, result) in results.study.runs.iter().zip(&results.runs) {
+        let (id, all) = (run.id.get_ref(), result.members.len());
+        let lost: Vec<f64> = result.members.iter().filter_map(|member| member.metrics.lost_at).collect();
+        if let Some(first) = lost.iter().copied().reduce(f64::min) {
+            let time = rounded(first);
+            notes.push(format!(
+                "{id}: the attitude is lost in {} of {all} runs, at t = {time} s or later",
+                lost.len()
+            ));
+        }
+        if let (Some(vary), Some((first, others))) = (&run.vary, result.members.split_first())
+            && !others.is_empty()
+            && others.iter().all(|other| other.moves_as(first))
+        {
+            let names = vary.parameter.all().join(" and ");
+            notes.push(format!("{id}: {names} changes nothing, all {all} runs are the same"));
+        }
+    }
+    notes
 }
 
 /// Name of a study: of its folder.
@@ -217,6 +260,10 @@ fn parts(study: &Study) -> Vec<Part> {
 /// For each run, a hash of all that its parts depend on: the experiment, what the study changes in it and wants of it, the
 /// FMUs, and this program.
 fn keys(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Result<Vec<String>, Error> {
+    let digest =
+        |path: &Path| fs::read(path).map(|bytes| hex(&Sha256::digest(bytes))).map_err(Error::file(path));
+    let executable = std::env::current_exe().map_err(Error::file("the path of this program"))?;
+    let program = digest(&executable)?;
     let mut archives: BTreeMap<PathBuf, String> = BTreeMap::new();
     let mut keys = Vec::new();
     for (run, preparation) in study.runs.iter().zip(preparations) {
@@ -224,8 +271,7 @@ fn keys(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Res
         let mut fmus = BTreeMap::new();
         for (name, fmu) in plan.order.iter().zip(&plan.fmus) {
             if !archives.contains_key(&fmu.path) {
-                let bytes = fs::read(&fmu.path).map_err(Error::file(&fmu.path))?;
-                archives.insert(fmu.path.clone(), hex(&Sha256::digest(bytes)));
+                archives.insert(fmu.path.clone(), digest(&fmu.path)?);
             }
             fmus.insert(name, archives[&fmu.path].clone());
         }
@@ -242,7 +288,7 @@ fn keys(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Res
             .collect();
         let all = json!({
             "format": FORMAT,
-            "version": env!("CARGO_PKG_VERSION"),
+            "program": program,
             "experiment": plan.experiment.source.text,
             "set": run.set,
             "unset": run.unset,
@@ -270,16 +316,37 @@ fn hex(bytes: &[u8]) -> String {
 
 /// The file of a finished part.
 #[derive(Serialize, Deserialize)]
-struct Kept<T> {
+struct Kept {
     key: String,
     members: std::ops::Range<u32>,
-    outcome: T,
+    /// Of all the rest, so that no number is taken over that has changed since.
+    digest: String,
+    outcome: Outcome,
+}
+
+impl Kept {
+    fn new(key: String, members: std::ops::Range<u32>, outcome: Outcome) -> serde_json::Result<Self> {
+        let digest = Self::digest(&key, &members, &outcome)?;
+        Ok(Self { key, members, digest, outcome })
+    }
+
+    fn digest(key: &str, members: &std::ops::Range<u32>, outcome: &Outcome) -> serde_json::Result<String> {
+        Ok(hex(&Sha256::digest(serde_json::to_vec(&(key, members, outcome))?)))
+    }
+
+    fn is_whole(&self) -> bool {
+        Self::digest(&self.key, &self.members, &self.outcome).is_ok_and(|digest| digest == self.digest)
+    }
 }
 
 /// What a part left earlier, if it is still good.
 fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
-    let text = fs::read_to_string(path).ok()?;
-    let kept: Kept<Outcome> = serde_json::from_str(&text).ok()?;
+    let text = fs::read(path).ok()?;
+    let kept = serde_json::from_slice::<Kept>(&text).ok().filter(Kept::is_whole);
+    let Some(kept) = kept else {
+        tracing::error!("{} is damaged: it is run again", path.display());
+        return None;
+    };
     (kept.key == key && kept.members == part.range).then_some(kept.outcome)
 }
 
@@ -300,6 +367,7 @@ struct Work<'a> {
     keys: &'a [String],
     file: &'a (dyn Fn(&Part) -> PathBuf + Sync),
     progress: &'a Parts,
+    interrupt: &'a Interrupt,
 }
 
 /// Outcomes by run and first member.
@@ -326,6 +394,8 @@ impl Work<'_> {
                             Ok(outcome) => {
                                 lock(&done).insert((part.run, part.range.start), outcome);
                             }
+                            // Asked to end: what the other threads finish is kept.
+                            Err(Error::Interrupted { .. }) => lock(&queue).clear(),
                             Err(error) => {
                                 lock(&queue).clear();
                                 lock(&failure).get_or_insert(error);
@@ -344,11 +414,15 @@ impl Work<'_> {
     fn part(&self, part: &Part, opened: &mut Opened) -> Result<Outcome, Error> {
         let run = &self.study.runs[part.run];
         let outcome = self.preparations[part.run]
-            .execute(part.range.clone(), opened)
-            .map_err(|error| Error::Run { run: run.id.get_ref().clone(), source: Box::new(error) })?;
+            .execute(part.range.clone(), opened, self.interrupt)
+            .map_err(|error| match error {
+                Error::Interrupted { .. } => error,
+                error => Error::Run { run: run.id.get_ref().clone(), source: Box::new(error) },
+            })?;
         let path = (self.file)(part);
-        let kept = Kept { key: self.keys[part.run].clone(), members: part.range.clone(), outcome };
-        let text = serde_json::to_vec(&kept).map_err(|error| Error::file(&path)(error.into()))?;
+        let fault = |error: serde_json::Error| Error::file(&path)(error.into());
+        let kept = Kept::new(self.keys[part.run].clone(), part.range.clone(), outcome).map_err(fault)?;
+        let text = serde_json::to_vec(&kept).map_err(fault)?;
         write_whole(&path, &text)?;
         self.progress.finished(&run.label);
         Ok(kept.outcome)

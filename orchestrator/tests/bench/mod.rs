@@ -52,7 +52,8 @@ impl Default for Recipe<'_> {
 
 /// A folder with `Unit.fmu` and `loop.toml`.
 pub struct Bench {
-    folder: TempDir,
+    /// Vanishes with it.
+    pub folder: TempDir,
 }
 
 impl Bench {
@@ -107,8 +108,9 @@ impl Bench {
         (status.code().expect("no signal"), text(stdout), text(stderr))
     }
 
+    /// Runs the experiment, as often as one likes.
     pub fn run(&self, arguments: &[&str]) -> (i32, String, String) {
-        self.call(&[&["run", "loop.toml"], arguments].concat())
+        self.call(&[&["run", "loop.toml", "--force"], arguments].concat())
     }
 
     /// Refusal of an experiment: exit code 2, and one line.

@@ -40,7 +40,7 @@ typedef struct {
     char text[64];
 } Unit;
 
-enum { OK = 0, ERROR = 3, FATAL = 4 };
+enum { OK = 0, WARNING = 1, ERROR = 3, FATAL = 4 };
 
 static int complain(Unit *unit, int status, const char *what, double value) {
     unit->callbacks->logger(unit->callbacks->environment, unit->name, status, "trouble", "%s %g", what, value);
@@ -161,6 +161,7 @@ int fmi2SetString(Unit *unit, const unsigned *references, size_t n, const char *
 int fmi2DoStep(Unit *unit, double time, double step, int no_set_state) {
     (void)no_set_state;
     if (time >= unit->fail_time - 1e-9) return complain(unit, unit->fail_status, "out of propellant at", time);
+    if (unit->flag) complain(unit, WARNING, "runs hot at", 7.0);
     struct timespec pause = {(time_t)unit->pause, (long)(1e9 * (unit->pause - (double)(time_t)unit->pause))};
     nanosleep(&pause, NULL);
     unit->state += step * unit->input;

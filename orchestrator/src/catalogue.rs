@@ -1,0 +1,106 @@
+//! Which of a unit's variables are shown, and all that is known of them as JSON.
+
+use crate::description::{Interface, Kind, ModelDescription, Variable};
+use crate::error::Error;
+use crate::fmu::Fmu;
+use crate::names;
+use serde_json::{Value, json};
+use std::io::{self, Write};
+
+/// Chooses variables.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Filter {
+    /// Variables to show: a name, a pattern with *, or a part of a name. All, if it is left out.
+    pub pattern: Option<String>,
+    /// Variables of this causality only: parameter, calculatedParameter, input, output, local or independent.
+    #[arg(long)]
+    pub causality: Option<String>,
+}
+
+impl Filter {
+    fn fits(&self, variable: &Variable) -> bool {
+        let by_name = self.pattern.as_ref().is_none_or(|pattern| {
+            names::matches(pattern, &variable.name)
+                || (!pattern.contains('*') && variable.name.to_lowercase().contains(&pattern.to_lowercase()))
+        });
+        by_name && self.causality.as_ref().is_none_or(|causality| *causality == variable.causality)
+    }
+
+    /// Leaves only what it lets through.
+    ///
+    /// # Errors
+    /// If that is nothing.
+    pub fn apply(&self, description: &mut ModelDescription) -> Result<(), Error> {
+        if self.pattern.is_none() && self.causality.is_none() {
+            return Ok(());
+        }
+        let known: Vec<String> = description.variables.iter().map(|v| v.name.clone()).collect();
+        description.variables.retain(|variable| self.fits(variable));
+        if !description.variables.is_empty() {
+            return Ok(());
+        }
+        let causality = self.causality.as_ref().map_or(String::new(), |c| format!(" of causality {c}"));
+        let (name, hint) = self.pattern.as_ref().map_or((String::new(), String::new()), |pattern| {
+            (format!(" that fits \"{pattern}\""), names::hint(pattern, known.iter().map(String::as_str)))
+        });
+        let model = &description.model_name;
+        Err(Error::experiment(format!("{model} has no variable{causality}{name}{hint}")))
+    }
+}
+
+/// Prints an archive's description as JSON.
+///
+/// # Errors
+/// If the text cannot be written.
+pub fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
+    let d = &fmu.description;
+    let interface = |interface: &Option<Interface>| {
+        interface
+            .as_ref()
+            .map(|i| json!({ "model_identifier": i.model_identifier, "capabilities": i.capabilities }))
+    };
+    let experiment = &d.default_experiment;
+    let all = json!({
+        "model_name": d.model_name,
+        "fmi_version": d.fmi_version,
+        "description": d.description,
+        "version": d.version,
+        "generation_tool": d.generation_tool,
+        "guid": d.guid,
+        "platforms": fmu.platforms(),
+        "co_simulation": interface(&d.co_simulation),
+        "model_exchange": interface(&d.model_exchange),
+        "default_experiment": {
+            "start": experiment.start,
+            "stop": experiment.stop,
+            "step": experiment.step,
+            "tolerance": experiment.tolerance,
+        },
+        "variables": d.variables.iter().map(variable).collect::<Vec<_>>(),
+    });
+    serde_json::to_writer_pretty(&mut *out, &all)?;
+    writeln!(out)
+}
+
+fn variable(variable: &Variable) -> Value {
+    let mut all = json!({
+        "name": variable.name,
+        "value_reference": variable.reference,
+        "causality": variable.causality,
+        "variability": variable.variability,
+        "type": variable.kind.name(),
+        "start": variable.start,
+        "description": variable.description,
+    });
+    match &variable.kind {
+        Kind::Real { unit, min, max, .. } => {
+            (all["unit"], all["min"], all["max"]) = (json!(unit), json!(min), json!(max));
+        }
+        Kind::Integer { min, max } => (all["min"], all["max"]) = (json!(min), json!(max)),
+        Kind::Enumeration { items } => {
+            all["items"] = items.iter().map(|(name, item)| (name.clone(), json!(item))).collect();
+        }
+        Kind::Boolean | Kind::String => {}
+    }
+    all
+}

@@ -1,0 +1,99 @@
+//! What units warn of during a run: each warning is told once, at the end, with its first time and how often it came.
+
+use std::cell::RefCell;
+
+/// A unit that never says the same twice is collected up to so many warnings.
+const MOST: usize = 100;
+
+/// A warning, in a unit's words.
+struct Warning {
+    text: String,
+    first: f64,
+    count: u64,
+}
+
+/// The present time, s, and what was heard.
+#[derive(Default)]
+struct Heard {
+    now: f64,
+    warnings: Vec<Warning>,
+}
+
+thread_local! {
+    static HEARD: RefCell<Option<Heard>> = const { RefCell::new(None) };
+}
+
+/// Warnings of this thread's units are collected for as long as this lives.
+pub struct Collection(());
+
+/// Begins to collect. Where nothing is collected, warnings are told as they come.
+pub fn collect() -> Collection {
+    HEARD.with_borrow_mut(|heard| *heard = Some(Heard::default()));
+    Collection(())
+}
+
+/// Time goes on, s.
+pub fn at(time: f64) {
+    HEARD.with_borrow_mut(|heard| {
+        if let Some(heard) = heard {
+            heard.now = time;
+        }
+    });
+}
+
+/// A unit warns.
+pub fn warn(text: &str) {
+    let is_collected = HEARD.with_borrow_mut(|heard| {
+        let Some(Heard { now, warnings }) = heard else { return false };
+        if let Some(warning) = warnings.iter_mut().find(|warning| warning.text == text) {
+            warning.count += 1;
+        } else if warnings.len() < MOST {
+            warnings.push(Warning { text: text.to_string(), first: *now, count: 1 });
+        } else {
+            return false;
+        }
+        true
+    });
+    if !is_collected {
+        tracing::warn!("{text}");
+    }
+}
+
+impl Warning {
+    fn told(&self) -> String {
+        let time = crate::clock::rounded(self.first);
+        match self.count {
+            1 => format!("{} (at t = {time} s)", self.text),
+            count => format!("{} (first at t = {time} s, {count} times)", self.text),
+        }
+    }
+}
+
+impl Drop for Collection {
+    /// Tells what was collected.
+    fn drop(&mut self) {
+        let heard = HEARD.with_borrow_mut(Option::take);
+        for warning in heard.iter().flat_map(|heard| &heard.warnings) {
+            tracing::warn!("{}", warning.told());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warning_is_told_once_with_its_first_time_and_its_count() {
+        let collection = collect();
+        for (time, text) in [(0.0, "late"), (0.1 + 0.2, "lost"), (0.5, "lost"), (0.7, "lost")] {
+            at(time);
+            warn(text);
+        }
+        let told: Vec<String> = HEARD
+            .with_borrow(|heard| heard.iter().flat_map(|heard| &heard.warnings).map(Warning::told).collect());
+        assert_eq!(told, ["late (at t = 0 s)", "lost (first at t = 0.3 s, 3 times)"]);
+        drop(collection);
+        assert!(HEARD.with_borrow(Option::is_none));
+    }
+}

@@ -1,0 +1,141 @@
+//! Where experiments, studies and units are found from any folder: here, by an environment variable, and beside this program.
+
+use crate::error::Error;
+use crate::names;
+use std::collections::BTreeSet;
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use walkdir::WalkDir;
+
+/// The environment variable with further folders, separated as those of PATH are.
+pub const VARIABLE: &str = "ORCHESTRATOR_PATH";
+
+/// Where the project keeps its experiments.
+const EXPERIMENTS: &str = "orchestrator/experiments";
+
+fn by_variable() -> Vec<PathBuf> {
+    env::var_os(VARIABLE).map(|paths| env::split_paths(&paths).collect()).unwrap_or_default()
+}
+
+fn beside_program(places: &[&str]) -> Vec<PathBuf> {
+    let program = env::current_exe().and_then(fs::canonicalize).ok();
+    let folder = program.as_deref().and_then(Path::parent);
+    folder.into_iter().flat_map(|folder| places.iter().map(|place| folder.join(place))).collect()
+}
+
+/// The folders that are there, each once, without roundabout ways.
+fn there(folders: Vec<PathBuf>) -> Vec<PathBuf> {
+    let mut known = BTreeSet::new();
+    let is_new = |folder: &PathBuf| fs::canonicalize(folder).is_ok_and(|path| known.insert(path));
+    let straight = |folder: PathBuf| {
+        if folder.is_absolute() { fs::canonicalize(&folder).unwrap_or(folder) } else { folder }
+    };
+    folders.into_iter().filter(|folder| folder.is_dir()).filter(is_new).map(straight).collect()
+}
+
+/// Folders with experiments and studies.
+pub fn experiments() -> Vec<PathBuf> {
+    let mut folders = vec![PathBuf::from(EXPERIMENTS)];
+    folders.extend(by_variable());
+    folders.extend(beside_program(&["experiments", "../../orchestrator/experiments"]));
+    there(folders)
+}
+
+/// Folders with units.
+pub fn units() -> Vec<PathBuf> {
+    let mut folders = vec![PathBuf::from("target/fmu")];
+    folders.extend(by_variable());
+    folders.extend(beside_program(&["fmu", "../fmu"]));
+    there(folders)
+}
+
+/// Files with this extension below a folder. Hidden folders and build folders are passed over.
+pub fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    WalkDir::new(folder)
+        .sort_by_file_name()
+        .into_iter()
+        .filter_entry(|entry| entry.depth() == 0 || !is_passed_over(&entry.file_name().to_string_lossy()))
+        .flatten()
+        .map(walkdir::DirEntry::into_path)
+        .filter(|path| path.is_file() && path.extension().is_some_and(|e| e == extension))
+        .collect()
+}
+
+/// Hidden folders and build folders are large and hold nothing to be run, but for `target/fmu`, which is asked for by name.
+fn is_passed_over(name: &str) -> bool {
+    name.starts_with('.') || name == "target"
+}
+
+/// Whether the text of a TOML file is that of an experiment, with or without faults.
+pub fn is_experiment(text: &str) -> bool {
+    text.lines().any(|line| line.trim_start().starts_with("[components."))
+}
+
+/// Experiments below a folder.
+fn experiments_below(folder: &Path) -> Vec<PathBuf> {
+    let mut found = files(folder, "toml");
+    found.retain(|path| fs::read_to_string(path).is_ok_and(|text| is_experiment(&text)));
+    found
+}
+
+/// The experiment of this name: a file, or one that `list` shows, by its name or by the end of its path.
+///
+/// # Errors
+/// If there is none, if there are several, or if it is something else.
+pub fn experiment(name: &Path) -> Result<PathBuf, Error> {
+    let shown = name.display();
+    let extension = name.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    if extension == "fmu" {
+        return Err(Error::experiment(format!(
+            "{shown} is a unit, and units are run by an experiment: a file that names it, as in [components.plant] \
+             fmu = \"{}\". --fmu COMPONENT={shown} puts it into an experiment that there is, \
+             and `orchestrator inspect {shown}` shows its variables",
+            name.file_name().unwrap_or_default().to_string_lossy()
+        )));
+    }
+    if name.is_file() {
+        return Ok(name.to_path_buf());
+    }
+    if extension == "ssp" || name.is_absolute() {
+        return Err(Error::experiment(format!("{shown}: there is no such file")));
+    }
+    let wanted = if extension == "toml" { name.to_path_buf() } else { with_toml(name) };
+    if wanted.is_file() {
+        return Ok(wanted);
+    }
+    let mut all = Vec::new();
+    for folder in experiments().into_iter().chain([PathBuf::from(".")]) {
+        let here = experiments_below(&folder);
+        let fitting: Vec<&PathBuf> = here.iter().filter(|path| path.ends_with(&wanted)).collect();
+        match fitting[..] {
+            [] => all.extend(here),
+            [path] => return Ok(path.clone()),
+            [..] => {
+                let paths: Vec<String> = fitting.iter().map(|path| path.display().to_string()).collect();
+                return Err(Error::experiment(format!(
+                    "several experiments are called {shown}: {}",
+                    paths.join(", ")
+                )));
+            }
+        }
+    }
+    let stems: BTreeSet<String> = all
+        .iter()
+        .filter_map(|path| path.file_stem())
+        .map(|stem| stem.to_string_lossy().into_owned())
+        .collect();
+    let hint = names::hint(
+        &with_toml(name).file_stem().unwrap_or_default().to_string_lossy(),
+        stems.iter().map(String::as_str),
+    );
+    Err(Error::experiment(format!(
+        "there is no experiment \"{shown}\", neither as a file nor among those that `orchestrator list` shows{hint}"
+    )))
+}
+
+fn with_toml(name: &Path) -> PathBuf {
+    let mut text = name.as_os_str().to_owned();
+    text.push(".toml");
+    PathBuf::from(text)
+}
