@@ -1,9 +1,13 @@
 """SSP archives: written from experiments, valid by the standard's schema, run by the orchestrator; others' archives too. Run by others: test_importers.py."""
 
 import csv
+import html
+import json
 import math
+import re
 import shutil
 import subprocess
+import tomllib
 import zipfile
 
 import numpy as np
@@ -41,13 +45,17 @@ def columns(out) -> dict[str, np.ndarray]:
 def test_every_experiment_becomes_a_valid_archive(experiment, tmp_path):
     path = tmp_path / "x.ssp"
     said = pack(experiment, path)
-    assert "says nothing of the step" in said
+    assert "the standard has no place for the step" in said
     # Against the schema of SSP 1.0.
     structure = read_ssd(str(path), validate=True)
     assert all(element.source.startswith("resources/") for element in structure.system.elements)
     text = zipfile.ZipFile(path).read("SystemStructure.ssd").decode()
     assert text.count('implementation="CoSimulation"') == len(structure.system.elements)
-    assert "Annotation" not in text
+    # An importer wants identifiers as names.
+    names = re.findall(r' name="([^"]*)"', text.split("<ssd:Elements>")[0]) + re.findall(r'<ssv:ParameterSet version="1.0" name="([^"]*)"', text)
+    assert names and all(name.isidentifier() for name in names)
+    assert html.unescape(re.search(r' description="([^"]*)"', text)[1]) == tomllib.loads(experiment.read_text())["title"]
+    assert re.search(r'<oms:FixedStepMaster [^>]*stepSize="0\.\d+"', text)
     again = tmp_path / "again.ssp"
     pack(experiment, again)
     assert path.read_bytes() == again.read_bytes()
@@ -66,6 +74,52 @@ def test_an_archive_runs_as_its_experiment_does(name, tmp_path):
     for column, values in toml.items():
         if not column.endswith(TIMES):
             assert np.array_equal(ssp[column], values), column
+
+
+@pytest.mark.parametrize("name", ["crmpc-2022/estimator", "tvsmc-2015/sotvsmc-do", "exchange/two-loop-smc-allocated"])
+def test_an_archive_of_ours_is_the_same_run(name, tmp_path):
+    """Without being told the step, the order, what is recorded or what the figures of merit are of."""
+    experiment = EXPERIMENTS.parent / f"{name}.toml"
+    pack(experiment, tmp_path / "x.ssp", "--stop", "2")
+    finished = run(tmp_path / "x.ssp", tmp_path / "ssp")
+    assert finished.returncode == 0, finished.stderr
+    finished = run(experiment, tmp_path / "toml", "--stop", "2", "--fmu-dir", TARGET / "fmu")
+    assert finished.returncode == 0, finished.stderr
+    assert (tmp_path / "ssp" / "results.csv").read_bytes() == (tmp_path / "toml" / "results.csv").read_bytes()
+    ssp, toml = (json.loads((tmp_path / kind / "metrics.json").read_text()) for kind in ("ssp", "toml"))
+    assert ssp["ems_deg"] == toml["ems_deg"] and ssp["cms"] == toml["cms"]
+    ssp, toml = (json.loads((tmp_path / kind / "results.json").read_text()) for kind in ("ssp", "toml"))
+    assert ssp["simulation"] == toml["simulation"] and ssp["title"] == toml["title"]
+    assert [unit["sha256"] for unit in ssp["components"].values()] == [unit["sha256"] for unit in toml["components"].values()]
+
+
+def test_enumerations_are_connectors(tmp_path):
+    pack(EXPERIMENTS / "crmpc-robust.toml", tmp_path / "x.ssp")
+    text = zipfile.ZipFile(tmp_path / "x.ssp").read("SystemStructure.ssd").decode()
+    kind = re.search(r'<ssd:Connector name="solver.status" kind="output">\s*<ssc:Enumeration name="(\w+)"/>', text)[1]
+    assert re.search(rf'<ssc:Enumeration name="{kind}">\s*<ssc:Item name="\w+" value="\d+"/>', text)
+
+
+def test_a_step_by_another_tools_annotation_is_read(tmp_path):
+    annotation = b"""<Annotations><c:Annotation type="org.openmodelica"><o:Annotations xmlns:o="o"><o:SimulationInformation>
+      <o:FixedStepMaster stepSize="0.01"/></o:SimulationInformation></o:Annotations></c:Annotation></Annotations>
+  </System>
+  <DefaultExperiment"""
+    ssd = SSD.replace(b"</System>\n  <DefaultExperiment", annotation)
+    assert ssd != SSD
+    finished = run(foreign(tmp_path / "x.ssp", ssd), tmp_path / "out")
+    assert finished.returncode == 0, finished.stderr
+    assert json.loads((tmp_path / "out" / "results.json").read_text())["simulation"]["step"] == 0.01
+
+
+def test_a_unit_that_fails_in_an_archive_is_named_by_archive_and_entry(tmp_path):
+    path = foreign(tmp_path / "x.ssp")
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(tmp_path / "y.ssp", "w") as new:
+        for entry in old.namelist():
+            new.writestr(entry, b"no archive" if entry == "resources/LQR.fmu" else old.read(entry))
+    finished = run(tmp_path / "y.ssp", tmp_path / "out")
+    assert finished.returncode == 2
+    assert finished.stderr.startswith(f"error: {tmp_path / 'y.ssp'}: resources/LQR.fmu: is not a zip archive"), finished.stderr
 
 
 SSD = """<?xml version="1.0" encoding="ISO-8859-1"?>

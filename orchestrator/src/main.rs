@@ -110,6 +110,9 @@ enum Command {
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
         overrides: Overrides,
+        /// Leave outputs that are enumerations out of the connectors: libcosim aborts where there is one.
+        #[arg(long)]
+        no_enumerations: bool,
         /// Replace the archive if there is one.
         #[arg(long)]
         force: bool,
@@ -190,16 +193,17 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             force,
         } => {
             let experiment = search::experiment(&experiment)?;
-            let plan = if experiment.extension().is_some_and(|extension| extension == "ssp") {
-                let mut loaded = ssp::load(&experiment, &overrides)?;
-                Plan::with(loaded.experiment, &fmu_dir, &mut loaded.opened)?
+            let (plan, entries) = if experiment.extension().is_some_and(|extension| extension == "ssp") {
+                let ssp::Loaded { experiment, mut opened, entries } = ssp::load(&experiment, &overrides)?;
+                let plan = Plan::with(experiment, &fmu_dir, &mut opened);
+                (plan.map_err(|error| entries.named(error))?, Some(entries))
             } else {
                 let mut experiment = Experiment::load(&experiment)?;
                 experiment.apply(&overrides)?;
-                Plan::new(experiment, &fmu_dir)?
+                (Plan::new(experiment, &fmu_dir)?, None)
             };
             let real_time = real_time.map(|factor| realtime::Settings { factor, on_miss, priority });
-            let report = plan.run(&Options {
+            let outcome = plan.run(&Options {
                 out: folder,
                 quiet,
                 real_time,
@@ -207,6 +211,10 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 files,
                 force,
                 interrupt: interrupt.clone(),
+            });
+            let report = outcome.map_err(|error| match &entries {
+                Some(entries) => entries.named(error),
+                None => error,
             })?;
             if !quiet {
                 report::summary(&report, out)?;
@@ -235,7 +243,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             }
             Ok(())
         }
-        Command::Pack { experiment: path, ssp, out: archive, fmu_dir, overrides, force } => {
+        Command::Pack { experiment: path, ssp, out: archive, fmu_dir, overrides, no_enumerations, force } => {
             if !ssp {
                 return Err(Error::experiment(
                     "pack wants the form of the archive, of which there is one: --ssp",
@@ -253,7 +261,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 )));
             }
             let plan = Plan::new(experiment, &fmu_dir)?;
-            ssp::pack(&plan, &archive, interrupt)?;
+            ssp::pack(&plan, !no_enumerations, &archive, interrupt)?;
             report::packed(&plan, &archive, out).map_err(Error::from)
         }
         Command::Inspect { fmu, check: true, .. } => inspect::check(&fmu, out),

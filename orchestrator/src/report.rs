@@ -111,14 +111,11 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
 /// If it cannot be written.
 pub fn packed(plan: &Plan, archive: &Path, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "{}: {}", archive.display(), plan.order.join(", "))?;
-    let simulation = &plan.experiment.simulation;
-    writeln!(out, "  an SSP archive says nothing of the step: use {} s", simulation.step)?;
-    let slower = plan.order.iter().filter(|name| plan.experiment.components[*name].every > 1);
-    for name in slower {
-        let every = plan.experiment.components[name].every;
-        writeln!(out, "  nor that {name} steps at every {every}th communication point here")?;
-    }
-    Ok(())
+    let step = plan.experiment.simulation.step;
+    writeln!(
+        out,
+        "  the standard has no place for the step, {step} s: it stands in annotations, which not every tool reads"
+    )
 }
 
 /// Prints what a reproduction came to.

@@ -4,10 +4,14 @@
 mod read;
 mod write;
 
-pub use read::{Loaded, load};
+pub use read::{Entries, Loaded, load};
 pub use write::pack;
 
 /// Where the structure stands in an archive.
 const STRUCTURE: &str = "SystemStructure.ssd";
+/// The type of the annotation that holds what the standard has no place for, in our words.
+const OWN: &str = "orchestrator";
+/// The type of a widely read annotation that holds the step.
+const OPEN_MODELICA: &str = "org.openmodelica";
 /// What a component is, and what it is if it says nothing.
 const FMU: &str = "application/x-fmu-sharedlibrary";

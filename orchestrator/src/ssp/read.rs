@@ -1,6 +1,6 @@
 //! From an archive to an experiment.
 
-use super::{FMU, STRUCTURE};
+use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
 use crate::archive;
 use crate::delay;
 use crate::error::Error;
@@ -25,8 +25,107 @@ pub struct Loaded {
     pub experiment: Experiment,
     /// Its FMUs.
     pub opened: Opened,
-    /// They lie here until this goes.
-    _folder: TempDir,
+    /// Where they lie.
+    pub entries: Entries,
+}
+
+/// The entries of an archive, unpacked until this goes.
+pub struct Entries {
+    path: PathBuf,
+    folder: TempDir,
+}
+
+impl Entries {
+    /// An error of one of its FMUs, with the names of the archive and of the entry.
+    pub fn named(&self, error: Error) -> Error {
+        of_entry(error, &self.path, self.folder.path())
+    }
+}
+
+/// An FMU in an archive is called by the names of both, not by where it was unpacked.
+fn of_entry(error: Error, archive: &Path, folder: &Path) -> Error {
+    match error {
+        Error::Fmu { path, message } => match path.strip_prefix(folder) {
+            Ok(entry) => {
+                Error::Fmu { message: format!("{}: {message}", entry.display()), path: archive.to_path_buf() }
+            }
+            Err(_) => Error::Fmu { path, message },
+        },
+        error => error,
+    }
+}
+
+/// What an archive of this program says of its run.
+struct Own {
+    title: String,
+    description: String,
+    step: f64,
+    coupling: Coupling,
+    /// Components with their periods, in their order.
+    order: Vec<(String, u32)>,
+    recorded: Vec<String>,
+    record_every: u32,
+    metrics: Roles,
+}
+
+impl Own {
+    fn read(element: &Element) -> Result<Self, String> {
+        let count = |element: &Element, name: &str| {
+            let text = element.required(name)?;
+            text.parse::<u32>().map_err(|_| format!("{name}=\"{text}\" is no count"))
+        };
+        let coupling = match element.required("coupling")? {
+            "gauss-seidel" => Coupling::GaussSeidel,
+            "jacobi" => Coupling::Jacobi,
+            other => return Err(format!("the coupling \"{other}\" is not known")),
+        };
+        let those = |name: &'static str| element.children.iter().filter(move |child| child.name == name);
+        let mut metrics = Roles::default();
+        if let Some(stated) = element.child("Metrics") {
+            let role = |name: &str| stated.attribute(name).map(String::from);
+            metrics = Roles {
+                attitude: role("attitude"),
+                reference: role("reference"),
+                rate: role("rate"),
+                moment: role("moment"),
+                limit: role("limit"),
+                solver: role("solver"),
+                guarantee: role("guarantee"),
+                every: count(stated, "every")?,
+                lost_deg: stated.number("lostDeg")?,
+            };
+        }
+        Ok(Self {
+            title: element.required("title")?.to_string(),
+            description: element.attribute("description").unwrap_or_default().to_string(),
+            step: element.number("step")?.ok_or("the annotation of the run says no step")?,
+            coupling,
+            order: those("Component")
+                .map(|child| Ok((child.required("name")?.to_string(), count(child, "every")?)))
+                .collect::<Result<_, String>>()?,
+            recorded: those("Record")
+                .map(|child| child.required("variable").map(String::from))
+                .collect::<Result<_, String>>()?,
+            record_every: count(element, "recordEvery")?,
+            metrics,
+        })
+    }
+
+    fn apply(self, experiment: &mut Experiment) -> Result<(), String> {
+        (experiment.title, experiment.description) = (self.title, self.description);
+        experiment.simulation.coupling = self.coupling;
+        for (name, every) in &self.order {
+            let component = experiment.components.get_mut(name);
+            component
+                .ok_or_else(|| format!("the annotation of the run: there is no component \"{name}\""))?
+                .every = *every;
+        }
+        experiment.simulation.order = self.order.into_iter().map(|(name, _)| name).collect();
+        let texts = self.recorded.into_iter().map(|name| Spanned::new(0..0, name));
+        experiment.record = Record { variables: texts.collect(), every: self.record_every };
+        experiment.metrics = self.metrics;
+        Ok(())
+    }
 }
 
 /// Reads an archive. The stop time and the step come from `overrides`, or else from the archive and from what its FMUs propose
@@ -49,16 +148,31 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     for component in &structure.components {
         let fmu = structure.folder.join(&component.source);
         if !opened.contains_key(&fmu) {
-            opened.insert(fmu.clone(), Rc::new(Fmu::open(&fmu)?));
+            let unit = Fmu::open(&fmu).map_err(|error| of_entry(error, path, folder.path()))?;
+            opened.insert(fmu.clone(), Rc::new(unit));
         }
     }
     let of = |component: &Found| &opened[&structure.folder.join(&component.source)].description;
+
+    let system = root.child("System");
+    let annotation = |kind: &str| {
+        let mut all = system.into_iter().flat_map(|system| system.list("Annotations", "Annotation"));
+        all.find(|annotation| annotation.attribute("type") == Some(kind))
+    };
+    let own = annotation(OWN).and_then(|annotation| annotation.child("Experiment"));
+    let own = own.map(Own::read).transpose().map_err(in_structure)?;
+    let master = annotation(OPEN_MODELICA)
+        .and_then(|annotation| annotation.child("Annotations"))
+        .and_then(|all| all.child("SimulationInformation"))
+        .and_then(|information| information.child("FixedStepMaster"));
+    let common = master.map_or(Ok(None), |master| master.number("stepSize")).map_err(in_structure)?;
 
     let experiment = root.child("DefaultExperiment");
     let time = |name| experiment.map_or(Ok(None), |e| e.number(name)).map_err(in_structure);
     let stop = overrides.stop.map_or_else(|| time("stopTime"), |stop| Ok(Some(stop)))?;
     let proposed = structure.components.iter().filter_map(|component| of(component).default_experiment.step);
-    let step = overrides.step.or(proposed.reduce(f64::min));
+    let stated = own.as_ref().map(|own| own.step).or(common);
+    let step = overrides.step.or(stated).or(proposed.reduce(f64::min));
     let simulation = Simulation {
         on_invalid: OnInvalid::default(),
         start: time("startTime")?.unwrap_or(0.0),
@@ -98,8 +212,11 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let wires = wiring::wires(&experiment, &parts)?;
     experiment.simulation.order =
         delay::order(&parts, &wires).into_iter().map(|index| parts[index].name.to_string()).collect();
+    if let Some(own) = own {
+        own.apply(&mut experiment).map_err(in_structure)?;
+    }
     experiment.apply(overrides)?;
-    Ok(Loaded { experiment, opened, _folder: folder })
+    Ok(Loaded { experiment, opened, entries: Entries { path: path.to_path_buf(), folder } })
 }
 
 fn parts<'a>(components: &'a [Found], opened: &'a Opened, folder: &Path) -> Vec<Part<'a>> {

@@ -1,9 +1,9 @@
 //! From an experiment to an archive.
 
-use super::{FMU, STRUCTURE};
+use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
 use crate::description::{Kind, Variable};
 use crate::error::Error;
-use crate::experiment::Scaling;
+use crate::experiment::{Coupling, Scaling};
 use crate::interrupt::Interrupt;
 use crate::run::Plan;
 use crate::settings::SettingValue;
@@ -12,6 +12,7 @@ use quick_xml::events::{BytesDecl, Event};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Cursor, Write};
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
@@ -24,18 +25,33 @@ const NAMESPACES: [(&str, &str); 3] = [
 
 type Xml = Writer<Vec<u8>>;
 
-/// Writes an experiment as an archive. Its communication step has no place in the standard; a value that is the FMU's own is
-/// left out. The same experiment gives the same bytes.
+/// What is written.
+struct Source<'a> {
+    plan: &'a Plan,
+    /// Whether outputs that are enumerations have connectors.
+    enumerations: bool,
+}
+
+impl Deref for Source<'_> {
+    type Target = Plan;
+
+    fn deref(&self) -> &Plan {
+        self.plan
+    }
+}
+
+/// Writes an experiment as an archive. What the standard has no place for, the step above all, stands in annotations; a value that
+/// is the FMU's own is left out. Outputs that are enumerations are connectors if `enumerations` says so. The same experiment gives the same bytes.
 ///
 /// # Errors
 /// If a file cannot be read or written, or if it is asked to end; then nothing is left behind.
-pub fn pack(plan: &Plan, path: &Path, interrupt: &Interrupt) -> Result<(), Error> {
+pub fn pack(plan: &Plan, enumerations: bool, path: &Path, interrupt: &Interrupt) -> Result<(), Error> {
     let goes_on = || interrupt.asked().map_or(Ok(()), |request| Err(Error::Ended(request)));
     let mut entries: BTreeMap<String, Vec<u8>> = BTreeMap::new();
     for fmu in &plan.fmus {
         entries.insert(resource(&fmu.path), fs::read(&fmu.path).map_err(Error::file(&fmu.path))?);
     }
-    let structure = structure(plan).map_err(Error::file(path))?;
+    let structure = structure(&Source { plan, enumerations }).map_err(Error::file(path))?;
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default());
@@ -64,26 +80,31 @@ fn resource(fmu: &Path) -> String {
     format!("resources/{}", fmu.file_name().unwrap_or_default().to_string_lossy())
 }
 
-fn structure(plan: &Plan) -> io::Result<Vec<u8>> {
+fn structure(plan: &Source) -> io::Result<Vec<u8>> {
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     let mut attributes = NAMESPACES.map(|(name, value)| (name, value.to_string())).to_vec();
-    attributes.push(("name", plan.experiment.title.clone()));
+    let stem = plan.experiment.source.path.file_stem().unwrap_or_default();
+    attributes.push(("name", identifier(&stem.to_string_lossy())));
     attributes.push(("version", "1.0".into()));
-    if !plan.experiment.description.is_empty() {
-        attributes.push(("description", plan.experiment.description.trim().to_string()));
-    }
+    attributes.push(("description", plan.experiment.title.clone()));
     attributes.push(("generationTool", concat!("orchestrator ", env!("CARGO_PKG_VERSION")).into()));
     element(&mut xml, "ssd:SystemStructureDescription", &attributes, |xml| {
         element(xml, "ssd:System", &[("name", "system".into())], |xml| {
             element(xml, "ssd:Elements", &[], |xml| {
                 (0..plan.order.len()).try_for_each(|i| component(xml, plan, i))
             })?;
-            if plan.wires.is_empty() {
-                return Ok(());
+            if !plan.wires.is_empty() {
+                element(xml, "ssd:Connections", &[], |xml| connections(xml, plan))?;
             }
-            element(xml, "ssd:Connections", &[], |xml| connections(xml, plan))
+            element(xml, "ssd:Annotations", &[], |xml| {
+                element(xml, "ssc:Annotation", &[("type", OPEN_MODELICA.into())], |xml| {
+                    open_modelica(xml, plan)
+                })?;
+                element(xml, "ssc:Annotation", &[("type", OWN.into())], |xml| own(xml, plan))
+            })
         })?;
+        enumerations(xml, plan)?;
         units(xml, plan)?;
         let experiment = &plan.experiment.simulation;
         let time = [("startTime", real(experiment.start)), ("stopTime", real(experiment.stop))];
@@ -94,7 +115,74 @@ fn structure(plan: &Plan) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn component(xml: &mut Xml, plan: &Plan, index: usize) -> io::Result<()> {
+/// A text as an identifier, which some tools want every name to be.
+fn identifier(text: &str) -> String {
+    let mut name: String =
+        text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();
+    if !name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
+        name.insert(0, '_');
+    }
+    name
+}
+
+/// The step as OMSimulator writes it, and others read it.
+fn open_modelica(xml: &mut Xml, plan: &Source) -> io::Result<()> {
+    let schema = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd";
+    element(xml, "oms:Annotations", &[("xmlns:oms", schema.into())], |xml| {
+        element(xml, "oms:SimulationInformation", &[], |xml| {
+            let master = [
+                ("description", "oms-ma".into()),
+                ("stepSize", real(plan.clock.step())),
+                ("absoluteTolerance", "0.0001".into()),
+                ("relativeTolerance", "0.0001".into()),
+            ];
+            leaf(xml, "oms:FixedStepMaster", &master)
+        })
+    })
+}
+
+/// What makes the same run of an archive: step, coupling, order, periods, what is recorded and what the figures of merit are of.
+fn own(xml: &mut Xml, plan: &Source) -> io::Result<()> {
+    let experiment = &plan.experiment;
+    let coupling = match experiment.simulation.coupling {
+        Coupling::GaussSeidel => "gauss-seidel",
+        Coupling::Jacobi => "jacobi",
+    };
+    let attributes = [
+        ("xmlns:run", "urn:orchestrator:run:1".into()),
+        ("title", experiment.title.clone()),
+        ("description", experiment.description.trim().to_string()),
+        ("step", real(plan.clock.step())),
+        ("coupling", coupling.into()),
+        ("recordEvery", experiment.record.every.to_string()),
+    ];
+    element(xml, "run:Experiment", &attributes, |xml| {
+        for name in &plan.order {
+            let every = experiment.components[name].every.to_string();
+            leaf(xml, "run:Component", &[("name", name.clone()), ("every", every)])?;
+        }
+        for column in &plan.columns {
+            leaf(xml, "run:Record", &[("variable", column.name.clone())])?;
+        }
+        let roles = &experiment.metrics;
+        let mut stated = vec![("every", roles.every.to_string())];
+        for (name, role) in [
+            ("attitude", &roles.attitude),
+            ("reference", &roles.reference),
+            ("rate", &roles.rate),
+            ("moment", &roles.moment),
+            ("limit", &roles.limit),
+            ("solver", &roles.solver),
+            ("guarantee", &roles.guarantee),
+        ] {
+            stated.extend(role.as_ref().map(|role| (name, role.clone())));
+        }
+        stated.extend(roles.lost_deg.map(|lost| ("lostDeg", real(lost))));
+        leaf(xml, "run:Metrics", &stated)
+    })
+}
+
+fn component(xml: &mut Xml, plan: &Source, index: usize) -> io::Result<()> {
     let attributes = [
         ("name", plan.order[index].clone()),
         ("type", FMU.into()),
@@ -103,38 +191,77 @@ fn component(xml: &mut Xml, plan: &Plan, index: usize) -> io::Result<()> {
     ];
     element(xml, "ssd:Component", &attributes, |xml| {
         element(xml, "ssd:Connectors", &[], |xml| {
-            connectors(plan, index).try_for_each(|variable| connector(xml, variable))
+            connectors(plan, index).try_for_each(|variable| connector(xml, plan, variable))
         })?;
         parameters(xml, plan, index)
     })
 }
 
 /// Inputs that are connected, and all outputs that a connector can have the type of.
-fn connectors(plan: &Plan, index: usize) -> impl Iterator<Item = &Variable> {
+fn connectors<'a>(plan: &'a Source, index: usize) -> impl Iterator<Item = &'a Variable> {
     let variables = &plan.fmus[index].description.variables;
     let is_connected =
         move |position| plan.wires.iter().any(|w| w.to.component == index && w.to.variable == position);
     variables.iter().enumerate().filter_map(move |(position, variable)| match variable.causality.as_str() {
         "input" if is_connected(position) => Some(variable),
-        "output" if matches!(variable.kind, Kind::Real { .. } | Kind::Integer { .. } | Kind::Boolean) => {
-            Some(variable)
-        }
+        "output" => match variable.kind {
+            Kind::String => None,
+            Kind::Enumeration { .. } => plan.enumerations.then_some(variable),
+            _ => Some(variable),
+        },
         _ => None,
     })
 }
 
-fn connector(xml: &mut Xml, variable: &Variable) -> io::Result<()> {
+/// Enumerations of the connectors, each once, by the name it is given here: that of the first variable that is of it.
+fn kinds<'a>(plan: &'a Source) -> Vec<(String, &'a [(String, i32)])> {
+    let mut kinds: Vec<(String, &'a [(String, i32)])> = Vec::new();
+    for (index, fmu) in plan.fmus.iter().enumerate() {
+        for variable in connectors(plan, index) {
+            if let Kind::Enumeration { items } = &variable.kind
+                && !kinds.iter().any(|(_, known)| *known == items.as_slice())
+            {
+                let name = identifier(&format!("{}_{}", fmu.description.model_name, variable.name));
+                kinds.push((name, items));
+            }
+        }
+    }
+    kinds
+}
+
+fn enumerations(xml: &mut Xml, plan: &Source) -> io::Result<()> {
+    let kinds = kinds(plan);
+    if kinds.is_empty() {
+        return Ok(());
+    }
+    element(xml, "ssd:Enumerations", &[], |xml| {
+        kinds.iter().try_for_each(|(name, items)| {
+            element(xml, "ssc:Enumeration", &[("name", name.clone())], |xml| {
+                items.iter().try_for_each(|(item, value)| {
+                    leaf(xml, "ssc:Item", &[("name", item.clone()), ("value", value.to_string())])
+                })
+            })
+        })
+    })
+}
+
+fn connector(xml: &mut Xml, plan: &Source, variable: &Variable) -> io::Result<()> {
     let attributes = [("name", variable.name.clone()), ("kind", variable.causality.clone())];
     element(xml, "ssd:Connector", &attributes, |xml| {
         let unit = match &variable.kind {
             Kind::Real { unit: Some(unit), .. } => vec![("unit", unit.clone())],
+            Kind::Enumeration { items } => {
+                let kinds = kinds(plan).into_iter();
+                let known = kinds.filter(|(_, known)| *known == items.as_slice());
+                known.map(|(name, _)| ("name", name)).collect()
+            }
             _ => Vec::new(),
         };
         leaf(xml, &format!("ssc:{}", variable.kind.name()), &unit)
     })
 }
 
-fn parameters(xml: &mut Xml, plan: &Plan, index: usize) -> io::Result<()> {
+fn parameters(xml: &mut Xml, plan: &Source, index: usize) -> io::Result<()> {
     let description = &plan.fmus[index].description;
     let own = |name: &str| description.find(name).and_then(|(_, variable)| variable.start.as_deref());
     let differs = |name: &str, value: &SettingValue| match value {
@@ -152,7 +279,7 @@ fn parameters(xml: &mut Xml, plan: &Plan, index: usize) -> io::Result<()> {
     element(xml, "ssd:ParameterBindings", &[], |xml| {
         element(xml, "ssd:ParameterBinding", &[], |xml| {
             element(xml, "ssd:ParameterValues", &[], |xml| {
-                let name = format!("{} values", plan.order[index]);
+                let name = identifier(&format!("{}_values", plan.order[index]));
                 element(xml, "ssv:ParameterSet", &[("version", "1.0".into()), ("name", name)], |xml| {
                     element(xml, "ssv:Parameters", &[], |xml| {
                         set.iter().try_for_each(|setting| {
@@ -178,7 +305,7 @@ fn typed(value: &SettingValue) -> (&'static str, String) {
     }
 }
 
-fn connections(xml: &mut Xml, plan: &Plan) -> io::Result<()> {
+fn connections(xml: &mut Xml, plan: &Source) -> io::Result<()> {
     let name =
         |component: usize, variable: usize| plan.fmus[component].description.variables[variable].name.clone();
     plan.wires.iter().try_for_each(|wire| {
@@ -201,7 +328,7 @@ fn connections(xml: &mut Xml, plan: &Plan) -> io::Result<()> {
 }
 
 /// The units that connectors have.
-fn units(xml: &mut Xml, plan: &Plan) -> io::Result<()> {
+fn units(xml: &mut Xml, plan: &Source) -> io::Result<()> {
     let mut units = BTreeMap::new();
     for (index, fmu) in plan.fmus.iter().enumerate() {
         for variable in connectors(plan, index) {
