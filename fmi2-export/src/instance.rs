@@ -68,6 +68,10 @@ pub(crate) trait Scalar: PartialEq + Sized {
     fn same(&self, other: &Self) -> bool {
         self == other
     }
+    /// Whether the value can be handed out: a number that is infinite or none at all cannot.
+    fn is_presentable(&self) -> bool {
+        true
+    }
     /// What is wrong with the value for a variable of this kind.
     fn problem(&self, _kind: &Kind) -> Option<String> {
         None
@@ -82,6 +86,9 @@ impl Scalar for f64 {
     fn same(&self, other: &Self) -> bool {
         // 0 and −0 are equal, but not the same to what is computed from them.
         self.to_bits() == other.to_bits()
+    }
+    fn is_presentable(&self) -> bool {
+        self.is_finite()
     }
     fn problem(&self, kind: &Kind) -> Option<String> {
         if !self.is_finite() {
@@ -335,11 +342,22 @@ impl Instance {
         }
         for (i, &reference) in references.iter().enumerate() {
             match T::field(self.unit.as_mut(), reference as usize) {
-                Some(value) => sink(i, value),
+                Some(value) if value.is_presentable() => sink(i, value),
+                Some(_) => return Err(self.overflow(reference)),
                 None => return Err(self.misfit::<T>(reference)),
             }
         }
         Ok(())
+    }
+
+    /// A calculated value is not finite. In model exchange it may come from an integrator's trial state.
+    fn overflow(&self, reference: u32) -> Failure {
+        let name = self.variable(reference).map_or("", |variable| &variable.name);
+        let text = format!("'{name}' is not a finite number; an input or a parameter is too large");
+        match self.interface {
+            Interface::ModelExchange => Failure::Discard(text),
+            Interface::CoSimulation => Failure::Error(text),
+        }
     }
 
     /// Sets all variables, or none if one value is refused.

@@ -2,7 +2,7 @@
 
 use crate::law::{Law, Vehicle};
 use crate::solver::{self, SolverOutputs, SolverParameters};
-use crate::table::{self, ANGLES, enumeration, item, number, sampled_inputs, vector};
+use crate::table::{self, ANGLES, enumeration, item, number, sampled_inputs, shown, shown_vector, vector};
 use crate::unit::Unit;
 use control::crmpc::{
     Constraints, Crmpc, Guarantee, InitialState, Memory, ObserverSettings, Settings, Standing,
@@ -162,13 +162,13 @@ impl Law for CrmpcLaw {
 
     fn show(&mut self, memory: &Memory) {
         self.shown = Shown {
-            angles: memory.nominal.fixed_rows::<3>(0).into(),
-            rates: memory.nominal.fixed_rows::<3>(3).into(),
+            angles: shown_vector(&memory.nominal.fixed_rows::<3>(0).into()),
+            rates: shown_vector(&memory.nominal.fixed_rows::<3>(3).into()),
             in_force: memory.standing == Standing::InForce,
             standing: number(&STANDINGS, &memory.standing),
-            rate_margin: memory.margins.rate,
-            moment_margin: memory.margins.moment,
-            disturbance: memory.observed.disturbance,
+            rate_margin: shown(memory.margins.rate),
+            moment_margin: shown(memory.margins.moment),
+            disturbance: shown_vector(&memory.observed.disturbance),
             solver: SolverOutputs::from(&memory.report),
         };
     }
@@ -196,6 +196,10 @@ impl CrmpcLaw {
     pub(crate) fn set_feedback(&mut self, k1: f64, k2: f64, period: f64) {
         self.feedback = Gain { k1, k2 };
         self.period_feedback = period;
+    }
+
+    pub(crate) fn solver_mut(&mut self) -> &mut SolverParameters {
+        &mut self.solver
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::law::{Law, Vehicle};
 use crate::solver::{self, SolverOutputs, SolverParameters};
-use crate::table::{ANGLES, RATES, sampled_inputs, vector};
+use crate::table::{ANGLES, RATES, sampled_inputs, shown_vector, vector};
 use crate::unit::Unit;
 use control::dlmpc::{Dlmpc, Memory, Settings, SlidingMode};
 use fmi2_export::table::{discrete_output, parameter};
@@ -79,8 +79,8 @@ impl Law for DlmpcLaw {
 
     fn show(&mut self, memory: &Memory) {
         self.shown = Shown {
-            rate_command: memory.rate_command,
-            sliding: memory.sliding,
+            rate_command: shown_vector(&memory.rate_command),
+            sliding: shown_vector(&memory.sliding),
             solver: SolverOutputs::from(&memory.report),
             inner_time: memory.inner_time,
         };
@@ -88,6 +88,13 @@ impl Law for DlmpcLaw {
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
         solver::warning(&before.report, &after.report)
+    }
+}
+
+#[cfg(test)]
+impl DlmpcLaw {
+    pub(crate) fn solver_mut(&mut self) -> &mut SolverParameters {
+        &mut self.solver
     }
 }
 

@@ -1,7 +1,7 @@
 //! `BTVSMC`, `BTVSMC_DO`, `SOTVSMC_DO`: parameters and outputs of the time-varying sliding modes.
 
 use crate::law::{Law, Vehicle};
-use crate::table::{self, ANGLES, sampled_inputs, vector};
+use crate::table::{self, ANGLES, sampled_inputs, shown_vector, vector};
 use crate::unit::Unit;
 use control::sliding::{BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc};
 use fmi2_export::table::{discrete_output, parameter};
@@ -75,8 +75,10 @@ impl<V: Variant> Law for TvsmcLaw<V> {
     }
 
     fn show(&mut self, memory: &Memory<<V::Reaching as Reaching>::Memory>) {
-        self.sliding = memory.sliding;
+        self.sliding = shown_vector(&memory.sliding);
         self.estimate = memory.estimate;
+        self.estimate.sliding = shown_vector(&memory.estimate.sliding);
+        self.estimate.disturbance = shown_vector(&memory.estimate.disturbance);
     }
 }
 

@@ -1,7 +1,7 @@
 //! `TwoLoopSMC`: its own parameters and outputs.
 
 use crate::law::{Law, Vehicle};
-use crate::table::{self, ANGLES, RATES, enumeration, item, number, sampled_inputs, vector};
+use crate::table::{self, ANGLES, RATES, enumeration, item, number, sampled_inputs, shown_vector, vector};
 use crate::unit::Unit;
 use control::two_loop::{Form, Loop, OuterKinematics, TwoLoopMemory, TwoLoopSettings, TwoLoopSmc};
 use fmi2_export::table::{discrete_output, parameter};
@@ -84,12 +84,12 @@ impl Law for TwoLoopLaw {
     }
 
     fn show(&mut self, memory: &TwoLoopMemory) {
-        self.outer_sliding = memory.outer_sliding;
-        self.inner_sliding = memory.inner_sliding;
-        self.rate_command = memory.rate_command;
+        self.outer_sliding = shown_vector(&memory.outer_sliding);
+        self.inner_sliding = shown_vector(&memory.inner_sliding);
+        self.rate_command = shown_vector(&memory.rate_command);
         let gain = |of: &Loop| Vector3::from(of.k);
-        self.outer_integral = gain(&self.settings.outer).component_mul(&memory.outer_integral);
-        self.inner_integral = gain(&self.settings.inner).component_mul(&memory.inner_integral);
+        self.outer_integral = shown_vector(&gain(&self.settings.outer).component_mul(&memory.outer_integral));
+        self.inner_integral = shown_vector(&gain(&self.settings.inner).component_mul(&memory.inner_integral));
     }
 }
 
