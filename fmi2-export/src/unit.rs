@@ -1,7 +1,7 @@
 //! A model bound to its table, seen without its type: what the shell works with.
 
 use crate::call::State;
-use crate::model::{Context, EventInfo, Failure, Inputs, Model};
+use crate::model::{Context, EventInfo, Failure, Inputs, Model, Restoration};
 use crate::table::{Access, Description, Table};
 use model_description::ModelDescription;
 use model_description::variable::Kind;
@@ -175,7 +175,8 @@ impl<M: Model> Unit for Bound<M> {
         if !rest.is_empty() {
             return Err(unfit(format!("{} bytes are left over", rest.len())));
         }
-        model.restored()?;
+        let Progress { time, start_time, .. } = progress;
+        model.restored(Restoration { before: &mut self.model, time, start_time })?;
         self.model = model;
         Ok(progress)
     }

@@ -5,7 +5,7 @@ use crate::ticks::{self, Ticked};
 use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Settings, Status};
 use control::schedule::Sampled;
 use fmi2_export::table::{Common, discrete_output, input, parameter};
-use fmi2_export::{Context, Description, Failure, Inputs, Model, Table};
+use fmi2_export::{Context, Description, Failure, Inputs, Model, Restoration, Table};
 use model_description::DefaultExperiment;
 use model_description::unit;
 use nalgebra::Vector3;
@@ -103,14 +103,24 @@ impl From<&Memory> for Output {
 }
 
 impl ControlAllocator {
-    fn design(&self) -> Result<Allocator, Failure> {
-        let settings = Settings {
+    fn settings(&self) -> Settings {
+        Settings {
             method: item(&METHODS, self.parameters.method),
             jets: item(&JET_COMMANDS, self.parameters.jets),
             max_iterations: self.parameters.max_iterations.max(0).cast_unsigned(),
             ..self.parameters.settings.clone()
-        };
-        Allocator::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        }
+    }
+
+    fn design(&self) -> Result<Allocator, Failure> {
+        Allocator::new(self.settings()).map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    /// The allocator of `before`, if it was built from the same settings; else a new one.
+    fn design_again(&self, before: &mut Self) -> Result<Allocator, Failure> {
+        let settings = self.settings();
+        let same = |allocator: &mut Allocator| *allocator.settings() == settings;
+        before.allocator.take_if(same).map_or_else(|| self.design(), Ok)
     }
 
     /// The allocator and its schedule; there from initialization on.
@@ -204,8 +214,8 @@ impl Model for ControlAllocator {
         ticks::step(self, from, to, inputs, log)
     }
 
-    fn restored(&mut self) -> Result<(), Failure> {
-        self.allocator = if self.sampled.is_some() { Some(self.design()?) } else { None };
+    fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
+        self.allocator = if self.sampled.is_some() { Some(self.design_again(from.before)?) } else { None };
         Ok(())
     }
 }

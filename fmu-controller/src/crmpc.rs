@@ -7,9 +7,10 @@ use crate::unit::Unit;
 use control::crmpc::{
     Constraints, Crmpc, Guarantee, InitialState, Memory, ObserverSettings, Settings, Standing,
 };
+use control::error::DesignError;
 use control::sampled::Gain;
+use fmi2_export::Table;
 use fmi2_export::table::{discrete_output, parameter};
-use fmi2_export::{Failure, Table};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -118,6 +119,7 @@ impl Default for CrmpcLaw {
 
 impl Law for CrmpcLaw {
     type Controller = Crmpc;
+    type Settings = Settings;
 
     const NAME: &'static str = "CRMPC";
     const DESCRIPTION: &'static str =
@@ -129,8 +131,8 @@ impl Law for CrmpcLaw {
     }
 
     #[allow(private_interfaces)]
-    fn design(&self, vehicle: &Vehicle) -> Result<Crmpc, Failure> {
-        let settings = Settings {
+    fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
+        Settings {
             body: vehicle.body,
             limit_rate: vehicle.limit_rate,
             limit_moment: vehicle.limit_moment,
@@ -156,8 +158,11 @@ impl Law for CrmpcLaw {
             reference_rate: self.reference_rate,
             reference_acceleration: self.reference_acceleration,
             solver: self.solver.settings(),
-        };
-        Crmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        }
+    }
+
+    fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
+        Crmpc::new(settings)
     }
 
     fn show(&mut self, memory: &Memory) {

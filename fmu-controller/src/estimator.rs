@@ -9,7 +9,7 @@ use control::estimation::{
 };
 use control::schedule::Sampled;
 use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input, parameter};
-use fmi2_export::{Context, Description, Failure, Inputs, Model, Table};
+use fmi2_export::{Context, Description, Failure, Inputs, Model, Restoration, Table};
 use model_description::DefaultExperiment;
 use model_description::unit::{self, Unit};
 use nalgebra::Vector3;
@@ -240,7 +240,7 @@ impl Model for AttitudeEstimator {
         ticks::step(self, from, to, inputs, log)
     }
 
-    fn restored(&mut self) -> Result<(), Failure> {
+    fn restored(&mut self, _from: Restoration<'_, Self>) -> Result<(), Failure> {
         self.estimator = if self.sampled.is_some() { Some(self.design()?) } else { None };
         Ok(())
     }

@@ -263,3 +263,11 @@ fn a_time_budget_of_any_length_is_worked_with() {
         assert!(crmpc.output.moment.norm() > 0.0 && dlmpc.output.moment.norm() > 0.0, "{budget} s");
     }
 }
+
+#[test]
+fn variants_have_an_observer_if_their_published_settings_have_one() {
+    fn agrees<V: tvsmc::Variant>() -> bool {
+        V::published().observer.is_some() == V::OBSERVER
+    }
+    assert!(agrees::<tvsmc::Btvsmc>() && agrees::<tvsmc::BtvsmcDo>() && agrees::<tvsmc::SotvsmcDo>());
+}

@@ -3,9 +3,10 @@
 use crate::law::{Law, Vehicle};
 use crate::table::{self, ANGLES, RATES, enumeration, item, number, sampled_inputs, shown_vector, vector};
 use crate::unit::Unit;
+use control::error::DesignError;
 use control::two_loop::{Form, Loop, OuterKinematics, TwoLoopMemory, TwoLoopSettings, TwoLoopSmc};
+use fmi2_export::Table;
 use fmi2_export::table::{discrete_output, parameter};
-use fmi2_export::{Failure, Table};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -54,6 +55,7 @@ impl Default for TwoLoopLaw {
 
 impl Law for TwoLoopLaw {
     type Controller = TwoLoopSmc;
+    type Settings = TwoLoopSettings;
 
     const NAME: &'static str = "TwoLoopSMC";
     const DESCRIPTION: &'static str = "Two-loop sliding-mode attitude controller of Jia, Zhou and Zhou";
@@ -72,15 +74,18 @@ impl Law for TwoLoopLaw {
     }
 
     #[allow(private_interfaces)]
-    fn design(&self, vehicle: &Vehicle) -> Result<TwoLoopSmc, Failure> {
-        let settings = TwoLoopSettings {
+    fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
+        TwoLoopSettings {
             form: item(&FORMS, self.form),
             kinematics: item(&KINEMATICS, self.kinematics),
             body: vehicle.body,
             limit_moment: vehicle.saturates_at(),
             ..self.settings
-        };
-        TwoLoopSmc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        }
+    }
+
+    fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
+        TwoLoopSmc::new(settings)
     }
 
     fn show(&mut self, memory: &TwoLoopMemory) {

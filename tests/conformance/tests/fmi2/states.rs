@@ -4,6 +4,7 @@
 use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE};
 use conformance::{Bits, Instance, Unit, c, units};
 use std::ops::Range;
+use std::time::Instant;
 
 fn driver(fmu_type: i32) -> fn(&Instance, Range<u32>) -> Vec<Bits> {
     if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive }
@@ -46,6 +47,46 @@ fn handles_and_bytes_bring_back_the_same_future() {
             instance.ok(c!(instance, fmi2FreeFMUstate(instance.component, &mut handle)));
             let status = c!(instance, fmi2SetFMUstate(instance.component, before));
             instance.refused(status, ERROR, &["fmi2SetFMUstate", "was freed"]);
+        }
+    }
+}
+
+/// The medians of 201 calls, s. Once as the state is and once with the one from before the first step: the parameters are the same.
+fn durations(unit: &Unit, fmu_type: i32) -> [f64; 2] {
+    let instance = unit.instance(fmu_type).initialized();
+    let first = instance.save();
+    driver(fmu_type)(&instance, 0..12);
+    let mut last = instance.save();
+    let median = |call: &mut dyn FnMut()| {
+        let mut all: Vec<_> = (0..201)
+            .map(|_| {
+                let clock = Instant::now();
+                call();
+                clock.elapsed().as_secs_f64()
+            })
+            .collect();
+        all.sort_by(f64::total_cmp);
+        all[100]
+    };
+    let get = median(&mut || instance.ok(c!(instance, fmi2GetFMUstate(instance.component, &mut last))));
+    let mut turn = 0;
+    let set = median(&mut || {
+        turn += 1;
+        instance.restore(if turn % 2 == 0 { first } else { last });
+    });
+    [get, set]
+}
+
+/// `cargo test --release -p conformance --test fmi2 -- --ignored --nocapture taking_back`
+#[test]
+#[ignore = "measures time"]
+fn taking_back_a_state_takes_little_time() {
+    println!("{:<20} {:>12} {:>12}", "unit", "get (us)", "set (us)");
+    for unit in units() {
+        for &fmu_type in unit.interfaces() {
+            let [get, set] = durations(&unit, fmu_type);
+            println!("{:<20} {:>12.2} {:>12.2}", unit.name(), get * 1e6, set * 1e6);
+            assert!(set <= 20e-6, "{}: {} us", unit.name(), set * 1e6);
         }
     }
 }
