@@ -3,7 +3,7 @@
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use vehicle::time::{tick_time, tolerance};
+use vehicle::time::{tick_time, tick_tolerance};
 
 /// Memory of a sampled unit and where it stands in time. At a tick the output is a function of the committed memory and of
 /// the input now given: it may be evaluated any number of times, and is committed when time leaves the tick. Attitude
@@ -47,12 +47,12 @@ where
 
     /// Whether a tick is due at `time` (s).
     pub fn is_due(&self, time: f64, period: f64) -> bool {
-        self.next_time(period) <= time + tolerance(time)
+        self.next_time(period) <= time + tick_tolerance(time, period)
     }
 
     /// Time of the first uncommitted tick (s), if it comes before `time` (s).
     pub fn next_before(&self, time: f64, period: f64) -> Option<f64> {
-        Some(self.next_time(period)).filter(|tick| *tick < time - tolerance(time))
+        Some(self.next_time(period)).filter(|tick| *tick < time - tick_tolerance(time, period))
     }
 
     /// Evaluates the first uncommitted tick: `update` gets memory and number of the tick. It must be a function of these and

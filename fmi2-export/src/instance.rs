@@ -15,8 +15,11 @@ use std::path::PathBuf;
 
 /// How far the communication point may be from the unit's time, relative to both and to the step: importers add up time.
 const TIME_TOLERANCE: f64 = 1e-9;
-/// How far a step may reach beyond the stop time, relative to it. The standard wants an error for computing past a defined
-/// stop time; importers that add up time overshoot it by some 1e-9.
+/// But never further than this (s), unless rounding is larger.
+const LONGEST_TOLERANCE: f64 = 1e-4;
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// How far a step may reach beyond the stop time, relative to it, but never by more than a step. The standard wants an error for
+/// computing past a defined stop time; importers that add up time overshoot it by some 1e-9.
 const STOP_TOLERANCE: f64 = 1e-6;
 
 /// Result of the body of a call.
@@ -526,12 +529,14 @@ impl Instance {
             return error(format!("cannot step from {point} s by {size} s"));
         }
         let from = self.progress.time;
-        if (point - from).abs() > TIME_TOLERANCE * from.abs().max(point.abs()).max(size) {
+        let largest = from.abs().max(point.abs()).max(size);
+        let tolerance = (TIME_TOLERANCE * largest).min(LONGEST_TOLERANCE).max(ROUNDING * largest);
+        if (point - from).abs() > tolerance {
             return error(format!("communication point {point} s, but the unit is at {from} s"));
         }
         let to = (point + size).max(from);
         if let Some(stop) = self.progress.stop_time
-            && to - stop > STOP_TOLERANCE * stop.abs().max(size)
+            && to - stop > (STOP_TOLERANCE * stop.abs().max(size)).min(size.max(tolerance))
         {
             return error(format!(
                 "a step to {to} s goes beyond the stop time {stop} s given to fmi2SetupExperiment"

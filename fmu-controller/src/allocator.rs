@@ -190,7 +190,9 @@ impl Model for ControlAllocator {
     }
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
-        self.allocator = Some(self.design()?);
+        let allocator = self.design()?;
+        ticks::check_resolution(context.start_time, allocator.period())?;
+        self.allocator = Some(allocator);
         self.sampled = Some(Sampled::new(context.start_time, Memory::default()));
         Ok(())
     }

@@ -215,6 +215,7 @@ impl Model for AttitudeEstimator {
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         let estimator = self.design()?;
+        ticks::check_resolution(context.start_time, estimator.period())?;
         self.sampled = Some(Sampled::new(context.start_time, estimator.memory()));
         self.estimator = Some(estimator);
         Ok(())

@@ -186,6 +186,7 @@ impl<L: Law> Model for Unit<L> {
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         self.source = Source::new(&self.parameters.reference, context)?;
         let designed = self.design()?;
+        ticks::check_resolution(context.start_time, designed.controller.period())?;
         self.sampled = Some(Sampled::new(context.start_time, designed.controller.memory()));
         self.designed = Some(designed);
         Ok(())

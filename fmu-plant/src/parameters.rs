@@ -20,7 +20,7 @@ use vehicle::triad::Triad;
 /// Longest integration step by default, s.
 const STEP: f64 = 0.01;
 /// A time (s) that no simulation reaches; FMI importers do not all read an infinite number.
-const NEVER: f64 = 1e9;
+const NEVER: f64 = 1e15;
 
 /// The kinds in the order of their enumeration values 1, 2, …, with name and description.
 pub(crate) const KINDS: [(Kind, &str, &str); 7] = [

@@ -13,7 +13,7 @@ use crate::integrator::{equal_steps, rk4};
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
 use crate::platform::Surroundings;
 use crate::sensors::{self, Sensors};
-use crate::time::tolerance;
+use crate::time::{check_resolution, tolerance};
 use crate::transport::Transport;
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, SMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -248,6 +248,10 @@ impl Plant {
             return refuse("actuation.delay", problem);
         }
         config.disturbance.check()?;
+        let held = config.disturbance.intervals(start_time).map(|(_, length)| length);
+        for period in held.into_iter().chain([config.step]) {
+            check_resolution(start_time, period)?;
+        }
         config.surroundings.check()?;
         let initial = angles(&config.initial);
         let mut state = config.initial;

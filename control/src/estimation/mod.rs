@@ -18,7 +18,7 @@ use vehicle::kinematics::{self, Kinematics};
 use vehicle::platform::body_from_velocity;
 use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
-use vehicle::time::tolerance;
+use vehicle::time::tick_tolerance;
 
 /// Where the magnetometer's calibration comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -438,7 +438,7 @@ impl Estimator {
     /// believed, as there are no others.
     fn is_usable(&self, memory: &Memory, time: f64, line: &Line) -> bool {
         let oldest = memory.running.map_or(f64::NEG_INFINITY, |running| running.last.time);
-        let taken = line.time <= time + tolerance(time)
+        let taken = line.time <= time + tick_tolerance(time, self.settings.period)
             && line.time >= oldest
             && line.time >= time - self.settings.lost_after;
         let shown = || self.settings.gates.iter().zip(&line.readings).all(|(gate, value)| gate.shows(value));
