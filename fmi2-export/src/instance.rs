@@ -462,7 +462,7 @@ impl Instance {
         let position = self.find(handle)?;
         let payload =
             saved::unwrap(&self.guid, self.interface, &self.saved[position].0).map_err(Failure::Error)?;
-        self.progress = self.unit.restore(payload)?;
+        self.progress = self.unit.restore(payload, self.interface)?;
         self.progress.extrapolations.reserve(self.variables.len());
         self.stale = true;
         self.last_step = Status::Ok;

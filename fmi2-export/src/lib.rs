@@ -20,6 +20,7 @@ mod instance;
 pub mod interface;
 mod logger;
 pub mod model;
+mod numbers;
 mod resource;
 mod saved;
 pub mod table;

@@ -50,6 +50,10 @@ pub struct Restoration<'a, M> {
     pub time: f64,
     /// Start time of its experiment, s.
     pub start_time: f64,
+    /// Whether the model was initialized with the parameters that it has; else it will be before anything is asked of it.
+    pub initialized: bool,
+    /// Whether the state is one of a step that may have failed in the middle.
+    pub failed: bool,
 }
 
 /// A unit: parameters, inputs, state and outputs in one value, whose fields the [`Description`]'s table points at.

@@ -217,7 +217,15 @@ impl Model for ControlAllocator {
     }
 
     fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
-        self.allocator = if self.sampled.is_some() { Some(self.design_again(from.before)?) } else { None };
+        let Some(sampled) = self.sampled.as_ref().filter(|_| from.initialized) else { return Ok(()) };
+        let period = match self.settings() {
+            Settings { jets: JetCommand::Pwpf, pwpf, .. } => pwpf.period,
+            Settings { period, .. } => period,
+        };
+        if !sampled.fits((from.start_time, from.time), period, from.failed, |_| true) {
+            return ticks::misfit("its ticks are not those of its time");
+        }
+        self.allocator = Some(self.design_again(from.before)?);
         Ok(())
     }
 }

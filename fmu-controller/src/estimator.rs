@@ -241,8 +241,13 @@ impl Model for AttitudeEstimator {
         ticks::step(self, from, to, inputs, log)
     }
 
-    fn restored(&mut self, _from: Restoration<'_, Self>) -> Result<(), Failure> {
-        self.estimator = if self.sampled.is_some() { Some(self.design()?) } else { None };
+    fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
+        let Some(sampled) = self.sampled.as_ref().filter(|_| from.initialized) else { return Ok(()) };
+        let estimator = self.design()?;
+        if !sampled.fits((from.start_time, from.time), estimator.period(), from.failed, |_| true) {
+            return ticks::misfit("its ticks are not those of its time");
+        }
+        self.estimator = Some(estimator);
         Ok(())
     }
 }

@@ -220,7 +220,19 @@ impl<L: Law> Model for Unit<L> {
     }
 
     fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
-        self.designed = if self.sampled.is_some() { Some(self.design_again(from.before)?) } else { None };
-        Ok(())
+        let Some(sampled) = self.sampled.as_ref().filter(|_| from.initialized) else { return Ok(()) };
+        if self.source != from.before.source && !self.source.fits(&self.parameters.reference) {
+            return ticks::misfit("its reference is not that of its parameters");
+        }
+        let designed = self.design_again(from.before)?;
+        let period = designed.controller.period();
+        let times = (from.start_time, from.time);
+        if sampled.fits(times, period, from.failed, |memory| designed.controller.fits(memory)) {
+            self.designed = Some(designed);
+            return Ok(());
+        }
+        // The other unit goes on with what was taken from it.
+        from.before.designed.get_or_insert(designed);
+        ticks::misfit("its ticks are not those of its time, or its memory has another shape")
     }
 }

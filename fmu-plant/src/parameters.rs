@@ -65,7 +65,7 @@ const IDEAL_SENSORS: i32 = 1;
 pub(crate) const MEMS_SENSORS: i32 = 2;
 
 /// What a user sets before the simulation, named as in the table.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Parameters {
     pub(crate) inertia: Inertia,
     pub(crate) inertia_scale: f64,

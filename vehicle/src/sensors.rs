@@ -153,6 +153,20 @@ impl Sensors {
         Ok(Self { config: *config, start, before: None, last: None, line: vec![None; length], arrived })
     }
 
+    /// Whether both are made of the same configuration and begin at the same time.
+    pub(crate) fn same_configuration(&self, other: &Self) -> bool {
+        self.config == other.config && self.start == other.start && self.line.len() == other.line.len()
+    }
+
+    /// Whether these can be the sensors at `time` (s): nothing that they have taken is of the future.
+    pub(crate) fn fits(&self, time: f64, failed: bool) -> bool {
+        let latest = if failed { i64::MAX / 2 } else { self.tick_at(time) };
+        let past = |taken: &Taken| (0..=latest).contains(&taken.tick) && taken.time.is_finite();
+        check_resolution(time, self.config.line.period).is_ok()
+            && self.before.iter().chain(&self.last).chain(self.line.iter().flatten()).all(past)
+            && self.arrived.time.is_finite()
+    }
+
     fn tick_at(&self, time: f64) -> i64 {
         tick(time, self.start, self.config.line.period)
     }
