@@ -32,6 +32,11 @@ pub trait Controller {
         Self::Memory::default()
     }
 
+    /// Whether `memory` can be one of this controller's, or has another shape: one that was restored may be forged.
+    fn fits(&self, _memory: &Self::Memory) -> bool {
+        true
+    }
+
     /// The tick with number `tick` at `time` (s): the moment to hold until the next one, N m.
     fn update(
         &mut self,

@@ -202,6 +202,10 @@ impl<C: Controller> Controller for Delayed<C> {
         Memory { inner: self.inner.memory(), under_way: vec![Vector3::zeros(); self.predictor.count] }
     }
 
+    fn fits(&self, memory: &Self::Memory) -> bool {
+        memory.under_way.len() == self.predictor.count && self.inner.fits(&memory.inner)
+    }
+
     fn update(
         &mut self,
         memory: &mut Self::Memory,

@@ -50,8 +50,8 @@ impl Report {
         self.cost = ended.certificate.cost;
         self.iterations = ended.iterations;
         self.residual = ended.certificate.residual();
-        self.solves += 1;
-        self.fallbacks += u32::from(ended.status == Status::Fallback);
+        self.solves = self.solves.saturating_add(1);
+        self.fallbacks = self.fallbacks.saturating_add(u32::from(ended.status == Status::Fallback));
         self.time = clock.elapsed().as_secs_f64();
     }
 }

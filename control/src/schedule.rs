@@ -3,7 +3,10 @@
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use vehicle::time::{tick_time, tolerance};
+use vehicle::time::{check_resolution, tick_time, tick_tolerance};
+
+/// Beyond this number the time of a tick is not exact.
+const LAST_TICK: u64 = 1 << 53;
 
 /// Memory of a sampled unit and where it stands in time. At a tick the output is a function of the committed memory and of
 /// the input now given: it may be evaluated any number of times, and is committed when time leaves the tick. Attitude
@@ -47,12 +50,31 @@ where
 
     /// Whether a tick is due at `time` (s).
     pub fn is_due(&self, time: f64, period: f64) -> bool {
-        self.next_time(period) <= time + tolerance(time)
+        self.next_time(period) <= time + tick_tolerance(time, period)
     }
 
     /// Time of the first uncommitted tick (s), if it comes before `time` (s).
     pub fn next_before(&self, time: f64, period: f64) -> Option<f64> {
-        Some(self.next_time(period)).filter(|tick| *tick < time - tolerance(time))
+        Some(self.next_time(period)).filter(|tick| *tick < time - tick_tolerance(time, period))
+    }
+
+    /// Whether this can be where a unit stands at `time` (s) in an experiment that began at `start` (s): all ticks before are
+    /// committed and, unless a step has `failed` in the middle, none that come later. `fits` looks at each memory.
+    pub fn fits(
+        &self,
+        (start, time): (f64, f64),
+        period: f64,
+        failed: bool,
+        fits: impl Fn(&Memory) -> bool,
+    ) -> bool {
+        let next = self.next_time(period);
+        check_resolution(start, period).is_ok()
+            && self.start.to_bits() == start.to_bits()
+            && self.next <= LAST_TICK
+            && self.next_before(time, period).is_none()
+            && (failed || next <= time + period + tick_tolerance(time, period))
+            && fits(&self.committed)
+            && fits(&self.pending)
     }
 
     /// Evaluates the first uncommitted tick: `update` gets memory and number of the tick. It must be a function of these and

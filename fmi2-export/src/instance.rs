@@ -15,8 +15,11 @@ use std::path::PathBuf;
 
 /// How far the communication point may be from the unit's time, relative to both and to the step: importers add up time.
 const TIME_TOLERANCE: f64 = 1e-9;
-/// How far a step may reach beyond the stop time, relative to it. The standard wants an error for computing past a defined
-/// stop time; importers that add up time overshoot it by some 1e-9.
+/// But never further than this (s), unless rounding is larger.
+const LONGEST_TOLERANCE: f64 = 1e-4;
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// How far a step may reach beyond the stop time, relative to it, but never by more than a step. The standard wants an error for
+/// computing past a defined stop time; importers that add up time overshoot it by some 1e-9.
 const STOP_TOLERANCE: f64 = 1e-6;
 
 /// Result of the body of a call.
@@ -68,6 +71,10 @@ pub(crate) trait Scalar: PartialEq + Sized {
     fn same(&self, other: &Self) -> bool {
         self == other
     }
+    /// Whether the value can be handed out: a number that is infinite or none at all cannot.
+    fn is_presentable(&self) -> bool {
+        true
+    }
     /// What is wrong with the value for a variable of this kind.
     fn problem(&self, _kind: &Kind) -> Option<String> {
         None
@@ -82,6 +89,9 @@ impl Scalar for f64 {
     fn same(&self, other: &Self) -> bool {
         // 0 and −0 are equal, but not the same to what is computed from them.
         self.to_bits() == other.to_bits()
+    }
+    fn is_presentable(&self) -> bool {
+        self.is_finite()
     }
     fn problem(&self, kind: &Kind) -> Option<String> {
         if !self.is_finite() {
@@ -335,11 +345,22 @@ impl Instance {
         }
         for (i, &reference) in references.iter().enumerate() {
             match T::field(self.unit.as_mut(), reference as usize) {
-                Some(value) => sink(i, value),
+                Some(value) if value.is_presentable() => sink(i, value),
+                Some(_) => return Err(self.overflow(reference)),
                 None => return Err(self.misfit::<T>(reference)),
             }
         }
         Ok(())
+    }
+
+    /// A calculated value is not finite. In model exchange it may come from an integrator's trial state.
+    fn overflow(&self, reference: u32) -> Failure {
+        let name = self.variable(reference).map_or("", |variable| &variable.name);
+        let text = format!("'{name}' is not a finite number; an input or a parameter is too large");
+        match self.interface {
+            Interface::ModelExchange => Failure::Discard(text),
+            Interface::CoSimulation => Failure::Error(text),
+        }
     }
 
     /// Sets all variables, or none if one value is refused.
@@ -441,7 +462,7 @@ impl Instance {
         let position = self.find(handle)?;
         let payload =
             saved::unwrap(&self.guid, self.interface, &self.saved[position].0).map_err(Failure::Error)?;
-        self.progress = self.unit.restore(payload)?;
+        self.progress = self.unit.restore(payload, self.interface)?;
         self.progress.extrapolations.reserve(self.variables.len());
         self.stale = true;
         self.last_step = Status::Ok;
@@ -508,12 +529,14 @@ impl Instance {
             return error(format!("cannot step from {point} s by {size} s"));
         }
         let from = self.progress.time;
-        if (point - from).abs() > TIME_TOLERANCE * from.abs().max(point.abs()).max(size) {
+        let largest = from.abs().max(point.abs()).max(size);
+        let tolerance = (TIME_TOLERANCE * largest).min(LONGEST_TOLERANCE).max(ROUNDING * largest);
+        if (point - from).abs() > tolerance {
             return error(format!("communication point {point} s, but the unit is at {from} s"));
         }
         let to = (point + size).max(from);
         if let Some(stop) = self.progress.stop_time
-            && to - stop > STOP_TOLERANCE * stop.abs().max(size)
+            && to - stop > (STOP_TOLERANCE * stop.abs().max(size)).min(size.max(tolerance))
         {
             return error(format!(
                 "a step to {to} s goes beyond the stop time {stop} s given to fmi2SetupExperiment"

@@ -15,20 +15,47 @@ use crate::types::{
     TERMINATED,
 };
 use crate::unit::Export;
+use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr::null_mut;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// `fmi2Component`.
 type Component = *mut c_void;
 
-/// Runs a call on the instance behind `component`. A null component has no logger to report to.
-unsafe fn run(component: Component, call: &Call, body: impl FnOnce(&mut Instance) -> Outcome) -> Status {
-    // SAFETY: not null means that it came from fmi2Instantiate and was not freed, and that no other call is under way.
-    match unsafe { component.cast::<Instance>().as_mut() } {
-        Some(instance) => instance.run(call, body),
-        None => Status::Error,
+/// What `fmi2Component` points at: an instance that one call at a time may use. The standard leaves that to the importer, but a
+/// logger that calls its unit back, or a second thread, must not find an instance that is being changed.
+struct Shared {
+    busy: AtomicBool,
+    instance: UnsafeCell<Instance>,
+}
+
+/// The instance is free again when this is dropped, also by a panic.
+struct Busy<'a>(&'a AtomicBool);
+
+impl<'a> Busy<'a> {
+    /// `None` if a call is under way.
+    fn begin(busy: &'a AtomicBool) -> Option<Self> {
+        busy.compare_exchange(false, true, Ordering::Acquire, Ordering::Relaxed).is_ok().then(|| Self(busy))
     }
+}
+
+impl Drop for Busy<'_> {
+    fn drop(&mut self) {
+        self.0.store(false, Ordering::Release);
+    }
+}
+
+/// Runs a call on the instance behind `component`. A null component has no logger to report to, and that of an instance which
+/// another call is using must not be touched: both are refused without a word.
+unsafe fn run(component: Component, call: &Call, body: impl FnOnce(&mut Instance) -> Outcome) -> Status {
+    // SAFETY: not null means that it came from fmi2Instantiate and was not freed.
+    let Some(shared) = (unsafe { component.cast::<Shared>().as_ref() }) else { return Status::Error };
+    let Some(_busy) = Busy::begin(&shared.busy) else { return Status::Error };
+    // SAFETY: whoever has set the flag is alone until it is cleared, which is after the last use of this reference.
+    let instance = unsafe { &mut *shared.instance.get() };
+    instance.run(call, body)
 }
 
 fn check_room<T>(name: &str, is_null: bool, n: usize) -> Result<(), Failure> {
@@ -154,7 +181,8 @@ pub unsafe fn fmi2Instantiate(
             Some(resource::folder(unsafe { text("fmuResourceLocation", resource_location) }?)?)
         };
         let setting = Setting { guid, interface, logger: logger(), resources };
-        Ok(Box::into_raw(Box::new(Instance::new(export, description, setting))).cast())
+        let instance = UnsafeCell::new(Instance::new(export, description, setting));
+        Ok(Box::into_raw(Box::new(Shared { busy: AtomicBool::new(false), instance })).cast())
     };
     match catch_unwind(AssertUnwindSafe(instantiate)) {
         Ok(Ok(component)) => component,
@@ -170,12 +198,15 @@ pub unsafe fn fmi2Instantiate(
     }
 }
 
+/// Does nothing while another call uses the instance: a logger cannot free the unit that calls it.
 pub unsafe fn fmi2FreeInstance(component: Component) {
-    if component.is_null() {
-        return;
-    }
-    // SAFETY: not null, so it came from fmi2Instantiate and is freed once.
-    let instance = unsafe { Box::from_raw(component.cast::<Instance>()) };
+    // SAFETY: not null means that it came from fmi2Instantiate and was not freed.
+    let Some(shared) = (unsafe { component.cast::<Shared>().as_ref() }) else { return };
+    let Some(busy) = Busy::begin(&shared.busy) else { return };
+    // The flag stays set for good.
+    std::mem::forget(busy);
+    // SAFETY: not null, so it came from fmi2Instantiate and is freed once; no call is under way.
+    let instance = unsafe { Box::from_raw(component.cast::<Shared>()) };
     if let Err(panic) = catch_unwind(AssertUnwindSafe(|| drop(instance))) {
         std::mem::forget(panic);
     }

@@ -20,6 +20,7 @@ mod instance;
 pub mod interface;
 mod logger;
 pub mod model;
+mod numbers;
 mod resource;
 mod saved;
 pub mod table;
@@ -27,6 +28,6 @@ pub mod table;
 pub mod types;
 mod unit;
 
-pub use model::{Context, EventInfo, Failure, Inputs, Model};
+pub use model::{Context, EventInfo, Failure, Inputs, Model, Restoration};
 pub use table::{Description, Table};
 pub use unit::{Export, MAX_INPUT_DERIVATIVE_ORDER, describe};

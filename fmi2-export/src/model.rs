@@ -41,6 +41,21 @@ pub struct EventInfo {
     pub states_changed: bool,
 }
 
+/// What surrounds a model that was restored from a saved state.
+#[derive(Debug)]
+pub struct Restoration<'a, M> {
+    /// The model whose place it takes.
+    pub before: &'a mut M,
+    /// Time of the saved state, s.
+    pub time: f64,
+    /// Start time of its experiment, s.
+    pub start_time: f64,
+    /// Whether the model was initialized with the parameters that it has; else it will be before anything is asked of it.
+    pub initialized: bool,
+    /// Whether the state is one of a step that may have failed in the middle.
+    pub failed: bool,
+}
+
 /// A unit: parameters, inputs, state and outputs in one value, whose fields the [`Description`]'s table points at.
 ///
 /// The shell owns call order, value checks, logging and memory; a model only computes. Everything that determines the
@@ -80,11 +95,12 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
         log: &mut dyn FnMut(&str),
     ) -> Result<(), Failure>;
 
-    /// Called after the model was restored from a saved state: makes scratch space again.
+    /// Called after the model was restored from a saved state, before it takes the place of another one: makes scratch space
+    /// again, or takes over that of the other, which is not used any more if this succeeds.
     ///
     /// # Errors
-    /// If the state cannot be used.
-    fn restored(&mut self) -> Result<(), Failure> {
+    /// If the state cannot be used. The other model is then as it was.
+    fn restored(&mut self, _from: Restoration<'_, Self>) -> Result<(), Failure> {
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! The one table of a unit's variables: what FMI says of each, and the field of the model that holds its value.
 
+use crate::instance::Scalar;
 use model_description::DefaultExperiment;
 use model_description::unit::Unit;
 use model_description::variable::{Causality, EnumerationType, Kind, Variability, Variable};
@@ -20,6 +21,22 @@ pub(crate) enum Access<M> {
 pub struct Entry<M> {
     pub(crate) variable: Variable,
     pub(crate) access: Access<M>,
+}
+
+impl<M> Entry<M> {
+    /// What is wrong with the value that the model holds, if it is one that is set from outside.
+    pub(crate) fn problem(&self, model: &mut M) -> Option<String> {
+        let Variable { name, kind, .. } = &self.variable;
+        if self.variable.is_calculated() {
+            return None;
+        }
+        let problem = match &self.access {
+            Access::Real(field) => field(model).problem(kind),
+            Access::Integer(field) | Access::Enumeration(field) => field(model).problem(kind),
+            Access::Boolean(_) | Access::String(_) => None,
+        };
+        problem.map(|problem| format!("'{name}' {problem}"))
+    }
 }
 
 /// All that makes a unit: the texts, the proposed experiment and the table.

@@ -1,10 +1,12 @@
 //! A model bound to its table, seen without its type: what the shell works with.
 
 use crate::call::State;
-use crate::model::{Context, EventInfo, Failure, Inputs, Model};
+use crate::model::{Context, EventInfo, Failure, Inputs, Model, Restoration};
+use crate::numbers::are_numbers;
 use crate::table::{Access, Description, Table};
+use crate::types::Interface;
 use model_description::ModelDescription;
-use model_description::variable::Kind;
+use model_description::variable::{Causality, Kind, Variability, Variable};
 use serde::{Deserialize, Serialize};
 
 /// Highest order of fmi2SetRealInputDerivatives.
@@ -56,6 +58,41 @@ impl Default for Progress {
     }
 }
 
+impl Progress {
+    /// Why this cannot be where an instance stands.
+    fn problem<M>(&self, table: &Table<M>, interface: Interface) -> Option<String> {
+        let Self { state, time, start_time, stop_time, initialized, extrapolations } = self;
+        if !(time.is_finite() && start_time.is_finite() && !stop_time.is_some_and(f64::is_nan)) {
+            return Some("it holds a time that is not a finite number".into());
+        }
+        let possible = match interface {
+            Interface::ModelExchange => !matches!(state, State::StepComplete | State::StepFailed),
+            Interface::CoSimulation => !matches!(state, State::EventMode | State::ContinuousTimeMode),
+        };
+        if *state == State::Fatal || !possible {
+            return Some(format!("a unit cannot go on in state {}", state.name()));
+        }
+        let running = matches!(state, State::EventMode | State::ContinuousTimeMode | State::StepComplete);
+        if running && !initialized {
+            return Some("it runs but was not initialized".into());
+        }
+        let continuous = |input: &Extrapolation| {
+            let entry = table.entries.get(input.reference);
+            let right = entry.is_some_and(|entry| {
+                let Variable { causality, variability, .. } = &entry.variable;
+                matches!(entry.access, Access::Real(_))
+                    && *causality == Causality::Input
+                    && *variability == Variability::Continuous
+            });
+            right && input.base.is_finite() && input.derivatives.iter().all(|value| value.is_finite())
+        };
+        if extrapolations.len() > table.entries.len() || !extrapolations.iter().all(continuous) {
+            return Some("it holds derivatives of what is not a continuous input".into());
+        }
+        None
+    }
+}
+
 /// A model with its table.
 pub(crate) trait Unit: Send {
     fn real(&mut self, reference: usize) -> Option<&mut f64>;
@@ -78,7 +115,7 @@ pub(crate) trait Unit: Send {
 
     fn save(&self, progress: &Progress) -> Result<Vec<u8>, Failure>;
     /// On an error the model is as it was.
-    fn restore(&mut self, payload: &[u8]) -> Result<Progress, Failure>;
+    fn restore(&mut self, payload: &[u8], interface: Interface) -> Result<Progress, Failure>;
 
     fn continuous_states(&self, states: &mut [f64]);
     fn set_continuous_states(&mut self, states: &[f64]);
@@ -168,14 +205,27 @@ impl<M: Model> Unit for Bound<M> {
             .map_err(|error| Failure::Error(format!("the state cannot be saved: {error}")))
     }
 
-    fn restore(&mut self, payload: &[u8]) -> Result<Progress, Failure> {
+    fn restore(&mut self, payload: &[u8], interface: Interface) -> Result<Progress, Failure> {
         let unfit = |problem: String| Failure::Error(format!("the saved state does not fit: {problem}"));
         let ((progress, mut model), rest): ((Progress, M), _) =
             postcard::take_from_bytes(payload).map_err(|error| unfit(error.to_string()))?;
+        if let Some(problem) = progress.problem(&self.table, interface) {
+            return Err(unfit(problem));
+        }
         if !rest.is_empty() {
             return Err(unfit(format!("{} bytes are left over", rest.len())));
         }
-        model.restored()?;
+        if !are_numbers(&model) {
+            return Err(unfit("it holds a value that is not a number".into()));
+        }
+        for entry in &self.table.entries {
+            if let Some(problem) = entry.problem(&mut model) {
+                return Err(unfit(problem));
+            }
+        }
+        let Progress { time, start_time, state, initialized, .. } = progress;
+        let failed = matches!(state, State::StepFailed | State::Error | State::Terminated);
+        model.restored(Restoration { before: &mut self.model, time, start_time, initialized, failed })?;
         self.model = model;
         Ok(progress)
     }

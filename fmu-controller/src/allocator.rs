@@ -5,7 +5,7 @@ use crate::ticks::{self, Ticked};
 use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Settings, Status};
 use control::schedule::Sampled;
 use fmi2_export::table::{Common, discrete_output, input, parameter};
-use fmi2_export::{Context, Description, Failure, Inputs, Model, Table};
+use fmi2_export::{Context, Description, Failure, Inputs, Model, Restoration, Table};
 use model_description::DefaultExperiment;
 use model_description::unit;
 use nalgebra::Vector3;
@@ -103,14 +103,24 @@ impl From<&Memory> for Output {
 }
 
 impl ControlAllocator {
-    fn design(&self) -> Result<Allocator, Failure> {
-        let settings = Settings {
+    fn settings(&self) -> Settings {
+        Settings {
             method: item(&METHODS, self.parameters.method),
             jets: item(&JET_COMMANDS, self.parameters.jets),
             max_iterations: self.parameters.max_iterations.max(0).cast_unsigned(),
             ..self.parameters.settings.clone()
-        };
-        Allocator::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        }
+    }
+
+    fn design(&self) -> Result<Allocator, Failure> {
+        Allocator::new(self.settings()).map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    /// The allocator of `before`, if it was built from the same settings; else a new one.
+    fn design_again(&self, before: &mut Self) -> Result<Allocator, Failure> {
+        let settings = self.settings();
+        let same = |allocator: &mut Allocator| *allocator.settings() == settings;
+        before.allocator.take_if(same).map_or_else(|| self.design(), Ok)
     }
 
     /// The allocator and its schedule; there from initialization on.
@@ -180,7 +190,9 @@ impl Model for ControlAllocator {
     }
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
-        self.allocator = Some(self.design()?);
+        let allocator = self.design()?;
+        ticks::check_resolution(context.start_time, allocator.period())?;
+        self.allocator = Some(allocator);
         self.sampled = Some(Sampled::new(context.start_time, Memory::default()));
         Ok(())
     }
@@ -204,8 +216,16 @@ impl Model for ControlAllocator {
         ticks::step(self, from, to, inputs, log)
     }
 
-    fn restored(&mut self) -> Result<(), Failure> {
-        self.allocator = if self.sampled.is_some() { Some(self.design()?) } else { None };
+    fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
+        let Some(sampled) = self.sampled.as_ref().filter(|_| from.initialized) else { return Ok(()) };
+        let period = match self.settings() {
+            Settings { jets: JetCommand::Pwpf, pwpf, .. } => pwpf.period,
+            Settings { period, .. } => period,
+        };
+        if !sampled.fits((from.start_time, from.time), period, from.failed, |_| true) {
+            return ticks::misfit("its ticks are not those of its time");
+        }
+        self.allocator = Some(self.design_again(from.before)?);
         Ok(())
     }
 }

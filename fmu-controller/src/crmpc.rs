@@ -2,14 +2,15 @@
 
 use crate::law::{Law, Vehicle};
 use crate::solver::{self, SolverOutputs, SolverParameters};
-use crate::table::{self, ANGLES, enumeration, item, number, sampled_inputs, vector};
+use crate::table::{self, ANGLES, enumeration, item, number, sampled_inputs, shown, shown_vector, vector};
 use crate::unit::Unit;
 use control::crmpc::{
     Constraints, Crmpc, Guarantee, InitialState, Memory, ObserverSettings, Settings, Standing,
 };
+use control::error::DesignError;
 use control::sampled::Gain;
+use fmi2_export::Table;
 use fmi2_export::table::{discrete_output, parameter};
-use fmi2_export::{Failure, Table};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -118,6 +119,7 @@ impl Default for CrmpcLaw {
 
 impl Law for CrmpcLaw {
     type Controller = Crmpc;
+    type Settings = Settings;
 
     const NAME: &'static str = "CRMPC";
     const DESCRIPTION: &'static str =
@@ -129,8 +131,8 @@ impl Law for CrmpcLaw {
     }
 
     #[allow(private_interfaces)]
-    fn design(&self, vehicle: &Vehicle) -> Result<Crmpc, Failure> {
-        let settings = Settings {
+    fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
+        Settings {
             body: vehicle.body,
             limit_rate: vehicle.limit_rate,
             limit_moment: vehicle.limit_moment,
@@ -156,19 +158,22 @@ impl Law for CrmpcLaw {
             reference_rate: self.reference_rate,
             reference_acceleration: self.reference_acceleration,
             solver: self.solver.settings(),
-        };
-        Crmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        }
+    }
+
+    fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
+        Crmpc::new(settings)
     }
 
     fn show(&mut self, memory: &Memory) {
         self.shown = Shown {
-            angles: memory.nominal.fixed_rows::<3>(0).into(),
-            rates: memory.nominal.fixed_rows::<3>(3).into(),
+            angles: shown_vector(&memory.nominal.fixed_rows::<3>(0).into()),
+            rates: shown_vector(&memory.nominal.fixed_rows::<3>(3).into()),
             in_force: memory.standing == Standing::InForce,
             standing: number(&STANDINGS, &memory.standing),
-            rate_margin: memory.margins.rate,
-            moment_margin: memory.margins.moment,
-            disturbance: memory.observed.disturbance,
+            rate_margin: shown(memory.margins.rate),
+            moment_margin: shown(memory.margins.moment),
+            disturbance: shown_vector(&memory.observed.disturbance),
             solver: SolverOutputs::from(&memory.report),
         };
     }
@@ -196,6 +201,10 @@ impl CrmpcLaw {
     pub(crate) fn set_feedback(&mut self, k1: f64, k2: f64, period: f64) {
         self.feedback = Gain { k1, k2 };
         self.period_feedback = period;
+    }
+
+    pub(crate) fn solver_mut(&mut self) -> &mut SolverParameters {
+        &mut self.solver
     }
 }
 

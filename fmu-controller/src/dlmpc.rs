@@ -2,11 +2,12 @@
 
 use crate::law::{Law, Vehicle};
 use crate::solver::{self, SolverOutputs, SolverParameters};
-use crate::table::{ANGLES, RATES, sampled_inputs, vector};
+use crate::table::{ANGLES, RATES, sampled_inputs, shown_vector, vector};
 use crate::unit::Unit;
 use control::dlmpc::{Dlmpc, Memory, Settings, SlidingMode};
+use control::error::DesignError;
+use fmi2_export::Table;
 use fmi2_export::table::{discrete_output, parameter};
-use fmi2_export::{Failure, Table};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -51,6 +52,7 @@ impl Default for DlmpcLaw {
 
 impl Law for DlmpcLaw {
     type Controller = Dlmpc;
+    type Settings = Settings;
 
     const NAME: &'static str = "DLMPC";
     const DESCRIPTION: &'static str = "Double-layered model predictive and sliding-mode attitude controller, the comparison of Chai et al. (2022)";
@@ -61,8 +63,8 @@ impl Law for DlmpcLaw {
     }
 
     #[allow(private_interfaces)]
-    fn design(&self, vehicle: &Vehicle) -> Result<Dlmpc, Failure> {
-        let settings = Settings {
+    fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
+        Settings {
             body: vehicle.body,
             limit_rate: vehicle.limit_rate,
             limit_moment: vehicle.limit_moment,
@@ -73,14 +75,17 @@ impl Law for DlmpcLaw {
             q: self.q,
             sliding_mode: self.sliding_mode,
             solver: self.solver.settings(),
-        };
-        Dlmpc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        }
+    }
+
+    fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
+        Dlmpc::new(settings)
     }
 
     fn show(&mut self, memory: &Memory) {
         self.shown = Shown {
-            rate_command: memory.rate_command,
-            sliding: memory.sliding,
+            rate_command: shown_vector(&memory.rate_command),
+            sliding: shown_vector(&memory.sliding),
             solver: SolverOutputs::from(&memory.report),
             inner_time: memory.inner_time,
         };
@@ -88,6 +93,13 @@ impl Law for DlmpcLaw {
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
         solver::warning(&before.report, &after.report)
+    }
+}
+
+#[cfg(test)]
+impl DlmpcLaw {
+    pub(crate) fn solver_mut(&mut self) -> &mut SolverParameters {
+        &mut self.solver
     }
 }
 

@@ -4,12 +4,12 @@ use crate::table::{ANGLES, AXES, RATES, enumeration, item, number};
 use crate::ticks::{self, Ticked};
 use control::estimation::ellipsoid::Correction;
 use control::estimation::{
-    Alignment, CalibrationMode, CalibrationStatus, Estimator, Health, Line, Memory, Settings,
-    mems_corrections,
+    Alignment, CalibrationMode, CalibrationStatus, Estimate, Estimator, Health, LARGEST_RANGE, Line, Memory,
+    Settings, mems_corrections,
 };
 use control::schedule::Sampled;
 use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input, parameter};
-use fmi2_export::{Context, Description, Failure, Inputs, Model, Table};
+use fmi2_export::{Context, Description, Failure, Inputs, Model, Restoration, Table};
 use model_description::DefaultExperiment;
 use model_description::unit::{self, Unit};
 use nalgebra::Vector3;
@@ -37,7 +37,7 @@ const STATUSES: [(CalibrationStatus, &str, &str); 4] = [
     (CalibrationStatus::Fitted, "fitted", "the fitted ellipsoid"),
     (CalibrationStatus::Refused, "refused", "the parameters, as the readings determine no ellipsoid"),
 ];
-const HEALTH: [(Health, &str, &str); 7] = [
+const HEALTH: [(Health, &str, &str); 8] = [
     (Health::Waiting, "waiting", "nothing has arrived yet"),
     (Health::Ok, "ok", "all is well"),
     (Health::Bridging, "bridging", "a sample is missing: the last rate is held"),
@@ -45,6 +45,7 @@ const HEALTH: [(Health, &str, &str); 7] = [
     (Health::Lost, "lost", "samples have been missing or frozen for longer than lost.after"),
     (Health::Calibrating, "calibrating", "readings are collected"),
     (Health::Uncalibrated, "uncalibrated", "the calibration was refused"),
+    (Health::Rejected, "sampleRejected", "a reading of the newest sample cannot be believed: it is left out"),
 ];
 
 /// The estimator as a unit.
@@ -99,6 +100,7 @@ struct Output {
     health: i32,
     age: f64,
     dropped: i32,
+    rejected: i32,
     gyroscope_bias: Vector3<f64>,
     filter_delay: f64,
     status: i32,
@@ -116,6 +118,7 @@ impl Output {
             health: number(&HEALTH, &estimate.health),
             age: estimate.age,
             dropped: estimate.dropped,
+            rejected: estimate.rejected,
             gyroscope_bias: estimate.gyroscope_bias,
             filter_delay,
             status: number(&STATUSES, &calibration.status),
@@ -167,7 +170,11 @@ impl Ticked for AttitudeEstimator {
         let (estimator, sampled) = self.parts()?;
         let time = sampled.next_time(estimator.period());
         sampled.evaluate_with(line, |memory, _| estimator.update(memory, time, &line));
-        Ok(())
+        let Estimate { angles, rates, gyroscope_bias, .. } = sampled.in_force().1.estimate;
+        if [angles, rates, gyroscope_bias].iter().flatten().all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        Err(Failure::Error(format!("the estimate at t = {time} s is not finite; see the inputs 'measured'")))
     }
 
     fn commit(&mut self) -> Result<Option<&'static str>, Failure> {
@@ -192,7 +199,7 @@ impl Model for AttitudeEstimator {
                 tolerance: 1e-6,
                 step: Settings::default().period,
             },
-            table: corrections(calibration(stages(start(outputs(inputs(Table::new())))))),
+            table: corrections(calibration(gates(stages(start(outputs(inputs(Table::new()))))))),
         }
     }
 
@@ -208,6 +215,7 @@ impl Model for AttitudeEstimator {
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         let estimator = self.design()?;
+        ticks::check_resolution(context.start_time, estimator.period())?;
         self.sampled = Some(Sampled::new(context.start_time, estimator.memory()));
         self.estimator = Some(estimator);
         Ok(())
@@ -233,8 +241,13 @@ impl Model for AttitudeEstimator {
         ticks::step(self, from, to, inputs, log)
     }
 
-    fn restored(&mut self) -> Result<(), Failure> {
-        self.estimator = if self.sampled.is_some() { Some(self.design()?) } else { None };
+    fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
+        let Some(sampled) = self.sampled.as_ref().filter(|_| from.initialized) else { return Ok(()) };
+        let estimator = self.design()?;
+        if !sampled.fits((from.start_time, from.time), estimator.period(), from.failed, |_| true) {
+            return ticks::misfit("its ticks are not those of its time");
+        }
+        self.estimator = Some(estimator);
         Ok(())
     }
 }
@@ -258,6 +271,11 @@ fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
         Some("no usable samples for longer than lost.after: the attitude is lost (health)")
     } else if comes(Health::Frozen) {
         Some("a sensor repeats its value and is left out (health)")
+    } else if comes(Health::Rejected) && before.estimate.rejected == 0 {
+        // Said the first time only; `rejectedSamples` counts on.
+        Some(
+            "a sample was left out, beyond the sensor's range or too far from the last one (health, rejectedSamples)",
+        )
     } else if comes(Health::Uncalibrated) {
         Some("the readings determine no ellipsoid: the given calibration stays in use (calibration.status)")
     } else {
@@ -376,6 +394,10 @@ fn outputs(table: Variables) -> Variables {
     let health = sampled("health", "How far the estimate can be trusted");
     let age = sampled("age", "Time since the newest sample was taken");
     let dropped = sampled("droppedSamples", "Samples so far that never arrived");
+    let rejected = sampled(
+        "rejectedSamples",
+        "Samples so far of which a reading, or the time, could not be believed and was left out",
+    );
     let delay = sampled("filter.delay", "Phase delay of sensors and low-pass filter at low frequencies");
     let status = sampled("calibration.status", "Where the magnetometer's calibration in force comes from");
     let residual = sampled(
@@ -392,6 +414,7 @@ fn outputs(table: Variables) -> Variables {
         .enumeration(health, healths, |m| &mut m.output.health)
         .real(seconds(age).nominal(0.01), |m| &mut m.output.age)
         .integer(dropped, (None, None), |m| &mut m.output.dropped)
+        .integer(rejected, (None, None), |m| &mut m.output.rejected)
         .real(seconds(delay).nominal(0.01), |m| &mut m.output.filter_delay);
     let table = vector(table, AXES, bias, |m| &mut m.output.gyroscope_bias)
         .enumeration(status, statuses, |m| &mut m.output.status)
@@ -476,6 +499,29 @@ fn stages(table: Variables) -> Variables {
         })
         .real(seconds(lost).min(0.0).nominal(0.5), |m| &mut m.parameters.settings.lost_after)
         .integer(frozen, (Some(0), None), |m| &mut m.parameters.frozen_samples)
+}
+
+fn gates(mut table: Variables) -> Variables {
+    for (i, sensor) in SENSORS.iter().enumerate() {
+        let range = parameter(
+            &format!("{}.range", sensor.name),
+            &format!("Largest reading of the {} along an axis; a larger one is left out", sensor.name),
+        );
+        let jump = parameter(
+            &format!("{}.jump", sensor.name),
+            &format!(
+                "Largest change of the {}'s reading from one sample to the next; after a larger one it is left out until a second confirms it",
+                sensor.name
+            ),
+        );
+        let real = |common: Common| {
+            common.real().unit((sensor.unit)()).min(0.0).max(LARGEST_RANGE).nominal(sensor.nominal)
+        };
+        table = table
+            .real(real(range), move |m| &mut m.parameters.settings.gates[i].range)
+            .real(real(jump), move |m| &mut m.parameters.settings.gates[i].jump);
+    }
+    table
 }
 
 fn calibration(table: Variables) -> Variables {

@@ -3,9 +3,10 @@
 use crate::law::{Law, Vehicle};
 use crate::table;
 use crate::unit::Unit;
+use control::error::DesignError;
 use control::sliding::{Fbl, FblSettings};
+use fmi2_export::Table;
 use fmi2_export::table::parameter;
-use fmi2_export::{Failure, Table};
 use model_description::unit;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,7 @@ impl Default for FblLaw {
 
 impl Law for FblLaw {
     type Controller = Fbl;
+    type Settings = FblSettings;
 
     const NAME: &'static str = "FBL";
     const DESCRIPTION: &'static str =
@@ -38,9 +40,12 @@ impl Law for FblLaw {
     }
 
     #[allow(private_interfaces)]
-    fn design(&self, vehicle: &Vehicle) -> Result<Fbl, Failure> {
-        let settings = FblSettings { body: vehicle.body, ..self.settings };
-        Fbl::new(settings).map_err(|error| Failure::Error(error.to_string()))
+    fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
+        FblSettings { body: vehicle.body, ..self.settings }
+    }
+
+    fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
+        Fbl::new(settings)
     }
 
     fn show(&mut self, (): &()) {}

@@ -3,12 +3,13 @@
 use crate::unit::Unit;
 use control::Controller;
 use control::delay::Latency;
-use fmi2_export::{Failure, Table};
+use control::error::DesignError;
+use fmi2_export::Table;
 use serde::{Serialize, de::DeserializeOwned};
 use vehicle::dynamics::RigidBody;
 
 /// What every controller is told about the vehicle.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Vehicle {
     /// The rigid body as the controller believes it to be.
     pub(crate) body: RigidBody,
@@ -33,6 +34,8 @@ impl Vehicle {
 pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// The sampled controller behind it.
     type Controller: Controller + Send;
+    /// All that the controller is built from.
+    type Settings: Clone + PartialEq + Send;
 
     /// Name of the unit.
     const NAME: &'static str;
@@ -44,12 +47,15 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// Adds the law's own variables to the table.
     fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>>;
 
-    /// Builds the controller from the parameters.
+    /// The settings that the parameters make.
+    #[allow(private_interfaces)]
+    fn settings(&self, vehicle: &Vehicle) -> Self::Settings;
+
+    /// Builds the controller.
     ///
     /// # Errors
     /// Names the parameter at fault.
-    #[allow(private_interfaces)]
-    fn design(&self, vehicle: &Vehicle) -> Result<Self::Controller, Failure>;
+    fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError>;
 
     /// Takes the law's own outputs from the memory in force.
     fn show(&mut self, memory: &<Self::Controller as Controller>::Memory);

@@ -4,8 +4,9 @@ use crate::law::{Law, Vehicle};
 use crate::table;
 use crate::unit::Unit;
 use control::crmpc::{Constraints, Settings};
+use control::error::DesignError;
 use control::lqr::{Lqr, LqrSettings};
-use fmi2_export::{Failure, Table};
+use fmi2_export::Table;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the regulator.
@@ -25,6 +26,7 @@ impl Default for LqrLaw {
 
 impl Law for LqrLaw {
     type Controller = Lqr;
+    type Settings = LqrSettings;
 
     const NAME: &'static str = "LQR";
     const DESCRIPTION: &'static str =
@@ -37,9 +39,12 @@ impl Law for LqrLaw {
     }
 
     #[allow(private_interfaces)]
-    fn design(&self, vehicle: &Vehicle) -> Result<Lqr, Failure> {
-        let settings = LqrSettings { body: vehicle.body, p: self.p, q: self.q, period: self.period };
-        Lqr::new(settings).map_err(|error| Failure::Error(error.to_string()))
+    fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
+        LqrSettings { body: vehicle.body, p: self.p, q: self.q, period: self.period }
+    }
+
+    fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
+        Lqr::new(settings)
     }
 
     fn show(&mut self, (): &()) {}

@@ -67,6 +67,20 @@ impl Source {
         })
     }
 
+    /// Whether it is one that these parameters lead to. The file of a table is not read again.
+    pub(crate) fn fits(&self, parameters: &Parameters) -> bool {
+        let table = (1..).zip(PROFILES).find(|(_, item)| item.0 == "table").map(|(number, _)| number);
+        let wants_table = table == Some(parameters.profile);
+        match self {
+            Self::Profile(Profile::Table(table)) => wants_table && table.check().is_ok(),
+            _ if wants_table => false,
+            _ => {
+                let context = Context { start_time: 0.0, stop_time: None, resources: None };
+                Self::new(parameters, &context).is_ok_and(|source| source == *self)
+            }
+        }
+    }
+
     /// The reference at `time` (s) as it is known at `now` (s). Of the external one nothing is known beyond now: its angles
     /// are taken to stay.
     pub(crate) fn at(&self, time: f64, now: f64, external: &Reference) -> Reference {

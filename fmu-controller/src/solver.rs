@@ -1,7 +1,7 @@
 //! What every controller that optimises shows of its solver.
 
 use crate::law::Law;
-use crate::table::{enumeration, item, number, sampled_inputs};
+use crate::table::{enumeration, item, number, sampled_inputs, shown};
 use crate::unit::Unit;
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::report::{Report, Status};
@@ -58,9 +58,9 @@ impl From<&Report> for SolverOutputs {
     fn from(report: &Report) -> Self {
         Self {
             status: number(&STATUSES, &report.status),
-            cost: report.cost,
+            cost: shown(report.cost),
             iterations: report.iterations.cast_signed(),
-            residual: report.residual,
+            residual: shown(report.residual),
             time: report.time,
             solves: report.solves.cast_signed(),
             fallbacks: report.fallbacks.cast_signed(),
@@ -132,6 +132,13 @@ impl SolverParameters {
             exits: self.exits,
             time_budget: self.time_budget,
         }
+    }
+}
+
+#[cfg(test)]
+impl SolverParameters {
+    pub(crate) fn set_time_budget(&mut self, budget: f64) {
+        self.time_budget = budget;
     }
 }
 

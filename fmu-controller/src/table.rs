@@ -267,6 +267,17 @@ pub(crate) fn weights<L: Law>(
     table
 }
 
+/// A value for looking at, which no controller depends on, as a number that can be handed out: what is beyond all numbers is
+/// shown as the largest one, and so is what cannot be calculated.
+pub(crate) fn shown(value: f64) -> f64 {
+    if value.is_nan() { f64::MAX } else { value.clamp(-f64::MAX, f64::MAX) }
+}
+
+/// The same of each component.
+pub(crate) fn shown_vector(value: &Vector3<f64>) -> Vector3<f64> {
+    value.map(shown)
+}
+
 /// Of items (value, name, text) the value of the one with number `number`, or of the first.
 pub(crate) fn item<T: Copy>(items: &[(T, &str, &str)], number: i32) -> T {
     usize::try_from(number - 1).ok().and_then(|i| items.get(i)).unwrap_or(&items[0]).0

@@ -252,3 +252,22 @@ fn a_delay_out_of_range_is_refused_by_name() {
     let text = refusal::<Lqr>(|unit| unit.parameters.latency.action = 1.1);
     assert!(text.contains("delay = 1.1 s"), "{text}");
 }
+
+#[test]
+fn a_time_budget_of_any_length_is_worked_with() {
+    for budget in [1e9, 1e19, 1e300, f64::MAX] {
+        let mut crmpc: Crmpc = ready(|unit: &mut Crmpc| unit.law.solver_mut().set_time_budget(budget));
+        crmpc.calculate(0.0).unwrap();
+        let mut dlmpc: Dlmpc = ready(|unit: &mut Dlmpc| unit.law.solver_mut().set_time_budget(budget));
+        dlmpc.calculate(0.0).unwrap();
+        assert!(crmpc.output.moment.norm() > 0.0 && dlmpc.output.moment.norm() > 0.0, "{budget} s");
+    }
+}
+
+#[test]
+fn variants_have_an_observer_if_their_published_settings_have_one() {
+    fn agrees<V: tvsmc::Variant>() -> bool {
+        V::published().observer.is_some() == V::OBSERVER
+    }
+    assert!(agrees::<tvsmc::Btvsmc>() && agrees::<tvsmc::BtvsmcDo>() && agrees::<tvsmc::SotvsmcDo>());
+}

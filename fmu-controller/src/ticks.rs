@@ -2,6 +2,16 @@
 
 use fmi2_export::{Failure, Inputs, Model};
 
+/// Refuses an experiment that starts where ticks cannot be told apart.
+pub(crate) fn check_resolution(start: f64, period: f64) -> Result<(), Failure> {
+    vehicle::time::check_resolution(start, period).map_err(|error| Failure::Error(error.to_string()))
+}
+
+/// Refuses a saved state that no unit can have been in.
+pub(crate) fn misfit(problem: &str) -> Result<(), Failure> {
+    Err(Failure::Error(format!("the saved state does not fit: {problem}")))
+}
+
 /// A unit that works at ticks.
 pub(crate) trait Ticked: Model {
     /// When the first uncommitted tick is (s), if it comes before `to`.

@@ -1,11 +1,12 @@
 //! `BTVSMC`, `BTVSMC_DO`, `SOTVSMC_DO`: parameters and outputs of the time-varying sliding modes.
 
 use crate::law::{Law, Vehicle};
-use crate::table::{self, ANGLES, sampled_inputs, vector};
+use crate::table::{self, ANGLES, sampled_inputs, shown_vector, vector};
 use crate::unit::Unit;
+use control::error::DesignError;
 use control::sliding::{BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc};
+use fmi2_export::Table;
 use fmi2_export::table::{discrete_output, parameter};
-use fmi2_export::{Failure, Table};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -13,11 +14,13 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 /// What one of the laws has of its own.
 pub trait Variant: Sized + Send + Sync + 'static {
     /// Its reaching law.
-    type Reaching: Reaching + Serialize + DeserializeOwned + Send + 'static;
+    type Reaching: Reaching + PartialEq + Serialize + DeserializeOwned + Send + 'static;
     /// Name of the unit.
     const NAME: &'static str;
     /// One line: what the unit is.
     const DESCRIPTION: &'static str;
+    /// Whether it has a disturbance observer.
+    const OBSERVER: bool;
     /// The published settings.
     fn published() -> Settings<Self::Reaching>;
     /// Adds the reaching law's parameters.
@@ -43,14 +46,9 @@ impl<V: Variant> Default for TvsmcLaw<V> {
     }
 }
 
-impl<V: Variant> TvsmcLaw<V> {
-    fn has_observer() -> bool {
-        V::published().observer.is_some()
-    }
-}
-
 impl<V: Variant> Law for TvsmcLaw<V> {
     type Controller = Tvsmc<V::Reaching>;
+    type Settings = Settings<V::Reaching>;
 
     const NAME: &'static str = V::NAME;
     const DESCRIPTION: &'static str = V::DESCRIPTION;
@@ -59,24 +57,29 @@ impl<V: Variant> Law for TvsmcLaw<V> {
     fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
         let table = table::period(table, 0.01, |law| &mut law.settings.period);
         let table = anti_windup(V::reaching(surface(table)));
-        let table = if Self::has_observer() { observer(table) } else { table };
+        let table = if V::OBSERVER { observer(table) } else { table };
         outputs(table)
     }
 
     #[allow(private_interfaces)]
-    fn design(&self, vehicle: &Vehicle) -> Result<Self::Controller, Failure> {
-        let settings = Settings {
+    fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
+        Settings {
             body: vehicle.body,
             limit_moment: vehicle.saturates_at(),
-            observer: Self::has_observer().then_some(self.observer),
+            observer: V::OBSERVER.then_some(self.observer),
             ..self.settings
-        };
-        Tvsmc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        }
+    }
+
+    fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
+        Tvsmc::new(settings)
     }
 
     fn show(&mut self, memory: &Memory<<V::Reaching as Reaching>::Memory>) {
-        self.sliding = memory.sliding;
+        self.sliding = shown_vector(&memory.sliding);
         self.estimate = memory.estimate;
+        self.estimate.sliding = shown_vector(&memory.estimate.sliding);
+        self.estimate.disturbance = shown_vector(&memory.estimate.disturbance);
     }
 }
 
@@ -130,7 +133,7 @@ fn outputs<V: Variant>(table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V
         common.real().unit(unit::angular_acceleration()).nominal(0.01)
     };
     let table = vector(table, ANGLES, sliding, |m| &mut m.law.sliding);
-    if TvsmcLaw::<V>::has_observer() {
+    if V::OBSERVER {
         let table = vector(table, ANGLES, of_sliding, |m| &mut m.law.estimate.sliding);
         vector(table, ANGLES, of_disturbance, |m| &mut m.law.estimate.disturbance)
     } else {
@@ -156,6 +159,7 @@ impl Variant for Btvsmc {
     type Reaching = BoundaryLayer;
     const NAME: &'static str = "BTVSMC";
     const DESCRIPTION: &'static str = "Time-varying sliding-mode attitude controller with a boundary layer, a comparison of Wu et al. (2015)";
+    const OBSERVER: bool = false;
 
     fn published() -> Settings<BoundaryLayer> {
         Settings::btvsmc()
@@ -174,6 +178,7 @@ impl Variant for BtvsmcDo {
     type Reaching = BoundaryLayer;
     const NAME: &'static str = "BTVSMC_DO";
     const DESCRIPTION: &'static str = "Time-varying sliding-mode attitude controller with a boundary layer and a disturbance observer, of Wu et al. (2015)";
+    const OBSERVER: bool = true;
 
     fn published() -> Settings<BoundaryLayer> {
         Settings::btvsmc_do()
@@ -192,6 +197,7 @@ impl Variant for SotvsmcDo {
     type Reaching = SecondOrder;
     const NAME: &'static str = "SOTVSMC_DO";
     const DESCRIPTION: &'static str = "Second-order time-varying sliding-mode attitude controller with a disturbance observer, of Wu et al. (2015)";
+    const OBSERVER: bool = true;
 
     fn published() -> Settings<SecondOrder> {
         Settings::sotvsmc_do()

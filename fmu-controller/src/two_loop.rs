@@ -1,11 +1,12 @@
 //! `TwoLoopSMC`: its own parameters and outputs.
 
 use crate::law::{Law, Vehicle};
-use crate::table::{self, ANGLES, RATES, enumeration, item, number, sampled_inputs, vector};
+use crate::table::{self, ANGLES, RATES, enumeration, item, number, sampled_inputs, shown_vector, vector};
 use crate::unit::Unit;
+use control::error::DesignError;
 use control::two_loop::{Form, Loop, OuterKinematics, TwoLoopMemory, TwoLoopSettings, TwoLoopSmc};
+use fmi2_export::Table;
 use fmi2_export::table::{discrete_output, parameter};
-use fmi2_export::{Failure, Table};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -54,6 +55,7 @@ impl Default for TwoLoopLaw {
 
 impl Law for TwoLoopLaw {
     type Controller = TwoLoopSmc;
+    type Settings = TwoLoopSettings;
 
     const NAME: &'static str = "TwoLoopSMC";
     const DESCRIPTION: &'static str = "Two-loop sliding-mode attitude controller of Jia, Zhou and Zhou";
@@ -72,24 +74,27 @@ impl Law for TwoLoopLaw {
     }
 
     #[allow(private_interfaces)]
-    fn design(&self, vehicle: &Vehicle) -> Result<TwoLoopSmc, Failure> {
-        let settings = TwoLoopSettings {
+    fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
+        TwoLoopSettings {
             form: item(&FORMS, self.form),
             kinematics: item(&KINEMATICS, self.kinematics),
             body: vehicle.body,
             limit_moment: vehicle.saturates_at(),
             ..self.settings
-        };
-        TwoLoopSmc::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        }
+    }
+
+    fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
+        TwoLoopSmc::new(settings)
     }
 
     fn show(&mut self, memory: &TwoLoopMemory) {
-        self.outer_sliding = memory.outer_sliding;
-        self.inner_sliding = memory.inner_sliding;
-        self.rate_command = memory.rate_command;
+        self.outer_sliding = shown_vector(&memory.outer_sliding);
+        self.inner_sliding = shown_vector(&memory.inner_sliding);
+        self.rate_command = shown_vector(&memory.rate_command);
         let gain = |of: &Loop| Vector3::from(of.k);
-        self.outer_integral = gain(&self.settings.outer).component_mul(&memory.outer_integral);
-        self.inner_integral = gain(&self.settings.inner).component_mul(&memory.inner_integral);
+        self.outer_integral = shown_vector(&gain(&self.settings.outer).component_mul(&memory.outer_integral));
+        self.inner_integral = shown_vector(&gain(&self.settings.inner).component_mul(&memory.inner_integral));
     }
 }
 

@@ -7,7 +7,7 @@ use crate::ticks::{self, Ticked};
 use control::controller::{Controller, Measurement};
 use control::delay::{Delayed, Latency};
 use control::schedule::Sampled;
-use fmi2_export::{Context, Description, Failure, Inputs, Model};
+use fmi2_export::{Context, Description, Failure, Inputs, Model, Restoration};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::Scenario;
@@ -29,7 +29,14 @@ pub struct Unit<L: Law> {
     /// From initialization on.
     sampled: Option<Sampled<Memory<L>>>,
     #[serde(skip)]
-    controller: Option<Delayed<L::Controller>>,
+    designed: Option<Designed<L>>,
+}
+
+/// A controller and what it was designed for.
+struct Designed<L: Law> {
+    settings: L::Settings,
+    vehicle: Vehicle,
+    controller: Delayed<L::Controller>,
 }
 
 /// Parameters of every controller.
@@ -71,8 +78,8 @@ struct Parts<'a, L: Law> {
 impl<L: Law> Unit<L> {
     /// The controller and its schedule; there from initialization on.
     fn parts(&mut self) -> Result<Parts<'_, L>, Failure> {
-        match (&mut self.controller, &mut self.sampled) {
-            (Some(controller), Some(sampled)) => {
+        match (&mut self.designed, &mut self.sampled) {
+            (Some(Designed { controller, .. }), Some(sampled)) => {
                 Ok(Parts { controller, sampled, input: &self.input, source: &self.source })
             }
             _ => Err(Failure::Error("the unit is not initialized".into())),
@@ -85,11 +92,22 @@ impl<L: Law> Unit<L> {
         Ok(Vehicle { body, limit_rate, limit_moment, saturation, latency })
     }
 
-    fn design(&self) -> Result<Delayed<L::Controller>, Failure> {
+    fn design(&self) -> Result<Designed<L>, Failure> {
         let vehicle = self.vehicle()?;
-        let law = self.law.design(&vehicle)?;
-        let delayed = Delayed::new(law, vehicle.body, vehicle.latency, vehicle.saturates_at());
-        delayed.map_err(|error| Failure::Error(error.to_string()))
+        let settings = self.law.settings(&vehicle);
+        let controller = L::design(settings.clone())
+            .and_then(|law| Delayed::new(law, vehicle.body, vehicle.latency, vehicle.saturates_at()))
+            .map_err(|error| Failure::Error(error.to_string()))?;
+        Ok(Designed { settings, vehicle, controller })
+    }
+
+    /// The controller of `before`, if it was designed for the same; else a new one. What a controller keeps beside its memory
+    /// is scratch.
+    fn design_again(&self, before: &mut Self) -> Result<Designed<L>, Failure> {
+        let vehicle = self.vehicle()?;
+        let settings = self.law.settings(&vehicle);
+        let same = |designed: &mut Designed<L>| designed.vehicle == vehicle && designed.settings == settings;
+        before.designed.take_if(same).map_or_else(|| self.design(), Ok)
     }
 }
 
@@ -161,15 +179,16 @@ impl<L: Law> Model for Unit<L> {
             law: L::default(),
             source: Source::Profile(scenario.reference),
             sampled: None,
-            controller: None,
+            designed: None,
         }
     }
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         self.source = Source::new(&self.parameters.reference, context)?;
-        let controller = self.design()?;
-        self.sampled = Some(Sampled::new(context.start_time, controller.memory()));
-        self.controller = Some(controller);
+        let designed = self.design()?;
+        ticks::check_resolution(context.start_time, designed.controller.period())?;
+        self.sampled = Some(Sampled::new(context.start_time, designed.controller.memory()));
+        self.designed = Some(designed);
         Ok(())
     }
 
@@ -178,7 +197,9 @@ impl<L: Law> Model for Unit<L> {
         if sampled.is_due(time, controller.period()) {
             self.evaluate()?;
         }
-        let (Some(controller), Some(sampled)) = (&self.controller, &self.sampled) else { return Ok(()) };
+        let (Some(Designed { controller, .. }), Some(sampled)) = (&self.designed, &self.sampled) else {
+            return Ok(());
+        };
         let (moment, memory) = sampled.in_force();
         self.law.show(&memory.inner);
         self.output = Output {
@@ -198,8 +219,20 @@ impl<L: Law> Model for Unit<L> {
         ticks::step(self, from, to, inputs, log)
     }
 
-    fn restored(&mut self) -> Result<(), Failure> {
-        self.controller = if self.sampled.is_some() { Some(self.design()?) } else { None };
-        Ok(())
+    fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
+        let Some(sampled) = self.sampled.as_ref().filter(|_| from.initialized) else { return Ok(()) };
+        if self.source != from.before.source && !self.source.fits(&self.parameters.reference) {
+            return ticks::misfit("its reference is not that of its parameters");
+        }
+        let designed = self.design_again(from.before)?;
+        let period = designed.controller.period();
+        let times = (from.start_time, from.time);
+        if sampled.fits(times, period, from.failed, |memory| designed.controller.fits(memory)) {
+            self.designed = Some(designed);
+            return Ok(());
+        }
+        // The other unit goes on with what was taken from it.
+        from.before.designed.get_or_insert(designed);
+        ticks::misfit("its ticks are not those of its time, or its memory has another shape")
     }
 }

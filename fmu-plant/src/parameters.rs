@@ -20,7 +20,7 @@ use vehicle::triad::Triad;
 /// Longest integration step by default, s.
 const STEP: f64 = 0.01;
 /// A time (s) that no simulation reaches; FMI importers do not all read an infinite number.
-const NEVER: f64 = 1e9;
+const NEVER: f64 = 1e15;
 
 /// The kinds in the order of their enumeration values 1, 2, …, with name and description.
 pub(crate) const KINDS: [(Kind, &str, &str); 7] = [
@@ -65,7 +65,7 @@ const IDEAL_SENSORS: i32 = 1;
 pub(crate) const MEMS_SENSORS: i32 = 2;
 
 /// What a user sets before the simulation, named as in the table.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Parameters {
     pub(crate) inertia: Inertia,
     pub(crate) inertia_scale: f64,

@@ -2,7 +2,7 @@
 
 use crate::parameters::Parameters;
 use crate::table::{self, Known, Unknown};
-use fmi2_export::{Context, Description, EventInfo, Failure, Inputs, Model};
+use fmi2_export::{Context, Description, EventInfo, Failure, Inputs, Model, Restoration};
 use nalgebra::{SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 use vehicle::actuators::Command;
@@ -139,6 +139,27 @@ impl Model for ReentryPlant {
         });
         self.plant = Some(plant);
         result.map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    /// What is made of the parameters is not believed but compared: with the plant that was there before, if that has the same
+    /// parameters, else with a new one.
+    fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
+        let Some(plant) = self.plant.as_ref().filter(|_| from.initialized) else { return Ok(()) };
+        let failed = |error: vehicle::Error| Failure::Error(error.to_string());
+        let before = from.before.plant.as_ref().filter(|before| {
+            before.start_time() == from.start_time && from.before.parameters == self.parameters
+        });
+        let fits = if let Some(before) = before {
+            plant.fits(before, from.time, from.failed)
+        } else {
+            let config = self.parameters.config().map_err(failed)?;
+            plant.fits(&Plant::new(&config, from.start_time).map_err(failed)?, from.time, from.failed)
+        };
+        if fits {
+            return Ok(());
+        }
+        let text = "the saved state does not fit: its plant is not that of its parameters and its time";
+        Err(Failure::Error(text.into()))
     }
 
     fn continuous_states(&self, states: &mut [f64]) {

@@ -124,6 +124,12 @@ impl Actuators {
         Drive { direction, ..drive }
     }
 
+    /// Whether this can be a drive of actuators.
+    pub(crate) fn fits(drive: &Drive) -> bool {
+        (0..SURFACES).all(|i| drive.target[i].is_finite() && [-1.0, 0.0, 1.0].contains(&drive.direction[i]))
+            && drive.thrust.iter().all(|value| value.is_finite())
+    }
+
     /// Rates of the deflections, rad/s.
     pub fn rates(&self, drive: &Drive) -> Surfaces {
         self.rate.component_mul(&drive.direction)

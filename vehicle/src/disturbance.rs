@@ -154,7 +154,7 @@ impl Disturbance {
     }
 
     /// Origin and length of the intervals over which Δ is held; `origin` is the start of the experiment (s).
-    fn intervals(&self, origin: f64) -> Option<(f64, f64)> {
+    pub(crate) fn intervals(&self, origin: f64) -> Option<(f64, f64)> {
         match self.kind {
             Kind::None | Kind::Constant | Kind::Sine => None,
             Kind::White | Kind::AlongRate | Kind::AgainstMoment => Some((origin, self.period)),

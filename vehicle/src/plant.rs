@@ -13,7 +13,7 @@ use crate::integrator::{equal_steps, rk4};
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
 use crate::platform::Surroundings;
 use crate::sensors::{self, Sensors};
-use crate::time::tolerance;
+use crate::time::{check_resolution, tolerance};
 use crate::transport::Transport;
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, SMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -248,6 +248,10 @@ impl Plant {
             return refuse("actuation.delay", problem);
         }
         config.disturbance.check()?;
+        let held = config.disturbance.intervals(start_time).map(|(_, length)| length);
+        for period in held.into_iter().chain([config.step]) {
+            check_resolution(start_time, period)?;
+        }
         config.surroundings.check()?;
         let initial = angles(&config.initial);
         let mut state = config.initial;
@@ -271,6 +275,44 @@ impl Plant {
             state,
             deflections: Surfaces::zeros(),
         })
+    }
+
+    /// Whether this can be what `built`, made of the same configuration and start time, has become at `time` (s): a plant that was
+    /// restored may be forged. A step that has `failed` may have gone beyond that time.
+    pub fn fits(&self, built: &Self, time: f64, failed: bool) -> bool {
+        let held = self.held.as_ref().is_none_or(|held| {
+            held.since.is_finite() && (self.actuators.is_none() || Actuators::fits(&held.drive))
+        });
+        let period = self.disturbance.intervals(self.start_time).map_or(self.step, |(_, length)| length);
+        held && check_resolution(time, period).is_ok()
+            && self.state.iter().chain(&self.deflections).all(|value| value.is_finite())
+            && self.same_configuration(built)
+            && self.sensors.as_ref().is_none_or(|sensors| sensors.fits(time, failed))
+            && self.transport.as_ref().is_none_or(|transport| transport.fits(time, failed))
+    }
+
+    fn same_configuration(&self, other: &Self) -> bool {
+        let sensors = match (&self.sensors, &other.sensors) {
+            (Some(one), Some(other)) => one.same_configuration(other),
+            (one, other) => one.is_none() && other.is_none(),
+        };
+        let transport = self.transport.as_ref().map(Transport::delay);
+        sensors
+            && transport == other.transport.as_ref().map(Transport::delay)
+            && self.body == other.body
+            && self.kinematics == other.kinematics
+            && self.earth_rate == other.earth_rate
+            && self.disturbance == other.disturbance
+            && self.actuators == other.actuators
+            && self.calibration == other.calibration
+            && self.surroundings == other.surroundings
+            && self.step == other.step
+            && self.start_time == other.start_time
+    }
+
+    /// Start of the experiment, s.
+    pub fn start_time(&self) -> f64 {
+        self.start_time
     }
 
     /// The vehicle's rigid body.
@@ -495,7 +537,8 @@ impl Plant {
                 None => self.hold(time, &input(time), command),
                 Some(before) => self.hold_between(time, &input(time), &before),
             };
-            let cut = self.next_change(time, &held).filter(|&change| change + tolerance(to) < to);
+            let cut =
+                self.next_change(time, &held).filter(|&change| change > time && change + tolerance(to) < to);
             let end = cut.unwrap_or(to);
             let steps = equal_steps(end - time, self.step);
             let h = (end - time) / steps as f64;

@@ -6,7 +6,7 @@
 use crate::error::Error;
 use crate::noise::{normal_pair, uniform};
 use crate::platform::Readings;
-use crate::time::{tick, tick_time, tolerance};
+use crate::time::{check_resolution, tick, tick_time, tick_tolerance};
 use crate::triad::{Memory, Names, Triad, Window};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -147,9 +147,24 @@ impl Sensors {
     /// Names the value of the configuration that is out of range.
     pub fn new(config: &Config, start: f64) -> Result<Self, Error> {
         config.check()?;
+        check_resolution(start, config.line.period)?;
         let length = (config.line.delay / config.line.period) as usize + 2;
         let arrived = Sample { time: start, ..Sample::default() };
         Ok(Self { config: *config, start, before: None, last: None, line: vec![None; length], arrived })
+    }
+
+    /// Whether both are made of the same configuration and begin at the same time.
+    pub(crate) fn same_configuration(&self, other: &Self) -> bool {
+        self.config == other.config && self.start == other.start && self.line.len() == other.line.len()
+    }
+
+    /// Whether these can be the sensors at `time` (s): nothing that they have taken is of the future.
+    pub(crate) fn fits(&self, time: f64, failed: bool) -> bool {
+        let latest = if failed { i64::MAX / 2 } else { self.tick_at(time) };
+        let past = |taken: &Taken| (0..=latest).contains(&taken.tick) && taken.time.is_finite();
+        check_resolution(time, self.config.line.period).is_ok()
+            && self.before.iter().chain(&self.last).chain(self.line.iter().flatten()).all(past)
+            && self.arrived.time.is_finite()
     }
 
     fn tick_at(&self, time: f64) -> i64 {
@@ -170,21 +185,22 @@ impl Sensors {
     /// The last tick whose sample has had the time to arrive.
     fn tick_arrived(&self, time: f64) -> i64 {
         let Line { period, delay, .. } = self.config.line;
-        ((time - delay - self.start + tolerance(time)) / period).floor() as i64
+        ((time - delay - self.start + tick_tolerance(time, period)) / period).floor() as i64
     }
 
     /// The sample that is due at `time` (s), if its tick has come and has not gone.
     fn due(&self, time: f64, felt: &Readings) -> Option<Taken> {
         let tick = self.tick_at(time);
+        let tolerance = tick_tolerance(time, self.config.line.period);
         let before = match self.last {
-            Some(last) if last.tick == tick && time <= last.time + tolerance(time) => self.before,
+            Some(last) if last.tick == tick && time <= last.time + tolerance => self.before,
             Some(last) if last.tick >= tick => return None,
             last => last,
         };
         let Config { triads, line, .. } = &self.config;
         // An importer may have missed the tick's time; the sample is then taken late.
         let nominal = tick_time(tick, self.start, line.period);
-        let taken = if time > nominal + tolerance(time) { time } else { nominal };
+        let taken = if time > nominal + tolerance { time } else { nominal };
         let (noise, chance) = self.config.draw(tick);
         let memories = std::array::from_fn(|i| {
             let before = before.as_ref().map(|before| (&before.memories[i], taken - before.time));

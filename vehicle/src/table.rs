@@ -22,6 +22,8 @@ const COLUMNS: [(&str, &[(&str, f64)]); 4] = [
     ("beta", &[("beta_rad", 1.0), ("beta_deg", DEGREE)]),
     ("sigma", &[("sigma_rad", 1.0), ("sigma_deg", DEGREE)]),
 ];
+/// Most points of a table: 10 000 s at 10 Hz.
+const MOST_POINTS: usize = 100_000;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 impl Table {
@@ -30,22 +32,23 @@ impl Table {
     /// # Errors
     /// If there are no points, their numbers differ, one is not finite, or the times do not increase.
     pub fn new(times: Vec<f64>, angles: Vec<Vector3<f64>>) -> Result<Self, Error> {
-        let refuse = |problem: String| Err(Error::Parameter { name: "reference table", problem });
-        if times.is_empty() || times.len() != angles.len() {
-            return refuse(format!(
-                "has {} times and {} attitudes; at least one of each is needed",
-                times.len(),
-                angles.len()
-            ));
-        }
-        if !times.iter().chain(angles.iter().flatten()).all(|value| value.is_finite()) {
-            return refuse("holds a value that is not finite".into());
-        }
-        if let Some([before, after, ..]) = times.windows(2).find(|pair| pair[0] >= pair[1]) {
-            return refuse(format!("has time {after} s after {before} s; times must increase"));
-        }
+        check(&times, &angles)?;
         let curvatures = curvatures(&times, &angles);
         Ok(Self { times, angles, curvatures })
+    }
+
+    /// Refuses what [`Table::new`] would not have made: a table that was restored may be forged.
+    ///
+    /// # Errors
+    /// As those of [`Table::new`].
+    pub fn check(&self) -> Result<(), Error> {
+        check(&self.times, &self.angles)?;
+        let finite = self.curvatures.iter().flatten().all(|value| value.is_finite());
+        if self.curvatures.len() == self.times.len() && finite {
+            return Ok(());
+        }
+        let problem = "has other curvatures than points".into();
+        Err(Error::Parameter { name: "reference table", problem })
     }
 
     /// From a CSV file with the headings `time_s` and, in any order, `alpha_deg` or `alpha_rad`, likewise `beta_…` and
@@ -140,6 +143,9 @@ impl Table {
                     format!("{time} does not come after the line before"),
                 ));
             }
+            if times.len() == MOST_POINTS {
+                return Err(refuse(line, None, too_many()));
+            }
             times.push(time);
             angles.push(Vector3::new(alpha, beta, sigma));
         }
@@ -167,6 +173,31 @@ impl Table {
             accelerations: c0 * a + c1 * b,
         }
     }
+}
+
+fn check(times: &[f64], angles: &[Vector3<f64>]) -> Result<(), Error> {
+    let refuse = |problem: String| Err(Error::Parameter { name: "reference table", problem });
+    if times.len() > MOST_POINTS {
+        return refuse(too_many());
+    }
+    if times.is_empty() || times.len() != angles.len() {
+        return refuse(format!(
+            "has {} times and {} attitudes; at least one of each is needed",
+            times.len(),
+            angles.len()
+        ));
+    }
+    if !times.iter().chain(angles.iter().flatten()).all(|value| value.is_finite()) {
+        return refuse("holds a value that is not finite".into());
+    }
+    if let Some([before, after, ..]) = times.windows(2).find(|pair| pair[0] >= pair[1]) {
+        return refuse(format!("has time {after} s after {before} s; times must increase"));
+    }
+    Ok(())
+}
+
+fn too_many() -> String {
+    format!("has more than {MOST_POINTS} points; keep fewer, the spline is smooth between them")
 }
 
 /// Second derivatives at the knots. The third derivative is continuous at the second and at the last but one knot; three

@@ -1,16 +1,45 @@
 //! Comparison of times and ticks: t = start + k · period with an integer k, never accumulated.
 
+use crate::error::Error;
+
 /// Instants closer than this are one, relative to their size or absolute in s below 1 s.
 pub const TOLERANCE: f64 = 1e-9;
+/// Instants further apart than this (s) are never one, however large they are.
+const LONGEST: f64 = 1e-4;
+/// An instant and a tick that lie further apart than this share of the period are never one.
+const SHARE_OF_PERIOD: f64 = 0.1;
+/// What rounding does to times, relative to their size.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// The distance (s) below which another instant is the same as `time` (s).
 pub fn tolerance(time: f64) -> f64 {
-    TOLERANCE * time.abs().max(1.0)
+    (TOLERANCE * time.abs().max(1.0)).min(LONGEST).max(ROUNDING * time.abs())
+}
+
+/// The distance (s) below which a tick is at `time` (s), if there is one every `period` (s). Importers add up time, so that it
+/// grows with time, but never so far that one tick is taken for the next.
+pub fn tick_tolerance(time: f64, period: f64) -> f64 {
+    (TOLERANCE * time.abs().max(1.0)).min(SHARE_OF_PERIOD * period)
+}
+
+/// Refuses an experiment that starts where rounding is as large as the tolerance of ticks.
+///
+/// # Errors
+/// Names start time and period.
+pub fn check_resolution(start: f64, period: f64) -> Result<(), Error> {
+    let latest = SHARE_OF_PERIOD * period / ROUNDING;
+    if start.abs() <= latest {
+        return Ok(());
+    }
+    let problem = format!(
+        "= {start} s is too large to tell apart ticks with a period of {period} s; start between -{latest:.1e} s and {latest:.1e} s"
+    );
+    Err(Error::Parameter { name: "start time", problem })
 }
 
 /// Number of the last tick at or before `time` (s), counted from 0 at `start`.
 pub fn tick(time: f64, start: f64, period: f64) -> i64 {
-    ((time - start + tolerance(time)) / period).floor() as i64
+    ((time - start + tick_tolerance(time, period)) / period).floor() as i64
 }
 
 /// Time of a tick, s.
@@ -29,6 +58,28 @@ mod tests {
             assert_eq!(tick(time, 0.1, 0.04), k);
             assert_eq!(tick(time.next_down(), 0.1, 0.04), k);
             assert_eq!(tick(time + 0.039, 0.1, 0.04), k);
+        }
+    }
+
+    #[test]
+    fn ticks_are_found_at_unix_time_too() {
+        let start = 1.7e9;
+        for period in [1e-4, 1e-3, 0.01, 0.04, 0.2] {
+            check_resolution(start, period).unwrap();
+            for k in 0..100_000 {
+                let time = tick_time(k, start, period);
+                assert_eq!(tick(time, start, period), k);
+                assert_eq!(tick(time.next_down(), start, period), k);
+                assert_eq!(tick(time + 0.85 * period, start, period), k, "{period}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_start_at_which_ticks_cannot_be_told_apart_is_refused() {
+        for start in [1e14, -1e14, f64::MAX] {
+            let text = check_resolution(start, 0.04).unwrap_err().to_string();
+            assert!(text.contains("start time") && text.contains("0.04 s"), "{text}");
         }
     }
 

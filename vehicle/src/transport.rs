@@ -45,6 +45,22 @@ impl Transport {
         Ok((delay > 0.0).then(|| Self { delay, changes: VecDeque::new() }))
     }
 
+    /// s.
+    pub(crate) fn delay(&self) -> f64 {
+        self.delay
+    }
+
+    /// Whether these can be the commands under way at `time` (s).
+    pub(crate) fn fits(&self, time: f64, failed: bool) -> bool {
+        let past =
+            |change: &Change| failed && change.time.is_finite() || change.time <= time + tolerance(time);
+        let ascend = self.changes.iter().zip(self.changes.iter().skip(1)).all(|(a, b)| a.time < b.time);
+        let finite = |change: &Change| change.moment.iter().all(|value| value.is_finite());
+        ascend
+            && self.changes.len() <= UNDER_WAY + 2
+            && self.changes.iter().all(|change| past(change) && finite(change))
+    }
+
     /// Whether what was commanded at `commanded` (s) acts at `time` (s). Instants that differ by rounding are one, but a
     /// command never acts at the instant at which it is given.
     fn acts(&self, commanded: f64, time: f64) -> bool {

@@ -171,3 +171,15 @@ fn csv_faults_are_named_with_file_line_and_column() {
     let missing = Table::from_csv_file("no/such.csv".as_ref()).unwrap_err().to_string();
     assert!(missing.contains("no/such.csv"), "{missing}");
 }
+
+#[test]
+fn a_table_of_more_points_than_anybody_needs_is_refused() {
+    let of = |n: u32| Table::new((0..n).map(f64::from).collect(), vec![Vector3::zeros(); n as usize]);
+    assert!(of(100_000).is_ok());
+    let text = of(100_001).unwrap_err().to_string();
+    assert!(text.contains("more than 100000 points"), "{text}");
+    let lines: Vec<_> = (0..=100_000).map(|k| format!("{k},0,0,0")).collect();
+    let csv = format!("time_s,alpha_deg,beta_deg,sigma_deg\n{}", lines.join("\n"));
+    let text = Table::from_csv("it.csv", csv.as_bytes()).unwrap_err().to_string();
+    assert!(text.contains("it.csv, line 100002") && text.contains("points"), "{text}");
+}

@@ -116,6 +116,11 @@ impl Allocator {
         Ok(Self { settings, limits, ratio, problem, without_jets })
     }
 
+    /// What it was built from.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
     /// Time between ticks, s: the modulator's period, or that of the allocation if nothing is modulated.
     pub fn period(&self) -> f64 {
         match self.settings.jets {
@@ -192,7 +197,7 @@ impl Allocator {
             status: if found.is_some() { Status::Optimal } else { Status::Fallback },
             iterations: first + iterations,
             time: begin.elapsed().as_secs_f64(),
-            fallbacks: memory.report.fallbacks + u32::from(found.is_none()),
+            fallbacks: memory.report.fallbacks.saturating_add(u32::from(found.is_none())),
         };
     }
 }

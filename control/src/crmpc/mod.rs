@@ -480,6 +480,11 @@ impl Controller for Crmpc {
         Memory { plan: Plan::new(self.settings.horizon), ..Memory::default() }
     }
 
+    fn fits(&self, memory: &Memory) -> bool {
+        let (n, Plan { states, accelerations, multipliers, .. }) = (self.settings.horizon, &memory.plan);
+        states.len() == n + 1 && accelerations.len() == n && multipliers.len() == n
+    }
+
     fn update(
         &mut self,
         memory: &mut Memory,
@@ -538,7 +543,7 @@ impl Controller for Crmpc {
             };
             memory.observed.remember(&angle_rates, &acceleration);
         }
-        memory.ended += u32::from(assured && !memory.assured());
+        memory.ended = memory.ended.saturating_add(u32::from(assured && !memory.assured()));
         moment
     }
 }

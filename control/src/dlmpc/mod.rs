@@ -340,6 +340,11 @@ impl Controller for Dlmpc {
         Memory { plan: Plan::new(self.settings.horizon), ..Memory::default() }
     }
 
+    fn fits(&self, memory: &Memory) -> bool {
+        let (n, Plan { angles, commands, multipliers }) = (self.settings.horizon, &memory.plan);
+        angles.len() == n + 1 && commands.len() == n && multipliers.len() == n
+    }
+
     fn update(
         &mut self,
         memory: &mut Memory,

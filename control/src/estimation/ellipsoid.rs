@@ -60,6 +60,9 @@ const CONDITION: f64 = 1000.0;
 
 type Row = SVector<f64, 10>;
 
+/// Largest sum of products that is fitted.
+const LARGEST: f64 = 1e30;
+
 /// Sum of d dᵀ over the readings, d = (x², y², z², 2yz, 2xz, 2xy, 2x, 2y, 2z, 1): all that a fit needs, however many they are.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scatter {
@@ -96,6 +99,10 @@ impl Scatter {
     /// # Errors
     /// If the readings do not determine one.
     pub fn fit(&self) -> Result<Fit, FitError> {
+        // Readings are near 1; eigenvalues of what is far from that, or not finite, cannot be found.
+        if !(self.sum.amax() < LARGEST && self.count.is_finite()) {
+            return Err(FitError::NoEllipsoid);
+        }
         let s = self.sum / self.count.max(1.0);
         let v = quadric(&s).ok_or(FitError::NoEllipsoid)?;
         // Li, Griffiths 2004, (3): the quadric xᵀ Q x + 2 nᵀ x + d = 0.
@@ -104,6 +111,9 @@ impl Scatter {
         let inverse = q.try_inverse().ok_or(FitError::NoEllipsoid)?;
         let bias = -(inverse * n);
         let size = n.dot(&(inverse * n)) - v[9];
+        if !(q / size).amax().is_finite() {
+            return Err(FitError::NoEllipsoid);
+        }
         let squared = (q / size).symmetric_eigen();
         if !(squared.eigenvalues.min() > 0.0 && size.is_finite()) {
             return Err(FitError::NoEllipsoid);
@@ -113,7 +123,11 @@ impl Scatter {
 
         // Of u = W (m − b): uᵀu − 1 is the quadric over `size`.
         let residual = v.dot(&(s * v)).max(0.0).sqrt() / (2.0 * size.abs());
-        let mut eigenvalues = seen_from(&matrix, &bias, &s).symmetric_eigenvalues();
+        let seen = seen_from(&matrix, &bias, &s);
+        if !seen.iter().all(|value| value.is_finite()) {
+            return Err(FitError::NoEllipsoid);
+        }
+        let mut eigenvalues = seen.symmetric_eigenvalues();
         eigenvalues.as_mut_slice().sort_by(f64::total_cmp);
         let condition = eigenvalues[9] / eigenvalues[1].max(f64::MIN_POSITIVE);
         if condition > CONDITION {
@@ -146,6 +160,9 @@ fn quadric(s: &SMatrix<f64, 10, 10>) -> Option<Row> {
     let l = (reduced + Matrix6::identity() * (1e-13 * reduced.trace())).cholesky()?.l();
     let half = l.solve_lower_triangular(&c)?;
     let pencil = l.solve_lower_triangular(&half.transpose())?;
+    if !pencil.iter().all(|value| value.is_finite()) {
+        return None;
+    }
     let eigen = ((pencil + pencil.transpose()) / 2.0).symmetric_eigen();
     let w: Vector6<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into();
     let v1 = l.transpose().solve_upper_triangular(&w)?;

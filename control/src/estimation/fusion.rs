@@ -32,16 +32,16 @@ fn flip() -> Matrix3<f64> {
 }
 
 /// The part of the magnetic field that is perpendicular to the specific force. With it the heading is corrected as fast as the
-/// tilt, and the magnetometer cannot tilt the attitude.
-fn horizontal(force: &Vector3<f64>, field: &Vector3<f64>) -> Vector3<f64> {
-    let up = force.normalize();
-    field - up * up.dot(field)
+/// tilt, and the magnetometer cannot tilt the attitude. `None` without a force.
+fn horizontal(force: &Vector3<f64>, field: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let up = force.try_normalize(0.0)?;
+    Some(field - up * up.dot(field))
 }
 
 /// Body axes from north, east, down, out of specific force and magnetic field; `None` if they are zero or parallel. The triad of
 /// Black, *A passive system for determining the attitude of a satellite*, AIAA Journal 2 (1964).
 pub fn triad(force: &Vector3<f64>, field: &Vector3<f64>) -> Option<Rotation3<f64>> {
-    let north = horizontal(force, field).try_normalize(1e-9 * field.norm())?;
+    let north = horizontal(force, field)?.try_normalize(1e-9 * field.norm())?;
     let down = -force.normalize();
     Some(Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[north, down.cross(&north), down])))
 }
@@ -85,7 +85,7 @@ impl Fusion {
         // The crate compares with the attitude before the turn: turn first, then correct.
         filter.update_gyro(&<[f64; 3]>::from(rate - self.bias).into());
         let corrected = seen.is_some_and(|(force, field)| {
-            let field = horizontal(force, field);
+            let Some(field) = horizontal(force, field) else { return false };
             let (force, field) = (<[f64; 3]>::from(*force).into(), <[f64; 3]>::from(field).into());
             filter.update(&[0.0; 3].into(), &force, &field).is_ok()
         });

@@ -18,6 +18,7 @@ use vehicle::kinematics::{self, Kinematics};
 use vehicle::platform::body_from_velocity;
 use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
+use vehicle::time::tick_tolerance;
 
 /// Where the magnetometer's calibration comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -70,6 +71,45 @@ pub struct Settings {
     pub lost_after: f64,
     /// Equal samples in a row from which a sensor counts as frozen; 0 for never.
     pub frozen_samples: u32,
+    /// Which readings of gyroscope (rad/s), accelerometer (m/s²) and magnetometer (T) are believed.
+    pub gates: [Gate; 3],
+}
+
+/// Which readings of a sensor are believed. What a sensor cannot show, and what no motion can bring about, is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Gate {
+    /// Largest reading along an axis, either way.
+    pub range: f64,
+    /// Largest change from one sample to the next, as a norm. Readings that lie further away are believed when a second one
+    /// confirms them.
+    pub jump: f64,
+}
+
+/// Largest range that can be set: squares and products of readings within it are far from overflow.
+pub const LARGEST_RANGE: f64 = 1e9;
+
+impl Gate {
+    /// Rounding of a converter may take a reading at the end of the range beyond it by a part of a step.
+    const ROUNDING: f64 = 1e-3;
+
+    fn shows(&self, reading: &Vector3<f64>) -> bool {
+        reading.iter().all(|value| value.abs() <= self.range * (1.0 + Self::ROUNDING))
+    }
+
+    fn holds(&self, reading: &Vector3<f64>, before: &Vector3<f64>) -> bool {
+        (reading - before).norm() <= self.jump
+    }
+}
+
+/// What becomes of a sensor's reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Verdict {
+    /// It lies near the last one that was believed.
+    Believed,
+    /// It lies near the one before, which was not believed: the two confirm each other.
+    Confirmed,
+    /// It is left out; the last one that was believed is held in its place.
+    Rejected,
 }
 
 #[derive(Deserialize)]
@@ -83,13 +123,18 @@ struct File {
     lost_after: f64,
     frozen_samples: u32,
     calibration_duration: f64,
+    jump_gyroscope: f64,
+    jump_accelerometer: f64,
+    jump_magnetometer: f64,
 }
 
 impl Default for Settings {
     /// Of `data/estimator.toml`, for the start of Chai 2022 and sensors without errors in the field of the vehicle's data.
     fn default() -> Self {
         let file: File = embedded(include_str!("../../data/estimator.toml"));
-        let field = SensorData::embedded().surroundings.field;
+        let SensorData { surroundings, mems, .. } = SensorData::embedded();
+        let field = surroundings.field;
+        let jumps = [file.jump_gyroscope, file.jump_accelerometer, file.jump_magnetometer];
         Self {
             period: file.period,
             cutoff: file.cutoff,
@@ -106,6 +151,7 @@ impl Default for Settings {
             rest_duration: 0.0,
             lost_after: file.lost_after,
             frozen_samples: file.frozen_samples,
+            gates: std::array::from_fn(|i| Gate { range: mems[i].range, jump: jumps[i] }),
         }
     }
 }
@@ -166,6 +212,8 @@ pub enum Health {
     Calibrating,
     /// The fit was refused: the given calibration is in use.
     Uncalibrated,
+    /// A reading of the newest sample, or the sample as a whole, cannot be believed: it is left out.
+    Rejected,
 }
 
 /// State of the magnetometer's calibration.
@@ -208,11 +256,18 @@ pub struct Estimate {
     pub age: f64,
     /// Samples that never arrived, so far.
     pub dropped: i32,
+    /// Samples that were left out as a whole or in part, so far.
+    pub rejected: i32,
     /// Bias of the gyroscope: given, of the rest, and learned, rad/s.
     pub gyroscope_bias: Vector3<f64>,
 }
 
 type Nine = SVector<f64, 9>;
+
+const SENSORS: [&str; 3] = ["gyroscope", "accelerometer", "magnetometer"];
+
+/// Most samples that are put between two that arrived.
+const MOST_STEPS: f64 = 1000.0;
 
 /// What is carried from tick to tick.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -223,6 +278,8 @@ pub struct Memory {
     pub calibration: Calibration,
     scatter: Scatter,
     running: Option<Running>,
+    /// Number of the last sample that was left out as a whole; 0 for none.
+    refused: i32,
 }
 
 /// From the first sample on.
@@ -230,7 +287,14 @@ pub struct Memory {
 struct Running {
     /// When the first sample was taken, s.
     start: f64,
+    /// The last sample, with the readings that were believed last.
     last: Line,
+    /// Its readings as they came.
+    raw: [Vector3<f64>; 3],
+    /// Whether a reading of it was left out.
+    rejected: bool,
+    /// Whether a second sample has confirmed the first.
+    confirmed: bool,
     /// When it was seen, s.
     arrived: f64,
     filter: lowpass::State<9>,
@@ -292,13 +356,20 @@ impl Estimator {
             ("sensor.delay", s.sensor_delay, 1.0),
             ("rest.duration", s.rest_duration, f64::MAX),
         ];
+        for (sensor, gate) in SENSORS.iter().zip(&s.gates) {
+            for (what, value) in [("range", gate.range), ("jump", gate.jump)] {
+                if !(value > 0.0 && value <= LARGEST_RANGE) {
+                    let name = format!("{sensor}.{what}");
+                    return Err(DesignError::Setting { name, value });
+                }
+            }
+        }
         for (name, value, high) in limits {
             if !(0.0..high).contains(&value) {
                 return Err(DesignError::OutOfRange { name, value, low: 0.0, high });
             }
         }
-        for (sensor, correction) in ["gyroscope", "accelerometer", "magnetometer"].iter().zip(&s.corrections)
-        {
+        for (sensor, correction) in SENSORS.iter().zip(&s.corrections) {
             let determinant = correction.matrix.determinant();
             if !(determinant.abs() > 0.0 && determinant.is_finite()) {
                 return Err(DesignError::Singular { name: format!("{sensor}.matrix") });
@@ -341,7 +412,8 @@ impl Estimator {
         let arrived = memory.running.map_or(line.readings[1] != Vector3::zeros(), |running| {
             line.sample == 0 || line.sample != running.last.sample
         });
-        if arrived {
+        let usable = arrived && self.is_usable(memory, time, &line);
+        if usable {
             memory.running = match memory.running {
                 Some(running) => Some(self.take(memory, &running, &line)),
                 None => self.begin(memory, &line),
@@ -351,7 +423,42 @@ impl Estimator {
             }
             self.calibrate(memory);
         }
-        self.show(memory, time, arrived);
+        let refused = arrived && !usable && (line.sample == 0 || line.sample != memory.refused);
+        if refused {
+            memory.refused = line.sample;
+        }
+        let rejected = refused || usable && memory.running.is_some_and(|running| running.rejected);
+        if rejected {
+            memory.estimate.rejected = memory.estimate.rejected.saturating_add(1);
+        }
+        self.show(memory, time, usable, rejected);
+    }
+
+    /// Whether the sample was taken at a time at which it can have been taken; of the first one, whether its readings can be
+    /// believed, as there are no others.
+    fn is_usable(&self, memory: &Memory, time: f64, line: &Line) -> bool {
+        let oldest = memory.running.map_or(f64::NEG_INFINITY, |running| running.last.time);
+        let taken = line.time <= time + tick_tolerance(time, self.settings.period)
+            && line.time >= oldest
+            && line.time >= time - self.settings.lost_after;
+        let shown = || self.settings.gates.iter().zip(&line.readings).all(|(gate, value)| gate.shows(value));
+        taken && (memory.running.is_some() || shown())
+    }
+
+    /// What becomes of the readings of a sample that follows that of `before`.
+    fn judge(&self, before: &Running, line: &Line) -> [Verdict; 3] {
+        std::array::from_fn(|i| {
+            let (gate, reading) = (&self.settings.gates[i], &line.readings[i]);
+            if !gate.shows(reading) {
+                Verdict::Rejected
+            } else if gate.holds(reading, &before.last.readings[i]) {
+                Verdict::Believed
+            } else if gate.holds(reading, &before.raw[i]) {
+                Verdict::Confirmed
+            } else {
+                Verdict::Rejected
+            }
+        })
     }
 
     /// Whether readings of this sensor have been the same for too long.
@@ -387,6 +494,9 @@ impl Estimator {
         Some(Running {
             start: line.time,
             last: *line,
+            raw: line.readings,
+            rejected: false,
+            confirmed: false,
             arrived: line.time,
             filter: self.filter.settled(&filtered),
             filtered,
@@ -397,25 +507,44 @@ impl Estimator {
         })
     }
 
-    /// With the next sample. What lies between the samples is interpolated.
+    /// With the next sample. What lies between the samples is interpolated; in place of a reading that is not believed the last
+    /// one is held.
     fn take(&self, memory: &mut Memory, before: &Running, line: &Line) -> Running {
         let s = &self.settings;
-        let mut running = Running { last: *line, ..*before };
+        let verdicts = self.judge(before, line);
+        let rejected = verdicts.map(|verdict| verdict == Verdict::Rejected);
+        let left_out = rejected.contains(&true);
+        if !before.confirmed && !left_out && verdicts.contains(&Verdict::Confirmed) {
+            // Two samples agree against the first one, from which all began.
+            let again = self.begin(memory, line);
+            return again.map_or(*before, |again| Running { start: before.start, ..again });
+        }
+        let readings =
+            std::array::from_fn(|i| if rejected[i] { before.last.readings[i] } else { line.readings[i] });
+        let mut running = Running {
+            last: Line { readings, ..*line },
+            raw: line.readings,
+            rejected: left_out,
+            confirmed: before.confirmed || !left_out,
+            ..*before
+        };
         for (i, equal) in running.equal.iter_mut().enumerate() {
-            *equal = if line.readings[i] == before.last.readings[i] { *equal + 1 } else { 0 };
+            *equal = if line.readings[i] == before.raw[i] { equal.saturating_add(1) } else { 0 };
         }
-        memory.estimate.dropped += (line.sample - before.last.sample - 1).max(0);
-        let frozen = [0, 1, 2].map(|i| self.is_frozen(&running, i));
         let elapsed = if line.time > before.last.time { line.time - before.last.time } else { s.period };
-        if line.time - before.alive > s.lost_after && !frozen.contains(&true) {
-            return self.again(memory, &running, stacked(&line.readings));
+        let steps = (elapsed / s.period).round().clamp(1.0, MOST_STEPS);
+        let missing = line.sample.saturating_sub(before.last.sample).saturating_sub(1);
+        memory.estimate.dropped = memory.estimate.dropped.saturating_add(missing.clamp(0, steps as i32));
+        let frozen = [0, 1, 2].map(|i| self.is_frozen(&running, i));
+        let alive = !left_out && !frozen.contains(&true);
+        if line.time - before.alive > s.lost_after && alive {
+            return self.again(memory, &running, stacked(&readings));
         }
-        if !frozen.contains(&true) {
+        if alive {
             running.alive = line.time;
         }
 
-        let (from, to) = (stacked(&before.last.readings), stacked(&line.readings));
-        let steps = (elapsed / s.period).round().max(1.0);
+        let (from, to) = (stacked(&before.last.readings), stacked(&readings));
         let resting = line.time - running.start < s.rest_duration;
         let collecting = memory.calibration.status == CalibrationStatus::Collecting;
         for k in 1..=steps as u32 {
@@ -426,7 +555,8 @@ impl Estimator {
                 running.rest = (running.rest.0 + rate, running.rest.1 + 1.0);
                 running.fusion = running.fusion.with_bias(Vector3::zeros());
             }
-            let seen = (!(collecting || frozen[1] || frozen[2])).then_some((&force, &field));
+            let left_out = frozen[1] || frozen[2] || rejected[1] || rejected[2];
+            let seen = (!(collecting || left_out)).then_some((&force, &field));
             running.fusion.step(&s.gains, elapsed / steps, &(rate - running.rest_bias()), seen);
         }
         running
@@ -468,8 +598,11 @@ impl Estimator {
     }
 
     /// What is shown at `time` (s).
-    fn show(&self, memory: &mut Memory, time: f64, arrived: bool) {
-        let Some(running) = memory.running else { return };
+    fn show(&self, memory: &mut Memory, time: f64, arrived: bool, rejected: bool) {
+        let Some(running) = memory.running else {
+            memory.estimate.health = if rejected { Health::Rejected } else { Health::Waiting };
+            return;
+        };
         let s = &self.settings;
         let [rate, ..] = self.corrected(memory, &running.filtered);
         let bias = running.rest_bias() + running.fusion.bias();
@@ -486,19 +619,22 @@ impl Estimator {
         memory.estimate = Estimate {
             angles,
             rates,
-            health: self.health(memory, &running, time, arrived),
+            health: self.health(memory, &running, time, arrived, rejected),
             age,
             dropped: memory.estimate.dropped,
+            rejected: memory.estimate.rejected,
             gyroscope_bias: s.corrections[0].bias
                 + s.corrections[0].matrix.try_inverse().unwrap_or_default() * bias,
         };
     }
 
-    fn health(&self, memory: &Memory, running: &Running, time: f64, arrived: bool) -> Health {
+    fn health(&self, memory: &Memory, running: &Running, time: f64, arrived: bool, rejected: bool) -> Health {
         if time - running.alive > self.settings.lost_after {
             Health::Lost
         } else if (0..3).any(|i| self.is_frozen(running, i)) {
             Health::Frozen
+        } else if rejected {
+            Health::Rejected
         } else if !arrived && time > running.arrived {
             Health::Bridging
         } else {

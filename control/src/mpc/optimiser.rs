@@ -214,7 +214,10 @@ impl<const O: usize> Optimiser<O> {
         previous: Option<(&Motion<O>, &[[f64; 2]])>,
     ) -> Report {
         let budget = self.settings.time_budget;
-        let deadline = (budget > 0.0).then(|| Instant::now() + Duration::from_secs_f64(budget));
+        // A budget that no clock can count to is no limit.
+        let deadline = Some(budget)
+            .filter(|&budget| budget > 0.0)
+            .and_then(|budget| Instant::now().checked_add(Duration::try_from_secs_f64(budget).ok()?));
         let sample = Sample { start, affine, deadline };
         let Self { layout, settings, unconstrained, solution, .. } = self;
         let Solution { motion, multipliers } = solution;

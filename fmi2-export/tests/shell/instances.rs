@@ -1,9 +1,11 @@
 //! Instantiation, several instances and units side by side, panics.
 
 use crate::support::*;
-use fmi2_export::types::Status;
-use std::ffi::CStr;
+use fmi2_export::types::{Callbacks, LogCallback, Status};
+use std::ffi::{CStr, c_char, c_void};
 use std::ptr::{null, null_mut};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicPtr, Ordering};
 
 #[test]
 #[allow(unsafe_code)]
@@ -118,4 +120,75 @@ fn a_panic_is_fatal_for_the_instance_only() {
         assert_eq!(instance.step(0.0, 0.1), Status::Fatal);
     }
     assert_eq!(bystander.step(0.0, 0.1), Status::Ok);
+}
+
+/// What a logger does that calls its unit back, and what it was answered.
+#[derive(Default)]
+struct Caller {
+    component: AtomicPtr<c_void>,
+    answers: Mutex<Vec<Status>>,
+    /// Another thread that calls at the same time.
+    other: Mutex<Option<Vec<Status>>>,
+}
+
+fn call_all(component: *mut c_void) -> Vec<Status> {
+    let mut value = 0.0;
+    let mut state = null_mut();
+    vec![
+        c!(fmi2GetReal(component, &Y, 1, &mut value)),
+        c!(fmi2DoStep(component, 0.0, 1.0, 1)),
+        c!(fmi2GetFMUstate(component, &mut state)),
+        c!(fmi2Reset(component)),
+    ]
+}
+
+#[allow(unsafe_code)]
+extern "C" fn calls_back(
+    environment: *mut c_void,
+    _: *const c_char,
+    _: Status,
+    _: *const c_char,
+    _: *const c_char,
+) {
+    // SAFETY: the environment is the caller, which the test keeps alive.
+    let caller = unsafe { &*environment.cast::<Caller>() };
+    let component = caller.component.load(Ordering::SeqCst);
+    caller.answers.lock().unwrap().extend(call_all(component));
+    c!(fmi2FreeInstance(component));
+    let address = component as usize;
+    let other = std::thread::spawn(move || call_all(address as *mut c_void));
+    *caller.other.lock().unwrap() = Some(other.join().unwrap());
+}
+
+#[test]
+#[allow(unsafe_code)]
+fn calls_during_a_call_are_refused_whoever_makes_them() {
+    type Fixed = extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char);
+    let caller = Caller::default();
+    // SAFETY: a variadic call without variadic arguments passes the fixed ones like any other on the supported platforms.
+    let logger = unsafe { std::mem::transmute::<Fixed, LogCallback>(calls_back) };
+    let callbacks = Callbacks {
+        logger: Some(logger),
+        allocate_memory: None,
+        free_memory: None,
+        step_finished: None,
+        component_environment: (&raw const caller).cast_mut().cast(),
+    };
+    let guid = guid("Lag");
+    let component =
+        c!(fmi2Instantiate(c"it".as_ptr(), CO_SIMULATION, guid.as_ptr(), null(), &callbacks, 0, 0));
+    caller.component.store(component, Ordering::SeqCst);
+    assert_eq!(c!(fmi2SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0)), Status::Ok);
+    assert_eq!(c!(fmi2EnterInitializationMode(component)), Status::Ok);
+    assert_eq!(c!(fmi2ExitInitializationMode(component)), Status::Ok);
+    assert!(caller.answers.lock().unwrap().is_empty(), "nothing was said yet");
+    // An error is said, and everything that the logger and the other thread try meanwhile is refused.
+    assert_eq!(c!(fmi2SetReal(component, &X, 1, &1.0)), Status::Error);
+    assert_eq!(*caller.answers.lock().unwrap(), [Status::Error; 4]);
+    assert_eq!(*caller.other.lock().unwrap(), Some(vec![Status::Error; 4]));
+    // The instance is as it was, and free again.
+    let mut value = f64::NAN;
+    assert_eq!(c!(fmi2GetReal(component, &U, 1, &mut value)), Status::Ok);
+    assert_eq!(c!(fmi2Reset(component)), Status::Ok);
+    c!(fmi2FreeInstance(component));
 }

@@ -1,9 +1,13 @@
 //! Saved states of every unit: taken back bit for bit, and refused if anything is wrong with them. That they go on in another
 //! process is tested with the packed archives (tests/test_states.py).
 
-use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE};
+use conformance::interface::{CO_SIMULATION, ERROR, FATAL, MODEL_EXCHANGE, OK};
 use conformance::{Bits, Instance, Unit, c, units};
+use model_description::variable::Kind;
 use std::ops::Range;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 fn driver(fmu_type: i32) -> fn(&Instance, Range<u32>) -> Vec<Bits> {
     if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive }
@@ -46,6 +50,46 @@ fn handles_and_bytes_bring_back_the_same_future() {
             instance.ok(c!(instance, fmi2FreeFMUstate(instance.component, &mut handle)));
             let status = c!(instance, fmi2SetFMUstate(instance.component, before));
             instance.refused(status, ERROR, &["fmi2SetFMUstate", "was freed"]);
+        }
+    }
+}
+
+/// The medians of 201 calls, s. Once as the state is and once with the one from before the first step: the parameters are the same.
+fn durations(unit: &Unit, fmu_type: i32) -> [f64; 2] {
+    let instance = unit.instance(fmu_type).initialized();
+    let first = instance.save();
+    driver(fmu_type)(&instance, 0..12);
+    let mut last = instance.save();
+    let median = |call: &mut dyn FnMut()| {
+        let mut all: Vec<_> = (0..201)
+            .map(|_| {
+                let clock = Instant::now();
+                call();
+                clock.elapsed().as_secs_f64()
+            })
+            .collect();
+        all.sort_by(f64::total_cmp);
+        all[100]
+    };
+    let get = median(&mut || instance.ok(c!(instance, fmi2GetFMUstate(instance.component, &mut last))));
+    let mut turn = 0;
+    let set = median(&mut || {
+        turn += 1;
+        instance.restore(if turn % 2 == 0 { first } else { last });
+    });
+    [get, set]
+}
+
+/// `cargo test --release -p conformance --test fmi2 -- --ignored --nocapture taking_back`
+#[test]
+#[ignore = "measures time"]
+fn taking_back_a_state_takes_little_time() {
+    println!("{:<20} {:>12} {:>12}", "unit", "get (us)", "set (us)");
+    for unit in units() {
+        for &fmu_type in unit.interfaces() {
+            let [get, set] = durations(&unit, fmu_type);
+            println!("{:<20} {:>12.2} {:>12.2}", unit.name(), get * 1e6, set * 1e6);
+            assert!(set <= 20e-6, "{}: {} us", unit.name(), set * 1e6);
         }
     }
 }
@@ -125,5 +169,127 @@ fn bytes_fill_the_room_that_was_asked_for_and_no_more() {
         let (status, room) = serialize(bytes.len() + 16);
         instance.ok(status);
         assert!(room == [bytes.as_slice(), &[0xaa; 16]].concat(), "{}", unit.name());
+    }
+}
+
+/// CRC-32 as in zip files.
+fn checksum(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0, |crc, &byte| {
+        (0..8)
+            .fold(crc ^ u32::from(byte), |crc: u32, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
+    })
+}
+
+/// Length of the header, whose last four bytes are the checksum of what follows.
+const HEADER: usize = 61;
+
+/// Restores each forgery and steps on, as far as the unit takes it. What is done last is left in `doing`.
+fn survive_forgeries(unit: &Unit, fmu_type: i32, prepare: fn(&Instance), doing: &Mutex<String>) -> usize {
+    let instance = unit.instance(fmu_type);
+    prepare(&instance);
+    let instance = instance.initialized();
+    let drive = driver(fmu_type);
+    drive(&instance, 0..7);
+    let (genuine, component) = (instance.serialize(), instance.component);
+    let results = unit.references(|v| v.is_calculated() && matches!(v.kind, Kind::Real { .. }));
+    let h = unit.description.default_experiment.step;
+    let (mut values, mut taken) = (vec![0.0; results.len()], 0);
+    let replacements: [[u8; 8]; 9] = [
+        f64::NAN.to_le_bytes(),
+        f64::INFINITY.to_le_bytes(),
+        1e308_f64.to_le_bytes(),
+        (-1e308_f64).to_le_bytes(),
+        1e15_f64.to_le_bytes(),
+        (-1.0_f64).to_le_bytes(),
+        1e-300_f64.to_le_bytes(),
+        [0; 8],
+        [0xff; 8],
+    ];
+    let length = genuine.len() - HEADER;
+    let stride = length.div_ceil(FORGERIES / (replacements.len() + 2)).max(1);
+    for offset in (0..length).step_by(stride) {
+        let at = HEADER + offset;
+        let overwritten = replacements.iter().map(|replacement| {
+            let mut bytes = genuine.clone();
+            let end = (at + 8).min(bytes.len());
+            bytes[at..end].copy_from_slice(&replacement[..end - at]);
+            bytes
+        });
+        let flipped = [0x01, 0x80].into_iter().map(|bit| {
+            let mut bytes = genuine.clone();
+            bytes[at] ^= bit;
+            bytes
+        });
+        for (kind, mut bytes) in overwritten.chain(flipped).enumerate() {
+            *doing.lock().unwrap() = format!("{}: byte {offset} of {length}, forgery {kind}", unit.name());
+            let sum = checksum(&bytes[HEADER..]).to_le_bytes();
+            bytes[HEADER - 4..HEADER].copy_from_slice(&sum);
+            let (status, mut state) = instance.deserialize(&bytes);
+            instance.ok(status);
+            let status = c!(instance, fmi2SetFMUstate(component, state));
+            assert!(status == OK || status == ERROR, "{}", doing.lock().unwrap());
+            instance.ok(c!(instance, fmi2FreeFMUstate(component, &mut state)));
+            if status == OK {
+                taken += 1;
+                let mut time = 7.0 * h;
+                for _ in 0..3 {
+                    let (all, n) = (results.as_ptr(), results.len());
+                    let got = c!(instance, fmi2GetReal(component, all, n, values.as_mut_ptr()));
+                    let stepped = c!(instance, fmi2DoStep(component, time, h, 1));
+                    assert!(got != FATAL && stepped != FATAL, "{}", doing.lock().unwrap());
+                    time += h;
+                }
+            }
+            instance.ok(c!(instance, fmi2Reset(component)));
+            instance.forget();
+        }
+    }
+    taken
+}
+
+/// Forgeries of each unit, about.
+const FORGERIES: usize = 6000;
+
+#[test]
+fn forged_states_neither_hang_nor_panic() {
+    let plants: [fn(&Instance); 3] = [
+        |_| (),
+        |instance| {
+            let reference = instance.unit.reference("sensor.set");
+            instance.ok(c!(instance, fmi2SetInteger(instance.component, &reference, 1, &2)));
+            instance.choose("actuation", "surfacesAndJets");
+        },
+        |instance| {
+            let reference = instance.unit.reference("actuation.delay");
+            instance.ok(instance.set_real(reference, 0.1));
+        },
+    ];
+    for unit in units() {
+        let all = if unit.name() == "ReentryPlant" { &plants[..] } else { &plants[..1] };
+        for &prepare in all {
+            let doing = Arc::new(Mutex::new(String::new()));
+            let (done, finished) = channel();
+            let (name, unit, shared) = (unit.name().to_owned(), unit.clone(), doing.clone());
+            let thread = std::thread::spawn(move || {
+                let taken = survive_forgeries(&unit, CO_SIMULATION, prepare, &shared);
+                let _ = done.send(taken);
+            });
+            let mut last = String::new();
+            let taken = loop {
+                match finished.recv_timeout(Duration::from_secs(20)) {
+                    Ok(taken) => break taken,
+                    Err(RecvTimeoutError::Disconnected) => {
+                        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+                        panic!("{name} ended without a word");
+                    }
+                    Err(RecvTimeoutError::Timeout) => {
+                        let now = doing.lock().unwrap().clone();
+                        assert_ne!(now, last, "it hangs");
+                        last = now;
+                    }
+                }
+            };
+            println!("{name}: {taken} forgeries were taken");
+        }
     }
 }

@@ -72,16 +72,10 @@ fn an_experiment_without_sense_is_refused() {
 }
 
 #[test]
-fn an_experiment_may_start_at_any_time() {
+fn an_experiment_may_start_at_any_time_that_ticks_can_be_told_apart_at() {
     for unit in units() {
         let h = unit.description.default_experiment.step;
-        // So far out that a step changes nothing, there is nothing to check but that it is survived.
-        for start in [1e18, 1e300, f64::MAX, -1e300] {
-            let instance = begun(&unit, (None, start, None));
-            instance.ok(instance.step(start, h));
-            instance.bits(&unit.results());
-        }
-        for start in [-3.0, 1.0, 1e6] {
+        for start in [-3.0, 1.0, 1e6, 1.7e9, -1e10] {
             let instance = begun(&unit, (None, start, None));
             for k in 0..3 {
                 instance.ok(instance.step(start + f64::from(k) * h, h));
@@ -213,6 +207,65 @@ fn times_of_model_exchange_are_checked() {
             let instance = unit.instance(MODEL_EXCHANGE).initialized();
             let status = c!(instance, fmi2SetTime(instance.component, time));
             instance.refused(status, ERROR, &["fmi2SetTime", "not finite"]);
+        }
+    }
+}
+
+/// What the results are after 50 s from `start` on, stepped by 0.04 s with a clock that the importer adds up.
+fn after_50_seconds(unit: &Unit, start: f64, names: &[&str]) -> Vec<f64> {
+    let instance = begun(unit, (None, start, None));
+    let component = instance.component;
+    let mut time = start;
+    for _ in 0..1250 {
+        instance.ok(c!(instance, fmi2DoStep(component, time, 0.04, 1)));
+        time += 0.04;
+    }
+    names.iter().map(|name| instance.real(unit.reference(name))).collect()
+}
+
+#[test]
+fn an_experiment_that_starts_at_unix_time_has_the_same_ticks() {
+    for name in ["CRMPC", "DLMPC"] {
+        let unit = conformance::unit(name);
+        let instance = |start: f64| {
+            let instance = unit.instance(CO_SIMULATION);
+            instance.choose("reference.profile", "constant");
+            instance.ok(set_up(&instance, (None, start, None)));
+            through_initialization(&instance);
+            instance
+        };
+        for start in [0.0, 1e6, 1.7e9, -1.7e9] {
+            let instance = instance(start);
+            let (reference, mut time, mut solves) = (unit.reference("solver.solves"), start, 0);
+            for _ in 0..1250 {
+                instance.ok(c!(instance, fmi2DoStep(instance.component, time, 0.04, 1)));
+                time += 0.04;
+            }
+            instance.ok(c!(instance, fmi2GetInteger(instance.component, &reference, 1, &mut solves)));
+            assert_eq!(solves, 251, "{name} from {start} s on");
+        }
+    }
+    // The noise of the disturbance is a function of the tick's number.
+    let plant = conformance::unit("ReentryPlant");
+    let names = ["attitude.alpha", "attitude.sigma", "rate.p", "rate.q", "rate.r"];
+    let expected = after_50_seconds(&plant, 0.0, &names);
+    for start in [1e6, 1.7e9] {
+        let found = after_50_seconds(&plant, start, &names);
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!((found - expected).abs() < 1e-4 * expected.abs(), "{found} {expected} from {start} s on");
+        }
+    }
+}
+
+#[test]
+fn a_start_at_which_ticks_cannot_be_told_apart_is_refused() {
+    for unit in units() {
+        for start in [1e16, 1e300, f64::MAX, -1e300] {
+            let instance = unit.instance(CO_SIMULATION);
+            instance.ok(set_up(&instance, (None, start, None)));
+            instance.ok(c!(instance, fmi2EnterInitializationMode(instance.component)));
+            let status = c!(instance, fmi2ExitInitializationMode(instance.component));
+            instance.refused(status, ERROR, &[&format!("start time = {start} s"), "a period of 0.0"]);
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Value references: one by one or all at once, wrong ones, repeated ones, values at the limits.
 
-use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE, Status};
+use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE, OK, Status};
 use conformance::{Instance, c, units};
-use model_description::variable::Kind;
+use model_description::variable::{Causality, Kind};
 use std::ffi::c_int;
 use std::ptr::null;
 
@@ -187,6 +187,41 @@ fn values_up_to_the_declared_limits_are_taken_and_none_beyond() {
                 Kind::String { .. } => refused(instance.set_string(&variable.name, c"\xff")),
             }
             instance.restore(here);
+        }
+    }
+}
+
+#[test]
+fn what_is_calculated_from_the_largest_inputs_is_a_number_or_an_error() {
+    let large = [1e10, 1e100, 1e154, 1e160, 1e300, f64::MAX];
+    for unit in units() {
+        let inputs = unit.references(|variable| {
+            variable.causality == Causality::Input && matches!(variable.kind, Kind::Real { .. })
+        });
+        let results = unit.references(|v| v.is_calculated() && matches!(v.kind, Kind::Real { .. }));
+        for value in large.into_iter().flat_map(|value| [value, -value]) {
+            // Each input alone, then all of them.
+            for set in inputs.chunks(1).chain([inputs.as_slice()]) {
+                let instance = unit.instance(CO_SIMULATION).initialized();
+                for tick in 0..2 {
+                    for reference in set {
+                        let (component, name) = (instance.component, unit.name());
+                        if c!(instance, fmi2SetReal(component, reference, 1, &value)) != OK {
+                            break;
+                        }
+                        let mut found = vec![0.0_f64; results.len()];
+                        let (all, n) = (results.as_ptr(), results.len());
+                        let status = c!(instance, fmi2GetReal(component, all, n, found.as_mut_ptr()));
+                        assert!(status == OK || status == ERROR, "{name}: status {status}");
+                        let wrong = found.iter().zip(&results).find(|(value, _)| !value.is_finite());
+                        let which = wrong.map(|(_, &i)| &unit.description.variables[i as usize].name);
+                        assert!(which.is_none(), "{name}: {which:?} is not finite for {reference} = {value}");
+                    }
+                    if c!(instance, fmi2DoStep(instance.component, f64::from(tick) * 0.2, 0.2, 1)) != OK {
+                        break;
+                    }
+                }
+            }
         }
     }
 }
