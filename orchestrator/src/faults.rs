@@ -1,10 +1,11 @@
 //! What is wrong with a description that can be read all the same. Units run with most of it, but not everywhere, and not always as meant.
 
 use crate::description::{Kind, ModelDescription, Variable};
+use crate::wiring::Carrier;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// `causality` of FMI 2.0, section 2.2.7.
-const CAUSALITIES: [&str; 6] =
+pub const CAUSALITIES: [&str; 6] =
     ["parameter", "calculatedParameter", "input", "output", "local", "independent"];
 /// `variability` of the same section.
 const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
@@ -30,7 +31,7 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
         }
         // Other variables may share a reference as aliases; of two that are set, the later would win.
         if matches!(variable.causality.as_str(), "input" | "parameter") {
-            let handle = (variable.reference, carrier(&variable.kind));
+            let handle = (variable.reference, Carrier::of(&variable.kind));
             if let Some(other) = handles.insert(handle, name) {
                 faults.push(format!("\"{other}\" and \"{name}\" have the same value reference {}", handle.0));
             }
@@ -38,14 +39,6 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
         of_variable(variable, &units, &mut faults);
     }
     faults
-}
-
-/// The calls by which a variable is set; references are unique within each.
-fn carrier(kind: &Kind) -> &'static str {
-    match kind {
-        Kind::Enumeration { .. } => "Integer",
-        other => other.name(),
-    }
 }
 
 fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<String>) {

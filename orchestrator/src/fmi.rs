@@ -1,58 +1,32 @@
 //! The types of FMI 2.0's C interface as the master meets them. What a unit gives back is taken as the integer that C passes: a unit may return
 //! anything, and a Rust enumeration must not hold what it has no item for.
 
+pub use fmi_rs::fmi2::types::{
+    fmi2False as FALSE, fmi2Status as Status, fmi2StatusKind, fmi2True as TRUE, fmi2Type,
+};
 use std::ffi::{c_char, c_int, c_uint, c_void};
 
-/// fmi2True and fmi2False.
-pub const TRUE: c_int = 1;
-/// See [`TRUE`].
-pub const FALSE: c_int = 0;
 /// fmi2CoSimulation.
-pub const CO_SIMULATION: c_int = 1;
+pub const CO_SIMULATION: c_int = fmi2Type::CoSimulation as c_int;
 /// fmi2LastSuccessfulTime.
-pub const LAST_SUCCESSFUL_TIME: c_int = 2;
+pub const LAST_SUCCESSFUL_TIME: c_int = fmi2StatusKind::LastSuccessfulTime as c_int;
 /// fmi2Terminated.
-pub const TERMINATED: c_int = 3;
+pub const TERMINATED: c_int = fmi2StatusKind::Terminated as c_int;
 
-/// What a call returned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Status {
-    /// fmi2OK.
-    Ok,
-    /// fmi2Warning.
-    Warning,
-    /// fmi2Discard.
-    Discard,
-    /// fmi2Error.
-    Error,
-    /// fmi2Fatal.
-    Fatal,
-    /// fmi2Pending.
-    Pending,
-    /// No status of FMI 2.0.
-    Unknown(c_int),
+/// The status that a call returned; its number if FMI 2.0 has none such.
+///
+/// # Errors
+/// The number.
+#[inline]
+pub fn status(code: c_int) -> Result<Status, c_int> {
+    Status::try_from(code).map_err(|()| code)
 }
 
-impl From<c_int> for Status {
-    fn from(code: c_int) -> Self {
-        match code {
-            0 => Self::Ok,
-            1 => Self::Warning,
-            2 => Self::Discard,
-            3 => Self::Error,
-            4 => Self::Fatal,
-            5 => Self::Pending,
-            other => Self::Unknown(other),
-        }
-    }
-}
-
-impl std::fmt::Display for Status {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match self {
-            Self::Unknown(code) => write!(f, "status {code}, which FMI 2.0 does not have"),
-            known => write!(f, "fmi2{}", if *known == Self::Ok { "OK".into() } else { format!("{known:?}") }),
-        }
+/// What a call returned, as text.
+pub fn name_of(status: Result<Status, c_int>) -> String {
+    match status {
+        Ok(known) => format!("{known:?}"),
+        Err(code) => format!("status {code}, which FMI 2.0 does not have"),
     }
 }
 
@@ -104,11 +78,8 @@ mod tests {
 
     #[test]
     fn a_status_that_fmi_does_not_have_is_kept_as_a_number() {
-        assert_eq!(Status::from(2), Status::Discard);
-        assert_eq!(Status::from(-7).to_string(), "status -7, which FMI 2.0 does not have");
-        assert_eq!(
-            (Status::Ok.to_string(), Status::Fatal.to_string()),
-            ("fmi2OK".into(), "fmi2Fatal".into())
-        );
+        assert_eq!(status(2), Ok(Status::Discard));
+        assert_eq!(name_of(status(-7)), "status -7, which FMI 2.0 does not have");
+        assert_eq!(name_of(status(4)), "fmi2Fatal");
     }
 }

@@ -137,10 +137,9 @@ impl Fmu {
     /// FMU refuses.
     pub fn instantiate(&self, name: &str) -> Result<FmuUnit, Error> {
         let refuse = |message: String| Error::Fmu { path: self.path.clone(), message };
-        let is_first = !self.is_sound.get();
         let functions = self.load().map_err(refuse)?;
-        if let Some(fault) = functions.version_fault().filter(|_| is_first) {
-            tracing::warn!("{}: {fault}", self.path.display());
+        if let Some(fault) = functions.version_fault() {
+            heard::warn_once(format!("{}: {fault}", self.path.display()));
         }
 
         let text =
@@ -327,12 +326,12 @@ impl Log {
         self.last.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    fn message(&self, status: Status, category: &str, message: &str) {
+    fn message(&self, status: Result<Status, c_int>, category: &str, message: &str) {
         let (component, message) = (&self.component, message.trim_end().replace('\n', " "));
         match status {
-            Status::Ok | Status::Pending => tracing::info!("{component}: [{category}] {message}"),
-            Status::Warning => heard::warn(&format!("{component}: [{category}] {message}")),
-            Status::Discard | Status::Error | Status::Fatal | Status::Unknown(_) => {
+            Ok(Status::Ok | Status::Pending) => tracing::info!("{component}: [{category}] {message}"),
+            Ok(Status::Warning) => heard::warn(&format!("{component}: [{category}] {message}")),
+            Ok(Status::Discard | Status::Error | Status::Fatal) | Err(_) => {
                 if !self.instantiates.load(Ordering::Relaxed) {
                     tracing::error!("{component}: [{category}] {message}");
                 }
@@ -352,7 +351,7 @@ unsafe extern "C" fn receive_message(
 ) {
     // SAFETY: the environment is the `Log` given with the callbacks, which lives as long as the instance.
     if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
-        log.message(status.into(), &text_of(category), &text_of(message));
+        log.message(fmi::status(status), &text_of(category), &text_of(message));
     }
 }
 
@@ -374,25 +373,25 @@ pub struct FmuUnit {
 impl FmuUnit {
     #[inline]
     fn check(&mut self, call: &'static str, status: c_int) -> Outcome {
-        match Status::from(status) {
-            Status::Ok | Status::Warning => Ok(()),
+        match fmi::status(status) {
+            Ok(Status::Ok | Status::Warning) => Ok(()),
             status => Err(self.failure(call, status)),
         }
     }
 
     #[cold]
-    fn failure(&mut self, call: &'static str, status: Status) -> UnitFailure {
-        self.fatal |= status == Status::Fatal;
+    fn failure(&mut self, call: &'static str, status: Result<Status, c_int>) -> UnitFailure {
+        self.fatal |= status == Ok(Status::Fatal);
         let said = self.instance.log.take();
-        if status == Status::Discard && call == "doStep" {
+        if status == Ok(Status::Discard) && call == "doStep" {
             return self.discarded(said);
         }
-        if status == Status::Pending {
+        if status == Ok(Status::Pending) {
             let message = "it wants to step asynchronously, which is not supported";
-            return UnitFailure::new(call, format!("{message} ({status})"));
+            return UnitFailure::new(call, format!("{message} ({:?})", Status::Pending));
         }
         let said = said.unwrap_or_else(|| "no message in its log".into());
-        UnitFailure::new(call, format!("{said} ({status})"))
+        UnitFailure::new(call, format!("{said} ({})", fmi::name_of(status)))
     }
 
     /// Why a step was discarded: FMI 2.0, section 4.2.3, lets a unit end the simulation so.
@@ -406,7 +405,7 @@ impl FmuUnit {
                 get_boolean_status(self.component, fmi::TERMINATED, &raw mut terminated),
             ]
         };
-        let [knows_time, knows_end] = statuses.map(|status| Status::from(status) == Status::Ok);
+        let [knows_time, knows_end] = statuses.map(|status| fmi::status(status) == Ok(Status::Ok));
         let ends = knows_end && terminated != fmi::FALSE;
         let mut parts: Vec<String> = said.into_iter().collect();
         if !ends && parts.is_empty() {
@@ -417,7 +416,7 @@ impl FmuUnit {
         }
         UnitFailure {
             ends,
-            ..UnitFailure::new("doStep", format!("{} ({})", parts.join("; "), Status::Discard))
+            ..UnitFailure::new("doStep", format!("{} ({:?})", parts.join("; "), Status::Discard))
         }
     }
 }

@@ -1,6 +1,8 @@
 //! What units warn of during a run: each warning is told once, at the end, with its first time and how often it came.
 
 use std::cell::RefCell;
+use std::collections::BTreeSet;
+use std::sync::{Mutex, PoisonError};
 
 /// A unit that never says the same twice is collected up to so many warnings.
 const MOST: usize = 100;
@@ -56,6 +58,16 @@ pub fn warn(text: &str) {
     });
     if !is_collected {
         tracing::warn!("{text}");
+    }
+}
+
+/// What is wrong with a file is told once, however many threads open it and however often.
+pub fn warn_once(text: String) {
+    static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
+    if !told.contains(&text) {
+        tracing::warn!("{text}");
+        told.insert(text);
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::catalogue::{self, Filter};
 use crate::description::{Interface, Kind, ModelDescription, Variable};
 use crate::error::Error;
+use crate::faults::CAUSALITIES;
 use crate::fmu::Fmu;
 use std::io::{self, Write};
 use std::path::Path;
@@ -64,13 +65,17 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
         named.iter().filter_map(|(name, value, unit)| value.map(|v| format!("{name} {v:?}{unit}"))).collect();
     line("experiment", &proposed.join(", "))?;
 
-    for causality in ["parameter", "calculatedParameter", "input", "output", "local", "independent"] {
+    let mut unknown: Vec<&str> = d.variables.iter().map(|v| v.causality.as_str()).collect();
+    unknown.retain(|causality| !CAUSALITIES.contains(causality));
+    unknown.sort_unstable();
+    unknown.dedup();
+    for causality in CAUSALITIES.into_iter().chain(unknown) {
         let rows: Vec<[String; 6]> =
             d.variables.iter().filter(|v| v.causality == causality).map(|v| row(d, v)).collect();
         if rows.is_empty() {
             continue;
         }
-        writeln!(out, "\n{causality} ({})", rows.len())?;
+        writeln!(out, "\n{} ({})", causality.escape_default(), rows.len())?;
         let header = ["name", "type", "variability", "unit", "start", "description"].map(String::from);
         let mut widths = [0; 6];
         for row in rows.iter().chain([&header]) {

@@ -368,7 +368,7 @@ impl Plan {
             let fmu = &self.fmus[index];
             let unit: Box<dyn CoSimulationUnit> = Box::new(fmu.instantiate(name)?);
             let on_invalid = self.experiment.simulation.on_invalid;
-            let mut unit = Watched::around(unit, name, &fmu.description, on_invalid);
+            let mut unit = Watched::around(unit, name, fmu, on_invalid);
             settings::apply(&self.settings[index], unit.as_mut()).map_err(|failure| Error::Unit {
                 component: name.clone(),
                 time: self.clock.start(),
@@ -409,7 +409,7 @@ fn open(path: &Path) -> Result<Fmu, Error> {
             1 => String::new(),
             count => format!(" ({} more: orchestrator inspect --check)", count - 1),
         };
-        tracing::warn!("{}: {first}{more}", path.display());
+        heard::warn_once(format!("{}: {first}{more}", path.display()));
     }
     Ok(fmu)
 }

@@ -1,12 +1,14 @@
 //! Watches what a unit gives: a value that is no number, no item of its enumeration, or neither true nor false would spread through the loop and
 //! pass for a result.
 
-use crate::description::{Kind, ModelDescription, Variable};
+use crate::description::{Kind, Variable};
 use crate::error::UnitFailure;
+use crate::fmu::Fmu;
+use crate::heard;
 use crate::unit::{CoSimulationUnit, Outcome};
 use crate::wiring::Carrier;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use std::rc::Rc;
 
 /// What is done about an invalid value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, clap::ValueEnum)]
@@ -25,12 +27,11 @@ pub enum OnInvalid {
 pub struct Watched {
     unit: Box<dyn CoSimulationUnit>,
     name: String,
-    /// Names and references of the variables, to tell of them.
-    variables: Vec<(Carrier, u32, String)>,
+    /// Knows the names of the variables.
+    fmu: Rc<Fmu>,
     /// References of the enumerations, sorted, with the values of their items.
     items: Vec<(u32, Vec<i32>)>,
     warns: bool,
-    told: BTreeSet<(u32, Carrier)>,
 }
 
 impl Watched {
@@ -38,45 +39,48 @@ impl Watched {
     pub fn around(
         unit: Box<dyn CoSimulationUnit>,
         name: &str,
-        description: &ModelDescription,
+        fmu: &Rc<Fmu>,
         on_invalid: OnInvalid,
     ) -> Box<dyn CoSimulationUnit> {
         if on_invalid == OnInvalid::Allow {
             return unit;
         }
-        let named = |variable: &Variable| {
-            Some((Carrier::of(&variable.kind)?, variable.reference, variable.name.clone()))
-        };
         let of_items = |variable: &Variable| match &variable.kind {
             Kind::Enumeration { items } => {
                 Some((variable.reference, items.iter().map(|(_, value)| *value).collect()))
             }
             _ => None,
         };
-        let mut items: Vec<(u32, Vec<i32>)> = description.variables.iter().filter_map(of_items).collect();
+        let mut items: Vec<(u32, Vec<i32>)> = fmu.description.variables.iter().filter_map(of_items).collect();
         items.sort();
         Box::new(Self {
             unit,
             name: name.to_string(),
-            variables: description.variables.iter().filter_map(named).collect(),
+            fmu: fmu.clone(),
             items,
             warns: on_invalid == OnInvalid::Warn,
-            told: BTreeSet::new(),
         })
     }
 
     #[cold]
-    fn invalid(&mut self, call: &'static str, carrier: Carrier, reference: u32, what: &str) -> Outcome {
-        let known = self.variables.iter().find(|known| (known.0, known.1) == (carrier, reference));
+    fn invalid(
+        &self,
+        call: &'static str,
+        carrier: Carrier,
+        reference: u32,
+        value: &str,
+        what: &str,
+    ) -> Outcome {
+        let is_meant =
+            |known: &&Variable| (Carrier::of(&known.kind), known.reference) == (Some(carrier), reference);
+        let known = self.fmu.description.variables.iter().find(is_meant);
         let variable =
-            known.map_or_else(|| format!("variable {reference}"), |known| format!("\"{}\"", known.2));
+            known.map_or_else(|| format!("variable {reference}"), |known| format!("\"{}\"", known.name));
         if !self.warns {
             let remedy = "--on-invalid warn lets the run go on";
-            return Err(UnitFailure::new(call, format!("{variable} is {what}; {remedy}")));
+            return Err(UnitFailure::new(call, format!("{variable} is {value}, {what}; {remedy}")));
         }
-        if self.told.insert((reference, carrier)) {
-            tracing::warn!("{}: {variable} is {what}", self.name);
-        }
+        heard::warn(&format!("{}: {variable} is {what}", self.name));
         Ok(())
     }
 }
@@ -86,7 +90,7 @@ impl CoSimulationUnit for Watched {
         self.unit.get_real(references, values)?;
         for (value, &reference) in values.iter().zip(references) {
             if !value.is_finite() {
-                self.invalid("getReal", Carrier::Real, reference, &value.to_string())?;
+                self.invalid("getReal", Carrier::Real, reference, &value.to_string(), "not finite")?;
             }
         }
         Ok(())
@@ -100,8 +104,8 @@ impl CoSimulationUnit for Watched {
         for (value, &reference) in values.iter().zip(references) {
             let place = self.items.binary_search_by_key(&reference, |(reference, _)| *reference);
             if place.is_ok_and(|place| !self.items[place].1.contains(value)) {
-                let what = format!("{value}, which is no item of its enumeration");
-                self.invalid("getInteger", Carrier::Integer, reference, &what)?;
+                let what = "no item of its enumeration";
+                self.invalid("getInteger", Carrier::Integer, reference, &value.to_string(), what)?;
             }
         }
         Ok(())
@@ -111,8 +115,8 @@ impl CoSimulationUnit for Watched {
         self.unit.get_boolean(references, values)?;
         for (value, &reference) in values.iter().zip(references) {
             if !matches!(value, 0 | 1) {
-                let what = format!("{value}, which is neither true nor false");
-                self.invalid("getBoolean", Carrier::Boolean, reference, &what)?;
+                let what = "neither true nor false";
+                self.invalid("getBoolean", Carrier::Boolean, reference, &value.to_string(), what)?;
             }
         }
         Ok(())

@@ -74,8 +74,8 @@ pub trait Bounded<const O: usize>: Constraints<O> {
     /// Sets the bounds of the intervals `of` about `motion`: of the state at the end of each, and of its input.
     fn tighten(&mut self, motion: &Motion<O>, of: Range<usize>);
 
-    /// Sets the bounds of all intervals about `motion` but those in `skip`. Those that it violates, from the first to the last; the
-    /// terminal ball is not looked at.
+    /// The intervals that `motion` violates, from the first to the last; those in `skip` and the terminal ball are not looked at. Sets the
+    /// bounds of the others about `motion`; those between the first and the last violated one may stay as they were.
     fn violated(&mut self, motion: &Motion<O>, skip: Range<usize>) -> Option<Range<usize>>;
 
     /// Whether `motion` violates one of the intervals `of` with the bounds about itself. The bounds stay as they are. Nothing to do for bounds that
@@ -308,11 +308,11 @@ impl<const O: usize> Optimiser<O> {
     fn begin_at(&mut self, start: &State<O>, affine: &[State<O>], active: &[[f64; 2]], search: &mut Search) {
         let n = self.layout.horizon;
         let mut range = search.window.clone().unwrap_or(0..n);
-        let largest = active.iter().flatten().copied().fold(0.0, f64::max);
         let more_than = |least: f64| move |&[state, input]: &[f64; 2]| state.max(input) > least;
         if !active[range.clone()].iter().any(more_than(0.0)) {
             return;
         }
+        let largest = active.iter().flatten().copied().fold(0.0, f64::max);
         let is_active = more_than(ACTIVE * largest);
         while let Some(last) = active[range.end..(range.end + MARGIN).min(n)].iter().rposition(is_active) {
             range.end += last + 1;
