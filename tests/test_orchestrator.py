@@ -184,3 +184,11 @@ def test_list_shows_experiments_and_units():
     assert finished.returncode == 0, finished.stderr
     for name in NAMES:
         assert name in finished.stdout
+
+
+@pytest.mark.parametrize(("kind", "warns"), [("constant", True), ("white", False)])
+def test_a_seed_that_changes_nothing_is_told(orchestrate, kind, warns):
+    settings = ["--set", f"plant.disturbance.kind={kind}", "--set", "plant.disturbance.seed=7"]
+    finished, _ = orchestrate(EXPERIMENTS / "lqr.toml", *settings)
+    assert finished.returncode == 0, finished.stderr
+    assert ("--set plant.disturbance.seed: changes nothing" in finished.stderr) == warns, finished.stderr

@@ -37,6 +37,7 @@ pub mod recorder;
 pub mod report;
 pub mod run;
 pub mod search;
+pub mod seeds;
 pub mod settings;
 pub mod sidecar;
 pub mod ssp;

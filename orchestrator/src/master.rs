@@ -320,16 +320,8 @@ impl Master {
             if let Some(pacer) = &mut self.pacer {
                 pacer.wait(tick);
             }
+            self.advance(tick)?;
             let time = self.clock.time(tick);
-            heard::at(time);
-            if let Some(request) = self.interrupt.asked() {
-                return Err(Error::Interrupted { time, request });
-            }
-            if tick > 0 {
-                self.step_to(tick)?;
-            }
-            self.propagate(tick).map_err(|culprit| self.error(time, culprit))?;
-            self.probe.read(&mut self.members).map_err(|culprit| self.error(time, culprit))?;
             let deadlines = self.pacer.as_mut().map_or(Ok(()), |pacer| pacer.check(tick));
             let sample = Sample { tick, time, last: tick == self.clock.ticks(), values: &self.probe.values };
             for observer in observers.iter_mut() {
@@ -342,6 +334,25 @@ impl Master {
             outcome.map_err(|failure| self.error(self.clock.stop(), (index, failure)))?;
         }
         Ok(())
+    }
+
+    /// Goes on to this tick, the one after the last, or from the initialized units to tick 0. What is probed there, in the order in which it
+    /// was asked for.
+    ///
+    /// # Errors
+    /// What a unit said; that the run was ended from outside.
+    pub fn advance(&mut self, tick: u64) -> Result<&[f64], Error> {
+        let time = self.clock.time(tick);
+        heard::at(time);
+        if let Some(request) = self.interrupt.asked() {
+            return Err(Error::Interrupted { time, request });
+        }
+        if tick > 0 {
+            self.step_to(tick)?;
+        }
+        self.propagate(tick).map_err(|culprit| self.error(time, culprit))?;
+        self.probe.read(&mut self.members).map_err(|culprit| self.error(time, culprit))?;
+        Ok(&self.probe.values)
     }
 
     /// Steps the units whose interval ends at this tick.

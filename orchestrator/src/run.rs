@@ -22,6 +22,7 @@ use crate::realtime::priority::{Priority, Scheduling};
 use crate::realtime::timer::{self, Monotonic};
 use crate::recorder::Recorder;
 use crate::search;
+use crate::seeds;
 use crate::settings::{self, Setting};
 use crate::sidecar;
 use crate::unit::CoSimulationUnit;
@@ -112,7 +113,7 @@ pub struct Plan {
     /// Feedback loops.
     pub loops: Vec<FeedbackLoop>,
     probes: Probes,
-    places: Places,
+    pub(crate) places: Places,
     limits: [Option<Port>; 2],
 }
 
@@ -189,10 +190,7 @@ impl Plan {
         if options.live {
             live::check_terminal()?;
         }
-        let step = self.clock.step();
-        for warning in delay::warnings(&self.parts(), &self.settings, &self.loops, step) {
-            tracing::warn!("{warning}");
-        }
+        self.warn(&options.interrupt)?;
         let experiment = &self.experiment;
         let stem = experiment.source.path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy());
         let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(stem.as_ref()));
@@ -296,6 +294,17 @@ impl Plan {
         })
     }
 
+    /// What is doubtful though it can be run.
+    fn warn(&self, interrupt: &Interrupt) -> Result<(), Error> {
+        for warning in delay::warnings(&self.parts(), &self.settings, &self.loops, self.clock.step()) {
+            tracing::warn!("{warning}");
+        }
+        for seed in seeds::without_effect(self, interrupt)? {
+            tracing::warn!("--set {seed}: changes nothing, another seed comes to the same");
+        }
+        Ok(())
+    }
+
     /// The file of the recorded variables.
     fn recorder(&self, out: &Path, labels: bool) -> Result<Recorder, Error> {
         let mut columns = Vec::new();
@@ -326,8 +335,19 @@ impl Plan {
         self.initialized_with(&self.probes)
     }
 
+    /// The units, initialized with `settings` instead of their own.
+    ///
+    /// # Errors
+    /// What a unit said.
+    pub fn ready(&self, settings: &[Vec<Setting>], interrupt: &Interrupt) -> Result<Master, Error> {
+        let mut master = self.master(&self.probes, settings)?;
+        master.heed(interrupt);
+        master.initialize()?;
+        Ok(master)
+    }
+
     fn initialized_with(&self, probes: &Probes) -> Result<(Master, Limits), Error> {
-        let mut master = self.master(probes)?;
+        let mut master = self.master(probes, &self.settings)?;
         master.initialize()?;
         let limit = |port: Option<Port>, master: &mut Master| {
             port.map(|port| master.read(&[port]).map(|values| values[0])).transpose()
@@ -361,7 +381,7 @@ impl Plan {
     }
 
     /// Instantiates the units and sets their parameters.
-    fn master(&self, probes: &Probes) -> Result<Master, Error> {
+    fn master(&self, probes: &Probes, settings: &[Vec<Setting>]) -> Result<Master, Error> {
         let every = periods(&self.experiment, &self.order);
         let mut members = Vec::new();
         for (index, name) in self.order.iter().enumerate() {
@@ -369,7 +389,7 @@ impl Plan {
             let unit: Box<dyn CoSimulationUnit> = Box::new(fmu.instantiate(name)?);
             let on_invalid = self.experiment.simulation.on_invalid;
             let mut unit = Watched::around(unit, name, fmu, on_invalid);
-            settings::apply(&self.settings[index], unit.as_mut()).map_err(|failure| Error::Unit {
+            settings::apply(&settings[index], unit.as_mut()).map_err(|failure| Error::Unit {
                 component: name.clone(),
                 time: self.clock.start(),
                 failure,

@@ -4,6 +4,7 @@ use crate::description::Kind;
 use crate::error::Error;
 use crate::realtime;
 use crate::run::Plan;
+use crate::seeds::is_seed;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -24,7 +25,7 @@ pub fn sidecar(
     let seeds: BTreeMap<String, &Value> = parameters
         .iter()
         .flat_map(|(component, own)| own.iter().map(move |(name, value)| (component, name, value)))
-        .filter(|(_, name, _)| name.rsplit('.').next() == Some("seed"))
+        .filter(|(_, name, _)| is_seed(name))
         .map(|(component, name, value)| (format!("{component}.{name}"), value))
         .collect();
     let parts = plan.parts();
