@@ -185,6 +185,10 @@ impl mpc::Constraints<2> for Sets {
         true
     }
 
+    fn feasibility(&self) -> f64 {
+        if self.follow { 1e-5 } else { 1e-9 }
+    }
+
     fn balls(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> Balls<2> {
         let [angles, rates, a] = self.nominal(k, state, input);
         let kinematics = InverseKinematics::at(&angles);

@@ -7,7 +7,7 @@ use super::problem::{
     Chain, Constraints, Cost, End, From, Frozen, Motion, Multipliers, Problem, Solution, Start, State,
     zero_state,
 };
-use super::riccati::Riccati;
+use super::riccati::{Rest, Riccati};
 use crate::report::Status;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -137,6 +137,8 @@ struct Search {
     /// Whether the multipliers are those of a similar problem.
     warm: bool,
     iterations: u32,
+    /// Whether the bounds follow the iterates.
+    follow: bool,
     /// Whether the optimum keeps the bounds about itself.
     settled: bool,
 }
@@ -254,6 +256,10 @@ impl<const O: usize> Optimiser<O> {
                 status = self.settle(bounded, &sample, &mut search, false, Self::solve);
             }
             None if self.settled_by_riccati(bounded, &sample, &mut search) => status = Status::Constrained,
+            None if self.settings.nonlinearity == Nonlinearity::Exact => {
+                self.about.clone_from(&self.solution.motion);
+                status = self.settle(bounded, &sample, &mut search, false, Self::solve);
+            }
             None => {
                 for _ in 0..FIRST_PASSES {
                     self.about.clone_from(&self.solution.motion);
@@ -280,8 +286,10 @@ impl<const O: usize> Optimiser<O> {
         mut solve: impl FnMut(&mut Self, &mut B, &Sample<O>, &mut Search) -> Status,
     ) -> Status {
         let mut status = Status::Fallback;
-        for _ in 0..SETTLING_PASSES {
+        for pass in 0..SETTLING_PASSES {
+            let follow = follow && pass == 0;
             bounded.follow(follow);
+            search.follow = follow;
             status = solve(self, bounded, sample, search);
             bounded.follow(false);
             // Linearised balls would have to be linearised anew as well.
@@ -341,8 +349,7 @@ impl<const O: usize> Optimiser<O> {
             return false;
         }
         self.about.clone_from(&self.solution.motion);
-        // Without a plan the motion still moves far: a window of twice the length need not grow.
-        search.window = search.window.take().map(|window| self.layout.widen(&window, window.len() / 2));
+
         let by_riccati = |this: &mut Self, bounded: &mut B, sample: &Sample<O>, search: &mut Search| {
             if this.by_riccati(bounded, sample, search) { Status::Constrained } else { Status::Fallback }
         };
@@ -421,8 +428,8 @@ impl<const O: usize> Optimiser<O> {
         let Some(window) = search.window.as_mut() else { return false };
         unconstrained.arrive(start, affine);
         for _ in 0..WINDOWS {
-            // At most half the horizon, or it does not pay.
-            if 2 * window.len() > n {
+            // At most three quarters of the horizon, or it does not pay.
+            if 4 * window.len() > 3 * n {
                 return false;
             }
             bounded.tighten(about, window.clone());
@@ -443,7 +450,9 @@ impl<const O: usize> Optimiser<O> {
                 end: End { weight, slope, radius },
             };
             let outcome = if self.settings.nonlinearity == Nonlinearity::Exact {
-                riccati.solve(&problem, solution, window.start, search.warm, deadline)
+                let rest = Rest { unconstrained: &*unconstrained, affine };
+                let rest = Some(rest).filter(|_| search.follow && problem.end.radius.is_none());
+                riccati.solve_further(&problem, solution, window.start, search.warm, deadline, rest)
             } else {
                 frozen.set(bounded, about);
                 let constraints = &From { constraints: &*frozen, first: window.start };
@@ -455,6 +464,7 @@ impl<const O: usize> Optimiser<O> {
             if !outcome.solved() {
                 return false;
             }
+            window.end = window.start + riccati.horizon();
             let motion = &mut solution.motion;
             unconstrained.trace_back(window.start, affine, motion);
             unconstrained.follow(window.end, affine, motion);

@@ -153,6 +153,11 @@ pub struct Balls<const O: usize> {
 
 /// The constraints of a problem.
 pub trait Constraints<const O: usize> {
+    /// ‖y‖ − 1 at most of what counts as within the balls.
+    fn feasibility(&self) -> f64 {
+        super::riccati::FEASIBILITY
+    }
+
     /// Whether states have a ball of their own.
     fn has_state_balls(&self) -> bool;
 
@@ -176,6 +181,10 @@ pub(super) struct From<'a, C> {
 impl<const O: usize, C: Constraints<O>> Constraints<O> for From<'_, C> {
     fn has_state_balls(&self) -> bool {
         self.constraints.has_state_balls()
+    }
+
+    fn feasibility(&self) -> f64 {
+        self.constraints.feasibility()
     }
 
     fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> Balls<O> {

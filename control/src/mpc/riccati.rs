@@ -5,8 +5,9 @@
 //! curvature of the balls is exact, that of y is left out (Gauss-Newton). Balls that the motion stays well inside of are left out: every
 //! iterate is looked at, and from where it comes near a ball, that is in the problem.
 
+use super::lq::Unconstrained;
 use super::problem::{
-    Balls, Constraints, Multipliers, Outcome, Problem, Solution, Start, State, apply, dot, zero_state,
+    Balls, Constraints, End, Multipliers, Outcome, Problem, Solution, Start, State, apply, dot, zero_state,
 };
 use super::sweep::{Blocks, Gain, Quadratic, minimiser};
 use nalgebra::{Matrix3, SVector, Vector3};
@@ -14,7 +15,7 @@ use std::time::Instant;
 
 /// Relative residuals at which a motion is the optimum.
 const STATIONARITY: f64 = 1e-6;
-const FEASIBILITY: f64 = 1e-9;
+pub(super) const FEASIBILITY: f64 = 1e-9;
 const GAP: f64 = 1e-9;
 /// Share of the way to the boundary that a step goes at most.
 const TO_BOUNDARY: f64 = 0.9999;
@@ -23,10 +24,18 @@ const SHORT: f64 = 0.1;
 const RECENTRING: f64 = 0.5;
 /// ‖y‖² from which on a ball is near.
 const NEAR: f64 = 0.5;
+/// Stages beyond the end that are looked at.
+const AHEAD: usize = 6;
 /// Smallest slack at the start, and Σ sλ over half the cost.
 const COLD: (f64, f64) = (0.03, 0.03);
+/// Smallest slack of a ball that an iterate comes near to.
+const NEWLY: f64 = 0.3;
 /// The same where the multipliers of a similar problem are known.
 const WARM: (f64, f64) = (3e-4, 1e-6);
+/// The same where the first guess violates a ball by far.
+const FAR: (f64, f64) = (3.0, 10.0);
+/// ‖y‖² from which on that is so.
+const FAR_OUTSIDE: f64 = 4.0;
 
 /// One inequality c ≤ 0 with its slack and multiplier.
 #[derive(Clone, Copy, Debug, Default)]
@@ -131,6 +140,14 @@ struct Face<const O: usize> {
     pair: Pair,
 }
 
+/// What follows the last stage: the optimum without balls.
+pub struct Rest<'a, const O: usize> {
+    /// Of the whole horizon, solved.
+    pub unconstrained: &'a Unconstrained<O>,
+    /// d of the whole horizon.
+    pub affine: &'a [State<O>],
+}
+
 /// The solver: its iterate and scratch. Nothing is carried from one problem to the next.
 pub struct Riccati<const O: usize> {
     stages: Vec<Stage<O>>,
@@ -157,8 +174,8 @@ struct Residuals {
 }
 
 impl Residuals {
-    fn converged(&self) -> bool {
-        self.stationarity <= STATIONARITY && self.feasibility <= FEASIBILITY && self.gap <= GAP * self.cost
+    fn converged(&self, feasibility: f64) -> bool {
+        self.stationarity <= STATIONARITY && self.feasibility <= feasibility && self.gap <= GAP * self.cost
     }
 
     /// μ.
@@ -202,11 +219,25 @@ impl<const O: usize> Riccati<O> {
         warm: bool,
         deadline: Option<Instant>,
     ) -> Outcome {
+        self.solve_further(problem, solution, first, warm, deadline, None)
+    }
+
+    /// As [`Self::solve`]. With a `rest`, stages that the iterates come near to violating beyond the end are taken in.
+    pub fn solve_further<C: Constraints<O>>(
+        &mut self,
+        problem: &Problem<O, C>,
+        solution: &mut Solution<O>,
+        first: usize,
+        warm: bool,
+        deadline: Option<Instant>,
+        rest: Option<Rest<O>>,
+    ) -> Outcome {
+        let problem = &mut Problem { ..*problem };
         self.horizon = problem.affine.len();
         self.begin(problem, solution, first, warm);
         for iteration in 0..=self.max_iterations {
             let residuals = self.residuals(problem);
-            if residuals.converged() {
+            if residuals.converged(problem.constraints.feasibility()) {
                 self.write(problem, solution, first);
                 return Outcome::Solved(iteration);
             }
@@ -229,9 +260,51 @@ impl<const O: usize> Riccati<O> {
             }
             self.step(problem, alpha);
             let mean = centre.max(WARM.1 * residuals.cost / residuals.count);
-            self.watch(problem, COLD.0, mean, |_| [0.0; 2]);
+            if let Some(rest) = &rest {
+                self.extend(problem, rest, first);
+            }
+            self.watch(problem, NEWLY, mean, |_| [0.0; 2]);
         }
         Outcome::Failed(self.max_iterations)
+    }
+
+    /// Intervals of the last problem.
+    pub fn horizon(&self) -> usize {
+        self.horizon
+    }
+
+    /// Takes the next stages in if one of them is near a ball.
+    fn extend<'a, C: Constraints<O>>(
+        &mut self,
+        problem: &mut Problem<'a, O, C>,
+        rest: &Rest<'a, O>,
+        first: usize,
+    ) {
+        let last = rest.affine.len() - first;
+        loop {
+            let end = self.horizon;
+            let until = (end + AHEAD).min(last);
+            let state_balls = problem.constraints.has_state_balls();
+            let mut is_near = false;
+            for k in end..until {
+                let state = self.stages[k].state;
+                let (input, next) = rest.unconstrained.go_on(first + k, &state, rest.affine);
+                let (of_state, of_input) = problem.constraints.squares(k, &state, &input);
+                is_near |= of_input > NEAR || state_balls && k > end && of_state > NEAR;
+                self.stages[k].input = input;
+                let stage = &mut self.stages[k + 1];
+                stage.state = next;
+                (stage.state_pair.watched, stage.input_pair.watched) = (false, false);
+            }
+            if !is_near || end == until {
+                // The bounds of the last state may look at its input.
+                return;
+            }
+            self.horizon = until;
+            self.stages[until].input = Vector3::zeros();
+            let (weight, slope) = rest.unconstrained.to_go(first + until);
+            problem.end = End { weight, slope, radius: None };
+        }
     }
 
     /// The first iterate.
@@ -265,7 +338,11 @@ impl<const O: usize> Riccati<O> {
         }
         self.evaluate(problem);
         let cost = self.cost(problem);
-        let (smallest, gap) = if warm { WARM } else { COLD };
+        let (smallest, gap) = match warm {
+            _ if self.furthest(problem) > FAR_OUTSIDE => FAR,
+            true => WARM,
+            false => COLD,
+        };
         let balls = if problem.constraints.has_state_balls() { 2 } else { 1 };
         let mean = gap * cost / (balls * self.horizon + self.faces.len() + 1) as f64;
         let Multipliers { state, input, terminal, .. } = multipliers;
@@ -278,6 +355,18 @@ impl<const O: usize> Riccati<O> {
             let known = [before.and_then(|k| state.get(k)), input.get(first + k)];
             known.map(|known| known.copied().filter(|_| warm).unwrap_or_default())
         });
+    }
+
+    /// The largest ‖y‖² of the iterate.
+    fn furthest<C: Constraints<O>>(&self, problem: &Problem<O, C>) -> f64 {
+        let end = self.end();
+        let state_balls = problem.constraints.has_state_balls();
+        let of_stage = |(k, stage): (usize, &Stage<O>)| {
+            let (state, input) = problem.constraints.squares(k, &stage.state, &stage.input);
+            let of_state = if k > 0 && state_balls { state } else { 0.0 };
+            of_state.max(if k < end { input } else { 0.0 })
+        };
+        self.stages[..=end].iter().enumerate().map(of_stage).fold(0.0, f64::max)
     }
 
     /// Takes the balls in that the iterate has come near; `known` gives their multipliers, that on the state first.
