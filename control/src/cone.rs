@@ -76,6 +76,17 @@ impl Programme {
         Ok(Self { solver, cost: cost.nzval, linear_cost, matrix: matrix.nzval, right_side })
     }
 
+    /// Limits the iterations and the time (s) of the next solutions.
+    pub(crate) fn limit(&mut self, iterations: u32, seconds: f64) {
+        let settings = self.solver.settings();
+        // Without limits nothing changes, and nothing is allocated.
+        if (settings.max_iter, settings.time_limit) != (iterations, seconds) {
+            let settings = DefaultSettings { max_iter: iterations, time_limit: seconds, ..settings.clone() };
+            // Both may be changed at any time.
+            let _ = self.solver.update_settings(settings);
+        }
+    }
+
     /// Solves with the data as they are now: the optimum and its duals, if there is one, and the iterations.
     pub(crate) fn solve(&mut self) -> (Option<Optimum<'_>>, u32) {
         let accepted = self.solver.update_P(&self.cost).is_ok()

@@ -189,6 +189,7 @@ impl Crmpc {
     /// One optimisation at `time` from the measured state (Θ, x_ω): leaves the plan and the report in `memory`.
     fn optimise(&mut self, memory: &mut Memory, time: f64, measured: Vector6<f64>, reference: ReferenceAt) {
         let clock = Instant::now();
+        self.optimiser.begin();
         // Without guarantee the command makes up for it instead.
         let shift = if memory.assured() { memory.observed.shift(&self.settings) } else { Vector3::zeros() };
         self.preview(time, reference, shift);

@@ -20,6 +20,8 @@ use vehicle::reference::Reference;
 pub(super) struct Sets {
     kind: Kind,
     body: RigidBody,
+    /// h, s.
+    step: f64,
     /// References at the prediction times.
     pub(super) references: Vec<Reference>,
     /// ε of the paper's terminal ball.
@@ -105,7 +107,14 @@ impl Sets {
             }
         };
         let references = vec![Reference::default(); n + 1];
-        Ok(Self { kind, body: settings.body, references, terminal_radius, follow: false })
+        Ok(Self {
+            kind,
+            body: settings.body,
+            step: settings.period_optimisation,
+            references,
+            terminal_radius,
+            follow: false,
+        })
     }
 
     /// The bounds in force.
@@ -265,6 +274,33 @@ impl Bounded<2> for Sets {
             (Some(before), Some(after)) => Some(before.start..after.end),
             (before, after) => before.or(after),
         }
+    }
+
+    /// One interval of the whole moment, or input, does not bring the rates down to what the set allows at its end.
+    fn out_of_reach(&self, start: &State<2>) -> bool {
+        let [angles, rates, _] = self.nominal(0, start, &Vector3::zeros());
+        let (body, h) = (&self.body, self.step);
+        let kinematics = InverseKinematics::at(&angles);
+        // x_ω after an interval without input, and the most that the input adds to it.
+        let (coasting, most, allowed) = match &self.kind {
+            Kind::Robust(robust) => {
+                let Settings { limit_rate, limit_moment, .. } = robust.settings;
+                let at_rest = kinematics.motion(body, &rates).moment_at_rest;
+                let secant = 1.0 / angles.y.cos();
+                let most = secant * limit_moment / robust.design.smallest_inertia;
+                let drift = vehicle::kinematics::r(&angles) * (body.inverse * -at_rest);
+                // The sideslip is another one by then.
+                let beta = angles.y.abs() + h * (rates.norm() + h * (drift.norm() + most));
+                if beta >= std::f64::consts::FRAC_PI_3 {
+                    return false;
+                }
+                (rates + drift * h, h * most, limit_rate / beta.cos())
+            }
+            Kind::Paper { x_tube, u_tube, .. } => {
+                (rates - kinematics.input(body, &rates, &Vector3::zeros()) * h, h * u_tube, *x_tube)
+            }
+        };
+        coasting.norm() - most > allowed * (1.0 + ROUNDING)
     }
 
     fn terminal_radius(&self) -> Option<f64> {

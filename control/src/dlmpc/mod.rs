@@ -230,6 +230,7 @@ impl Dlmpc {
     /// One optimisation at `time` from the measured angles: leaves the plan and the report in `memory`.
     fn optimise(&mut self, memory: &mut Memory, time: f64, measured: Vector3<f64>, reference: ReferenceAt) {
         let clock = Instant::now();
+        self.optimiser.begin();
         self.preview(time, reference);
         let first = !memory.started;
         if first {

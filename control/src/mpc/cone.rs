@@ -154,9 +154,15 @@ impl<const O: usize> Cone<O> {
         Ok(Self { structure, programme, state_slots, input_slots, start_row, terminal_row })
     }
 
-    /// The optimum of `problem`, replacing the motion in `solution` if it is found.
-    pub fn solve(&mut self, problem: &Problem<O, Frozen<O>>, solution: &mut Solution<O>) -> Outcome {
+    /// The optimum of `problem`, replacing the motion in `solution` if it is found; within so many iterations and so long (s).
+    pub fn solve(
+        &mut self,
+        problem: &Problem<O, Frozen<O>>,
+        solution: &mut Solution<O>,
+        (iterations, seconds): (u32, f64),
+    ) -> Outcome {
         self.update(problem);
+        self.programme.limit(iterations.min(self.structure.max_iterations), seconds);
         let Structure { chain, scale, horizon: n, .. } = &self.structure;
         let (found, iterations) = self.programme.solve();
         let Some(Optimum { x, duals }) = found else { return Outcome::Failed(iterations) };

@@ -5,6 +5,7 @@
 // Loops over axes and blocks are written with their indices, as the equations are.
 #![allow(clippy::needless_range_loop)]
 
+pub mod budget;
 pub mod certificate;
 pub mod cone;
 pub mod lq;
@@ -13,6 +14,7 @@ pub mod problem;
 pub mod riccati;
 mod sweep;
 
+pub use budget::Budget;
 pub use certificate::Certificate;
 pub use optimiser::{Bounded, Layout, Method, Nonlinearity, Optimiser, Report, SolverSettings};
 pub use problem::{Ball, Balls, Chain, Constraints, Cost, Motion, State, per_axis};

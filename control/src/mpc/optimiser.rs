@@ -1,5 +1,6 @@
 //! The ways to the optimum, cheapest first. Each is checked against the constraints as they are, so that none loses anything.
 
+use super::budget::Budget;
 use super::certificate::Certificate;
 use super::cone::{Cone, Structure};
 use super::lq::Unconstrained;
@@ -12,7 +13,6 @@ use crate::report::Status;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
-use std::time::{Duration, Instant};
 
 /// Which solver is asked first where the exits do not lead to the optimum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,6 +49,8 @@ pub struct SolverSettings {
     pub exits: bool,
     /// Wall-clock time after which no further iteration or solver is begun, s; 0 for none. Runs with one do not repeat.
     pub time_budget: f64,
+    /// Iterations of all solvers together after which none is begun any more; 0 for no limit.
+    pub iteration_budget: u32,
 }
 
 impl SolverSettings {
@@ -60,6 +62,7 @@ impl SolverSettings {
             max_iterations,
             exits: true,
             time_budget: 0.0,
+            iteration_budget: 0,
         }
     }
 }
@@ -81,6 +84,11 @@ pub trait Bounded<const O: usize>: Constraints<O> {
     /// Whether `motion` violates one of the intervals `of` with the bounds about itself. The bounds stay as they are. Nothing to do for bounds that
     /// do not depend on the motion.
     fn unsettled(&mut self, _motion: &Motion<O>, _of: Range<usize>) -> bool {
+        false
+    }
+
+    /// Whether nothing can keep the constraints from this start on. Nothing is said by `false`.
+    fn out_of_reach(&self, _start: &State<O>) -> bool {
         false
     }
 
@@ -126,7 +134,6 @@ pub struct Layout<const O: usize> {
 struct Sample<'a, const O: usize> {
     start: &'a State<O>,
     affine: &'a [State<O>],
-    deadline: Option<Instant>,
 }
 
 /// How far the search for the optimum has come.
@@ -137,6 +144,8 @@ struct Search {
     /// Whether the multipliers are those of a similar problem.
     warm: bool,
     iterations: u32,
+    /// Whether the last solver came to the conclusion that nothing keeps the balls.
+    hopeless: bool,
     /// Whether the bounds follow the iterates.
     follow: bool,
     /// Whether the optimum keeps the bounds about itself.
@@ -147,6 +156,7 @@ struct Search {
 pub struct Optimiser<const O: usize> {
     layout: Layout<O>,
     settings: SolverSettings,
+    budget: Budget,
     unconstrained: Unconstrained<O>,
     riccati: Riccati<O>,
     cone: Cone<O>,
@@ -185,6 +195,7 @@ impl<const O: usize> Optimiser<O> {
             frozen: Frozen::new(*horizon),
             about: Motion::new(*horizon),
             solution: Solution::new(*horizon),
+            budget: Budget::unlimited(),
             layout,
             settings,
         })
@@ -206,6 +217,16 @@ impl<const O: usize> Optimiser<O> {
         state.iter().zip(input).map(|(&state, &input)| [state, input])
     }
 
+    /// An optimisation of the controller begins, and with it the budget of all calls of [`Self::optimise`] until the next one.
+    pub fn begin(&mut self) {
+        self.budget = Budget::begin(&self.settings);
+    }
+
+    /// Whether the budget ended what was begun.
+    pub fn is_exhausted(&self) -> bool {
+        self.budget.is_exhausted()
+    }
+
     /// One optimisation from `start`. `previous` holds the motion planned before from now on, with its multipliers; without one, the bounds and the linearised
     /// balls are set about the solution again until that stands still.
     pub fn optimise<B: Bounded<O>>(
@@ -215,12 +236,7 @@ impl<const O: usize> Optimiser<O> {
         affine: &[State<O>],
         previous: Option<(&Motion<O>, &[[f64; 2]])>,
     ) -> Report {
-        let budget = self.settings.time_budget;
-        // A budget that no clock can count to is no limit.
-        let deadline = Some(budget)
-            .filter(|&budget| budget > 0.0)
-            .and_then(|budget| Instant::now().checked_add(Duration::try_from_secs_f64(budget).ok()?));
-        let sample = Sample { start, affine, deadline };
+        let sample = Sample { start, affine };
         let Self { layout, settings, unconstrained, solution, .. } = self;
         let Solution { motion, multipliers } = solution;
         multipliers.clear();
@@ -241,6 +257,9 @@ impl<const O: usize> Optimiser<O> {
                 }
                 (_, violated) => search.window = layout.window(violated, outside.is_some()),
             }
+        }
+        if layout.start.is_none() && bounded.out_of_reach(start) {
+            return self.report(bounded, &sample, Status::Fallback, 0);
         }
 
         let mut status = Status::Fallback;
@@ -364,7 +383,9 @@ impl<const O: usize> Optimiser<O> {
         search: &mut Search,
     ) -> bool {
         self.settings.method == Method::Riccati
-            && (self.in_windows(bounded, sample, search) || self.over_whole_horizon(bounded, sample, search))
+            && !search.hopeless
+            && (self.in_windows(bounded, sample, search)
+                || !search.hopeless && self.over_whole_horizon(bounded, sample, search))
     }
 
     /// The same by the solvers in turn.
@@ -372,17 +393,20 @@ impl<const O: usize> Optimiser<O> {
         if self.by_riccati(bounded, sample, search) {
             return Status::Constrained;
         }
-        if sample.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+        // Where nothing keeps the balls, it finds nothing either.
+        if search.hopeless {
             return Status::Fallback;
         }
+        let Some(limits) = self.budget.of_the_cone() else { return Status::Fallback };
         search.window = None;
         bounded.follow(false);
         bounded.tighten(&self.about, 0..self.layout.horizon);
         self.frozen.set(bounded, &self.about);
         let end = self.layout.end(bounded.terminal_radius());
         let problem = self.layout.problem(sample, end, &self.frozen);
-        let outcome = self.cone.solve(&problem, &mut self.solution);
+        let outcome = self.cone.solve(&problem, &mut self.solution, limits);
         search.iterations += outcome.iterations();
+        self.budget.spend(outcome.iterations());
         if outcome.solved() { Status::Cone } else { Status::Fallback }
     }
 
@@ -394,6 +418,7 @@ impl<const O: usize> Optimiser<O> {
     ) -> bool {
         search.window = None;
         if !search.warm {
+            self.unconstrained.solve(sample.start, sample.affine, &mut self.solution.motion);
             self.solution.multipliers.clear();
         }
         bounded.tighten(&self.about, 0..self.layout.horizon);
@@ -401,15 +426,16 @@ impl<const O: usize> Optimiser<O> {
         let outcome = match self.settings.nonlinearity {
             Nonlinearity::Exact => {
                 let exact = self.layout.problem(sample, end, &*bounded);
-                self.riccati.solve(&exact, &mut self.solution, 0, search.warm, sample.deadline)
+                self.riccati.solve(&exact, &mut self.solution, 0, search.warm, &mut self.budget)
             }
             Nonlinearity::Frozen => {
                 self.frozen.set(bounded, &self.about);
                 let frozen = self.layout.problem(sample, end, &self.frozen);
-                self.riccati.solve(&frozen, &mut self.solution, 0, search.warm, sample.deadline)
+                self.riccati.solve(&frozen, &mut self.solution, 0, search.warm, &mut self.budget)
             }
         };
         search.iterations += outcome.iterations();
+        search.hopeless = outcome.hopeless() && !search.warm;
         outcome.solved()
     }
 
@@ -422,9 +448,9 @@ impl<const O: usize> Optimiser<O> {
         sample: &Sample<O>,
         search: &mut Search,
     ) -> bool {
-        let Self { layout, unconstrained, riccati, frozen, about, solution, .. } = self;
+        let Self { layout, budget, unconstrained, riccati, frozen, about, solution, .. } = self;
         let n = layout.horizon;
-        let Sample { start, affine, deadline } = *sample;
+        let Sample { start, affine } = *sample;
         let Some(window) = search.window.as_mut() else { return false };
         unconstrained.arrive(start, affine);
         for _ in 0..WINDOWS {
@@ -452,16 +478,19 @@ impl<const O: usize> Optimiser<O> {
             let outcome = if self.settings.nonlinearity == Nonlinearity::Exact {
                 let rest = Rest { unconstrained: &*unconstrained, affine };
                 let rest = Some(rest).filter(|_| search.follow && problem.end.radius.is_none());
-                riccati.solve_further(&problem, solution, window.start, search.warm, deadline, rest)
+                riccati.solve_further(&problem, solution, window.start, search.warm, budget, rest)
             } else {
                 frozen.set(bounded, about);
                 let constraints = &From { constraints: &*frozen, first: window.start };
                 let Problem { chain, cost, start, affine, end, .. } = problem;
                 let problem = Problem { chain, cost, start, affine, constraints, end };
-                riccati.solve(&problem, solution, window.start, search.warm, deadline)
+                riccati.solve(&problem, solution, window.start, search.warm, budget)
             };
             search.iterations += outcome.iterations();
             if !outcome.solved() {
+                // What nothing keeps within the window, nothing keeps within the horizon, unless a wrong guess has led astray.
+                search.hopeless = outcome.hopeless() && !search.warm;
+                search.warm = false;
                 return false;
             }
             window.end = window.start + riccati.horizon();
@@ -503,7 +532,7 @@ impl<const O: usize> Optimiser<O> {
     ) -> Report {
         self.solution.motion.clone_from(plan);
         self.solution.multipliers.clear();
-        let sample = Sample { start, affine, deadline: None };
+        let sample = Sample { start, affine };
         self.report(bounded, &sample, status, iterations)
     }
 

@@ -390,14 +390,21 @@ pub enum Outcome {
     Solved(u32),
     /// Without.
     Failed(u32),
+    /// Without, as its steps became too short far outside of the balls: nothing seems to keep them.
+    Hopeless(u32),
 }
 
 impl Outcome {
     /// Iterations done.
     pub fn iterations(self) -> u32 {
         match self {
-            Self::Solved(iterations) | Self::Failed(iterations) => iterations,
+            Self::Solved(iterations) | Self::Failed(iterations) | Self::Hopeless(iterations) => iterations,
         }
+    }
+
+    /// Whether nothing seems to keep the balls.
+    pub fn hopeless(self) -> bool {
+        matches!(self, Self::Hopeless(_))
     }
 
     /// Whether the optimum was found.

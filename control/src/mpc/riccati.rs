@@ -5,13 +5,13 @@
 //! curvature of the balls is exact, that of y is left out (Gauss-Newton). Balls that the motion stays well inside of are left out: every
 //! iterate is looked at, and from where it comes near a ball, that is in the problem.
 
+use super::budget::Budget;
 use super::lq::Unconstrained;
 use super::problem::{
     Balls, Constraints, End, Multipliers, Outcome, Problem, Solution, Start, State, apply, dot, zero_state,
 };
 use super::sweep::{Blocks, Gain, Quadratic, minimiser};
 use nalgebra::{Matrix3, SVector, Vector3};
-use std::time::Instant;
 
 /// Relative residuals at which a motion is the optimum.
 const STATIONARITY: f64 = 1e-6;
@@ -22,6 +22,13 @@ const TO_BOUNDARY: f64 = 0.9999;
 /// A step shorter than this is tried again without second order, towards this share of the mean of sλ.
 const SHORT: f64 = 0.1;
 const RECENTRING: f64 = 0.5;
+/// A search has stalled when its steps were shorter than this so many times in a row, or when the balls' residual has not been halved in so many
+/// iterations.
+const STALLED: f64 = 1e-5;
+const STALLED_STEPS: u32 = 3;
+const STALLED_ITERATIONS: u32 = 10;
+/// Residual of the balls from which on a search that ended so is hopeless.
+const FAR_FROM_FEASIBLE: f64 = 1e-3;
 /// ‖y‖² from which on a ball is near.
 const NEAR: f64 = 0.5;
 /// Stages beyond the end that are looked at.
@@ -217,9 +224,9 @@ impl<const O: usize> Riccati<O> {
         solution: &mut Solution<O>,
         first: usize,
         warm: bool,
-        deadline: Option<Instant>,
+        budget: &mut Budget,
     ) -> Outcome {
-        self.solve_further(problem, solution, first, warm, deadline, None)
+        self.solve_further(problem, solution, first, warm, budget, None)
     }
 
     /// As [`Self::solve`]. With a `rest`, stages that the iterates come near to violating beyond the end are taken in.
@@ -229,21 +236,29 @@ impl<const O: usize> Riccati<O> {
         solution: &mut Solution<O>,
         first: usize,
         warm: bool,
-        deadline: Option<Instant>,
+        budget: &mut Budget,
         rest: Option<Rest<O>>,
     ) -> Outcome {
         let problem = &mut Problem { ..*problem };
         self.horizon = problem.affine.len();
         self.begin(problem, solution, first, warm);
+        let (mut short_steps, mut nearest) = (0, (f64::INFINITY, 0));
         for iteration in 0..=self.max_iterations {
             let residuals = self.residuals(problem);
             if residuals.converged(problem.constraints.feasibility()) {
                 self.write(problem, solution, first);
                 return Outcome::Solved(iteration);
             }
-            let late = deadline.is_some_and(|deadline| Instant::now() >= deadline);
-            if iteration == self.max_iterations || late || self.factor(problem).is_none() {
+            if iteration == self.max_iterations || !budget.take() {
                 return Outcome::Failed(iteration);
+            }
+            let gives_up = if residuals.feasibility > FAR_FROM_FEASIBLE {
+                Outcome::Hopeless(iteration)
+            } else {
+                Outcome::Failed(iteration)
+            };
+            if self.factor(problem).is_none() {
+                return gives_up;
             }
             let affine = self.predictor(problem);
             // Mehrotra's rule; not below what converges, or the scaling grows without bound while the motion still moves.
@@ -257,6 +272,14 @@ impl<const O: usize> Riccati<O> {
             if alpha < SHORT {
                 // The second order misleads.
                 alpha = self.corrector(problem, RECENTRING * residuals.mean(), (0.0, 0.0));
+            }
+            short_steps = if alpha < STALLED { short_steps + 1 } else { 0 };
+            if residuals.feasibility < 0.5 * nearest.0 {
+                nearest = (residuals.feasibility, iteration);
+            }
+            let stalls = residuals.feasibility > FEASIBILITY && iteration >= nearest.1 + STALLED_ITERATIONS;
+            if short_steps == STALLED_STEPS || stalls {
+                return gives_up;
             }
             self.step(problem, alpha);
             let mean = centre.max(WARM.1 * residuals.cost / residuals.count);
