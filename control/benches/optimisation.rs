@@ -130,6 +130,7 @@ const WAY: SolverSettings = SolverSettings {
     max_iterations: 50,
     exits: true,
     time_budget: 0.0,
+    iteration_budget: 0,
 };
 
 /// The distributions of one controller, over the samples of one run.

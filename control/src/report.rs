@@ -41,17 +41,20 @@ pub struct Report {
     pub solves: u32,
     /// Fallbacks so far.
     pub fallbacks: u32,
+    /// Optimisations so far that the budget ended early.
+    pub exhausted: u32,
 }
 
 impl Report {
-    /// Takes over how an optimisation ended that began at `clock`.
-    pub(crate) fn record(&mut self, ended: &mpc::Report, clock: Instant) {
+    /// Takes over how an optimisation ended that began at `clock`, and whether its budget ended it.
+    pub(crate) fn record(&mut self, ended: &mpc::Report, exhausted: bool, clock: Instant) {
         self.status = ended.status;
         self.cost = ended.certificate.cost;
         self.iterations = ended.iterations;
         self.residual = ended.certificate.residual();
         self.solves = self.solves.saturating_add(1);
         self.fallbacks = self.fallbacks.saturating_add(u32::from(ended.status == Status::Fallback));
+        self.exhausted = self.exhausted.saturating_add(u32::from(exhausted));
         self.time = clock.elapsed().as_secs_f64();
     }
 }

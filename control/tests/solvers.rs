@@ -4,6 +4,7 @@
 mod balls;
 
 use balls::Sets;
+use control::mpc::Budget;
 use control::mpc::certificate::Certificate;
 use control::mpc::cone::{Cone, Structure};
 use control::mpc::lq::Unconstrained;
@@ -150,8 +151,8 @@ impl Solvers {
             end: End { weight: &shape.cost.end, slope: zero, radius },
         };
         let mut judged = solution.clone();
-        let outcome = riccati.solve(&problem, &mut solution, 0, false, None);
-        let verdict = cone.solve(&problem, &mut judged);
+        let outcome = riccati.solve(&problem, &mut solution, 0, false, &mut Budget::unlimited());
+        let verdict = cone.solve(&problem, &mut judged, (u32::MAX, f64::INFINITY));
         let of = |outcome, solution: &Solution<2>| {
             (outcome, shape.cost.of(&solution.motion), Certificate::of(&problem, solution, false))
         };
@@ -317,7 +318,13 @@ fn oracle_balls_that_only_the_iterates_come_near_are_found() {
     Unconstrained::new(horizon, &chain, &cost).solve(&start, &affine, &mut fast.motion);
     still.motion.states.fill(start);
     let optima = [fast, still].map(|mut solution| {
-        let outcome = Riccati::new(horizon, 0, MAX_ITERATIONS).solve(&problem, &mut solution, 0, false, None);
+        let outcome = Riccati::new(horizon, 0, MAX_ITERATIONS).solve(
+            &problem,
+            &mut solution,
+            0,
+            false,
+            &mut Budget::unlimited(),
+        );
         assert!(outcome.solved(), "{outcome:?}");
         let residual = Certificate::of(&problem, &solution, false).residual();
         assert!(residual <= 1e-6, "{residual}");
@@ -399,6 +406,7 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
     let mut optimiser = Optimiser::new(layout, solver).unwrap();
     let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
     let mut sets = Spoilt { sets, tightened: 1 };
+    optimiser.begin();
     let report = optimiser.optimise(&mut sets, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
     assert_eq!((report.status, report.iterations), (Status::Fallback, 0));
 }

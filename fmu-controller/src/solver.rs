@@ -52,6 +52,7 @@ pub(crate) struct SolverOutputs {
     time: f64,
     solves: i32,
     fallbacks: i32,
+    exhausted: i32,
 }
 
 impl From<&Report> for SolverOutputs {
@@ -64,6 +65,7 @@ impl From<&Report> for SolverOutputs {
             time: report.time,
             solves: report.solves.cast_signed(),
             fallbacks: report.fallbacks.cast_signed(),
+            exhausted: report.exhausted.cast_signed(),
         }
     }
 }
@@ -90,6 +92,10 @@ pub(crate) fn outputs<L: Law>(
     );
     let solves = sampled("solver.solves", "Optimisations so far");
     let fallbacks = sampled("solver.fallbacks", "Optimisations so far that did not succeed");
+    let exhausted = sampled(
+        "solver.exhausted",
+        "Optimisations so far that their budget of time or iterations ended early",
+    );
     let statuses = enumeration("SolverStatus", "How a plan came about", &STATUSES);
     table
         .enumeration(status, statuses, move |m| &mut solver(&mut m.law).status)
@@ -99,6 +105,7 @@ pub(crate) fn outputs<L: Law>(
         .real(residual.real().nominal(1e-8), move |m| &mut solver(&mut m.law).residual)
         .integer(solves, (None, None), move |m| &mut solver(&mut m.law).solves)
         .integer(fallbacks, (None, None), move |m| &mut solver(&mut m.law).fallbacks)
+        .integer(exhausted, (None, None), move |m| &mut solver(&mut m.law).exhausted)
 }
 
 /// How an optimisation is solved. Enumerations are held as their 1-based item number.
@@ -109,6 +116,7 @@ pub(crate) struct SolverParameters {
     max_iterations: i32,
     exits: bool,
     time_budget: f64,
+    iteration_budget: i32,
 }
 
 impl From<&SolverSettings> for SolverParameters {
@@ -119,6 +127,7 @@ impl From<&SolverSettings> for SolverParameters {
             max_iterations: settings.max_iterations.cast_signed(),
             exits: settings.exits,
             time_budget: settings.time_budget,
+            iteration_budget: settings.iteration_budget.cast_signed(),
         }
     }
 }
@@ -131,6 +140,7 @@ impl SolverParameters {
             max_iterations: self.max_iterations.max(0).cast_unsigned(),
             exits: self.exits,
             time_budget: self.time_budget,
+            iteration_budget: self.iteration_budget.max(0).cast_unsigned(),
         }
     }
 }
@@ -164,6 +174,10 @@ pub(crate) fn parameters<L: Law>(
         "solver.timeBudget",
         "Wall-clock time of an optimisation after which no further iteration or solver is begun, 0 for none; runs with one do not repeat",
     );
+    let iterations_in_all = parameter(
+        "solver.iterationBudget",
+        "Iterations of all solvers and passes of an optimisation after which none is begun any more, 0 for no limit; runs with one repeat",
+    );
     table
         .enumeration(method, enumeration("Solver", "Solver of the optimisation", &METHODS), move |m| {
             &mut solver(&mut m.law).method
@@ -177,6 +191,9 @@ pub(crate) fn parameters<L: Law>(
         .boolean(exits, move |m| &mut solver(&mut m.law).exits)
         .real(budget.real().unit(unit::time()).min(0.0).nominal(1e-3), move |m| {
             &mut solver(&mut m.law).time_budget
+        })
+        .integer(iterations_in_all, (Some(0), Some(100_000)), move |m| {
+            &mut solver(&mut m.law).iteration_budget
         })
 }
 

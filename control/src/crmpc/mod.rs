@@ -206,7 +206,7 @@ impl Crmpc {
             Constraints::Robust => self.plan_robustly(memory, &measured, first),
             Constraints::Paper => self.plan_as_printed(memory, &measured, first),
         };
-        memory.report.record(&report, clock);
+        memory.report.record(&report, self.optimiser.is_exhausted(), clock);
     }
 
     /// A plan that the vehicle is further from than the assumptions explain is of no use any more.

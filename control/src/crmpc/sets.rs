@@ -194,8 +194,8 @@ impl mpc::Constraints<2> for Sets {
         true
     }
 
-    fn feasibility(&self) -> f64 {
-        if self.follow { 1e-5 } else { 1e-9 }
+    fn follows(&self) -> bool {
+        self.follow
     }
 
     fn balls(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> Balls<2> {
@@ -274,6 +274,10 @@ impl Bounded<2> for Sets {
             (Some(before), Some(after)) => Some(before.start..after.end),
             (before, after) => before.or(after),
         }
+    }
+
+    fn is_set_beyond(&self) -> bool {
+        self.follow || matches!(self.kind, Kind::Paper { .. })
     }
 
     /// One interval of the whole moment, or input, does not bring the rates down to what the set allows at its end.

@@ -256,7 +256,7 @@ impl Dlmpc {
             memory.plan.multipliers.clear();
             memory.plan.multipliers.extend(self.optimiser.multipliers());
         }
-        memory.report.record(&report, clock);
+        memory.report.record(&report, self.optimiser.is_exhausted(), clock);
     }
 
     /// References at the prediction times, and d_k = Θ_r,k + h Θ̇_r,k − Θ_r,k+1.

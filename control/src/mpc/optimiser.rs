@@ -87,6 +87,12 @@ pub trait Bounded<const O: usize>: Constraints<O> {
         false
     }
 
+    /// Whether the bounds of intervals for which [`Self::tighten`] was not called are those that would be set. So it is where they do not depend on
+    /// the motion, and where they follow the iterates.
+    fn is_set_beyond(&self) -> bool {
+        true
+    }
+
     /// Whether nothing can keep the constraints from this start on. Nothing is said by `false`.
     fn out_of_reach(&self, _start: &State<O>) -> bool {
         false
@@ -146,8 +152,6 @@ struct Search {
     iterations: u32,
     /// Whether the last solver came to the conclusion that nothing keeps the balls.
     hopeless: bool,
-    /// Whether the bounds follow the iterates.
-    follow: bool,
     /// Whether the optimum keeps the bounds about itself.
     settled: bool,
 }
@@ -275,7 +279,9 @@ impl<const O: usize> Optimiser<O> {
                 status = self.settle(bounded, &sample, &mut search, false, Self::solve);
             }
             None if self.settled_by_riccati(bounded, &sample, &mut search) => status = Status::Constrained,
-            None if self.settings.nonlinearity == Nonlinearity::Exact => {
+            None if (self.settings.method, self.settings.nonlinearity)
+                == (Method::Riccati, Nonlinearity::Exact) =>
+            {
                 self.about.clone_from(&self.solution.motion);
                 status = self.settle(bounded, &sample, &mut search, false, Self::solve);
             }
@@ -308,7 +314,6 @@ impl<const O: usize> Optimiser<O> {
         for pass in 0..SETTLING_PASSES {
             let follow = follow && pass == 0;
             bounded.follow(follow);
-            search.follow = follow;
             status = solve(self, bounded, sample, search);
             bounded.follow(false);
             // Linearised balls would have to be linearised anew as well.
@@ -382,10 +387,11 @@ impl<const O: usize> Optimiser<O> {
         sample: &Sample<O>,
         search: &mut Search,
     ) -> bool {
-        self.settings.method == Method::Riccati
-            && !search.hopeless
-            && (self.in_windows(bounded, sample, search)
-                || !search.hopeless && self.over_whole_horizon(bounded, sample, search))
+        if self.settings.method != Method::Riccati || search.hopeless {
+            return false;
+        }
+        self.in_windows(bounded, sample, search)
+            || !search.hopeless && self.over_whole_horizon(bounded, sample, search)
     }
 
     /// The same by the solvers in turn.
@@ -477,7 +483,7 @@ impl<const O: usize> Optimiser<O> {
             };
             let outcome = if self.settings.nonlinearity == Nonlinearity::Exact {
                 let rest = Rest { unconstrained: &*unconstrained, affine };
-                let rest = Some(rest).filter(|_| search.follow && problem.end.radius.is_none());
+                let rest = Some(&rest).filter(|_| bounded.is_set_beyond() && problem.end.radius.is_none());
                 riccati.solve_further(&problem, solution, window.start, search.warm, budget, rest)
             } else {
                 frozen.set(bounded, about);

@@ -153,9 +153,9 @@ pub struct Balls<const O: usize> {
 
 /// The constraints of a problem.
 pub trait Constraints<const O: usize> {
-    /// ‖y‖ − 1 at most of what counts as within the balls.
-    fn feasibility(&self) -> f64 {
-        super::riccati::FEASIBILITY
+    /// Whether the balls' sizes are those about the motion that is evaluated, with their own derivatives left out.
+    fn follows(&self) -> bool {
+        false
     }
 
     /// Whether states have a ball of their own.
@@ -183,8 +183,8 @@ impl<const O: usize, C: Constraints<O>> Constraints<O> for From<'_, C> {
         self.constraints.has_state_balls()
     }
 
-    fn feasibility(&self) -> f64 {
-        self.constraints.feasibility()
+    fn follows(&self) -> bool {
+        self.constraints.follows()
     }
 
     fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> Balls<O> {

@@ -15,7 +15,9 @@ use nalgebra::{Matrix3, SVector, Vector3};
 
 /// Relative residuals at which a motion is the optimum.
 const STATIONARITY: f64 = 1e-6;
-pub(super) const FEASIBILITY: f64 = 1e-9;
+const FEASIBILITY: f64 = 1e-9;
+/// The same where the bounds follow the motion: as their derivatives are left out, the residual then only shrinks by a factor from iteration to iteration.
+const FEASIBILITY_FOLLOWING: f64 = 1e-6;
 const GAP: f64 = 1e-9;
 /// Share of the way to the boundary that a step goes at most.
 const TO_BOUNDARY: f64 = 0.9999;
@@ -25,8 +27,8 @@ const RECENTRING: f64 = 0.5;
 /// A search has stalled when its steps were shorter than this so many times in a row, or when the balls' residual has not been halved in so many
 /// iterations.
 const STALLED: f64 = 1e-5;
-const STALLED_STEPS: u32 = 3;
-const STALLED_ITERATIONS: u32 = 10;
+const STALLED_STEPS: u32 = 4;
+const STALLED_ITERATIONS: u32 = 15;
 /// Residual of the balls from which on a search that ended so is hopeless.
 const FAR_FROM_FEASIBLE: f64 = 1e-3;
 /// ‖y‖² from which on a ball is near.
@@ -237,15 +239,16 @@ impl<const O: usize> Riccati<O> {
         first: usize,
         warm: bool,
         budget: &mut Budget,
-        rest: Option<Rest<O>>,
+        rest: Option<&Rest<O>>,
     ) -> Outcome {
         let problem = &mut Problem { ..*problem };
         self.horizon = problem.affine.len();
         self.begin(problem, solution, first, warm);
+        let feasibility = if problem.constraints.follows() { FEASIBILITY_FOLLOWING } else { FEASIBILITY };
         let (mut short_steps, mut nearest) = (0, (f64::INFINITY, 0));
         for iteration in 0..=self.max_iterations {
             let residuals = self.residuals(problem);
-            if residuals.converged(problem.constraints.feasibility()) {
+            if residuals.converged(feasibility) {
                 self.write(problem, solution, first);
                 return Outcome::Solved(iteration);
             }
@@ -274,16 +277,16 @@ impl<const O: usize> Riccati<O> {
                 alpha = self.corrector(problem, RECENTRING * residuals.mean(), (0.0, 0.0));
             }
             short_steps = if alpha < STALLED { short_steps + 1 } else { 0 };
-            if residuals.feasibility < 0.5 * nearest.0 {
+            if !(0.5 * nearest.0..=2.0 * nearest.0).contains(&residuals.feasibility) {
                 nearest = (residuals.feasibility, iteration);
             }
-            let stalls = residuals.feasibility > FEASIBILITY && iteration >= nearest.1 + STALLED_ITERATIONS;
+            let stalls = residuals.feasibility > feasibility && iteration >= nearest.1 + STALLED_ITERATIONS;
             if short_steps == STALLED_STEPS || stalls {
                 return gives_up;
             }
             self.step(problem, alpha);
             let mean = centre.max(WARM.1 * residuals.cost / residuals.count);
-            if let Some(rest) = &rest {
+            if let Some(rest) = rest {
                 self.extend(problem, rest, first);
             }
             self.watch(problem, NEWLY, mean, |_| [0.0; 2]);
@@ -320,7 +323,6 @@ impl<const O: usize> Riccati<O> {
                 (stage.state_pair.watched, stage.input_pair.watched) = (false, false);
             }
             if !is_near || end == until {
-                // The bounds of the last state may look at its input.
                 return;
             }
             self.horizon = until;
@@ -463,7 +465,9 @@ impl<const O: usize> Riccati<O> {
     fn residuals<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> Residuals {
         let (mut feasibility, mut gap, mut count) = (0.0_f64, 0.0, 0.0_f64);
         self.each_pair(problem, |pair| {
-            feasibility = feasibility.max((pair.c + pair.slack).abs());
+            let own = (pair.c + pair.slack).abs();
+            // What is no number stays to be seen.
+            feasibility = if own.is_nan() || own > feasibility { own } else { feasibility };
             gap += pair.slack * pair.multiplier;
             count += 1.0;
         });
