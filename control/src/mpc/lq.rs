@@ -143,20 +143,32 @@ impl<const O: usize> Unconstrained<O> {
 
     /// The optimum from stage `first` of `motion` on, for the affine terms of the last [`Self::solve`].
     pub fn follow(&self, first: usize, affine: &[State<O>], motion: &mut Motion<O>) {
-        for k in first..self.gains.len() {
-            (motion.inputs[k], motion.states[k + 1]) = self.go_on(k, &motion.states[k], affine);
+        for (k, gain) in self.gains.iter().enumerate().skip(first) {
+            let state = motion.states[k];
+            (motion.inputs[k], motion.states[k + 1]) =
+                self.advance(gain, &self.slopes[k + 1], &state, &affine[k]);
         }
     }
 
     /// The input of the optimum at `state` of stage `k`, and the state that it leads to, for the affine terms of the last [`Self::solve`].
     pub fn go_on(&self, k: usize, state: &State<O>, affine: &[State<O>]) -> (Vector3<f64>, State<O>) {
-        let gain = &self.gains[k];
-        let costate = costate(gain, &self.slopes[k + 1], &affine[k]);
+        self.advance(&self.gains[k], &self.slopes[k + 1], state, &affine[k])
+    }
+
+    #[inline]
+    fn advance(
+        &self,
+        gain: &Gain<O>,
+        slope: &State<O>,
+        state: &State<O>,
+        affine: &State<O>,
+    ) -> (Vector3<f64>, State<O>) {
+        let costate = costate(gain, slope, affine);
         let v = (0..O).fold(Vector3::zeros(), |sum, i| {
             sum + gain.feedback[i].component_mul(&state[i]) - gain.feedforward[i].component_mul(&costate[i])
         });
         let next = self.chain.advance(state, &v);
-        (v, std::array::from_fn(|i| next[i] + affine[k][i]))
+        (v, std::array::from_fn(|i| next[i] + affine[i]))
     }
 
     /// Leads stages `first` to `last` of `motion` along `plan` from the state that it has at `first`, with the gains of the optimum.

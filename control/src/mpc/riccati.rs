@@ -33,6 +33,8 @@ const STALLED_ITERATIONS: u32 = 15;
 const FAR_FROM_FEASIBLE: f64 = 1e-3;
 /// ‖y‖² from which on a ball is near.
 const NEAR: f64 = 0.5;
+/// ‖y‖² from which on a stage beyond the end is taken in.
+const NEARLY_OUTSIDE: f64 = 0.9;
 /// Stages beyond the end that are looked at.
 const AHEAD: usize = 6;
 /// Smallest slack at the start, and Σ sλ over half the cost.
@@ -43,8 +45,8 @@ const NEWLY: f64 = 0.3;
 const WARM: (f64, f64) = (3e-4, 1e-6);
 /// The same where the first guess violates a ball by far.
 const FAR: (f64, f64) = (3.0, 10.0);
-/// ‖y‖² from which on that is so.
-const FAR_OUTSIDE: f64 = 4.0;
+/// c from which on that is so.
+const FAR_OUTSIDE: f64 = 1.5;
 
 /// One inequality c ≤ 0 with its slack and multiplier.
 #[derive(Clone, Copy, Debug, Default)]
@@ -299,7 +301,8 @@ impl<const O: usize> Riccati<O> {
         self.horizon
     }
 
-    /// Takes the next stages in if one of them is near a ball.
+    /// Takes the next stages in if one of them is nearly outside of a ball.
+    #[inline(never)]
     fn extend<'a, C: Constraints<O>>(
         &mut self,
         problem: &mut Problem<'a, O, C>,
@@ -316,7 +319,7 @@ impl<const O: usize> Riccati<O> {
                 let state = self.stages[k].state;
                 let (input, next) = rest.unconstrained.go_on(first + k, &state, rest.affine);
                 let (of_state, of_input) = problem.constraints.squares(k, &state, &input);
-                is_near |= of_input > NEAR || state_balls && k > end && of_state > NEAR;
+                is_near |= of_input > NEARLY_OUTSIDE || state_balls && k > end && of_state > NEARLY_OUTSIDE;
                 self.stages[k].input = input;
                 let stage = &mut self.stages[k + 1];
                 stage.state = next;
@@ -363,13 +366,10 @@ impl<const O: usize> Riccati<O> {
         }
         self.evaluate(problem);
         let cost = self.cost(problem);
-        let (smallest, gap) = match warm {
-            _ if self.furthest(problem) > FAR_OUTSIDE => FAR,
-            true => WARM,
-            false => COLD,
-        };
+        let (smallest, gap) = if warm { WARM } else { COLD };
         let balls = if problem.constraints.has_state_balls() { 2 } else { 1 };
-        let mean = gap * cost / (balls * self.horizon + self.faces.len() + 1) as f64;
+        let share = cost / (balls * self.horizon + self.faces.len() + 1) as f64;
+        let mean = gap * share;
         let Multipliers { state, input, terminal, .. } = multipliers;
         self.terminal.begin(smallest, mean, if warm { *terminal } else { 0.0 });
         for face in &mut self.faces {
@@ -380,18 +380,11 @@ impl<const O: usize> Riccati<O> {
             let known = [before.and_then(|k| state.get(k)), input.get(first + k)];
             known.map(|known| known.copied().filter(|_| warm).unwrap_or_default())
         });
-    }
-
-    /// The largest ‖y‖² of the iterate.
-    fn furthest<C: Constraints<O>>(&self, problem: &Problem<O, C>) -> f64 {
-        let end = self.end();
-        let state_balls = problem.constraints.has_state_balls();
-        let of_stage = |(k, stage): (usize, &Stage<O>)| {
-            let (state, input) = problem.constraints.squares(k, &stage.state, &stage.input);
-            let of_state = if k > 0 && state_balls { state } else { 0.0 };
-            of_state.max(if k < end { input } else { 0.0 })
-        };
-        self.stages[..=end].iter().enumerate().map(of_stage).fold(0.0, f64::max)
+        let mut furthest = 0.0_f64;
+        self.each_pair(problem, |pair| furthest = furthest.max(pair.c));
+        if furthest > FAR_OUTSIDE {
+            self.each_pair(problem, |pair| pair.begin(FAR.0, FAR.1 * share, 0.0));
+        }
     }
 
     /// Takes the balls in that the iterate has come near; `known` gives their multipliers, that on the state first.
