@@ -380,9 +380,9 @@ impl<const O: usize> Riccati<O> {
             let known = [before.and_then(|k| state.get(k)), input.get(first + k)];
             known.map(|known| known.copied().filter(|_| warm).unwrap_or_default())
         });
-        let mut furthest = 0.0_f64;
-        self.each_pair(problem, |pair| furthest = furthest.max(pair.c));
-        if furthest > FAR_OUTSIDE {
+        let pairs =
+            self.stages[..=self.horizon].iter().flat_map(|stage| [&stage.state_pair, &stage.input_pair]);
+        if pairs.filter(|pair| pair.watched).any(|pair| pair.c > FAR_OUTSIDE) {
             self.each_pair(problem, |pair| pair.begin(FAR.0, FAR.1 * share, 0.0));
         }
     }
