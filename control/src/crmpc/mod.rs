@@ -325,6 +325,9 @@ impl Crmpc {
         memory.age = 0;
         let mut iterations = tried;
         for share in LESS {
+            if self.optimiser.is_exhausted() {
+                break;
+            }
             self.sets.begin(0, share);
             let report = self.solve(memory, measured, true);
             iterations += report.iterations;

@@ -387,7 +387,7 @@ impl<const O: usize> Optimiser<O> {
         sample: &Sample<O>,
         search: &mut Search,
     ) -> bool {
-        if self.settings.method != Method::Riccati || search.hopeless {
+        if self.settings.method != Method::Riccati || search.hopeless || self.is_exhausted() {
             return false;
         }
         self.in_windows(bounded, sample, search)
