@@ -500,10 +500,12 @@ impl<const O: usize> Optimiser<O> {
                 return false;
             }
             window.end = window.start + riccati.horizon();
+            // A window that has grown to the end has done so without the terminal ball.
+            let unheld = bounded.terminal_radius().filter(|_| radius.is_none());
             let motion = &mut solution.motion;
             unconstrained.trace_back(window.start, affine, motion);
             unconstrained.follow(window.end, affine, motion);
-            let outside = layout.ends_outside(motion, bounded.terminal_radius().filter(|_| window.end < n));
+            let outside = layout.ends_outside(motion, unheld);
             let violated = bounded.violated(motion, window.clone());
             if outside.is_none() && violated.is_none() {
                 return true;

@@ -390,7 +390,7 @@ pub enum Outcome {
     Solved(u32),
     /// Without.
     Failed(u32),
-    /// Without, as its steps became too short far outside of the balls: nothing seems to keep them.
+    /// Without, and far outside of the balls: nothing seems to keep them.
     Hopeless(u32),
 }
 

@@ -329,7 +329,9 @@ impl<const O: usize> Riccati<O> {
                 return;
             }
             self.horizon = until;
-            self.stages[until].input = Vector3::zeros();
+            // Nothing of another problem may move the input after the last state.
+            let after = &mut self.stages[until];
+            (after.input, after.d_input) = (Vector3::zeros(), Vector3::zeros());
             let (weight, slope) = rest.unconstrained.to_go(first + until);
             problem.end = End { weight, slope, radius: None };
         }
