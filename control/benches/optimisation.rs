@@ -10,41 +10,16 @@ mod harness;
 use control::crmpc::{self, Constraints};
 use control::dlmpc;
 use control::mpc::{Method, Nonlinearity, SolverSettings};
-use control::report::{Report, Status};
+use control::report::Status;
 use control::{Controller, Crmpc, Dlmpc, Measurement};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use harness::{disturbance, settings, simulate};
+use harness::{Optimising, disturbance, settings, simulate};
 use std::hint::black_box;
 use vehicle::disturbance::Kind;
 use vehicle::scenario::Scenario;
 
 /// Repetitions of each sample.
 const REPETITIONS: usize = 20;
-
-/// A controller that optimises at some of its ticks.
-trait Optimising: Controller {
-    fn report(memory: &Self::Memory) -> Report;
-    /// Ticks per optimisation.
-    fn ratio(&self) -> u64;
-}
-
-impl Optimising for Crmpc {
-    fn report(memory: &crmpc::Memory) -> Report {
-        memory.report
-    }
-    fn ratio(&self) -> u64 {
-        self.design().ratio as u64
-    }
-}
-
-impl Optimising for Dlmpc {
-    fn report(memory: &dlmpc::Memory) -> Report {
-        memory.report
-    }
-    fn ratio(&self) -> u64 {
-        self.ratio()
-    }
-}
 
 /// What goes into one tick of the run, and how its optimisation came out.
 struct Tick<Memory> {

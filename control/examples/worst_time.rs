@@ -3,13 +3,15 @@
 //! ```text
 //! cargo run --release -p control --example worst_time -- random LAW FIRST COUNT [SIZE [BUDGET_MS]]
 //! cargo run --release -p control --example worst_time -- search LAW FIRST COUNT EVALUATIONS [SIZE]
+//! cargo run --release -p control --example worst_time -- list LAW FIRST COUNT
 //! cargo run --release -p control --example worst_time -- one LAW SEED [SIZE]
 //! ```
 //!
 //! A case is a reference, a start, and a second state to which the vehicle is kicked one optimisation later: errors of up to 15 deg and rates of up to
 //! 4.5 deg/s, both times SIZE. Three optimisations of it count: the first one (cold), the one after the kick, and the one that follows.
 //! `random` draws COUNT cases from seed FIRST on, `search` starts COUNT searches by CMA-ES for the most iterations. Each optimisation is repeated from the same
-//! memory, and the smallest time counts. `one` does a single case once, for a profiler.
+//! memory, and the smallest time counts. `list` prints the cases with the most iterations for control/tests/data/worst_draws.csv. `one` does a single case once, for
+//! a profiler.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
@@ -17,123 +19,18 @@ mod harness;
 use cmaes::{CMAESOptions, DVector};
 use control::crmpc::Constraints;
 use control::report::{Report, Status};
-use control::{Controller, Crmpc, Dlmpc, Measurement, crmpc, dlmpc};
+use control::{Crmpc, Dlmpc, dlmpc};
+use harness::draws::{Case, UNKNOWNS};
 use harness::flight::Random;
-use harness::{in_parallel, settings};
-use nalgebra::Vector3;
+use harness::{Optimising, in_parallel, settings};
 use std::collections::BTreeMap;
-use vehicle::kinematics;
-use vehicle::reference::Profile;
-use vehicle::scenario::Scenario;
 
 /// Repetitions of each optimisation.
 const REPETITIONS: usize = 5;
-/// Errors of the angles and rates at most, deg and deg/s.
-const ERRORS: (f64, f64) = (15.0, 4.5);
-/// Numbers of size 1 that make a case.
-const UNKNOWNS: usize = 22;
+/// Cases that are listed of each law.
+const LISTED: usize = 40;
 /// The optimisations of a case.
 const SITUATIONS: [&str; 3] = ["cold", "after a kick", "the next one"];
-
-/// A controller that optimises at some of its ticks.
-trait Optimising: Controller {
-    fn report(memory: &Self::Memory) -> Report;
-    /// Ticks per optimisation.
-    fn ratio(&self) -> u64;
-}
-
-impl Optimising for Crmpc {
-    fn report(memory: &crmpc::Memory) -> Report {
-        memory.report
-    }
-    fn ratio(&self) -> u64 {
-        self.design().ratio as u64
-    }
-}
-
-impl Optimising for Dlmpc {
-    fn report(memory: &dlmpc::Memory) -> Report {
-        memory.report
-    }
-    fn ratio(&self) -> u64 {
-        self.ratio()
-    }
-}
-
-/// What to optimise.
-struct Case {
-    /// The time that the reference has at the start, s.
-    time: f64,
-    reference: Profile,
-    /// Errors of the angles, rad, and x_ω, rad/s: at the start, and after the kick.
-    states: [(Vector3<f64>, Vector3<f64>); 2],
-}
-
-fn degrees(values: [f64; 3]) -> Vector3<f64> {
-    Vector3::from(values.map(f64::to_radians))
-}
-
-impl Case {
-    fn of(x: &[f64], size: f64) -> Self {
-        let at = |i: usize| x[i].clamp(-1.0, 1.0);
-        let three = |i: usize| Vector3::new(at(i), at(i + 1), at(i + 2));
-        let mean = degrees([10.0, 0.0, -30.0]) + three(2).component_mul(&degrees([5.0, 3.0, 20.0]));
-        let reference = match at(1) {
-            paper if paper < 0.0 => Scenario::crmpc2022().reference,
-            sine if sine < 0.5 => {
-                let amplitude = three(5).component_mul(&degrees([3.0, 1.0, 6.0]));
-                Profile::sine(mean, amplitude, 0.45 + 0.35 * at(8), 3.15 * at(9))
-            }
-            _ => Profile::step(mean, mean + three(5).component_mul(&degrees([5.0, 3.0, 16.0])), 25.0),
-        };
-        // In the ball.
-        let vector =
-            |i: usize, length: f64| three(i) * (size * length.to_radians() / three(i).norm().max(1.0));
-        let states = [10, 16].map(|i| (vector(i, ERRORS.0), vector(i + 3, ERRORS.1)));
-        Self { time: 25.0 + 25.0 * at(0), reference, states }
-    }
-
-    fn random(seed: u64, size: f64) -> Self {
-        let random = &mut Random::new(seed);
-        let x: Vec<f64> = (0..UNKNOWNS).map(|_| random.between(-1.0, 1.0)).collect();
-        Self::of(&x, size)
-    }
-
-    /// The reports of the optimisations.
-    fn optimise<C: Optimising>(&self, law: &mut C, repetitions: usize) -> [Report; 3] {
-        let (period, ratio) = (law.period(), law.ratio());
-        let mut memory = law.memory();
-        let begin = (self.time / period).round() as u64 / ratio * ratio;
-        let reference = |time: f64| self.reference.at(time);
-        let [first, kicked] = self.states;
-        let mut state = (reference(begin as f64 * period).angles + first.0, first.1);
-        [0, 1, 2].map(|number| {
-            let tick = begin + number * ratio;
-            let time = tick as f64 * period;
-            if number == 1 {
-                state = (reference(time).angles + kicked.0, kicked.1);
-            }
-            let measured = |(angles, rates): (Vector3<f64>, Vector3<f64>)| Measurement {
-                angles,
-                rates: kinematics::r_inverse(&angles) * rates,
-                ..Measurement::default()
-            };
-            let before = memory.clone();
-            let mut best = f64::INFINITY;
-            for _ in 0..repetitions {
-                memory.clone_from(&before);
-                law.update(&mut memory, tick, time, &measured(state), &reference);
-                best = best.min(C::report(&memory).time);
-            }
-            for tick in tick + 1..tick + ratio {
-                law.update(&mut memory, tick, tick as f64 * period, &measured(state), &reference);
-            }
-            // About so far does it come until the next one.
-            state.0 += state.1 * (ratio as f64 * period);
-            Report { time: best, ..C::report(&memory) }
-        })
-    }
-}
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -180,6 +77,17 @@ fn go<C: Optimising>(
             for (situation, title) in SITUATIONS.iter().enumerate() {
                 let own: Vec<Report> = reports.iter().map(|reports| reports[situation]).collect();
                 print(&format!("{name}, {title}"), &seeds, &own);
+            }
+        }
+        "list" => {
+            let law = &mut new(0.0);
+            let most = |reports: &[Report; 3]| reports.iter().map(|report| report.iterations).max();
+            let mut all: Vec<(u64, [Report; 3])> =
+                seeds.iter().map(|&seed| (seed, Case::random(seed, 1.0).optimise(law, 1))).collect();
+            all.sort_by_key(|(_, reports)| std::cmp::Reverse(most(reports)));
+            for (seed, reports) in all.iter().take(LISTED) {
+                let [cold, kicked, next] = reports.map(|report| report.iterations);
+                println!("{name},{seed},{cold},{kicked},{next}");
             }
         }
         "search" => {

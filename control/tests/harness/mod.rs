@@ -1,12 +1,14 @@
 //! A closed loop of the scenario of Chai 2022 in one process, for tests, the campaign example and the benchmark.
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
+pub mod draws;
 pub mod flight;
 pub mod platform;
 
 use control::crmpc::{Constraints, Memory, Settings, Standing, Status};
 use control::lqr::LqrSettings;
-use control::{Controller, Crmpc, Lqr, Measurement};
+use control::report::Report;
+use control::{Controller, Crmpc, Dlmpc, Lqr, Measurement, dlmpc};
 use nalgebra::Vector3;
 use vehicle::disturbance::{Disturbance, Kind};
 use vehicle::plant::Plant;
@@ -24,6 +26,34 @@ pub fn settings(constraints: Constraints) -> Settings {
 pub fn lqr() -> Lqr {
     let Settings { body, p, q, period_feedback: period, .. } = settings(Constraints::Robust);
     Lqr::new(LqrSettings { body, p, q, period }).unwrap()
+}
+
+/// A controller that optimises at some of its ticks.
+pub trait Optimising: Controller {
+    /// What the last optimisation reported.
+    fn report(memory: &Self::Memory) -> Report;
+    /// Ticks per optimisation.
+    fn ratio(&self) -> u64;
+}
+
+impl Optimising for Crmpc {
+    /// What the last optimisation reported.
+    fn report(memory: &Memory) -> Report {
+        memory.report
+    }
+    fn ratio(&self) -> u64 {
+        self.design().ratio as u64
+    }
+}
+
+impl Optimising for Dlmpc {
+    /// What the last optimisation reported.
+    fn report(memory: &dlmpc::Memory) -> Report {
+        memory.report
+    }
+    fn ratio(&self) -> u64 {
+        self.ratio()
+    }
 }
 
 /// The disturbance of the scenario with another kind.
