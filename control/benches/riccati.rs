@@ -83,13 +83,13 @@ fn iterations<'a, C: mpc::Constraints<2> + 'a>(
     for (name, most) in [("1 iteration", 1), ("2 iterations", 2), ("3 iterations", 3), ("to the optimum", 50)]
     {
         let mut riccati = Riccati::new(problem.affine.len(), 0, most);
-        let outcome = riccati.solve(&problem, &mut cold.clone(), 0, false, &mut Budget::unlimited());
+        let outcome = riccati.solve(&problem, &mut cold.clone(), 0, false, &mut Budget::unlimited(), None);
         // Fewer would not be what the name says.
         assert!(outcome.solved() == (most == 50), "{outcome:?}");
         group.bench_function(name, |bencher| {
             bencher.iter_batched_ref(
                 || cold.clone(),
-                |solution| riccati.solve(&problem, solution, 0, false, &mut Budget::unlimited()),
+                |solution| riccati.solve(&problem, solution, 0, false, &mut Budget::unlimited(), None),
                 BatchSize::SmallInput,
             );
         });

@@ -352,6 +352,11 @@ impl<const O: usize> Optimiser<O> {
         if let Some(window) = &mut search.window {
             window.end = range.end;
         }
+        // The motion must satisfy the chain over all that is to be solved.
+        if !self.layout.is_worth_a_window(&range) {
+            search.window = None;
+            range = 0..n;
+        }
         let Self { unconstrained, about, solution, .. } = self;
         let Solution { motion, multipliers } = solution;
         motion.states[range.start] = if range.start == 0 { *start } else { about.states[range.start] };
@@ -432,12 +437,12 @@ impl<const O: usize> Optimiser<O> {
         let outcome = match self.settings.nonlinearity {
             Nonlinearity::Exact => {
                 let exact = self.layout.problem(sample, end, &*bounded);
-                self.riccati.solve(&exact, &mut self.solution, 0, search.warm, &mut self.budget)
+                self.riccati.solve(&exact, &mut self.solution, 0, search.warm, &mut self.budget, None)
             }
             Nonlinearity::Frozen => {
                 self.frozen.set(bounded, &self.about);
                 let frozen = self.layout.problem(sample, end, &self.frozen);
-                self.riccati.solve(&frozen, &mut self.solution, 0, search.warm, &mut self.budget)
+                self.riccati.solve(&frozen, &mut self.solution, 0, search.warm, &mut self.budget, None)
             }
         };
         search.iterations += outcome.iterations();
@@ -460,8 +465,7 @@ impl<const O: usize> Optimiser<O> {
         let Some(window) = search.window.as_mut() else { return false };
         unconstrained.arrive(start, affine);
         for _ in 0..WINDOWS {
-            // At most three quarters of the horizon, or it does not pay.
-            if 4 * window.len() > 3 * n {
+            if !layout.is_worth_a_window(window) {
                 return false;
             }
             bounded.tighten(about, window.clone());
@@ -484,13 +488,13 @@ impl<const O: usize> Optimiser<O> {
             let outcome = if self.settings.nonlinearity == Nonlinearity::Exact {
                 let rest = Rest { unconstrained: &*unconstrained, affine };
                 let rest = Some(&rest).filter(|_| bounded.is_set_beyond() && problem.end.radius.is_none());
-                riccati.solve_further(&problem, solution, window.start, search.warm, budget, rest)
+                riccati.solve(&problem, solution, window.start, search.warm, budget, rest)
             } else {
                 frozen.set(bounded, about);
                 let constraints = &From { constraints: &*frozen, first: window.start };
                 let Problem { chain, cost, start, affine, end, .. } = problem;
                 let problem = Problem { chain, cost, start, affine, constraints, end };
-                riccati.solve(&problem, solution, window.start, search.warm, budget)
+                riccati.solve(&problem, solution, window.start, search.warm, budget, None)
             };
             search.iterations += outcome.iterations();
             if !outcome.solved() {
@@ -594,6 +598,11 @@ impl<const O: usize> Layout<O> {
             (violated, false) => violated?,
         };
         Some(self.widen(&violated, MARGIN + violated.len() / 2))
+    }
+
+    /// Whether to solve for these intervals alone pays: at most three quarters of the horizon.
+    fn is_worth_a_window(&self, range: &Range<usize>) -> bool {
+        4 * range.len() <= 3 * self.horizon
     }
 
     /// These intervals and so many before and after.

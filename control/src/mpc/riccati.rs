@@ -221,20 +221,8 @@ impl<const O: usize> Riccati<O> {
     }
 
     /// The optimum of `problem`, which takes the stages from `first` on of `solution`. Their motion is the first guess, which must satisfy
-    /// the chain, and is replaced if the optimum is found.
+    /// the chain, and is replaced if the optimum is found. With a `rest`, stages that the iterates come near to violating beyond the end are taken in.
     pub fn solve<C: Constraints<O>>(
-        &mut self,
-        problem: &Problem<O, C>,
-        solution: &mut Solution<O>,
-        first: usize,
-        warm: bool,
-        budget: &mut Budget,
-    ) -> Outcome {
-        self.solve_further(problem, solution, first, warm, budget, None)
-    }
-
-    /// As [`Self::solve`]. With a `rest`, stages that the iterates come near to violating beyond the end are taken in.
-    pub fn solve_further<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
         solution: &mut Solution<O>,
