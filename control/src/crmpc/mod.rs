@@ -194,29 +194,34 @@ impl Crmpc {
         let shift = if memory.assured() { memory.observed.shift(&self.settings) } else { Vector3::zeros() };
         self.preview(time, reference, shift);
         let first = !memory.started;
-        if first {
+        let anew = if first {
             memory.plan.resize(self.settings.horizon);
             memory.started = true;
+            true
         } else {
             self.shift(&mut memory.plan);
             memory.age = memory.age.saturating_add(self.design.ratio as u32);
-            self.look_at_the_deviation(memory, &measured);
-        }
+            self.is_left_behind(memory, &measured)
+        };
         let report = match self.settings.constraints {
-            Constraints::Robust => self.plan_robustly(memory, &measured, first),
+            Constraints::Robust => self.plan_robustly(memory, &measured, anew),
             Constraints::Paper => self.plan_as_printed(memory, &measured, first),
         };
         memory.report.record(&report, self.optimiser.is_exhausted(), clock);
     }
 
-    /// A plan that the vehicle is further from than the assumptions explain is of no use any more.
-    fn look_at_the_deviation(&mut self, memory: &mut Memory, measured: &Vector6<f64>) {
+    /// Whether the vehicle is further from the plan than the assumptions explain, so that it is of no use any more: it ends the guarantee, and bounds about
+    /// it lead astray. Where the design does not hold anyway, the plan still serves as a guess.
+    fn is_left_behind(&mut self, memory: &mut Memory, measured: &Vector6<f64>) -> bool {
         let (angles, rates) = split(&(measured - memory.plan.states[0]));
         let gain = self.settings.feedback;
         self.sets.begin(memory.age as usize, 1.0);
-        if memory.assured() && !self.explains(0, &angles, &rates, &(angles * gain.k1 + rates * gain.k2)) {
+        let left = self.design.counted >= 1.0
+            && !self.explains(0, &angles, &rates, &(angles * gain.k1 + rates * gain.k2));
+        if memory.assured() && left {
             memory.standing = Standing::Exceeded;
         }
+        left
     }
 
     /// The optimum within the paper's sets, or the shifted previous plan (31).
@@ -239,7 +244,7 @@ impl Crmpc {
     /// A plan that keeps the conditions of the theorem (docs/guarantee.md): the optimum from the measured state, or from where the previous plan put the
     /// nominal motion, or else the previous plan as it is, which keeps them if it did before and the vehicle is no further from it than the
     /// assumptions explain. Without any, what violates the limits least.
-    fn plan_robustly(&mut self, memory: &mut Memory, measured: &Vector6<f64>, first: bool) -> mpc::Report {
+    fn plan_robustly(&mut self, memory: &mut Memory, measured: &Vector6<f64>, anew: bool) -> mpc::Report {
         let assured = memory.assured();
         if !self.credible(memory) {
             return self.violate_least(memory, measured, 0);
@@ -253,7 +258,7 @@ impl Crmpc {
         let mut iterations = 0;
         for (start, age) in starts.into_iter().flatten() {
             self.sets.begin(age as usize, 1.0);
-            let (report, certified) = self.certified(memory, &start, first);
+            let (report, certified) = self.certified(memory, &start, anew);
             iterations += report.iterations;
             let solved = report.status != Status::Fallback;
             // Linearised constraints are there for comparison: their optimum is taken without guarantee.

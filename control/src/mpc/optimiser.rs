@@ -446,6 +446,11 @@ impl<const O: usize> Optimiser<O> {
             }
         };
         search.iterations += outcome.iterations();
+        if !outcome.solved() && search.warm && !self.is_exhausted() {
+            // The guess has led astray.
+            search.warm = false;
+            return self.over_whole_horizon(bounded, sample, search);
+        }
         search.hopeless = outcome.hopeless() && !search.warm;
         outcome.solved()
     }

@@ -29,6 +29,11 @@ const RECENTRING: f64 = 0.5;
 const STALLED: f64 = 1e-5;
 const STALLED_STEPS: u32 = 4;
 const STALLED_ITERATIONS: u32 = 15;
+/// A search goes round in a circle when its residual has not been halved in so many iterations; its steps are then so much shorter.
+const CIRCLING: u32 = 8;
+const DAMPING: f64 = 0.5;
+/// It has gone astray when the balls' residual is so many times the least so far, and beyond 1.
+const ASTRAY: f64 = 1e3;
 /// Residual of the balls from which on a search that ended so is hopeless.
 const FAR_FROM_FEASIBLE: f64 = 1e-3;
 /// ‖y‖² from which on a ball is near.
@@ -235,7 +240,8 @@ impl<const O: usize> Riccati<O> {
         self.horizon = problem.affine.len();
         self.begin(problem, solution, first, warm);
         let feasibility = if problem.constraints.follows() { FEASIBILITY_FOLLOWING } else { FEASIBILITY };
-        let (mut short_steps, mut nearest) = (0, (f64::INFINITY, 0));
+        let (mut short_steps, mut nearest, mut best) = (0, (f64::INFINITY, 0), (f64::INFINITY, 0));
+        let mut least_outside = f64::INFINITY;
         for iteration in 0..=self.max_iterations {
             let residuals = self.residuals(problem);
             if residuals.converged(feasibility) {
@@ -273,6 +279,16 @@ impl<const O: usize> Riccati<O> {
             let stalls = residuals.feasibility > feasibility && iteration >= nearest.1 + STALLED_ITERATIONS;
             if short_steps == STALLED_STEPS || stalls {
                 return gives_up;
+            }
+            least_outside = residuals.feasibility.clamp(1.0, least_outside);
+            if residuals.feasibility > ASTRAY * least_outside {
+                return Outcome::Failed(iteration);
+            }
+            let residual = residuals.stationarity.max(residuals.feasibility);
+            if residual < 0.5 * best.0 {
+                best = (residual, iteration);
+            } else if iteration >= best.1 + CIRCLING {
+                alpha *= DAMPING;
             }
             self.step(problem, alpha);
             let mean = centre.max(WARM.1 * residuals.cost / residuals.count);
