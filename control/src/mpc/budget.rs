@@ -6,11 +6,16 @@ use std::time::{Duration, Instant};
 /// The cone solver is begun only if this many times as long is left as has passed: it sets itself up for longer than one iteration takes.
 const FOR_THE_CONE: u32 = 4;
 
+/// Iterations for which there must be time: the one that is begun, and about as much for the plan and the report after it.
+const TO_END: u32 = 2;
+
 /// The budget of one optimisation of a controller, which may solve several problems.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
     begin: Instant,
     deadline: Option<Instant>,
+    /// When the last iteration was begun.
+    last: Instant,
     iterations: u32,
     exhausted: bool,
 }
@@ -25,17 +30,23 @@ impl Budget {
             .filter(|&budget| budget > 0.0)
             .and_then(|budget| begin.checked_add(Duration::try_from_secs_f64(budget).ok()?));
         let iterations = if iteration_budget == 0 { u32::MAX } else { iteration_budget };
-        Self { begin, deadline, iterations, exhausted: false }
+        Self { begin, deadline, last: begin, iterations, exhausted: false }
     }
 
     /// No limits.
     pub fn unlimited() -> Self {
-        Self { begin: Instant::now(), deadline: None, iterations: u32::MAX, exhausted: false }
+        let begin = Instant::now();
+        Self { begin, deadline: None, last: begin, iterations: u32::MAX, exhausted: false }
     }
 
-    /// Takes one iteration, unless there is none left.
+    /// Takes one iteration, unless there is none left, or no time for another one like the last and for what follows it.
     pub fn take(&mut self) -> bool {
-        self.exhausted |= self.iterations == 0 || self.is_late();
+        self.exhausted |= self.iterations == 0;
+        if let Some(deadline) = self.deadline {
+            let now = Instant::now();
+            self.exhausted |= now + (now - self.last) * TO_END >= deadline;
+            self.last = now;
+        }
         if self.exhausted {
             return false;
         }

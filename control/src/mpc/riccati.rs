@@ -17,7 +17,7 @@ use nalgebra::{Matrix3, SVector, Vector3};
 const STATIONARITY: f64 = 1e-6;
 const FEASIBILITY: f64 = 1e-9;
 /// The same where the bounds follow the motion: as their derivatives are left out, the residual then only shrinks by a factor from iteration to iteration.
-const FEASIBILITY_FOLLOWING: f64 = 1e-6;
+const FEASIBILITY_FOLLOWING: f64 = 1e-5;
 const GAP: f64 = 1e-9;
 /// Share of the way to the boundary that a step goes at most.
 const TO_BOUNDARY: f64 = 0.9999;
@@ -32,7 +32,7 @@ const STALLED_ITERATIONS: u32 = 15;
 /// A search goes round in a circle when its residual has not been halved in so many iterations; its steps are then so much shorter.
 const CIRCLING: u32 = 8;
 const DAMPING: f64 = 0.5;
-/// It has gone astray when the balls' residual is so many times the least so far, and beyond 1.
+/// A guess has led it astray when the balls' residual is so many times the least so far, and beyond 1.
 const ASTRAY: f64 = 1e3;
 /// Residual of the balls from which on a search that ended so is hopeless.
 const FAR_FROM_FEASIBLE: f64 = 1e-3;
@@ -252,9 +252,9 @@ impl<const O: usize> Riccati<O> {
                 return Outcome::Failed(iteration);
             }
             let gives_up = if residuals.feasibility > FAR_FROM_FEASIBLE {
-                Outcome::Hopeless(iteration)
+                Outcome::Hopeless(iteration + 1)
             } else {
-                Outcome::Failed(iteration)
+                Outcome::Failed(iteration + 1)
             };
             if self.factor(problem).is_none() {
                 return gives_up;
@@ -281,8 +281,8 @@ impl<const O: usize> Riccati<O> {
                 return gives_up;
             }
             least_outside = residuals.feasibility.clamp(1.0, least_outside);
-            if residuals.feasibility > ASTRAY * least_outside {
-                return Outcome::Failed(iteration);
+            if warm && residuals.feasibility > ASTRAY * least_outside {
+                return Outcome::Failed(iteration + 1);
             }
             let residual = residuals.stationarity.max(residuals.feasibility);
             if residual < 0.5 * best.0 {
