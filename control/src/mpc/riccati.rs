@@ -24,11 +24,13 @@ const TO_BOUNDARY: f64 = 0.9999;
 /// A step shorter than this is tried again without second order, towards this share of the mean of sλ.
 const SHORT: f64 = 0.1;
 const RECENTRING: f64 = 0.5;
-/// A search has stalled when its steps were shorter than this so many times in a row, or when the balls' residual has not been halved in so many
-/// iterations.
+/// A search has stalled when its steps were shorter than this so many times in a row.
 const STALLED: f64 = 1e-5;
 const STALLED_STEPS: u32 = 4;
-const STALLED_ITERATIONS: u32 = 15;
+/// Or when its residual has not been halved in so many iterations; a residual so many times the least begins the count anew, as an iterate then has met
+/// what it had not looked at. With given bounds, which may be of any size, and with bounds that follow the motion.
+const PATIENCE: (u32, f64) = (30, 1e3);
+const PATIENCE_FOLLOWING: (u32, f64) = (16, f64::INFINITY);
 /// A search goes round in a circle when its residual has not been halved in so many iterations; its steps are then so much shorter.
 const CIRCLING: u32 = 8;
 const DAMPING: f64 = 0.5;
@@ -239,8 +241,12 @@ impl<const O: usize> Riccati<O> {
         let problem = &mut Problem { ..*problem };
         self.horizon = problem.affine.len();
         self.begin(problem, solution, first, warm);
-        let feasibility = if problem.constraints.follows() { FEASIBILITY_FOLLOWING } else { FEASIBILITY };
-        let (mut short_steps, mut nearest, mut best) = (0, (f64::INFINITY, 0), (f64::INFINITY, 0));
+        let (feasibility, (patience, anew)) = if problem.constraints.follows() {
+            (FEASIBILITY_FOLLOWING, PATIENCE_FOLLOWING)
+        } else {
+            (FEASIBILITY, PATIENCE)
+        };
+        let (mut short_steps, mut best) = (0, (f64::INFINITY, 0));
         let mut least_outside = f64::INFINITY;
         for iteration in 0..=self.max_iterations {
             let residuals = self.residuals(problem);
@@ -273,10 +279,11 @@ impl<const O: usize> Riccati<O> {
                 alpha = self.corrector(problem, RECENTRING * residuals.mean(), (0.0, 0.0));
             }
             short_steps = if alpha < STALLED { short_steps + 1 } else { 0 };
-            if !(0.5 * nearest.0..=2.0 * nearest.0).contains(&residuals.feasibility) {
-                nearest = (residuals.feasibility, iteration);
+            let residual = residuals.stationarity.max(residuals.feasibility);
+            if !(0.5 * best.0..=anew * best.0).contains(&residual) {
+                best = (residual, iteration);
             }
-            let stalls = residuals.feasibility > feasibility && iteration >= nearest.1 + STALLED_ITERATIONS;
+            let stalls = residuals.feasibility > feasibility && iteration >= best.1 + patience;
             if short_steps == STALLED_STEPS || stalls {
                 return gives_up;
             }
@@ -284,10 +291,7 @@ impl<const O: usize> Riccati<O> {
             if warm && residuals.feasibility > ASTRAY * least_outside {
                 return Outcome::Failed(iteration + 1);
             }
-            let residual = residuals.stationarity.max(residuals.feasibility);
-            if residual < 0.5 * best.0 {
-                best = (residual, iteration);
-            } else if iteration >= best.1 + CIRCLING {
+            if iteration >= best.1 + CIRCLING {
                 alpha *= DAMPING;
             }
             self.step(problem, alpha);
