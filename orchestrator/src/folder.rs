@@ -5,7 +5,8 @@ use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
 /// What a run may leave.
-pub const RESULTS: [&str; 5] = ["results.csv", "results.json", "metrics.json", "plot.svg", "realtime.svg"];
+pub const RESULTS: [&str; 6] =
+    ["results.csv", "results.parquet", "results.json", "metrics.json", "plot.svg", "realtime.svg"];
 
 /// A folder that belongs to this process for as long as this lives.
 pub struct Folder {

@@ -20,7 +20,7 @@ use crate::progress::Progress;
 use crate::realtime;
 use crate::realtime::priority::{Priority, Scheduling};
 use crate::realtime::timer::{self, Monotonic};
-use crate::recorder::Recorder;
+use crate::recorder::{self, Format, Recorder};
 use crate::search;
 use crate::seeds;
 use crate::settings::{self, Setting};
@@ -40,6 +40,9 @@ pub struct Files {
     /// Write no results.csv.
     #[arg(long)]
     pub no_csv: bool,
+    /// The file of the recorded variables.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t, conflicts_with = "no_csv")]
+    pub format: Format,
     /// Draw no plot.svg.
     #[arg(long)]
     pub no_plot: bool,
@@ -214,7 +217,7 @@ impl Plan {
         Folder::check(&out, options.force)?;
         folder.clear()?;
         let mut recorder =
-            if options.files.no_csv { None } else { Some(self.recorder(&out, options.files.labels)?) };
+            if options.files.no_csv { None } else { Some(self.recorder(&out, options.files)?) };
         let mut merit = self.merit(limits).ending_when_lost();
         let mut curves = Curves::new(self.places, limits, self.clock.ticks());
         let silent = options.quiet || options.live;
@@ -252,7 +255,7 @@ impl Plan {
         let mut metrics = merit.metrics(wall, reached, loop_delay);
         let mut files = vec!["results.json", "metrics.json"];
         if recorder.is_some() {
-            files.insert(0, "results.csv");
+            files.insert(0, options.files.format.file());
         }
         let sidecar = sidecar::sidecar(self, &parameters, options.real_time, outcome.as_ref().err());
         write_json(&out.join("results.json"), &sidecar)?;
@@ -306,25 +309,20 @@ impl Plan {
     }
 
     /// The file of the recorded variables.
-    fn recorder(&self, out: &Path, labels: bool) -> Result<Recorder, Error> {
-        let mut columns = Vec::new();
-        let mut items = Vec::new();
-        for column in &self.columns {
-            let Some(place) = self.place(column.port) else { continue };
+    fn recorder(&self, out: &Path, files: Files) -> Result<Recorder, Error> {
+        let column = |column: &Column| {
+            let place = self.place(column.port)?;
             let kind = &self.fmus[column.port.component].description.variables[column.port.variable].kind;
-            let name = match kind {
-                Kind::Real { unit: Some(unit), .. } if labels => format!("{} [{unit}]", column.name),
-                _ => column.name.clone(),
+            let unit = match kind {
+                Kind::Real { unit, .. } => unit.clone(),
+                _ => None,
             };
-            columns.push((name, place, column.port.carrier));
-            items.push(self.items(place));
-        }
-        let columns: Vec<_> =
-            columns.iter().map(|(name, place, carrier)| (name.as_str(), *place, *carrier)).collect();
-        let path = out.join("results.csv");
-        let time = if labels { "time [s]" } else { "time" };
-        let recorder = Recorder::create(&path, time, &columns, self.experiment.record.every)?;
-        Ok(if labels { recorder.with_names(items) } else { recorder })
+            let (name, carrier) = (column.name.clone(), column.port.carrier);
+            Some(recorder::Column { name, place, carrier, unit, items: self.items(place) })
+        };
+        let columns: Vec<_> = self.columns.iter().filter_map(column).collect();
+        let path = out.join(files.format.file());
+        Recorder::create(&path, files.format, &columns, self.experiment.record.every, files.labels)
     }
 
     /// The units, initialized, and the limits that the experiment states.

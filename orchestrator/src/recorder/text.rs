@@ -1,0 +1,89 @@
+//! results.csv.
+
+use super::Column;
+use crate::error::Error;
+use crate::wiring::Carrier;
+use std::fs::File;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Bytes that are held in memory and written at once.
+const HELD: usize = 1 << 16;
+
+/// A CSV file in the making.
+pub(super) struct Text {
+    path: PathBuf,
+    file: File,
+    /// Rows that are not yet written.
+    held: Vec<u8>,
+    columns: Vec<Shown>,
+}
+
+/// How a column's values are told.
+struct Shown {
+    place: usize,
+    carrier: Carrier,
+    /// Items that are told by their names, as fields.
+    items: Vec<(String, i32)>,
+}
+
+impl Text {
+    /// The file with its header.
+    pub(super) fn create(path: &Path, columns: &[Column], labels: bool) -> Result<Self, Error> {
+        let file = File::create(path).map_err(Error::file(path))?;
+        let head = |name: &str, unit: Option<&str>| match unit {
+            Some(unit) if labels => field(&format!("{name} [{unit}]")),
+            _ => field(name),
+        };
+        let mut held = Vec::with_capacity(HELD + (1 << 12));
+        held.extend_from_slice(head("time", Some("s")).as_bytes());
+        for Column { name, unit, .. } in columns {
+            held.push(b',');
+            held.extend_from_slice(head(name, unit.as_deref()).as_bytes());
+        }
+        held.push(b'\n');
+        let shown = |column: &Column| {
+            let items = column.items.iter().filter(|_| labels).map(|(name, item)| (field(name), *item));
+            Shown { place: column.place, carrier: column.carrier, items: items.collect() }
+        };
+        let columns = columns.iter().map(shown).collect();
+        Ok(Self { path: path.to_path_buf(), file, held, columns })
+    }
+
+    pub(super) fn row(&mut self, time: f64, values: &[f64]) -> Result<(), Error> {
+        let (mut real, mut integer) = (zmij::Buffer::new(), itoa::Buffer::new());
+        self.held.extend_from_slice(real.format(time).as_bytes());
+        for Shown { place, carrier, items } in &self.columns {
+            let value = values[*place];
+            let text = match carrier {
+                Carrier::Real => real.format(value),
+                // It came from an i32.
+                Carrier::Integer | Carrier::Boolean => {
+                    let item = items.iter().find(|(_, item)| *item == value as i32);
+                    item.map_or_else(|| integer.format(value as i32), |(name, _)| name)
+                }
+            };
+            self.held.push(b',');
+            self.held.extend_from_slice(text.as_bytes());
+        }
+        self.held.push(b'\n');
+        if self.held.len() < HELD { Ok(()) } else { self.finish() }
+    }
+
+    /// Writes what is held.
+    pub(super) fn finish(&mut self) -> Result<(), Error> {
+        let outcome = self.file.write_all(&self.held);
+        self.held.clear();
+        outcome.map_err(Error::file(&self.path))
+    }
+}
+
+/// A text as a field, in quotation marks where it needs them.
+fn field(text: &str) -> String {
+    let mut writer =
+        csv::WriterBuilder::new().terminator(csv::Terminator::Any(b'\n')).from_writer(Vec::new());
+    // Writing to memory cannot fail.
+    let _ = writer.write_record([text]);
+    let bytes = writer.into_inner().unwrap_or_default();
+    String::from_utf8_lossy(&bytes).trim_end_matches('\n').to_owned()
+}
