@@ -4,6 +4,7 @@ use crate::crmpc::{Constraints, Guarantee, InitialState, ObserverSettings, Setti
 use crate::mpc::SolverSettings;
 use crate::sampled::Gain;
 use serde::Deserialize;
+use std::sync::LazyLock;
 use vehicle::scenario::Scenario;
 
 #[derive(Deserialize)]
@@ -87,9 +88,12 @@ pub struct Published {
     pub epsilon2: f64,
 }
 
-fn embedded() -> File {
+fn embedded() -> &'static File {
     // Cannot fail: every test that uses the published settings reads it.
-    toml::from_str(include_str!("../data/crmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
+    static READ: LazyLock<File> = LazyLock::new(|| {
+        toml::from_str(include_str!("../data/crmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
+    });
+    &READ
 }
 
 impl Settings {

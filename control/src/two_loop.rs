@@ -10,6 +10,7 @@ use crate::error::DesignError;
 use crate::sliding::{Commanded, FiniteTimeLayer, all_positive, sampled_decay};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
 use vehicle::reference::Reference;
@@ -106,8 +107,11 @@ impl TwoLoopSettings {
     #[allow(clippy::missing_panics_doc)]
     pub fn ours() -> Self {
         // Neither can fail, as the tests that use it show: the files are embedded.
-        let file: File = toml::from_str(include_str!("../data/two-loop-smc.toml"))
-            .unwrap_or_else(|error| panic!("{error}"));
+        static READ: LazyLock<File> = LazyLock::new(|| {
+            toml::from_str(include_str!("../data/two-loop-smc.toml"))
+                .unwrap_or_else(|error| panic!("{error}"))
+        });
+        let file = &*READ;
         let body = Scenario::two_loop().inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
         Self {
             form: Form::Corrected,

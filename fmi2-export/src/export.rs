@@ -26,11 +26,12 @@ macro_rules! export_fmus {
             use $crate::types::{CEventInfo, Callbacks, Status};
             use ::std::ffi::{c_char, c_int, c_void};
 
-            const EXPORTS: &[$crate::Export] = &[$($crate::Export::of::<$model>()),+];
+            const COUNT: usize = [$(stringify!($model)),+].len();
+            static EXPORTS: [$crate::Export; COUNT] = [$($crate::Export::of::<$model>()),+];
 
             #[unsafe(no_mangle)]
             pub extern "C" fn fmu_model_descriptions() -> *mut c_char {
-                shell::fmu_model_descriptions(EXPORTS)
+                shell::fmu_model_descriptions(&EXPORTS)
             }
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi2Instantiate(
@@ -44,7 +45,7 @@ macro_rules! export_fmus {
             ) -> *mut c_void {
                 unsafe {
                     shell::fmi2Instantiate(
-                        EXPORTS, name, fmu_type, guid, resources, callbacks, visible, logging_on,
+                        &EXPORTS, name, fmu_type, guid, resources, callbacks, visible, logging_on,
                     )
                 }
             }

@@ -6,12 +6,14 @@ use crate::model::{Context, EventInfo, Failure};
 use crate::saved;
 use crate::types::{Interface, Status};
 use crate::unit::{Export, Extrapolation, MAX_INPUT_DERIVATIVE_ORDER, Progress, Unit};
+use model_description::ModelDescription;
 use model_description::variable::{Causality, Kind, Variability, Variable};
 use std::any::Any;
 use std::ffi::CString;
 use std::mem;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// How far the communication point may be from the unit's time, relative to both and to the step: importers add up time.
 const TIME_TOLERANCE: f64 = 1e-9;
@@ -32,10 +34,9 @@ pub(crate) fn error<T>(text: impl Into<String>) -> Result<T, Failure> {
 /// What `fmi2Component` points at.
 pub(crate) struct Instance {
     unit: Box<dyn Unit>,
-    variables: Vec<Variable>,
+    description: Arc<ModelDescription>,
     /// State and derivative pairs.
     states: Vec<(usize, usize)>,
-    event_indicators: usize,
     guid: String,
     interface: Interface,
     logger: Logger,
@@ -137,11 +138,7 @@ impl Scalar for String {
 }
 
 impl Instance {
-    pub(crate) fn new(
-        export: &Export,
-        description: model_description::ModelDescription,
-        setting: Setting,
-    ) -> Self {
+    pub(crate) fn new(export: &Export, description: Arc<ModelDescription>, setting: Setting) -> Self {
         let Setting { guid, interface, logger, resources } = setting;
         let states = description.states();
         let mut progress = Progress::default();
@@ -149,8 +146,7 @@ impl Instance {
         Self {
             unit: (export.create)(),
             states,
-            event_indicators: description.event_indicators,
-            variables: description.variables,
+            description,
             guid,
             interface,
             logger,
@@ -308,11 +304,11 @@ impl Instance {
     // Variables
 
     fn variable(&self, reference: u32) -> Result<&Variable, Failure> {
-        self.variables.get(reference as usize).map_or_else(
+        self.description.variables.get(reference as usize).map_or_else(
             || {
                 error(format!(
                     "value reference {reference} does not exist: {} is the last",
-                    self.variables.len() - 1
+                    self.description.variables.len() - 1
                 ))
             },
             Ok,
@@ -338,8 +334,9 @@ impl Instance {
 
     /// Hands the values of the variables to `sink`, with their positions.
     pub(crate) fn get<T: Scalar>(&mut self, references: &[u32], mut sink: impl FnMut(usize, &T)) -> Outcome {
-        let calculated =
-            |&reference: &u32| self.variables.get(reference as usize).is_some_and(Variable::is_calculated);
+        let calculated = |&reference: &u32| {
+            self.description.variables.get(reference as usize).is_some_and(Variable::is_calculated)
+        };
         if references.iter().any(calculated) {
             self.refresh()?;
         }
@@ -387,7 +384,7 @@ impl Instance {
             if !field.same(&value) {
                 *field = value;
                 self.stale = true;
-                if self.variables[reference as usize].causality == Causality::Parameter {
+                if self.description.variables[reference as usize].causality == Causality::Parameter {
                     self.progress.initialized = false;
                 }
             }
@@ -463,7 +460,7 @@ impl Instance {
         let payload =
             saved::unwrap(&self.guid, self.interface, &self.saved[position].0).map_err(Failure::Error)?;
         self.progress = self.unit.restore(payload, self.interface)?;
-        self.progress.extrapolations.reserve(self.variables.len());
+        self.progress.extrapolations.reserve(self.description.variables.len());
         self.stale = true;
         self.last_step = Status::Ok;
         self.logger.log(Category::Events, "state restored");
@@ -610,7 +607,7 @@ impl Instance {
     pub(crate) fn set_continuous_states(&mut self, states: &[f64]) -> Outcome {
         Self::expect_length("continuous states", states.len(), self.states.len())?;
         if let Some(i) = states.iter().position(|x| !x.is_finite()) {
-            let name = &self.variables[self.states[i].0].name;
+            let name = &self.description.variables[self.states[i].0].name;
             // Not an error: an integrator that went too far tries a smaller step.
             return Err(Failure::Discard(format!(
                 "state '{name}' = {} is not finite; it keeps its value",
@@ -641,7 +638,7 @@ impl Instance {
     }
 
     pub(crate) fn event_indicators(&mut self, indicators: &mut [f64]) -> Outcome {
-        Self::expect_length("event indicators", indicators.len(), self.event_indicators)?;
+        Self::expect_length("event indicators", indicators.len(), self.description.event_indicators)?;
         self.refresh()?;
         self.unit.event_indicators(indicators);
         Ok(())
@@ -650,7 +647,7 @@ impl Instance {
     pub(crate) fn nominals(&self, nominals: &mut [f64]) -> Outcome {
         Self::expect_length("nominal values", nominals.len(), self.states.len())?;
         for (value, &(state, _)) in nominals.iter_mut().zip(&self.states) {
-            *value = match self.variables[state].kind {
+            *value = match self.description.variables[state].kind {
                 Kind::Real { nominal: Some(nominal), .. } => nominal,
                 _ => 1.0,
             };

@@ -14,7 +14,7 @@ use crate::types::{
     CEventInfo, Callbacks, DO_STEP_STATUS, Interface, LAST_SUCCESSFUL_TIME, PENDING_STATUS, Status,
     TERMINATED,
 };
-use crate::unit::Export;
+use crate::unit::{Described, Export};
 use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -112,7 +112,7 @@ unsafe fn text<'a>(name: &str, pointer: *const c_char) -> Result<&'a str, String
 /// The descriptions of `exports` as a JSON list in memory of this library; null if that fails.
 pub fn fmu_model_descriptions(exports: &[Export]) -> *mut c_char {
     let json = || {
-        let descriptions: Vec<_> = exports.iter().map(|export| (export.describe)()).collect();
+        let descriptions: Vec<_> = exports.iter().map(|export| &*export.described().description).collect();
         CString::new(serde_json::to_vec(&descriptions).ok()?).ok()
     };
     catch_unwind(AssertUnwindSafe(json)).ok().flatten().map_or(null_mut(), CString::into_raw)
@@ -158,19 +158,17 @@ pub unsafe fn fmi2Instantiate(
         let interface = Interface::from_c(fmu_type).ok_or_else(|| {
             format!("fmuType {fmu_type} is neither 0 (model exchange) nor 1 (co-simulation)")
         })?;
-        let described = || {
-            exports.iter().map(|export| {
-                let description = (export.describe)();
-                (description.guid(), export, description)
-            })
-        };
-        let (guid, export, description) = described().find(|(own, ..)| own == guid).ok_or_else(|| {
-            let list: Vec<_> = described().map(|(guid, _, unit)| format!("{} {guid}", unit.name)).collect();
+        let export = exports.iter().find(|export| export.described().guid == guid).ok_or_else(|| {
+            let list: Vec<_> = exports.iter().map(Export::described).collect();
+            let list: Vec<_> =
+                list.iter().map(|unit| format!("{} {}", unit.description.name, unit.guid)).collect();
             format!(
                 "no unit with GUID '{guid}' in this library, which holds {}: pack it again",
                 list.join(", ")
             )
         })?;
+        let Described { guid, description } = export.described();
+        let (guid, description) = (guid.clone(), description.clone());
         if interface == Interface::ModelExchange && !description.model_exchange {
             return Err(format!("{} is for co-simulation only", description.name));
         }

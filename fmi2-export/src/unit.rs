@@ -8,6 +8,7 @@ use crate::types::Interface;
 use model_description::ModelDescription;
 use model_description::variable::{Causality, Kind, Variability, Variable};
 use serde::{Deserialize, Serialize};
+use std::sync::{Arc, OnceLock};
 
 /// Highest order of fmi2SetRealInputDerivatives.
 pub const MAX_INPUT_DERIVATIVE_ORDER: usize = 3;
@@ -252,16 +253,30 @@ impl<M: Model> Unit for Bound<M> {
 }
 
 /// A unit that a library exports.
-#[derive(Clone, Copy)]
 pub struct Export {
-    pub(crate) describe: fn() -> ModelDescription,
+    describe: fn() -> ModelDescription,
     pub(crate) create: fn() -> Box<dyn Unit>,
+    described: OnceLock<Described>,
+}
+
+/// What importers know of a unit.
+pub(crate) struct Described {
+    pub(crate) guid: String,
+    pub(crate) description: Arc<ModelDescription>,
 }
 
 impl Export {
     /// The unit that `M` is the model of.
     pub const fn of<M: Model>() -> Self {
-        Self { describe: describe::<M>, create: create::<M> }
+        Self { describe: describe::<M>, create: create::<M>, described: OnceLock::new() }
+    }
+
+    /// Its description, which is made once in a process.
+    pub(crate) fn described(&self) -> &Described {
+        self.described.get_or_init(|| {
+            let description = (self.describe)();
+            Described { guid: description.guid(), description: Arc::new(description) }
+        })
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use nalgebra::{SMatrix, SVector, Vector3};
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 
 /// Number of aerodynamic surfaces.
 pub const SURFACES: usize = 8;
@@ -45,7 +46,8 @@ pub struct Effectors {
 impl Effectors {
     /// Wu 2015, section 6, as printed; with a representative effectiveness of the surfaces.
     pub fn published() -> Self {
-        embedded(EFFECTORS)
+        static READ: LazyLock<Effectors> = LazyLock::new(|| embedded(EFFECTORS));
+        READ.clone()
     }
 
     /// The same with jet 4 as the mirror image of jet 8: the printed 10944 N m breaks the symmetry of the other columns.

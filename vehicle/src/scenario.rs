@@ -10,6 +10,7 @@ use crate::platform::Surroundings;
 use crate::reference::{Course, Profile, Segment, Wave};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 
 const CRMPC_2022: (&str, &str) = ("crmpc-2022.toml", include_str!("../data/crmpc-2022.toml"));
 const TVSMC_2015: (&str, &str) = ("tvsmc-2015.toml", include_str!("../data/tvsmc-2015.toml"));
@@ -43,17 +44,20 @@ pub struct Scenario {
 impl Scenario {
     /// Chai 2022, section 5.1.
     pub fn crmpc2022() -> Self {
-        embedded(CRMPC_2022)
+        static READ: LazyLock<Scenario> = LazyLock::new(|| embedded(CRMPC_2022));
+        READ.clone()
     }
 
     /// Wu 2015, section 6.
     pub fn tvsmc2015() -> Self {
-        embedded(TVSMC_2015)
+        static READ: LazyLock<Scenario> = LazyLock::new(|| embedded(TVSMC_2015));
+        READ.clone()
     }
 
     /// Jia, Zhou, Zhou, section V.
     pub fn two_loop() -> Self {
-        embedded(TWO_LOOP_SMC)
+        static READ: LazyLock<Scenario> = LazyLock::new(|| embedded(TWO_LOOP_SMC));
+        READ.clone()
     }
 
     /// From the text of a scenario file; `file` names it in messages. The files in `data/` show the form.

@@ -6,6 +6,7 @@ use crate::sensors::Line;
 use crate::triad::{Triad, Window};
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
+use std::sync::LazyLock;
 
 const TEXT: &str = include_str!("../data/sensors.toml");
 
@@ -53,9 +54,11 @@ impl SensorData {
     }
 }
 
-fn file() -> File {
+fn file() -> &'static File {
     // Cannot fail: a test reads it.
-    toml::from_str(TEXT).unwrap_or_else(|error| panic!("sensors.toml: {error}"))
+    static READ: LazyLock<File> =
+        LazyLock::new(|| toml::from_str(TEXT).unwrap_or_else(|error| panic!("sensors.toml: {error}")));
+    &READ
 }
 
 #[derive(Deserialize)]

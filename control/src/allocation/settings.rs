@@ -4,6 +4,7 @@ use super::pwpf::Pwpf;
 use crate::error::DesignError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 use vehicle::effectors::{Effectors, SURFACES, Surfaces};
 
 /// How the moment is divided among the effectors.
@@ -82,7 +83,7 @@ struct Solver {
 impl Settings {
     /// Wu 2015, sections 5 and 6; blending and everything else that is ours as in `data/allocation.toml`.
     pub fn published() -> Self {
-        let File { period, weight, pwpf, blending, solver } = embedded();
+        let &File { period, ref weight, pwpf, ref blending, ref solver } = embedded();
         Self {
             effectors: Effectors::published(),
             method: Method::Optimal,
@@ -156,7 +157,10 @@ impl Settings {
     }
 }
 
-fn embedded() -> File {
+fn embedded() -> &'static File {
     // Cannot fail: every test that uses the published settings reads it.
-    toml::from_str(include_str!("../../data/allocation.toml")).unwrap_or_else(|error| panic!("{error}"))
+    static READ: LazyLock<File> = LazyLock::new(|| {
+        toml::from_str(include_str!("../../data/allocation.toml")).unwrap_or_else(|error| panic!("{error}"))
+    });
+    &READ
 }

@@ -3,6 +3,7 @@
 use crate::error::DesignError;
 use crate::mpc::SolverSettings;
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
 
@@ -152,7 +153,10 @@ impl Settings {
     }
 }
 
-fn embedded() -> File {
+fn embedded() -> &'static File {
     // Cannot fail: every test that uses the published settings reads it.
-    toml::from_str(include_str!("../../data/dlmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
+    static READ: LazyLock<File> = LazyLock::new(|| {
+        toml::from_str(include_str!("../../data/dlmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
+    });
+    &READ
 }

@@ -14,6 +14,7 @@ use fusion::{Fusion, Gains, triad};
 use lowpass::LowPass;
 use nalgebra::{Matrix3, Rotation3, SVector, Vector3};
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 use vehicle::kinematics::{self, Kinematics};
 use vehicle::platform::body_from_velocity;
 use vehicle::scenario::Scenario;
@@ -131,7 +132,8 @@ struct File {
 impl Default for Settings {
     /// Of `data/estimator.toml`, for the start of Chai 2022 and sensors without errors in the field of the vehicle's data.
     fn default() -> Self {
-        let file: File = embedded(include_str!("../../data/estimator.toml"));
+        static READ: LazyLock<File> = LazyLock::new(|| embedded(include_str!("../../data/estimator.toml")));
+        let file = &*READ;
         let SensorData { surroundings, mems, .. } = SensorData::embedded();
         let field = surroundings.field;
         let jumps = [file.jump_gyroscope, file.jump_accelerometer, file.jump_magnetometer];
@@ -178,8 +180,9 @@ struct CorrectionFile {
 
 /// Corrections of gyroscope, accelerometer and magnetometer of the MEMS set, from `data/sensor-calibration.toml`.
 pub fn mems_corrections() -> [Correction; 3] {
-    let file: CalibrationFile = embedded(include_str!("../../data/sensor-calibration.toml"));
-    [file.gyroscope, file.accelerometer, file.magnetometer]
+    static READ: LazyLock<CalibrationFile> =
+        LazyLock::new(|| embedded(include_str!("../../data/sensor-calibration.toml")));
+    [&READ.gyroscope, &READ.accelerometer, &READ.magnetometer]
         .map(|each| Correction { matrix: Matrix3::from(each.matrix).transpose(), bias: each.bias })
 }
 

@@ -2,6 +2,7 @@
 
 use crate::sliding::{BoundaryLayer, FblSettings, Observer, SecondOrder, Surface};
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
 
@@ -53,8 +54,11 @@ struct AntiWindup {
 }
 
 // Neither of the two can fail, as the tests that use them show: the files are embedded.
-fn embedded() -> File {
-    toml::from_str(include_str!("../../data/tvsmc-2015.toml")).unwrap_or_else(|error| panic!("{error}"))
+fn embedded() -> &'static File {
+    static READ: LazyLock<File> = LazyLock::new(|| {
+        toml::from_str(include_str!("../../data/tvsmc-2015.toml")).unwrap_or_else(|error| panic!("{error}"))
+    });
+    &READ
 }
 
 fn body() -> RigidBody {
@@ -64,7 +68,7 @@ fn body() -> RigidBody {
 impl FblSettings {
     /// Wu 2015, section 6, with its vehicle at the nominal inertia.
     pub fn published() -> Self {
-        let File { period, feedback_linearisation: FeedbackLinearisation { kp, kd }, .. } = embedded();
+        let &File { period, feedback_linearisation: FeedbackLinearisation { kp, kd }, .. } = embedded();
         Self { body: body(), period, kp, kd }
     }
 }
@@ -88,13 +92,13 @@ impl Settings<BoundaryLayer> {
     /// BTVSMC of Wu 2015, Table 1.
     pub fn btvsmc() -> Self {
         let file = embedded();
-        Self::published(&file, file.boundary_layer, None)
+        Self::published(file, file.boundary_layer, None)
     }
 
     /// BTVSMC/DO of Wu 2015, Table 1.
     pub fn btvsmc_do() -> Self {
         let file = embedded();
-        Self::published(&file, file.boundary_layer, Some(file.observer))
+        Self::published(file, file.boundary_layer, Some(file.observer))
     }
 }
 
@@ -102,6 +106,6 @@ impl Settings<SecondOrder> {
     /// SOTVSMC/DO of Wu 2015, Table 1.
     pub fn sotvsmc_do() -> Self {
         let file = embedded();
-        Self::published(&file, file.second_order, Some(file.observer))
+        Self::published(file, file.second_order, Some(file.observer))
     }
 }
