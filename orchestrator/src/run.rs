@@ -52,6 +52,18 @@ pub struct Files {
     pub labels: bool,
 }
 
+impl Files {
+    /// Refuses what would be without effect.
+    fn check(self) -> Result<(), Error> {
+        if self.labels && self.format != Format::Csv {
+            let problem =
+                "--labels is about results.csv: results.parquet has units and items in its metadata";
+            return Err(Error::experiment(problem));
+        }
+        Ok(())
+    }
+}
+
 /// Where results go, and how much is said.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
@@ -195,6 +207,7 @@ impl Plan {
         }
         self.warn(&options.interrupt)?;
         let experiment = &self.experiment;
+        options.files.check()?;
         let stem = experiment.source.path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy());
         let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(stem.as_ref()));
 

@@ -456,6 +456,8 @@ fn results_can_be_left_out_or_labelled() {
     assert_eq!(code, 0, "{errors}");
     assert!(summary.contains("columnar: results.parquet, results.json"), "{summary}");
     assert!(bench.path("columnar/results.parquet").exists() && !bench.path("columnar/results.csv").exists());
+    let (code, _, errors) = bench.run(&["--format", "parquet", "--labels", "--out", "neither"]);
+    assert!(code == 2 && errors.contains("--labels") && !bench.path("neither").exists(), "{code} {errors}");
     let head = |arguments: &[&str]| {
         assert_eq!(bench.run(arguments).0, 0);
         let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();

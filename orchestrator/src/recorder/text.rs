@@ -78,6 +78,13 @@ impl Text {
     }
 }
 
+impl Drop for Text {
+    /// Keeps what is held where a panic ends the run; there is nobody to tell of failure.
+    fn drop(&mut self) {
+        let _ = self.finish();
+    }
+}
+
 /// A text as a field, in quotation marks where it needs them.
 fn field(text: &str) -> String {
     let mut writer =
