@@ -329,7 +329,12 @@ impl<const O: usize> Optimiser<O> {
             if search.settled {
                 break;
             }
-            self.about.clone_from(&self.solution.motion);
+            if pass == 0 {
+                self.about.clone_from(&self.solution.motion);
+            } else {
+                // Where the bounds change by more than the motion does, whole steps swing to and fro between two motions.
+                self.about.halve_the_way_to(&self.solution.motion);
+            }
             search.warm = true;
         }
         status
