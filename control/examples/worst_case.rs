@@ -14,6 +14,7 @@ mod harness;
 
 use cmaes::{CMAESOptions, DVector};
 use control::crmpc::{Constraints, Design, Settings};
+use control::mpc::SolverSettings;
 use control::sampled::Gain;
 use harness::flight::{Course, Flight, Random, Shown, Sight};
 use harness::in_parallel;
@@ -30,14 +31,16 @@ struct Loop {
     errors: (f64, f64),
     /// Whether the errors are those of the estimator, whose output is as old as the delay.
     estimator: bool,
+    /// Time budget of the solver, ms; 0 for none.
+    budget: f64,
 }
 
 const fn bare(name: &'static str, gain: (f64, f64), delay: f64) -> Loop {
-    Loop { name, gain, delay, errors: (0.0, 0.0), estimator: false }
+    Loop { name, gain, delay, errors: (0.0, 0.0), estimator: false, budget: 0.0 }
 }
 
 const fn erroneous(name: &'static str, gain: (f64, f64), delay: f64, errors: (f64, f64)) -> Loop {
-    Loop { name, gain, delay, errors, estimator: false }
+    Loop { errors, ..bare(name, gain, delay) }
 }
 
 /// A flight with more fallbacks than this gets a line of its own.
@@ -45,8 +48,9 @@ const MANY: u32 = 20;
 /// Bounds on the errors of the estimator, deg and deg/s.
 const ESTIMATED: (f64, f64) = (0.25, 0.25);
 
-const LOOPS: [Loop; 9] = [
+const LOOPS: [Loop; 10] = [
     bare("ideal", (-2.0, -4.0), 0.0),
+    Loop { budget: 0.1, ..bare("ideal-budget-0.1-ms", (-2.0, -4.0), 0.0) },
     bare("ideal-printed-gain", (-5.0, -5.0), 0.0),
     bare("delay-0.04", (-2.0, -4.0), 0.04),
     bare("delay-0.117", (-2.0, -4.0), 0.117),
@@ -61,12 +65,14 @@ impl Loop {
     /// With the published disturbance bound, or the largest that the design accepts if that is less.
     fn settings(&self) -> Option<Settings> {
         let (k1, k2) = self.gain;
+        let robust = Settings::new(Constraints::Robust);
         let settings = Settings {
+            solver: SolverSettings { time_budget: 1e-3 * self.budget, ..robust.solver },
             feedback: Gain { k1, k2 },
             delay: self.delay,
             angle_error: self.errors.0.to_radians(),
             rate_error: self.errors.1.to_radians(),
-            ..Settings::new(Constraints::Robust)
+            ..robust
         };
         let with = |disturbance_bound| Settings { disturbance_bound, ..settings };
         let holds = |bound| Design::new(&with(bound)).is_ok();
