@@ -67,7 +67,10 @@ pub(crate) struct Setting {
 /// A type that variables have, with how the shell reaches and checks it.
 pub(crate) trait Scalar: PartialEq + Sized {
     const TYPE: &'static str;
-    fn field(unit: &mut dyn Unit, reference: usize) -> Option<&mut Self>;
+    /// What `look` makes of the variable's value; `None` if the variable has another type.
+    fn look<R>(unit: &mut dyn Unit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R>;
+    /// Sets the variable, which has this type.
+    fn put(self, unit: &mut dyn Unit, reference: usize);
     /// Whether setting the other value would change nothing.
     fn same(&self, other: &Self) -> bool {
         self == other
@@ -84,8 +87,13 @@ pub(crate) trait Scalar: PartialEq + Sized {
 
 impl Scalar for f64 {
     const TYPE: &'static str = "Real";
-    fn field(unit: &mut dyn Unit, reference: usize) -> Option<&mut Self> {
-        unit.real(reference)
+    fn look<R>(unit: &mut dyn Unit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+        unit.real(reference).map(|value| look(value))
+    }
+    fn put(self, unit: &mut dyn Unit, reference: usize) {
+        if let Some(field) = unit.real(reference) {
+            *field = self;
+        }
     }
     fn same(&self, other: &Self) -> bool {
         // 0 and −0 are equal, but not the same to what is computed from them.
@@ -108,8 +116,11 @@ impl Scalar for f64 {
 
 impl Scalar for i32 {
     const TYPE: &'static str = "Integer or Enumeration";
-    fn field(unit: &mut dyn Unit, reference: usize) -> Option<&mut Self> {
-        unit.integer(reference)
+    fn look<R>(unit: &mut dyn Unit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+        unit.integer(reference).map(|value| look(&value))
+    }
+    fn put(self, unit: &mut dyn Unit, reference: usize) {
+        unit.set_integer(reference, self);
     }
     fn problem(&self, kind: &Kind) -> Option<String> {
         match kind {
@@ -125,15 +136,25 @@ impl Scalar for i32 {
 
 impl Scalar for bool {
     const TYPE: &'static str = "Boolean";
-    fn field(unit: &mut dyn Unit, reference: usize) -> Option<&mut Self> {
-        unit.boolean(reference)
+    fn look<R>(unit: &mut dyn Unit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+        unit.boolean(reference).map(|value| look(value))
+    }
+    fn put(self, unit: &mut dyn Unit, reference: usize) {
+        if let Some(field) = unit.boolean(reference) {
+            *field = self;
+        }
     }
 }
 
 impl Scalar for String {
     const TYPE: &'static str = "String";
-    fn field(unit: &mut dyn Unit, reference: usize) -> Option<&mut Self> {
-        unit.string(reference)
+    fn look<R>(unit: &mut dyn Unit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+        unit.string(reference).map(|value| look(value))
+    }
+    fn put(self, unit: &mut dyn Unit, reference: usize) {
+        if let Some(field) = unit.string(reference) {
+            *field = self;
+        }
     }
 }
 
@@ -326,10 +347,7 @@ impl Instance {
     }
 
     fn expect_type<T: Scalar>(&mut self, reference: u32) -> Outcome {
-        match T::field(self.unit.as_mut(), reference as usize) {
-            Some(_) => Ok(()),
-            None => Err(self.misfit::<T>(reference)),
-        }
+        T::look(self.unit.as_mut(), reference as usize, |_| ()).ok_or_else(|| self.misfit::<T>(reference))
     }
 
     /// Hands the values of the variables to `sink`, with their positions.
@@ -341,9 +359,16 @@ impl Instance {
             self.refresh()?;
         }
         for (i, &reference) in references.iter().enumerate() {
-            match T::field(self.unit.as_mut(), reference as usize) {
-                Some(value) if value.is_presentable() => sink(i, value),
-                Some(_) => return Err(self.overflow(reference)),
+            let shown = T::look(self.unit.as_mut(), reference as usize, |value| {
+                let presentable = value.is_presentable();
+                if presentable {
+                    sink(i, value);
+                }
+                presentable
+            });
+            match shown {
+                Some(true) => (),
+                Some(false) => return Err(self.overflow(reference)),
                 None => return Err(self.misfit::<T>(reference)),
             }
         }
@@ -378,11 +403,9 @@ impl Instance {
         }
         for (i, &reference) in references.iter().enumerate() {
             let value = value(i).map_err(Failure::Error)?;
-            let Some(field) = T::field(self.unit.as_mut(), reference as usize) else {
-                return Err(self.misfit::<T>(reference));
-            };
-            if !field.same(&value) {
-                *field = value;
+            let same = T::look(self.unit.as_mut(), reference as usize, |before| before.same(&value));
+            if same != Some(true) {
+                value.put(self.unit.as_mut(), reference as usize);
                 self.stale = true;
                 if self.description.variables[reference as usize].causality == Causality::Parameter {
                     self.progress.initialized = false;

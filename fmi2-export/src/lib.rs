@@ -29,5 +29,5 @@ pub mod types;
 mod unit;
 
 pub use model::{Context, EventInfo, Failure, Inputs, Model, Restoration};
-pub use table::{Description, Table};
+pub use table::{Description, Enumeration, Table};
 pub use unit::{Export, MAX_INPUT_DERIVATIVE_ORDER, describe};

@@ -6,15 +6,46 @@ use model_description::unit::Unit;
 use model_description::variable::{Causality, EnumerationType, Kind, Variability, Variable};
 
 type Lens<M, T> = Box<dyn Fn(&mut M) -> &mut T + Send + Sync>;
+type Setter<M, T> = Box<dyn Fn(&mut M, T) + Send + Sync>;
 
-/// The field that holds a variable's value.
+/// Access to the field that holds a variable's value.
 pub(crate) enum Access<M> {
     Real(Lens<M, f64>),
-    Integer(Lens<M, i32>),
+    /// Of an integer or an enumeration.
+    Integer(Integer<M>),
     Boolean(Lens<M, bool>),
-    /// Enumerations are held as their 1-based item number.
-    Enumeration(Lens<M, i32>),
     String(Lens<M, String>),
+}
+
+/// A field of some type that FMI sees as an integer.
+pub(crate) struct Integer<M> {
+    pub(crate) get: Box<dyn Fn(&mut M) -> i32 + Send + Sync>,
+    /// Called with values only that the declaration allows.
+    pub(crate) set: Setter<M, i32>,
+}
+
+/// An enumeration type: the values of a Rust type, each with its FMI name and a description. FMI numbers the items from 1 in
+/// this order. Every value that a model can hold must be listed.
+#[derive(Debug)]
+pub struct Enumeration<T: 'static> {
+    /// Name of the type.
+    pub name: &'static str,
+    /// One line: what the type is for.
+    pub description: &'static str,
+    /// Value, name, description.
+    pub items: &'static [(T, &'static str, &'static str)],
+}
+
+impl<T: PartialEq> Enumeration<T> {
+    /// The item number of `value`; 0, which importers and the check of descriptions refuse, if it is not listed.
+    pub(crate) fn number(&self, value: &T) -> i32 {
+        (1..).zip(self.items).find(|(_, item)| item.0 == *value).map_or(0, |(number, _)| number)
+    }
+
+    fn described(&self) -> EnumerationType {
+        let items = self.items.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect();
+        EnumerationType { name: self.name.into(), description: self.description.into(), items }
+    }
 }
 
 /// A declared variable together with its field.
@@ -32,7 +63,7 @@ impl<M> Entry<M> {
         }
         let problem = match &self.access {
             Access::Real(field) => field(model).problem(kind),
-            Access::Integer(field) | Access::Enumeration(field) => field(model).problem(kind),
+            Access::Integer(field) => (field.get)(model).problem(kind),
             Access::Boolean(_) | Access::String(_) => None,
         };
         problem.map(|problem| format!("'{name}' {problem}"))
@@ -46,7 +77,7 @@ pub struct Description<M> {
     /// One line: what the unit is.
     pub description: &'static str,
     /// HTML fragment: what the unit computes, with equations and sources.
-    pub documentation: &'static str,
+    pub documentation: String,
     /// Crate version.
     pub version: &'static str,
     /// Whether the unit is also a model exchange unit (then it has states and derivatives).
@@ -95,15 +126,29 @@ impl<M: 'static> Table<M> {
         self
     }
 
-    /// Adds an integer variable.
+    /// Adds an integer variable, whose field may have any integer type: what is set from outside is checked against the
+    /// limits, and a type without negative numbers sets the lower one to zero.
     #[must_use]
-    pub fn integer(
+    pub fn integer<I>(
         mut self,
         common: Common,
         (min, max): (Option<i32>, Option<i32>),
-        field: impl Fn(&mut M) -> &mut i32 + Send + Sync + 'static,
-    ) -> Self {
-        self.push(common, Kind::Integer { min, max, start: None }, Access::Integer(Box::new(field)));
+        field: impl Fn(&mut M) -> &mut I + Copy + Send + Sync + 'static,
+    ) -> Self
+    where
+        I: Copy + TryFrom<i32> + TryInto<i32>,
+    {
+        let is_set = matches!(common.causality, Causality::Parameter | Causality::Input);
+        let min = min.or((is_set && I::try_from(-1).is_err()).then_some(0));
+        let access = Integer {
+            get: Box::new(move |model| (*field(model)).try_into().unwrap_or(i32::MAX)),
+            set: Box::new(move |model, value| {
+                if let Ok(value) = I::try_from(value) {
+                    *field(model) = value;
+                }
+            }),
+        };
+        self.push(common, Kind::Integer { min, max, start: None }, Access::Integer(access));
         self
     }
 
@@ -118,15 +163,24 @@ impl<M: 'static> Table<M> {
         self
     }
 
-    /// Adds an enumeration variable, held as its 1-based item number.
+    /// Adds an enumeration variable, whose field has the type that is enumerated.
     #[must_use]
-    pub fn enumeration(
+    pub fn enumeration<T: Copy + PartialEq + Send + Sync>(
         mut self,
         common: Common,
-        of: EnumerationType,
-        field: impl Fn(&mut M) -> &mut i32 + Send + Sync + 'static,
+        of: &'static Enumeration<T>,
+        field: impl Fn(&mut M) -> &mut T + Copy + Send + Sync + 'static,
     ) -> Self {
-        self.push(common, Kind::Enumeration { of, start: None }, Access::Enumeration(Box::new(field)));
+        let access = Integer {
+            get: Box::new(move |model| of.number(field(model))),
+            set: Box::new(move |model, number| {
+                let item = usize::try_from(number - 1).ok().and_then(|i| of.items.get(i));
+                if let Some((value, ..)) = item {
+                    *field(model) = *value;
+                }
+            }),
+        };
+        self.push(common, Kind::Enumeration { of: of.described(), start: None }, Access::Integer(access));
         self
     }
 

@@ -98,7 +98,9 @@ impl Progress {
 pub(crate) trait Unit: Send {
     fn real(&mut self, reference: usize) -> Option<&mut f64>;
     /// Integers and enumerations.
-    fn integer(&mut self, reference: usize) -> Option<&mut i32>;
+    fn integer(&mut self, reference: usize) -> Option<i32>;
+    /// Sets one of them to a value that its declaration allows.
+    fn set_integer(&mut self, reference: usize, value: i32);
     fn boolean(&mut self, reference: usize) -> Option<&mut bool>;
     fn string(&mut self, reference: usize) -> Option<&mut String>;
 
@@ -155,10 +157,16 @@ impl<M: Model> Unit for Bound<M> {
         }
     }
 
-    fn integer(&mut self, reference: usize) -> Option<&mut i32> {
+    fn integer(&mut self, reference: usize) -> Option<i32> {
         match &self.table.entries.get(reference)?.access {
-            Access::Integer(field) | Access::Enumeration(field) => Some(field(&mut self.model)),
+            Access::Integer(field) => Some((field.get)(&mut self.model)),
             _ => None,
+        }
+    }
+
+    fn set_integer(&mut self, reference: usize, value: i32) {
+        if let Some(Access::Integer(field)) = self.table.entries.get(reference).map(|entry| &entry.access) {
+            (field.set)(&mut self.model, value);
         }
     }
 
@@ -303,9 +311,8 @@ pub fn describe<M: Model>() -> ModelDescription {
         if !variable.is_calculated() {
             match (&mut variable.kind, &entry.access) {
                 (Kind::Real { start, .. }, Access::Real(field)) => *start = Some(*field(&mut model)),
-                (Kind::Integer { start, .. }, Access::Integer(field))
-                | (Kind::Enumeration { start, .. }, Access::Enumeration(field)) => {
-                    *start = Some(*field(&mut model));
+                (Kind::Integer { start, .. } | Kind::Enumeration { start, .. }, Access::Integer(field)) => {
+                    *start = Some((field.get)(&mut model));
                 }
                 (Kind::Boolean { start }, Access::Boolean(field)) => *start = Some(*field(&mut model)),
                 (Kind::String { start }, Access::String(field)) => *start = Some(field(&mut model).clone()),
@@ -317,7 +324,7 @@ pub fn describe<M: Model>() -> ModelDescription {
     ModelDescription {
         name: name.into(),
         description: description.into(),
-        documentation: documentation.into(),
+        documentation,
         version: version.into(),
         co_simulation: true,
         model_exchange,

@@ -1,13 +1,13 @@
 //! `DLMPC`: its own parameters and outputs.
 
-use crate::law::{Law, Vehicle};
-use crate::solver::{self, SolverOutputs, SolverParameters};
-use crate::table::{ANGLES, RATES, sampled_inputs, shown_vector, vector};
-use crate::unit::Unit;
-use control::dlmpc::{Dlmpc, Memory, Settings, SlidingMode};
+use crate::solver;
+use control::dlmpc::{Dlmpc, Memory, Settings};
 use control::error::DesignError;
+use control::report::Report;
+use controller_export::table::{ANGLES, RATES, sampled_output, shown_vector, vector};
+use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::Table;
-use fmi2_export::table::{discrete_output, parameter};
+use fmi2_export::table::parameter;
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -15,13 +15,8 @@ use serde::{Deserialize, Serialize};
 /// Parameters and outputs of DLMPC.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DlmpcLaw {
-    horizon: i32,
-    period_optimisation: f64,
-    period_feedback: f64,
-    p: [f64; 3],
-    q: [f64; 3],
-    sliding_mode: SlidingMode,
-    solver: SolverParameters,
+    /// Body and limits in it are those of the vehicle.
+    pub(crate) settings: Settings,
     shown: Shown,
 }
 
@@ -30,23 +25,13 @@ pub struct DlmpcLaw {
 struct Shown {
     rate_command: Vector3<f64>,
     sliding: Vector3<f64>,
-    solver: SolverOutputs,
+    report: Report,
     inner_time: f64,
 }
 
 impl Default for DlmpcLaw {
     fn default() -> Self {
-        let s = Settings::published();
-        Self {
-            horizon: i32::try_from(s.horizon).unwrap_or(i32::MAX),
-            period_optimisation: s.period_optimisation,
-            period_feedback: s.period_feedback,
-            p: s.p,
-            q: s.q,
-            sliding_mode: s.sliding_mode,
-            solver: SolverParameters::from(&s.solver),
-            shown: Shown::default(),
-        }
+        Self { settings: Settings::published(), shown: Shown::default() }
     }
 }
 
@@ -56,25 +41,18 @@ impl Law for DlmpcLaw {
 
     const NAME: &'static str = "DLMPC";
     const DESCRIPTION: &'static str = "Double-layered model predictive and sliding-mode attitude controller, the comparison of Chai et al. (2022)";
-    const DOCUMENTATION: &'static str = concat!(include_str!("dlmpc.html"), include_str!("wiring.html"));
+    const DOCUMENTATION: &'static str = include_str!("dlmpc.html");
 
-    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
+    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         outputs(sliding_mode(weights(schedule(table))))
     }
 
-    #[allow(private_interfaces)]
-    fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
+    fn settings(&self, vehicle: &Vehicle) -> Settings {
         Settings {
             body: vehicle.body,
             limit_rate: vehicle.limit_rate,
             limit_moment: vehicle.limit_moment,
-            horizon: self.horizon.max(0).cast_unsigned() as usize,
-            period_optimisation: self.period_optimisation,
-            period_feedback: self.period_feedback,
-            p: self.p,
-            q: self.q,
-            sliding_mode: self.sliding_mode,
-            solver: self.solver.settings(),
+            ..self.settings
         }
     }
 
@@ -86,7 +64,7 @@ impl Law for DlmpcLaw {
         self.shown = Shown {
             rate_command: shown_vector(&memory.rate_command),
             sliding: shown_vector(&memory.sliding),
-            solver: SolverOutputs::from(&memory.report),
+            report: solver::shown_report(&memory.report),
             inner_time: memory.inner_time,
         };
     }
@@ -96,14 +74,7 @@ impl Law for DlmpcLaw {
     }
 }
 
-#[cfg(test)]
-impl DlmpcLaw {
-    pub(crate) fn solver_mut(&mut self) -> &mut SolverParameters {
-        &mut self.solver
-    }
-}
-
-type Controller = Table<Unit<DlmpcLaw>>;
+type Controller = Table<ControllerFmu<DlmpcLaw>>;
 
 fn schedule(table: Controller) -> Controller {
     let horizon = parameter("horizon", "Number of prediction steps of the outer layer");
@@ -113,26 +84,26 @@ fn schedule(table: Controller) -> Controller {
     );
     let feedback = parameter("period.feedback", "Period of the inner layer");
     let table = table
-        .integer(horizon, (Some(2), Some(1000)), |m| &mut m.law.horizon)
+        .integer(horizon, (Some(2), Some(1000)), |m| &mut m.law.settings.horizon)
         .real(optimisation.real().unit(unit::time()).min(1e-3).max(10.0).nominal(0.2), |m| {
-            &mut m.law.period_optimisation
+            &mut m.law.settings.period_optimisation
         })
         .real(feedback.real().unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| {
-            &mut m.law.period_feedback
+            &mut m.law.settings.period_feedback
         });
-    solver::parameters(table, |law| &mut law.solver)
+    solver::parameters(table, |law| &mut law.settings.solver)
 }
 
 fn weights(mut table: Controller) -> Controller {
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
         let text = format!("Diagonal entry {} of P: weight on the error of the {meaning}", i + 1);
         let p = parameter(&format!("weight.P[{}]", i + 1), &text).real().min(0.0).nominal(50.0);
-        table = table.real(p, move |m| &mut m.law.p[i]);
+        table = table.real(p, move |m| &mut m.law.settings.p[i]);
     }
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
         let text = format!("Diagonal entry {} of Q: weight on the error rate of the {meaning}", i + 1);
         let q = parameter(&format!("weight.Q[{}]", i + 1), &text).real().min(0.0).nominal(10.0);
-        table = table.real(q, move |m| &mut m.law.q[i]);
+        table = table.real(q, move |m| &mut m.law.settings.q[i]);
     }
     table
 }
@@ -144,14 +115,14 @@ fn sliding_mode(table: Controller) -> Controller {
         parameter("slidingMode.gamma", "Gain of the sliding manifold, on the integral of the power rho");
     let rho = parameter("slidingMode.rho", "Power of manifold and reaching law, above 0 and below 1");
     table
-        .real(q.real().unit(unit::gain_rate()).min(0.0).nominal(5.0), |m| &mut m.law.sliding_mode.q)
-        .real(p.real().min(0.0).nominal(5.0), |m| &mut m.law.sliding_mode.p)
-        .real(gamma.real().min(0.0).nominal(0.1), |m| &mut m.law.sliding_mode.gamma)
-        .real(rho.real().min(0.0).max(1.0), |m| &mut m.law.sliding_mode.rho)
+        .real(q.real().unit(unit::gain_rate()).min(0.0).nominal(5.0), |m| &mut m.law.settings.sliding_mode.q)
+        .real(p.real().min(0.0).nominal(5.0), |m| &mut m.law.settings.sliding_mode.p)
+        .real(gamma.real().min(0.0).nominal(0.1), |m| &mut m.law.settings.sliding_mode.gamma)
+        .real(rho.real().min(0.0).max(1.0), |m| &mut m.law.settings.sliding_mode.rho)
 }
 
 fn outputs(table: Controller) -> Controller {
-    let sampled = |name: &str, text: &str| discrete_output(name, text).depends_on(sampled_inputs());
+    let sampled = sampled_output;
     let command = |axis: &str, meaning: &str| {
         let text = format!("Body {meaning} rate that the outer layer commands, held for period.optimisation");
         sampled(&format!("rateCommand.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
@@ -166,6 +137,6 @@ fn outputs(table: Controller) -> Controller {
     );
     let table = vector(table, RATES, command, |m| &mut m.law.shown.rate_command);
     let table = vector(table, RATES, sliding, |m| &mut m.law.shown.sliding);
-    solver::outputs(table, |law| &mut law.shown.solver)
+    solver::outputs(table, |law| &mut law.shown.report)
         .real(time.real().unit(unit::time()).nominal(1e-6), |m| &mut m.law.shown.inner_time)
 }

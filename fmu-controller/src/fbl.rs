@@ -1,10 +1,8 @@
 //! `FBL`: its own parameters.
 
-use crate::law::{Law, Vehicle};
-use crate::table;
-use crate::unit::Unit;
 use control::error::DesignError;
 use control::sliding::{Fbl, FblSettings};
+use controller_export::{ControllerFmu, Law, Vehicle, table};
 use fmi2_export::Table;
 use fmi2_export::table::parameter;
 use model_description::unit;
@@ -29,9 +27,9 @@ impl Law for FblLaw {
     const NAME: &'static str = "FBL";
     const DESCRIPTION: &'static str =
         "Feedback linearisation of the attitude, a comparison of Wu et al. (2015)";
-    const DOCUMENTATION: &'static str = concat!(include_str!("fbl.html"), include_str!("wiring.html"));
+    const DOCUMENTATION: &'static str = include_str!("fbl.html");
 
-    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
+    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         let p = parameter("gain.p", "Gain on the error of the angles").real().min(0.0);
         let d = parameter("gain.d", "Gain on the error of their rates").real().min(0.0);
         table::period(table, 0.01, |law| &mut law.settings.period)
@@ -39,7 +37,6 @@ impl Law for FblLaw {
             .real(d.unit(unit::gain_rate()), |m| &mut m.law.settings.kd)
     }
 
-    #[allow(private_interfaces)]
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
         FblSettings { body: vehicle.body, ..self.settings }
     }
@@ -47,6 +44,4 @@ impl Law for FblLaw {
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
         Fbl::new(settings)
     }
-
-    fn show(&mut self, (): &()) {}
 }

@@ -6,38 +6,33 @@ mod crmpc;
 mod dlmpc;
 mod estimator;
 mod fbl;
-mod law;
 mod lqr;
-mod reference;
 mod solver;
-mod table;
 #[cfg(test)]
 mod tests;
-mod ticks;
 mod tvsmc;
 mod two_loop;
-mod unit;
 
 pub use allocator::ControlAllocator;
+use controller_export::ControllerFmu;
 pub use estimator::AttitudeEstimator;
-pub use unit::Unit;
 
 /// `CRMPC`: centralised robust model predictive control.
-pub type Crmpc = Unit<crmpc::CrmpcLaw>;
+pub type Crmpc = ControllerFmu<crmpc::CrmpcLaw>;
 /// `DLMPC`: double-layered model predictive and sliding-mode control.
-pub type Dlmpc = Unit<dlmpc::DlmpcLaw>;
+pub type Dlmpc = ControllerFmu<dlmpc::DlmpcLaw>;
 /// `FBL`: feedback linearisation.
-pub type Fbl = Unit<fbl::FblLaw>;
+pub type Fbl = ControllerFmu<fbl::FblLaw>;
 /// `BTVSMC`: time-varying sliding mode with a boundary layer.
-pub type Btvsmc = Unit<tvsmc::TvsmcLaw<tvsmc::Btvsmc>>;
+pub type Btvsmc = ControllerFmu<tvsmc::TvsmcLaw<tvsmc::Btvsmc>>;
 /// `BTVSMC_DO`: the same with a disturbance observer.
-pub type BtvsmcDo = Unit<tvsmc::TvsmcLaw<tvsmc::BtvsmcDo>>;
+pub type BtvsmcDo = ControllerFmu<tvsmc::TvsmcLaw<tvsmc::BtvsmcDo>>;
 /// `SOTVSMC_DO`: second-order time-varying sliding mode with a disturbance observer.
-pub type SotvsmcDo = Unit<tvsmc::TvsmcLaw<tvsmc::SotvsmcDo>>;
+pub type SotvsmcDo = ControllerFmu<tvsmc::TvsmcLaw<tvsmc::SotvsmcDo>>;
 /// `TwoLoopSMC`: two-loop sliding-mode control.
-pub type TwoLoopSmc = Unit<two_loop::TwoLoopLaw>;
+pub type TwoLoopSmc = ControllerFmu<two_loop::TwoLoopLaw>;
 /// `LQR`: linear-quadratic regulator.
-pub type Lqr = Unit<lqr::LqrLaw>;
+pub type Lqr = ControllerFmu<lqr::LqrLaw>;
 
 fmi2_export::export_fmus!(
     Crmpc,

@@ -1,26 +1,23 @@
 //! `LQR`: its own parameters.
 
-use crate::law::{Law, Vehicle};
-use crate::table;
-use crate::unit::Unit;
 use control::crmpc::{Constraints, Settings};
 use control::error::DesignError;
 use control::lqr::{Lqr, LqrSettings};
+use controller_export::{ControllerFmu, Law, Vehicle, table};
 use fmi2_export::Table;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the regulator.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LqrLaw {
-    p: [f64; 6],
-    q: [f64; 3],
-    period: f64,
+    /// The body in it is that of the vehicle.
+    settings: LqrSettings,
 }
 
 impl Default for LqrLaw {
     fn default() -> Self {
-        let Settings { p, q, period_feedback, .. } = Settings::new(Constraints::Robust);
-        Self { p, q, period: period_feedback }
+        let Settings { body, p, q, period_feedback: period, .. } = Settings::new(Constraints::Robust);
+        Self { settings: LqrSettings { body, p, q, period } }
     }
 }
 
@@ -31,21 +28,18 @@ impl Law for LqrLaw {
     const NAME: &'static str = "LQR";
     const DESCRIPTION: &'static str =
         "Linear-quadratic attitude regulator, the unconstrained comparison of Chai et al. (2022)";
-    const DOCUMENTATION: &'static str = concat!(include_str!("lqr.html"), include_str!("wiring.html"));
+    const DOCUMENTATION: &'static str = include_str!("lqr.html");
 
-    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
-        let table = table::period(table, 0.04, |law| &mut law.period);
-        table::weights(table, |law| &mut law.p, |law| &mut law.q)
+    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+        let table = table::period(table, 0.04, |law| &mut law.settings.period);
+        table::weights(table, |law| &mut law.settings.p, |law| &mut law.settings.q)
     }
 
-    #[allow(private_interfaces)]
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
-        LqrSettings { body: vehicle.body, p: self.p, q: self.q, period: self.period }
+        LqrSettings { body: vehicle.body, ..self.settings }
     }
 
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
         Lqr::new(settings)
     }
-
-    fn show(&mut self, (): &()) {}
 }

@@ -2,9 +2,11 @@
 
 use crate::crmpc::CrmpcLaw;
 use crate::dlmpc::DlmpcLaw;
-use crate::law::Law;
 use crate::tvsmc::{self, TvsmcLaw};
-use crate::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo, Unit};
+use crate::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo};
+use control::sampled::Gain;
+use controller_export::reference::Choice;
+use controller_export::{ControllerFmu, Law};
 use fmi2_export::{Context, Failure, Inputs, Model, describe};
 use model_description::ModelDescription;
 use model_description::variable::Causality;
@@ -84,7 +86,7 @@ fn a_tick_evaluated_with_other_inputs_leaves_no_trace() {
 }
 
 fn assert_any_communication_steps_give_the_same_moments<L: Law>(delay: f64) {
-    let start = || ready(|unit: &mut Unit<L>| unit.parameters.latency.action = delay);
+    let start = || ready(|unit: &mut ControllerFmu<L>| unit.parameters.latency.action = delay);
     let mut reference = start();
     let expected: Vec<_> = (0..10_u32)
         .map(|k| {
@@ -126,14 +128,19 @@ fn moments_are_held_between_ticks() {
     assert_ne!(unit.output.moment, held);
 }
 
+fn set_feedback(unit: &mut Crmpc, k: f64, period: f64) {
+    let settings = &mut unit.law.settings;
+    (settings.feedback, settings.period_feedback) = (Gain { k1: k, k2: k }, period);
+}
+
 #[test]
 fn parameters_that_cannot_work_are_refused_by_name() {
-    let text = refusal::<Crmpc>(|unit| unit.law.set_feedback(-10.0, -10.0, 0.2));
+    let text = refusal::<Crmpc>(|unit| set_feedback(unit, -10.0, 0.2));
     assert!(text.contains("spectral radius 1.0"), "{text}");
-    let text = refusal::<Crmpc>(|unit| unit.law.set_feedback(-5.0, -5.0, 0.03));
+    let text = refusal::<Crmpc>(|unit| set_feedback(unit, -5.0, 0.03));
     assert!(text.contains("period.optimisation") && text.contains("period.feedback"), "{text}");
     let text = refusal::<Lqr>(|unit| {
-        unit.parameters.reference.profile = 6;
+        unit.parameters.reference.profile = Choice::Table;
         unit.parameters.reference.file = "no-such-file.csv".into();
     });
     assert!(text.contains("reference.file") && text.contains("no-such-file.csv"), "{text}");
@@ -143,7 +150,7 @@ fn parameters_that_cannot_work_are_refused_by_name() {
 
 #[test]
 fn the_external_reference_is_followed() {
-    let mut unit: Lqr = ready(|unit: &mut Lqr| unit.parameters.reference.profile = 7);
+    let mut unit: Lqr = ready(|unit: &mut Lqr| unit.parameters.reference.profile = Choice::External);
     unit.input.reference.angles = unit.input.measured.angles;
     unit.input.reference.rates = Vector3::zeros();
     unit.input.reference.accelerations = Vector3::zeros();
@@ -236,7 +243,7 @@ fn oracle_a_known_delay_shifts_the_loop_and_does_nothing_else_even_in_saturation
 #[test]
 fn an_external_reference_counts_when_the_moment_acts() {
     let mut unit: Lqr = ready(|unit: &mut Lqr| {
-        unit.parameters.reference.profile = 7;
+        unit.parameters.reference.profile = Choice::External;
         unit.parameters.latency.action = 0.1;
     });
     unit.input.reference = Reference { angles: unit.input.measured.angles, ..Reference::default() };
@@ -256,9 +263,9 @@ fn a_delay_out_of_range_is_refused_by_name() {
 #[test]
 fn a_time_budget_of_any_length_is_worked_with() {
     for budget in [1e9, 1e19, 1e300, f64::MAX] {
-        let mut crmpc: Crmpc = ready(|unit: &mut Crmpc| unit.law.solver_mut().set_time_budget(budget));
+        let mut crmpc: Crmpc = ready(|unit: &mut Crmpc| unit.law.settings.solver.time_budget = budget);
         crmpc.calculate(0.0).unwrap();
-        let mut dlmpc: Dlmpc = ready(|unit: &mut Dlmpc| unit.law.solver_mut().set_time_budget(budget));
+        let mut dlmpc: Dlmpc = ready(|unit: &mut Dlmpc| unit.law.settings.solver.time_budget = budget);
         dlmpc.calculate(0.0).unwrap();
         assert!(crmpc.output.moment.norm() > 0.0 && dlmpc.output.moment.norm() > 0.0, "{budget} s");
     }

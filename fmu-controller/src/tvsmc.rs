@@ -1,12 +1,11 @@
 //! `BTVSMC`, `BTVSMC_DO`, `SOTVSMC_DO`: parameters and outputs of the time-varying sliding modes.
 
-use crate::law::{Law, Vehicle};
-use crate::table::{self, ANGLES, sampled_inputs, shown_vector, vector};
-use crate::unit::Unit;
 use control::error::DesignError;
 use control::sliding::{BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc};
+use controller_export::table::{self, ANGLES, sampled_output, shown_vector, vector};
+use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::Table;
-use fmi2_export::table::{discrete_output, parameter};
+use fmi2_export::table::parameter;
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -24,7 +23,7 @@ pub trait Variant: Sized + Send + Sync + 'static {
     /// The published settings.
     fn published() -> Settings<Self::Reaching>;
     /// Adds the reaching law's parameters.
-    fn reaching(table: Table<Unit<TvsmcLaw<Self>>>) -> Table<Unit<TvsmcLaw<Self>>>;
+    fn reaching(table: Table<ControllerFmu<TvsmcLaw<Self>>>) -> Table<ControllerFmu<TvsmcLaw<Self>>>;
 }
 
 /// Parameters and outputs of a time-varying sliding mode.
@@ -52,16 +51,15 @@ impl<V: Variant> Law for TvsmcLaw<V> {
 
     const NAME: &'static str = V::NAME;
     const DESCRIPTION: &'static str = V::DESCRIPTION;
-    const DOCUMENTATION: &'static str = concat!(include_str!("tvsmc.html"), include_str!("wiring.html"));
+    const DOCUMENTATION: &'static str = include_str!("tvsmc.html");
 
-    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
+    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         let table = table::period(table, 0.01, |law| &mut law.settings.period);
         let table = anti_windup(V::reaching(surface(table)));
         let table = if V::OBSERVER { observer(table) } else { table };
         outputs(table)
     }
 
-    #[allow(private_interfaces)]
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
         Settings {
             body: vehicle.body,
@@ -83,14 +81,14 @@ impl<V: Variant> Law for TvsmcLaw<V> {
     }
 }
 
-fn surface<V: Variant>(table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V>>> {
+fn surface<V: Variant>(table: Table<ControllerFmu<TvsmcLaw<V>>>) -> Table<ControllerFmu<TvsmcLaw<V>>> {
     let c = ("surface.c", "Gain c of the sliding surface on the error");
     let lambda = parameter("surface.lambda", "Rate at which the surface's offset decays").real().min(0.0);
     table::gains(table, c, Some(&unit::gain_rate()), |law| &mut law.settings.surface.c)
         .real(lambda.unit(unit::gain_rate()), |m| &mut m.law.settings.surface.lambda)
 }
 
-fn anti_windup<V: Variant>(table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V>>> {
+fn anti_windup<V: Variant>(table: Table<ControllerFmu<TvsmcLaw<V>>>) -> Table<ControllerFmu<TvsmcLaw<V>>> {
     let on = parameter(
         "antiWindup",
         "Whether the surface is laid anew through the state while the actuators saturate; false as in the paper",
@@ -106,7 +104,7 @@ fn anti_windup<V: Variant>(table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcL
         })
 }
 
-fn observer<V: Variant>(mut table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V>>> {
+fn observer<V: Variant>(mut table: Table<ControllerFmu<TvsmcLaw<V>>>) -> Table<ControllerFmu<TvsmcLaw<V>>> {
     for i in 0..3 {
         let text = format!("Gain lambda{i} of the disturbance observer");
         let gain = parameter(&format!("observer.lambda{i}"), &text).real().min(0.0);
@@ -116,8 +114,8 @@ fn observer<V: Variant>(mut table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<Tvsmc
     table::gains(table, l, None, |law| &mut law.observer.l)
 }
 
-fn outputs<V: Variant>(table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V>>> {
-    let sampled = |name: String, text: String| discrete_output(&name, &text).depends_on(sampled_inputs());
+fn outputs<V: Variant>(table: Table<ControllerFmu<TvsmcLaw<V>>>) -> Table<ControllerFmu<TvsmcLaw<V>>> {
+    let sampled = |name: String, text: String| sampled_output(&name, &text);
     let sliding = |axis: &str, meaning: &str| {
         let text = format!("Sliding variable of the {meaning} at the last tick");
         sampled(format!("slidingVariable.{axis}"), text).real().unit(unit::angular_rate()).nominal(1e-3)
@@ -142,8 +140,8 @@ fn outputs<V: Variant>(table: Table<Unit<TvsmcLaw<V>>>) -> Table<Unit<TvsmcLaw<V
 }
 
 fn boundary_layer<V: Variant<Reaching = BoundaryLayer>>(
-    table: Table<Unit<TvsmcLaw<V>>>,
-) -> Table<Unit<TvsmcLaw<V>>> {
+    table: Table<ControllerFmu<TvsmcLaw<V>>>,
+) -> Table<ControllerFmu<TvsmcLaw<V>>> {
     let eta = ("reaching.eta", "Reaching gain eta");
     let h = ("boundaryLayer.h", "Thickness h of the boundary layer");
     let table =
@@ -165,7 +163,7 @@ impl Variant for Btvsmc {
         Settings::btvsmc()
     }
 
-    fn reaching(table: Table<Unit<TvsmcLaw<Self>>>) -> Table<Unit<TvsmcLaw<Self>>> {
+    fn reaching(table: Table<ControllerFmu<TvsmcLaw<Self>>>) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
         boundary_layer(table)
     }
 }
@@ -184,7 +182,7 @@ impl Variant for BtvsmcDo {
         Settings::btvsmc_do()
     }
 
-    fn reaching(table: Table<Unit<TvsmcLaw<Self>>>) -> Table<Unit<TvsmcLaw<Self>>> {
+    fn reaching(table: Table<ControllerFmu<TvsmcLaw<Self>>>) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
         boundary_layer(table)
     }
 }
@@ -203,7 +201,7 @@ impl Variant for SotvsmcDo {
         Settings::sotvsmc_do()
     }
 
-    fn reaching(table: Table<Unit<TvsmcLaw<Self>>>) -> Table<Unit<TvsmcLaw<Self>>> {
+    fn reaching(table: Table<ControllerFmu<TvsmcLaw<Self>>>) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
         let text = |what| ("reaching.".to_owned() + what, "Reaching gain ".to_owned() + what);
         let [(n1, t1), (n2, t2), (n3, t3), (n4, t4)] = ["k1", "k2", "k3", "k4"].map(text);
         let table = table::gains(table, (&n1, &t1), None, |law| &mut law.settings.reaching.k1);

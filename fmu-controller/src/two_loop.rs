@@ -1,34 +1,37 @@
 //! `TwoLoopSMC`: its own parameters and outputs.
 
-use crate::law::{Law, Vehicle};
-use crate::table::{self, ANGLES, RATES, enumeration, item, number, sampled_inputs, shown_vector, vector};
-use crate::unit::Unit;
 use control::error::DesignError;
 use control::two_loop::{Form, Loop, OuterKinematics, TwoLoopMemory, TwoLoopSettings, TwoLoopSmc};
-use fmi2_export::Table;
-use fmi2_export::table::{discrete_output, parameter};
+use controller_export::table::{self, ANGLES, RATES, sampled_output, shown_vector, vector};
+use controller_export::{ControllerFmu, Law, Vehicle};
+use fmi2_export::table::parameter;
+use fmi2_export::{Enumeration, Table};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-const FORMS: [(Form, &str, &str); 3] = [
-    (Form::Corrected, "corrected", "both loops come to their sliding surfaces"),
-    (Form::PrintedSign, "printedSign", "minus I rho SIGN(s_n) in the inner loop, as (10) is printed"),
-    (Form::PrintedFactor, "printedFactor", "f of (7) and (11) with the minus sign it is printed with"),
-];
-const KINEMATICS: [(OuterKinematics, &str, &str); 2] = [
-    (OuterKinematics::Corrected, "corrected", "consistent in order and axes"),
-    (OuterKinematics::Printed, "printed", "(3) as it is printed"),
-];
+static FORMS: Enumeration<Form> = Enumeration {
+    name: "ReachingForm",
+    description: "Signs of the reaching terms",
+    items: &[
+        (Form::Corrected, "corrected", "both loops come to their sliding surfaces"),
+        (Form::PrintedSign, "printedSign", "minus I rho SIGN(s_n) in the inner loop, as (10) is printed"),
+        (Form::PrintedFactor, "printedFactor", "f of (7) and (11) with the minus sign it is printed with"),
+    ],
+};
+static KINEMATICS: Enumeration<OuterKinematics> = Enumeration {
+    name: "OuterKinematics",
+    description: "What stands for R",
+    items: &[
+        (OuterKinematics::Corrected, "corrected", "consistent in order and axes"),
+        (OuterKinematics::Printed, "printed", "(3) as it is printed"),
+    ],
+};
 
 /// Parameters and outputs of the two-loop sliding mode.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TwoLoopLaw {
     settings: TwoLoopSettings,
-    /// Number of the item of [`FORMS`], from 1.
-    form: i32,
-    /// Number of the item of [`KINEMATICS`], from 1.
-    kinematics: i32,
     outer_sliding: Vector3<f64>,
     inner_sliding: Vector3<f64>,
     rate_command: Vector3<f64>,
@@ -39,11 +42,8 @@ pub struct TwoLoopLaw {
 impl Default for TwoLoopLaw {
     fn default() -> Self {
         let zero = Vector3::zeros();
-        let settings = TwoLoopSettings::ours();
         Self {
-            settings,
-            form: number(&FORMS, &settings.form),
-            kinematics: number(&KINEMATICS, &settings.kinematics),
+            settings: TwoLoopSettings::ours(),
             outer_sliding: zero,
             inner_sliding: zero,
             rate_command: zero,
@@ -59,9 +59,9 @@ impl Law for TwoLoopLaw {
 
     const NAME: &'static str = "TwoLoopSMC";
     const DESCRIPTION: &'static str = "Two-loop sliding-mode attitude controller of Jia, Zhou and Zhou";
-    const DOCUMENTATION: &'static str = concat!(include_str!("two_loop.html"), include_str!("wiring.html"));
+    const DOCUMENTATION: &'static str = include_str!("two_loop.html");
 
-    fn declare(table: Table<Unit<Self>>) -> Table<Unit<Self>> {
+    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         let table = table::period(table, 0.01, |law| &mut law.settings.period);
         let outer = ["outer", "outer loop"];
         let table = reaching(table, outer, ANGLES, &unit::angular_rate(), &unit::angle(), |law| {
@@ -73,15 +73,8 @@ impl Law for TwoLoopLaw {
         outputs(printed(actuators(table)))
     }
 
-    #[allow(private_interfaces)]
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
-        TwoLoopSettings {
-            form: item(&FORMS, self.form),
-            kinematics: item(&KINEMATICS, self.kinematics),
-            body: vehicle.body,
-            limit_moment: vehicle.saturates_at(),
-            ..self.settings
-        }
+        TwoLoopSettings { body: vehicle.body, limit_moment: vehicle.saturates_at(), ..self.settings }
     }
 
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
@@ -98,7 +91,7 @@ impl Law for TwoLoopLaw {
     }
 }
 
-type Controller = Table<Unit<TwoLoopLaw>>;
+type Controller = Table<ControllerFmu<TwoLoopLaw>>;
 type Field = fn(&mut Loop) -> &mut [f64; 3];
 
 /// The parameters of one loop, per axis.
@@ -160,16 +153,12 @@ fn printed(table: Controller) -> Controller {
     let form = parameter("form", "Signs of the reaching terms");
     let kinematics = parameter("kinematics", "What the outer loop takes for R");
     table
-        .enumeration(form, enumeration("ReachingForm", "Signs of the reaching terms", &FORMS), |m| {
-            &mut m.law.form
-        })
-        .enumeration(kinematics, enumeration("OuterKinematics", "What stands for R", &KINEMATICS), |m| {
-            &mut m.law.kinematics
-        })
+        .enumeration(form, &FORMS, |m| &mut m.law.settings.form)
+        .enumeration(kinematics, &KINEMATICS, |m| &mut m.law.settings.kinematics)
 }
 
 fn outputs(table: Controller) -> Controller {
-    let sampled = |name: String, text: String| discrete_output(&name, &text).depends_on(sampled_inputs());
+    let sampled = |name: String, text: String| sampled_output(&name, &text);
     let outer = |axis: &str, meaning: &str| {
         let text = format!("Sliding variable of the {meaning} at the last tick");
         sampled(format!("slidingVariable.{axis}"), text).real().unit(unit::angle()).nominal(1e-2)

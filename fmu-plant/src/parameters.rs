@@ -1,5 +1,6 @@
 //! The unit's parameters, with their default: the scenario of Chai 2022.
 
+use fmi2_export::Enumeration;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::Scenario;
@@ -22,40 +23,72 @@ const STEP: f64 = 0.01;
 /// A time (s) that no simulation reaches; FMI importers do not all read an infinite number.
 const NEVER: f64 = 1e15;
 
-/// The kinds in the order of their enumeration values 1, 2, …, with name and description.
-pub(crate) const KINDS: [(Kind, &str, &str); 7] = [
-    (Kind::None, "none", "no disturbance"),
-    (Kind::White, "white", "each component uniform within the bound, drawn anew every disturbance.period"),
-    (Kind::Constant, "constant", "bound times direction"),
-    (Kind::Sine, "sine", "a moment: offset plus two sinusoids"),
-    (Kind::Square, "square", "bound times direction, the sign changing every half disturbance.square.period"),
-    (
-        Kind::AlongRate,
-        "alongRate",
-        "plus or minus the bound so that the angular rate grows fastest, chosen every disturbance.period",
-    ),
-    (
-        Kind::AgainstMoment,
-        "againstMoment",
-        "plus or minus the bound against the control moment, chosen every disturbance.period",
-    ),
-];
+/// The courses of the disturbance.
+pub(crate) static KINDS: Enumeration<Kind> = Enumeration {
+    name: "DisturbanceKind",
+    description: "Course of the disturbance",
+    items: &[
+        (Kind::None, "none", "no disturbance"),
+        (
+            Kind::White,
+            "white",
+            "each component uniform within the bound, drawn anew every disturbance.period",
+        ),
+        (Kind::Constant, "constant", "bound times direction"),
+        (Kind::Sine, "sine", "a moment: offset plus two sinusoids"),
+        (
+            Kind::Square,
+            "square",
+            "bound times direction, the sign changing every half disturbance.square.period",
+        ),
+        (
+            Kind::AlongRate,
+            "alongRate",
+            "plus or minus the bound so that the angular rate grows fastest, chosen every disturbance.period",
+        ),
+        (
+            Kind::AgainstMoment,
+            "againstMoment",
+            "plus or minus the bound against the control moment, chosen every disturbance.period",
+        ),
+    ],
+};
 
-/// How the control moment comes about: the items in the order of their enumeration values 1, 2, with name and description.
-pub(crate) const ACTUATIONS: [(&str, &str); 2] = [
-    ("moment", "the input moment acts, after actuation.delay"),
-    ("surfacesAndJets", "the inputs surface and jet command eight aerodynamic surfaces and ten jets"),
-];
+/// How the control moment comes about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Actuation {
+    #[default]
+    Moment,
+    SurfacesAndJets,
+}
 
-/// The attitude kinematics in the order of their enumeration values 1, 2, with name and description.
-pub(crate) const KINEMATICS: [(Kinematics, &str, &str); 2] = [
-    (Kinematics::Printed, "printed", "R as in (2) of Chai 2022 and (4) of Wu 2015"),
-    (
-        Kinematics::Exact,
-        "exact",
-        "with the derivative of alpha times sin beta in the bank row, (1) of Wu 2015",
-    ),
-];
+/// The ways in which the control moment comes about.
+pub(crate) static ACTUATIONS: Enumeration<Actuation> = Enumeration {
+    name: "Actuation",
+    description: "How the control moment comes about",
+    items: &[
+        (Actuation::Moment, "moment", "the input moment acts, after actuation.delay"),
+        (
+            Actuation::SurfacesAndJets,
+            "surfacesAndJets",
+            "the inputs surface and jet command eight aerodynamic surfaces and ten jets",
+        ),
+    ],
+};
+
+/// The attitude kinematics.
+pub(crate) static KINEMATICS: Enumeration<Kinematics> = Enumeration {
+    name: "Kinematics",
+    description: "The matrix R of the attitude kinematics",
+    items: &[
+        (Kinematics::Printed, "printed", "R as in (2) of Chai 2022 and (4) of Wu 2015"),
+        (
+            Kinematics::Exact,
+            "exact",
+            "with the derivative of alpha times sin beta in the bank row, (1) of Wu 2015",
+        ),
+    ],
+};
 
 /// `sensor.set`: what they feel is shown as it is.
 pub(crate) const NO_SENSORS: i32 = 0;
@@ -71,11 +104,10 @@ pub(crate) struct Parameters {
     pub(crate) inertia_scale: f64,
     pub(crate) initial_angles: Vector3<f64>,
     pub(crate) initial_rates: Vector3<f64>,
-    /// Number of the item of [`KINDS`], from 1.
-    pub(crate) kind: i32,
+    pub(crate) kind: Kind,
     pub(crate) bound: f64,
     pub(crate) period: f64,
-    pub(crate) seed: i32,
+    pub(crate) seed: u64,
     pub(crate) direction: Vector3<f64>,
     pub(crate) square_period: f64,
     pub(crate) sine_offset: Vector3<f64>,
@@ -83,11 +115,9 @@ pub(crate) struct Parameters {
     pub(crate) start: f64,
     pub(crate) end: f64,
     pub(crate) step: f64,
-    /// Number of the item of [`KINEMATICS`], from 1.
-    pub(crate) kinematics: i32,
+    pub(crate) kinematics: Kinematics,
     pub(crate) earth_rate: f64,
-    /// Number of the item of [`ACTUATIONS`], from 1.
-    pub(crate) actuation: i32,
+    pub(crate) actuation: Actuation,
     pub(crate) moment_delay: f64,
     pub(crate) flight: Flight,
     pub(crate) density_scale: f64,
@@ -97,7 +127,7 @@ pub(crate) struct Parameters {
     pub(crate) sensor_set: i32,
     pub(crate) triads: [Triad; 3],
     pub(crate) line: Line,
-    pub(crate) sensor_seed: i32,
+    pub(crate) sensor_seed: u64,
     pub(crate) surroundings: Surroundings,
     pub(crate) calibrates: bool,
     pub(crate) sequence: Sequence,
@@ -110,7 +140,6 @@ impl Default for Parameters {
         let sine = tvsmc.disturbance.sine;
         let Disturbance { kind, bound, period, seed, direction, square_period, start, end, .. } =
             scenario.disturbance;
-        let number = (1..).zip(KINDS).find(|(_, item)| item.0 == kind).map_or(1, |(number, _)| number);
         let sensors = SensorData::embedded();
         let mut line = sensors.line;
         line.drop_window.end = line.drop_window.end.min(NEVER);
@@ -120,10 +149,10 @@ impl Default for Parameters {
             inertia_scale: scenario.inertia_scale,
             initial_angles: scenario.initial_angles,
             initial_rates: scenario.initial_rates,
-            kind: number,
+            kind,
             bound,
             period,
-            seed: i32::try_from(seed).unwrap_or(i32::MAX),
+            seed,
             direction,
             square_period,
             sine_offset: sine.offset,
@@ -131,9 +160,9 @@ impl Default for Parameters {
             start,
             end: end.min(NEVER),
             step: STEP,
-            kinematics: 1,
+            kinematics: Kinematics::Printed,
             earth_rate: 0.0,
-            actuation: 1,
+            actuation: Actuation::default(),
             moment_delay: 0.0,
             flight: tvsmc.flight.unwrap_or(Flight { altitude: 0.0, mach: 0.0 }),
             density_scale: 1.0,
@@ -162,7 +191,7 @@ impl Parameters {
 
     /// The actuators, if the control moment is not an input.
     fn actuators(&self) -> Result<Option<actuators::Config>, Error> {
-        if self.actuation == 1 {
+        if self.actuation == Actuation::Moment {
             return Ok(None);
         }
         let effectors = Effectors::published();
@@ -185,7 +214,7 @@ impl Parameters {
             }
             _ => self.triads,
         };
-        Some(sensors::Config { triads, line: self.line, seed: self.sensor_seed as u64 })
+        Some(sensors::Config { triads, line: self.line, seed: self.sensor_seed })
     }
 
     /// The plant they describe.
@@ -193,23 +222,22 @@ impl Parameters {
     /// # Errors
     /// Names the parameter that is out of range.
     pub(crate) fn config(&self) -> Result<Config, Error> {
-        let kind = item(self.kind, &KINDS).map_or(Kind::None, |item| item.0);
         Ok(Config {
             inertia: self.inertia,
             inertia_scale: self.inertia_scale,
             initial: state(&self.initial_angles, &self.initial_rates),
             disturbance: Disturbance {
-                kind,
+                kind: self.kind,
                 bound: self.bound,
                 period: self.period,
-                seed: self.seed as u64,
+                seed: self.seed,
                 direction: self.direction,
                 square_period: self.square_period,
                 sine: SineMoment { offset: self.sine_offset, waves: self.waves.to_vec() },
                 start: self.start,
                 end: self.end,
             },
-            kinematics: item(self.kinematics, &KINEMATICS).map_or(Kinematics::Printed, |item| item.0),
+            kinematics: self.kinematics,
             earth_rate: self.earth_rate,
             actuators: self.actuators()?,
             moment_delay: self.moment_delay,
@@ -219,9 +247,4 @@ impl Parameters {
             step: self.step,
         })
     }
-}
-
-/// An enumeration's item by its number, from 1.
-fn item<T>(number: i32, items: &[T]) -> Option<&T> {
-    items.get(usize::try_from(number - 1).ok()?)
 }

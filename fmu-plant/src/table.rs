@@ -10,7 +10,6 @@ use fmi2_export::table::{
 };
 use model_description::DefaultExperiment;
 use model_description::unit;
-use model_description::variable::EnumerationType;
 use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::atmosphere;
@@ -94,7 +93,7 @@ pub(crate) fn description() -> Description<ReentryPlant> {
     Description {
         name: "ReentryPlant",
         description: "Attitude motion of a re-entry vehicle under moments and bounded disturbances",
-        documentation: include_str!("plant.html"),
+        documentation: include_str!("plant.html").into(),
         version: env!("CARGO_PKG_VERSION"),
         model_exchange: true,
         event_indicators: SURFACES,
@@ -274,17 +273,12 @@ fn trajectory(mut table: Plant) -> Plant {
 }
 
 fn kinematics(table: Plant) -> Plant {
-    let items = EnumerationType {
-        name: "Kinematics".into(),
-        description: "The matrix R of the attitude kinematics".into(),
-        items: KINEMATICS.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect(),
-    };
     let earth = parameter(
         "trajectory.earthRate",
         "Angular rate of the Earth, really 7.2921e-5 rad/s; 0 leaves it out",
     );
     table
-        .enumeration(parameter("kinematics", "The matrix R of the attitude kinematics"), items, |m| {
+        .enumeration(parameter("kinematics", KINEMATICS.description), &KINEMATICS, |m| {
             &mut m.parameters.kinematics
         })
         .real(earth.real().unit(unit::angular_rate()).min(0.0).max(1.0).nominal(1e-4), |m| {
@@ -293,11 +287,6 @@ fn kinematics(table: Plant) -> Plant {
 }
 
 fn actuation(table: Plant) -> Plant {
-    let items = EnumerationType {
-        name: "Actuation".into(),
-        description: "How the control moment comes about".into(),
-        items: ACTUATIONS.iter().map(|(name, text)| ((*name).into(), (*text).into())).collect(),
-    };
     let altitude = parameter("flight.altitude", "Geometric altitude; gives air density and speed of sound");
     let mach = parameter("flight.mach", "Mach number");
     let density =
@@ -312,7 +301,7 @@ fn actuation(table: Plant) -> Plant {
         "Jet 4 as the mirror image of jet 8 instead of the printed column, which breaks the symmetry",
     );
     table
-        .enumeration(parameter("actuation", "How the control moment comes about"), items, |m| {
+        .enumeration(parameter("actuation", ACTUATIONS.description), &ACTUATIONS, |m| {
             &mut m.parameters.actuation
         })
         .real(altitude.real().unit(unit::length()).min(0.0).max(atmosphere::TOP).nominal(1e4), |m| {
@@ -362,11 +351,6 @@ fn initial(table: Plant) -> Plant {
 }
 
 fn disturbance(table: Plant) -> Plant {
-    let kinds = EnumerationType {
-        name: "DisturbanceKind".into(),
-        description: "Course of the disturbance".into(),
-        items: KINDS.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect(),
-    };
     let bound = parameter(
         "disturbance.bound",
         "Bound on each component of the disturbance on the attitude's acceleration",
@@ -391,9 +375,7 @@ fn disturbance(table: Plant) -> Plant {
     let time = |common: fmi2_export::table::Common| common.real().unit(unit::time());
 
     let table = table
-        .enumeration(parameter("disturbance.kind", "Course of the disturbance"), kinds, |m| {
-            &mut m.parameters.kind
-        })
+        .enumeration(parameter("disturbance.kind", KINDS.description), &KINDS, |m| &mut m.parameters.kind)
         .real(bound.real().unit(unit::angular_acceleration()).min(0.0).max(10.0).nominal(0.03), |m| {
             &mut m.parameters.bound
         })

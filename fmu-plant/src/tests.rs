@@ -2,14 +2,16 @@
 
 mod sensors;
 
+use crate::parameters::{Actuation, KINDS};
 use crate::plant::{Output, ReentryPlant};
 use crate::table::{Known, Unknown};
 use fmi2_export::{Context, Failure, Inputs, Model, describe};
-use model_description::variable::{Causality, Kind, Variability};
+use model_description::variable::{self, Causality, Variability};
 use nalgebra::Vector3;
 use vehicle::Scenario;
+use vehicle::disturbance::Kind;
 use vehicle::effectors::{Jets, Surfaces};
-use vehicle::kinematics::Trajectory;
+use vehicle::kinematics::{Kinematics, Trajectory};
 
 const CONTEXT: Context = Context { start_time: 0.0, stop_time: None, resources: None };
 
@@ -146,8 +148,10 @@ fn the_description_holds() {
     }
     let scenario = Scenario::crmpc2022();
     let start = |name: &str| match &description.variables[description.position(name).unwrap()].kind {
-        Kind::Real { start, .. } => start.unwrap(),
-        Kind::Integer { start, .. } | Kind::Enumeration { start, .. } => f64::from(start.unwrap()),
+        variable::Kind::Real { start, .. } => start.unwrap(),
+        variable::Kind::Integer { start, .. } | variable::Kind::Enumeration { start, .. } => {
+            f64::from(start.unwrap())
+        }
         _ => f64::NAN,
     };
     for (name, value) in [
@@ -180,8 +184,13 @@ fn the_description_holds() {
 const STATES: [f64; 14] =
     [0.3, 0.2, -0.5, 0.08, -0.05, 0.06, -0.01, -0.02, -0.01, -0.01, 0.01, -0.01, 0.01, 0.01];
 
+/// Every course of the disturbance.
+fn all_kinds() -> impl Iterator<Item = Kind> {
+    KINDS.items.iter().map(|(kind, ..)| *kind)
+}
+
 /// A unit in model exchange, after the first event, in a general attitude, with all kinds in turn.
-fn in_model_exchange(kind: i32) -> ReentryPlant {
+fn in_model_exchange(kind: Kind) -> ReentryPlant {
     let mut unit = started(|unit| unit.parameters.kind = kind);
     unit.input.moment = Vector3::new(3e4, -2e4, 1e4);
     unit.input.disturbance_moment = Vector3::new(1e3, 2e3, -3e3);
@@ -192,14 +201,14 @@ fn in_model_exchange(kind: i32) -> ReentryPlant {
 
 /// Asks for surfaces and jets instead of a moment.
 fn actuate(unit: &mut ReentryPlant) {
-    unit.parameters.actuation = 2;
+    unit.parameters.actuation = Actuation::SurfacesAndJets;
     unit.command.surfaces = Surfaces::from([-5.0, -2.0, -1.0, -4.0, 3.0, -6.0, 1.0, 2.0]) * 0.02;
     unit.command.jets = Jets::repeat(0.5);
 }
 
 /// The same with actuators; the jets take a duty cycle or switch.
 fn actuated_in_model_exchange(duty: bool) -> ReentryPlant {
-    let mut unit = in_model_exchange(1);
+    let mut unit = in_model_exchange(Kind::None);
     unit.parameters.jet_duty = duty;
     actuate(&mut unit);
     unit.initialize(&CONTEXT).unwrap();
@@ -209,7 +218,7 @@ fn actuated_in_model_exchange(duty: bool) -> ReentryPlant {
 }
 
 /// The exact kinematics along a trajectory that turns in every way.
-fn along_a_trajectory(kind: i32, kinematics: i32) -> ReentryPlant {
+fn along_a_trajectory(kind: Kind, kinematics: Kinematics) -> ReentryPlant {
     let mut unit = in_model_exchange(kind);
     unit.parameters.kinematics = kinematics;
     unit.parameters.earth_rate = 7.2921e-5;
@@ -231,7 +240,7 @@ fn along_a_trajectory(kind: i32, kinematics: i32) -> ReentryPlant {
 /// In co-simulation, at a communication point, with jets that take a duty cycle.
 fn at_a_communication_point() -> ReentryPlant {
     let mut unit = started(|unit| {
-        unit.parameters.kind = 1;
+        unit.parameters.kind = Kind::None;
         unit.parameters.jet_duty = true;
         actuate(unit);
     });
@@ -282,10 +291,14 @@ fn nudge(unit: &mut ReentryPlant, known: usize, by: f64) {
 #[test]
 fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
     let description = describe::<ReentryPlant>();
-    let units = (1..=7)
+    let units = all_kinds()
         .map(in_model_exchange)
         .chain([false, true].map(actuated_in_model_exchange))
-        .chain([(1, 1), (3, 2), (7, 2)].map(|(kind, kinematics)| along_a_trajectory(kind, kinematics)))
+        .chain([
+            along_a_trajectory(Kind::None, Kinematics::Printed),
+            along_a_trajectory(Kind::Constant, Kinematics::Exact),
+            along_a_trajectory(Kind::AgainstMoment, Kinematics::Exact),
+        ])
         .chain([at_a_communication_point(), under_a_delayed_moment()]);
     for (case, mut unit) in units.enumerate() {
         for known in known_positions() {
@@ -322,14 +335,14 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
     }
     let mut duty = at_a_communication_point();
     assert!((duty.partial_derivative(0.0, 14, 44).unwrap() - 19897.0).abs() < 1e-9, "yaw by jet 1");
-    let mut exact = along_a_trajectory(1, 2);
+    let mut exact = along_a_trajectory(Kind::None, Kinematics::Exact);
     assert!(exact.partial_derivative(0.0, 8, 63).unwrap() != 0.0, "bank rate by heading");
     assert!((exact.partial_derivative(0.0, 6, 65).unwrap() + 0.5f64.cos() / 0.2f64.cos()).abs() < 1e-15);
 }
 
 #[test]
 fn derivatives_by_parameters_are_refused() {
-    let mut unit = in_model_exchange(1);
+    let mut unit = in_model_exchange(Kind::None);
     for (unknown, known) in [(6, 69), (6, 6), (6, 35), (69, 0), (21, 21), (36, 36), (62, 62)] {
         assert!(unit.partial_derivative(0.0, unknown, known).is_err(), "{unknown} by {known}");
     }
@@ -349,20 +362,21 @@ fn outputs_are_right_from_initialization_on() {
 
 #[test]
 fn at_a_tick_the_outputs_show_the_disturbance_of_the_step_to_come() {
-    for kind in [2, 6, 7] {
+    for kind in [Kind::White, Kind::AlongRate, Kind::AgainstMoment] {
         let mut unit = started(|unit| unit.parameters.kind = kind);
         unit.input.moment = Vector3::new(1e4, -1e4, 1e4);
         step(&mut unit, 0.0, 0.04).unwrap();
         unit.input.moment *= -1.0;
         let announced = outputs(&mut unit, 0.04).delta;
         step(&mut unit, 0.04, 0.08 - 1e-6).unwrap();
-        assert_eq!(outputs(&mut unit, 0.08 - 1e-6).delta, announced, "kind {kind}");
+        assert_eq!(outputs(&mut unit, 0.08 - 1e-6).delta, announced, "kind {kind:?}");
     }
 }
 
 #[test]
 fn looking_changes_nothing() {
-    let [mut looked_at, mut left_alone] = [0, 1].map(|_| started(|unit| unit.parameters.kind = 7));
+    let [mut looked_at, mut left_alone] =
+        [0, 1].map(|_| started(|unit| unit.parameters.kind = Kind::AgainstMoment));
     for k in 0..50 {
         let [from, to] = [0.04 * f64::from(k), 0.04 * f64::from(k + 1)];
         looked_at.input.moment = Vector3::repeat(-1e4);
@@ -444,7 +458,7 @@ fn assert_same_motion(cs: &Output, me: &Output, case: &str) {
 
 #[test]
 fn oracle_model_exchange_agrees_with_co_simulation() {
-    for kind in 1..=7 {
+    for kind in all_kinds() {
         let set = |unit: &mut ReentryPlant| {
             unit.parameters.kind = kind;
             unit.parameters.start = 0.3;
@@ -457,15 +471,17 @@ fn oracle_model_exchange_agrees_with_co_simulation() {
             step(&mut cs, 0.04 * f64::from(k), 0.04 * f64::from(k + 1)).unwrap();
         }
         let events = exchange(&mut me, 0.0, 2.0);
-        assert_same_motion(&outputs(&mut cs, 2.0), &outputs(&mut me, 2.0), &format!("kind {kind}"));
-        let expected = [1, 38, 3, 3, 6, 38, 38][kind as usize - 1];
-        assert_eq!(events.len(), expected, "kind {kind}");
+        assert_same_motion(&outputs(&mut cs, 2.0), &outputs(&mut me, 2.0), &format!("kind {kind:?}"));
+        let expected = [1, 38, 3, 3, 6, 38, 38][kind as usize];
+        assert_eq!(events.len(), expected, "kind {kind:?}");
     }
 }
 
 #[test]
 fn oracle_model_exchange_agrees_with_co_simulation_under_surfaces_and_jets() {
-    for (kind, duty) in [(1, false), (1, true), (7, false), (7, true)] {
+    for (kind, duty) in
+        [Kind::None, Kind::AgainstMoment].into_iter().flat_map(|kind| [(kind, false), (kind, true)])
+    {
         let set = |unit: &mut ReentryPlant| {
             unit.parameters.kind = kind;
             unit.parameters.jet_duty = duty;
@@ -482,7 +498,7 @@ fn oracle_model_exchange_agrees_with_co_simulation_under_surfaces_and_jets() {
             step(&mut cs, begin, end).unwrap();
             exchange(&mut me, begin, end);
             let [cs, me] = [&mut cs, &mut me].map(|unit| outputs(unit, end));
-            assert_same_motion(&cs, &me, &format!("kind {kind}, duty {duty}, tick {k}"));
+            assert_same_motion(&cs, &me, &format!("kind {kind:?}, duty {duty}, tick {k}"));
             assert!((cs.deflections - me.deflections).amax() < 1e-13, "{}", cs.deflections - me.deflections);
             assert!((cs.applied_moment - me.applied_moment).amax() < 1e-7);
         }
@@ -494,7 +510,7 @@ const FAR: [f64; 8] = [-90.0, 4.0, -3.0, 0.0, 90.0, 0.0, 0.0, 0.0];
 
 fn commanded(degrees: [f64; 8]) -> ReentryPlant {
     started(|unit| {
-        unit.parameters.kind = 1;
+        unit.parameters.kind = Kind::None;
         actuate(unit);
         unit.command.surfaces = Surfaces::from(degrees).map(f64::to_radians);
     })
@@ -614,7 +630,7 @@ fn published_moments_of_jets_act_from_the_communication_point_on() {
     // Wu 2015, (64), column 4 as printed and as the mirror image of column 8
     for (symmetric, pitch) in [(false, 10944.0), (true, 11798.0)] {
         let mut unit = started(|unit| {
-            unit.parameters.actuation = 2;
+            unit.parameters.actuation = Actuation::SurfacesAndJets;
             unit.parameters.jet_symmetric = symmetric;
         });
         assert_eq!(outputs(&mut unit, 0.0).applied_moment, Vector3::zeros());
@@ -625,7 +641,7 @@ fn published_moments_of_jets_act_from_the_communication_point_on() {
 
 #[test]
 fn in_model_exchange_jets_switch_and_surfaces_turn_at_events_only() {
-    let mut unit = started(|unit| unit.parameters.actuation = 2);
+    let mut unit = started(|unit| unit.parameters.actuation = Actuation::SurfacesAndJets);
     unit.new_discrete_states(0.0).unwrap();
     unit.command.jets[0] = 1.0;
     unit.command.surfaces[4] = 0.1;
@@ -642,7 +658,7 @@ fn in_model_exchange_jets_switch_and_surfaces_turn_at_events_only() {
 fn oracle_dynamic_pressure_and_biases_of_aerodynamics_and_density() {
     let flaps = |scale: f64| {
         let mut unit = started(|unit| {
-            unit.parameters.actuation = 2;
+            unit.parameters.actuation = Actuation::SurfacesAndJets;
             unit.parameters.density_scale = scale;
             unit.parameters.aerodynamics_scale = scale;
             unit.command.surfaces[4] = 0.1;
@@ -676,7 +692,7 @@ fn with_a_moment_actuators_stay_at_rest_and_commands_do_nothing() {
 
 #[test]
 fn between_events_the_disturbance_is_held_even_beyond_a_tick() {
-    let mut unit = in_model_exchange(2);
+    let mut unit = in_model_exchange(Kind::White);
     let held = outputs(&mut unit, 0.0).delta;
     for time in [0.01, 0.04, 0.041] {
         assert_eq!(outputs(&mut unit, time).delta, held);
@@ -687,7 +703,7 @@ fn between_events_the_disturbance_is_held_even_beyond_a_tick() {
 
 #[test]
 fn an_event_iteration_sees_the_latest_moment() {
-    let mut unit = started(|unit| unit.parameters.kind = 7);
+    let mut unit = started(|unit| unit.parameters.kind = Kind::AgainstMoment);
     unit.new_discrete_states(0.0).unwrap();
     let before = outputs(&mut unit, 0.0).delta;
     unit.input.moment = vehicle::kinematics::r_inverse(&unit.output.angles) * before * 1e7;
@@ -702,7 +718,7 @@ fn an_event_iteration_sees_the_latest_moment() {
 fn oracle_input_derivatives_are_integrated() {
     // At beta = 0 a pitch moment k t alone gives q = k t² / 2 Iyy
     let mut unit = started(|unit| {
-        unit.parameters.kind = 1;
+        unit.parameters.kind = Kind::None;
         unit.parameters.initial_angles = Vector3::new(0.1, 0.0, 0.2);
     });
     unit.step(0.0, 2.0, &Ramp(1e4), &mut |_| {}).unwrap();
@@ -732,14 +748,14 @@ fn impossible_parameters_are_refused_by_name() {
 fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_exchange() {
     let mut singular = [0.0; 14];
     singular[1] = 1.6;
-    let mut unit = in_model_exchange(1);
+    let mut unit = in_model_exchange(Kind::None);
     unit.set_continuous_states(&singular);
     assert!(matches!(unit.calculate(0.1), Err(Failure::Discard(text)) if text.contains("singular")));
     let mut unit = started(|_| {});
     unit.set_continuous_states(&singular);
     assert!(matches!(unit.calculate(0.0), Err(Failure::Error(text)) if text.contains("singular")));
     let mut unit = started(|unit| {
-        unit.parameters.kind = 1;
+        unit.parameters.kind = Kind::None;
         unit.parameters.inertia.Ixz = 0.0;
         unit.parameters.initial_angles = Vector3::new(0.0, 1.5, 0.0);
         unit.parameters.initial_rates = Vector3::new(0.0, 0.0, -0.5);
@@ -769,7 +785,7 @@ fn before_initialization_it_says_so() {
 #[test]
 fn outputs_need_no_start_and_inputs_have_one() {
     for variable in describe::<ReentryPlant>().variables {
-        let Kind::Real { start, unit, .. } = &variable.kind else { continue };
+        let variable::Kind::Real { start, unit, .. } = &variable.kind else { continue };
         assert_eq!(start.is_none(), variable.causality == Causality::Output, "{}", variable.name);
         let plain = [
             "inertia.scale",

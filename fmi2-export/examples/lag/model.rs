@@ -1,16 +1,25 @@
 //! A first-order lag x' = (k u − x) / T whose gain changes at a time event and which tells when x crosses 1. Every kind of variable occurs in it.
 
 use fmi2_export::table::{discrete_input, discrete_output, input, local, output, parameter};
-use fmi2_export::{Context, Description, EventInfo, Failure, Inputs, Model, Table};
+use fmi2_export::{Context, Description, Enumeration, EventInfo, Failure, Inputs, Model, Table};
 use model_description::DefaultExperiment;
 use model_description::unit;
-use model_description::variable::EnumerationType;
 use serde::{Deserialize, Serialize};
 
 /// Runge–Kutta steps in a communication step.
 const SUBSTEPS: i32 = 4;
-/// Items of the enumeration `shape`.
-const SHAPE_SATURATED: i32 = 2;
+/// What is done to the output.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+enum Shape {
+    Linear,
+    Saturated,
+}
+
+static SHAPES: Enumeration<Shape> = Enumeration {
+    name: "Shape",
+    description: "What is done to the output",
+    items: &[(Shape::Linear, "linear", "Nothing"), (Shape::Saturated, "saturated", "Kept between -1 and 1")],
+};
 
 /// The model: parameters, input, state, outputs.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -22,7 +31,7 @@ pub struct Lag {
     initial: f64,
     order: i32,
     inverted: bool,
-    shape: i32,
+    shape: Shape,
     label: String,
 
     u: f64,
@@ -69,14 +78,6 @@ impl Lag {
 
 impl Model for Lag {
     fn description() -> Description<Self> {
-        let shape = EnumerationType {
-            name: "Shape".into(),
-            description: "What is done to the output".into(),
-            items: vec![
-                ("linear".into(), "Nothing".into()),
-                ("saturated".into(), "Kept between -1 and 1".into()),
-            ],
-        };
         let table = Table::new()
             .real(
                 parameter("timeConstant", "Time constant T").real().unit(unit::time()).min(1e-3).max(1e3),
@@ -92,7 +93,7 @@ impl Model for Lag {
                 &mut m.order
             })
             .boolean(parameter("inverted", "Whether the gain changes its sign"), |m| &mut m.inverted)
-            .enumeration(parameter("shape", "What is done to the output"), shape, |m| &mut m.shape)
+            .enumeration(parameter("shape", SHAPES.description), &SHAPES, |m| &mut m.shape)
             .string(parameter("label", "Text that is passed on; \"boom\" makes the unit panic"), |m| {
                 &mut m.label
             })
@@ -122,7 +123,7 @@ impl Model for Lag {
         Description {
             name: "Lag",
             description: "First-order lag with a gain that changes at a time event",
-            documentation: "<p>x' = (k u − x) / T, y = x + u + offset.</p>",
+            documentation: "<p>x' = (k u − x) / T, y = x + u + offset.</p>".into(),
             version: env!("CARGO_PKG_VERSION"),
             model_exchange: true,
             event_indicators: 1,
@@ -140,7 +141,7 @@ impl Model for Lag {
             initial: 0.5,
             order: 1,
             inverted: false,
-            shape: 1,
+            shape: Shape::Linear,
             label: "lag".into(),
             u: 0.0,
             x: 0.0,
@@ -168,7 +169,7 @@ impl Model for Lag {
         self.gain_now = self.gain(time);
         self.derivative = self.rate(self.x, self.gain_now);
         self.y = self.x + self.u + self.offset_held.unwrap_or(self.offset);
-        if self.shape == SHAPE_SATURATED {
+        if self.shape == Shape::Saturated {
             self.y = self.y.clamp(-1.0, 1.0);
         }
         self.description.clone_from(&self.label);

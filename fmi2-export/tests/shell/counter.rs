@@ -27,7 +27,7 @@ impl Model for Counter {
         Description {
             name: "Counter",
             description: "Counts its steps",
-            documentation: "",
+            documentation: String::new(),
             version: "1",
             model_exchange: false,
             event_indicators: 0,

@@ -4,14 +4,15 @@ use super::{Constant, assert_same_motion, exchange, integrate, outputs, started,
 use crate::plant::ReentryPlant;
 use fmi2_export::{Failure, Model};
 use nalgebra::Vector3;
-use vehicle::kinematics::r_inverse;
+use vehicle::disturbance::Kind;
+use vehicle::kinematics::{Kinematics, r_inverse};
 use vehicle::sensors::Sample;
 use vehicle::triad::Window;
 
 /// A typical MEMS set with everything that can happen to samples, on ticks that are exact numbers.
 fn mems(unit: &mut ReentryPlant) {
     let p = &mut unit.parameters;
-    p.kind = 1;
+    p.kind = Kind::None;
     p.step = 1.0 / 128.0;
     p.sensor_set = 2;
     p.line.period = 1.0 / 64.0;
@@ -42,7 +43,7 @@ fn stepped(unit: &mut ReentryPlant, length: f64) -> Vec<Sample> {
 #[test]
 fn without_sensors_what_they_would_feel_is_shown_at_all_times() {
     let mut unit = started(|unit| {
-        unit.parameters.kind = 1;
+        unit.parameters.kind = Kind::None;
         unit.input.moment = Vector3::new(1e5, 2e5, -1e5);
     });
     step(&mut unit, 0.0, 0.37).unwrap();
@@ -54,7 +55,7 @@ fn without_sensors_what_they_would_feel_is_shown_at_all_times() {
         output.rates - r_inverse(&output.angles).column(2) * (output.angle_rates.x * output.angles.y.sin());
     assert!((rate - expected).amax() < 1e-16 && (rate - output.rates).amax() > 1e-4);
     assert!((force.norm() - 9.80665).abs() < 1e-14 && (field.norm() - 5.094e-5).abs() < 1e-9);
-    let mut exact = started(|unit| unit.parameters.kinematics = 2);
+    let mut exact = started(|unit| unit.parameters.kinematics = Kinematics::Exact);
     step(&mut exact, 0.0, 0.5).unwrap();
     let output = outputs(&mut exact, 0.5);
     assert_eq!(output.measured.readings[0], output.rates, "with the exact kinematics the same");

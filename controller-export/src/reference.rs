@@ -1,6 +1,6 @@
 //! The reference a controller follows: a paper's profile, a simple course, a table, or the external inputs.
 
-use fmi2_export::{Context, Failure};
+use fmi2_export::{Context, Enumeration, Failure};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -8,34 +8,57 @@ use vehicle::Scenario;
 use vehicle::reference::{Profile, Reference};
 use vehicle::table::Table;
 
-/// The choices of `reference.profile` in the order of their values 1, 2, ….
-pub(crate) const PROFILES: [(&str, &str); 7] = [
-    ("crmpc2022", "the profile of Chai 2022, section 5.1, with its jump at 25 s"),
-    ("tvsmc2015", "the profile of Wu 2015, section 6"),
-    ("twoLoop", "the step of Jia, Zhou and Zhou, section V"),
-    ("constant", "reference.angle"),
-    ("sine", "reference.angle plus reference.amplitude times a sine"),
-    ("table", "interpolated from the file reference.file"),
-    ("external", "the inputs reference.external, taken as constant over a preview"),
-];
+/// Where the reference attitude comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[allow(missing_docs)] // Each item is described in [`PROFILES`].
+pub enum Choice {
+    #[default]
+    Crmpc2022,
+    Tvsmc2015,
+    TwoLoop,
+    Constant,
+    Sine,
+    Table,
+    External,
+}
+
+/// The choices of `reference.profile`.
+pub static PROFILES: Enumeration<Choice> = Enumeration {
+    name: "ReferenceProfile",
+    description: "Where the reference attitude comes from",
+    items: &[
+        (Choice::Crmpc2022, "crmpc2022", "the profile of Chai 2022, section 5.1, with its jump at 25 s"),
+        (Choice::Tvsmc2015, "tvsmc2015", "the profile of Wu 2015, section 6"),
+        (Choice::TwoLoop, "twoLoop", "the step of Jia, Zhou and Zhou, section V"),
+        (Choice::Constant, "constant", "reference.angle"),
+        (Choice::Sine, "sine", "reference.angle plus reference.amplitude times a sine"),
+        (Choice::Table, "table", "interpolated from the file reference.file"),
+        (Choice::External, "external", "the inputs reference.external, taken as constant over a preview"),
+    ],
+};
 
 /// The parameters of the reference.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Parameters {
-    /// Number of the item of [`PROFILES`], from 1.
-    pub(crate) profile: i32,
-    pub(crate) file: String,
-    pub(crate) angle: Vector3<f64>,
-    pub(crate) amplitude: Vector3<f64>,
-    pub(crate) frequency: f64,
-    pub(crate) phase: f64,
+pub struct Parameters {
+    /// Which of the courses it is.
+    pub profile: Choice,
+    /// CSV file of the table.
+    pub file: String,
+    /// Constant part of the angles, rad.
+    pub angle: Vector3<f64>,
+    /// Amplitude of the sine, rad.
+    pub amplitude: Vector3<f64>,
+    /// Angular frequency of the sine, rad/s.
+    pub frequency: f64,
+    /// Phase of the sine at t = 0, rad.
+    pub phase: f64,
 }
 
 impl Default for Parameters {
     fn default() -> Self {
         let angle = Scenario::crmpc2022().reference.at(0.0).angles;
         Self {
-            profile: 1,
+            profile: Choice::default(),
             file: String::new(),
             angle,
             amplitude: Vector3::zeros(),
@@ -55,22 +78,20 @@ pub(crate) enum Source {
 impl Source {
     pub(crate) fn new(parameters: &Parameters, context: &Context) -> Result<Self, Failure> {
         let Parameters { file, angle, amplitude, frequency, phase, .. } = parameters;
-        let item = usize::try_from(parameters.profile - 1).ok().and_then(|i| PROFILES.get(i));
-        Ok(match item.map(|item| item.0) {
-            Some("tvsmc2015") => Self::Profile(Scenario::tvsmc2015().reference),
-            Some("twoLoop") => Self::Profile(Scenario::two_loop().reference),
-            Some("constant") => Self::Profile(Profile::constant(*angle)),
-            Some("sine") => Self::Profile(Profile::sine(*angle, *amplitude, *frequency, *phase)),
-            Some("table") => Self::Profile(Profile::Table(table(file, context)?)),
-            Some("external") => Self::External,
-            _ => Self::Profile(Scenario::crmpc2022().reference),
+        Ok(match parameters.profile {
+            Choice::Crmpc2022 => Self::Profile(Scenario::crmpc2022().reference),
+            Choice::Tvsmc2015 => Self::Profile(Scenario::tvsmc2015().reference),
+            Choice::TwoLoop => Self::Profile(Scenario::two_loop().reference),
+            Choice::Constant => Self::Profile(Profile::constant(*angle)),
+            Choice::Sine => Self::Profile(Profile::sine(*angle, *amplitude, *frequency, *phase)),
+            Choice::Table => Self::Profile(Profile::Table(table(file, context)?)),
+            Choice::External => Self::External,
         })
     }
 
     /// Whether it is one that these parameters lead to. The file of a table is not read again.
     pub(crate) fn fits(&self, parameters: &Parameters) -> bool {
-        let table = (1..).zip(PROFILES).find(|(_, item)| item.0 == "table").map(|(number, _)| number);
-        let wants_table = table == Some(parameters.profile);
+        let wants_table = parameters.profile == Choice::Table;
         match self {
             Self::Profile(Profile::Table(table)) => wants_table && table.check().is_ok(),
             _ if wants_table => false,

@@ -2,22 +2,24 @@
 
 use crate::law::Law;
 use crate::reference::PROFILES;
-use crate::unit::Unit;
+use crate::unit::ControllerFmu;
 use control::delay;
-use fmi2_export::table::{Description, Real, Table, discrete_output, input, output, parameter};
+use fmi2_export::table::{Common, Description, Real, Table, discrete_output, input, output, parameter};
 use model_description::DefaultExperiment;
 use model_description::unit;
-use model_description::variable::EnumerationType;
 use nalgebra::Vector3;
 use vehicle::Scenario;
 
-pub(crate) const ANGLES: [(&str, &str); 3] =
+/// Name and meaning of the components of Θ.
+pub const ANGLES: [(&str, &str); 3] =
     [("alpha", "angle of attack"), ("beta", "sideslip angle"), ("sigma", "bank angle")];
-pub(crate) const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
-pub(crate) const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
+/// Name and meaning of the components of ω.
+pub const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
+/// Name and meaning of the components of a moment.
+pub const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
 
 /// Inputs that the outputs of a tick depend on.
-pub(crate) const MEASURED: [&str; 6] =
+const MEASURED: [&str; 6] =
     ["attitude.alpha", "attitude.beta", "attitude.sigma", "rate.p", "rate.q", "rate.r"];
 const EXTERNAL: [&str; 9] = [
     "reference.external.alpha",
@@ -32,19 +34,24 @@ const EXTERNAL: [&str; 9] = [
 ];
 
 /// Names of the inputs that a sampled output depends on.
-pub(crate) fn sampled_inputs() -> impl Iterator<Item = &'static str> {
+fn sampled_inputs() -> impl Iterator<Item = &'static str> {
     MEASURED.into_iter().chain(EXTERNAL)
 }
 
+/// An output of a law, which changes at its ticks only.
+pub fn sampled_output(name: &str, description: &str) -> Common {
+    discrete_output(name, description).depends_on(sampled_inputs())
+}
+
 /// The unit as FMI sees it.
-pub(crate) fn description<L: Law>() -> Description<Unit<L>> {
+pub fn description<L: Law>() -> Description<ControllerFmu<L>> {
     let scenario = Scenario::crmpc2022();
     let table = L::declare(vehicle(reference(outputs(inputs(Table::new())))));
     Description {
         name: L::NAME,
         description: L::DESCRIPTION,
-        documentation: L::DOCUMENTATION,
-        version: env!("CARGO_PKG_VERSION"),
+        documentation: format!("{}{}", L::DOCUMENTATION, include_str!("wiring.html")),
+        version: L::VERSION,
         model_exchange: false,
         event_indicators: 0,
         default_experiment: DefaultExperiment {
@@ -58,19 +65,19 @@ pub(crate) fn description<L: Law>() -> Description<Unit<L>> {
 }
 
 /// Adds the three components of a vector; `declare` gets name and meaning of each axis.
-pub(crate) fn vector<L: Law>(
-    mut table: Table<Unit<L>>,
+pub fn vector<M: 'static>(
+    mut table: Table<M>,
     axes: [(&'static str, &'static str); 3],
     declare: impl Fn(&str, &str) -> Real,
-    field: impl Fn(&mut Unit<L>) -> &mut Vector3<f64> + Copy + Send + Sync + 'static,
-) -> Table<Unit<L>> {
+    field: impl Fn(&mut M) -> &mut Vector3<f64> + Copy + Send + Sync + 'static,
+) -> Table<M> {
     for (i, (axis, meaning)) in axes.into_iter().enumerate() {
         table = table.real(declare(axis, meaning), move |m| &mut field(m)[i]);
     }
     table
 }
 
-fn inputs<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
+fn inputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     let angle = |axis: &str, meaning: &str| {
         let text = format!("Measured {meaning}");
         input(&format!("attitude.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
@@ -104,10 +111,10 @@ fn inputs<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
     vector(table, ANGLES, accelerations, |m| &mut m.input.reference.accelerations)
 }
 
-fn outputs<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
+fn outputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     let moment = |axis: &str, meaning: &str| {
         let text = format!("Commanded {meaning} moment, held between the ticks of period.feedback");
-        let common = discrete_output(&format!("moment.{axis}"), &text).depends_on(sampled_inputs());
+        let common = sampled_output(&format!("moment.{axis}"), &text);
         common.real().unit(unit::moment()).nominal(1e5)
     };
     let table = vector(table, AXES, moment, |m| &mut m.output.moment);
@@ -132,12 +139,7 @@ fn outputs<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
     vector(table, ANGLES, accelerations, |m| &mut m.output.reference.accelerations)
 }
 
-fn reference<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
-    let of = EnumerationType {
-        name: "ReferenceProfile".into(),
-        description: "Where the reference attitude comes from".into(),
-        items: PROFILES.map(|(name, text)| (name.into(), text.into())).to_vec(),
-    };
+fn reference<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     let profile = parameter("reference.profile", "Where the reference attitude comes from");
     let file = parameter(
         "reference.file",
@@ -155,7 +157,7 @@ fn reference<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
         parameter("reference.frequency", "Angular frequency if reference.profile is 'sine'").real();
     let phase = parameter("reference.phase", "Phase at t = 0 if reference.profile is 'sine'").real();
     let table = table
-        .enumeration(profile, of, |m| &mut m.parameters.reference.profile)
+        .enumeration(profile, &PROFILES, |m| &mut m.parameters.reference.profile)
         .string(file, |m| &mut m.parameters.reference.file);
     let table = vector(table, ANGLES, angle, |m| &mut m.parameters.reference.angle);
     vector(table, ANGLES, amplitude, |m| &mut m.parameters.reference.amplitude)
@@ -165,7 +167,7 @@ fn reference<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
         .real(phase.unit(unit::angle()), |m| &mut m.parameters.reference.phase)
 }
 
-fn vehicle<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
+fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     let moment_of_inertia = |name: &str, meaning: &str| {
         let text = format!("{meaning} as the controller believes it to be");
         parameter(name, &text).real().unit(unit::inertia()).nominal(1e6)
@@ -207,7 +209,7 @@ fn vehicle<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
 }
 
 /// The parameter of laws that use the moment that the actuators give.
-pub(crate) fn achieved_moment<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
+pub fn achieved_moment<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     let used = parameter(
         "achievedMoment.used",
         "Whether the inputs achievedMoment are fed; if not, the commanded moment is taken to act",
@@ -216,22 +218,22 @@ pub(crate) fn achieved_moment<L: Law>(table: Table<Unit<L>>) -> Table<Unit<L>> {
 }
 
 /// The parameter period.feedback of a law with one rate.
-pub(crate) fn period<L: Law>(
-    table: Table<Unit<L>>,
+pub fn period<L: Law>(
+    table: Table<ControllerFmu<L>>,
     nominal: f64,
     field: impl Fn(&mut L) -> &mut f64 + Copy + Send + Sync + 'static,
-) -> Table<Unit<L>> {
+) -> Table<ControllerFmu<L>> {
     let period = parameter("period.feedback", "Time between two evaluations of the law").real();
     table.real(period.unit(unit::time()).min(1e-4).max(10.0).nominal(nominal), move |m| field(&mut m.law))
 }
 
 /// Gains of the three angles, `name[1]` to `name[3]`, in the order of [`ANGLES`].
-pub(crate) fn gains<L: Law>(
-    mut table: Table<Unit<L>>,
+pub fn gains<L: Law>(
+    mut table: Table<ControllerFmu<L>>,
     (name, text): (&str, &str),
     unit: Option<&unit::Unit>,
     field: impl Fn(&mut L) -> &mut [f64; 3] + Copy + Send + Sync + 'static,
-) -> Table<Unit<L>> {
+) -> Table<ControllerFmu<L>> {
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
         let real = parameter(&format!("{name}[{}]", i + 1), &format!("{text}: {meaning}")).real().min(0.0);
         let real = match unit {
@@ -244,11 +246,11 @@ pub(crate) fn gains<L: Law>(
 }
 
 /// The weights P and Q on the tracking error and the input.
-pub(crate) fn weights<L: Law>(
-    mut table: Table<Unit<L>>,
+pub fn weights<L: Law>(
+    mut table: Table<ControllerFmu<L>>,
     p: impl Fn(&mut L) -> &mut [f64; 6] + Copy + Send + Sync + 'static,
     q: impl Fn(&mut L) -> &mut [f64; 3] + Copy + Send + Sync + 'static,
-) -> Table<Unit<L>> {
+) -> Table<ControllerFmu<L>> {
     for i in 0..6 {
         let (_, meaning) = ANGLES[i % 3];
         let of = if i < 3 { "error" } else { "error rate" };
@@ -269,29 +271,13 @@ pub(crate) fn weights<L: Law>(
 
 /// A value for looking at, which no controller depends on, as a number that can be handed out: what is beyond all numbers is
 /// shown as the largest one, and so is what cannot be calculated.
-pub(crate) fn shown(value: f64) -> f64 {
+pub fn shown(value: f64) -> f64 {
     if value.is_nan() { f64::MAX } else { value.clamp(-f64::MAX, f64::MAX) }
 }
 
 /// The same of each component.
-pub(crate) fn shown_vector(value: &Vector3<f64>) -> Vector3<f64> {
+pub fn shown_vector(value: &Vector3<f64>) -> Vector3<f64> {
     value.map(shown)
-}
-
-/// Of items (value, name, text) the value of the one with number `number`, or of the first.
-pub(crate) fn item<T: Copy>(items: &[(T, &str, &str)], number: i32) -> T {
-    usize::try_from(number - 1).ok().and_then(|i| items.get(i)).unwrap_or(&items[0]).0
-}
-
-/// The number of `value`, or 1.
-pub(crate) fn number<T: PartialEq>(items: &[(T, &str, &str)], value: &T) -> i32 {
-    (1..).zip(items).find(|(_, item)| item.0 == *value).map_or(1, |(number, _)| number)
-}
-
-/// The items as an enumeration of the description.
-pub(crate) fn enumeration<T>(name: &str, description: &str, items: &[(T, &str, &str)]) -> EnumerationType {
-    let items = items.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect();
-    EnumerationType { name: name.into(), description: description.into(), items }
 }
 
 fn capital(text: &str) -> String {

@@ -1,0 +1,64 @@
+//! Makes an FMI 2.0 unit of a sampled attitude controller.
+//!
+//! A control law implements [`control::Controller`] and [`Law`]; [`ControllerFmu`] gives it the inputs, outputs, reference
+//! profiles, limits and delays that all controllers share, so that one unit can take another's place without rewiring:
+//!
+//! ```
+//! use control::lqr::{Lqr, LqrSettings};
+//! use controller_export::{ControllerFmu, Law, Vehicle};
+//! use fmi2_export::{Table, describe, table::parameter};
+//! use serde::{Deserialize, Serialize};
+//!
+//! /// A regulator with one weight; the value holds the law's own parameters and outputs.
+//! #[derive(Serialize, Deserialize)]
+//! struct Soft {
+//!     weight: f64,
+//! }
+//!
+//! impl Default for Soft {
+//!     fn default() -> Self {
+//!         Self { weight: 10.0 }
+//!     }
+//! }
+//!
+//! impl Law for Soft {
+//!     type Controller = Lqr;
+//!     type Settings = LqrSettings;
+//!     const NAME: &'static str = "Soft";
+//!     const DESCRIPTION: &'static str = "Linear-quadratic regulator with one weight";
+//!
+//!     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+//!         table.real(parameter("weight", "Weight on the errors").real().min(0.0), |m| &mut m.law.weight)
+//!     }
+//!
+//!     fn settings(&self, vehicle: &Vehicle) -> LqrSettings {
+//!         LqrSettings { body: vehicle.body, p: [self.weight; 6], q: [10.0; 3], period: 0.04 }
+//!     }
+//!
+//!     fn design(settings: LqrSettings) -> Result<Lqr, control::error::DesignError> {
+//!         Lqr::new(settings)
+//!     }
+//! }
+//!
+//! // In the crate of the unit: fmi2_export::export_fmus!(ControllerFmu<Soft>);
+//! let description = describe::<ControllerFmu<Soft>>();
+//! assert!(description.variables.iter().any(|variable| variable.name == "moment.x"));
+//! ```
+//!
+//! | module | what it knows |
+//! |---|---|
+//! | [`law`] | what a controller adds to the unit that all of them share |
+//! | [`unit`] | that unit |
+//! | [`sampled`] | any unit that works at ticks: steps, saved states |
+//! | [`table`] | the table of variables that all controllers have, and declarations that laws share |
+//! | [`reference`] | where the reference comes from |
+
+pub mod law;
+pub mod reference;
+pub mod sampled;
+pub mod table;
+pub mod unit;
+
+pub use law::{Law, Vehicle};
+pub use sampled::{SampledFmu, SampledUnit};
+pub use unit::ControllerFmu;

@@ -1,0 +1,187 @@
+//! Any unit that works at ticks of its own: how it steps from tick to tick, and how it is restored.
+
+use control::schedule::Sampled;
+use fmi2_export::{Context, Description, Failure, Inputs, Model, Restoration};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use std::ops::{Deref, DerefMut};
+
+/// The ticks of a unit with their memory.
+pub type Ticks<U> =
+    Sampled<<U as SampledUnit>::Memory, <U as SampledUnit>::Input, <U as SampledUnit>::Output>;
+
+/// What works at ticks: the unit's parameters, inputs and outputs, and the device that is built from them.
+pub trait SampledUnit: Serialize + DeserializeOwned + Send + Sized + 'static {
+    /// What computes at the ticks. It keeps nothing beside the memory that a later tick could notice.
+    type Device: Send;
+    /// What is carried from tick to tick.
+    type Memory: Clone + Default + Serialize + DeserializeOwned + Send;
+    /// All that a tick depends on beside the memory.
+    type Input: Clone + Default + PartialEq + Serialize + DeserializeOwned + Send;
+    /// What a tick computes beside the memory.
+    type Output: Copy + Default + Serialize + DeserializeOwned + Send;
+
+    /// See [`Model::description`].
+    fn description() -> Description<SampledFmu<Self>>;
+
+    /// See [`Model::new`].
+    fn new() -> Self;
+
+    /// Loads what the parameters name.
+    ///
+    /// # Errors
+    /// Names the parameter at fault.
+    fn load(&mut self, _context: &Context) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// Builds the device.
+    ///
+    /// # Errors
+    /// Names the parameter at fault.
+    fn design(&self) -> Result<Self::Device, Failure>;
+
+    /// Whether [`Self::design`] would build the same device.
+    fn is_designed(&self, _device: &Self::Device) -> bool {
+        false
+    }
+
+    /// Time between two ticks, s.
+    fn period(device: &Self::Device) -> f64;
+
+    /// What is carried into the first tick.
+    fn memory(_device: &Self::Device) -> Self::Memory {
+        Self::Memory::default()
+    }
+
+    /// Evaluates the first tick that is not committed with the present inputs.
+    ///
+    /// # Errors
+    /// Says which input is at fault.
+    fn evaluate(&self, device: &mut Self::Device, ticks: &mut Ticks<Self>) -> Result<(), Failure>;
+
+    /// A warning for the log if something went wrong between two ticks.
+    fn warning(_before: &Self::Memory, _after: &Self::Memory) -> Option<&'static str> {
+        None
+    }
+
+    /// Takes the outputs at `time` (s) from what is in force.
+    fn show(&mut self, time: f64, device: &Self::Device, in_force: (Self::Output, &Self::Memory));
+
+    /// Whether a restored memory can be one of this device's.
+    fn fits(_device: &Self::Device, _memory: &Self::Memory) -> bool {
+        true
+    }
+
+    /// What is wrong with a restored unit, its ticks aside.
+    fn problem(&self, _before: &Self) -> Option<&'static str> {
+        None
+    }
+}
+
+/// A unit that works at ticks, as FMI sees it.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct SampledFmu<U: SampledUnit> {
+    unit: U,
+    /// Present from initialization on.
+    ticks: Option<Ticks<U>>,
+    #[serde(skip)]
+    device: Option<U::Device>,
+}
+
+impl<U: SampledUnit> Deref for SampledFmu<U> {
+    type Target = U;
+    fn deref(&self) -> &U {
+        &self.unit
+    }
+}
+
+impl<U: SampledUnit> DerefMut for SampledFmu<U> {
+    fn deref_mut(&mut self) -> &mut U {
+        &mut self.unit
+    }
+}
+
+/// Refuses a saved state that no unit can have been in.
+fn misfit(problem: &str) -> Result<(), Failure> {
+    Err(Failure::Error(format!("the saved state does not fit: {problem}")))
+}
+
+impl<U: SampledUnit> SampledFmu<U> {
+    /// Unit, device and ticks, which are there from initialization on.
+    fn parts(&mut self) -> Result<(&U, &mut U::Device, &mut Ticks<U>), Failure> {
+        match (&mut self.device, &mut self.ticks) {
+            (Some(device), Some(ticks)) => Ok((&self.unit, device, ticks)),
+            _ => Err(Failure::Error("the unit is not initialized".into())),
+        }
+    }
+}
+
+impl<U: SampledUnit> Model for SampledFmu<U> {
+    fn description() -> Description<Self> {
+        U::description()
+    }
+
+    fn new() -> Self {
+        Self { unit: U::new(), ticks: None, device: None }
+    }
+
+    fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
+        self.unit.load(context)?;
+        let device = self.unit.design()?;
+        vehicle::time::check_resolution(context.start_time, U::period(&device))
+            .map_err(|error| Failure::Error(error.to_string()))?;
+        self.ticks = Some(Sampled::new(context.start_time, U::memory(&device)));
+        self.device = Some(device);
+        Ok(())
+    }
+
+    fn calculate(&mut self, time: f64) -> Result<(), Failure> {
+        let (unit, device, ticks) = self.parts()?;
+        if ticks.is_due(time, U::period(device)) {
+            unit.evaluate(device, ticks)?;
+        }
+        if let (Some(device), Some(ticks)) = (&self.device, &self.ticks) {
+            self.unit.show(time, device, ticks.in_force());
+        }
+        Ok(())
+    }
+
+    /// Evaluates every tick from `from` up to, but not at, `to` with the inputs as they are then, and commits it.
+    fn step(
+        &mut self,
+        from: f64,
+        to: f64,
+        inputs: &dyn Inputs<Self>,
+        log: &mut dyn FnMut(&str),
+    ) -> Result<(), Failure> {
+        loop {
+            let (_, device, ticks) = self.parts()?;
+            let Some(tick) = ticks.next_before(to, U::period(device)) else { return Ok(()) };
+            inputs.advance(self, tick.max(from));
+            let (unit, device, ticks) = self.parts()?;
+            unit.evaluate(device, ticks)?;
+            ticks.commit();
+            if let Some(text) = ticks.last_change(U::warning) {
+                log(text);
+            }
+        }
+    }
+
+    fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
+        let Some(ticks) = self.ticks.as_ref().filter(|_| from.initialized) else { return Ok(()) };
+        if let Some(problem) = self.unit.problem(&from.before.unit) {
+            return misfit(problem);
+        }
+        let same = |device: &mut U::Device| self.unit.is_designed(device);
+        let device = from.before.device.take_if(same).map_or_else(|| self.unit.design(), Ok)?;
+        let times = (from.start_time, from.time);
+        if ticks.fits(times, U::period(&device), from.failed, |memory| U::fits(&device, memory)) {
+            self.device = Some(device);
+            return Ok(());
+        }
+        // The other unit goes on with what was taken from it.
+        from.before.device.get_or_insert(device);
+        misfit("its ticks are not those of its time, or its memory has another shape")
+    }
+}

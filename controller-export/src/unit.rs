@@ -1,0 +1,197 @@
+//! The unit that all controllers share: inputs, reference, limits.
+
+use crate::law::{Law, Vehicle};
+use crate::reference::{self, Source};
+use crate::sampled::{SampledFmu, SampledUnit, Ticks};
+use crate::table;
+use control::controller::{Controller, Measurement};
+use control::delay::{Delayed, Latency};
+use control::schedule::ControllerInput;
+use fmi2_export::{Context, Description, Failure};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::Scenario;
+use vehicle::dynamics::Inertia;
+use vehicle::reference::Reference;
+
+/// A controller as an FMI unit, to be handed to [`fmi2_export::export_fmus!`].
+pub type ControllerFmu<L> = SampledFmu<ControllerUnit<L>>;
+
+/// Parameters, inputs and outputs of a controller's unit.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct ControllerUnit<L: Law> {
+    /// Parameters of every controller.
+    pub parameters: Parameters,
+    /// Inputs of every controller.
+    pub input: Input,
+    /// Outputs of every controller.
+    pub output: Output,
+    /// The law's own parameters and outputs.
+    pub law: L,
+    source: Source,
+}
+
+/// Parameters of every controller.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Parameters {
+    /// What the reference follows from.
+    pub reference: reference::Parameters,
+    /// Inertia as the controller believes it to be, kg m².
+    pub inertia: Inertia,
+    /// Limit on ‖ω‖, rad/s.
+    pub limit_rate: f64,
+    /// Limit on ‖m‖, N m.
+    pub limit_moment: f64,
+    /// Whether the commanded moment is scaled into its limit.
+    pub saturation: bool,
+    /// Delays that the law predicts the state over.
+    pub latency: Latency,
+    /// Whether the input `achieved_moment` is fed; declared by laws that use it.
+    pub achieved_moment_used: bool,
+}
+
+/// Inputs of every controller.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Input {
+    /// Measured angles and rates.
+    pub measured: Measurement,
+    /// The moment that the actuators give, N m.
+    pub achieved_moment: Vector3<f64>,
+    /// The external reference.
+    pub reference: Reference,
+}
+
+/// Outputs of every controller.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Output {
+    /// The commanded moment, N m.
+    pub moment: Vector3<f64>,
+    /// The reference in force.
+    pub reference: Reference,
+}
+
+/// A controller with what it was designed for.
+pub struct Designed<L: Law> {
+    settings: L::Settings,
+    vehicle: Vehicle,
+    controller: Delayed<L::Controller>,
+}
+
+impl<L: Law> ControllerUnit<L> {
+    fn vehicle(&self) -> Result<Vehicle, Failure> {
+        let Parameters { inertia, limit_rate, limit_moment, saturation, latency, .. } = self.parameters;
+        let body = inertia.body(1.0).map_err(|error| Failure::Error(error.to_string()))?;
+        Ok(Vehicle { body, limit_rate, limit_moment, saturation, latency })
+    }
+}
+
+impl<L: Law> SampledUnit for ControllerUnit<L> {
+    type Device = Designed<L>;
+    type Memory = <Delayed<L::Controller> as Controller>::Memory;
+    type Input = ControllerInput;
+    type Output = Vector3<f64>;
+
+    fn description() -> Description<ControllerFmu<L>> {
+        table::description()
+    }
+
+    fn new() -> Self {
+        let scenario = Scenario::crmpc2022();
+        Self {
+            parameters: Parameters {
+                reference: reference::Parameters::default(),
+                inertia: scenario.inertia,
+                limit_rate: scenario.limit_rate,
+                limit_moment: scenario.limit_moment,
+                saturation: false,
+                latency: Latency::default(),
+                achieved_moment_used: false,
+            },
+            input: Input {
+                measured: Measurement {
+                    angles: scenario.initial_angles,
+                    rates: scenario.initial_rates,
+                    ..Measurement::default()
+                },
+                reference: scenario.reference.at(0.0),
+                ..Input::default()
+            },
+            output: Output::default(),
+            law: L::default(),
+            source: Source::Profile(scenario.reference),
+        }
+    }
+
+    fn load(&mut self, context: &Context) -> Result<(), Failure> {
+        self.source = Source::new(&self.parameters.reference, context)?;
+        Ok(())
+    }
+
+    fn design(&self) -> Result<Designed<L>, Failure> {
+        let vehicle = self.vehicle()?;
+        let controller = L::design(self.law.settings(&vehicle))
+            .and_then(|law| Delayed::new(law, vehicle.body, vehicle.latency, vehicle.saturates_at()))
+            .map_err(|error| Failure::Error(error.to_string()))?;
+        Ok(Designed { settings: self.law.settings(&vehicle), vehicle, controller })
+    }
+
+    fn is_designed(&self, device: &Designed<L>) -> bool {
+        self.vehicle()
+            .is_ok_and(|vehicle| device.vehicle == vehicle && device.settings == self.law.settings(&vehicle))
+    }
+
+    fn period(device: &Designed<L>) -> f64 {
+        device.controller.period()
+    }
+
+    fn memory(device: &Designed<L>) -> Self::Memory {
+        device.controller.memory()
+    }
+
+    fn evaluate(&self, device: &mut Designed<L>, ticks: &mut Ticks<Self>) -> Result<(), Failure> {
+        let Self { parameters, input, source, .. } = self;
+        let controller = &mut device.controller;
+        let achieved_moment = parameters.achieved_moment_used.then_some(input.achieved_moment);
+        let measured = Measurement { achieved_moment, ..input.measured };
+        let now = ticks.next_time(controller.period());
+        // Of an external reference the law takes the present value for that of the time at which its moment acts.
+        let known = now + controller.acts_after();
+        let external = match source {
+            Source::External => input.reference,
+            Source::Profile(_) => Reference::default(),
+        };
+        let mut mark = [0.0; 9];
+        for (i, part) in [external.angles, external.rates, external.accelerations].iter().enumerate() {
+            mark[3 * i..3 * i + 3].copy_from_slice(part.as_slice());
+        }
+        ticks.evaluate(controller, &measured, mark, &|time| source.at(time, known, &external));
+        if ticks.in_force().0.iter().all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        Err(Failure::Error(format!(
+            "the control moment at t = {now} s is not finite; the attitude may be singular (sideslip angle near 90 deg)"
+        )))
+    }
+
+    fn warning(before: &Self::Memory, after: &Self::Memory) -> Option<&'static str> {
+        L::warning(&before.inner, &after.inner)
+    }
+
+    fn show(&mut self, time: f64, device: &Designed<L>, (moment, memory): (Vector3<f64>, &Self::Memory)) {
+        self.law.show(&memory.inner);
+        self.output = Output {
+            moment: device.controller.saturated(moment),
+            reference: self.source.at(time, time, &self.input.reference),
+        };
+    }
+
+    fn fits(device: &Designed<L>, memory: &Self::Memory) -> bool {
+        device.controller.fits(memory)
+    }
+
+    fn problem(&self, before: &Self) -> Option<&'static str> {
+        let fits = self.source == before.source || self.source.fits(&self.parameters.reference);
+        (!fits).then_some("its reference is not that of its parameters")
+    }
+}
