@@ -1,6 +1,7 @@
 //! Attitude controllers of the papers. Knows the vehicle, not FMI. SI units and radians throughout.
 
 pub mod allocation;
+pub mod closed_loop;
 mod cone;
 pub mod controller;
 pub mod crmpc;

@@ -23,6 +23,20 @@ pub struct LqrSettings {
 }
 
 /// Linear feedback on E = x − x_r with cancellation of the drift f: u = −f + Θ̈_r + K E.
+///
+/// ```
+/// use control::closed_loop::fly;
+/// use control::crmpc::{Constraints, Settings};
+/// use control::lqr::{Lqr, LqrSettings};
+/// use vehicle::Scenario;
+///
+/// // P and Q of the comparison are those of CRMPC.
+/// let Settings { body, p, q, period_feedback: period, .. } = Settings::new(Constraints::Robust);
+/// let mut law = Lqr::new(LqrSettings { body, p, q, period })?;
+/// let summary = fly(&mut law, &mut (), &Scenario::crmpc2022(), |_| ())?;
+/// assert!(summary.error_rms.to_degrees() < 3.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lqr {
     settings: LqrSettings,

@@ -261,6 +261,22 @@ pub struct TwoLoopMemory {
 }
 
 /// The controller.
+///
+/// ```
+/// use control::closed_loop::fly;
+/// use control::two_loop::{TwoLoopSettings, TwoLoopSmc};
+/// use control::Controller;
+/// use vehicle::Scenario;
+///
+/// let mut law = TwoLoopSmc::new(TwoLoopSettings::ours())?;
+/// let mut memory = law.memory();
+/// let mut last = f64::INFINITY;
+/// fly(&mut law, &mut memory, &Scenario::two_loop(), |sample| {
+///     last = (sample.measured.angles - sample.reference.angles).norm().to_degrees();
+/// })?;
+/// assert!(last < 0.1, "{last} deg");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoLoopSmc {
     settings: TwoLoopSettings,

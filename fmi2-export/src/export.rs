@@ -8,7 +8,7 @@
 /// - `fmu_free_model_descriptions(char*)`, which also takes null.
 ///
 /// The GUID given to `fmi2Instantiate` picks the unit. The crate needs `crate-type = ["cdylib", …]` and
-/// `build = "../fmi2-export/link.rs"`, which keeps the library loaded once it is.
+/// a build script that calls `fmi2_build::link`, which keeps the library loaded once it is.
 ///
 /// ```ignore
 /// fmi2_export::export_fmus!(Plant);

@@ -78,6 +78,18 @@ pub struct Memory {
 }
 
 /// The allocator: settings and solver. Everything that matters later is in [`Memory`].
+///
+/// ```
+/// use control::allocation::{Allocator, Command, Memory, Settings};
+/// use nalgebra::Vector3;
+///
+/// let mut allocator = Allocator::new(Settings::published())?;
+/// let mut memory = Memory::default();
+/// let command = Command { moment: Vector3::new(1e3, -2e3, 5e2), dynamic_pressure: 7e3 };
+/// allocator.update(&mut memory, 0, &command);
+/// assert!(memory.residual.norm() < 1.0, "surfaces and jets give the moment: {}", memory.residual);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Allocator {
     settings: Settings,
     /// Least and greatest deflections, rad.

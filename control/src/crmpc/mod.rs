@@ -108,6 +108,22 @@ impl Clone for Memory {
 }
 
 /// The controller: settings, offline design, solvers and scratch space. Everything that matters later is in [`Memory`].
+///
+/// ```
+/// use control::crmpc::{Constraints, Settings, Standing};
+/// use control::closed_loop::fly;
+/// use control::{Controller, Crmpc};
+/// use vehicle::Scenario;
+///
+/// let scenario = Scenario { duration: 4.0, ..Scenario::crmpc2022() };
+/// let mut law = Crmpc::new(Settings::new(Constraints::Robust))?;
+/// let mut memory = law.memory();
+/// fly(&mut law, &mut memory, &scenario, |sample| {
+///     assert_eq!(sample.memory.standing, Standing::InForce, "the limits are guaranteed from the first tick on");
+/// })?;
+/// assert_eq!(memory.report.fallbacks, 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Crmpc {
     settings: Settings,
     design: Design,

@@ -117,6 +117,20 @@ impl Clone for Memory {
 }
 
 /// The controller: settings, solvers and scratch space. Everything that matters later is in [`Memory`].
+///
+/// ```
+/// use control::closed_loop::fly;
+/// use control::dlmpc::{Dlmpc, Settings};
+/// use control::Controller;
+/// use vehicle::Scenario;
+///
+/// let mut law = Dlmpc::new(Settings::published())?;
+/// let mut memory = law.memory();
+/// let scenario = Scenario { duration: 4.0, ..Scenario::crmpc2022() };
+/// fly(&mut law, &mut memory, &scenario, |_| ())?;
+/// assert_eq!(memory.report.solves, 20, "the outer layer optimises five times a second");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Dlmpc {
     settings: Settings,
     /// Inner ticks per optimisation.

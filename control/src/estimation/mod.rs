@@ -320,6 +320,17 @@ impl Running {
 }
 
 /// The estimator.
+///
+/// ```
+/// use control::estimation::{Estimator, Health, Line, Settings};
+///
+/// let mut estimator = Estimator::new(Settings::default())?;
+/// let mut memory = estimator.memory();
+/// // Nothing has arrived on the line yet.
+/// estimator.update(&mut memory, 0.0, &Line::default());
+/// assert_eq!(memory.estimate.health, Health::Waiting);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Estimator {
     settings: Settings,

@@ -23,6 +23,17 @@ pub struct FblSettings {
 }
 
 /// M = K⁻¹ (v − B) with v = Θ̈_r − k_p e − k_d ė, (15) and (61).
+///
+/// ```
+/// use control::closed_loop::fly;
+/// use control::sliding::{Fbl, FblSettings};
+/// use vehicle::Scenario;
+///
+/// let mut law = Fbl::new(FblSettings::published())?;
+/// let summary = fly(&mut law, &mut (), &Scenario::tvsmc2015(), |_| ())?;
+/// assert!(summary.error_rms.to_degrees() < 5.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fbl {
     settings: FblSettings,

@@ -105,6 +105,22 @@ pub struct Memory<Integral> {
 }
 
 /// v = b − z₁ + ṡ, (27), with one of the reaching laws; without observer z₁ = 0.
+///
+/// ```
+/// use control::closed_loop::fly;
+/// use control::sliding::{Settings, SotvsmcDo};
+/// use control::Controller;
+/// use vehicle::Scenario;
+///
+/// let mut law = SotvsmcDo::new(Settings::sotvsmc_do())?;
+/// let mut memory = law.memory();
+/// let mut last = f64::INFINITY;
+/// fly(&mut law, &mut memory, &Scenario::tvsmc2015(), |sample| {
+///     last = (sample.measured.angles - sample.reference.angles).norm().to_degrees();
+/// })?;
+/// assert!(last < 0.01, "the observer leaves no error at rest: {last} deg");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tvsmc<R> {
     settings: Settings<R>,

@@ -5,17 +5,15 @@ pub mod draws;
 pub mod flight;
 pub mod platform;
 
+pub use control::closed_loop::CHECK;
+use control::closed_loop::{Summary, fly};
 use control::crmpc::{Constraints, Memory, Settings, Standing, Status};
 use control::lqr::LqrSettings;
 use control::report::Report;
 use control::{Controller, Crmpc, Dlmpc, Lqr, Measurement, dlmpc};
 use nalgebra::Vector3;
 use vehicle::disturbance::{Disturbance, Kind};
-use vehicle::plant::Plant;
 use vehicle::scenario::Scenario;
-
-/// Time between the checks of the rates within a tick, s.
-pub const CHECK: f64 = 0.01;
 
 /// Settings of Chai 2022 with these sets.
 pub fn settings(constraints: Constraints) -> Settings {
@@ -93,38 +91,16 @@ pub fn simulate<C: Controller>(
     disturbance: Disturbance,
     mut observe: impl FnMut(&C::Memory, u64, &Measurement),
 ) -> Outcome {
-    let scenario = Scenario::crmpc2022();
-    let mut config = scenario.config(CHECK);
-    config.inertia_scale = inertia_scale;
-    config.disturbance = disturbance;
-    let mut plant = Plant::new(&config, 0.0).unwrap();
-    let reference = |time: f64| scenario.reference.at(time);
-    let period = controller.period();
-    let ticks = (scenario.duration / period).round() as u64;
-    let checks = (period / CHECK).round() as u32;
-    let (mut error, mut effort) = (0.0, 0.0);
-    let (mut largest_rate, mut largest_moment) = (0.0f64, 0.0f64);
-    for tick in 0..ticks {
-        let time = tick as f64 * period;
-        let measured = Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
-        let moment = controller.update(memory, tick, time, &measured, &reference);
-        observe(memory, tick, &measured);
-        error += (measured.angles - reference(time).angles).norm_squared();
-        effort += (moment.norm() / scenario.limit_moment).powi(2);
-        largest_moment = largest_moment.max(moment.norm());
-        for i in 0..checks {
-            let at = |i: u32| time + f64::from(i) * CHECK;
-            // Beyond the singularity of the angles the attitude is lost.
-            if plant.advance(at(i), at(i + 1), moment).is_err() {
-                let lost = f64::INFINITY;
-                return Outcome { ems_deg: lost, cms: lost, rate: lost, moment: lost };
-            }
-            largest_rate = largest_rate.max(plant.rates().norm());
-        }
-    }
+    let scenario = Scenario { inertia_scale, disturbance, ..Scenario::crmpc2022() };
+    let flown =
+        fly(controller, memory, &scenario, |sample| observe(sample.memory, sample.tick, &sample.measured));
+    let Ok(Summary { error_rms, moment_rms, largest_rate, largest_moment }) = flown else {
+        let lost = f64::INFINITY;
+        return Outcome { ems_deg: lost, cms: lost, rate: lost, moment: lost };
+    };
     Outcome {
-        ems_deg: (error / ticks as f64).sqrt().to_degrees(),
-        cms: (effort / ticks as f64).sqrt(),
+        ems_deg: error_rms.to_degrees(),
+        cms: moment_rms / scenario.limit_moment,
         rate: largest_rate / scenario.limit_rate,
         moment: largest_moment / scenario.limit_moment,
     }

@@ -1,0 +1,94 @@
+//! A controller that flies a scenario in one process: the shortest way from a law to its errors.
+//!
+//! ```
+//! use control::closed_loop::fly;
+//! use control::crmpc::{Constraints, Settings};
+//! use control::{Controller, Crmpc};
+//! use vehicle::Scenario;
+//!
+//! let scenario = Scenario { duration: 2.0, ..Scenario::crmpc2022() };
+//! let mut law = Crmpc::new(Settings::new(Constraints::Robust))?;
+//! let mut memory = law.memory();
+//! let summary = fly(&mut law, &mut memory, &scenario, |sample| {
+//!     println!("{:.2} s: {:.0} N m", sample.time, sample.moment.norm());
+//! })?;
+//! assert!(summary.largest_rate <= scenario.limit_rate && summary.largest_moment <= scenario.limit_moment);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use crate::controller::{Controller, Measurement};
+use nalgebra::Vector3;
+use vehicle::Scenario;
+use vehicle::error::Error;
+use vehicle::plant::Plant;
+use vehicle::reference::Reference;
+
+/// Longest time between two looks at the rates within a tick, and longest integration step, s.
+pub const CHECK: f64 = 0.01;
+
+/// One tick of a flight.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample<'a, Memory> {
+    /// Number of the tick, from 0.
+    pub tick: u64,
+    /// Time of the tick, s.
+    pub time: f64,
+    /// What the controller is told.
+    pub measured: Measurement,
+    /// The reference at this time.
+    pub reference: Reference,
+    /// The moment that is held until the next tick, N m.
+    pub moment: Vector3<f64>,
+    /// What the controller carries into the next tick.
+    pub memory: &'a Memory,
+}
+
+/// What a flight amounts to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Root mean square of ‖Θ − Θ_r‖ over the ticks, rad: the EMS of Chai 2022.
+    pub error_rms: f64,
+    /// Root mean square of ‖m‖ over the ticks, N m: as a share of the limit the CMS of Chai 2022.
+    pub moment_rms: f64,
+    /// Largest ‖ω‖, looked at every [`CHECK`], rad/s.
+    pub largest_rate: f64,
+    /// Largest ‖m‖, N m.
+    pub largest_moment: f64,
+}
+
+/// Flies `scenario` with ideal measurement: inertia, start, disturbance and reference are those that it states. `observe` sees each
+/// tick after the controller's update.
+///
+/// # Errors
+/// Says which value of the scenario is at fault, or when the attitude was lost: beyond the singularity of its angles.
+pub fn fly<C: Controller>(
+    controller: &mut C,
+    memory: &mut C::Memory,
+    scenario: &Scenario,
+    mut observe: impl FnMut(&Sample<C::Memory>),
+) -> Result<Summary, Error> {
+    let mut plant = Plant::new(&scenario.config(CHECK), 0.0)?;
+    let reference = |time: f64| scenario.reference.at(time);
+    let period = controller.period();
+    let ticks = (scenario.duration / period).round() as u64;
+    let looks = (period / CHECK - 1e-9).ceil().max(1.0);
+    let mut summary = Summary::default();
+    for tick in 0..ticks {
+        let time = tick as f64 * period;
+        let measured = Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
+        let moment = controller.update(memory, tick, time, &measured, &reference);
+        let now = reference(time);
+        observe(&Sample { tick, time, measured, reference: now, moment, memory });
+        summary.error_rms += (measured.angles - now.angles).norm_squared();
+        summary.moment_rms += moment.norm_squared();
+        summary.largest_moment = summary.largest_moment.max(moment.norm());
+        for look in 0..looks as u32 {
+            let at = |look: u32| time + f64::from(look) * (period / looks);
+            plant.advance(at(look), at(look + 1), moment)?;
+            summary.largest_rate = summary.largest_rate.max(plant.rates().norm());
+        }
+    }
+    let mean = |sum: f64| (sum / ticks.max(1) as f64).sqrt();
+    (summary.error_rms, summary.moment_rms) = (mean(summary.error_rms), mean(summary.moment_rms));
+    Ok(summary)
+}

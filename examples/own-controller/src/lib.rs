@@ -1,0 +1,60 @@
+//! A control law of one's own as an FMI unit: proportional and derivative action, nonlinear terms cancelled.
+
+use control::crmpc::{Constraints, Settings};
+use control::{Controller, DesignError, Measurement, controller::ReferenceAt, linearise::moment};
+use controller_export::{ControllerFmu, Law, Vehicle};
+use fmi2_export::{Table, table::parameter};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::{dynamics::RigidBody, kinematics::r};
+
+/// The law and its parameters; `body` is that of the vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pd {
+    body: RigidBody,
+    /// Gains on the angles (1/s²) and on their rates (1/s).
+    gains: (f64, f64),
+}
+
+impl Default for Pd {
+    fn default() -> Self {
+        Self { body: Settings::new(Constraints::Robust).body, gains: (0.5, 1.5) }
+    }
+}
+
+impl Controller for Pd {
+    type Memory = ();
+
+    fn period(&self) -> f64 {
+        0.04 // s
+    }
+
+    fn update(&mut self, (): &mut (), _: u64, t: f64, x: &Measurement, at: ReferenceAt) -> Vector3<f64> {
+        let (rates, wanted) = (r(&x.angles) * x.rates, at(t));
+        let (error, error_rate) = (x.angles - wanted.angles, rates - wanted.rates);
+        let a = wanted.accelerations - error * self.gains.0 - error_rate * self.gains.1;
+        moment(&self.body, &x.angles, &rates, &a)
+    }
+}
+
+impl Law for Pd {
+    type Controller = Self;
+    type Settings = Self;
+    const NAME: &'static str = "PD";
+    const DESCRIPTION: &'static str = "Proportional and derivative attitude control";
+
+    fn declare(own: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+        own.real(parameter("gain.p", "Gain on the angles").real().min(0.0), |m| &mut m.law.gains.0)
+            .real(parameter("gain.d", "Gain on their rates").real().min(0.0), |m| &mut m.law.gains.1)
+    }
+
+    fn settings(&self, vehicle: &Vehicle) -> Self {
+        Self { body: vehicle.body, ..*self }
+    }
+
+    fn design(settings: Self) -> Result<Self, DesignError> {
+        Ok(settings)
+    }
+}
+
+fmi2_export::export_fmus!(ControllerFmu<Pd>);

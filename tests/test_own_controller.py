@@ -1,0 +1,38 @@
+"""examples/own-controller, a law outside the project's workspace: built, validated, flown and compared."""
+
+import csv
+import subprocess
+
+import numpy as np
+from fmpy.validation import validate_fmu
+
+from conftest import EXPERIMENTS, ROOT, program
+from fmi import ANGLES, MOMENT, RATES
+
+FOLDER = ROOT / "examples" / "own-controller"
+# The gains that the Riccati equation gives for P = 50, Q = 10: sqrt(P/Q), sqrt((P + 2 sqrt(P Q))/Q).
+GAINS = {"gain.p": np.sqrt(5.0), "gain.d": np.sqrt(5.0 + 2.0 * np.sqrt(5.0))}
+
+
+def columns(folder):
+    with open(folder / "results.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    moment = [f"controller.{name}" for name in MOMENT]
+    return np.array([[float(row[name]) for name in [*(f"plant.{name}" for name in ANGLES + RATES), *moment]] for row in rows])
+
+
+def test_oracle_a_law_from_outside_is_built_flown_and_agrees_with_lqr(experiment, tmp_path):
+    packed = tmp_path / "fmu" / "PD.fmu"
+    subprocess.run([ROOT / "scripts" / "pack-crate", FOLDER, packed.parent], check=True, capture_output=True)
+    assert validate_fmu(str(packed)) == []
+    assert len((FOLDER / "src" / "lib.rs").read_text().splitlines()) <= 60
+
+    # In an experiment that was written for another controller.
+    flown = tmp_path / "flown"
+    command = [program("orchestrator"), "run", EXPERIMENTS / "crmpc-robust.toml", "--fmu", f"controller={packed}", "--out", flown]
+    gains = [f"--set=controller.{name}={value!r}" for name, value in {k: float(v) for k, v in GAINS.items()}.items()]
+    subprocess.run([*command, *gains], check=True, capture_output=True)
+    found = columns(flown)
+    expected = columns(experiment("lqr"))
+    assert found.shape == expected.shape == (1251, 9)
+    assert (np.abs(found - expected).max(axis=0) <= 1e-9 * np.abs(expected).max(axis=0)).all()
