@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use vehicle::reference::Reference;
+use vehicle::reference::{Profile, Reference};
 
 /// What a controller is told about the vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,6 +17,34 @@ pub struct Measurement {
 
 /// The reference as a function of time (s): a controller with preview asks for the future too.
 pub type ReferenceAt<'a> = &'a dyn Fn(f64) -> Reference;
+
+/// What is known of the reference at a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Preview<'a> {
+    /// All of it, which does not change during an experiment.
+    Profile(&'a Profile),
+    /// The reference that is given from outside, valid until a time (s). Of what follows nothing is known: its angles are taken to stay.
+    External(Reference, f64),
+}
+
+impl Preview<'_> {
+    /// The reference at `time` (s).
+    pub fn at(&self, time: f64) -> Reference {
+        match self {
+            Self::Profile(profile) => profile.at(time),
+            Self::External(reference, until) if time <= *until => *reference,
+            Self::External(reference, _) => Reference { angles: reference.angles, ..Reference::default() },
+        }
+    }
+
+    /// The part of it that may change during an experiment.
+    pub(crate) fn external(&self) -> Option<Reference> {
+        match self {
+            Self::Profile(_) => None,
+            Self::External(reference, _) => Some(*reference),
+        }
+    }
+}
 
 /// A sampled attitude controller. `update` changes nothing but `memory` that a later call could notice, so that a tick can be
 /// evaluated again with other inputs from the same memory, and a saved memory continues bit for bit.

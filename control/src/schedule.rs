@@ -1,8 +1,9 @@
 //! The sampled side of a controller on integer ticks: t_k = t₀ + k·period, never accumulated.
 
-use crate::controller::{Controller, Measurement, ReferenceAt};
+use crate::controller::{Controller, Measurement, Preview};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use vehicle::reference::Reference;
 use vehicle::time::{check_resolution, tick_time, tick_tolerance};
 
 /// Beyond this number the time of a tick is not exact.
@@ -28,8 +29,8 @@ pub struct Sampled<Memory, Input = ControllerInput, Output = Vector3<f64>> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ControllerInput {
     measured: Measurement,
-    /// Mark of the caller's further inputs (an external reference).
-    mark: [f64; 9],
+    /// The external reference, if that is what is followed.
+    external: Option<Reference>,
 }
 
 impl<Memory, Input, Output> Sampled<Memory, Input, Output>
@@ -115,18 +116,18 @@ where
 }
 
 impl<Memory: Clone + Default> Sampled<Memory> {
-    /// Evaluates the first uncommitted tick of a controller. `mark` must change whenever `reference` does; nothing is
-    /// computed again if both inputs are the same.
+    /// Evaluates the first uncommitted tick of a controller. Nothing is computed again if measurement and external reference are
+    /// the same.
     pub fn evaluate<C: Controller<Memory = Memory>>(
         &mut self,
         controller: &mut C,
         measured: &Measurement,
-        mark: [f64; 9],
-        reference: ReferenceAt,
+        preview: &Preview,
     ) {
         let time = self.next_time(controller.period());
-        self.evaluate_with(ControllerInput { measured: *measured, mark }, |memory, tick| {
-            controller.update(memory, tick, time, measured, reference)
+        let input = ControllerInput { measured: *measured, external: preview.external() };
+        self.evaluate_with(input, |memory, tick| {
+            controller.update(memory, tick, time, measured, &|time| preview.at(time))
         });
     }
 }
@@ -134,7 +135,7 @@ impl<Memory: Clone + Default> Sampled<Memory> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use vehicle::reference::Reference;
+    use crate::controller::ReferenceAt;
 
     /// Sums what it measured, so that every evaluation that is lost or counted twice shows.
     struct Sum;
@@ -162,7 +163,7 @@ mod tests {
     }
 
     fn evaluate(sampled: &mut Sampled<f64>, x: f64) {
-        sampled.evaluate(&mut Sum, &measured(x), [0.0; 9], &|_| Reference::default());
+        sampled.evaluate(&mut Sum, &measured(x), &Preview::External(Reference::default(), 0.0));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 mod harness;
 
-use control::controller::ReferenceAt;
+use control::controller::{Preview, ReferenceAt};
 use control::crmpc::{Constraints, Settings};
 use control::delay::{Latency, Memory, Predictor, saturated};
 use control::lqr::LqrSettings;
@@ -224,7 +224,7 @@ fn without_delay_nothing_changes_by_a_bit() {
 #[test]
 fn a_tick_evaluated_again_gives_the_same_and_leaves_no_trace() {
     let reference = Scenario::crmpc2022().reference;
-    let reference = |time: f64| reference.at(time);
+    let preview = Preview::Profile(&reference);
     let at = |k: i32| Measurement {
         angles: Vector3::new(0.13, 0.17, -0.5) * (1.0 - 0.01 * f64::from(k)),
         rates: Vector3::new(0.01, -0.02, 0.01),
@@ -233,11 +233,11 @@ fn a_tick_evaluated_again_gives_the_same_and_leaves_no_trace() {
     let mut controller = delayed(lqr(), 0.117);
     let [mut once, mut often] = [0, 1].map(|_| Sampled::new(0.0, controller.memory()));
     for k in 0..10 {
-        once.evaluate(&mut controller, &at(k), [0.0; 9], &reference);
+        once.evaluate(&mut controller, &at(k), &preview);
         for other in garbage() {
-            often.evaluate(&mut controller, &other, [0.0; 9], &reference);
+            often.evaluate(&mut controller, &other, &preview);
         }
-        often.evaluate(&mut controller, &at(k), [0.0; 9], &reference);
+        often.evaluate(&mut controller, &at(k), &preview);
         assert_eq!(once.in_force(), often.in_force(), "{k}");
         once.commit();
         often.commit();

@@ -2,6 +2,7 @@
 
 mod harness;
 
+use control::controller::Preview;
 use control::dlmpc::{Memory, Plan, Report, Settings, SlidingMode, Status};
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::schedule::Sampled;
@@ -398,16 +399,17 @@ fn tuned_gains_spend_less_moment_at_no_larger_error() {
 
 #[test]
 fn another_evaluation_of_a_tick_leaves_no_trace() {
-    let reference = reference();
+    let scenario = Scenario::crmpc2022();
+    let preview = Preview::Profile(&scenario.reference);
     let garbage = harness::garbage();
     let (mut disturbed_controller, mut calm_controller) = (dlmpc(), dlmpc());
     let (mut disturbed, mut calm) =
         (Sampled::new(0.0, Memory::default()), Sampled::new(0.0, Memory::default()));
     for Recorded { tick, measured, .. } in recorded().iter().take(300) {
         let wrong = &garbage[*tick as usize / 5 % garbage.len()];
-        disturbed.evaluate(&mut disturbed_controller, wrong, [0.0; 9], &reference);
-        disturbed.evaluate(&mut disturbed_controller, measured, [0.0; 9], &reference);
-        calm.evaluate(&mut calm_controller, measured, [0.0; 9], &reference);
+        disturbed.evaluate(&mut disturbed_controller, wrong, &preview);
+        disturbed.evaluate(&mut disturbed_controller, measured, &preview);
+        calm.evaluate(&mut calm_controller, measured, &preview);
         let ((moment, memory), (calm_moment, calm_memory)) = (disturbed.in_force(), calm.in_force());
         assert_eq!(moment, calm_moment, "tick {tick}");
         assert_eq!(timeless(memory), timeless(calm_memory), "tick {tick}");
@@ -419,14 +421,15 @@ fn another_evaluation_of_a_tick_leaves_no_trace() {
 #[test]
 fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
     let recorded = recorded();
-    let reference = reference();
+    let scenario = Scenario::crmpc2022();
+    let preview = Preview::Profile(&scenario.reference);
     let mut used = dlmpc();
     let mut sampled = Sampled::new(0.0, Memory::default());
     for (tick, Recorded { measured, .. }) in recorded.iter().enumerate().take(750) {
         // Within and at the beginning of an optimisation period, with the tick evaluated and not.
         if tick % 7 == 3 {
             if tick % 2 == 0 {
-                sampled.evaluate(&mut used, measured, [0.0; 9], &reference);
+                sampled.evaluate(&mut used, measured, &preview);
             }
             let saved = postcard::to_stdvec(&sampled).unwrap();
             let mut restored: Sampled<Memory> = postcard::from_bytes(&saved).unwrap();
@@ -434,7 +437,7 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
             let mut fresh = dlmpc();
             for later in &recorded[tick..tick + 7] {
                 for (sampled, controller) in [(&mut restored, &mut fresh), (&mut copy, &mut used)] {
-                    sampled.evaluate(controller, &later.measured, [0.0; 9], &reference);
+                    sampled.evaluate(controller, &later.measured, &preview);
                 }
                 let ((moment, memory), (moment_used, memory_used)) = (restored.in_force(), copy.in_force());
                 assert_eq!(moment, moment_used, "saved at tick {tick}");
@@ -443,7 +446,7 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
                 copy.commit();
             }
         }
-        sampled.evaluate(&mut used, measured, [0.0; 9], &reference);
+        sampled.evaluate(&mut used, measured, &preview);
         sampled.commit();
     }
 }

@@ -2,6 +2,7 @@
 
 mod harness;
 
+use control::controller::Preview;
 use control::crmpc::{Constraints, InitialState, Memory, Plan, Report, Settings, Standing, Status};
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::schedule::Sampled;
@@ -447,7 +448,8 @@ fn a_solver_that_fails_from_the_start_is_outlived() {
 
 #[test]
 fn another_evaluation_of_a_tick_leaves_no_trace() {
-    let reference = reference();
+    let scenario = Scenario::crmpc2022();
+    let preview = Preview::Profile(&scenario.reference);
     let garbage = harness::garbage();
     let mut truth = Vec::new();
     simulate(
@@ -463,9 +465,9 @@ fn another_evaluation_of_a_tick_leaves_no_trace() {
         (Sampled::new(0.0, Memory::default()), Sampled::new(0.0, Memory::default()));
     for (tick, measured) in truth.iter().enumerate().take(300) {
         let wrong = &garbage[tick / 5 % garbage.len()];
-        disturbed.evaluate(&mut disturbed_controller, wrong, [0.0; 9], &reference);
-        disturbed.evaluate(&mut disturbed_controller, measured, [0.0; 9], &reference);
-        calm.evaluate(&mut calm_controller, measured, [0.0; 9], &reference);
+        disturbed.evaluate(&mut disturbed_controller, wrong, &preview);
+        disturbed.evaluate(&mut disturbed_controller, measured, &preview);
+        calm.evaluate(&mut calm_controller, measured, &preview);
         let ((moment, memory), (calm_moment, calm_memory)) = (disturbed.in_force(), calm.in_force());
         assert_eq!(moment, calm_moment, "tick {tick} {:?} {:?}", memory.report, calm_memory.report);
         assert_eq!(timeless(memory), timeless(calm_memory), "tick {tick}");
@@ -485,14 +487,15 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
             disturbance(Kind::White),
             |_, _, &measured| truth.push(measured),
         );
-        let reference = reference();
+        let scenario = Scenario::crmpc2022();
+        let preview = Preview::Profile(&scenario.reference);
         let mut used = controller(constraints);
         let mut sampled = Sampled::new(0.0, Memory::default());
         for (tick, measured) in truth.iter().enumerate().take(750) {
             // Within and at the beginning of an optimisation period, with the tick evaluated and not.
             if tick % 7 == 3 {
                 if tick % 2 == 0 {
-                    sampled.evaluate(&mut used, measured, [0.0; 9], &reference);
+                    sampled.evaluate(&mut used, measured, &preview);
                 }
                 let saved = postcard::to_stdvec(&sampled).unwrap();
                 let mut restored: Sampled<Memory> = postcard::from_bytes(&saved).unwrap();
@@ -500,7 +503,7 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
                 let mut fresh = controller(constraints);
                 for later in &truth[tick..tick + 7] {
                     for (sampled, controller) in [(&mut restored, &mut fresh), (&mut copy, &mut used)] {
-                        sampled.evaluate(controller, later, [0.0; 9], &reference);
+                        sampled.evaluate(controller, later, &preview);
                     }
                     let ((moment, memory), (moment_used, memory_used)) =
                         (restored.in_force(), copy.in_force());
@@ -510,7 +513,7 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
                     copy.commit();
                 }
             }
-            sampled.evaluate(&mut used, measured, [0.0; 9], &reference);
+            sampled.evaluate(&mut used, measured, &preview);
             sampled.commit();
         }
     }

@@ -1,5 +1,6 @@
 //! The reference a controller follows: a paper's profile, a simple course, a table, or the external inputs.
 
+use control::controller::Preview;
 use fmi2_export::{Context, Enumeration, Failure};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -102,13 +103,11 @@ impl Source {
         }
     }
 
-    /// The reference at `time` (s) as it is known at `now` (s). Of the external one nothing is known beyond now: its angles
-    /// are taken to stay.
-    pub(crate) fn at(&self, time: f64, now: f64, external: &Reference) -> Reference {
+    /// What is known of it where the external reference holds until `known` (s).
+    pub(crate) fn preview(&self, known: f64, external: &Reference) -> Preview<'_> {
         match self {
-            Self::Profile(profile) => profile.at(time),
-            Self::External if time <= now => *external,
-            Self::External => Reference { angles: external.angles, ..Reference::default() },
+            Self::Profile(profile) => Preview::Profile(profile),
+            Self::External => Preview::External(*external, known),
         }
     }
 }

@@ -157,15 +157,7 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
         let now = ticks.next_time(controller.period());
         // Of an external reference the law takes the present value for that of the time at which its moment acts.
         let known = now + controller.acts_after();
-        let external = match source {
-            Source::External => input.reference,
-            Source::Profile(_) => Reference::default(),
-        };
-        let mut mark = [0.0; 9];
-        for (i, part) in [external.angles, external.rates, external.accelerations].iter().enumerate() {
-            mark[3 * i..3 * i + 3].copy_from_slice(part.as_slice());
-        }
-        ticks.evaluate(controller, &measured, mark, &|time| source.at(time, known, &external));
+        ticks.evaluate(controller, &measured, &source.preview(known, &input.reference));
         if ticks.in_force().0.iter().all(|value| value.is_finite()) {
             return Ok(());
         }
@@ -182,7 +174,7 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
         self.law.show(&memory.inner);
         self.output = Output {
             moment: device.controller.saturated(moment),
-            reference: self.source.at(time, time, &self.input.reference),
+            reference: self.source.preview(time, &self.input.reference).at(time),
         };
     }
 
