@@ -1,6 +1,6 @@
 //! Time of one optimisation of CRMPC and of DLMPC's outer layer on the scenario of Chai 2022 (white noise, inertia + 5 %).
 //!
-//! First the distribution over every sample of 50 s is printed, with the exits that come before the cone programme of the whole
+//! First the distribution over every sample of 50 s is printed, with the exits that come before the cone program of the whole
 //! horizon, and without. Each sample is repeated from the same memory, and the smallest time counts: what else the machine
 //! does can only add to it. Then Criterion takes single samples of CRMPC apart.
 

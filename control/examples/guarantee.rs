@@ -7,7 +7,7 @@
 //! prints the largest bound of the disturbance that is accepted, and what is left of the moment at the published one.
 
 use control::crmpc::{Constraints, Design, Guarantee, Settings};
-use control::sampled::Gain;
+use control::error_dynamics::Gain;
 
 fn main() {
     println!(

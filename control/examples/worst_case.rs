@@ -14,8 +14,8 @@ mod harness;
 
 use cmaes::{CMAESOptions, DVector};
 use control::crmpc::{Constraints, Design, Settings};
+use control::error_dynamics::Gain;
 use control::mpc::SolverSettings;
-use control::sampled::Gain;
 use harness::flight::{Course, Flight, Random, Shown, Sight};
 use harness::in_parallel;
 use nalgebra::Vector3;

@@ -2,20 +2,19 @@
 
 pub mod allocation;
 pub mod closed_loop;
-mod cone;
+mod conic_program;
 pub mod controller;
 pub mod crmpc;
 pub mod delay;
 pub mod dlmpc;
 pub mod error;
+pub mod error_dynamics;
 pub mod estimation;
 pub mod linearise;
 pub mod lqr;
 pub mod mpc;
 pub mod report;
-pub mod sampled;
 pub mod schedule;
-pub mod settings;
 pub mod sliding;
 pub mod two_loop;
 

@@ -2,12 +2,12 @@
 //! Tolerances are half a unit of the last digit that is printed.
 
 use control::DesignError;
+use control::crmpc::Published;
 use control::crmpc::{
     Constraints, Design, Guarantee, PaperConstants, Settings, held_terminal_weight, step_response_peak,
     terminal_weight,
 };
-use control::sampled::{Gain, SampledError};
-use control::settings::Published;
+use control::error_dynamics::{Gain, SampledError};
 use nalgebra::{Matrix2, Vector2};
 
 fn settings() -> Settings {
@@ -273,7 +273,7 @@ fn oracle_constant_disturbance_reaches_the_peak_of_the_step_response_only() {
 
 mod properties {
     use super::{PUBLISHED_CASES, Simulation, gain};
-    use control::sampled::SampledError;
+    use control::error_dynamics::SampledError;
     use nalgebra::Vector2;
     use proptest::prelude::*;
 
@@ -302,7 +302,7 @@ mod properties {
             k1 in -30.0..-0.1f64, k2 in -30.0..-0.1f64, period in 0.001..0.2f64,
             angle in -1.0..1.0f64, rate in -1.0..1.0f64, disturbance in -1.0..1.0f64,
         ) {
-            let gain = control::sampled::Gain { k1, k2 };
+            let gain = control::error_dynamics::Gain { k1, k2 };
             let mut simulation = Simulation { gain, period, deviation: Vector2::new(angle, rate) };
             let ours = SampledError::new(gain, period).advance(&simulation.deviation, disturbance);
             simulation.advance(&[disturbance; 7]);

@@ -64,14 +64,14 @@ fn optimisations() -> Vec<Recorded> {
 
 // Outer layer
 
-/// The programme written out in its commands v_0 … v_{N−1} alone.
-struct Programme {
+/// The program written out in its commands v_0 … v_{N−1} alone.
+struct ConicProgram {
     settings: Settings,
     time: f64,
     start: Vector3<f64>,
 }
 
-impl Programme {
+impl ConicProgram {
     fn angles(&self, v: &DVector<f64>) -> Vec<Vector3<f64>> {
         let mut angles = vec![self.start];
         for k in 0..self.settings.horizon {
@@ -122,12 +122,12 @@ fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
         let mut memory = Memory::default();
         dlmpc().update(&mut memory, 0, time, &measured, &reference());
         assert_eq!(memory.report.status, Status::Constrained);
-        let programme = Programme { settings, time, start };
+        let program = ConicProgram { settings, time, start };
         let v = DVector::from_iterator(
             3 * settings.horizon,
             memory.plan.commands.iter().flat_map(|v| [v.x, v.y, v.z]),
         );
-        assert!((memory.report.cost - programme.cost(&v)).abs() < 1e-9 * programme.cost(&v));
+        assert!((memory.report.cost - program.cost(&v)).abs() < 1e-9 * program.cost(&v));
 
         let derivative = |of: &dyn Fn(&DVector<f64>) -> DVector<f64>, i: usize| {
             let (mut plus, mut minus) = (v.clone(), v.clone());
@@ -135,16 +135,16 @@ fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
             minus[i] -= step;
             (of(&plus) - of(&minus)) / (2.0 * step)
         };
-        let cost = |v: &DVector<f64>| DVector::repeat(1, programme.cost(v));
+        let cost = |v: &DVector<f64>| DVector::repeat(1, program.cost(v));
         let gradient = DVector::from_fn(v.len(), |i, _| derivative(&cost, i)[0]);
-        let constraints = programme.constraints(&v);
+        let constraints = program.constraints(&v);
         let scale = settings.limit_rate.powi(2);
         assert!(constraints.max() <= 1e-6 * scale, "{}", constraints.max() / scale);
         let active: Vec<usize> = (0..constraints.len()).filter(|&k| constraints[k] > -1e-5 * scale).collect();
         assert!(active.len() >= 2, "{active:?}");
         let columns: Vec<_> = (0..v.len())
             .map(|i| {
-                let slope = derivative(&|v| programme.constraints(v), i);
+                let slope = derivative(&|v| program.constraints(v), i);
                 DVector::from_iterator(active.len(), active.iter().map(|&k| slope[k]))
             })
             .collect();

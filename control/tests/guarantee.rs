@@ -4,7 +4,7 @@
 mod harness;
 
 use control::crmpc::{Constraints, Guarantee, Settings};
-use control::sampled::Gain;
+use control::error_dynamics::Gain;
 use harness::flight::{Course, Flight, Shown, Sight, Tried, random_settings, tried};
 use harness::{constant, in_parallel, run, settings};
 use nalgebra::Vector3;

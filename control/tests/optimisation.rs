@@ -27,7 +27,7 @@ fn controller(constraints: Constraints) -> Crmpc {
     Crmpc::new(settings(constraints)).unwrap()
 }
 
-/// The same with the cone programme of the whole horizon at every sample.
+/// The same with the cone program of the whole horizon at every sample.
 fn cone(constraints: Constraints) -> Crmpc {
     let settings = settings(constraints);
     let solver = SolverSettings { method: Method::Cone, exits: false, ..settings.solver };

@@ -6,7 +6,7 @@ mod balls;
 use balls::Sets;
 use control::mpc::Budget;
 use control::mpc::certificate::Certificate;
-use control::mpc::cone::{Cone, Structure};
+use control::mpc::conic::{ConicSolver, Structure};
 use control::mpc::lq::Unconstrained;
 use control::mpc::problem::{End, Frozen, Outcome, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
@@ -89,7 +89,7 @@ struct Solvers {
     chain: Chain<2>,
     unconstrained: Unconstrained<2>,
     riccati: Riccati<2>,
-    cone: Cone<2>,
+    cone: ConicSolver<2>,
     frozen: Frozen<2>,
     affine: Vec<State<2>>,
 }
@@ -101,7 +101,7 @@ impl Solvers {
     fn new(shape: Shape, start: Option<[Vec<SVector<f64, 2>>; 3]>) -> Self {
         let chain = Chain::new(0.2);
         let faces = start.iter().flatten().map(Vec::len).sum();
-        let cone = Cone::new(Structure {
+        let cone = ConicSolver::new(Structure {
             chain,
             cost: shape.cost,
             horizon: shape.horizon,
@@ -277,7 +277,7 @@ fn an_infeasible_problem_is_recognised_within_the_iteration_limit() {
 
 #[test]
 fn oracle_riccati_and_cone_agree_where_the_start_is_free_within_a_set() {
-    use control::sampled::{Gain, SampledError};
+    use control::error_dynamics::{Gain, SampledError};
     let set = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04).invariant_set(0.0).unwrap();
     let normals: [Vec<SVector<f64, 2>>; 3] =
         [0.03, 0.05, 0.1].map(|bound| set.normals().iter().map(|normal| normal / bound).collect());

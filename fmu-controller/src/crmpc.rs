@@ -3,8 +3,8 @@
 use crate::solver;
 use control::crmpc::{Constraints, Crmpc, Guarantee, InitialState, Margins, Memory, Settings, Standing};
 use control::error::DesignError;
+use control::error_dynamics::Gain;
 use control::report::Report;
-use control::sampled::Gain;
 use controller_export::table::{self, ANGLES, sampled_output, shown, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::table::parameter;

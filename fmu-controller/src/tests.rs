@@ -4,7 +4,7 @@ use crate::crmpc::CrmpcLaw;
 use crate::dlmpc::DlmpcLaw;
 use crate::tvsmc::{self, TvsmcLaw};
 use crate::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo};
-use control::sampled::Gain;
+use control::error_dynamics::Gain;
 use controller_export::reference::Choice;
 use controller_export::{ControllerFmu, Law};
 use fmi2_export::{Context, Failure, Inputs, Model, describe};

@@ -4,7 +4,7 @@ use crate::interval::Interval;
 use crate::lemmas::{Finding, ROUNDING};
 use crate::sums::{Axis, Bounds};
 use control::crmpc::{Deviation, InitialState, Lemmas, Settings, Tightening};
-use control::sampled::SampledError;
+use control::error_dynamics::SampledError;
 
 /// What drives the deviation.
 struct Drive {

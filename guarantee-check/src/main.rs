@@ -6,7 +6,7 @@
 
 use clap::Parser;
 use control::crmpc::{Constraints, Settings};
-use control::sampled::Gain;
+use control::error_dynamics::Gain;
 use guarantee_check::Report;
 use std::process::ExitCode;
 use vehicle::dynamics::Inertia;

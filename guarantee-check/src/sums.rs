@@ -5,7 +5,7 @@
 
 use crate::interval::Interval;
 use control::crmpc::{Settings, held_terminal_weight, terminal_weight};
-use control::sampled::{Gain, SampledError};
+use control::error_dynamics::{Gain, SampledError};
 use nalgebra::{Matrix2, Vector2};
 
 type Matrix = [[Interval; 2]; 2];

@@ -1,7 +1,7 @@
 //! The check for published and other settings, and that it can fail.
 
 use control::crmpc::{Constraints, Guarantee, InitialState, Lemmas, Settings};
-use control::sampled::Gain;
+use control::error_dynamics::Gain;
 use guarantee_check::lemmas::{self, Finding};
 use guarantee_check::{Report, assessment, dynamics};
 use vehicle::dynamics::Inertia;

@@ -1,15 +1,15 @@
 //! Control allocation: which deflections and which jets give the commanded moment. Wu et al. (2015), section 5, and the selector
 //! of Jia et al., section IV.
 
-mod cone;
+mod optimum;
 pub mod pwpf;
 mod settings;
 
 pub use settings::{JetCommand, Method, Settings};
 
 use crate::error::DesignError;
-use cone::{ConeProblem, Weights};
 use nalgebra::{SMatrix, Vector3};
+use optimum::{OptimalAllocation, Weights};
 use pwpf::Modulator;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -96,9 +96,9 @@ pub struct Allocator {
     limits: (Surfaces, Surfaces),
     /// Ticks per allocation.
     ratio: u64,
-    problem: ConeProblem,
+    problem: OptimalAllocation,
     /// The same without jets, for blending.
-    without_jets: ConeProblem,
+    without_jets: OptimalAllocation,
 }
 
 /// A rest of the moment that is rounding, as a fraction of the moment.
@@ -121,7 +121,7 @@ impl Allocator {
         };
         let jets = &settings.effectors.jet_moments;
         let problem = |weights, jets: &JetMatrix| {
-            ConeProblem::new(weights, jets, settings.max_iterations).map_err(DesignError::Solver)
+            OptimalAllocation::new(weights, jets, settings.max_iterations).map_err(DesignError::Solver)
         };
         let alone = Weights { moment: weights.moment.component_mul(&scarcity(jets)), ..weights };
         let (problem, without_jets) = (problem(weights, jets)?, problem(alone, &JetMatrix::zeros())?);

@@ -3,8 +3,8 @@
 use super::guarantee::{self, Assessment, Tightening};
 use crate::delay;
 use crate::error::DesignError;
+use crate::error_dynamics::{Gain, InvariantSet, Reach, SampledError};
 use crate::mpc::SolverSettings;
-use crate::sampled::{Gain, InvariantSet, Reach, SampledError};
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;

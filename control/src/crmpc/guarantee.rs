@@ -8,7 +8,7 @@ pub use lemmas::Lemmas;
 
 use super::design::{InitialState, Settings};
 use crate::error::DesignError;
-use crate::sampled::{Reach, SampledError};
+use crate::error_dynamics::{Reach, SampledError};
 use nalgebra::Vector3;
 use std::f64::consts::SQRT_2;
 

@@ -7,6 +7,7 @@ mod design;
 mod guarantee;
 mod observer;
 mod plan;
+mod published;
 mod sets;
 
 pub use crate::report::{Report, Status};
@@ -19,13 +20,14 @@ pub use guarantee::Lemmas;
 pub use guarantee::{Assessment, Deviation, Geometry, Tightening};
 pub use observer::Observed;
 pub use plan::Plan;
+pub use published::Published;
 pub use sets::{Bounds, Margins};
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
+use crate::error_dynamics::InvariantSet;
 use crate::linearise;
 use crate::mpc::{self, Chain, Cost, Layout, Motion, Nonlinearity, Optimiser, State, per_axis};
-use crate::sampled::InvariantSet;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use sets::{Certified, Sets};

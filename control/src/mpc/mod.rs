@@ -7,7 +7,7 @@
 
 pub mod budget;
 pub mod certificate;
-pub mod cone;
+pub mod conic;
 pub mod lq;
 pub mod optimiser;
 pub mod problem;

@@ -2,7 +2,7 @@
 
 use super::budget::Budget;
 use super::certificate::Certificate;
-use super::cone::{Cone, Structure};
+use super::conic::{ConicSolver, Structure};
 use super::lq::Unconstrained;
 use super::problem::{
     Chain, Constraints, Cost, End, From, Frozen, Motion, Multipliers, Problem, Solution, Start, State,
@@ -163,7 +163,7 @@ pub struct Optimiser<const O: usize> {
     budget: Budget,
     unconstrained: Unconstrained<O>,
     riccati: Riccati<O>,
-    cone: Cone<O>,
+    cone: ConicSolver<O>,
     frozen: Frozen<O>,
     about: Motion<O>,
     solution: Solution<O>,
@@ -181,7 +181,7 @@ impl<const O: usize> Optimiser<O> {
     /// The cone solver's message if it refuses the data.
     pub fn new(layout: Layout<O>, settings: SolverSettings) -> Result<Self, String> {
         let Layout { chain, cost, horizon, start, .. } = &layout;
-        let cone = Cone::new(Structure {
+        let cone = ConicSolver::new(Structure {
             chain: *chain,
             cost: *cost,
             horizon: *horizon,

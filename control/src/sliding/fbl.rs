@@ -2,8 +2,8 @@
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
+use crate::error_dynamics::{Gain, SampledError};
 use crate::linearise;
-use crate::sampled::{Gain, SampledError};
 use crate::sliding::{all_positive, tracking_error};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

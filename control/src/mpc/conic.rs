@@ -1,11 +1,11 @@
-//! The problem with its balls linearised, as a second-order cone programme for Clarabel: the judge of [`super::riccati`], and what
+//! The problem with its balls linearised, as a second-order cone program for Clarabel: the judge of [`super::riccati`], and what
 //! takes over where that fails.
 //!
 //! Unknowns are the errors E_k, k = 0..=N, scaled; the inputs are eliminated, as the last derivative's error moves by
 //! h v_k = E_{k+1} − E_k − d_k.
 
 use super::problem::{Balls, Cost, Frozen, Outcome, Problem, Solution, Start, of_axis};
-use crate::cone::{Optimum, Programme, Triplets};
+use crate::conic_program::{ConicProgram, Optimum, Triplets};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT, ZeroConeT};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -31,10 +31,10 @@ pub struct Structure<const O: usize> {
     pub max_iterations: u32,
 }
 
-/// The programme with its solver.
-pub struct Cone<const O: usize> {
+/// The program with its solver.
+pub struct ConicSolver<const O: usize> {
     structure: Structure<O>,
-    programme: Programme,
+    program: ConicProgram,
     /// Where each stage's ball coefficients stand in the matrix, and its rows in the right side.
     state_slots: Vec<Slots<O>>,
     input_slots: Vec<Slots<O>>,
@@ -50,8 +50,8 @@ struct Slots<const O: usize> {
     next: Option<[[usize; 3]; 3]>,
 }
 
-impl<const O: usize> Cone<O> {
-    /// Sets the programme up.
+impl<const O: usize> ConicSolver<O> {
+    /// Sets the program up.
     ///
     /// # Errors
     /// The solver's own message if it refuses the data, for example weights that are not positive semidefinite.
@@ -150,8 +150,8 @@ impl<const O: usize> Cone<O> {
             right_side[slots.row] = 1.0;
         }
         let cost = cost_matrix(&structure);
-        let programme = Programme::new(cost, matrix, right_side, &cones, structure.max_iterations)?;
-        Ok(Self { structure, programme, state_slots, input_slots, start_row, terminal_row })
+        let program = ConicProgram::new(cost, matrix, right_side, &cones, structure.max_iterations)?;
+        Ok(Self { structure, program, state_slots, input_slots, start_row, terminal_row })
     }
 
     /// The optimum of `problem`, replacing the motion in `solution` if it is found; within so many iterations and so long (s).
@@ -162,9 +162,9 @@ impl<const O: usize> Cone<O> {
         (iterations, seconds): (u32, f64),
     ) -> Outcome {
         self.update(problem);
-        self.programme.limit(iterations.min(self.structure.max_iterations), seconds);
+        self.program.limit(iterations.min(self.structure.max_iterations), seconds);
         let Structure { chain, scale, horizon: n, .. } = &self.structure;
-        let (found, iterations) = self.programme.solve();
+        let (found, iterations) = self.program.solve();
         let Some(Optimum { x, duals }) = found else { return Outcome::Failed(iterations) };
         let Solution { motion, multipliers } = solution;
         for (k, x) in x.chunks_exact(3 * O).enumerate() {
@@ -213,15 +213,15 @@ impl<const O: usize> Cone<O> {
         let Structure { chain, cost, scale, .. } = &self.structure;
         let top = O - 1;
         let h = chain.step;
-        self.programme.linear_cost.fill(0.0);
+        self.program.linear_cost.fill(0.0);
         for (k, d) in problem.affine.iter().enumerate() {
             for axis in 0..3 {
                 // V/h² (E_{k+1} − E_k − d)² of the last derivative
                 let slope = 2.0 * cost.input[axis] / (h * h) * d[top][axis] * scale[top];
-                self.programme.linear_cost[3 * (O * k + top) + axis] += slope;
-                self.programme.linear_cost[3 * (O * (k + 1) + top) + axis] -= slope;
+                self.program.linear_cost[3 * (O * k + top) + axis] += slope;
+                self.program.linear_cost[3 * (O * (k + 1) + top) + axis] -= slope;
                 for i in 0..top {
-                    self.programme.right_side[3 * (top * k + i) + axis] =
+                    self.program.right_side[3 * (top * k + i) + axis] =
                         (d[i][axis] - chain.b[i] / h * d[top][axis]) / scale[i];
                 }
             }
@@ -229,7 +229,7 @@ impl<const O: usize> Cone<O> {
         match &problem.start {
             Start::Fixed(given) => {
                 for i in 0..3 * O {
-                    self.programme.right_side[self.start_row + i] = given[i / 3][i % 3] / scale[i / 3];
+                    self.program.right_side[self.start_row + i] = given[i / 3][i % 3] / scale[i / 3];
                 }
             }
             Start::Arrival(..) => {}
@@ -238,8 +238,8 @@ impl<const O: usize> Cone<O> {
                 for (axis, normals) in normals.iter().enumerate() {
                     for normal in normals {
                         let at: f64 = (0..O).map(|i| normal[i] * given[i][axis]).sum();
-                        self.programme.right_side[row] = 1.0 - at;
-                        self.programme.right_side[row + 1] = 1.0 + at;
+                        self.program.right_side[row] = 1.0 - at;
+                        self.program.right_side[row + 1] = 1.0 + at;
                         row += 2;
                     }
                 }
@@ -247,28 +247,28 @@ impl<const O: usize> Cone<O> {
         }
         let balls = problem.constraints.stages();
         for (slots, Balls { state, .. }) in self.state_slots.iter().zip(&balls[1..]) {
-            write_ball(&mut self.programme, slots, &state.by_state, &state.value, scale);
+            write_ball(&mut self.program, slots, &state.by_state, &state.value, scale);
         }
         for (k, (slots, Balls { input, .. })) in self.input_slots.iter().zip(balls).enumerate() {
             let by_difference = input.by_input / h;
             let mut by_state = input.by_state;
             by_state[top] -= by_difference;
             let value = input.value - by_difference * problem.affine[k][top];
-            write_ball(&mut self.programme, slots, &by_state, &value, scale);
+            write_ball(&mut self.program, slots, &by_state, &value, scale);
             for (i, places) in slots.next.iter().flatten().enumerate() {
                 for (j, &place) in places.iter().enumerate() {
-                    self.programme.matrix[place] = -by_difference[(i, j)] * scale[top];
+                    self.program.matrix[place] = -by_difference[(i, j)] * scale[top];
                 }
             }
         }
         if let (Some(row), Some(radius)) = (self.terminal_row, problem.end.radius) {
-            self.programme.right_side[row] = radius / scale[0];
+            self.program.right_side[row] = radius / scale[0];
         }
     }
 }
 
 fn write_ball<const O: usize>(
-    programme: &mut Programme,
+    program: &mut ConicProgram,
     slots: &Slots<O>,
     by_state: &[Matrix3<f64>; O],
     value: &Vector3<f64>,
@@ -277,12 +277,12 @@ fn write_ball<const O: usize>(
     for (component, places) in slots.here.iter().enumerate() {
         for (i, places) in places.iter().enumerate() {
             for (axis, &place) in places.iter().enumerate() {
-                programme.matrix[place] = -by_state[i][(component, axis)] * scale[i];
+                program.matrix[place] = -by_state[i][(component, axis)] * scale[i];
             }
         }
-        programme.right_side[slots.row + 1 + component] = value[component];
+        program.right_side[slots.row + 1 + component] = value[component];
     }
-    programme.right_side[slots.row] = 1.0;
+    program.right_side[slots.row] = 1.0;
 }
 
 /// Lᵀ with G = L Lᵀ; zero where G is zero.

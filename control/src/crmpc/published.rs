@@ -1,8 +1,8 @@
 //! The published settings, from `data/crmpc-2022.toml`.
 
-use crate::crmpc::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
+use super::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
+use crate::error_dynamics::Gain;
 use crate::mpc::SolverSettings;
-use crate::sampled::Gain;
 use serde::Deserialize;
 use std::sync::LazyLock;
 use vehicle::scenario::Scenario;
@@ -91,7 +91,7 @@ pub struct Published {
 fn embedded() -> &'static File {
     // Cannot fail: every test that uses the published settings reads it.
     static READ: LazyLock<File> = LazyLock::new(|| {
-        toml::from_str(include_str!("../data/crmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
+        toml::from_str(include_str!("../../data/crmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
     });
     &READ
 }

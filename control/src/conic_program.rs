@@ -39,7 +39,7 @@ impl Triplets {
 
 /// Minimise ½ xᵀP x + qᵀx subject to A x + s = b, s in a product of cones. The vectors are the solver's data, to be changed
 /// between solves.
-pub(crate) struct Programme {
+pub(crate) struct ConicProgram {
     solver: DefaultSolver<f64>,
     /// Values of P, upper triangle in compressed columns.
     pub(crate) cost: Vec<f64>,
@@ -57,7 +57,7 @@ pub(crate) struct Optimum<'a> {
     pub(crate) duals: &'a [f64],
 }
 
-impl Programme {
+impl ConicProgram {
     /// Sets the solver up for these patterns.
     ///
     /// # Errors

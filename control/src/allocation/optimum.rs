@@ -1,11 +1,11 @@
-//! (60) of Wu 2015 subject to (59), (63), (65) as a second-order cone programme.
+//! (60) of Wu 2015 subject to (59), (63), (65) as a second-order cone program.
 //!
 //! Unknowns are t, x and u: t bounds the norm, δ_A = middle + half ∘ x with −1 ≤ x ≤ 1, and δ_RCS = u. Between the two bounds that
-//! range and rate leave to a surface lies middle ± half; a surface that may not move has half = 0, so that the programme always
+//! range and rate leave to a surface lies middle ± half; a surface that may not move has half = 0, so that the program always
 //! has an interior.
 
 use super::SurfaceMatrix;
-use crate::cone::{Programme, Triplets};
+use crate::conic_program::{ConicProgram, Triplets};
 use clarabel::solver::SupportedConeT::{NonnegativeConeT, SecondOrderConeT};
 use nalgebra::{SMatrix, Vector3};
 use vehicle::effectors::{JETS, Jets, SURFACES, Surfaces};
@@ -27,16 +27,16 @@ pub(super) struct Weights {
     pub surface: Surfaces,
 }
 
-/// The programme with its solver.
-pub(super) struct ConeProblem {
-    programme: Programme,
+/// The program with its solver.
+pub(super) struct OptimalAllocation {
+    program: ConicProgram,
     weights: Weights,
     /// Where the numbers of D_A stand.
     surface_slots: [[usize; 3]; SURFACES],
 }
 
-impl ConeProblem {
-    /// Sets the programme up.
+impl OptimalAllocation {
+    /// Sets the program up.
     ///
     /// # Errors
     /// The solver's own message if it refuses the data.
@@ -77,10 +77,10 @@ impl ConeProblem {
         }
         let cones = [NonnegativeConeT(BOX_ROWS), SecondOrderConeT(4)];
         let cost = cost.compress(COLUMNS, COLUMNS).0;
-        let mut programme = Programme::new(cost, matrix, right_side, &cones, max_iterations)?;
-        programme.linear_cost[0] = MOMENT_SCALE;
-        programme.linear_cost[1 + SURFACES..].copy_from_slice(weights.jet.as_slice());
-        Ok(Self { programme, weights, surface_slots })
+        let mut program = ConicProgram::new(cost, matrix, right_side, &cones, max_iterations)?;
+        program.linear_cost[0] = MOMENT_SCALE;
+        program.linear_cost[1 + SURFACES..].copy_from_slice(weights.jet.as_slice());
+        Ok(Self { program, weights, surface_slots })
     }
 
     /// The optimum for the moment `moment` (N m), if it is found, and the iterations. `matrix` is D_A in N m/rad.
@@ -95,16 +95,16 @@ impl ConeProblem {
         let weight = self.weights.moment / MOMENT_SCALE;
         for (j, slots) in self.surface_slots.iter().enumerate() {
             let square = self.weights.surface[j] * half[j];
-            self.programme.cost[j] = square * half[j];
-            self.programme.linear_cost[1 + j] = square * middle[j];
+            self.program.cost[j] = square * half[j];
+            self.program.linear_cost[1 + j] = square * middle[j];
             for (i, &slot) in slots.iter().enumerate() {
-                self.programme.matrix[slot] = weight[i] * matrix[(i, j)] * half[j];
+                self.program.matrix[slot] = weight[i] * matrix[(i, j)] * half[j];
             }
         }
         for i in 0..3 {
-            self.programme.right_side[BOX_ROWS + 1 + i] = weight[i] * rest[i];
+            self.program.right_side[BOX_ROWS + 1 + i] = weight[i] * rest[i];
         }
-        let (solution, iterations) = self.programme.solve();
+        let (solution, iterations) = self.program.solve();
         let solution = solution.map(|optimum| optimum.x);
         let found = solution.map(|solution| {
             let x = Surfaces::from_column_slice(&solution[1..=SURFACES]);
