@@ -55,11 +55,11 @@ def library(crate: str) -> Path:
 
 
 def example(name: str) -> Path:
-    """A built example of the orchestrator: `cargo test` builds them too."""
+    """A built example of a crate: `cargo test` builds them too."""
     file = name + (".exe" if os.name == "nt" else "")
     candidates = [TARGET / profile / "examples" / file for profile in ("release", "debug")]
     found = [path for path in candidates if path.is_file()]
-    assert found, f"none of {candidates} exists: run cargo build -p orchestrator --example {name}"
+    assert found, f"none of {candidates} exists: run cargo build --workspace --example {name}"
     return max(found, key=lambda path: path.stat().st_mtime)
 
 

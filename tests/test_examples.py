@@ -13,6 +13,7 @@ from matplotlib.image import imread
 from nbclient import NotebookClient
 
 from conftest import EXPERIMENTS, ROOT, TARGET
+from conftest import example as built_example
 
 EXAMPLES = ROOT / "scripts" / "examples"
 
@@ -74,3 +75,17 @@ def test_the_notebook_runs(tmp_path):
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     assert "CRMPC: EMS 1.979" in outputs[0]["text"]
     assert sum("image/png" in output.get("data", {}) for output in outputs) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("01_fly_a_law", "EMS 1.6"),
+        ("02_the_guarantee", "in force at 1250 ticks of 1250"),
+        ("03_a_delay", "predicted over: ‖ω‖ 0.6"),
+    ],
+)
+def test_regress_the_numbered_examples_of_the_laws(name, says):
+    done = subprocess.run([built_example(name)], capture_output=True, text=True, encoding="utf-8", timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert says in done.stdout

@@ -1,0 +1,45 @@
+//! Flies CRMPC with its command acting 0.117 s late, the computing time that Chai et al. (2022) print: once without knowing
+//! of it, and once with the state predicted over the delay.
+//!
+//! ```text
+//! cargo run --release -p control --example 03_a_delay
+//! ```
+
+use control::crmpc::{Constraints, Settings};
+use control::delay::{Delayed, Latency};
+use control::{Controller, Crmpc, Measurement};
+use vehicle::Scenario;
+use vehicle::plant::Plant;
+
+/// s.
+const DELAY: f64 = 0.117;
+
+/// Largest rate and moment as shares of their limits, where the law knows of this delay (s).
+fn flown(known: f64) -> Result<(f64, f64), Box<dyn std::error::Error>> {
+    let scenario = Scenario::crmpc2022();
+    let settings = Settings { delay: known, ..Settings::new(Constraints::Robust) };
+    let latency = Latency::of_action(known);
+    let mut law = Delayed::new(Crmpc::new(settings)?, settings.body, latency, f64::INFINITY)?;
+    let mut memory = law.memory();
+    let mut config = scenario.config(0.01);
+    config.moment_delay = DELAY;
+    let mut plant = Plant::new(&config, 0.0)?;
+    let (mut rate, mut moment) = (0.0_f64, 0.0_f64);
+    for tick in 0..1250_u32 {
+        let [from, to] = [tick, tick + 1].map(|k| 0.04 * f64::from(k));
+        let measured = Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
+        let command =
+            law.update(&mut memory, tick.into(), from, &measured, &|time| scenario.reference.at(time));
+        plant.advance(from, to, command)?;
+        (rate, moment) = (rate.max(plant.rates().norm()), moment.max(command.norm()));
+    }
+    Ok((rate / scenario.limit_rate, moment / scenario.limit_moment))
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    for (text, known) in [("not known to the law", 0.0), ("predicted over", DELAY)] {
+        let (rate, moment) = flown(known)?;
+        println!("delay of {DELAY} s, {text}: ‖ω‖ {rate:.3}, ‖m‖ {moment:.3} of their limits");
+    }
+    Ok(())
+}
