@@ -43,18 +43,18 @@
 //! lost_deg = 60.0                   # optional: further from its reference the attitude is lost, and the run ends
 //! ```
 
+use crate::document::Source;
 use crate::error::Error;
 use crate::names;
 use crate::watch::OnInvalid;
-use serde::de::DeserializeOwned;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use toml::{Spanned, Value};
 
 /// An experiment as it is written.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// One line.
@@ -83,13 +83,13 @@ pub struct Experiment {
     /// What the command line sets of no component.
     #[serde(skip)]
     pub unplaced: Vec<String>,
-    /// The file and its text.
+    /// The file, with those that it extends.
     #[serde(skip)]
     pub source: Source,
 }
 
 /// Time and coupling.
-#[derive(Clone, Debug, Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Simulation {
     /// Start time, s.
@@ -111,7 +111,7 @@ pub struct Simulation {
 }
 
 /// How values are passed on at a communication point.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coupling {
     /// One component after the other: each gets what those before it make of their new inputs.
@@ -122,19 +122,22 @@ pub enum Coupling {
 }
 
 /// A unit and its settings.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Component {
     /// File name of the archive.
+    #[schemars(with = "String")]
     pub fmu: Spanned<String>,
     /// Steps at every n-th communication point.
     #[serde(default = "one")]
     pub every: u32,
     /// Inputs that stay at their start value.
     #[serde(default)]
+    #[schemars(with = "Vec<String>")]
     pub unconnected: Vec<Spanned<String>>,
     /// Values for parameters and for inputs without connection.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, crate::schema::Scalar>")]
     pub parameters: BTreeMap<String, Spanned<Value>>,
     /// Whether the command line exchanged the unit; no key of an experiment file.
     #[serde(skip)]
@@ -142,12 +145,14 @@ pub struct Component {
 }
 
 /// One line of wiring.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Connection {
     /// `component.output`, or `component.prefix.*`.
+    #[schemars(with = "String")]
     pub from: Spanned<String>,
     /// `component.input`, or `component.prefix.*`.
+    #[schemars(with = "String")]
     pub to: Spanned<String>,
     /// Whether values are converted if the units differ in scale only; else that is refused.
     #[serde(default)]
@@ -187,10 +192,11 @@ impl Scaling {
 }
 
 /// What goes into the results.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
     /// `component.variable`, or `component.prefix.*`.
+    #[schemars(with = "Vec<String>")]
     pub variables: Vec<Spanned<String>>,
     /// A row at every n-th communication point.
     #[serde(default = "one")]
@@ -198,7 +204,7 @@ pub struct Record {
 }
 
 /// Prefixes below which the figures of merit find their variables. `None` takes the default, if it exists.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Roles {
     /// Attitude angles.
@@ -266,56 +272,24 @@ pub struct Overrides {
     pub on_invalid: Option<OnInvalid>,
 }
 
-/// The file an experiment was read from.
-#[derive(Clone, Debug, Default)]
-pub struct Source {
-    /// Path of the file.
-    pub path: PathBuf,
-    /// Its text.
-    pub text: String,
-}
-
-impl Source {
-    /// An error at a place in the file; `0..0` is no place.
-    pub fn error(&self, span: &Range<usize>, message: impl Into<String>) -> Error {
-        let mut at = format!("{}: ", self.path.display());
-        if !span.is_empty() {
-            let before = self.text.get(..span.start).unwrap_or(&self.text);
-            let line = 1 + before.matches('\n').count();
-            at = format!("{}:{line}: ", self.path.display());
-        }
-        Error::Experiment { at, message: message.into() }
-    }
-
-    /// Reads the text as TOML.
-    ///
-    /// # Errors
-    /// If it is none, or holds an unknown key.
-    pub fn read<T: DeserializeOwned>(&self) -> Result<T, Error> {
-        toml::from_str(&self.text).map_err(|error| {
-            let message = error.message().replace('\n', " ");
-            self.error(&error.span().map_or(0..0, |s| s.start..s.end.max(s.start + 1)), message)
-        })
-    }
-}
-
 impl Experiment {
-    /// Reads an experiment file.
+    /// Reads an experiment file with all that it extends.
     ///
     /// # Errors
-    /// If it cannot be read, is no TOML, or holds an unknown key.
+    /// If one cannot be read, is no TOML, or holds an unknown key.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::experiment(format!("{}: {source}", path.display())))?;
-        Self::parse(path, text)
+        Self::of(Source::load(path)?)
     }
 
-    /// Reads the text of an experiment file; `path` is for messages, and for finding FMUs beside it.
+    /// Reads the text of an experiment file; `path` is for messages, and for finding FMUs and what it extends beside it.
     ///
     /// # Errors
     /// If it is no TOML, or holds an unknown key.
     pub fn parse(path: &Path, text: String) -> Result<Self, Error> {
-        let source = Source { path: path.to_path_buf(), text };
+        Self::of(Source::new(path, text)?)
+    }
+
+    fn of(source: Source) -> Result<Self, Error> {
         let mut experiment: Self = source.read()?;
         experiment.source = source;
         Ok(experiment)
