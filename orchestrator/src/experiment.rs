@@ -1,47 +1,6 @@
 //! An experiment file: which FMUs, their parameters, their wiring, how they are stepped, what is recorded.
 //!
-//! ```toml
-//! title = "CRMPC on the paper's scenario"
-//! description = "Optional, as long as you like."
-//!
-//! [simulation]
-//! start = 0.0                       # s, default 0
-//! stop = 50.0                       # s, a whole number of steps after start
-//! step = 0.04                       # communication step, s
-//! coupling = "gauss-seidel"         # default; or "jacobi"
-//! order = ["controller", "plant"]   # Gauss-Seidel: whose inputs are set first at each communication point; others follow by name
-//! on_invalid = "error"              # default; "warn" or "allow": a unit gives a value that is no number or outside its type
-//!
-//! [components.plant]
-//! fmu = "ReentryPlant.fmu"          # searched beside the experiment, in each --fmu-dir, in target/fmu, in ORCHESTRATOR_PATH, beside the program
-//! every = 1                         # steps at every n-th communication point, default 1
-//! unconnected = ["disturbanceMoment.*", "surface*", "jet*", "trajectory.*"]   # inputs that stay at their start value
-//!
-//! [components.plant.parameters]     # parameters, and constant values for inputs without connection
-//! "inertia.scale" = 1.05            # a number is in the variable's own unit
-//! "disturbance.kind" = "white"      # an enumeration takes the name of an item
-//! "disturbance.bound" = "2 deg/s2"  # text with a unit is converted by the FMU's own unit definitions
-//!
-//! [[connections]]
-//! from = "plant.attitude.*"         # a final * stands for every rest that both sides have
-//! to = "controller.attitude.*"
-//! convert_units = true              # optional: from one unit to the other, where they measure the same thing
-//!
-//! [record]
-//! variables = ["plant.attitude.*", "controller.moment.*"]
-//! every = 1                         # a row at every n-th communication point and at the stop, default 1
-//!
-//! [metrics]                         # where the figures of merit find their variables; these are the defaults
-//! attitude = "plant.attitude"       # .alpha .beta .sigma
-//! reference = "controller.reference"
-//! rate = "plant.rate"               # .p .q .r
-//! moment = "controller.moment"      # .x .y .z
-//! limit = "controller.limit"        # parameters .rate and .moment
-//! solver = "controller.solver"      # .time .solves .fallbacks
-//! guarantee = "controller.guarantee"   # .inForce .status .rateMargin .momentMargin
-//! every = 1                         # means are of every n-th communication point, largest values of all
-//! lost_deg = 60.0                   # optional: further from its reference the attitude is lost, and the run ends
-//! ```
+//! All keys stand in docs/experiments.md, and in `orchestrator/schema/experiment.json` for editors.
 
 use crate::document::Source;
 use crate::error::Error;

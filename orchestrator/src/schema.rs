@@ -103,6 +103,7 @@ fn with_templates(schema: &mut Schema) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
     use std::path::Path;
 
     #[test]
@@ -111,6 +112,23 @@ mod tests {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("schema/{name}.json"));
             let kept = std::fs::read_to_string(&path).unwrap();
             assert!(kept == text(kind), "scripts/update-generated writes {} anew", path.display());
+        }
+    }
+
+    #[test]
+    fn the_pages_explain_every_key() {
+        for (kind, name) in [(Kind::Experiment, "experiments"), (Kind::Study, "studies")] {
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../docs/{name}.md"));
+            let page = std::fs::read_to_string(&path).unwrap();
+            let is_part = |c: char| c.is_alphanumeric() || c == '_';
+            let code = page.split('`').skip(1).step_by(2).flat_map(|code| code.split(|c| !is_part(c)));
+            let explained: BTreeSet<&str> = code.collect();
+            let schema: Value = serde_json::from_str(&text(kind)).unwrap();
+            let definitions = schema["definitions"].as_object().unwrap().values();
+            let tables = definitions.chain([&schema]).filter_map(|table| table["properties"].as_object());
+            for key in tables.flat_map(Map::keys) {
+                assert!(explained.contains(key.as_str()), "{}: {key}", path.display());
+            }
         }
     }
 }

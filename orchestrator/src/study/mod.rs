@@ -487,6 +487,7 @@ pub struct Check {
     /// `run.metric`.
     pub left: String,
     /// How the left stands to the right.
+    #[serde(default)]
     pub relation: Relation,
     /// `run.metric`, a value, or a number.
     pub right: Quantity,
@@ -495,10 +496,11 @@ pub struct Check {
 }
 
 /// How the left of a check stands to its right.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Relation {
     /// Not above it.
+    #[default]
     Below,
     /// Not below it.
     Above,
