@@ -319,7 +319,7 @@ def test_a_changed_experiment_is_run_again(report, tmp_path):
     [
         ('experiment = "{id}.toml" }', 'experiment = "{id}q.toml" }', "run crmpc-paper"),
         ('runs = ["lqr", "dlmpc"', 'runs = ["lqq", "dlmpc"', 'did you mean "lqr"'),
-        ('signal = "plant.attitude.{angle} -', 'signal = "plant.attitude.{angle}a -', 'did you mean "attitude.alpha"'),
+        ('signal = "estimator.attitude.{angle} ', 'signal = "estimator.attitude.{angle}a ', 'did you mean "attitude.alpha"'),
         ('paper = "ems.dlmpc"', 'paper = "ems.dlmp"', 'did you mean "ems.dlmpc"'),
         ('ours = "dlmpc-est.cms"', 'ours = "dlmpc-est.cmss"', 'did you mean "cms"'),
         ('beside = "dlmpc.cms"', 'beside = "dlmpc.cmss"', 'did you mean "cms"'),
