@@ -111,6 +111,11 @@ def fmu(tmp_path_factory):
     return open_once
 
 
+def merged(experiment: Path) -> str:
+    """An experiment with all that it extends, as one text that can stand in any folder."""
+    return subprocess.run([program("orchestrator"), "show", experiment], capture_output=True, text=True, check=True).stdout
+
+
 @pytest.fixture(scope="session")
 def orchestrate(tmp_path_factory):
     """Runs the orchestrator with the packed FMUs; returns the finished process and the folder of its results."""

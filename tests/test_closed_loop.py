@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from conftest import EXPERIMENTS
+from conftest import EXPERIMENTS, merged
 from fmi import Loop, Unit, number
 
 if sys.version_info >= (3, 11):
@@ -55,11 +55,11 @@ def compare(fmu, text: str, results, jacobi: bool = False) -> None:
 
 @pytest.mark.parametrize("name", ["crmpc-robust", "crmpc-paper", "lqr"])
 def test_oracle_stepping_by_hand_gives_the_orchestrators_trajectory(fmu, experiment, name):
-    compare(fmu, (EXPERIMENTS / f"{name}.toml").read_text(), experiment(name))
+    compare(fmu, merged(EXPERIMENTS / f"{name}.toml"), experiment(name))
 
 
 def test_oracle_jacobi_by_hand_adds_one_communication_step_of_delay(fmu, orchestrate, tmp_path):
-    text = (EXPERIMENTS / "crmpc-robust.toml").read_text()
+    text = merged(EXPERIMENTS / "crmpc-robust.toml")
     jacobi = tmp_path / "jacobi.toml"
     jacobi.write_text(text.replace('coupling = "gauss-seidel"', 'coupling = "jacobi"'))
     finished, out = orchestrate(jacobi)

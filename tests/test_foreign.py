@@ -8,7 +8,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from conftest import EXPERIMENTS, TARGET, archive, program
+from conftest import EXPERIMENTS, TARGET, archive, merged, program
 from test_ssp import columns
 
 LAW = "LQR"
@@ -39,7 +39,7 @@ def write(path, files: dict[str, bytes]):
 def run(tmp_path, *arguments, change=lambda text: text):
     """The closed loop of our plant and the LQR.fmu in the folder `fmu` below `tmp_path`; the temporary folder below `temporary`."""
     experiment = tmp_path / "x.toml"
-    experiment.write_text(change((EXPERIMENTS / "lqr.toml").read_text()).replace("stop = 50.0", "stop = 4.0"))
+    experiment.write_text(change(merged(EXPERIMENTS / "lqr.toml")).replace("stop = 50.0", "stop = 4.0"))
     temporary = tmp_path / "temporary"
     temporary.mkdir(exist_ok=True)
     command = [program("orchestrator"), "run", experiment, "--out", tmp_path / "out", "--force", "--quiet", *arguments]

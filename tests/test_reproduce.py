@@ -11,7 +11,7 @@ import tomllib
 
 import pytest
 
-from conftest import EXPERIMENTS, TARGET, program
+from conftest import EXPERIMENTS, TARGET, merged, program
 
 MEMBERS = 2
 
@@ -19,6 +19,12 @@ MEMBERS = 2
 def reproduce(study, out, *arguments: str) -> subprocess.CompletedProcess:
     command = [program("orchestrator"), "reproduce", study, "--out", out, "--fmu-dir", TARGET / "fmu", *arguments]
     return subprocess.run(command, capture_output=True, text=True, cwd=out.parent, timeout=300)
+
+
+def copied(name: str, folder):
+    """A copy of all experiments, as studies extend what they share; returns the folder of one study."""
+    shutil.copytree(EXPERIMENTS.parent, folder / "experiments")
+    return folder / "experiments" / name
 
 
 @pytest.fixture(scope="module")
@@ -263,7 +269,7 @@ def test_texts_count_the_runs_that_there_are(report, results):
 def test_a_claim_without_its_numbers_is_not_judged_and_a_seed_that_changes_nothing_is_told(tmp_path):
     study = tmp_path / "study"
     study.mkdir()
-    text = (EXPERIMENTS / "lqr.toml").read_text()
+    text = merged(EXPERIMENTS / "lqr.toml")
     (study / "lqr.toml").write_text(text.replace("lost_deg = 60.0", "lost_deg = 2.0"))
     (study / "study.toml").write_text(
         """title = "one run"
@@ -297,11 +303,10 @@ right = 1.0
 
 
 def test_a_changed_experiment_is_run_again(report, tmp_path):
-    study, out = tmp_path / "study", tmp_path / "out"
-    shutil.copytree(EXPERIMENTS, study)
+    study, out = copied("crmpc-2022", tmp_path), tmp_path / "out"
     shutil.copytree(report[1] / "runs", out / "runs")
     text = (study / "lqr.toml").read_text()
-    (study / "lqr.toml").write_text(text.replace("stop = 50.0", "stop = 48.0"))
+    (study / "lqr.toml").write_text(text.replace("[simulation]", "[simulation]\nstop = 48.0"))
     finished = reproduce(study, out, "--members", str(MEMBERS))
     assert finished.returncode == 0, finished.stderr
     run, kept = (int(n) for n in re.search(r"(\d+) run now, (\d+) kept", finished.stdout).groups())
@@ -312,22 +317,24 @@ def test_a_changed_experiment_is_run_again(report, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "culprit"),
     [
-        ('experiment = "lqr.toml"', 'experiment = "lqq.toml"', "run lqr"),
+        ('experiment = "{id}.toml" }', 'experiment = "{id}q.toml" }', "run crmpc-paper"),
         ('runs = ["lqr", "dlmpc"', 'runs = ["lqq", "dlmpc"', 'did you mean "lqr"'),
-        ('signal = "plant.rate.p"', 'signal = "plant.rate.pp"', 'did you mean "rate.p"'),
+        ('signal = "estimator.attitude.{angle} ', 'signal = "estimator.attitude.{angle}a ', 'did you mean "attitude.alpha"'),
         ('paper = "ems.dlmpc"', 'paper = "ems.dlmp"', 'did you mean "ems.dlmpc"'),
         ('ours = "dlmpc-est.cms"', 'ours = "dlmpc-est.cmss"', 'did you mean "cms"'),
         ('beside = "dlmpc.cms"', 'beside = "dlmpc.cmss"', 'did you mean "cms"'),
         ('left = "crmpc-paper.cms"', 'left = "crmpc-papr.cms"', 'did you mean "crmpc-paper"'),
         ('parameter = "plant.disturbance.seed"', 'parameter = "plant.disturbance.sed"', "disturbance.seed"),
-        ('bound = "tube.case1"', 'bound = "tube.case3"', "tube.case3"),
-        ('within = ["angle-1-printed"', 'within = ["angle-1-prnted"', 'did you mean "angle-1-printed"'),
+        ('bound = "tube.case{case}"', 'bound = "tube.cas{case}"', "tube.cas1"),
+        ('within = ["angle-{case}-printed"', 'within = ["angle-{case}-prnted"', 'did you mean "angle-1-printed"'),
         ("columns = 2", "colums = 2", "colums"),
+        ('use = "calm"', 'use = "clam"', 'did you mean "calm"'),
+        ('each = "optimising"', 'each = "optimizing"', 'did you mean "optimising"'),
+        ('id = "{id}-calm"', 'id = "{di}-calm"', "{di}"),
     ],
 )
 def test_a_study_with_a_mistake_is_refused_before_anything_runs(tmp_path, old, new, culprit):
-    study, out = tmp_path / "study", tmp_path / "out"
-    shutil.copytree(EXPERIMENTS, study)
+    study, out = copied("crmpc-2022", tmp_path), tmp_path / "out"
     text = (study / "study.toml").read_text()
     assert old in text
     (study / "study.toml").write_text(text.replace(old, new, 1))
@@ -414,7 +421,7 @@ def test_every_controller_flies_every_scenario(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "culprit"),
     [
-        ('runs = ["chai-allocated-*"]', 'runs = ["chai-alocated-*"]', "chai-alocated-*"),
+        ('runs = ["*"]', 'runs = ["chai-alocated-*"]', "chai-alocated-*"),
         ("set_for.dlmpc", "set_for.dlmp", 'did you mean "dlmpc"'),
         ('of = "step_us.controller"', 'of = "step_s.controller"', "step_s.controller"),
         ("hold = 2.0", "hold = -2.0", "hold"),
@@ -422,8 +429,7 @@ def test_every_controller_flies_every_scenario(tmp_path):
     ],
 )
 def test_a_grid_with_a_mistake_is_refused_before_anything_runs(tmp_path, old, new, culprit):
-    study, out = tmp_path / "study", tmp_path / "out"
-    shutil.copytree(EXPERIMENTS.parent / "exchange", study)
+    study, out = copied("exchange", tmp_path), tmp_path / "out"
     text = (study / "study.toml").read_text()
     assert old in text
     (study / "study.toml").write_text(text.replace(old, new, 1))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conftest import EXPERIMENTS
+from conftest import EXPERIMENTS, merged
 from fmi import ANGLES, RATES, Unit
 
 ANGLE_RATES = [f"attitudeRate.{axis}" for axis in ("alpha", "beta", "sigma")]
@@ -76,7 +76,7 @@ def test_oracle_an_inertial_attitude_at_rest_turns_against_the_earth(fmu):
 
 
 def test_the_orchestrator_gives_values_to_inputs_without_a_connection(orchestrate, tmp_path):
-    text = (EXPERIMENTS / "lqr.toml").read_text()
+    text = merged(EXPERIMENTS / "lqr.toml")
     values = '"trajectory.flightPathAngleRate" = "-0.1 deg/s"\n"kinematics" = "exact"\n'
     assert "[components.plant.parameters]\n" in text
     ends = []

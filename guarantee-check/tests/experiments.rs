@@ -3,7 +3,7 @@
 use control::crmpc::{Constraints, Settings};
 use guarantee_check::Report;
 use std::path::Path;
-use toml::Value;
+use toml::{Table, Value};
 
 const GAP: f64 = 3e-3;
 
@@ -21,13 +21,28 @@ fn quantity(value: &Value) -> f64 {
     }
 }
 
+/// The parameters of the component `controller` in a file and in those that it extends.
+fn parameters(file: &Path) -> Table {
+    let table: Table = std::fs::read_to_string(file).unwrap().parse().unwrap();
+    let bases = match table.get("extends") {
+        Some(Value::Array(bases)) => &bases[..],
+        Some(base) => std::slice::from_ref(base),
+        None => &[],
+    };
+    let beside = |base: &Value| file.parent().unwrap().join(base.as_str().unwrap());
+    let mut all: Table = bases.iter().flat_map(|base| parameters(&beside(base))).collect();
+    let own = table["components"].get("controller").and_then(|controller| controller.get("parameters"));
+    all.extend(own.and_then(Value::as_table).cloned().unwrap_or_default());
+    all
+}
+
 /// The settings of the component `controller`.
 fn settings(experiment: &str) -> Settings {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../orchestrator/experiments/crmpc-2022");
-    let text = std::fs::read_to_string(folder.join(experiment)).unwrap();
-    let table: toml::Table = text.parse().unwrap();
+    let parameters = parameters(&folder.join(experiment));
+    assert_eq!(parameters["limit.moment"].as_float(), Some(1.356e5), "a value of the base");
     let mut s = Settings::new(Constraints::Robust);
-    for (name, value) in table["components"]["controller"]["parameters"].as_table().unwrap() {
+    for (name, value) in &parameters {
         match name.as_str() {
             "feedback.k1" => s.feedback.k1 = quantity(value),
             "feedback.k2" => s.feedback.k2 = quantity(value),

@@ -1,60 +1,19 @@
 //! An experiment file: which FMUs, their parameters, their wiring, how they are stepped, what is recorded.
 //!
-//! ```toml
-//! title = "CRMPC on the paper's scenario"
-//! description = "Optional, as long as you like."
-//!
-//! [simulation]
-//! start = 0.0                       # s, default 0
-//! stop = 50.0                       # s, a whole number of steps after start
-//! step = 0.04                       # communication step, s
-//! coupling = "gauss-seidel"         # default; or "jacobi"
-//! order = ["controller", "plant"]   # Gauss-Seidel: whose inputs are set first at each communication point; others follow by name
-//! on_invalid = "error"              # default; "warn" or "allow": a unit gives a value that is no number or outside its type
-//!
-//! [components.plant]
-//! fmu = "ReentryPlant.fmu"          # searched beside the experiment, in each --fmu-dir, in target/fmu, in ORCHESTRATOR_PATH, beside the program
-//! every = 1                         # steps at every n-th communication point, default 1
-//! unconnected = ["disturbanceMoment.*", "surface*", "jet*", "trajectory.*"]   # inputs that stay at their start value
-//!
-//! [components.plant.parameters]     # parameters, and constant values for inputs without connection
-//! "inertia.scale" = 1.05            # a number is in the variable's own unit
-//! "disturbance.kind" = "white"      # an enumeration takes the name of an item
-//! "disturbance.bound" = "2 deg/s2"  # text with a unit is converted by the FMU's own unit definitions
-//!
-//! [[connections]]
-//! from = "plant.attitude.*"         # a final * stands for every rest that both sides have
-//! to = "controller.attitude.*"
-//! convert_units = true              # optional: from one unit to the other, where they measure the same thing
-//!
-//! [record]
-//! variables = ["plant.attitude.*", "controller.moment.*"]
-//! every = 1                         # a row at every n-th communication point and at the stop, default 1
-//!
-//! [metrics]                         # where the figures of merit find their variables; these are the defaults
-//! attitude = "plant.attitude"       # .alpha .beta .sigma
-//! reference = "controller.reference"
-//! rate = "plant.rate"               # .p .q .r
-//! moment = "controller.moment"      # .x .y .z
-//! limit = "controller.limit"        # parameters .rate and .moment
-//! solver = "controller.solver"      # .time .solves .fallbacks
-//! guarantee = "controller.guarantee"   # .inForce .status .rateMargin .momentMargin
-//! every = 1                         # means are of every n-th communication point, largest values of all
-//! lost_deg = 60.0                   # optional: further from its reference the attitude is lost, and the run ends
-//! ```
+//! All keys stand in docs/experiments.md, and in `orchestrator/schema/experiment.json` for editors.
 
+use crate::document::Source;
 use crate::error::Error;
 use crate::names;
 use crate::watch::OnInvalid;
-use serde::de::DeserializeOwned;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use toml::{Spanned, Value};
 
 /// An experiment as it is written.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// One line.
@@ -83,13 +42,13 @@ pub struct Experiment {
     /// What the command line sets of no component.
     #[serde(skip)]
     pub unplaced: Vec<String>,
-    /// The file and its text.
+    /// The file, with those that it extends.
     #[serde(skip)]
     pub source: Source,
 }
 
 /// Time and coupling.
-#[derive(Clone, Debug, Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Simulation {
     /// Start time, s.
@@ -111,7 +70,7 @@ pub struct Simulation {
 }
 
 /// How values are passed on at a communication point.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coupling {
     /// One component after the other: each gets what those before it make of their new inputs.
@@ -122,19 +81,22 @@ pub enum Coupling {
 }
 
 /// A unit and its settings.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Component {
     /// File name of the archive.
+    #[schemars(with = "String")]
     pub fmu: Spanned<String>,
     /// Steps at every n-th communication point.
     #[serde(default = "one")]
     pub every: u32,
     /// Inputs that stay at their start value.
     #[serde(default)]
+    #[schemars(with = "Vec<String>")]
     pub unconnected: Vec<Spanned<String>>,
     /// Values for parameters and for inputs without connection.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, crate::schema::Scalar>")]
     pub parameters: BTreeMap<String, Spanned<Value>>,
     /// Whether the command line exchanged the unit; no key of an experiment file.
     #[serde(skip)]
@@ -142,12 +104,14 @@ pub struct Component {
 }
 
 /// One line of wiring.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Connection {
     /// `component.output`, or `component.prefix.*`.
+    #[schemars(with = "String")]
     pub from: Spanned<String>,
     /// `component.input`, or `component.prefix.*`.
+    #[schemars(with = "String")]
     pub to: Spanned<String>,
     /// Whether values are converted if the units differ in scale only; else that is refused.
     #[serde(default)]
@@ -187,10 +151,11 @@ impl Scaling {
 }
 
 /// What goes into the results.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
     /// `component.variable`, or `component.prefix.*`.
+    #[schemars(with = "Vec<String>")]
     pub variables: Vec<Spanned<String>>,
     /// A row at every n-th communication point.
     #[serde(default = "one")]
@@ -198,7 +163,7 @@ pub struct Record {
 }
 
 /// Prefixes below which the figures of merit find their variables. `None` takes the default, if it exists.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Roles {
     /// Attitude angles.
@@ -266,56 +231,24 @@ pub struct Overrides {
     pub on_invalid: Option<OnInvalid>,
 }
 
-/// The file an experiment was read from.
-#[derive(Clone, Debug, Default)]
-pub struct Source {
-    /// Path of the file.
-    pub path: PathBuf,
-    /// Its text.
-    pub text: String,
-}
-
-impl Source {
-    /// An error at a place in the file; `0..0` is no place.
-    pub fn error(&self, span: &Range<usize>, message: impl Into<String>) -> Error {
-        let mut at = format!("{}: ", self.path.display());
-        if !span.is_empty() {
-            let before = self.text.get(..span.start).unwrap_or(&self.text);
-            let line = 1 + before.matches('\n').count();
-            at = format!("{}:{line}: ", self.path.display());
-        }
-        Error::Experiment { at, message: message.into() }
-    }
-
-    /// Reads the text as TOML.
-    ///
-    /// # Errors
-    /// If it is none, or holds an unknown key.
-    pub fn read<T: DeserializeOwned>(&self) -> Result<T, Error> {
-        toml::from_str(&self.text).map_err(|error| {
-            let message = error.message().replace('\n', " ");
-            self.error(&error.span().map_or(0..0, |s| s.start..s.end.max(s.start + 1)), message)
-        })
-    }
-}
-
 impl Experiment {
-    /// Reads an experiment file.
+    /// Reads an experiment file with all that it extends.
     ///
     /// # Errors
-    /// If it cannot be read, is no TOML, or holds an unknown key.
+    /// If one cannot be read, is no TOML, or holds an unknown key.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::experiment(format!("{}: {source}", path.display())))?;
-        Self::parse(path, text)
+        Self::of(Source::load(path)?)
     }
 
-    /// Reads the text of an experiment file; `path` is for messages, and for finding FMUs beside it.
+    /// Reads the text of an experiment file; `path` is for messages, and for finding FMUs and what it extends beside it.
     ///
     /// # Errors
     /// If it is no TOML, or holds an unknown key.
     pub fn parse(path: &Path, text: String) -> Result<Self, Error> {
-        let source = Source { path: path.to_path_buf(), text };
+        Self::of(Source::new(path, text)?)
+    }
+
+    fn of(source: Source) -> Result<Self, Error> {
         let mut experiment: Self = source.read()?;
         experiment.source = source;
         Ok(experiment)

@@ -1,7 +1,7 @@
 //! Steps FMUs along an experiment file and reports what they did. It knows FMUs only: nothing of vehicles or controllers
 //! but the names by which an experiment's figures of merit and the live view find their variables.
 //!
-//! [`experiment`] is read, [`run::Plan`] resolves it ([`wiring`], [`settings`], [`delay`]) against what the archives say
+//! [`experiment`] is read ([`document`]), [`run::Plan`] resolves it ([`wiring`], [`settings`], [`delay`]) against what the archives say
 //! ([`fmu`], [`archive`], [`description`], [`quantity`]), [`master`] steps the units ([`unit`]) on integer ticks
 //! ([`clock`]), in [`realtime`] if it is asked to, and observers look on: [`recorder`], [`metrics`], [`plot`], [`progress`],
 //! [`live`]. [`report`] and [`sidecar`] tell what came of it.
@@ -13,6 +13,7 @@ pub mod catalogue;
 pub mod clock;
 pub mod delay;
 pub mod description;
+pub mod document;
 pub mod error;
 pub mod experiment;
 pub mod faults;
@@ -36,6 +37,7 @@ pub mod realtime;
 pub mod recorder;
 pub mod report;
 pub mod run;
+pub mod schema;
 pub mod search;
 pub mod seeds;
 pub mod settings;

@@ -9,9 +9,9 @@ use orchestrator::live::log::Messages;
 use orchestrator::realtime::{self, Factor, OnMiss};
 use orchestrator::run::{Files, Options, Plan};
 use orchestrator::study::{Study, reproduce};
-use orchestrator::{inspect, list, report, search, ssp};
+use orchestrator::{inspect, list, report, schema, search, ssp};
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
@@ -129,6 +129,17 @@ enum Command {
         /// Say what is wrong with it, its library included, instead. Ends with 1 if anything is.
         #[arg(long, conflicts_with_all = ["json", "pattern", "causality"])]
         check: bool,
+    },
+    /// Print an experiment with all that it extends merged into one text, which runs as the experiment does.
+    Show {
+        /// Experiment: a file, or the name of one that `list` shows.
+        experiment: PathBuf,
+    },
+    /// Print the JSON Schema of a kind of file, by which editors complete and check it.
+    Schema {
+        /// The kind of file.
+        #[arg(value_enum)]
+        kind: schema::Kind,
     },
     /// Write a script that completes commands and options in a shell, for example `orchestrator completions bash`.
     Completions {
@@ -266,10 +277,18 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         }
         Command::Inspect { fmu, check: true, .. } => inspect::check(&fmu, out),
         Command::Inspect { fmu, filter, json, check: false } => inspect::inspect(&fmu, &filter, json, out),
+        Command::Show { experiment } => show(&experiment, out),
+        Command::Schema { kind } => Ok(out.write_all(schema::text(kind).as_bytes())?),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Arguments::command(), "orchestrator", out);
             Ok(())
         }
         Command::List { folder } => list::list(folder.as_deref(), out),
     }
+}
+
+/// Prints an experiment with all that it extends.
+fn show(experiment: &Path, out: &mut impl Write) -> Result<(), Error> {
+    let experiment = Experiment::load(&search::experiment(experiment)?)?;
+    Ok(out.write_all(experiment.source.whole().as_bytes())?)
 }

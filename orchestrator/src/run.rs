@@ -598,8 +598,8 @@ fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
 /// The archive of a component: beside the experiment, in the folders given, where units are found from any folder.
 fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result<PathBuf, Error> {
     let written = &experiment.components[name].fmu;
-    let beside = experiment.source.path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-    let mut folders = vec![if beside.as_os_str().is_empty() { PathBuf::from(".") } else { beside }];
+    let mut folders: Vec<PathBuf> = experiment.source.folders().map(Path::to_path_buf).collect();
+    folders.dedup();
     folders.extend(fmu_dirs.iter().cloned());
     folders.extend(search::units());
     if let Some(path) =

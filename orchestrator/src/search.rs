@@ -67,9 +67,17 @@ fn is_passed_over(name: &str) -> bool {
     name.starts_with('.') || name == "target"
 }
 
-/// Whether the text of a TOML file is that of an experiment, with or without faults.
+/// Whether the text of a TOML file is that of an experiment, with or without faults. A file without a title is there to be extended,
+/// and one of a paper is a study.
 pub fn is_experiment(text: &str) -> bool {
-    text.lines().any(|line| line.trim_start().starts_with("[components."))
+    let mut lines = text.lines().map(str::trim_start);
+    let sets = |key: &str| {
+        let is_it =
+            |line: &str| line.strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='));
+        text.lines().any(|line| is_it(line.trim_start()))
+    };
+    let has_components = lines.any(|line| line.starts_with("[components."));
+    sets("title") && !sets("paper") && (has_components || sets("extends"))
 }
 
 /// Experiments below a folder.

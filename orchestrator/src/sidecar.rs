@@ -92,7 +92,7 @@ pub fn sidecar(
         "columns": columns,
         "experiment": {
             "file": experiment.source.path.file_name().map(|name| name.to_string_lossy()),
-            "text": experiment.source.text,
+            "text": experiment.source.whole(),
         },
     })
 }

@@ -7,11 +7,12 @@ use crate::fmu::Fmu;
 use crate::heard;
 use crate::unit::{CoSimulationUnit, Outcome};
 use crate::wiring::Carrier;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
 /// What is done about an invalid value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnInvalid {
     /// It ends the run.

@@ -2,8 +2,9 @@
 //! fit is refused with its place in the file and the nearest right name.
 
 use crate::description::{Kind, ModelDescription, Variable};
+use crate::document::Source;
 use crate::error::Error;
-use crate::experiment::{Experiment, Scaling, Source};
+use crate::experiment::{Experiment, Scaling};
 use crate::names;
 use crate::quantity;
 use std::collections::BTreeSet;

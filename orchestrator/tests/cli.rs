@@ -723,6 +723,39 @@ fn nothing_is_left_in_the_temporary_folder() {
 }
 
 #[test]
+fn an_experiment_that_extends_another_is_all_of_them() {
+    let bench = Bench::new();
+    let (code, _, errors) = bench.call(&["run", "loop.toml", "--quiet"]);
+    assert_eq!(code, 0, "{errors}");
+    let results = |name: &str| fs::read_to_string(bench.path(&format!("out/{name}/results.csv"))).unwrap();
+    let own = "extends = \"../loop.toml\"\ntitle = \"longer\"\n[simulation]\nstop = 4.0\n";
+    fs::create_dir(bench.path("more")).unwrap();
+    fs::write(bench.path("more/longer.toml"), own).unwrap();
+    // The unit stands beside the file that is extended.
+    let (code, _, errors) = bench.call(&["run", "longer", "--quiet"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(results("longer").starts_with(&results("loop")) && results("longer") != results("loop"));
+    // What is kept of the run, what is shown and what is packed is the whole.
+    let kept = bench.json("out/longer/results.json");
+    let (code, shown, _) = bench.call(&["show", "longer"]);
+    assert!(code == 0 && kept["experiment"]["text"] == shown && !shown.contains("extends"), "{shown}");
+    fs::write(bench.path("whole.toml"), shown).unwrap();
+    let (code, _, errors) = bench.call(&["run", "whole.toml", "--quiet"]);
+    assert!(code == 0 && results("whole") == results("longer"), "{errors}");
+    let (code, _, errors) = bench.call(&["pack", "more/longer.toml", "--ssp", "--out", "longer.ssp"]);
+    assert_eq!(code, 0, "{errors}");
+    let (code, _, errors) = bench.call(&["run", "longer.ssp", "--quiet", "--out", "out/packed"]);
+    assert_eq!(code, 0, "{errors}");
+    // A fault is told with the file that has it; without a title a file is no experiment of its own.
+    fs::write(bench.path("loop.toml"), LOOP.replace("plant.steps", "plant.stepz")).unwrap();
+    let (code, _, errors) = bench.call(&["run", "more/longer.toml", "--force"]);
+    assert!(code == 2 && errors.contains("loop.toml:18: ") && errors.contains("\"steps\""), "{errors}");
+    fs::write(bench.path("loop.toml"), LOOP.replace("title = \"gain and integrator\"\n", "")).unwrap();
+    let (_, text, _) = bench.call(&["list"]);
+    assert!(lists(&text, "longer.toml", "longer") && !text.contains("./loop.toml"), "{text}");
+}
+
+#[test]
 fn all_experiments_of_the_project_can_be_read() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
     let (code, text, _) = Bench::new().call(&["list", folder.to_str().unwrap()]);

@@ -4,10 +4,11 @@ pub mod interactive;
 pub mod png;
 pub mod svg;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// Red, green, blue; written `#rrggbb`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(try_from = "String")]
 pub struct Color(pub u8, pub u8, pub u8);
 

@@ -3,9 +3,10 @@
 use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
 use crate::archive;
 use crate::delay;
+use crate::document::Source;
 use crate::error::Error;
 use crate::experiment::{
-    Component, Connection, Coupling, Experiment, Overrides, Record, Roles, Scaling, Simulation, Source,
+    Component, Connection, Coupling, Experiment, Overrides, Record, Roles, Scaling, Simulation,
 };
 use crate::fmu::Fmu;
 use crate::run::Opened;
@@ -206,7 +207,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         leaves_inputs_open: true,
         assigned: BTreeSet::new(),
         unplaced: Vec::new(),
-        source: Source { path: path.to_path_buf(), text },
+        source: Source::plain(path, text),
     };
     let parts = parts(&structure.components, &opened, &structure.folder);
     let wires = wiring::wires(&experiment, &parts)?;

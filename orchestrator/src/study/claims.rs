@@ -143,6 +143,8 @@ fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::results::RunResult;
+    use std::path::Path;
 
     fn checked(held: usize, all: usize) -> Checked {
         let one = Numbers(vec![1.0]);
@@ -155,5 +157,19 @@ mod tests {
         assert_eq!(checked(2, 3).verdict(), Verdict::HoldsPartly);
         assert_eq!(checked(0, 3).verdict(), Verdict::DoesNotHold);
         assert_eq!(checked(0, 0).verdict(), Verdict::NotJudged);
+    }
+
+    #[test]
+    fn a_claim_without_runs_is_not_judged() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/two-loop-smc/study.toml");
+        let study = Study::load(&path).unwrap();
+        let runs = vec![RunResult::default(); study.runs.len()];
+        let results = Results { study: &study, runs };
+        assert!(!study.claims.is_empty());
+        for claim in &study.claims {
+            let judged = judge(claim, &results).unwrap();
+            assert_eq!(judged.verdict, Verdict::NotJudged, "{}", claim.says);
+            assert!(judged.checks.iter().all(|check| check.verdict() == Verdict::NotJudged));
+        }
     }
 }

@@ -5,13 +5,14 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::figure::Color;
 use crate::names;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::{Spanned, Value};
 
 /// Every candidate on every scenario: the runs `SCENARIO-CANDIDATE`.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
     /// What is compared.
@@ -23,7 +24,7 @@ pub struct Grid {
 }
 
 /// What it takes to put a candidate into any experiment.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Candidate {
     id: String,
@@ -32,6 +33,7 @@ struct Candidate {
     #[serde(default)]
     fmu: BTreeMap<String, String>,
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, crate::schema::Scalar>")]
     set: BTreeMap<String, Value>,
     /// Parameters that it has not: left out where an experiment sets them.
     #[serde(default)]
@@ -39,24 +41,29 @@ struct Candidate {
 }
 
 /// An experiment, and what is taken of its runs.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Scenario {
+    #[schemars(with = "String")]
     id: Spanned<String>,
     /// Heading of its rows in an overview.
     label: String,
     experiment: PathBuf,
     /// Parameters that differ from the experiment's, for all candidates that have them.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, crate::schema::Scalar>")]
     set: BTreeMap<String, Value>,
     /// Parameters of single candidates, by their id.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, BTreeMap<String, crate::schema::Scalar>>")]
     set_for: BTreeMap<Spanned<String>, BTreeMap<String, Value>>,
     #[serde(default)]
     timed: bool,
     #[serde(default)]
+    #[schemars(with = "Vec<String>")]
     within: Vec<Spanned<String>>,
     #[serde(default)]
+    #[schemars(with = "Vec<String>")]
     measures: Vec<Spanned<String>>,
 }
 

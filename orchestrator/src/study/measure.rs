@@ -4,11 +4,12 @@ use super::signal::Resolved;
 use crate::error::Error;
 use crate::master::{Observer, Sample};
 use crate::metrics::larger;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
 /// A number as it is asked for.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Measure {
     /// By which it is referred to: `run.measure.ID`.
@@ -16,6 +17,7 @@ pub struct Measure {
     /// What is done with the signals.
     pub kind: Kind,
     /// A list of signals.
+    #[schemars(with = "String")]
     pub signals: Spanned<String>,
     /// From and to, s; the whole run if it is left out.
     pub over: Option<[f64; 2]>,
@@ -29,7 +31,7 @@ pub struct Measure {
 }
 
 /// What is done with the signals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// √(mean of the sum of squares).

@@ -1,117 +1,7 @@
 //! A paper's comparison as data: which experiments are run, over which seeds; what is drawn and tabulated of them; what the
 //! paper prints; and what it claims. `orchestrator reproduce` runs it and writes the report.
 //!
-//! ```toml
-//! title = "…"
-//! paper = "…"                          # how to cite it
-//! summary = "…"                        # paragraphs, separated by an empty line
-//! values = ["published.toml"]          # files of [[value]], see [`values`]
-//!
-//! [[scenario]]
-//! what = "inertia"
-//! value = "…"
-//! source = "section 5.1"               # optional
-//!
-//! [[assumption]]
-//! silent = "what the paper leaves open"
-//! taken = "what is done here"
-//!
-//! [[run]]
-//! id = "lqr"
-//! label = "LQR"
-//! color = "#7f7f7f"
-//! experiment = "lqr.toml"              # beside this file
-//! fmu = { controller = "FBL.fmu" }     # optional: another FMU for a component
-//! set = { "plant.disturbance.kind" = "none" }
-//! unset = ["controller.weight.P[1]"]   # optional: parameters that the experiment sets, and this FMU has not
-//! vary = { parameter = "plant.disturbance.seed", first = 1, count = 20 }   # optional: one run for each value; or several parameters: ["…", "…"]
-//! timed = true                         # its first run has the machine for itself
-//! within = ["tube"]                    # bounds that it is held against
-//! measures = ["settling"]              # further numbers that are taken of it
-//! group = "…"                          # optional: heading of its rows in an overview
-//!
-//! [[grid]]                             # or: every candidate on every scenario, the runs SCENARIO-CANDIDATE
-//! [[grid.candidate]]                   # id, label, color, fmu and set as in [[run]]
-//! id = "lqr"
-//! without = ["controller.horizon"]     # parameters that it has not, left out where an experiment sets them
-//! [[grid.scenario]]                    # id, experiment, set, timed, within and measures as in [[run]]
-//! id = "calm"
-//! label = "Calm air"                   # the group
-//! set_for.lqr = { "controller.limit.rate" = "2 deg/s" }         # for single candidates
-//!
-//! [signals]                            # lists of signals, see [`signal`]
-//! deviation = ["plant.attitude.alpha - controller.nominal.alpha"]
-//!
-//! [[within]]                           # how often, and by how much, signals are within a bound
-//! id = "tube"
-//! signals = "deviation"
-//! bound = "tube.printed"               # a value, or a number
-//!
-//! [[measure]]                          # further numbers of a run: run.measure.ID
-//! id = "settling"
-//! kind = "settling"                    # rms, largest, settling, pulses, leaving: see [`measure`]
-//! signals = "deviation"
-//! band = 0.02
-//! over = [0.0, 20.0]                   # optional
-//! hold = 1.0                           # s, optional: settled only if it was seen for so long
-//!
-//! [[figure]]
-//! id = "fig-4"                         # name of its files
-//! title = "…"
-//! caption = "…"
-//! columns = 2
-//! runs = ["lqr", "calm-*"]             # a * stands for all that fit
-//!
-//! [[figure.panel]]
-//! label = "roll rate p, deg/s"
-//! signal = "plant.rate.p"              # one curve for each run; or: signals = [{ of = "…", label = "…", color = "…" }]
-//! reference = "controller.reference.p" # drawn once, of the first run
-//! spread = true                        # the band of all values of `vary`, not the first run alone
-//! bounds = [{ at = 5.0, label = "limit", symmetric = true }]    # horizontal lines
-//! marks = [{ at = "time.printed", label = "printed mean" }]     # vertical lines
-//! x_range = [0.0, 25.0]                # part of the horizontal axis
-//! unit = { name = "kN m", factor = 1e-3 }                       # instead of the FMU's display unit
-//! # instead of signal: histogram = "solver_ms"  or  scatter = { x = "ems_deg", y = "cms" }  or across  or nothing but points
-//! points = [{ x = 50.0, y = "ems.lqr", label = "printed", color = "#000000" }]
-//!
-//! [figure.panel.across]                # instead of signal: metrics of many runs against each other, as lines through them
-//! x = { of = "parameter.plant.actuation.delay", factor = 1e3 }
-//! y = { of = "ems_deg" }               # as metrics.json has it; factor: optional
-//! lines = [{ label = "LQR", color = "#000000", runs = ["delay-*-lqr"], dashed = true }]
-//!
-//! [[table]]
-//! id = "table-1"
-//! title = "…"
-//! against = "Paper"                    # heading of what is compared with; this is the default
-//! ours = "Ours"                        # heading of ours; this is the default
-//! beside = "Ours, without noise"       # heading of a further column; none is the default
-//!
-//! [[table.row]]
-//! label = "EMS of LQR, deg"
-//! paper = "ems.lqr"                    # optional
-//! ours = "lqr.ems_deg"                 # run.metric, or run.parameter.COMPONENT.NAME
-//! beside = "calm-lqr.ems_deg"          # optional, in the further column
-//!
-//! [[overview]]                         # all runs against metrics
-//! title = "…"
-//! runs = ["lqr"]
-//! metrics = [
-//!     { of = "ems_deg", label = "EMS, deg" },
-//!     { of = "guarantee_share", label = "guarantee in force, % of the ticks", factor = 100.0 },   # as metrics.json has it
-//!     { of = "parameter.controller.disturbance.bound", label = "bound, deg/s²", factor = 57.29577951308232 },   # factor: optional
-//! ]
-//!
-//! [[claim]]
-//! says = "in our words, what the paper claims"   # in every text {runs:ID} is the number of runs that were made of a [[run]]
-//! source = "section 5.2"
-//!
-//! [[claim.check]]
-//! label = "with noise"
-//! left = "crmpc.cms"                   # run.metric
-//! relation = "below"                   # or "above"
-//! right = "dlmpc.cms"                  # run.metric, a value, or a number
-//! by = 0.34                            # optional: by at least this fraction
-//! ```
+//! All keys stand in docs/studies.md, and in `orchestrator/schema/study.json` for editors.
 
 pub mod claims;
 pub mod figures;
@@ -122,14 +12,17 @@ pub mod part;
 pub mod reproduce;
 pub mod results;
 pub mod signal;
+pub mod template;
 pub mod values;
 
+use crate::document::Source;
 use crate::error::Error;
-use crate::experiment::{Experiment, Source};
+use crate::experiment::Experiment;
 use crate::figure::Color;
 use crate::names;
 use grid::Grid;
 use measure::Measure;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use signal::Signal;
 use std::collections::BTreeMap;
@@ -138,7 +31,7 @@ use toml::{Spanned, Value};
 use values::{Quantity, Values};
 
 /// A study as it is written.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Study {
     /// One line.
@@ -186,13 +79,13 @@ pub struct Study {
     /// The values of the files.
     #[serde(skip)]
     pub values: Values,
-    /// The file and its text.
+    /// The file, with those that it extends.
     #[serde(skip)]
     pub source: Source,
 }
 
 /// One line of the scenario.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fact {
     /// What it is.
@@ -205,7 +98,7 @@ pub struct Fact {
 }
 
 /// A gap in the paper, and what fills it here.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Assumption {
     /// What the paper does not say.
@@ -215,10 +108,11 @@ pub struct Assumption {
 }
 
 /// An experiment that is run, once or for several values of a parameter.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Run {
     /// Short name.
+    #[schemars(with = "String")]
     pub id: Spanned<String>,
     /// Name in legends and tables.
     pub label: String,
@@ -234,6 +128,7 @@ pub struct Run {
     pub fmu: BTreeMap<String, String>,
     /// Parameters that differ from the experiment's.
     #[serde(default)]
+    #[schemars(with = "BTreeMap<String, crate::schema::Scalar>")]
     pub set: BTreeMap<String, Value>,
     /// Parameters of the experiment that are left at the FMU's own value.
     #[serde(default)]
@@ -245,14 +140,16 @@ pub struct Run {
     pub timed: bool,
     /// Bounds that it is held against, by id.
     #[serde(default)]
+    #[schemars(with = "Vec<String>")]
     pub within: Vec<Spanned<String>>,
     /// Further numbers that are taken of it, by id.
     #[serde(default)]
+    #[schemars(with = "Vec<String>")]
     pub measures: Vec<Spanned<String>>,
 }
 
 /// Values `first`, `first` + 1, … of a parameter.
-#[derive(Clone, Debug, Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Vary {
     /// `component.parameter`, or several of them that take the same values.
@@ -263,8 +160,15 @@ pub struct Vary {
     pub count: u32,
 }
 
+impl Vary {
+    /// How many values there are of at most so many, of which one is the least.
+    fn limited(&self, members: Option<u32>) -> u32 {
+        members.map_or(self.count, |limit| self.count.min(limit.max(1)))
+    }
+}
+
 /// One parameter or several.
-#[derive(Clone, Debug, Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(untagged)]
 pub enum Parameters {
     /// One.
@@ -284,19 +188,20 @@ impl Parameters {
 }
 
 /// A bound on the magnitude of signals.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Within {
     /// Short name.
     pub id: String,
     /// A list of signals: all of them must be within the bound for a sample to count.
+    #[schemars(with = "String")]
     pub signals: Spanned<String>,
     /// The bound.
     pub bound: Quantity,
 }
 
 /// A figure with its panels.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Figure {
     /// Name of its files.
@@ -311,6 +216,7 @@ pub struct Figure {
     pub columns: usize,
     /// Whose curves are drawn.
     #[serde(default)]
+    #[schemars(with = "Vec<String>")]
     pub runs: Vec<Spanned<String>>,
     /// The panels, row by row.
     #[serde(rename = "panel")]
@@ -330,7 +236,7 @@ fn ours() -> String {
 }
 
 /// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `scatter` and `across` says what is drawn, or `points` alone.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
     /// Label of the vertical axis.
@@ -341,6 +247,7 @@ pub struct Panel {
     #[serde(default)]
     pub title: String,
     /// Instead of the figure's.
+    #[schemars(with = "Option<Vec<String>>")]
     pub runs: Option<Vec<Spanned<String>>>,
     /// One curve for each run.
     pub signal: Option<Signal>,
@@ -374,7 +281,7 @@ pub struct Panel {
 }
 
 /// A curve of its own name and colour.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Curve {
     /// What is drawn.
@@ -386,7 +293,7 @@ pub struct Curve {
 }
 
 /// What is counted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 pub enum Histogram {
     /// Duration of each solution, ms.
     #[serde(rename = "solver_ms")]
@@ -394,7 +301,7 @@ pub enum Histogram {
 }
 
 /// Metrics against each other.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scatter {
     /// Metric along the horizontal axis.
@@ -404,7 +311,7 @@ pub struct Scatter {
 }
 
 /// Metrics of several runs against each other.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Across {
     /// Along the horizontal axis.
@@ -416,7 +323,7 @@ pub struct Across {
 }
 
 /// A metric along an axis.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
     /// The metric.
@@ -427,7 +334,7 @@ pub struct Axis {
 }
 
 /// A line through several runs: the mean of each run's metric.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Through {
     /// Name in the legend.
@@ -435,6 +342,7 @@ pub struct Through {
     /// Its colour.
     pub color: Color,
     /// The runs, in their order.
+    #[schemars(with = "Vec<String>")]
     pub runs: Vec<Spanned<String>>,
     /// Whether it is dashed.
     #[serde(default)]
@@ -442,7 +350,7 @@ pub struct Through {
 }
 
 /// A straight line across a panel.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
     /// Where.
@@ -458,7 +366,7 @@ pub struct Line {
 }
 
 /// A single point.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Point {
     /// Along the horizontal axis.
@@ -472,7 +380,7 @@ pub struct Point {
 }
 
 /// A unit made of another.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scaled {
     /// Its name.
@@ -482,7 +390,7 @@ pub struct Scaled {
 }
 
 /// Paper against ours.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
     /// One line.
@@ -505,7 +413,7 @@ pub struct Table {
 }
 
 /// One quantity.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
     /// What it is, with unit.
@@ -522,7 +430,7 @@ pub struct Row {
 }
 
 /// Runs against metrics.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Overview {
     /// One line.
@@ -531,13 +439,14 @@ pub struct Overview {
     #[serde(default)]
     pub note: String,
     /// The rows.
+    #[schemars(with = "Vec<String>")]
     pub runs: Vec<Spanned<String>>,
     /// The columns.
     pub metrics: Vec<Column>,
 }
 
 /// A column of an overview.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
     /// The metric.
@@ -554,7 +463,7 @@ fn unscaled() -> f64 {
 }
 
 /// A claim of the paper with the checks that decide on it.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Claim {
     /// What the paper claims, in our words.
@@ -570,7 +479,7 @@ pub struct Claim {
 }
 
 /// A comparison of two numbers, for each value of `vary`.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Check {
     /// Under which circumstances.
@@ -578,6 +487,7 @@ pub struct Check {
     /// `run.metric`.
     pub left: String,
     /// How the left stands to the right.
+    #[serde(default)]
     pub relation: Relation,
     /// `run.metric`, a value, or a number.
     pub right: Quantity,
@@ -586,17 +496,31 @@ pub struct Check {
 }
 
 /// How the left of a check stands to its right.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Relation {
     /// Not above it.
+    #[default]
     Below,
     /// Not below it.
     Above,
 }
 
-/// Begins a place in a study's texts that stands for the number of runs of an id.
-const COUNT: &str = "{runs:";
+/// A text with the numbers of runs in the places that ask for them.
+fn counted(text: &str, runs: &[Run], members: Option<u32>) -> Result<Option<String>, String> {
+    let mut parts = text.split("{runs:");
+    let mut counted = parts.next().unwrap_or_default().to_string();
+    for part in parts {
+        let (id, rest) = part.split_once('}').ok_or("\"{runs:\" is not closed by a brace")?;
+        let run = runs.iter().find(|run| run.id.get_ref() == id).ok_or_else(|| {
+            let hint = names::hint(id, runs.iter().map(|run| run.id.get_ref().as_str()));
+            format!("\"{{runs:{id}}}\": there is no [[run]] \"{id}\"{hint}")
+        })?;
+        counted += &run.vary.as_ref().map_or(1, |vary| vary.limited(members)).to_string();
+        counted += rest;
+    }
+    Ok((counted != text).then_some(counted))
+}
 
 impl Study {
     /// Reads a study and its files of values.
@@ -613,42 +537,16 @@ impl Study {
     /// # Errors
     /// As [`Self::load`].
     pub fn load_with(path: &Path, members: Option<u32>) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::experiment(format!("{}: {source}", path.display())))?;
-        let source = Source { path: path.to_path_buf(), text };
-        let study = Self::read(source, members)?;
-        if !study.source.text.contains(COUNT) {
-            return Ok(study);
-        }
-        let text = study.counted()?;
-        Self::read(Source { path: path.to_path_buf(), text }, members)
-    }
-
-    /// The text with the numbers of runs in it.
-    fn counted(&self) -> Result<String, Error> {
-        let text = &self.source.text;
-        let mut counted = String::with_capacity(text.len());
-        let mut rest = text.as_str();
-        while let Some((before, after)) = rest.split_once(COUNT) {
-            let place = text.len() - after.len();
-            let fault = |message: String| self.source.error(&(place..place + 1), message);
-            let (id, end) = after
-                .split_once('}')
-                .ok_or_else(|| fault(format!("\"{COUNT}\" is not closed by a brace")))?;
-            let run = self.run(id).ok_or_else(|| {
-                let hint = names::hint(id, self.runs.iter().map(|run| run.id.get_ref().as_str()));
-                fault(format!("\"{COUNT}{id}}}\": there is no run \"{id}\"{hint}"))
-            })?;
-            counted.push_str(before);
-            counted.push_str(&run.vary.as_ref().map_or(1, |vary| vary.count).to_string());
-            rest = end;
-        }
-        counted.push_str(rest);
-        Ok(counted)
-    }
-
-    fn read(source: Source, members: Option<u32>) -> Result<Self, Error> {
-        let mut study: Self = source.read()?;
+        let source = Source::load(path)?;
+        let fault = |(span, message): template::Fault| source.error(&span, message);
+        let mut study: Self = source.read_with(|mut table| {
+            template::expand(table.get_mut()).map_err(fault)?;
+            let Self { runs, .. } = source.take(table.clone())?;
+            let counted = |text: &str| counted(text, &runs, members);
+            let mut values = table.get_mut().iter_mut();
+            values.try_for_each(|(_, value)| template::rewrite(value, &counted)).map_err(fault)?;
+            source.take(table)
+        })?;
         study.source = source;
         for grid in std::mem::take(&mut study.grids) {
             let runs = grid.runs(&study)?;
@@ -659,10 +557,8 @@ impl Study {
             study.values.load(&study.beside(file))?;
         }
         study.check()?;
-        if let Some(limit) = members {
-            for vary in study.runs.iter_mut().filter_map(|run| run.vary.as_mut()) {
-                vary.count = vary.count.min(limit.max(1));
-            }
+        for vary in study.runs.iter_mut().filter_map(|run| run.vary.as_mut()) {
+            vary.count = vary.limited(members);
         }
         Ok(study)
     }

@@ -289,7 +289,7 @@ fn keys(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Res
         let all = json!({
             "format": FORMAT,
             "program": program,
-            "experiment": plan.experiment.source.text,
+            "experiment": plan.experiment.source.whole(),
             "set": run.set,
             "unset": run.unset,
             "vary": run.vary.as_ref().map(|vary| (&vary.parameter, vary.first)),

@@ -9,11 +9,12 @@
 use crate::description::Kind;
 use crate::run::Plan;
 use crate::wiring::{Port, find};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
 /// A signal as it is written.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
 #[serde(try_from = "String", into = "String")]
 pub struct Signal {
     /// `component.variable`, with what is subtracted from it.

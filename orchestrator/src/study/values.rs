@@ -9,9 +9,10 @@
 //! source = "Table I, p. 9"
 //! ```
 
+use crate::document::Source;
 use crate::error::Error;
-use crate::experiment::Source;
 use crate::names;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -53,7 +54,7 @@ struct File {
 }
 
 /// A number as it is written, or the id of a value (or, where it says so, `run.metric`).
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Quantity {
     /// As it is written.
@@ -72,9 +73,7 @@ impl Values {
     /// # Errors
     /// If it cannot be read, is no such file, or repeats an id.
     pub fn load(&mut self, path: &Path) -> Result<(), Error> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::experiment(format!("{}: {source}", path.display())))?;
-        let source = Source { path: path.to_path_buf(), text };
+        let source = Source::load(path)?;
         let File { value } = source.read()?;
         for value in value {
             if self.find(&value.id).is_some() {

@@ -1,0 +1,328 @@
+//! A TOML file together with the files that it extends, read as one table in which every place still knows its file and line.
+//!
+//! ```toml
+//! extends = "base.toml"               # beside this file; or several, of which a later one has precedence: ["a.toml", "b.toml"]
+//! unset = ["controller.gain.p"]       # parameters that a base sets, left at the unit's own value
+//! ```
+//!
+//! Tables are merged key by key; a list or a single value replaces that of the base. A base may extend others in its turn. A file
+//! that is extended in several ways counts once, where it is named first.
+
+use crate::error::Error;
+use crate::names;
+use serde::de::DeserializeOwned;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::{fs, iter};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, Deserializer};
+
+/// A TOML file with the files that it extends.
+///
+/// A place in it is a range of bytes: in the file itself, or behind that in the texts of the others, one after the other.
+#[derive(Clone, Debug, Default)]
+pub struct Source {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+    /// The files that it extends with their texts, the one that has precedence first.
+    bases: Vec<(PathBuf, String)>,
+    /// The text of all of them merged, if there are any.
+    merged: Option<String>,
+}
+
+impl Source {
+    /// Reads a file and all that it extends.
+    ///
+    /// # Errors
+    /// If one of them cannot be read or is no TOML, or if they extend each other in a circle.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let text = fs::read_to_string(path)
+            .map_err(|error| Error::experiment(format!("{}: {error}", path.display())))?;
+        Self::new(path, text)
+    }
+
+    /// The same for a file whose text is known.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn new(path: &Path, text: String) -> Result<Self, Error> {
+        let mut files = Vec::new();
+        collect(path, text, &mut Vec::new(), &mut files)?;
+        let (path, text) = files.pop().unwrap_or_default();
+        files.reverse();
+        let mut source = Self { path, text, bases: files, merged: None };
+        if !source.bases.is_empty() {
+            let text = toml::to_string(&source.read::<toml::Table>()?);
+            source.merged = Some(text.map_err(|error| source.error(&(0..0), error.to_string()))?);
+        }
+        Ok(source)
+    }
+
+    /// A text that is no file and extends nothing; `path` is for messages.
+    pub fn plain(path: &Path, text: String) -> Self {
+        Self { path: path.to_path_buf(), text, ..Self::default() }
+    }
+
+    /// The whole as one text: that of the file or, if it extends others, of all of them merged, without comments.
+    pub fn whole(&self) -> &str {
+        self.merged.as_deref().unwrap_or(&self.text)
+    }
+
+    /// The folders of the file and of those that it extends.
+    pub fn folders(&self) -> impl Iterator<Item = &Path> {
+        self.files()
+            .map(|(path, _)| path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")))
+    }
+
+    fn files(&self) -> impl Iterator<Item = (&Path, &str)> {
+        let bases = self.bases.iter().map(|(path, text)| (path.as_path(), text.as_str()));
+        iter::once((self.path.as_path(), self.text.as_str())).chain(bases)
+    }
+
+    /// An error at a place; `0..0` is no place, only the file.
+    pub fn error(&self, span: &Range<usize>, message: impl Into<String>) -> Error {
+        let mut at = format!("{}: ", self.path.display());
+        let mut start = 0;
+        for (path, text) in self.files().take_while(|_| !span.is_empty()) {
+            if let Some(before) = span.start.checked_sub(start).and_then(|end| text.get(..end)) {
+                at = format!("{}:{}: ", path.display(), 1 + before.matches('\n').count());
+            }
+            start += text.len() + 1;
+        }
+        Error::Experiment { at, message: message.into() }
+    }
+
+    /// Reads the whole.
+    ///
+    /// # Errors
+    /// If it is no TOML, or holds an unknown key.
+    pub fn read<T: DeserializeOwned>(&self) -> Result<T, Error> {
+        self.read_with(|table| self.take(table))
+    }
+
+    /// Reads the whole, of which `take` makes a value.
+    ///
+    /// # Errors
+    /// If it is no TOML; what `take` finds.
+    pub fn read_with<T>(&self, take: impl FnOnce(Spanned<DeTable>) -> Result<T, Error>) -> Result<T, Error> {
+        // A text that is set in by the length of those before it has its places behind theirs.
+        let mut start = 0;
+        let texts: Vec<String> = self
+            .files()
+            .map(|(_, text)| {
+                let inset = " ".repeat(start) + text;
+                start = inset.len() + 1;
+                inset
+            })
+            .collect();
+        let mut whole: Option<Spanned<DeTable>> = None;
+        for text in texts.iter().rev() {
+            let mut table = DeTable::parse(text).map_err(|error| self.refusal(&error))?;
+            let unset = table.get_mut().remove("unset");
+            table.get_mut().remove("extends");
+            if let Some(below) = &mut whole {
+                self.unset(below.get_mut(), unset)?;
+                overlay(table.get_mut(), below.get_ref());
+            } else if let Some(unset) = unset {
+                return Err(self.error(&unset.span(), "unset: the file extends none"));
+            }
+            whole = Some(table);
+        }
+        take(whole.unwrap_or_else(|| Spanned::new(0..0, DeTable::new())))
+    }
+
+    /// Reads a table of this document.
+    ///
+    /// # Errors
+    /// If it holds an unknown key or a value of the wrong type, or lacks one.
+    pub fn take<T: DeserializeOwned>(&self, table: Spanned<DeTable>) -> Result<T, Error> {
+        T::deserialize(Deserializer::from(table)).map_err(|error| self.refusal(&error))
+    }
+
+    fn refusal(&self, error: &toml::de::Error) -> Error {
+        let message = error.message().replace('\n', " ");
+        self.error(&error.span().map_or(0..0, |s| s.start..s.end.max(s.start + 1)), message)
+    }
+
+    /// Takes out the parameters that `unset` names.
+    fn unset(&self, table: &mut DeTable, unset: Option<Spanned<DeValue>>) -> Result<(), Error> {
+        let Some(unset) = unset else { return Ok(()) };
+        for (target, place) in texts(&unset).map_err(|place| {
+            self.error(&place, "unset: wants a list of texts, for example [\"controller.gain.p\"]")
+        })? {
+            let refuse = |message: String| self.error(&place, format!("unset: {message}"));
+            let (component, parameter) = names::split(target)
+                .ok_or_else(|| refuse(format!("\"{target}\" is no component.parameter")))?;
+            let parameters = ["components", component, "parameters"].iter().try_fold(
+                &mut *table,
+                |table, key| match table.get_mut(*key)?.get_mut() {
+                    DeValue::Table(inner) => Some(inner),
+                    _ => None,
+                },
+            );
+            let known: Vec<String> = parameters
+                .iter()
+                .flat_map(|table| table.keys())
+                .map(|key| key.get_ref().to_string())
+                .collect();
+            if parameters.and_then(|table| table.remove(parameter)).is_none() {
+                let hint = names::hint(parameter, known.iter().map(String::as_str));
+                return Err(refuse(format!("what this file extends does not set \"{target}\"{hint}")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A text or a list of texts, each with its place.
+///
+/// # Errors
+/// The place of what is something else.
+pub fn texts<'a>(value: &'a Spanned<DeValue>) -> Result<Vec<(&'a str, Range<usize>)>, Range<usize>> {
+    let items = match value.get_ref() {
+        DeValue::Array(items) => &items[..],
+        _ => std::slice::from_ref(value),
+    };
+    items
+        .iter()
+        .map(|item| item.get_ref().as_str().map(|text| (text, item.span())).ok_or(item.span()))
+        .collect()
+}
+
+/// Adds what is in `below` and not in `table`, table by table.
+pub fn overlay<'i>(table: &mut DeTable<'i>, below: &DeTable<'i>) {
+    for (key, value) in below {
+        match (table.get_mut(key.get_ref().as_ref()).map(Spanned::get_mut), value.get_ref()) {
+            (None, _) => drop(table.insert(key.clone(), value.clone())),
+            (Some(DeValue::Table(own)), DeValue::Table(below)) => overlay(own, below),
+            _ => {}
+        }
+    }
+}
+
+/// Adds the files that this one extends, and then this one, to `files`; `chain` are those that led here.
+fn collect(
+    path: &Path,
+    text: String,
+    chain: &mut Vec<PathBuf>,
+    files: &mut Vec<(PathBuf, String)>,
+) -> Result<(), Error> {
+    let source = Source::plain(path, text);
+    let table = DeTable::parse(&source.text).map_err(|error| source.refusal(&error))?;
+    let bases = table.get_ref().get("extends").map_or(Ok(Vec::new()), texts).map_err(|place| {
+        source.error(&place, "extends: wants the name of a file or a list of such, for example \"base.toml\"")
+    })?;
+    chain.push(identity(path));
+    for (name, place) in bases {
+        let refuse = |message: String| source.error(&place, format!("extends = \"{name}\": {message}"));
+        let base = path.parent().unwrap_or(Path::new("")).join(name);
+        let own = identity(&base);
+        if chain.contains(&own) {
+            return Err(refuse("extends this file in its turn, a circle".into()));
+        }
+        if files.iter().any(|(known, _)| identity(known) == own) {
+            continue;
+        }
+        let text =
+            fs::read_to_string(&base).map_err(|error| refuse(format!("{}: {error}", base.display())))?;
+        collect(&base, text, chain, files)?;
+    }
+    chain.pop();
+    drop(table);
+    files.push((source.path, source.text));
+    Ok(())
+}
+
+/// By which a file is known again, whatever way leads to it.
+fn identity(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    fn source(files: &[(&str, &str)]) -> Result<Source, String> {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            fs::write(folder.path().join(name), text).unwrap();
+        }
+        let here = format!("{}/", folder.path().display());
+        Source::load(&folder.path().join(files[0].0)).map_err(|error| error.to_string().replace(&here, ""))
+    }
+
+    fn whole(files: &[(&str, &str)]) -> toml::Table {
+        source(files).unwrap().whole().parse().unwrap()
+    }
+
+    #[test]
+    fn tables_merge_by_their_keys_and_all_else_replaces() {
+        let merged = whole(&[
+            ("own.toml", "extends = \"base.toml\"\nlist = [3]\n[table]\nb = 3\n[table.inner]\nd = 4"),
+            ("base.toml", "text = \"x\"\nlist = [1, 2]\n[table]\na = 1\nb = 2\n[table.inner]\nc = 3"),
+        ]);
+        let wanted = "text = \"x\"\nlist = [3]\n[table]\na = 1\nb = 3\n[table.inner]\nc = 3\nd = 4";
+        assert_eq!(merged, wanted.parse().unwrap());
+    }
+
+    #[test]
+    fn a_later_base_has_precedence_and_a_common_one_counts_once() {
+        let merged = whole(&[
+            ("own.toml", "extends = [\"a.toml\", \"b.toml\"]"),
+            ("a.toml", "extends = \"common.toml\"\nx = \"a\"\ny = \"a\""),
+            ("b.toml", "extends = \"common.toml\"\ny = \"b\""),
+            ("common.toml", "x = \"common\"\nz = \"common\""),
+        ]);
+        assert_eq!(merged, "x = \"a\"\ny = \"b\"\nz = \"common\"".parse().unwrap());
+    }
+
+    #[test]
+    fn a_parameter_of_a_base_can_be_unset_and_set_again() {
+        let base = "[components.c.parameters]\n\"p.q\" = 1\n\"p.r\" = 2";
+        let own = "extends = \"base.toml\"\nunset = [\"c.p.q\"]";
+        let merged = whole(&[("own.toml", own), ("base.toml", base)]);
+        assert_eq!(merged, "[components.c.parameters]\n\"p.r\" = 2".parse().unwrap());
+        let last = "extends = \"own.toml\"\n[components.c.parameters]\n\"p.q\" = 3";
+        let merged = whole(&[("last.toml", last), ("own.toml", own), ("base.toml", base)]);
+        assert_eq!(merged["components"]["c"]["parameters"]["p.q"].as_integer(), Some(3));
+        let own = "extends = \"base.toml\"\n\nunset = [\"c.p.s\"]";
+        let message = source(&[("own.toml", own), ("base.toml", base)]).unwrap_err();
+        assert!(message.starts_with("own.toml:3: unset: ") && message.contains("did you mean"), "{message}");
+    }
+
+    #[test]
+    fn faults_name_the_file_they_are_in() {
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Known {
+            #[serde(rename = "a")]
+            _a: i32,
+        }
+        let both = |own: &str, base: &str| {
+            let own = format!("extends = \"base.toml\"\n{own}");
+            source(&[("own.toml", &own), ("base.toml", base)])
+        };
+        for (own, base, at) in [
+            ("a = 1", "\n\nb = 2", "base.toml:3: "),
+            ("\nb = 1", "a = 2", "own.toml:3: "),
+            ("", "\na = \"x\"", "base.toml:2: "),
+        ] {
+            let message = both(own, base).unwrap().read::<Known>().unwrap_err().to_string();
+            assert!(message.contains(&format!("/{at}")), "{message}");
+        }
+        let message = both("", "a = 1\na =").unwrap_err();
+        assert!(message.starts_with("base.toml:2: "), "{message}");
+        let message = source(&[("own.toml", "\nextends = \"none.toml\"")]).unwrap_err();
+        assert!(message.starts_with("own.toml:2: extends = \"none.toml\": "), "{message}");
+        let message = source(&[("own.toml", "extends = 1")]).unwrap_err();
+        assert!(message.starts_with("own.toml:1: extends: wants"), "{message}");
+        let message = both("", "extends = \"own.toml\"").unwrap_err();
+        assert!(
+            message.starts_with("base.toml:1: extends = \"own.toml\": ") && message.contains("circle"),
+            "{message}"
+        );
+    }
+}

@@ -1,0 +1,134 @@
+//! JSON Schemas of experiment and study files, made from the types that read them, so that editors complete and check these files.
+//!
+//! What a file leaves out may come from one that it extends, or from a template. So a schema knows every key and its type but asks for
+//! none; what is missing is told when the file is read.
+
+use crate::experiment::Experiment;
+use crate::study::Study;
+use schemars::generate::SchemaSettings;
+use schemars::transform::{RecursiveTransform, Transform};
+use schemars::{JsonSchema, Schema};
+use serde_json::{Map, Value, json};
+
+/// A kind of file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Kind {
+    /// An experiment.
+    Experiment,
+    /// A study.
+    Study,
+}
+
+/// What a parameter is set to, as a file has it: a number, a text or a truth value.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "stands for TOML's own type in the schema")]
+pub(crate) enum Scalar {
+    Number(f64),
+    Text(String),
+    Truth(bool),
+}
+
+/// The schema of a kind of file.
+pub fn text(kind: Kind) -> String {
+    let mut schema = match kind {
+        Kind::Experiment => schema_of::<Experiment>(json!({
+            "extends": texts("Files that this one extends, relative to it; a later one has precedence over those before."),
+            "unset": texts("Parameters component.parameter of what is extended that are left at the unit's own value."),
+        })),
+        Kind::Study => {
+            let mut schema = schema_of::<Study>(json!({
+                "extends": texts("Files that this one extends, relative to it; a later one has precedence over those before."),
+                "templates": {
+                    "description": "Tables by name, which items of lists build upon by `use`.",
+                    "type": "object",
+                    "additionalProperties": { "type": "object" },
+                },
+                "lists": {
+                    "description": "Lists of rows by name: an item of a list stands for one for each row by `each`.",
+                    "type": "object",
+                    "additionalProperties": { "type": "array", "items": { "type": "object" } },
+                },
+            }));
+            RecursiveTransform(with_templates).transform(&mut schema);
+            schema
+        }
+    };
+    RecursiveTransform(|schema: &mut Schema| drop(schema.remove("required"))).transform(&mut schema);
+    // A schema is plain JSON.
+    serde_json::to_string_pretty(&schema).unwrap_or_default() + "\n"
+}
+
+fn schema_of<T: JsonSchema>(further: Value) -> Schema {
+    let mut schema = SchemaSettings::draft07().into_generator().into_root_schema_for::<T>();
+    if let (Some(properties), Value::Object(further)) = (properties(&mut schema), further) {
+        properties.extend(further);
+    }
+    schema
+}
+
+fn properties(schema: &mut Schema) -> Option<&mut Map<String, Value>> {
+    schema.get_mut("properties").and_then(Value::as_object_mut)
+}
+
+fn texts(description: &str) -> Value {
+    json!({ "description": description, "type": ["string", "array"], "items": { "type": "string" } })
+}
+
+/// Allows what templates need: `use` and `each` in every table, and the name of a row's value in braces for a number, a truth value or a
+/// list.
+fn with_templates(schema: &mut Schema) {
+    if let Some(properties) = properties(schema).filter(|properties| !properties.contains_key("templates")) {
+        properties.insert("use".into(), texts("Templates that this table builds upon, one table for each."));
+        let each = json!({
+            "description": "A list of rows or its name: one table for each row, with the row's values for their names in braces.",
+            "type": ["string", "array"],
+            "items": { "type": "object" },
+        });
+        properties.insert("each".into(), each);
+    }
+    let is_replaced =
+        |name: &Value| ["number", "integer", "boolean", "array"].iter().any(|kind| name == kind);
+    let kinds = match schema.get("type") {
+        Some(Value::Array(kinds)) if !kinds.contains(&json!("string")) => kinds.clone(),
+        Some(kind @ Value::String(_)) => vec![kind.clone()],
+        _ => return,
+    };
+    if kinds.iter().any(is_replaced) {
+        schema.insert("type".into(), kinds.into_iter().chain([json!("string")]).collect());
+        schema.insert("pattern".into(), json!("^\\{\\w+\\}$"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
+    #[test]
+    fn the_kept_schemas_are_those_of_the_types() {
+        for (kind, name) in [(Kind::Experiment, "experiment"), (Kind::Study, "study")] {
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("schema/{name}.json"));
+            let kept = std::fs::read_to_string(&path).unwrap();
+            assert!(kept == text(kind), "scripts/update-generated writes {} anew", path.display());
+        }
+    }
+
+    #[test]
+    fn the_pages_explain_every_key() {
+        for (kind, name) in [(Kind::Experiment, "experiments"), (Kind::Study, "studies")] {
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../docs/{name}.md"));
+            let page = std::fs::read_to_string(&path).unwrap();
+            let is_part = |c: char| c.is_alphanumeric() || c == '_';
+            let code = page.split('`').skip(1).step_by(2).flat_map(|code| code.split(|c| !is_part(c)));
+            let explained: BTreeSet<&str> = code.collect();
+            let schema: Value = serde_json::from_str(&text(kind)).unwrap();
+            let definitions = schema["definitions"].as_object().unwrap().values();
+            let tables = definitions.chain([&schema]).filter_map(|table| table["properties"].as_object());
+            for key in tables.flat_map(Map::keys) {
+                assert!(explained.contains(key.as_str()), "{}: {key}", path.display());
+            }
+        }
+    }
+}
