@@ -51,6 +51,8 @@ pub struct Checked {
     pub difference: Numbers,
     /// What the paper's margin asks for, as a fraction.
     pub by: Option<f64>,
+    /// Pairs of members that were compared. Where one of the two has no number, the relation does not hold.
+    pub pairs: usize,
     /// Pairs for which the relation holds.
     pub held: usize,
 }
@@ -58,7 +60,7 @@ pub struct Checked {
 impl Checked {
     /// The verdict of this check alone.
     pub fn verdict(&self) -> Verdict {
-        Verdict::of(self.held, self.difference.0.len())
+        Verdict::of(self.held, self.pairs)
     }
 }
 
@@ -123,32 +125,45 @@ pub fn judge(claim: &Claim, results: &Results) -> Result<Judged, String> {
 }
 
 fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
-    let left = results.numbers(&check.left)?;
+    let left = results.of_members(&check.left)?;
     let right = results.quantity(&check.right)?;
     let by = check.by.as_ref().map(|by| results.study.values.number(by)).transpose()?;
+    let numbers = |side: &[Option<f64>]| Numbers(side.iter().copied().flatten().collect());
     // Without a number on either side there is nothing to compare.
-    let is_empty = left.0.is_empty() || right.0.is_empty();
-    let pairs = if is_empty { 0 } else { left.0.len().max(right.0.len()) };
-    let at = |numbers: &Numbers, k: usize| numbers.0[k % numbers.0.len()];
-    let difference: Vec<f64> = (0..pairs).map(|k| at(&left, k) / at(&right, k) - 1.0).collect();
+    let is_empty = numbers(&left).0.is_empty() || numbers(&right).0.is_empty();
+    let pairs = if is_empty { 0 } else { left.len().max(right.len()) };
+    let at = |side: &[Option<f64>], k: usize| side[k % side.len()];
+    let difference = (0..pairs).filter_map(|k| Some(at(&left, k)? / at(&right, k)? - 1.0));
+    let difference: Vec<f64> = difference.collect();
     let margin = by.unwrap_or(0.0);
     let holds = |difference: &&f64| match check.relation {
         Relation::Below => **difference <= -margin,
         Relation::Above => **difference >= margin,
     };
     let held = difference.iter().filter(holds).count();
-    Ok(Checked { left, right, difference: Numbers(difference), by, held })
+    Ok(Checked {
+        left: numbers(&left),
+        right: numbers(&right),
+        difference: Numbers(difference),
+        by,
+        pairs,
+        held,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metrics::Metrics;
+    use crate::study::part::Member;
     use crate::study::results::RunResult;
+    use std::collections::BTreeMap;
     use std::path::Path;
 
     fn checked(held: usize, all: usize) -> Checked {
         let one = Numbers(vec![1.0]);
-        Checked { left: one.clone(), right: one, difference: Numbers(vec![0.0; all]), by: None, held }
+        let difference = Numbers(vec![0.0; all]);
+        Checked { left: one.clone(), right: one, difference, by: None, pairs: all, held }
     }
 
     #[test]
@@ -171,5 +186,27 @@ mod tests {
             assert_eq!(judged.verdict, Verdict::NotJudged, "{}", claim.says);
             assert!(judged.checks.iter().all(|check| check.verdict() == Verdict::NotJudged));
         }
+    }
+
+    #[test]
+    fn a_member_without_the_number_does_not_hold_and_is_not_left_out() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/two-loop-smc/study.toml");
+        let study = Study::load(&path).unwrap();
+        let check = study.claims.iter().flat_map(|claim| &claim.checks);
+        let check = check.clone().find(|check| check.left == "direct.measure.settling-02").unwrap();
+        let mut runs = vec![RunResult::default(); study.runs.len()];
+        let (place, _) = resolve(&study, &check.left).unwrap();
+        // The second member does not settle.
+        runs[place].members = [Some(5.0), None, Some(6.0)]
+            .map(|settling| Member {
+                value: None,
+                metrics: Metrics::default(),
+                within: BTreeMap::new(),
+                measures: BTreeMap::from([("settling-02".to_string(), settling)]),
+            })
+            .to_vec();
+        let checked = compare(check, &Results { study: &study, runs }).unwrap();
+        assert_eq!((checked.held, checked.pairs, checked.verdict()), (2, 3, Verdict::HoldsPartly));
+        assert_eq!(checked.left.0, [5.0, 6.0]);
     }
 }

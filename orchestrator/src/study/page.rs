@@ -6,6 +6,7 @@ use super::values::{Quantity, ValueKind};
 use super::{Check, Claim, Column, Overview, Relation, Row, Table};
 use crate::figure::{self, interactive};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use std::fmt::Write as _;
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -185,7 +186,7 @@ fn class(verdict: Verdict) -> &'static str {
 }
 
 fn because(check: &Check, checked: &Checked) -> Markup {
-    let (held, all) = (checked.held, checked.difference.0.len());
+    let (held, all) = (checked.held, checked.pairs);
     if all == 0 {
         return html! { span.verdict { (checked.verdict().text()) } " " (check.label) ": there is no such number" };
     }
@@ -195,7 +196,11 @@ fn because(check: &Check, checked: &Checked) -> Markup {
         (Relation::Below, Some(by)) => format!("at least {} % below", shown(100.0 * by)),
         (Relation::Above, Some(by)) => format!("at least {} % above", shown(100.0 * by)),
     };
-    let count = if all > 1 { format!(", in {held} of {all} runs") } else { String::new() };
+    let mut count = if all > 1 { format!(", in {held} of {all} runs") } else { String::new() };
+    let missing = all - checked.difference.0.len();
+    if missing > 0 {
+        let _ = write!(count, ", of which {missing} have no such number");
+    }
     html! {
         span class=(class(checked.verdict())) { (checked.verdict().text()) } " "
         (check.label) ": " (several(&checked.left)) " against " (several(&checked.right))

@@ -493,7 +493,7 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
                         "right": checked.right.0,
                         "difference": checked.difference.0,
                         "held": checked.held,
-                        "of": checked.difference.0.len(),
+                        "of": checked.pairs,
                     })
                 })
                 .collect();

@@ -198,31 +198,40 @@ impl Results<'_> {
     /// # Errors
     /// If there is no such run or metric.
     pub fn numbers(&self, reference: &str) -> Result<Numbers, String> {
+        Ok(Numbers(self.of_members(reference)?.into_iter().flatten().collect()))
+    }
+
+    /// The number of each member that `run.metric` refers to; none where a member has no such quantity, such as a settling
+    /// time where the motion did not settle.
+    ///
+    /// # Errors
+    /// If there is no such run or metric.
+    pub fn of_members(&self, reference: &str) -> Result<Vec<Option<f64>>, String> {
         let (place, metric) = resolve(self.study, reference)?;
         let RunResult { members, parameters, .. } = &self.runs[place];
         if let Metric::Parameter(component, pattern) = &metric {
             let own = parameters.get(component).into_iter().flatten();
             let fitting = own.filter(|(name, _)| names::matches(pattern, name));
-            let numbers: Vec<f64> = fitting.filter_map(|(_, value)| value.as_f64()).collect();
+            let numbers: Vec<_> = fitting.filter_map(|(_, value)| value.as_f64()).map(Some).collect();
             let there = parameters.get(component).into_iter().flatten().map(|(name, _)| name.as_str());
             return if numbers.is_empty() {
                 Err(format!("\"{reference}\": there is no such parameter{}", names::hint(pattern, there)))
             } else {
-                Ok(Numbers(numbers))
+                Ok(numbers)
             };
         }
         let counted = if metric.is_time() { &members[..members.len().min(1)] } else { members };
-        Ok(Numbers(counted.iter().filter_map(|member| metric.of(member)).collect()))
+        Ok(counted.iter().map(|member| metric.of(member)).collect())
     }
 
-    /// The numbers of a reference, or the one of a value.
+    /// The number of each member that a reference stands for, or the one of a value.
     ///
     /// # Errors
     /// If it names nothing that there is.
-    pub fn quantity(&self, quantity: &Quantity) -> Result<Numbers, String> {
+    pub fn quantity(&self, quantity: &Quantity) -> Result<Vec<Option<f64>>, String> {
         match quantity {
-            Quantity::Named(name) if is_reference(self.study, quantity) => self.numbers(name),
-            _ => self.study.values.number(quantity).map(|number| Numbers(vec![number])),
+            Quantity::Named(name) if is_reference(self.study, quantity) => self.of_members(name),
+            _ => self.study.values.number(quantity).map(|number| vec![Some(number)]),
         }
     }
 }
