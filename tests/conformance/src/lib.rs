@@ -18,8 +18,8 @@ use std::path::PathBuf;
 use std::ptr::{null, null_mut};
 use std::sync::{Arc, Mutex};
 
-/// Calls a function of the library to which an instance or unit belongs: `c!(instance,
-/// fmi2Reset(component))`.
+/// Calls a function of the library to which an instance or unit belongs:
+/// `c!(instance, fmi2Reset(component))`.
 #[macro_export]
 macro_rules! c {
     ($on:expr, $function:ident($($argument:expr),* $(,)?)) => {{
