@@ -120,8 +120,8 @@ mod tests {
 
     #[test]
     fn oracle_derivatives_of_a_quotient() {
-        // The function x²/(x + y) has at (2, 1) the value 4/3 and the derivatives (x² + 2xy)/(x +
-        // y)² = 8/9 and −x²/(x + y)² = −4/9.
+        // The function x²/(x + y) has at (2, 1) the value 4/3 and the derivatives
+        // (x² + 2xy)/(x + y)² = 8/9 and −x²/(x + y)² = −4/9.
         let [x, y] = [2.0, 1.0].map(Interval::point);
         let (x, y) = (Dual::<2>::coordinate(0, x), Dual::coordinate(1, y));
         let f = x.squared() / (x + y);
