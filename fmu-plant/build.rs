@@ -1,4 +1,4 @@
-//! Keeps the library loaded.
+//! Links the library so that it stays loaded.
 
 fn main() {
     fmi2_build::link();

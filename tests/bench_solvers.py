@@ -1,10 +1,13 @@
-"""How long CRMPC's optimisations take over the 50 s scenario of Chai 2022: ours, CasADi with IPOPT, CasADi's sqpmethod, QOCO.
+"""Times of CRMPC's optimisations over the 50 s scenario of Chai 2022: our solver, CasADi with
+IPOPT, CasADi's sqpmethod, QOCO.
 
-All get the same samples, each from the same previous plan, shifted. IPOPT and sqpmethod solve the nonlinear programme as it is
-(multiple shooting, exact derivatives, warm-started in the primal unknowns); QOCO the cone programme linearised about that plan, its
-data updated in place. Only the solve calls are timed; ours include the preview of the references, the linearisation and the
-certificate. Of the repetitions of each sample the fastest counts, as what else the machine does can only add to it. No test: times
-differ from machine to machine, so only the ratios of one run count.
+All solvers get the same samples, each from the same previous plan, shifted. IPOPT and sqpmethod
+solve the nonlinear programme as it is (multiple shooting, exact derivatives, warm-started in the
+primal unknowns). QOCO solves the cone programme linearised about that plan, with its data updated
+in place. Only the solve calls are timed; ours include the preview of the references, the
+linearisation and the certificate. The fastest repetition of each sample counts, as other load on
+the machine can only add time. This is no test: times differ from machine to machine, so only the
+ratios of one run count.
 """
 
 from __future__ import annotations
@@ -27,19 +30,22 @@ from conftest import ROOT, TARGET
 
 N, H = nlp.HORIZON, nlp.STEP
 OURS = ["exits, riccati", "riccati", "cone"]
-# The cost is in deg^2 to the solvers, so that their absolute tolerances mean something.
+# The solvers get the cost in deg^2, so that their absolute tolerances make sense.
 SCALE = (180.0 / np.pi) ** 2
-# Ours stop there, too.
+# Our solver stops at the same step length.
 STANDSTILL = 1e-6
 FIRST_PASSES = 20
-# Seconds that one of the others may take for one constraint set before it gets every k-th sample only.
+# Time in seconds that another solver may take for one constraint set before it gets every k-th
+# sample only.
 PATIENCE = 60.0
 
 
 def pieces(kind: str) -> ca.Function:
-    """The two balls of a stage, (theta, x_omega, a) -> y of rates and y of input, not yet divided by their bounds.
+    """The two balls of a stage as (theta, x_omega, a) -> the vectors y of rates and of input, not
+    yet divided by their bounds.
 
-    With W = R^-1 in closed form, so that the expressions are as short as ours: m = I (W a + (dW/dt) x_omega) + omega x I omega.
+    W = R^-1 is used in closed form, so that the expressions are as short as ours: m = I (W a +
+    (dW/dt) x_omega) + omega x I omega.
     """
     angles, rates, a = (ca.SX.sym(name, 3) for name in ("angles", "rates", "a"))
     sa, ca_, sb, cb = ca.sin(angles[0]), ca.cos(angles[0]), ca.sin(angles[1]), ca.cos(angles[1])
@@ -60,7 +66,8 @@ def pieces(kind: str) -> ca.Function:
 
 @dataclass
 class Sample:
-    """One optimisation, in the order of unknowns that all of the others share: x_0 ... x_N, a_0 ... a_N-1."""
+    """Data of one optimisation. All other solvers share the order of unknowns x_0 ... x_N, a_0 ...
+    a_N-1."""
 
     kind: str
     time: float
@@ -79,7 +86,7 @@ class Sample:
         if previous is None:
             states, inputs = references[:, :6], references[:N, 6:]
         else:
-            # (31): the first interval dropped, one under the terminal law appended.
+            # By (31) the first interval is dropped and one under the terminal law is appended.
             states, inputs = np.array(previous["states"]), np.array(previous["accelerations"])
             last = states[-1]
             a = references[N - 1, 6:] - 5.0 * (last[:3] - references[N - 1, :3] + last[3:] - references[N - 1, 3:6])
@@ -99,24 +106,24 @@ class Sample:
 
 
 def stage_weights() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of (10), sampled: of a state, of an input, of the last state."""
+    """Weights of (10), sampled: those of a state, of an input, and of the last state."""
     g = nlp.printed_sets().weight
     return H * nlp.P * np.eye(6), H * nlp.Q * np.eye(3), np.kron(g, np.eye(3))
 
 
 def hessian() -> sparse.csc_matrix:
-    """P of z'Pz / 2, the cost in deg^2."""
+    """Matrix P of the cost z'Pz / 2, in deg^2."""
     w, v, g = stage_weights()
     return sparse.csc_matrix(2.0 * SCALE * sparse.block_diag([w] * N + [g] + [v] * N))
 
 
 def target(sample: Sample) -> np.ndarray:
-    """The unknowns without any error."""
+    """Values of the unknowns without any error."""
     return np.concatenate([sample.references[:, :6].ravel(), sample.references[:N, 6:].ravel()])
 
 
 class Casadi:
-    """The nonlinear programme, parametric in start, references and bounds."""
+    """The nonlinear programme with start, references and bounds as its parameters."""
 
     def __init__(self, kind: str, plugin: str, options: dict):
         balls = pieces(kind)
@@ -147,7 +154,7 @@ class Casadi:
         self.upper = ca.DM(np.concatenate([np.zeros(equalities.numel()), np.ones(inequalities.numel())]))
 
     def solve(self, sample: Sample) -> tuple[float, int, float | None]:
-        """Seconds, iterations and cost; no cost if it failed."""
+        """Returns seconds, iterations and cost; the cost is None if the solver failed."""
         parameters = ca.DM(np.concatenate([sample.start, sample.references.ravel(), sample.bounds]))
         guess = ca.DM(sample.guess)
         begin = time.perf_counter()
@@ -158,7 +165,8 @@ class Casadi:
 
 
 class Qoco:
-    """The cone programme linearised about the previous plan; the first, as ours, about its own solution until that stands still."""
+    """The cone programme, linearised about the previous plan. The first one is linearised about its
+    own solution until that stands still, as in our solver."""
 
     def __init__(self, kind: str):
         balls = pieces(kind)
@@ -174,7 +182,8 @@ class Qoco:
         chain = sparse.hstack([moved, -sparse.kron(sparse.eye(N), b)])
         first = sparse.hstack([e, sparse.csc_matrix((6, 9 * N))])
         self.a = sparse.csc_matrix(sparse.vstack([first, chain]))
-        # Rows and columns of G's blocks: for each stage the ball on its state, then that on its input; ours, zeros included.
+        # Rows and columns of G's blocks: for each stage the ball on its state, then that on its
+        # input, with zeros included.
         column = lambda k, of: 6 * k + np.arange(6) if of == "x" else 6 * (N + 1) + 3 * k + np.arange(3)
         self.columns = [(column(k + 1, "x"), np.concatenate([column(k, "x"), column(k, "a")])) for k in range(N)]
         rows, columns = [], []
@@ -187,14 +196,14 @@ class Qoco:
         columns.append(np.tile(column(N, "x"), 6))
         self.rows, self.at = np.concatenate(rows), np.concatenate(columns)
         self.m, self.n = 8 * N + 7, 9 * N + 6
-        # Where each entry goes among those that are stored column by column.
+        # Position of each entry in column-by-column storage.
         marked = sparse.csc_matrix((np.arange(1.0, len(self.rows) + 1.0), (self.rows, self.at)), (self.m, self.n))
         self.order = marked.data.astype(int) - 1
         self.marked = marked
         self.solver = None
 
     def linearise(self, sample: Sample, about: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Entries of G, column by column, and h: h - G z in the cones."""
+        """Returns the entries of G, column by column, and h, so that h - G z lies in the cones."""
         states, inputs = about[: 6 * (N + 1)].reshape(N + 1, 6), about[6 * (N + 1) :].reshape(N, 3)
         rate, by_rate, moment, by_moment = (
             np.array(value) for value in self.balls(states[:, :3].T, states[:, 3:].T, np.vstack([inputs, np.zeros(3)]).T)
@@ -215,7 +224,7 @@ class Qoco:
         return np.concatenate(entries)[self.order], h
 
     def solve(self, sample: Sample) -> tuple[float, int, float | None]:
-        """Seconds, iterations and cost; no cost if it failed."""
+        """Returns seconds, iterations and cost; the cost is None if the solver failed."""
         about, best = sample.guess.copy(), target(sample)
         about[:6] = sample.start
         c = -self.p @ best
@@ -249,7 +258,7 @@ class Qoco:
 
 
 def others(kind: str) -> dict:
-    """The solvers to compare with."""
+    """The other solvers with which ours is compared."""
     ipopt = {"print_level": 0, "sb": "yes", "tol": 1e-9, "bound_relax_factor": 0.0}
     quiet = {"print_header": False, "print_iteration": False, "print_status": False}
     qp = {"print_iter": False, "print_header": False, "print_info": False, "error_on_fail": False}
@@ -261,13 +270,13 @@ def others(kind: str) -> dict:
     }
 
 
-# Which of our ways solves the same programme.
+# Our variant that solves the same programme as each other solver.
 SAME = {"CasADi + IPOPT": "riccati", "CasADi sqpmethod": "riccati", "QOCO": "cone"}
 
 
 @dataclass
 class Timed:
-    """What one solver did with the samples that it got."""
+    """Results of one solver for the samples that it got."""
 
     samples: list[int] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
@@ -282,7 +291,7 @@ class Timed:
 
 
 def measure(kind: str, samples: list[Sample], every: int | None, repeat: int) -> dict[str, Timed]:
-    """All solvers on the samples of one constraint set."""
+    """Runs all solvers on the samples of one constraint set."""
     found = {name: Timed() for name in OURS}
     for index, sample in enumerate(samples):
         for name in OURS:
@@ -303,7 +312,7 @@ def measure(kind: str, samples: list[Sample], every: int | None, repeat: int) ->
 
 
 def table(kind: str, found: dict[str, Timed]) -> None:
-    """Prints what came out."""
+    """Prints a table of the times, iterations and costs."""
     ours = np.array(found[OURS[0]].seconds)
     print(f"\n{kind} set, {len(ours)} optimisations, times in ms; the ratio is that of the means over the same samples")
     columns = ("mean", "median", "p99", "max", "first", "iterations", "solved", "ratio", "cost differs by")
@@ -324,7 +333,7 @@ def table(kind: str, found: dict[str, Timed]) -> None:
 
 
 def draw(all_found: dict[str, dict[str, Timed]]) -> None:
-    """Every time as a point, with median and 99th percentile."""
+    """Draws every time as a point, with median and 99th percentile."""
     figure, axes = plt.subplots(1, len(all_found), figsize=(11, 3.8), layout="constrained", sharex=True, sharey=True)
     scatter = np.random.default_rng(0)
     for axis, (kind, found) in zip(np.atleast_1d(axes), all_found.items()):

@@ -1,5 +1,6 @@
-"""How fast importers step the same FMU and record all its outputs: the orchestrator, fmi-sim, libcosim, FMPy. No test: times differ
-from machine to machine, so only the ratios of one run count."""
+"""Speed at which importers step the same FMU and record all its outputs: the orchestrator, fmi-sim,
+libcosim, FMPy. This is no test: times differ from machine to machine, so only the ratios of one run
+count."""
 
 from __future__ import annotations
 
@@ -45,7 +46,7 @@ def with_fmpy(path: Path, outputs: list[str], steps: int, _folder: Path) -> None
     simulate_fmu(str(path), output=outputs, step_size=STEP, output_interval=STEP, stop_time=steps * STEP)
 
 
-# With the steps that take each about as long.
+# The numbers of steps make all tools take about equally long.
 TOOLS = {
     "orchestrator": (orchestrator, 500_000),
     "fmi-sim": (fmi_sim, 250_000),
@@ -55,7 +56,7 @@ TOOLS = {
 
 
 def rate(run, path: Path, outputs: list[str], steps: int) -> float:
-    """Steps per second, without what a run costs that hardly steps."""
+    """Steps per second, without the cost of a run that takes hardly any steps."""
     with tempfile.TemporaryDirectory() as folder:
         times = []
         for count in (10, steps):
@@ -75,7 +76,7 @@ def main() -> None:
         description = fmpy.read_model_description(str(archive(unit)))
         outputs = [v.name for v in description.modelVariables if v.causality == "output" and v.type == "Real"]
         rates: dict[str, list[float]] = {name: [] for name in TOOLS}
-        # In turns, so that whatever else the machine does falls on all alike.
+        # The tools run in turns, so that other load on the machine affects all alike.
         for _ in range(repeat):
             for name, (run, steps) in TOOLS.items():
                 rates[name].append(rate(run, archive(unit), outputs, steps))

@@ -1,9 +1,12 @@
-"""The best tracking that is possible at all in the scenario of Chai 2022: the whole run known beforehand, no disturbance.
+"""The best tracking that is possible at all in the scenario of Chai 2022, with the whole run known
+beforehand and no disturbance.
 
-A nonlinear programme (CasADi, IPOPT) over the exact double integrator of the angles: the input is the acceleration a of the
-angles, held for a given time; the objective is EMS itself, summed at the communication points t_k = 0.04 k before each step as
-metrics.json does (docs/symbols.md). The constraints are imposed where an input begins to be held, and nowhere between. IPOPT
-finds a local optimum. Nothing here comes from the project's code but the raw data in nlp.py. Angles in rad, SI units, EMS in deg.
+A nonlinear programme (CasADi, IPOPT) over the exact double integrator of the angles: the input is
+the acceleration a of the angles, held for a given time. The objective is EMS itself, summed at the
+communication points t_k = 0.04 k before each step as in metrics.json (docs/symbols.md). The
+constraints are imposed where an input begins to be held, and nowhere between. IPOPT finds a local
+optimum. Nothing here comes from the project's code except the raw data in nlp.py. Angles are in
+rad, all other values in SI units, EMS in deg.
 """
 
 from __future__ import annotations
@@ -23,7 +26,8 @@ INITIAL_STATE = np.concatenate([nlp.INITIAL_ANGLES, np.zeros(3)])
 
 @dataclass(frozen=True)
 class Motion:
-    """An optimal motion: `nodes` (n + 1 x 6) are its states every `hold` seconds, `accelerations` (n x 3) those between."""
+    """An optimal motion: `nodes` (n + 1 x 6) are its states every `hold` seconds, and
+    `accelerations` (n x 3) hold between them."""
 
     ems: float
     hold: float
@@ -31,30 +35,33 @@ class Motion:
     accelerations: np.ndarray
 
     def states(self, hold: float) -> np.ndarray:
-        """Its states every `hold` seconds, of which the own hold is a whole multiple."""
+        """The states every `hold` seconds, which must divide the motion's own hold."""
         ratio = round(self.hold / hold)
         inside = [advance(self.nodes[:-1].T, self.accelerations.T, j * hold).T for j in range(ratio)]
         return np.vstack([np.stack(inside, axis=1).reshape(-1, 6), self.nodes[-1]])
 
 
 def advance(state, a, h: float):
-    """The double integrator of each axis over h, columns side by side. For numbers and for expressions."""
+    """Moves the double integrator of each axis over h, with the axes side by side as columns. It
+    works for numbers and for expressions."""
     angles, rates = state[:3, :], state[3:, :]
     moved = (angles + h * rates + 0.5 * h * h * a, rates + h * a)
     return ca.vertcat(*moved) if isinstance(state, ca.MX) else np.vstack(moved)
 
 
 def outer_bounds() -> tuple[float, float]:
-    """x-bar_omega and u-bar of (6)."""
+    """Bounds x-bar_omega and u-bar of (6)."""
     r0 = np.sqrt(1.0 + np.tan(10.0 * nlp.DEG))
     return r0 * nlp.RATE_LIMIT, r0 * nlp.MOMENT_LIMIT / np.linalg.eigvalsh(nlp.INERTIA)[0]
 
 
 def constrained(sets: str) -> ca.Function:
-    """(state, a) -> squared norms over their bounds, of the rate and of the input.
+    """The function (state, a) -> squared norms of the rate and of the input, each over its squared
+    bound.
 
-    `printed`: x_omega and u within (6). `paper`: within the tightened sets (21), where the `paper` set keeps the nominal motion.
-    `limits`: omega and m within the limits themselves.
+    `printed` puts x_omega and u within (6). `paper` puts them within the tightened sets (21), where
+    the `paper` set keeps the nominal motion. `limits` puts omega and m within the limits
+    themselves.
     """
     state, a = ca.SX.sym("state", 6), ca.SX.sym("a", 3)
     angles, rates = state[:3], state[3:]
@@ -83,9 +90,11 @@ def optimum(
     sampling: float = SAMPLING,
     guess: Motion | None = None,
 ) -> Motion:
-    """The motion of least EMS, sampled every `sampling` seconds, from rest at the paper's initial state.
+    """The motion of least EMS, sampled every `sampling` seconds, from rest at the paper's initial
+    state.
 
-    `hold` and `duration` are whole multiples of `sampling`. `guess`, with a longer hold, warm-starts the solver.
+    `hold` and `duration` are whole multiples of `sampling`. `guess`, with a longer hold,
+    warm-starts the solver.
     """
     n, ratio = round(duration / hold), round(hold / sampling)
     x, a = ca.MX.sym("x", 6, n + 1), ca.MX.sym("a", 3, n)

@@ -1,4 +1,5 @@
-"""What the tests run on: FMUs, programs and experiments of the built project (scripts/build-fmus)."""
+"""Fixtures of the tests: FMUs, programs and experiments of the built project
+(scripts/build-fmus)."""
 
 from __future__ import annotations
 
@@ -33,21 +34,21 @@ NAMES = [
 
 
 def program(name: str) -> Path:
-    """A built program."""
+    """Path of a built program."""
     path = TARGET / "release" / (name + (".exe" if os.name == "nt" else ""))
     assert path.is_file(), f"{path} does not exist: run scripts/build-fmus"
     return path
 
 
 def archive(name: str) -> Path:
-    """A packed FMU."""
+    """Path of a packed FMU."""
     path = TARGET / "fmu" / f"{name}.fmu"
     assert path.is_file(), f"{path} does not exist: run scripts/build-fmus"
     return path
 
 
 def library(crate: str) -> Path:
-    """The built library of a crate."""
+    """Path of the built library of a crate."""
     candidates = [TARGET / "release" / name for name in (f"lib{crate}.so", f"lib{crate}.dylib", f"{crate}.dll")]
     found = [path for path in candidates if path.is_file()]
     assert found, f"none of {candidates} exists: run scripts/build-fmus"
@@ -65,7 +66,7 @@ def example(name: str) -> Path:
 
 @pytest.fixture(scope="session")
 def tool():
-    """A program that came with a Python package."""
+    """Path of a tool that came with a Python package."""
 
     def path(name: str) -> Path:
         found = Path(sys.executable).parent / (name + (".exe" if os.name == "nt" else ""))
@@ -77,7 +78,8 @@ def tool():
 
 @pytest.fixture(scope="session")
 def libpython() -> str:
-    """Python's shared library. Units by PythonFMU leave it to the importer to have it in the process."""
+    """Path of Python's shared library. Units by PythonFMU expect the importer to have it in the
+    process."""
     name, folder, platform = (sysconfig.get_config_var(key) or "" for key in ("INSTSONAME", "LIBDIR", "MULTIARCH"))
     found = [path for path in (Path(folder, name), Path(folder, platform, name)) if ".so" in name and path.is_file()]
     assert found, f"{name} is not in {folder}: on Debian and Ubuntu install the package libpython3-dev"
@@ -86,7 +88,8 @@ def libpython() -> str:
 
 @pytest.fixture
 def agree(request):
-    """Compares an importer's values with ours, in shares of each column's largest, by the bound of the test's mark."""
+    """Compares an importer's values with ours. Errors are relative to the largest value of each
+    column and must keep the bound of the test's mark."""
     within = request.node.get_closest_marker("importer").kwargs["within"]
 
     def compare(found: np.ndarray, expected: np.ndarray) -> None:
@@ -100,7 +103,7 @@ def agree(request):
 
 @pytest.fixture(scope="session")
 def fmu(tmp_path_factory):
-    """Opens an FMU by its name, once a session."""
+    """Opens an FMU by its name, once per session."""
     opened: dict[str, Fmu] = {}
 
     def open_once(name: str) -> Fmu:
@@ -118,12 +121,13 @@ def merged(experiment: Path) -> str:
 
 @pytest.fixture(scope="session")
 def orchestrate(tmp_path_factory):
-    """Runs the orchestrator with the packed FMUs; returns the finished process and the folder of its results."""
+    """Runs the orchestrator with the packed FMUs and returns the finished process and the folder of
+    its results."""
 
     def run(experiment: Path, *arguments: str) -> tuple[subprocess.CompletedProcess, Path]:
         out = tmp_path_factory.mktemp(experiment.stem)
         command = [program("orchestrator"), "run", experiment, "--out", out, "--fmu-dir", TARGET / "fmu", *arguments]
-        # Away from the project, so that nothing is found by accident.
+        # The run starts outside the project, so that it finds no file by accident.
         finished = subprocess.run(command, capture_output=True, text=True, cwd=out, timeout=120)
         return finished, out
 
@@ -132,7 +136,7 @@ def orchestrate(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def experiment(orchestrate):
-    """Results folder of one of the experiments of Chai 2022, run once a session."""
+    """Returns the results folder of an experiment of Chai 2022, which is run once per session."""
     done: dict[str, Path] = {}
 
     def run_once(name: str) -> Path:
@@ -145,7 +149,7 @@ def experiment(orchestrate):
     return run_once
 
 
-# The table of docs/importers.md: what the tests marked `importer` found.
+# The table of docs/importers.md holds the outcomes of the tests marked `importer`.
 
 
 def pytest_addoption(parser):
@@ -165,7 +169,7 @@ def pytest_configure(config):
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
     config.stash[importers.FINDINGS].expect(items)
-    # It looks at what the others found.
+    # This test looks at the outcomes of the others, so it runs last.
     items.sort(key=lambda item: "whole_matrix" in item.keywords)
 
 

@@ -1,7 +1,8 @@
-"""Restores a unit from a file and goes on with it, in a process of its own.
+"""Restores a unit from a file and continues it in a process of its own.
 
-Arguments: archive, folder to unpack to, parameters and recorded inputs (JSON), saved state, first tick, step. Prints the outputs
-at each tick as hexadecimal floats, so that no digit is lost.
+The arguments are the archive, the folder to unpack to, parameters and recorded inputs (JSON), the
+saved state, the first tick and the step. The program prints the outputs at each tick as hexadecimal
+floats, so that no digit is lost.
 """
 
 import json

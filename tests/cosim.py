@@ -1,4 +1,5 @@
-"""FMUs run by libcosim: one alone, or wired by an SSP or OSP system structure. It steps all units, then passes values on (Jacobi)."""
+"""FMUs run by libcosim: one alone, or several wired by an SSP or OSP system structure. libcosim
+steps all units, then passes values on (Jacobi)."""
 
 from __future__ import annotations
 
@@ -27,17 +28,18 @@ def alone(path: Path, step: float, steps: int, names: list[str]) -> np.ndarray:
 
 
 def archive(folder: Path, step: float, steps: int, names: list[tuple[str, str]]) -> np.ndarray:
-    """An unpacked SSP archive."""
+    """Runs an unpacked SSP archive."""
     return observed(CosimExecution.from_ssp_file(str(folder), nanoseconds(step)), steps, names)
 
 
 def structure(folder: Path, steps: int, names: list[tuple[str, str]]) -> np.ndarray:
-    """A folder with an OspSystemStructure.xml."""
+    """Runs a folder with an OspSystemStructure.xml."""
     return observed(CosimExecution.from_osp_config_file(str(folder)), steps, names)
 
 
 def write_structure(folder: Path, step: float, units: dict, connections: list[tuple[str, str, str]]) -> None:
-    """OspSystemStructure.xml: units as name: (archive, parameters that are numbers), connections as (from, to, variable)."""
+    """Writes OspSystemStructure.xml. Units are given as name: (archive, parameters that are
+    numbers), connections as (from, to, variable)."""
     simulators = "".join(
         f'<Simulator name="{name}" source={quoteattr(path.as_uri())} stepSize="{step}"><InitialValues>'
         + "".join(f'<InitialValue variable="{key}"><{kind(value)} value="{value}"/></InitialValue>' for key, value in values.items())
@@ -60,7 +62,7 @@ def kind(value) -> str:
 
 
 def observed(execution: CosimExecution, steps: int, names: list[tuple[str, str]]) -> np.ndarray:
-    """Real variables after each step."""
+    """Returns the values of Real variables after each step."""
     observer = CosimObserver.create_last_value()
     assert execution.add_observer(observer)
     indices = {unit: execution.slave_index_from_instance_name(unit) for unit, _ in names}

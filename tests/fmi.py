@@ -1,4 +1,4 @@
-"""FMI 2.0 units driven by hand through FMPy: variables by name, log messages kept."""
+"""FMI 2.0 units driven by hand through FMPy, with variables by name and log messages kept."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ RATES = [f"rate.{axis}" for axis in ("p", "q", "r")]
 MOMENT = [f"moment.{axis}" for axis in ("x", "y", "z")]
 REFERENCE = [f"reference.{axis}" for axis in ("alpha", "beta", "sigma")]
 
-# Differs from run to run, as it is wall-clock time.
+# These outputs are wall-clock times, which differ from run to run.
 NOT_REPRODUCIBLE = {"solver.time", "innerLaw.time"}
 
 
 @dataclass
 class Fmu:
-    """An archive, unpacked."""
+    """An unpacked FMU archive with its description."""
 
     path: Path
     folder: Path
@@ -43,7 +43,7 @@ class Fmu:
         return [v.name for v in self.description.modelVariables if v.causality == causality]
 
     def item(self, name: str, text: str) -> int:
-        """Value of an enumeration's item."""
+        """Returns the value of an enumeration's item."""
         items = self.variables[name].declaredType.items
         return next(int(item.value) for item in items if item.name == text)
 
@@ -53,11 +53,12 @@ class Fmu:
 
 
 class Unit:
-    """A co-simulation instance. Parameters by name, enumerations by their item's name."""
+    """A co-simulation instance. Parameters are set by name, and enumerations by their item's
+    name."""
 
     def __init__(self, fmu: Fmu, parameters: dict | None = None, instance: str = "unit", guid: str | None = None):
         self.fmu = fmu
-        # Status, category and message of each call of the logger.
+        # Each call of the logger adds status, category and message.
         self.log: list[tuple[int, str, str]] = []
         arguments = fmu.arguments()
         if guid is not None:
@@ -77,7 +78,7 @@ class Unit:
         self.log.append((status, category.decode(), message.decode()))
 
     def messages(self) -> str:
-        """The log's warnings and errors."""
+        """Returns the warnings and errors of the log."""
         return "\n".join(message for status, _, message in self.log if status >= fmi2.fmi2Warning)
 
     # Values by name
@@ -102,7 +103,8 @@ class Unit:
             setters[kind](references, group)
 
     def get(self, names: list[str]) -> list:
-        """Values in the order of the names. Reals come in one call, so do integers."""
+        """Returns values in the order of the names. All Reals are read in one call, and so are all
+        integers."""
         values = {}
         getters = {
             "Real": self.slave.getReal,
@@ -118,7 +120,7 @@ class Unit:
         return [values[name] for name in names]
 
     def outputs(self) -> list:
-        """All reproducible outputs."""
+        """Returns all reproducible outputs."""
         return self.get([name for name in self.fmu.names("output") if name not in NOT_REPRODUCIBLE])
 
     # Life
@@ -151,7 +153,8 @@ class Unit:
         self.slave.freeFMUstate(state)
 
     def reset(self, parameters: dict | None = None) -> None:
-        """Back to the state of a new instance. FMI leaves parameters at their start values: they are set anew."""
+        """Resets to the state of a new instance. FMI resets parameters to their start values, so
+        they are set anew."""
         self.slave.reset()
         self.set(parameters or {})
 
@@ -166,7 +169,8 @@ class Unit:
 
 
 def number(written):
-    """A parameter of an experiment file as a number in SI: text carries a unit in degrees."""
+    """Converts a parameter of an experiment file to a number in SI units; a text carries a unit in
+    degrees."""
     if not isinstance(written, str):
         return written
     match = re.fullmatch(r"(\S+) deg(/s2?)?", written)
@@ -176,7 +180,11 @@ def number(written):
 class Loop:
     """Controller and plant stepped by hand.
 
-    At each communication point the plant's state goes to the controller, then its moment to the plant (Gauss-Seidel in the order controller, plant). Or else (Jacobi) both are read before either is set. What was read is returned. A clock gives time and length of each step, where importers compute them in ways that round differently."""
+    At each communication point the plant's state goes to the controller, then the controller's
+    moment to the plant (Gauss-Seidel in the order controller, plant). With `jacobi`, both are read
+    before either is set. The values read are returned. A clock gives time and length of each step,
+    because importers compute them in ways that round differently.
+    """
 
     def __init__(self, controller: Unit, plant: Unit, step: float, jacobi: bool = False, clock: Callable | None = None):
         self.controller, self.plant, self.jacobi = controller, plant, jacobi

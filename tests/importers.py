@@ -1,4 +1,5 @@
-"""The table of docs/importers.md, made from the outcomes of the tests that are marked `importer`."""
+"""The table of docs/importers.md, made from the outcomes of the tests that are marked
+`importer`."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "importers.md"
 BEGIN, END = "<!-- From here on: scripts/update-generated -->\n", "<!-- Up to here: scripts/update-generated -->\n"
 FINDINGS = pytest.StashKey()
-# In this order, by the name that the marks use: what it is called, and what its version is written in.
+# Tools in the order of the table, by the name that the marks use: the tool's title, and the source
+# of its version.
 TOOLS = {
     "orchestrator": ("orchestrator", None),
     "FMPy": ("FMPy", "fmpy"),
@@ -27,7 +29,7 @@ VERSIONS = {"fmi-sim": r"^fmi_sim=(\S+)$", "fmi-rs": r'^name = "fmi-rs"\nversion
 class Findings:
     def __init__(self, units: list[str]):
         self.units = units
-        # By the test's identifier: its mark, and the units that it is about.
+        # Marks and units of each test, by the test's identifier.
         self.expected: dict[str, tuple[pytest.Mark, list[str]]] = {}
         self.outcomes: dict[str, str] = {}
         self.files: set[Path] = set()
@@ -42,12 +44,12 @@ class Findings:
 
     def note(self, item, outcome: str) -> None:
         if item.nodeid in self.expected:
-            # What failed in setting up or tearing down has failed.
+            # A test whose setup or teardown failed has failed.
             if self.outcomes.get(item.nodeid) != "failed":
                 self.outcomes[item.nodeid] = outcome
 
     def missing(self) -> str | None:
-        """Why there can be no table."""
+        """Says why the table cannot be made, or returns None if it can."""
         wanted = {path for path in Path(__file__).parent.glob("test_*.py") if "mark.importer(" in path.read_text()}
         if wanted - self.files:
             return f"{', '.join(sorted(path.name for path in wanted - self.files))} did not run"
@@ -76,7 +78,7 @@ class Findings:
 
 
 def split() -> tuple[str, str, str]:
-    """The page before, in and after the table."""
+    """Splits the page into the parts before, in and after the table."""
     before, rest = PAGE.read_text().split(BEGIN)
     table, after = rest.split(END)
     return before, table.strip() + "\n", after
@@ -92,7 +94,7 @@ def title(tool: str) -> str:
 
 
 def found(mark: pytest.Mark) -> str:
-    """Agreement and reference."""
+    """Returns the agreement and the reference of a mark, as cells of the table."""
     within = mark.kwargs.get("within")
     if within is None:
         return "no problem | –"

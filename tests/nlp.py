@@ -1,7 +1,9 @@
-"""The first optimisation of CRMPC as a nonlinear programme, from the raw data of Chai 2022, section 5.1, alone.
+"""The first optimisation of CRMPC as a nonlinear programme, made from the raw data of Chai 2022,
+section 5.1, alone.
 
-Nothing here comes from the project's code: the constants are computed with numpy from what the paper prints, the dynamics are
-written with CasADi, and IPOPT solves the programme by multiple shooting. Angles in rad, SI units.
+Nothing here comes from the project's code: the constants are computed with numpy from the values
+that the paper prints, the dynamics are written with CasADi, and IPOPT solves the programme by
+multiple shooting. Angles are in rad, all other values in SI units.
 """
 
 from __future__ import annotations
@@ -34,9 +36,10 @@ class Sets:
 
 
 def printed_sets() -> Sets:
-    """(6), (13), (15) and (21), under the readings of docs/errata.md."""
+    """Computes the sets (6), (13), (15) and (21), as docs/errata.md reads them."""
     terminal = np.array([-5.0, -5.0])
-    # (15) per axis with equality: A'G + GA + K~'Q K~ + P = 0 with A = [0 1; K~], as linear equations in G.
+    # (15) holds per axis with equality: A'G + GA + K~'Q K~ + P = 0 with A = [0 1; K~], as linear
+    # equations in G.
     closed = np.vstack([[0.0, 1.0], terminal])
     load = P * np.eye(2) + Q * np.outer(terminal, terminal)
     lyapunov = np.kron(np.eye(2), closed.T) + np.kron(closed.T, np.eye(2))
@@ -48,7 +51,8 @@ def printed_sets() -> Sets:
     gyroscopic = r0 * (moments[-1] / moments[0]) * np.sqrt(3.0) * RATE_LIMIT
     x = r0 * RATE_LIMIT
     u = r0 * MOMENT_LIMIT / moments[0]
-    # c-bar of (21) belongs to K = [-10, -10]: the peak of the step response (e^{st} - e^{ft})/(s - f).
+    # c-bar of (21) belongs to K = [-10, -10]: it is the peak of the step response (e^{st} -
+    # e^{ft})/(s - f).
     slow, fast = np.sort(np.roots([1.0, 10.0, 10.0]))[::-1]
     peak = np.log(slow / fast) / (fast - slow)
     c = (np.exp(slow * peak) - np.exp(fast * peak)) / (slow - fast)
@@ -62,7 +66,7 @@ def printed_sets() -> Sets:
 
 
 def reference(time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Reference angles and their first two derivatives. The first piece still applies at 25 s."""
+    """Reference angles and their first two derivatives. The first segment still applies at 25 s."""
     if time <= 25.0 + 1e-9:
         s, c = np.sin(0.5 * time), np.cos(0.5 * time)
         angles = [10.0 + 2.5 * s, 0.0, -30.0 + 5.0 * c]
@@ -77,7 +81,7 @@ def reference(time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def kinematics(angles):
-    """R(Theta) of (2)."""
+    """Matrix R(Theta) of (2)."""
     sa, ca_, sb, cb = ca.sin(angles[0]), ca.cos(angles[0]), ca.sin(angles[1]), ca.cos(angles[1])
     return ca.vertcat(
         ca.horzcat(-ca_ * sb / cb, 1.0, -sa * sb / cb),
@@ -87,7 +91,8 @@ def kinematics(angles):
 
 
 def drift_function() -> ca.Function:
-    """f(Theta, x_omega) = (dR/dt) omega - R I^-1 (omega x I omega), with dR/dt differentiated by CasADi."""
+    """Drift f(Theta, x_omega) = (dR/dt) omega - R I^-1 (omega x I omega), with dR/dt differentiated
+    by CasADi."""
     angles, rates = ca.SX.sym("angles", 3), ca.SX.sym("rates", 3)
     r = kinematics(angles)
     omega = ca.solve(r, rates)
@@ -99,7 +104,7 @@ def drift_function() -> ca.Function:
 
 @dataclass(frozen=True)
 class Optimum:
-    """Solution of the programme."""
+    """Solution of the nonlinear programme."""
 
     cost: float
     moment: np.ndarray
@@ -157,7 +162,7 @@ def first_optimum() -> Optimum:
     accelerations = values[6 * (n + 1) :].reshape(n, 3)
     drifts = [np.array(f(state[:3], state[3:])).reshape(-1) for state in states[:-1]]
     inputs = accelerations - np.array(drifts)
-    # m = I R^-1 u, at the first state.
+    # The moment is m = I R^-1 u at the first state.
     r = np.array(ca.DM(kinematics(ca.DM(INITIAL_ANGLES))))
     moment = INERTIA @ np.linalg.solve(r, inputs[0])
     return Optimum(float(solution["f"]), moment, states[:, 3:], inputs, sets)

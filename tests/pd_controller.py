@@ -1,6 +1,9 @@
-"""An attitude controller in Python, packed as an FMU by PythonFMU (`pythonfmu build -f pd_controller.py`).
+"""An attitude controller in Python, packed as an FMU by PythonFMU with
+`pythonfmu build -f pd_controller.py`.
 
-Proportional to the angles' error, damped by the angles' rates. The moment is that of the step's begin, so it comes one step late."""
+The moment is proportional to the errors of the angles and damped by their rates. It is computed at
+the beginning of a step, so it acts one step late.
+"""
 
 from math import cos, sin
 
@@ -43,7 +46,7 @@ class PdController(Fmi2Slave):
         ]
         sa, ca = sin(self.inputs["attitude.alpha"]), cos(self.inputs["attitude.alpha"])
         sb, cb = sin(self.inputs["attitude.beta"]), cos(self.inputs["attitude.beta"])
-        # Chai 2022, proof of Lemma 1: m = I R^-1 a, without products of inertia and of rates.
+        # Chai 2022, proof of Lemma 1: m = I R^-1 a, here without products of inertia and of rates.
         inertia = [self.parameters[f"inertia.{axis}"] for axis in ("Ixx", "Iyy", "Izz")]
         self.outputs["moment.x"] = inertia[0] * (-sb * ca * cb * a[0] + sa * a[1] - cb * ca * a[2])
         self.outputs["moment.y"] = inertia[1] * (cb * cb * a[0] - sb * a[2])

@@ -1,7 +1,9 @@
-"""What surfaces and jets can do at all in the scenario of Jia, Zhou and Zhou, two-loop SMC: linear programmes from the effectors'
-data alone. `python tests/reach.py` writes orchestrator/experiments/two-loop-smc/computed.toml.
+"""Limits of what surfaces and jets can do in the scenario of Jia, Zhou and Zhou, two-loop SMC, by
+linear programmes from the effectors' data alone. `python tests/reach.py` writes
+orchestrator/experiments/two-loop-smc/computed.toml.
 
-Moments in N m, deflections in deg, at the reference dynamic pressure."""
+Moments are in N m and deflections in deg, at the reference dynamic pressure.
+"""
 
 import itertools
 from pathlib import Path
@@ -34,7 +36,7 @@ DISTURBANCE = np.array(_SCENARIO["disturbance"]["sine"]["wave"][0]["amplitude"])
 
 
 def reach(direction, matrix=ALL, bounds=BOUNDS) -> float:
-    """The largest multiple of `direction` (N m) that the effectors give exactly."""
+    """Returns the largest multiple of `direction` (N m) that the effectors give exactly."""
     columns = matrix.shape[1]
     system = np.column_stack([matrix, -np.array(direction, float)])
     cost = np.append(np.zeros(columns), -1.0)
@@ -44,7 +46,8 @@ def reach(direction, matrix=ALL, bounds=BOUNDS) -> float:
 
 
 def _rate_limits(samples: int, columns: int) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """Rows that keep each surface within its rate from sample to sample of a period."""
+    """Rows that keep the rate of each surface within its limit from sample to sample of a
+    period."""
     step = 2 * np.pi / samples
     rows, entries = [], []
     for k, j in itertools.product(range(samples), range(N_SURFACES)):
@@ -57,7 +60,8 @@ def _rate_limits(samples: int, columns: int) -> tuple[sparse.csr_matrix, np.ndar
 
 
 def cancelled(samples: int = 64) -> float:
-    """The largest amplitude (N m) of sin t on all axes that effectors of limited range and rate cancel exactly, again and again."""
+    """Returns the largest amplitude (N m) of sin t on all axes that effectors of limited range and
+    rate cancel exactly in every period."""
     duties = N_SURFACES * samples
     columns = duties + N_JETS * samples + 1
     system = sparse.lil_matrix((3 * samples, columns))
@@ -75,8 +79,9 @@ def cancelled(samples: int = 64) -> float:
 
 
 def least_error(amplitude, samples: int = 64) -> float:
-    """The least largest error (deg) of any angle, in a periodic motion about alpha = beta = 5 deg under `amplitude` sin t, known
-    beforehand. Linear: R of Chai 2022 (2) there, no gyroscopic moment."""
+    """Returns the smallest possible largest error (deg) of any angle, in a periodic motion about
+    alpha = beta = 5 deg under `amplitude` sin t known beforehand. The model is linear, with R of
+    Chai 2022 (2) at that point and no gyroscopic moment."""
     inertia = _SCENARIO["inertia"]
     body = np.diag([inertia["Ixx"], inertia["Iyy"], inertia["Izz"]])
     body[0, 2] = body[2, 0] = -inertia["Ixz"]
@@ -93,7 +98,7 @@ def least_error(amplitude, samples: int = 64) -> float:
     for k in range(samples):
         then = (k + 1) % samples
         angles, rates = slice(6 * k, 6 * k + 3), slice(6 * k + 3, 6 * k + 6)
-        # Trapezia for angles and deflections; jets are held.
+        # Angles and deflections are integrated by the trapezoidal rule; jets are held.
         for at, sign in ((k, -1.0), (then, 1.0)):
             of = states + 6 * at
             system[angles, of : of + 3] = sign * np.eye(3)
@@ -117,14 +122,14 @@ def least_error(amplitude, samples: int = 64) -> float:
 
 
 def values() -> list[tuple[str, float, str, str]]:
-    """Name, value, unit and meaning of all."""
+    """Returns name, value, unit and meaning of all values."""
     one = np.eye(3)
     both = min(reach(np.ones(3)), reach(-np.ones(3)))
     about = "surfaces at 2859 Pa and jets, the other axes balanced"
     together = "moment of one size on all axes, of the worse sign"
     surfaces = (SURFACES, BOUNDS[:N_SURFACES])
     jets = (JETS, BOUNDS[N_SURFACES:])
-    # Of both signs the smaller one, but for pitch.
+    # The smaller value of both signs counts, except for pitch.
     return [
         ("reach.roll", min(reach(one[0]), reach(-one[0])), "N m", f"roll, {about}"),
         ("reach.pitch.up", reach(one[1]), "N m", f"pitch up, {about}"),
@@ -139,10 +144,10 @@ def values() -> list[tuple[str, float, str, str]]:
 
 
 def text() -> str:
-    """The file."""
+    """Returns the text of the file."""
     lines = ["# What surfaces and jets can do at all. Written by tests/reach.py: change that, not this file."]
     for name, value, unit, meaning in values():
-        # HiGHS meets its optimum to about 1e-9.
+        # HiGHS reaches its optimum to about 1e-9.
         lines += ["", "[[value]]", f'id = "{name}"', f"value = {value:.6g}", f'unit = "{unit}"', 'kind = "computed"', f'source = "tests/reach.py: {meaning}"']
     return "\n".join(lines) + "\n"
 

@@ -1,5 +1,5 @@
-"""ReentryPlant with surfaces and jets: stepped by hand, and as model exchange under CVode and Euler. Numbers printed in Wu 2015 are
-written here a second time."""
+"""ReentryPlant with surfaces and jets: stepped by hand, and as model exchange under CVode and
+Euler. Numbers printed in Wu 2015 are written here a second time."""
 
 from ctypes import c_double
 
@@ -17,11 +17,11 @@ JET = [f"jet[{j}]" for j in range(1, 11)]
 APPLIED = [f"appliedMoment.{axis}" for axis in "xyz"]
 STEP = 0.04
 
-# Wu 2015, (63), deg and deg/s.
+# Limits of Wu 2015, (63), in deg and deg/s.
 LOWER = np.array([-25.0, -25, -25, -25, -10, -10, -30, -30])
 UPPER = np.array([0.0, 0, 0, 0, 30, 30, 30, 30])
 RATE = 10.0
-# Wu 2015, (64), N m.
+# Jet moments of Wu 2015, (64), in N m.
 JETS = np.array(
     [
         [0, -2048, 11625, -6912, 0, 2054, -11623, 6912, 0, 0],
@@ -29,7 +29,7 @@ JETS = np.array(
         [19897, -15723, -9465, -11798, -19897, 15723, 9465, 11798, -19897, 19897],
     ]
 )
-# Representative, N m per degree at 2859 Pa.
+# Representative surface effectiveness, N m per degree at 2859 Pa.
 SURFACES = np.array(
     [
         [2800, -2800, 2150, -2150, 1375, -1375, 0, 0],
@@ -82,7 +82,7 @@ def test_published_moment_of_each_jet(fmu):
             np.testing.assert_allclose(plant.get(APPLIED), column, rtol=0, atol=1e-9)
     with started(fmu, {"jets.symmetric": True}) as plant:
         plant.set({"jet[4]": 1.0})
-        # The mirror image of jet 8.
+        # With symmetric jets, jet 4 is the mirror image of jet 8.
         np.testing.assert_allclose(plant.get(APPLIED), JETS[:, 7] * [-1, 1, -1], rtol=0, atol=1e-9)
 
 
@@ -101,14 +101,14 @@ def test_oracle_moment_of_surfaces_under_both_biases(fmu):
             plant.set(surfaces(command))
             plant.step(0.0, 1.0)
             pressure = plant.get(["flight.dynamicPressure"])[0]
-            # 55 km and Mach 9.8 in the US Standard Atmosphere 1976.
+            # The flight is at 55 km and Mach 9.8 in the US Standard Atmosphere 1976.
             assert pressure == pytest.approx(2858.9 * bias, abs=0.05)
             found = plant.get(APPLIED)
             np.testing.assert_allclose(found, nominal * bias * pressure / 2859.0, rtol=1e-12)
 
 
 def test_oracle_pitch_under_flaps_that_move_at_their_rate(fmu):
-    # Both flaps to -2 deg pitch alone at beta = 0: the moment rises for 0.2 s and stays.
+    # Both flaps at -2 deg give a pure pitching moment at beta = 0, which rises for 0.2 s and stays.
     with started(fmu, {"density.scale": 1.0}) as plant:
         inertia = 1.05 * plant.get(["inertia.Iyy"])[0]
         plant.set(surfaces([0, 0, 0, 0, -2, -2, 0, 0]))
@@ -143,14 +143,14 @@ def test_a_saved_state_continues_a_moving_surface(fmu):
 
 
 def commands(tick: int) -> dict:
-    """Piecewise constant, beyond rate and position limits, with jets that switch."""
+    """Piecewise constant commands beyond rate and position limits, with jets that switch."""
     time = tick * 0.2
     wanted = [12 * np.sin(0.9 * time + i) - (6 if i < 4 else 0) for i in range(8)]
     return surfaces(wanted) | {jet: float((tick * 7 + 3 * j) % 10 < 3) for j, jet in enumerate(JET)}
 
 
 def co_simulated(fmu, parameters: dict, at, ticks: int) -> np.ndarray:
-    """Angles, rates and deflections at every tick."""
+    """Returns angles, rates and deflections at every tick of co-simulation."""
     rows = []
     with Unit(fmu, parameters).start(inputs=at(0)) as plant:
         for tick in range(ticks + 1):
@@ -162,14 +162,14 @@ def co_simulated(fmu, parameters: dict, at, ticks: int) -> np.ndarray:
 
 
 def simulated(fmu, start: dict, **options) -> np.ndarray:
-    """What FMPy's model exchange records."""
+    """Returns the variables that FMPy records in model exchange."""
     values = {name: fmu.item(name, value) if isinstance(value, str) else value for name, value in start.items()}
     output = ANGLES + RATES + DEFLECTION
     return simulate_fmu(str(fmu.path), fmi_type="ModelExchange", start_values=values, output=output, **options)
 
 
 def exchanged(fmu, parameters: dict, at, ticks: int, **options) -> np.ndarray:
-    """The same with a jump of the commands at every tick."""
+    """Runs model exchange with a jump of the commands at every tick."""
     names = list(at(0))
     rows = []
     for tick in range(ticks + 1):
@@ -207,8 +207,8 @@ def test_oracle_euler_comes_to_co_simulation_with_order_one(fmu):
     expected = co_simulated(unit, ACTUATED, commands, 25)
 
     def error(step: float) -> float:
-        # FMPy's Euler integrates in steps of the output interval and looks at the event indicators after each, so that a
-        # deflection goes on for up to a step.
+        # FMPy's Euler method integrates in steps of the output interval and looks at the event
+        # indicators after each, so a deflection moves on for up to a step.
         result = exchanged(unit, ACTUATED, commands, 25, solver="Euler", step_size=step, output_interval=step)
         at_ticks = np.isclose(result["time"] / 0.2, np.round(result["time"] / 0.2))
         last = {round(row["time"] / 0.2): row for row in result[at_ticks]}
@@ -222,7 +222,8 @@ def test_oracle_euler_comes_to_co_simulation_with_order_one(fmu):
 
 
 def test_published_arrivals_are_located_by_cvode(fmu):
-    # Wu 2015, (63): commands beyond the limits, at a limit, within them; every surface that moves does so at 10 deg/s.
+    # Wu 2015, (63): the commands are beyond the limits, at a limit and within them; every surface
+    # that moves does so at 10 deg/s.
     wanted = np.array([-90.0, 4, -3, -7.5, 90, -10, 0, 29])
     stop = np.clip(wanted, LOWER, UPPER)
     options = dict(solver="CVode", relative_tolerance=1e-8, stop_time=4.0, output_interval=4.0, record_events=True)
@@ -232,7 +233,7 @@ def test_published_arrivals_are_located_by_cvode(fmu):
     arrivals = np.unique(np.abs(stop)[stop != 0]) / RATE
     np.testing.assert_allclose(events, arrivals, rtol=0, atol=1e-7)
     for i, name in enumerate(DEFLECTION):
-        # To the last bit, from the event on.
+        # From the event on, the deflection equals its target to the last bit.
         rested = result[name][np.flatnonzero(times >= np.abs(stop[i]) / RATE - 1e-7)[1:]]
         np.testing.assert_array_equal(rested, np.radians(stop[i]))
 

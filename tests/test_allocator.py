@@ -13,13 +13,13 @@ ACHIEVED = [f"achievedMoment.{axis}" for axis in "xyz"]
 RESIDUAL = [f"residual.{axis}" for axis in "xyz"]
 DEG = np.pi / 180
 
-# Wu 2015, (63) and (65), rad
+# Limits of Wu 2015, (63) and (65), in rad.
 MIN = -np.array([25, 25, 25, 25, 10, 10, 0, 0]) * DEG
 MAX = np.array([0, 0, 0, 0, 30, 30, 0, 0]) * DEG
 RANGE = np.array([25, 25, 25, 25, 40, 40]) * DEG
 RATE = 10 * DEG
 PERIOD = 0.01
-# Wu 2015, (64), N m
+# Jet moments of Wu 2015, (64), in N m.
 D_RCS = np.array(
     [
         [0, -2048, 11625, -6912, 0, 2054, -11623, 6912, 0, 0],
@@ -27,7 +27,7 @@ D_RCS = np.array(
         [19897, -15723, -9465, -11798, -19897, 15723, 9465, 11798, -19897, 19897],
     ]
 )
-# Representative, N m/rad at 2859 Pa
+# Representative surface effectiveness, N m/rad at 2859 Pa.
 D_A = (
     np.array(
         [
@@ -42,14 +42,15 @@ W_2, W_SURFACE = 0.1, 1e-3
 
 
 def cost(moment, pressure, surfaces, jets):
-    """(60) with the weight on the deflections, all of it written anew."""
+    """Cost of (60) with the weight on the deflections, written anew."""
     left = moment - D_A * (pressure / 2859) @ surfaces - D_RCS @ jets
     return np.linalg.norm(left) + W_2 * jets.sum() + 0.5 * W_SURFACE * ((surfaces / RANGE) ** 2).sum()
 
 
 def optimum(moment, pressure, before):
-    """The least cost by SLSQP, as a smooth problem: the norm's slack t with an inequality for the cone, or, if the moment can
-    be given, the equality M_c = D delta, for which the norm vanishes."""
+    """Returns the least cost by SLSQP, as a smooth problem: the norm's slack t with an inequality
+    for the cone, or, if the moment can be given, the equality M_c = D delta, for which the norm
+    vanishes."""
     low = np.maximum(MIN[:6], before - RATE * PERIOD)
     high = np.minimum(MAX[:6], before + RATE * PERIOD)
     scale = np.concatenate([(high - low), np.ones(10)])
@@ -77,7 +78,7 @@ def optimum(moment, pressure, before):
 
     bounds = [(0, 1)] * 16
     options = dict(method="SLSQP", bounds=bounds, options=dict(maxiter=2000, ftol=1e-14))
-    # The nearest point decides which of the two it is.
+    # The nearest point decides which of the two problems is solved.
     nearest = minimize(
         lambda x: ((rest - d @ x) ** 2).sum(), np.full(16, 0.5), jac=lambda x: -2 * d.T @ (rest - d @ x), **options
     )
@@ -90,7 +91,8 @@ def optimum(moment, pressure, before):
 
 
 def commands(number: int):
-    """Moments from within reach of the surfaces to beyond reach of everything, at various dynamic pressures."""
+    """Moments from within reach of the surfaces to beyond reach of all effectors, at various
+    dynamic pressures."""
     random = np.random.default_rng(2015)
     for _ in range(number):
         size = 10 ** random.uniform(3.5, 5.7)
@@ -105,7 +107,7 @@ def test_oracle_allocations_are_optimal(fmu):
     compared, reachable = 0, 0
     for moment, pressure in commands(60):
         with Unit(fmu("ControlAllocator"), {"jets": "duty"}).start(inputs=inputs(moment, pressure)) as unit:
-            # From the deflections that some samples have led to.
+            # The comparison starts from deflections that were reached after some samples.
             for k in range(30):
                 held = np.array(unit.get(SURFACE))[:6]
                 unit.step(k * PERIOD, PERIOD)
@@ -113,7 +115,7 @@ def test_oracle_allocations_are_optimal(fmu):
             assert unit.get(["solver.status"])[0] == unit.fmu.item("solver.status", "optimal")
         found, z = optimum(moment, pressure, held)
         ours, theirs = cost(moment, pressure, surfaces, jets), cost(moment, pressure, z[:6], z[6:])
-        # Better than scipy is no fault.
+        # A cost below that of scipy is no fault.
         assert ours <= theirs + 1e-6 * max(1, theirs)
         if found.success:
             compared += 1
@@ -150,7 +152,8 @@ def pulses(unit, step: float, seconds: float) -> np.ndarray:
 
 
 def test_jets_switch_every_millisecond_whatever_the_step(fmu):
-    """Read at the same instants, they are the same; the rest of the jets' pulses shows with 1 ms only."""
+    """The jets are the same at common instants; their pulses between them show only in steps of 1
+    ms."""
     given = inputs([2e3, -4e3, 1.2e4], 0.0)
     with Unit(fmu("ControlAllocator")).start(inputs=given) as fine:
         each = pulses(fine, 1e-3, 2.0)

@@ -1,4 +1,4 @@
-"""The archives themselves: valid, complete, reproducible, and as committed."""
+"""The archives themselves: valid, complete, reproducible, and equal to the committed snapshots."""
 
 import subprocess
 import zipfile
@@ -49,7 +49,8 @@ def test_description_says_what_tools_rely_on(fmu, name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_fmpy_simulates_a_unit_as_it_is(fmu, name):
-    """Dropped into a tool and started: the scenario of the paper, with whatever the tool passes by default."""
+    """A unit that a tool opens and starts flies the paper's scenario with the tool's default
+    values."""
     result = simulate_fmu(str(archive(name)), output=fmu(name).names("output"), stop_time=10.0, output_interval=0.04)
     assert len(result) == 251
     values = np.array(result.tolist())

@@ -1,4 +1,5 @@
-"""Plant and controller stepped by hand against the orchestrator: the same binaries in the same order."""
+"""Plant and controller stepped by hand against the orchestrator, with the same binaries in the same
+order."""
 
 import csv
 import json
@@ -22,7 +23,8 @@ COLUMNS = {
 
 
 def compare(fmu, text: str, results, jacobi: bool = False) -> None:
-    """Steps the components of an experiment by hand, next to the orchestrator's results."""
+    """Steps the components of an experiment by hand and compares them with the orchestrator's
+    results."""
     written = tomllib.loads(text)["components"]
     units = {}
     for component in ("controller", "plant"):

@@ -1,4 +1,5 @@
-"""DLMPC as a unit: its outer optimum against IPOPT, and its two rates against the communication step."""
+"""DLMPC as a unit: its outer optimum against IPOPT, and its two rates against the communication
+step."""
 
 import csv
 
@@ -17,7 +18,8 @@ OPTIMISATION = 0.2
 
 
 def outer_optimum(start: np.ndarray, time: float) -> tuple[float, np.ndarray]:
-    """Cost and first body rate command of the outer layer, as a nonlinear programme by multiple shooting."""
+    """Returns cost and first body rate command of the outer layer, from a nonlinear programme by
+    multiple shooting."""
     n, h = nlp.HORIZON, nlp.STEP
     angles, v = ca.MX.sym("angles", 3, n + 1), ca.MX.sym("v", 3, n)
     matrix = ca.SX.sym("angles", 3)
@@ -53,13 +55,13 @@ def outer_optimum(start: np.ndarray, time: float) -> tuple[float, np.ndarray]:
     "start, time, active",
     [
         (nlp.INITIAL_ANGLES, 0.0, True),
-        # The jump of the reference is ahead.
+        # The horizon contains the reference's jump.
         (np.array([12.0, 1.0, -29.0]) * nlp.DEG, 14.0, False),
     ],
 )
 def test_oracle_first_optimisation_is_the_nonlinear_optimum(fmu, start, time, active):
     cost, command = outer_optimum(start, time)
-    # Where the first command is bounded, the bound is what it depends on.
+    # If the first command is at its bound, the bound determines it.
     assert (np.linalg.norm(command) == pytest.approx(nlp.RATE_LIMIT, rel=1e-6)) == active
     dlmpc = Unit(fmu("DLMPC"))
     with dlmpc.start(start=time, inputs=dict(zip(ANGLES + RATES, [*start, 0.0, 0.0, 0.0]))):
@@ -71,7 +73,7 @@ def test_oracle_first_optimisation_is_the_nonlinear_optimum(fmu, start, time, ac
 
 
 def test_oracle_inner_law_at_the_first_tick(fmu):
-    """The equation of docs/DLMPC.md with z = 0, at rates near the command."""
+    """The moment follows the equation of docs/DLMPC.md with z = 0, at rates near the command."""
     q, p, gamma, rho = 5.0, 5.0, 0.15, 0.7
     angles = nlp.reference(0.0)[0]
     with Unit(fmu("DLMPC")).start(inputs=dict(zip(ANGLES + RATES, [*angles, 0.0, 0.0, 0.0]))) as dlmpc:
@@ -98,7 +100,7 @@ DIVISIONS = {
     "irregular": [0.013, 0.027, 0.001, 0.1, 0.059],
     "irregular, across ticks": [0.07, 0.003, 0.127],
 }
-# Divisions that stop at every tick, so that inputs can change there.
+# These divisions stop at every tick, so that inputs can change there.
 AT_TICKS = {
     "20 ms": [0.02] * 2,
     "40 ms": [0.04],
@@ -107,14 +109,16 @@ AT_TICKS = {
 
 
 def course(time: float) -> dict:
-    """Measurements as functions of time, near enough to the reference that the law does not rest in saturation."""
+    """Measurements as functions of time, near enough to the reference that the law is not always
+    saturated."""
     angles = np.array([10.0 + 2.0 * np.sin(0.5 * time), 3.0 * np.exp(-0.3 * time), -30.0 + 4.0 * np.cos(0.5 * time)])
     rates = np.array([0.3 * np.sin(2.1 * time), 0.8 * np.cos(0.7 * time), 0.4 * np.sin(1.3 * time + 1.0)])
     return dict(zip(ANGLES + RATES, [*(angles * nlp.DEG), *(rates * nlp.DEG)]))
 
 
 def driven(fmu, hold: float, division: list[float]) -> list[list[str]]:
-    """Every output at the beginning of each hold but those that a clock gives and the reference, exactly."""
+    """Returns the exact outputs at the beginning of each hold, except the reference and those that
+    a clock gives."""
     assert sum(division) == pytest.approx(hold)
     names = [n for n in fmu.names("output") if n not in NOT_REPRODUCIBLE and not n.startswith("reference")]
     rows = []
@@ -131,7 +135,7 @@ def driven(fmu, hold: float, division: list[float]) -> list[list[str]]:
 
 @pytest.mark.parametrize("division", [name for name in DIVISIONS if name != "200 ms"])
 def test_steps_inputs_of_the_outer_layer(fmu, division):
-    """Inputs held for 0.2 s: any division of that gives the same outputs, bit for bit."""
+    """With inputs held for 0.2 s, any division of that time gives the same outputs, bit for bit."""
     expected = driven(fmu("DLMPC"), OPTIMISATION, DIVISIONS["200 ms"])
     assert len({tuple(row) for row in expected}) == len(expected)
     assert driven(fmu("DLMPC"), OPTIMISATION, DIVISIONS[division]) == expected
@@ -139,7 +143,8 @@ def test_steps_inputs_of_the_outer_layer(fmu, division):
 
 @pytest.mark.parametrize("division", [name for name in AT_TICKS if name != "40 ms"])
 def test_steps_inputs_of_the_inner_layer(fmu, division):
-    """Inputs held for 0.04 s."""
+    """With inputs held for 0.04 s, any division of that time gives the same outputs, bit for
+    bit."""
     expected = driven(fmu("DLMPC"), FEEDBACK, AT_TICKS["40 ms"])
     assert len({tuple(row) for row in expected}) == len(expected)
     assert driven(fmu("DLMPC"), FEEDBACK, AT_TICKS[division]) == expected

@@ -1,4 +1,5 @@
-"""docs/errata.md names a test for everything it claims, docs/symbols.md only variables that exist."""
+"""docs/errata.md names a test for each of its claims, and docs/symbols.md names only variables that
+exist."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -11,7 +12,7 @@ CRATES = ["vehicle", "control", "modelDescription", "fmi2-export", "fmu-plant", 
 
 
 def tables(page: str) -> list[tuple[list[str], list[list[str]]]]:
-    """Every table of a page: its header and its rows, cell by cell."""
+    """Returns every table of a page: its header and its rows, cell by cell."""
     found: list[tuple[list[str], list[list[str]]]] = []
     inside = False
     for line in (ROOT / "docs" / page).read_text(encoding="utf-8").splitlines():
@@ -28,7 +29,7 @@ def tables(page: str) -> list[tuple[list[str], list[list[str]]]]:
 
 
 def quoted(cell: str) -> list[str]:
-    """What stands between backticks."""
+    """Returns the texts between backticks."""
     return re.findall(r"`([^`]+)`", cell)
 
 
@@ -39,7 +40,7 @@ ROWS = [(header, cells) for header, rows in tables("errata.md") for cells in row
 
 @pytest.fixture(scope="module")
 def names() -> set[str]:
-    """Names of all tests of the repository."""
+    """Returns the names of all tests of the repository."""
     found: set[str] = set()
     for crate in CRATES:
         for path in (ROOT / crate).rglob("*.rs"):
@@ -84,7 +85,7 @@ def test_tests_quoted_elsewhere_on_the_page_exist(names):
 
 @pytest.fixture(scope="module")
 def variables() -> set[str]:
-    """Names of the variables of all FMUs."""
+    """Returns the names of the variables of all FMUs."""
     found: set[str] = set()
     for path in (ROOT / "modelDescription" / "generated").glob("*.xml"):
         found.update(variable.get("name") for variable in ET.parse(path).iter("ScalarVariable"))
@@ -92,7 +93,7 @@ def variables() -> set[str]:
 
 
 def spelled_out(names: list[str]) -> list[str]:
-    """`a.x/y` as a.x, a.y, and an index alone as that index of the name before it."""
+    """Expands `a.x/y` to a.x and a.y, and an index alone to that index of the name before it."""
     result: list[str] = []
     for name in names:
         if re.fullmatch(r"\[\d+\]", name):

@@ -1,4 +1,5 @@
-"""AttitudeEstimator behind the sensors of ReentryPlant, stepped by hand: calibration flight, accuracy, lost and frozen samples."""
+"""AttitudeEstimator behind the sensors of ReentryPlant, stepped by hand: calibration flight,
+accuracy, lost and frozen samples."""
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ MEASURED += ["measured.time", "measured.sample"]
 
 
 def flown(fmu, plant: dict, estimator: dict, steps: int, names: list[str], truth: list[str] = ANGLES) -> tuple:
-    """What the estimator and the plant show at each tick."""
+    """Returns the outputs of the estimator and of the plant at each tick."""
     found, true = [], []
     with Unit(fmu("ReentryPlant"), MEMS | plant) as vehicle, Unit(fmu("AttitudeEstimator"), estimator) as unit:
         vehicle.start()
@@ -31,7 +32,8 @@ def health(fmu, item: str) -> int:
 
 
 def test_oracle_a_calibration_flight_finds_soft_and_hard_iron(fmu):
-    """The magnetometer's errors, read from the plant's parameters, come out of its readings alone."""
+    """The estimator finds the magnetometer's errors from its readings alone; the plant's parameters
+    hold the true errors."""
     matrix = [f"calibration.matrix[{i},{j}]" for i in (1, 2, 3) for j in (1, 2, 3)]
     bias = [f"calibration.bias.{axis}" for axis in "xyz"]
     estimator = {"calibration.mode": "fit", "calibration.duration": 60.0}
@@ -50,7 +52,8 @@ def test_oracle_a_calibration_flight_finds_soft_and_hard_iron(fmu):
 
 
 def test_oracle_attitude_and_rates_at_rest(fmu):
-    """0.2 deg and 0.1 deg/s, as wanted of the typical set; the rate's truth is the vehicle's drift at no moment."""
+    """The errors stay below the required 0.2 deg and 0.1 deg/s for the typical set. The true rate
+    is the vehicle's drift without a moment."""
     found, true = flown(fmu, {"sensor.seed": 3}, {"sensor.set": 2}, 2000, ANGLES + RATES, ANGLES + RATES)
     errors = np.degrees(found - true)[1:]
     rms = np.sqrt(np.mean(errors**2, axis=0))
@@ -59,7 +62,8 @@ def test_oracle_attitude_and_rates_at_rest(fmu):
 
 
 def test_ideal_sensors_unplugged_and_plugged_in(fmu):
-    """Without a line the inputs' start values show the scenario's start; the plant's true readings show the truth."""
+    """Without a line, the start values of the inputs give the scenario's start; with the plant's
+    true readings the estimate is the truth."""
     with Unit(fmu("AttitudeEstimator")).start() as unit:
         assert np.degrees(unit.get(ANGLES)) == pytest.approx([7.5, 10.0, -30.0], abs=1e-9)
         assert unit.get(["health"]) == [health(fmu, "ok")]

@@ -1,4 +1,4 @@
-"""The programs of scripts/examples run, and give what the orchestrator gives."""
+"""The programs of scripts/examples run and give the results of the orchestrator."""
 
 import csv
 import json
@@ -19,7 +19,7 @@ EXAMPLES = ROOT / "scripts" / "examples"
 
 
 def run(folder, name, *arguments):
-    """A program in a folder of its own; returns what it prints."""
+    """Runs a program in a folder of its own and returns the text that it prints."""
     command = [sys.executable, EXAMPLES / name, "--fmus", TARGET / "fmu", "--out", ".", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", timeout=120, cwd=folder)
     assert done.returncode == 0, done.stderr
@@ -59,7 +59,7 @@ def test_plot_makes_a_picture(tmp_path):
     run(tmp_path, "plot.py", "LQR", "--stop", "10")
     picture = imread(tmp_path / "closed_loop.png")
     assert picture.shape[:2] == (900, 1200)
-    # More than a frame: the lines have colours.
+    # The picture shows more than a frame, because its lines have colours.
     assert len(np.unique(picture.reshape(-1, picture.shape[2]), axis=0)) > 100
 
 

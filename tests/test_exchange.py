@@ -1,4 +1,5 @@
-"""ReentryPlant as model exchange under FMPy's CVode against its own co-simulation. Surfaces and jets: test_actuators.py."""
+"""ReentryPlant as model exchange under FMPy's CVode against its own co-simulation. For surfaces and
+jets see test_actuators.py."""
 
 from ctypes import c_double
 
@@ -11,15 +12,16 @@ from fmi import ANGLES, MOMENT, RATES, Unit
 
 STOP = 20.0
 STEP = 0.04
-# Between CVode and our integrator, rad and rad/s, over a swing of about one.
+# Bound on the difference between CVode and our integrator, rad and rad/s, over a swing of about
+# one.
 BOUND = 3e-7
-# Moments that swing the vehicle by some 0.7 rad without leaving |beta| < 90 deg.
+# Amplitudes of moments that swing the vehicle by some 0.7 rad without leaving |beta| < 90 deg.
 AMPLITUDE = np.array([2e4, 3e4, -4e4])
 FREQUENCY = np.array([0.5, 0.7, 0.9])
 
 
 def moment(tick: int) -> np.ndarray:
-    """Piecewise constant, so that both interfaces see the very same input."""
+    """Piecewise constant moment, so that both interfaces see exactly the same input."""
     return AMPLITUDE * np.sin(FREQUENCY * tick * STEP)
 
 
@@ -40,7 +42,8 @@ def co_simulated(fmu, settings) -> np.ndarray:
 
 
 def exchanged(fmu, settings) -> np.ndarray:
-    # A jump at each tick: a row for the old value and one for the new, which FMPy takes for an event.
+    # The input jumps at each tick: one row has the old value and one the new, which FMPy takes for
+    # an event.
     rows = []
     for tick in range(round(STOP / STEP) + 1):
         if tick > 0:
@@ -129,7 +132,7 @@ def test_oracle_euler_converges_to_co_simulation_with_order_one(fmu):
         expected = np.array(plant.get(ANGLES + RATES))
 
     def error(step: float) -> float:
-        # FMPy's Euler integrates in steps of the output interval.
+        # FMPy's Euler method integrates in steps of the output interval.
         result = simulate_fmu(
             str(vehicle.path),
             fmi_type="ModelExchange",

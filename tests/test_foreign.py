@@ -1,4 +1,5 @@
-"""FMUs as other makers write them, and as no one should: made from ours by changing the archive or its XML."""
+"""FMUs as other makers write them, and as no one should: made from ours by changing the archive or
+its XML."""
 
 import io
 import struct
@@ -22,7 +23,7 @@ def entries() -> dict[str, bytes]:
 
 
 def changed(old: str, new: str, count: int = -1, **encoding) -> dict[str, bytes]:
-    """The archive with another description."""
+    """Returns the entries of the archive with a changed description."""
     files = entries()
     text = files[DESCRIPTION].decode()
     assert old in text
@@ -37,7 +38,8 @@ def write(path, files: dict[str, bytes]):
 
 
 def run(tmp_path, *arguments, change=lambda text: text):
-    """The closed loop of our plant and the LQR.fmu in the folder `fmu` below `tmp_path`; the temporary folder below `temporary`."""
+    """Runs the closed loop of our plant and the LQR.fmu in the folder `fmu` below `tmp_path`. The
+    temporary folder is below `temporary`."""
     experiment = tmp_path / "x.toml"
     experiment.write_text(change(merged(EXPERIMENTS / "lqr.toml")).replace("stop = 50.0", "stop = 4.0"))
     temporary = tmp_path / "temporary"
@@ -46,7 +48,7 @@ def run(tmp_path, *arguments, change=lambda text: text):
     command += ["--fmu-dir", tmp_path / "fmu", "--fmu-dir", TARGET / "fmu"]
     environment = {"TMPDIR": str(temporary), "PATH": "/usr/bin:/bin"}
     finished = subprocess.run(command, capture_output=True, cwd=tmp_path, timeout=60, env=environment)
-    # Whatever happened, nothing stays behind.
+    # No temporary file stays behind, whatever happened.
     assert list(temporary.iterdir()) == []
     return finished
 
@@ -97,7 +99,7 @@ def test_what_others_write_is_run(name, tmp_path, usual):
 
 
 def with_entry(name: str, content: bytes = b"x", mode: int = 0o100644) -> bytes:
-    """The archive with a further entry, whose name is written as it stands."""
+    """Returns the archive with a further entry, whose name is written unchanged."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as file:
         for own, own_content in entries().items():
@@ -140,7 +142,7 @@ def bomb() -> bytes:
 
 
 def lying() -> bytes:
-    """An entry that declares 10 bytes and holds more."""
+    """Writes an entry that declares 10 bytes and holds more."""
     data = bytearray(with_entry("resources/large", b"y" * 100_000))
     for signature, offset in ((b"PK\x03\x04", 22), (b"PK\x01\x02", 24)):
         place = data.rindex(b"resources/large", 0, None if signature == b"PK\x01\x02" else data.rindex(b"PK\x01\x02"))
@@ -212,7 +214,7 @@ def test_what_is_hostile_or_broken_is_refused_in_one_line(name, tmp_path):
 
 
 def test_units_are_converted_only_when_asked(tmp_path, usual):
-    """The law as if it took its angles in thousandths of a radian."""
+    """The description is changed as if the law took its angles in thousandths of a radian."""
     (tmp_path / "fmu").mkdir()
     write(tmp_path / "fmu" / f"{LAW}.fmu", changed('<BaseUnit rad="1"/>', '<BaseUnit rad="1" factor="0.001"/>'))
 

@@ -1,6 +1,8 @@
-"""Every FMU in every importer at hand, alone and in the closed loop, against our own stepping with the importer's own coupling.
+"""Every FMU in every available importer, alone and in the closed loop, against our own stepping
+with the importer's own coupling.
 
-What is marked `importer` makes the table of docs/importers.md (conftest.py). Each test gives two arrays to `agree`: the importer's and ours.
+The tests marked `importer` make the table of docs/importers.md (conftest.py). Each of them gives
+two arrays to `agree`, the importer's and ours.
 """
 
 import csv
@@ -30,7 +32,8 @@ each_unit = pytest.mark.parametrize("name", NAMES)
 each_controller = pytest.mark.parametrize("name", CONTROLLERS)
 
 
-# Our own stepping. Time and length of step k, as importers compute them: they differ in the last bit
+# Our own stepping. The clocks give time and length of step k as importers compute them; they differ
+# in the last bit.
 
 
 def exact(tick):
@@ -42,13 +45,13 @@ def differences(tick):
 
 
 def nanoseconds(tick):
-    """Whole nanoseconds, turned into seconds."""
+    """Clock in whole nanoseconds, converted to seconds."""
     now, then = (round(STEP * 1e9) * count / 1e9 for count in (tick, tick + 1))
     return now, then - now
 
 
 def reals(unit) -> list[str]:
-    """Outputs that are real and no wall-clock time."""
+    """Names of the outputs that are Real and no wall-clock time."""
     names = unit.names("output")
     return [name for name in names if unit.variables[name].type == "Real" and name not in NOT_REPRODUCIBLE]
 
@@ -74,7 +77,8 @@ def by_hand(fmu):
 
 @pytest.fixture(scope="module")
 def loop(fmu):
-    """State and moment of the closed loop at each communication point, as read before they are passed on (Jacobi) or after."""
+    """State and moment of the closed loop at each communication point, read before they are passed
+    on (Jacobi) or after."""
     done = {}
 
     def run(name, jacobi, clock=exact, parameters=True):
@@ -85,14 +89,14 @@ def loop(fmu):
                 rows = [stepped.start()]
                 rows += [stepped.advance() for _ in range(STEPS)]
             done[key] = np.array(rows)
-            # A loop that does something: degrees, and a moment that changes.
+            # The loop must move: by degrees, and with a moment that changes.
             assert np.ptp(done[key][:, 0]) > 0.01 and np.ptp(done[key][:, 6]) > 1e3
         return done[key]
 
     return run
 
 
-# Unlike the start values, so that it shows whether they arrive.
+# These values differ from the start values, so that a lost parameter shows.
 PARAMETERS = {"inertia.scale": 0.97, "disturbance.seed": 3}
 EXPERIMENT = """
 title = "{0} on the scenario of its defaults, but for two parameters"
@@ -126,7 +130,8 @@ SIGNALS = [(source, name) for source, _, name in WIRES]
 
 
 def orchestrate(folder, text, *arguments):
-    """Columns of the results by the variable's name, with the component."""
+    """Runs the orchestrator and returns the columns of the results by component and variable
+    name."""
     (folder / "experiment.toml").write_text(text)
     command = [program("orchestrator"), "run", "experiment.toml", "--out", "out", "--fmu-dir", TARGET / "fmu", "--force", "--quiet"]
     done = subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=60, cwd=folder)
@@ -159,7 +164,7 @@ def cosim():
 
 @pytest.fixture
 def packed(tmp_path):
-    """The closed loop as an SSP archive."""
+    """Packs the closed loop as an SSP archive."""
 
     def pack(name):
         (tmp_path / "experiment.toml").write_text(EXPERIMENT.format(name, STOP, STEP))
@@ -236,18 +241,19 @@ def fmi_sim(folder, *arguments):
     return columns(folder / "out.csv")
 
 
-# The plant as model exchange. The same under CVode: test_exchange.py
+# The plant as model exchange; test_exchange.py has the comparison under CVode.
 
 
 @pytest.fixture(scope="module")
 def euler(fmu):
-    """States by FMPy's Euler method, which test_exchange.py shows to converge to our co-simulation."""
+    """States by FMPy's Euler method, which test_exchange.py shows to converge to our
+    co-simulation."""
     settings = dict(fmi_type="ModelExchange", solver="Euler", step_size=STEP, output_interval=STEP, stop_time=STOP)
     found = simulate_fmu(str(archive("ReentryPlant")), output=ANGLES + RATES, **settings)
     return np.array([found[name] for name in ANGLES + RATES]).T
 
 
-# It adds up time and step in another order than FMPy: the last bits differ.
+# fmi-rs accumulates time and step in another order than FMPy, so the last bits differ.
 @pytest.mark.importer("fmi-rs", "model exchange, Euler", unit="ReentryPlant", within=1e-12, to="FMPy's Euler")
 def test_oracle_fmi_rs_integrates_the_plant(euler, agree, tmp_path):
     found = fmi_rs(tmp_path, "me", archive("ReentryPlant"))
@@ -275,7 +281,7 @@ def test_oracle_the_orchestrator_closes_the_loop(loop, agree, tmp_path, name):
 def test_oracle_the_orchestrator_closes_the_loop_with_a_delay(loop, agree, tmp_path, name):
     text = EXPERIMENT.format(name, STOP, STEP).replace("order =", 'coupling = "jacobi"\norder =')
     found = orchestrate(tmp_path, text)
-    # The states: recorded moments are those after the exchange.
+    # Only the states are compared, because the recorded moments are those after the exchange.
     agree(np.array([found[f"plant.{signal}"] for signal in ANGLES + RATES]).T, loop(name, jacobi=True)[:, :6])
 
 
@@ -289,7 +295,8 @@ def test_oracle_fmi_rs_closes_the_loop(loop, agree, tmp_path, name):
 @each_controller
 @pytest.mark.importer("FMPy", "closed loop, SSP archive", plant=True, within=0.0, to="stepping its way by hand")
 def test_oracle_fmpy_closes_the_loop_of_an_archive(fmu, agree, packed, name):
-    """FMPy sets zeros at the first step, steps all units, and passes values on afterwards; rows bear the step's start. It leaves out the archive's values."""
+    """FMPy sets zeros at the first step, steps all units, and passes values on afterwards. Each row
+    bears the time at which its step starts. FMPy ignores the archive's values."""
     found = simulate_ssp(str(packed(name)), stop_time=STOP, step_size=STEP)
     expected = []
     with Unit(fmu(name)).start() as controller, Unit(fmu("ReentryPlant")).start() as plant:
@@ -328,7 +335,7 @@ def test_oracle_libcosim_closes_the_loop_of_a_system_structure(cosim, loop, agre
 @only_linux
 @pytest.mark.importer("fmu-manipulation-toolbox", "closed loop, container FMU in FMPy", plant=True, within=0.0, to="Jacobi by hand")
 def test_oracle_a_container_holds_the_closed_loop(loop, agree, packed, tool, tmp_path, name):
-    """Without the archive's values, which the toolbox leaves out."""
+    """The comparison has no parameters, because the toolbox ignores the archive's values."""
     packed(name)
     command = [tool("fmucontainer"), "-fmu-directory", ".", "-container", f"loop.ssp:{STEP}"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=tmp_path)
@@ -350,7 +357,7 @@ SECONDS = 20
 
 @pytest.fixture(scope="module")
 def foreign(tool, tmp_path_factory):
-    """tests/pd_controller.py as an FMU."""
+    """Builds tests/pd_controller.py as an FMU."""
     folder = tmp_path_factory.mktemp("pythonfmu")
     command = [tool("pythonfmu"), "build", "-f", ROOT / "tests" / "pd_controller.py", "-d", folder]
     subprocess.run(command, check=True, capture_output=True, timeout=60)
@@ -359,7 +366,7 @@ def foreign(tool, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def expected(fmu):
-    """The controller as a Python object, with the plant stepped by hand."""
+    """States and moments of the controller as a Python object, with the plant stepped by hand."""
     from pd_controller import PdController
 
     controller = PdController(instance_name="controller")
@@ -375,7 +382,7 @@ def expected(fmu):
             plant.set(dict(zip(MOMENT, moment)))
             rows.append(state + moment)
     rows = np.array(rows)
-    # From 30 degrees of bank to the noise about zero.
+    # The motion goes from 30 degrees of bank to the noise about zero.
     assert np.abs(rows[0, :3]).max() > 0.5 and np.abs(rows[-1, :3]).max() < 0.03
     return rows
 

@@ -1,4 +1,4 @@
-"""docs/importers.md against what the tests of this very session found."""
+"""docs/importers.md agrees with the outcomes of the tests of this session."""
 
 import pytest
 

@@ -1,4 +1,5 @@
-"""Bad input: an FMI error that names the culprit in the log, the process alive, the unit usable again after a reset."""
+"""Bad input gives an FMI error that names the culprit in the log; the process stays alive, and the
+unit is usable again after a reset."""
 
 import math
 from ctypes import c_double, c_uint
@@ -24,7 +25,7 @@ def drive(unit: Unit, ticks: int = 12) -> list:
 
 
 def refuses(unit: Unit, *words: str):
-    """The call must fail, and the log must tell why."""
+    """The call inside must fail, and the log must tell why."""
 
     class Expectation:
         def __enter__(self):
@@ -43,7 +44,7 @@ def refuses(unit: Unit, *words: str):
 
 @pytest.fixture(params=NAMES)
 def unit(request, fmu):
-    """A unit that misuse must leave alive: after a reset it does what a new one does."""
+    """A unit that misuse must not break: after a reset it behaves as a new one."""
     with Unit(fmu(request.param)) as fresh:
         expected = drive(fresh.start())
     with Unit(fmu(request.param)) as unit:
@@ -102,7 +103,7 @@ def test_parameters_out_of_range_are_refused_when_set(fmu, name, variable, value
 @pytest.mark.parametrize(
     "name, settings, words",
     [
-        # Marginal: at this rate the radius is exactly one (docs/errata.md).
+        # This case is marginal: at this rate the spectral radius is exactly one (docs/errata.md).
         ("CRMPC", {"feedback.k1": -10.0, "feedback.k2": -10.0, "period.feedback": 0.2}, ["spectral radius", "-10"]),
         ("CRMPC", {"feedback.k1": -60.0, "feedback.k2": -60.0}, ["spectral radius", "-60"]),
         ("CRMPC", {"period.optimisation": 0.21}, ["period.optimisation", "period.feedback"]),
@@ -154,7 +155,7 @@ def test_saved_states_that_do_not_fit(unit, fmu):
     with Unit(fmu(other)).start() as stranger:
         with refuses(unit, "GUID"):
             unit.restore(stranger.save())
-    # None of them left a trace.
+    # None of these refusals left a trace.
     assert unit.save() == saved
 
 
@@ -236,7 +237,8 @@ def test_a_plant_at_a_singular_attitude_says_so(fmu):
 
 
 def test_measurements_without_sense_do_not_end_a_controller(fmu):
-    """Far from anything feasible: a fallback with a finite moment, counted, and recovery."""
+    """At a state far from anything feasible the controller counts a fallback with a finite moment,
+    and recovers."""
     with Unit(fmu("CRMPC")).start() as unit:
         for tick in range(5):
             unit.step(tick * STEP, STEP)

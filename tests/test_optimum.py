@@ -1,4 +1,5 @@
-"""What the controllers compute at t = 0 against other tools: IPOPT for CRMPC, the Riccati solver of scipy for LQR."""
+"""The controllers' results at t = 0 against other tools: IPOPT for CRMPC, the Riccati solver of
+scipy for LQR."""
 
 import casadi as ca
 import numpy as np
@@ -15,7 +16,7 @@ def optimum():
 
 
 def test_published_constants_follow_from_the_raw_data(optimum):
-    # Chai 2022, section 5.1 and docs/errata.md; the printed digits.
+    # The digits are those printed in Chai 2022, section 5.1, and in docs/errata.md.
     sets = optimum.sets
     np.testing.assert_allclose(sets.weight, [[80.0, 30.0], [30.0, 36.0]], rtol=1e-12)
     assert sets.x_tube == pytest.approx(0.0896, abs=5e-5)
@@ -24,7 +25,7 @@ def test_published_constants_follow_from_the_raw_data(optimum):
 
 
 def test_oracle_first_optimisation_is_the_nonlinear_optimum(fmu, optimum):
-    # Both sets are active, so that the cost depends on them.
+    # Both sets are active, so the cost depends on them.
     assert np.linalg.norm(optimum.rates, axis=1).max() == pytest.approx(optimum.sets.x_tube, rel=1e-6)
     assert np.linalg.norm(optimum.inputs, axis=1).max() == pytest.approx(optimum.sets.u_tube, rel=1e-6)
 
@@ -38,7 +39,7 @@ def test_oracle_first_optimisation_is_the_nonlinear_optimum(fmu, optimum):
 
 
 def test_oracle_lqr_is_the_riccati_feedback_with_the_drift_cancelled(fmu):
-    # One axis is a double integrator.
+    # Each axis is a double integrator.
     a, b = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]])
     riccati = solve_continuous_are(a, b, nlp.P * np.eye(2), [[nlp.Q]])
     gain = -(b.T @ riccati / nlp.Q).reshape(2)

@@ -1,4 +1,5 @@
-"""The orchestrator's command line on the packed FMUs, and the figures of merit of the paper's scenario."""
+"""The orchestrator's command line on the packed FMUs, and the figures of merit of the paper's
+scenario."""
 
 import json
 import re
@@ -102,7 +103,7 @@ def test_oracle_figures_of_merit_follow_from_the_recorded_trajectory(experiment,
     error = vector(*(f"plant.attitude.{a}" for a in axes)) - vector(*(f"controller.reference.{a}" for a in axes))
     moment = np.linalg.norm(vector(*(f"controller.moment.{a}" for a in "xyz")), axis=1) / 1.356e5
     rate = np.linalg.norm(vector(*(f"plant.rate.{a}" for a in "pqr")), axis=1)
-    # Means over the steps, each counted by its beginning.
+    # The means are taken over the steps, each represented by its beginning.
     assert found["ems_deg"] == pytest.approx(np.degrees(np.sqrt((error[:-1] ** 2).sum(axis=1).mean())), rel=1e-12)
     assert found["cms"] == pytest.approx(np.sqrt((moment[:-1] ** 2).mean()), rel=1e-12)
     assert found["max_rate_deg_s"] == pytest.approx(np.degrees(rate.max()), rel=1e-12)
@@ -155,7 +156,7 @@ def test_a_lost_attitude_ends_the_run(orchestrate, tmp_path):
     assert found and "attitude lost at" in finished.stdout
     assert metrics(out)["lost_at"] == pytest.approx(float(found[1])) and metrics(out)["completed"] is False
     assert json.loads((out / "results.json").read_text())["status"].startswith("attitude lost at t = ")
-    # The row at which it was lost is the last one.
+    # The last row is that at which the attitude was lost.
     last = (out / "results.csv").read_text().splitlines()[-1]
     assert float(last.split(",")[0]) == metrics(out)["lost_at"]
 

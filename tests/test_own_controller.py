@@ -1,4 +1,5 @@
-"""examples/own-controller, a law outside the project's workspace: built, validated, flown and compared."""
+"""examples/own-controller, a law outside the project's workspace: built, validated, flown and
+compared."""
 
 import csv
 import subprocess
@@ -10,7 +11,7 @@ from conftest import EXPERIMENTS, ROOT, program
 from fmi import ANGLES, MOMENT, RATES
 
 FOLDER = ROOT / "examples" / "own-controller"
-# The gains that the Riccati equation gives for P = 50, Q = 10: sqrt(P/Q), sqrt((P + 2 sqrt(P Q))/Q).
+# The Riccati equation gives these gains for P = 50, Q = 10: sqrt(P/Q), sqrt((P + 2 sqrt(P Q))/Q).
 GAINS = {"gain.p": np.sqrt(5.0), "gain.d": np.sqrt(5.0 + 2.0 * np.sqrt(5.0))}
 
 
@@ -27,7 +28,7 @@ def test_oracle_a_law_from_outside_is_built_flown_and_agrees_with_lqr(experiment
     assert validate_fmu(str(packed)) == []
     assert len((FOLDER / "src" / "lib.rs").read_text().splitlines()) <= 60
 
-    # In an experiment that was written for another controller.
+    # The law replaces the controller in an experiment that was written for another one.
     flown = tmp_path / "flown"
     command = [program("orchestrator"), "run", EXPERIMENTS / "crmpc-robust.toml", "--fmu", f"controller={packed}", "--out", flown]
     gains = [f"--set=controller.{name}={value!r}" for name, value in {k: float(v) for k, v in GAINS.items()}.items()]

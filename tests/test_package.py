@@ -1,4 +1,5 @@
-"""FMUs for old Linux systems (scripts/package): what they need of a system, how large they are, and that they do the same."""
+"""FMUs for old Linux systems (scripts/package): their requirements, their size, and that they
+behave the same."""
 
 import platform
 import zipfile
@@ -14,7 +15,7 @@ from fmi import Fmu, Unit
 pytestmark = pytest.mark.skipif(
     (platform.system(), platform.machine()) != ("Linux", "x86_64"), reason="built on Linux x86_64 only"
 )
-# CentOS 7 and manylinux2014.
+# CentOS 7 and manylinux2014 have this version of glibc and these libraries.
 GLIBC = (2, 17)
 LIBRARIES = {"libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "ld-linux-x86-64.so.2"}
 NODELETE = 0x8
@@ -67,5 +68,6 @@ def test_the_unit_is_the_same(packed, fmu, tmp_path):
             for tick in range(10):
                 unit.step(0.04 * tick, 0.04)
             shown.append(unit.outputs())
-    # The libraries of mathematical functions are the system's own in either, but compiled calls to them may differ.
+    # Both builds use the system's mathematical functions, but their compiled calls to them may
+    # differ.
     assert shown[0] == pytest.approx(shown[1], rel=1e-9, abs=1e-12)

@@ -1,4 +1,4 @@
-"""The README's examples do what they say."""
+"""The README's examples run as described."""
 
 import re
 import subprocess

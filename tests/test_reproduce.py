@@ -1,4 +1,5 @@
-"""`orchestrator reproduce crmpc-2022`: the report of Chai 2022, section 5.2, with few members of each run."""
+"""`orchestrator reproduce crmpc-2022`: the report of Chai 2022, section 5.2, with few members of
+each run."""
 
 import json
 import os
@@ -51,7 +52,7 @@ def claim(results, words: str) -> dict:
 
 def test_the_report_is_one_page_that_needs_no_network(report):
     page = (report[1] / "report.html").read_text()
-    # The library of the plots holds addresses in its own text, which nothing loads.
+    # The library of the plots holds addresses in its own text, which no browser loads.
     outside = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
     loaded = re.findall(r'(?:src|href)\s*=\s*"([^"]*)"', outside)
     assert loaded and all(not re.match(r"(?:https?:)?//", address) for address in loaded)
@@ -77,7 +78,7 @@ def test_every_published_value_is_shown_with_its_place(report, results):
         assert value["kind"] in {"table", "text", "figure"} and re.search(r"section 5\.[12], p\. \d+", value["source"])
         assert value["id"] in page and value["source"] in page
     table = {value["id"]: value["value"] for value in published}
-    # Table I as printed.
+    # These are the values of Table I as printed.
     assert (table["ems.dlmpc"], table["ems.crmpc"]) == (1.8193, 1.6055)
     assert (table["cms.dlmpc"], table["cms.crmpc"]) == (0.5399, 0.3552)
     assert table["ems.reduction"] == pytest.approx(1 - 1.6055 / 1.8193, abs=5e-5)
@@ -92,30 +93,32 @@ def test_the_first_member_is_the_experiment_itself(experiment, results, run):
 
 
 def test_crmpc_needs_a_third_less_effort_than_dlmpc_with_the_printed_gains(results):
-    # Chai 2022, Table I: 34.21 %.
+    # Chai 2022, Table I, prints a reduction of 34.21 %.
     checks = claim(results, "34.21")["checks"]
     printed = [check for check in checks if "tuned" not in check["label"]]
     assert len(printed) == 5 and all(check["held"] == check["of"] for check in printed)
-    # Against the tuned gains, which halve DLMPC's effort, CRMPC still needs less; with the paper's sets by less than that.
+    # CRMPC also needs less effort than the tuned gains, which halve DLMPC's effort. With the
+    # paper's sets the saving is below 34.21 %.
     for run, least in [("crmpc-paper", 0.25), ("crmpc-robust", 0.3421)]:
         pairs = zip(metric(results, run, "cms"), metric(results, "dlmpc-tuned", "cms"), strict=True)
         assert all(ours <= (1 - least) * theirs for ours, theirs in pairs)
 
 
 def test_the_loop_with_estimator_is_stable_and_the_robust_set_keeps_its_limits(results):
-    # As many seeds as are run here; of the whole study 100.
+    # Each run has as many seeds as are run here; the whole study has 100.
     assert all(len(metric(results, run, "cms")) == MEMBERS for run in ["crmpc-guaranteed-est", "lqr-est"])
     checks = claim(results, "sensors, filter")["checks"]
     assert len(checks) == 4 and all(check["held"] == check["of"] for check in checks)
     for run in ["crmpc-guaranteed-est", "crmpc-robust-est"]:
         assert max(metric(results, run, "max_rate_deg_s")) < 5.0 and max(metric(results, run, "max_moment_ratio")) <= 1.0 + 1e-12
         assert max(metric(results, run, "fallbacks")) == 0
-    # From the second tick on, when the first command acts.
+    # The guarantee holds from the second tick on, when the first command acts.
     assert min(metric(results, "crmpc-guaranteed-est", "guarantee_share")) > 0.999
 
 
 def test_the_map_of_the_guarantee(results):
-    """Where the design accepts, the guarantee is in force and kept; further disturbance, error or delay is refused."""
+    """The guarantee is in force and kept where the design accepts the settings; larger
+    disturbances, errors or delays are refused."""
     accepted = {}
     for run, result in results["runs"].items():
         if not run.startswith("map-"):
@@ -124,7 +127,8 @@ def test_the_map_of_the_guarantee(results):
         accepted[run[4:]] = metrics["guarantee_share"] > 0.9
         assert metrics["guarantee_broken"] is False
         assert metrics["max_rate_deg_s"] <= 5.0 and metrics["max_moment_ratio"] <= 1.0 + 1e-12
-        # The delay that is known, the errors that are counted, and what is lost of the first ticks.
+        # An accepted design lacks the guarantee at most in the first ticks; a refused one has it at
+        # no tick.
         assert accepted[run[4:]] or metrics["guarantee_share"] == 0.0
     assert len(accepted) == 45
     for delay in ["000", "040", "117"]:
@@ -134,7 +138,8 @@ def test_the_map_of_the_guarantee(results):
 
 
 def test_prediction_makes_up_for_a_delay(results):
-    """What a delay costs in effort and beyond the limits, known and not."""
+    """Prediction over a known delay limits the extra effort and the excess over the rate limit; an
+    unknown delay costs more."""
     for law in ["robust", "paper", "dlmpc", "lqr"]:
         known, unknown = (
             results["runs"][f"delay-200-{law}{way}"]["members"][0]["metrics"] for way in ["-predicted", ""]
@@ -148,7 +153,7 @@ def test_oracle_crmpc_comes_near_the_clairvoyant_optimum_of_its_sets(results):
     bounds = {value["id"]: value["value"] for value in results["values"]}
     for ems in metric(results, "crmpc-paper", "ems_deg"):
         assert bounds["ems.clairvoyant.paper"] < ems <= 1.12 * bounds["ems.clairvoyant.paper"]
-        # The untightened sets, which are larger, have a lower bound.
+        # The untightened sets are larger, so their lower bound is lower.
         assert ems <= 1.12 * bounds["ems.clairvoyant.printed"]
     for run in ["crmpc-robust", "dlmpc", "dlmpc-tuned"]:
         assert min(metric(results, run, "ems_deg")) > bounds["ems.clairvoyant.limits"]
@@ -158,7 +163,7 @@ def test_the_orders_that_the_paper_prints(results):
     checks = {check["label"]: check for check in claim(results, "11.75")["checks"]}
     assert checks["paper sets, with noise, lower at all"]["held"] == MEMBERS
     assert checks["paper sets, no noise"]["held"] == 1
-    # What does not hold is said, too.
+    # Claims that do not hold are reported as such.
     assert checks["robust sets, with noise"]["held"] == 0
     assert claim(results, "11.75")["verdict"] == "holds-partly"
     assert claim(results, "LQR breaks both limits")["verdict"] == "holds"
@@ -179,7 +184,7 @@ def test_exits_change_the_time_and_not_the_motion(results):
 def test_parameters_are_shown_in_the_unit_of_their_heading(report):
     page = (report[1] / "report.html").read_text()
     row = page.split("Where the guarantee can be given")[1].split("errors 0.2 deg, 0.2 deg/s; disturbance 2.0 deg/s²")[1]
-    # 0.2 deg/s and 2 deg/s2, which the unit holds in rad.
+    # The unit holds these 0.2 deg/s and 2 deg/s2 in rad.
     assert re.findall(r"<td[^>]*>([^<]*)</td>", row)[:2] == ["0.2", "2"]
 
 
@@ -189,7 +194,7 @@ def test_a_square_wave_drives_the_rate_to_twice_the_printed_tube(results, case):
     assert 2.0 < within[f"rate-{case}-printed"]["ratio"] < 2.1
     exact = within[f"rate-{case}-exact"]
     assert exact["inside"] == exact["samples"] and exact["ratio"] > 0.99
-    # A constant disturbance reaches half of the exact rate tube, and all of the angle's.
+    # A constant disturbance reaches half of the exact rate tube, and all of the exact angle tube.
     within = results["runs"][f"tube-{case}-constant"]["members"][0]["within"]
     assert within[f"rate-{case}-exact"]["ratio"] == pytest.approx(0.5, abs=2e-3)
     assert within[f"angle-{case}-exact"]["ratio"] == pytest.approx(1.0, abs=2e-3)
@@ -210,14 +215,15 @@ def test_an_interruption_loses_no_finished_part(tmp_path):
     deadline = time.monotonic() + 60
     while len(list(out.glob("runs/*/*.json"))) < 4 and time.monotonic() < deadline:
         time.sleep(0.02)
-    # The hardest interruption there is; a key's may be ignored by whoever runs this in the background.
+    # The process is killed, which is the hardest interruption; a key's signal may be ignored in the
+    # background.
     process.kill()
     assert process.wait(timeout=30) != 0
     kept = {path: path.read_bytes() for path in out.glob("runs/*/*.json")}
     assert len(kept) >= 4 and not (out / "report.html").exists()
     finished = reproduce(EXPERIMENTS, out, "--members", "1")
     assert finished.returncode == 0, finished.stderr
-    # The first parts, of one timed member each, are the same with one member.
+    # The first parts hold one timed member each, so they are the same with one member.
     assert int(re.search(r"(\d+) kept from before", finished.stdout)[1]) >= 4
     assert all(path.read_bytes() == content for path, content in kept.items() if path.name == "0000-0001.json")
 
@@ -233,7 +239,7 @@ def test_a_signal_ends_it_and_keeps_what_is_finished(tmp_path):
     deadline = time.monotonic() + 60
     while len(list(out.glob("runs/*/*.json"))) < 3 and time.monotonic() < deadline:
         time.sleep(0.02)
-    # A second one must wait.
+    # A second process must wait.
     second = reproduce(EXPERIMENTS, out)
     assert second.returncode == 2 and "another process is writing its results to" in second.stderr
     process.send_signal(signal.SIGTERM)
@@ -310,7 +316,7 @@ def test_a_changed_experiment_is_run_again(report, tmp_path):
     finished = reproduce(study, out, "--members", str(MEMBERS))
     assert finished.returncode == 0, finished.stderr
     run, kept = (int(n) for n in re.search(r"(\d+) run now, (\d+) kept", finished.stdout).groups())
-    # LQR with and without noise.
+    # Two runs depend on this file: LQR with and without noise.
     assert run == 2 and kept > 10
 
 
@@ -365,7 +371,7 @@ def test_the_claims_of_wu_2015_hold_with_moments_acting_directly(wu):
     _, results = wu
     assert [claim["verdict"] for claim in results["claims"]] == ["holds"] * 4
     measures = {run: results["runs"][run]["members"][0]["measures"] for run in results["runs"]}
-    # docs/errata.md: RMS of alpha, beta, sigma over 10 to 20 s, deg.
+    # docs/errata.md states these RMS values of alpha, beta, sigma over 10 to 20 s, in deg.
     for run, expected in [("fbl", (0.205, 0.076, 0.493)), ("btvsmc", (0.047, 0.017, 0.112))]:
         ours = [measures[run][f"rms-{axis}"] for axis in ("alpha", "beta", "sigma")]
         assert ours == pytest.approx(expected, abs=5.1e-4)
@@ -378,7 +384,8 @@ def test_the_claims_of_wu_2015_hold_with_moments_acting_directly(wu):
 def test_wu_2015_with_control_allocation(wu):
     _, results = wu
     measures = {run: results["runs"][run]["members"][0]["measures"] for run in results["runs"]}
-    # With surfaces at 10 deg/s and all biases; the jets give what is asked for, or are switched by PWPF.
+    # These runs have surfaces at 10 deg/s and all biases; the jets give any commanded thrust, or
+    # PWPF switches them.
     for run in ["duty-btvsmc-do", "duty-sotvsmc-do", "optimal-btvsmc-do", "optimal-sotvsmc-do"]:
         assert measures[run]["settling"] <= 4.5 and measures[run]["largest-error"] <= 0.05
         rudders = results["runs"][run]["members"][0]["within"]["rudders"]
@@ -387,7 +394,7 @@ def test_wu_2015_with_control_allocation(wu):
     stable = {run: m["largest-error"] for run, m in measures.items() if run.startswith("optimal-")}
     assert len(stable) == 8 and max(stable.values()) < 1.3
     assert all(measures[run]["pulses"] > 0 for run in stable)
-    # By the selector of Jia et al. too, and the laws with an observer as precisely.
+    # With the selector of Jia et al. the laws with an observer are as precise.
     blended = {run: m["largest-error"] for run, m in measures.items() if run.startswith("blending-")}
     assert max(blended[f"blending-{law}-do"] for law in ("btvsmc", "sotvsmc")) <= 0.05
 
@@ -408,8 +415,8 @@ def test_every_controller_flies_every_scenario(tmp_path):
     for name, member in members.items():
         assert member["metrics"]["completed"], name
         assert member["metrics"]["step_us"]["controller"] > 0.0
-        # None was designed for the others' scenarios; none loses the attitude all the same, but for Jia's disturbance, which
-        # is more than surfaces and jets can give.
+        # No law was designed for the others' scenarios. Still none loses the attitude, except under
+        # Jia's disturbance, which is more than surfaces and jets can give.
         if not name.startswith("jia-allocated"):
             assert member["metrics"]["ems_deg"] < 10.0, name
         assert ("pulses" in member["measures"]) == ("allocated" in name)

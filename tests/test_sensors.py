@@ -1,5 +1,6 @@
-"""Sensors of ReentryPlant: what they show at rest, along the calibration sequence, through lost samples, in both interfaces. The
-errors are those of vehicle/data/sensors.toml, read back from the unit's parameters."""
+"""Sensors of ReentryPlant: their readings at rest, along the calibration sequence, through lost
+samples, in both interfaces. The errors are those of vehicle/data/sensors.toml, read back from the
+unit's parameters."""
 
 import csv
 
@@ -23,7 +24,7 @@ def matrix(sensor: str) -> list[str]:
 
 
 def errors(unit: Unit, sensor: str) -> tuple[np.ndarray, np.ndarray]:
-    """A and b of m = A h + b."""
+    """Returns A and b of m = A h + b."""
     bias = unit.get([f"sensor.{sensor}.bias.{axis}" for axis in "xyz"])
     return np.reshape(unit.get(matrix(sensor)), (3, 3)), np.array(bias)
 
@@ -40,11 +41,11 @@ def flown(fmu, parameters: dict, steps: int, step: float, names=SAMPLE + ALL) ->
 @pytest.mark.parametrize(
     "angles, force, field",
     [
-        # Level, to the north
+        # Level flight to the north.
         ({}, [0, 0, -1], ["north", "east", "down"]),
-        # Nose up: the belly looks north
+        # With the nose up, the belly looks north.
         ({"initial.alpha": 90.0}, [1, 0, 0], ["-down", "east", "north"]),
-        # Bank against the right-hand rule: the right wing is up
+        # The bank turns against the right-hand rule: the right wing is up.
         ({"initial.sigma": 90.0}, [0, 1, 0], ["north", "-down", "east"]),
     ],
 )
@@ -64,7 +65,8 @@ def test_oracle_readings_at_rest_by_hand(fmu, angles, force, field):
 def test_oracle_mean_and_deviation_at_rest_are_those_of_the_parameters(fmu):
     count = 4000
     rows = flown(fmu, {"sensor.set": MEMS}, count, 0.01)
-    # The delay is less than a period: of a step's end the sample of its beginning has arrived.
+    # The delay is less than a period, so at the end of a step the sample of its beginning has
+    # arrived.
     assert rows[1:, 0].tolist() == list(range(1, count + 1))
     np.testing.assert_allclose(rows[1:, 1], 0.01 * np.arange(count), rtol=0, atol=1e-12)
     with Unit(fmu("ReentryPlant"), REST).start() as unit:
@@ -74,7 +76,7 @@ def test_oracle_mean_and_deviation_at_rest_are_those_of_the_parameters(fmu):
             noise, step = unit.get([f"sensor.{sensor}.noise", f"sensor.{sensor}.resolution"])
             deviation = np.hypot(noise, step / np.sqrt(12))
             found = rows[1:, 2 + 3 * i : 5 + 3 * i]
-            # Five standard deviations of each estimate
+            # The bounds are five standard deviations of each estimate.
             assert np.abs(found.mean(axis=0) - expected).max() < 5 * deviation / np.sqrt(count)
             assert np.abs(found.std(axis=0) / deviation - 1).max() < 5 / np.sqrt(2 * count)
             np.testing.assert_allclose(found / step, np.round(found / step), rtol=0, atol=1e-6)
@@ -86,7 +88,8 @@ def test_samples_do_not_depend_on_the_communication_step(fmu, step):
     expected = flown(fmu, parameters, 100, 0.01)[:: round(step / 0.01)]
     found = flown(fmu, parameters, round(1.0 / step), step)
     assert found[:, 0].tolist() == expected[:, 0].tolist()
-    # To the bit, as steps of the converter are coarser than what the integration differs by
+    # The readings agree to the bit, because the converter's steps are coarser than the difference
+    # of the integrations.
     np.testing.assert_array_equal(found[:, 2:], expected[:, 2:])
 
 
@@ -105,7 +108,7 @@ def test_dropped_samples_leave_gaps_and_frozen_sensors_count_on(fmu):
     assert set(range(1, 101)) - set(numbers) == set(range(21, 31)), "taken from 0.20 s to 0.29 s"
     still = np.all(np.diff(rows[1:, 8:11], axis=0) == 0, axis=1)
     moving = np.any(np.diff(rows[1:, 2:5], axis=0) != 0, axis=1)
-    # Row k has arrived at (k + 1) · 0.01 s; it repeats the one before if it was dropped or frozen.
+    # Row k arrived at (k + 1) · 0.01 s; it repeats the one before if it was dropped or frozen.
     assert np.flatnonzero(still).tolist() == list(range(19, 29)) + list(range(49, 59))
     assert np.flatnonzero(~moving).tolist() == list(range(19, 29))
 
@@ -124,12 +127,12 @@ def test_oracle_the_gyroscope_measures_the_change_of_orientation_whatever_the_ki
     for kinematics in ("printed", "exact"):
         rows = flown(fmu, {"kinematics": kinematics, "integrator.step": step, **start}, 400, step, names)
         turned = np.array([orientation(row[:3]) for row in rows])
-        # Fourth-order difference of C; dC/dt C' = -omega^x
+        # A fourth-order difference gives dC/dt, and dC/dt C' = -omega^x.
         slope = (turned[:-4] - 8 * turned[1:-3] + 8 * turned[3:-1] - turned[4:]) / (12 * step)
         spin = -slope @ turned[2:-2].transpose(0, 2, 1)
         expected = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
         assert np.abs(rows[2:-2, 3:6] - expected).max() < 1e-9
-        # By hand: alpha_dot = -0.2617 rad/s at the start, times sin 10 deg
+        # The value by hand is alpha_dot = -0.2617 rad/s at the start, times sin 10 deg.
         off = np.linalg.norm(rows[:, 3:6] - rows[:, 6:9], axis=1)
         assert not off.any() if kinematics == "exact" else off[0] == pytest.approx(0.04544, abs=1e-5)
 
@@ -155,14 +158,15 @@ def exchanged(fmu, parameters: dict, solver: str):
 
 @pytest.mark.parametrize("solver", ["CVode", "Euler"])
 def test_oracle_model_exchange_takes_the_same_samples(fmu, solver):
-    # At rest, so that Euler's errors do not matter; noise, drops and delay do.
+    # The vehicle is at rest, so that Euler's errors do not matter; noise, drops and delay do.
     parameters = {"sensor.set": MEMS, "sensor.drop.probability": 0.2, "sensor.delay": 0.025}
     expected = {int(row[0]): row for row in flown(fmu, parameters, 100, 0.01)}
     result = exchanged(fmu, parameters, solver)
     found = {int(row["measured.sample"]): row for row in result}
     assert sorted(found) == sorted(expected) and len(found) > 70
     for number, row in found.items():
-        # At most a step of the converter, where the integrators' last bits tip it
+        # Readings differ by at most a step of the converter, where the integrators' last bits
+        # change the rounding.
         values = np.array([row[name] for name in SAMPLE + ALL])
         tolerance = np.array([0, 1e-9] + [1.4e-4] * 3 + [1.2e-3] * 3 + [1.6e-7] * 3)
         assert (np.abs(values - expected[number]) <= tolerance).all(), number
@@ -210,7 +214,8 @@ def test_what_is_out_of_its_limits_is_refused_when_it_is_set(fmu, name, value):
 
 
 def test_oracle_the_calibration_sequence_determines_hard_and_soft_iron(fmu):
-    # |A^-1 (m - b)| is the field's strength: an ellipsoid, fitted by least squares to what the magnetometer shows.
+    # |A^-1 (m - b)| is the field's strength, so the readings lie on an ellipsoid, which is fitted
+    # by least squares.
     m = flown(fmu, {"sensor.set": MEMS, "calibration.active": True}, 12000, 0.01, READINGS["magnetometer"])[1:]
     scale = 5e-5
     x, y, z = m.T / scale
@@ -222,7 +227,8 @@ def test_oracle_the_calibration_sequence_determines_hard_and_soft_iron(fmu):
     with Unit(fmu("ReentryPlant"), REST).start() as unit:
         a, b = errors(unit, "magnetometer")
         strength = np.linalg.norm(unit.get([f"sensor.field.{axis}" for axis in ("north", "east", "down")]))
-    # Noise of 0.3 uT in 12000 samples; the fit's own bias is of the noise's square by the field
+    # The noise is 0.3 uT in 12000 samples; the fit's own bias is of the size of the squared noise
+    # over the field.
     np.testing.assert_allclose(center * scale, b, rtol=0, atol=5e-8)
     inverse = np.linalg.inv(a)
     expected = inverse.T @ inverse * (scale / strength) ** 2
@@ -242,7 +248,7 @@ def test_regress_what_the_dropped_term_does_to_the_gyroscope_in_the_scenario_of_
     shown, model = (np.array([[float(row[f"plant.{n}"]) for n in names] for row in rows]) for names in (READINGS["gyroscope"], RATES))
     difference = np.degrees(np.linalg.norm(shown - model, axis=1))
     time = np.array([float(row["time"]) for row in rows])
-    # docs/ReentryPlant.md, deg/s
+    # docs/ReentryPlant.md states these values in deg/s.
     assert difference.max() == pytest.approx(0.277, abs=2e-3)
     assert np.sqrt(np.mean(difference**2)) == pytest.approx(0.0420, abs=1e-3)
     assert difference[time > 5.0].max() == pytest.approx(0.0038, abs=3e-4)

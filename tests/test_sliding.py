@@ -1,4 +1,5 @@
-"""The sliding-mode controllers as units: the scenario of Wu 2015 run by the orchestrator, and their laws at the first tick."""
+"""The sliding-mode controllers as units: the scenario of Wu 2015 run by the orchestrator, and their
+laws at the first tick."""
 
 import csv
 
@@ -16,7 +17,7 @@ START = dict(zip(ANGLES + RATES, [32 * DEG, 2 * DEG, 58 * DEG, 0.0, 0.0, 0.0]))
 
 
 def results(out, *names: str) -> np.ndarray:
-    """Time and these variables, whose column titles may carry a unit, row by row."""
+    """Returns time and these variables row by row; the column titles may carry a unit."""
     with open(out / "results.csv") as file:
         rows = list(csv.reader(line for line in file if not line.startswith("#")))
     header, rows = rows[0], np.array(rows[1:], dtype=float)
@@ -26,7 +27,7 @@ def results(out, *names: str) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def errors(orchestrate):
-    """Time (s) and the errors of the angles (deg) of one of the experiments."""
+    """Time (s) and errors of the angles (deg) of an experiment."""
     done = {}
 
     def run(name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -42,13 +43,13 @@ def errors(orchestrate):
 
 
 def rms(run) -> np.ndarray:
-    """Over 10 to 20 s, deg."""
+    """Root mean square of the errors over 10 to 20 s, deg."""
     time, error = run
     return np.sqrt(np.mean(error[time >= 10.0 - 1e-9] ** 2, axis=0))
 
 
 def settled(run) -> float:
-    """When all errors stay within 2 % of the first, s."""
+    """Time from which all errors stay within 2 % of the first, s."""
     time, error = run
     outside = (np.abs(error) > 0.02 * np.abs(error[0])).any(axis=1)
     return time[np.flatnonzero(outside)[-1] + 1]
@@ -68,7 +69,8 @@ def test_published_laws_with_observer_settle_within_4_s(errors):
 
 @pytest.mark.parametrize("name", ["FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO"])
 def test_oracle_first_moment(fmu, name):
-    """At rest at t = 0 s is 0, B is 0 and the observer rests: v = b = lambda a = -lambda c e, or -kp e."""
+    """In the vehicle at rest at t = 0, s is 0, B is 0 and the observer rests: v = b = lambda a =
+    -lambda c e, or -kp e."""
     parameters = BODY | {"reference.profile": "tvsmc2015"}
     with Unit(fmu(name), parameters).start(inputs=START) as unit:
         moment = np.array(unit.get(MOMENT))
@@ -82,7 +84,7 @@ def test_oracle_first_moment(fmu, name):
 
 @pytest.mark.parametrize("name", ["BTVSMC", "BTVSMC_DO", "SOTVSMC_DO"])
 def test_the_moment_does_not_depend_on_the_achieved_one_at_the_same_instant(fmu, name):
-    """No algebraic loop with actuators that answer at once, and none is declared."""
+    """There is no algebraic loop with actuators that answer at once, and none is declared."""
     unit = fmu(name)
     outputs = {variable.name: variable for variable in unit.description.modelVariables}
     dependencies = {

@@ -1,4 +1,5 @@
-"""SSP archives: written from experiments, valid by the standard's schema, run by the orchestrator; others' archives too. Run by others: test_importers.py."""
+"""SSP archives: written from experiments, valid by the standard's schema, and run by the
+orchestrator, as are archives of others. Other tools run them in test_importers.py."""
 
 import csv
 import html
@@ -36,7 +37,7 @@ def run(path, out, *arguments):
 
 
 def columns(out) -> dict[str, np.ndarray]:
-    """Results by the name of the variable, without unit."""
+    """Returns the results by the name of the variable, without unit."""
     with (out / "results.csv").open() as file:
         rows = list(csv.reader(file))
     names = [name.split(" ")[0] for name in rows[0]]
@@ -48,12 +49,12 @@ def test_every_experiment_becomes_a_valid_archive(experiment, tmp_path):
     path = tmp_path / "x.ssp"
     said = pack(experiment, path)
     assert "the standard has no place for the step" in said
-    # Against the schema of SSP 1.0.
+    # The description is checked against the schema of SSP 1.0.
     structure = read_ssd(str(path), validate=True)
     assert all(element.source.startswith("resources/") for element in structure.system.elements)
     text = zipfile.ZipFile(path).read("SystemStructure.ssd").decode()
     assert text.count('implementation="CoSimulation"') == len(structure.system.elements)
-    # An importer wants identifiers as names.
+    # Importers demand identifiers as names.
     names = re.findall(r' name="([^"]*)"', text.split("<ssd:Elements>")[0]) + re.findall(r'<ssv:ParameterSet version="1.0" name="([^"]*)"', text)
     assert names and all(name.isidentifier() for name in names)
     assert html.unescape(re.search(r' description="([^"]*)"', text)[1]) == tomllib.loads(experiment.read_text())["title"]
@@ -80,7 +81,8 @@ def test_an_archive_runs_as_its_experiment_does(name, tmp_path):
 
 @pytest.mark.parametrize("name", ["crmpc-2022/estimator", "tvsmc-2015/sotvsmc-do", "exchange/two-loop-smc-allocated"])
 def test_an_archive_of_ours_is_the_same_run(name, tmp_path):
-    """Without being told the step, the order, what is recorded or what the figures of merit are of."""
+    """The run needs no option for the step, the order, the recorded variables or the figures of
+    merit."""
     experiment = EXPERIMENTS.parent / f"{name}.toml"
     pack(experiment, tmp_path / "x.ssp", "--stop", "2")
     finished = run(tmp_path / "x.ssp", tmp_path / "ssp")
@@ -156,7 +158,7 @@ SSV = b"""<v:ParameterSet xmlns:v="x" version="1.0" name="all"><v:Parameters>
 
 
 def foreign(path, ssd=SSD, ssv=SSV):
-    """An archive as another tool could have made it."""
+    """Writes an archive as another tool could have made it."""
     with zipfile.ZipFile(path, "w") as file:
         file.writestr("SystemStructure.ssd", ssd)
         file.writestr("values of all.ssv", ssv)
@@ -172,7 +174,8 @@ def test_oracle_an_archive_of_another_maker_with_subsystems_and_transformations(
     assert found["time"][0] == 1.0 and found["time"][-1] == 3.0
     assert found["vehicle/body.attitude.alpha"][0] == pytest.approx(math.radians(3.0), rel=1e-15)
     assert not found["vehicle/body.disturbance.delta.alpha"].any()
-    # Four times, then half of it and seven more; and the law comes first, so that there is no delay.
+    # The moment is four times the law's, then half of that plus seven. The law comes first, so
+    # there is no delay.
     law, roll = found["law.moment.x"], found["vehicle/body.moment.x"]
     assert np.allclose(roll, 2.0 * law + 7.0, rtol=1e-15) and np.ptp(law) > 0.0
 
@@ -198,7 +201,7 @@ def test_archives_that_cannot_be_run_are_refused_in_one_line(old, new, culprit, 
     assert old in SSD
     finished = run(foreign(tmp_path / "x.ssp", SSD.replace(old, new, 1)), tmp_path / "out")
     if culprit is None:
-        # What comes from nowhere stays at its start value.
+        # An input without a connection keeps its start value.
         assert finished.returncode == 0
         return
     assert finished.returncode == 2 and culprit in finished.stderr, finished.stderr

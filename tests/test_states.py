@@ -1,4 +1,4 @@
-"""Saved states, reset, and instances side by side: all bit for bit."""
+"""Saved states, reset, and instances side by side, all bit for bit."""
 
 import json
 import subprocess
@@ -17,7 +17,7 @@ SETTINGS |= {name: {} for name in NAMES if name not in SETTINGS}
 
 
 def course(tick: int) -> dict:
-    """Measurements near the initial state, moving enough to change every optimisation."""
+    """Measurements near the initial state that move enough to change every optimisation."""
     values = [0.13 + 1e-3 * tick, 0.15 - 1e-3 * tick, -0.5 + 5e-4 * tick, 1e-2, -2e-3, 1e-4 * tick]
     return dict(zip(ANGLES + RATES, values))
 
@@ -31,7 +31,7 @@ def inputs(name: str, tick: int) -> dict:
 
 
 def drive(unit: Unit, ticks: range) -> list:
-    """Outputs at each tick, exactly."""
+    """Returns the exact outputs at each tick."""
     rows = []
     for tick in ticks:
         unit.set(inputs(unit.fmu.name, tick))

@@ -1,4 +1,4 @@
-"""A controller runs its own ticks whatever the communication step is."""
+"""A controller runs its own ticks, whatever the communication step is."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,11 @@ import pytest
 from fmi import ANGLES, MOMENT, RATES, REFERENCE, Unit
 
 CONTROLLERS = ["CRMPC", "LQR"]
-# Inputs are held for this long, s.
+# Time for which inputs are held, s.
 HOLD = 0.2
 HOLDS = 30
 FEEDBACK = 0.04
-# How the k-th hold is divided.
+# Division of the k-th hold into communication steps.
 DIVISIONS = {
     "20 ms": lambda _: [0.02] * 10,
     "40 ms": lambda _: [0.04] * 5,
@@ -24,7 +24,8 @@ def held(k: int) -> dict:
 
 
 def sampled(unit: Unit) -> list:
-    """Outputs that change at ticks only, exactly, and the reference, which depends on time."""
+    """Returns the exact outputs that change at ticks only, and the reference, which depends on
+    time."""
     names = [n for n in unit.fmu.names("output") if not n.startswith("reference") and n != "solver.time"]
     return unit.get(names), unit.get(REFERENCE)
 

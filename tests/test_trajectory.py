@@ -1,4 +1,5 @@
-"""ReentryPlant along a trajectory, Wu 2015 (1): against rotations that are multiplied and differentiated here."""
+"""ReentryPlant along a trajectory, Wu 2015 (1), against rotations that are multiplied and
+differentiated here."""
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from fmi import ANGLES, RATES, Unit
 ANGLE_RATES = [f"attitudeRate.{axis}" for axis in ("alpha", "beta", "sigma")]
 PLACE = ["trajectory.flightPathAngle", "trajectory.heading", "trajectory.latitude"]
 CHANGE = ["trajectory.flightPathAngleRate", "trajectory.headingRate", "trajectory.latitudeRate"]
-# Of the Earth, rad/s.
+# Angular rate of the Earth, rad/s.
 EARTH = 7.2921e-5
 
 
@@ -23,7 +24,8 @@ def about(axis: int, angle: float) -> np.ndarray:
 
 
 def attitude(place, longitude, angles) -> np.ndarray:
-    """Body axes in inertial ones. The bank angle falls when the vehicle rolls right, as R has it."""
+    """Rotation from body axes to inertial axes. The bank angle falls when the vehicle rolls right,
+    as R requires."""
     (gamma, psi, phi), (alpha, beta, sigma) = place, angles
     north_east_down = about(2, longitude) @ about(1, -phi) @ about(1, -np.pi / 2)
     return north_east_down @ about(2, psi) @ about(1, gamma) @ about(0, -sigma) @ about(2, -beta) @ about(1, alpha)
@@ -58,13 +60,14 @@ def test_oracle_attitude_rates_are_those_of_the_rotations(fmu, kinematics, seed)
 
 
 def test_oracle_an_inertial_attitude_at_rest_turns_against_the_earth(fmu):
-    """No moment, no rate: the body keeps its attitude in space while the vehicle flies around the Earth."""
+    """Without moment and rate the body keeps its attitude in space while the vehicle flies around
+    the Earth."""
     place, change, east = np.array([-0.02, 0.9, 0.3]), np.array([-1e-3, 2e-3, 4e-4]), 9e-4
     parameters = {"kinematics": "exact", "trajectory.earthRate": EARTH, "disturbance.kind": "none"}
     with Unit(fmu("ReentryPlant"), parameters).start() as plant:
         first = attitude(place, 0.0, plant.get(ANGLES))
         for tick in range(500):
-            # Angles that grow within a step: as input derivatives.
+            # Input derivatives let the angles grow within a step.
             plant.set(dict(zip(PLACE, place + 0.1 * tick * change)) | dict(zip(CHANGE, change)))
             plant.set({"trajectory.longitudeRate": east})
             references = [plant.fmu.variables[name].valueReference for name in PLACE]
@@ -87,6 +90,7 @@ def test_the_orchestrator_gives_values_to_inputs_without_a_connection(orchestrat
         assert finished.returncode == 0, finished.stderr
         data = np.genfromtxt(out / "results.csv", delimiter=",", names=True, deletechars="")
         ends.append(np.array([data[f"plant.{name}"][-1] for name in ANGLES]))
-    # 0.04 s of Eq. (1) from beta = 10 deg, sigma = -30 deg: alpha falls by cos sigma / cos beta of the path's turn.
+    # This is 0.04 s of Eq. (1) from beta = 10 deg, sigma = -30 deg: alpha falls by cos sigma / cos
+    # beta times the turn of the path.
     turn = np.radians(-0.1) * 0.04
     assert (ends[1] - ends[0])[0] == pytest.approx(-turn * np.cos(np.radians(30)) / np.cos(np.radians(10)), rel=1e-2)

@@ -1,4 +1,5 @@
-"""`orchestrator reproduce two-loop-smc`: steps under the disturbance of Jia et al., the selector of fins and jets, printed forms."""
+"""`orchestrator reproduce two-loop-smc`: steps under the disturbance of Jia et al., the selector of
+fins and jets, printed forms."""
 
 import json
 import subprocess
@@ -50,7 +51,7 @@ def verdict(results, words: str) -> str:
     return found["verdict"]
 
 
-# What the effectors can do, tests/reach.py.
+# Limits of the effectors, computed by tests/reach.py.
 
 
 def test_regress_the_file_of_reaches_is_what_the_programmes_give(computed):
@@ -61,7 +62,8 @@ def test_regress_the_file_of_reaches_is_what_the_programmes_give(computed):
 
 
 def test_oracle_reach_in_pitch_is_the_sum_of_what_each_effector_gives(computed):
-    # Left and right cancel in roll and yaw for surfaces; jets 4 and 8 do but for 8 N m, as long as others can balance.
+    # Left and right surfaces cancel in roll and yaw, and so do jets 4 and 8. The other pairs of jets
+    # leave 8 N m in roll, which other effectors can balance.
     pitch = reach.SURFACES[1]
     up = np.maximum(pitch * reach.LOW, pitch * reach.HIGH).sum() + np.maximum(reach.JETS[1], 0).sum()
     assert computed["reach.pitch.up"] == pytest.approx(up, rel=1e-6)
@@ -84,7 +86,7 @@ def test_the_disturbance_is_beyond_what_fins_and_jets_give_together(computed):
     assert computed["reach.yaw"] > reach.DISTURBANCE[2]
 
 
-# Moments that act directly.
+# Runs in which moments act directly.
 
 
 def test_regress_steps_settle_and_stay_within_the_reach_about_each_axis(results):
@@ -96,7 +98,8 @@ def test_regress_steps_settle_and_stay_within_the_reach_about_each_axis(results)
 
 
 def test_integrals_do_not_wind_up(results):
-    # Their parts of the sliding variables, in deg and deg/s, within the layers of 0.573 deg and 1.146 deg/s.
+    # The integral parts of the sliding variables, in deg and deg/s, stay within the layers of 0.573
+    # deg and 1.146 deg/s.
     assert measure(results, "direct", "outer-integral") < 0.1
     assert measure(results, "direct", "inner-integral") < 0.7
 
@@ -106,7 +109,7 @@ def test_an_inertia_error_of_a_fifth_changes_little(results, run):
     assert measure(results, run, "late") == pytest.approx(measure(results, "direct", "late"), rel=0.02)
 
 
-# Fins and jets.
+# Runs with fins and jets.
 
 
 def test_regress_fins_and_jets_bear_six_tenths_of_the_disturbance(results):
@@ -131,7 +134,7 @@ def test_below_the_threshold_the_jets_do_everything(results):
     assert measure(results, "below", "late") == pytest.approx(measure(results, "above", "late"), abs=0.01)
 
 
-# As printed.
+# Runs with the laws as printed.
 
 
 def test_regress_the_printed_forms_lose_the_attitude(results):

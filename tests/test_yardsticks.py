@@ -1,4 +1,4 @@
-"""The yardsticks of scripts/yardsticks: recomputed, and checked against what is known of them."""
+"""The yardsticks of scripts/yardsticks, recomputed and checked against known relations."""
 
 import casadi as ca
 import numpy as np
@@ -16,14 +16,15 @@ except ModuleNotFoundError:  # Python 3.10
 
 
 def values_of(name: str) -> dict[str, float]:
-    """The values of one of the files of the experiments."""
+    """Returns the values of one of the experiments' files."""
     with (EXPERIMENTS / name).open("rb") as file:
         return {entry["id"]: entry["value"] for entry in tomllib.load(file)["value"]}
 
 
 @pytest.fixture(scope="module")
 def coarse():
-    """The bounds with the input held 0.2 s, and their motions: seconds, where the finer ones take a minute."""
+    """The bounds with the input held 0.2 s, and their motions. They take seconds, where the finer
+    bounds take a minute."""
     return yardsticks.coarse_bounds()
 
 
@@ -46,7 +47,7 @@ def test_regress_the_file_of_yardsticks_is_what_the_script_computes(coarse, comp
 
 
 def test_oracle_motions_keep_their_sets_and_have_the_ems_that_is_claimed(coarse):
-    # With numpy, by other formulas than those of the programme.
+    # The norms are computed with numpy, by other formulas than those of the programme.
     x_bound, u_bound = clairvoyant.outer_bounds()
     tightened = nlp.printed_sets()
     bounds = {"printed": (x_bound, u_bound), "paper": (tightened.x_tube, tightened.u_tube)}
@@ -60,10 +61,10 @@ def test_oracle_motions_keep_their_sets_and_have_the_ems_that_is_claimed(coarse)
             rates.append(np.linalg.solve(r, state[3:]) if sets == "limits" else state[3:])
             actions.append(nlp.INERTIA @ np.linalg.solve(r, u) if sets == "limits" else u)
         for norms, bound in zip((rates, actions), bounds[sets]):
-            # Both are active, so that the bound on EMS depends on them.
+            # Both bounds are active, so the bound on EMS depends on them.
             assert np.linalg.norm(norms, axis=1).max() == pytest.approx(bound, rel=1e-6), sets
 
-        # The double integrator by plain steps of 0.04 s.
+        # The double integrator is stepped plainly in steps of 0.04 s.
         state, squares = clairvoyant.INITIAL_STATE, []
         for k in range(1250):
             squares.append(np.sum((np.degrees(state[:3] - nlp.reference(k * 0.04)[0])) ** 2))
@@ -78,7 +79,8 @@ def test_oracle_bounds_are_in_the_order_of_what_they_permit(computed):
         assert printed < paper
     for sets in yardsticks.SETS:
         hold, fine = computed[f"ems.clairvoyant.{sets}"], computed[f"ems.clairvoyant.{sets}.fine"]
-        # An input that may change five times as often can only do better; so little that 0.2 s is fine enough.
+        # An input that may change five times as often can only do better. The gain is so small that
+        # 0.2 s is fine enough.
         assert 0.995 * hold < fine < hold
     assert computed["ems.clairvoyant.paper"] == computed["ems.clairvoyant.paper.50s"]
 
@@ -90,7 +92,7 @@ def test_oracle_another_start_of_the_solver_leads_to_the_same_optimum(coarse):
 
 
 def test_published_ems_depends_on_the_length_of_the_run(computed, published):
-    # Chai 2022, Table I: 1.6055, over a run whose length is not printed.
+    # Chai 2022, Table I, prints 1.6055, over a run whose length is not stated.
     bounds = [computed[f"ems.clairvoyant.paper.{seconds}s"] for seconds in yardsticks.RUN_LENGTHS]
     assert all(longer < shorter for shorter, longer in zip(bounds, bounds[1:]))
     below = [s for s, bound in zip(yardsticks.RUN_LENGTHS, bounds) if bound < published["ems.crmpc"]]
@@ -98,7 +100,8 @@ def test_published_ems_depends_on_the_length_of_the_run(computed, published):
 
 
 def test_published_ems_is_below_what_the_tightened_sets_permit_in_50_s(computed, published):
-    # Not below what (6) itself permits, unless EMS is summed at the 5 Hz of the optimisation.
+    # The printed EMS is not below the bound of (6) itself, unless EMS is summed at the 5 Hz of the
+    # optimisation.
     assert computed["ems.clairvoyant.paper.fine"] > published["ems.crmpc"]
     assert computed["ems.clairvoyant.limits.fine"] > published["ems.crmpc"]
     assert computed["ems.clairvoyant.printed"] < published["ems.crmpc"] < computed["ems.clairvoyant.printed.5Hz"]
@@ -111,7 +114,8 @@ def test_published_tubes_of_the_angles_are_half_of_what_the_stated_bound_allows(
 
 
 def test_oracle_a_square_wave_takes_the_rate_to_twice_the_printed_tube(computed):
-    # (22) by plain steps of 0.04 s: after a long constant Delta the opposite one.
+    # (22) is stepped plainly in steps of 0.04 s: after a long constant Delta comes the opposite
+    # one.
     for case, k in yardsticks.CASES.items():
         o, rates, angles = np.zeros(2), [], []
         for step in range(1000):
@@ -122,13 +126,14 @@ def test_oracle_a_square_wave_takes_the_rate_to_twice_the_printed_tube(computed)
         constant, square = max(rates[:500]), max(rates[500:])
         assert constant < 1.05 * computed[f"tube.{case}.rate.printed"]
         assert square > 1.99 * computed[f"tube.{case}.rate.printed"]
-        # What the square wave reaches is all that any disturbance held at 25 Hz can do.
+        # The square wave reaches the most that any disturbance held at 25 Hz can reach.
         assert square == pytest.approx(computed[f"tube.{case}.rate.exact"], rel=1e-9)
         assert max(angles) <= computed[f"tube.{case}.angle.exact"] * (1.0 + 1e-12)
         assert angles[499] == pytest.approx(computed[f"tube.{case}.angle.exact"], rel=1e-9)
 
 
 def test_published_peak_of_the_step_response(computed):
-    # Chai 2022, section 5.1: 0.0835, which belongs to K = [-10, -10] (docs/errata.md); 0.1525 to the K of the text.
+    # Chai 2022, section 5.1, prints 0.0835, which belongs to K = [-10, -10] (docs/errata.md); the K
+    # of the text gives 0.1525.
     assert yardsticks.step_response_peak(-10.0, -10.0) == pytest.approx(0.0835, abs=5e-5)
     assert yardsticks.step_response_peak(-5.0, -5.0) == pytest.approx(0.1525, abs=5e-5)

@@ -1,6 +1,7 @@
-"""Numbers that the experiments of Chai 2022 are measured against, computed from the paper's raw data alone.
+"""Numbers against which the experiments of Chai 2022 are measured, computed from the paper's raw
+data alone.
 
-`python tests/yardsticks.py FILE` (scripts/yardsticks) writes them. Lengths of time in s, angles in deg.
+`python tests/yardsticks.py FILE` (scripts/yardsticks) writes them. Times are in s, angles in deg.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ SETS = {
     "paper": "x_omega and u within the tightened sets (21), where the paper set keeps the nominal motion",
     "limits": "omega and m within the limits of section 5.1 themselves",
 }
-# K of section 5.2: [k, k] on angle and rate of every axis.
+# K of section 5.2 is [k, k] on angle and rate of every axis.
 CASES = {"case1": -5.0, "case2": -10.0}
 FEEDBACK_PERIOD = 0.04
 STATED_BOUND = 2.0
-# deg/s2: the bound on Delta that the printed tubes of the angles belong to (docs/errata.md).
+# Bound on Delta in deg/s2 to which the printed tubes of the angles belong (docs/errata.md).
 PRINTED_BOUND = 1.0
 HEADER = """\
 # Yardsticks for the results of Chai 2022, computed from the paper's raw data. Written by scripts/yardsticks: change
@@ -33,7 +34,7 @@ HEADER = """\
 
 @dataclass(frozen=True)
 class Value:
-    """A number with its origin."""
+    """A number with its unit and its origin."""
 
     id: str
     value: float
@@ -42,7 +43,7 @@ class Value:
 
 
 def least_ems(name: str, sets: str, note: str = "", **options) -> tuple[Value, clairvoyant.Motion]:
-    """The clairvoyant lower bound of EMS. `options` are those of clairvoyant.optimum."""
+    """Computes the clairvoyant lower bound of EMS. `options` are those of clairvoyant.optimum."""
     motion = clairvoyant.optimum(sets, **options)
     hold = options.get("hold", clairvoyant.COARSE)
     duration = options.get("duration", clairvoyant.DURATION)
@@ -51,7 +52,8 @@ def least_ems(name: str, sets: str, note: str = "", **options) -> tuple[Value, c
 
 
 def coarse_bounds() -> tuple[list[Value], dict[str, clairvoyant.Motion]]:
-    """Everything with the input held 0.2 s, and the motions of the full run by their sets."""
+    """Computes all bounds with the input held 0.2 s, and the motions of the full run by their
+    sets."""
     values, motions = [], {}
     for sets in SETS:
         value, motions[sets] = least_ems(sets, sets)
@@ -65,20 +67,22 @@ def coarse_bounds() -> tuple[list[Value], dict[str, clairvoyant.Motion]]:
 
 
 def fine_bounds(motions: dict[str, clairvoyant.Motion]) -> list[Value]:
-    """The same with the input held for one communication step."""
+    """Computes the bounds with the input held for one communication step."""
     hold = clairvoyant.FINE
     return [least_ems(f"{sets}.fine", sets, hold=hold, guess=motions[sets])[0] for sets in SETS]
 
 
 def step_response_peak(k1: float, k2: float) -> float:
-    """c-bar of (21): the peak of (e^{st} - e^{ft})/(s - f), s and f the eigenvalues of the error dynamics."""
+    """c-bar of (21): the peak of (e^{st} - e^{ft})/(s - f), where s and f are the eigenvalues of
+    the error dynamics."""
     slow, fast = np.sort(np.roots([1.0, -k2, -k1]))[::-1]
     peak = np.log(slow / fast) / (fast - slow)
     return float((np.exp(slow * peak) - np.exp(fast * peak)) / (slow - fast))
 
 
 def sampled_reach(k1: float, k2: float, period: float) -> tuple[float, float]:
-    """What |Delta| <= 1, held over each period, can do to angle and rate at the feedback ticks: L1 norms of the impulse responses."""
+    """Bounds on angle and rate at the feedback ticks for |Delta| <= 1, held over each period: the
+    L1 norms of the impulse responses."""
     gamma = np.array([0.5 * period**2, period])
     phi = np.array([[1.0, period], [0.0, 1.0]]) + np.outer(gamma, [k1, k2])
     assert np.abs(np.linalg.eigvals(phi)).max() < 1.0
@@ -112,7 +116,7 @@ def tubes() -> list[Value]:
 
 
 def toml(values: list[Value]) -> str:
-    """The values as the orchestrator reads them."""
+    """Returns the values in the form that the orchestrator reads."""
     entries = [
         f'[[value]]\nid = "{v.id}"\nvalue = {v.value!r}\nunit = "{v.unit}"\nkind = "computed"\n'
         f'source = "scripts/yardsticks: {v.source}"\n'

@@ -1,10 +1,11 @@
-//! Which function may be called in which state: FMI 2.0 sections 3.2.3 (model exchange) and 4.2.4 (co-simulation).
+//! Table of the functions that may be called in each state: FMI 2.0 sections 3.2.3 (model exchange)
+//! and 4.2.4 (co-simulation).
 
 use crate::types::Interface;
 use serde::{Deserialize, Serialize};
 
-/// Where an instance stands. The standard's stepInProgress and stepCanceled do not occur: a step is done when
-/// `fmi2DoStep` returns.
+/// State of an instance in the standard's state machine. stepInProgress and stepCanceled do not
+/// occur, because a step is finished when `fmi2DoStep` returns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum State {
     Instantiated,
@@ -15,7 +16,7 @@ pub(crate) enum State {
     StepFailed,
     Terminated,
     Error,
-    /// After a panic: nothing but freeing is possible, and the table has no column for it.
+    /// State after a panic: the instance can only be freed, and the table has no column for it.
     Fatal,
 }
 
@@ -35,13 +36,13 @@ impl State {
     }
 }
 
-/// One function of the interface.
+/// One function of the interface, with the states in which it may be called.
 #[derive(Debug)]
 pub(crate) struct Call {
     pub(crate) name: &'static str,
-    /// The interface it belongs to; `None`: both.
+    /// Interface to which the function belongs, or `None` for both.
     pub(crate) interface: Option<Interface>,
-    /// Whether a refusal leaves the instance as it was, instead of in the error state.
+    /// Whether a refusal leaves the state as it was instead of changing it to the error state.
     pub(crate) leaves_state: bool,
     allowed: u16,
 }
@@ -57,7 +58,8 @@ impl Call {
     }
 }
 
-/// `columns` has a character for every [`State`] but the last, in their order; `-` means not allowed.
+/// Makes a row of the table. `columns` has a character for every [`State`] but the last, in their
+/// order; `-` means that the call is not allowed.
 const fn call(name: &'static str, interface: Option<Interface>, columns: &str) -> Call {
     let columns = columns.as_bytes();
     assert!(columns.len() == State::Fatal as usize);
@@ -74,8 +76,9 @@ const fn call(name: &'static str, interface: Option<Interface>, columns: &str) -
 const ME: Option<Interface> = Some(Interface::ModelExchange);
 const CS: Option<Interface> = Some(Interface::CoSimulation);
 
-/// The table. Where the standard allows setting some variables only, [`crate::instance`] looks at the variable; what may be
-/// got in initialization mode is not narrowed to outputs, states and derivatives.
+/// The table of calls. Where the standard allows setting some variables only, [`crate::instance`]
+/// looks at the variable. Getting values in initialization mode is not restricted to outputs,
+/// states and derivatives.
 #[rustfmt::skip]
 pub(crate) mod table {
     use super::{CS, Call, ME, call};

@@ -1,14 +1,15 @@
-//! The macro that turns models into the exported functions of a library.
+//! Macro that turns models into the exported functions of a library.
 
-/// Exports the models as FMI 2.0 units of the library that this is called in, once per library.
+/// Exports the models as FMI 2.0 units of the calling library. Call it once per library.
 ///
-/// Defines a module `fmi2` with the 44 functions of FMI 2.0 under their C names, and with
-/// - `fmu_model_descriptions() -> char*`: a NUL-terminated JSON list of the units' descriptions, null on failure. The
-///   memory is the library's: hand it back to
-/// - `fmu_free_model_descriptions(char*)`, which also takes null.
+/// The macro defines a module `fmi2` with the 44 functions of FMI 2.0 under their C names, and with
+/// - `fmu_model_descriptions() -> char*`: returns a NUL-terminated JSON list of the units'
+///   descriptions, or null on failure. The memory belongs to the library and is given back by
+/// - `fmu_free_model_descriptions(char*)`: frees that list; it accepts null.
 ///
-/// The GUID given to `fmi2Instantiate` picks the unit. The crate needs `crate-type = ["cdylib", …]` and
-/// a build script that calls `fmi2_build::link`, which keeps the library loaded once it is.
+/// The GUID given to `fmi2Instantiate` selects the unit. The crate needs
+/// `crate-type = ["cdylib", …]` and a build script that calls `fmi2_build::link`, which keeps the
+/// library loaded once it is.
 ///
 /// ```ignore
 /// fmi2_export::export_fmus!(Plant);
@@ -20,7 +21,7 @@ macro_rules! export_fmus {
         #[allow(unsafe_code, non_snake_case, missing_docs, unused_imports, unreachable_pub)]
         #[allow(clippy::all, clippy::pedantic, clippy::undocumented_unsafe_blocks)]
         pub mod fmi2 {
-            //! The C interface of this library.
+            //! C interface of this library, with the functions of FMI 2.0.
             use super::*;
             use $crate::interface as shell;
             use $crate::types::{CEventInfo, Callbacks, Status};
@@ -105,7 +106,7 @@ macro_rules! export_fmus {
     };
 }
 
-/// Defines exported functions that call those of the shell with the same name.
+/// Defines exported functions that call the shell's functions of the same name.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! forward {

@@ -1,4 +1,4 @@
-//! One instance of a unit: the part of the shell without pointers.
+//! One instance of a unit: the part of the shell that handles no pointers.
 
 use crate::call::{Call, State};
 use crate::logger::{Category, Logger};
@@ -15,13 +15,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// How far the communication point may be from the unit's time, relative to both and to the step: importers add up time.
+/// Largest distance of the communication point from the unit's time, relative to both and to the
+/// step. It allows for importers that accumulate time.
 const TIME_TOLERANCE: f64 = 1e-9;
-/// But never further than this (s), unless rounding is larger.
+/// Upper bound of that distance (s), unless rounding is larger.
 const LONGEST_TOLERANCE: f64 = 1e-4;
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
-/// How far a step may reach beyond the stop time, relative to it, but never by more than a step. The standard wants an error for
-/// computing past a defined stop time; importers that add up time overshoot it by some 1e-9.
+/// Largest amount by which a step may reach beyond the stop time, relative to that time, but never
+/// more than a step. The standard demands an error for computing past a defined stop time;
+/// importers that accumulate time overshoot it by about 1e-9.
 const STOP_TOLERANCE: f64 = 1e-6;
 
 /// Result of the body of a call.
@@ -31,32 +33,33 @@ pub(crate) fn error<T>(text: impl Into<String>) -> Result<T, Failure> {
     Err(Failure::Error(text.into()))
 }
 
-/// What `fmi2Component` points at.
+/// One instance of a unit with everything that the shell keeps for it.
 pub(crate) struct Instance {
     unit: Box<dyn Unit>,
     description: Arc<ModelDescription>,
-    /// State and derivative pairs.
+    /// Value references of each state and its derivative.
     states: Vec<(usize, usize)>,
     guid: String,
     interface: Interface,
     logger: Logger,
     resources: Option<PathBuf>,
-    /// Its list of extrapolations has room for every variable: nothing is allocated between steps.
+    /// Progress of the simulation. Its list of extrapolations has room for every variable, so
+    /// nothing is allocated between steps.
     progress: Progress,
-    /// Whether calculated variables are behind state, inputs or time.
+    /// Whether calculated variables are older than the state, the inputs or the time.
     stale: bool,
     last_step: Status,
-    /// States handed out by fmi2GetFMUstate; the importer holds their addresses.
+    /// Saved states handed out by fmi2GetFMUstate; the importer holds their addresses.
     #[expect(clippy::vec_box, reason = "the address is the importer's handle and must not move")]
     saved: Vec<Box<Saved>>,
-    /// What the last fmi2GetString handed out.
+    /// Texts handed out by the last fmi2GetString.
     strings: Vec<CString>,
 }
 
-/// A saved state. Never empty, so every one has an address of its own.
+/// A saved state. It is never empty, so every saved state has its own address.
 pub(crate) struct Saved(Box<[u8]>);
 
-/// What fmi2Instantiate knows besides the unit.
+/// Arguments of fmi2Instantiate, apart from the unit.
 pub(crate) struct Setting {
     pub(crate) guid: String,
     pub(crate) interface: Interface,
@@ -64,22 +67,23 @@ pub(crate) struct Setting {
     pub(crate) resources: Option<PathBuf>,
 }
 
-/// A type that variables have, with how the shell reaches and checks it.
+/// Type of a variable's value, with the functions by which the shell accesses and checks it.
 pub(crate) trait Scalar: PartialEq + Sized {
     const TYPE: &'static str;
-    /// What `look` makes of the variable's value; `None` if the variable has another type.
+    /// Returns the result of `look` for the variable's value, or `None` if the variable has another
+    /// type.
     fn look<R>(unit: &mut dyn Unit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R>;
-    /// Sets the variable, which has this type.
+    /// Sets the variable, which must have this type.
     fn put(self, unit: &mut dyn Unit, reference: usize);
-    /// Whether setting the other value would change nothing.
+    /// Whether replacing this value by `other` would change nothing.
     fn same(&self, other: &Self) -> bool {
         self == other
     }
-    /// Whether the value can be handed out: a number that is infinite or none at all cannot.
+    /// Whether the value can be given to the importer; infinite numbers and NaN cannot.
     fn is_presentable(&self) -> bool {
         true
     }
-    /// What is wrong with the value for a variable of this kind.
+    /// Says why the value is not allowed for a variable of this kind, or `None` if it is.
     fn problem(&self, _kind: &Kind) -> Option<String> {
         None
     }
@@ -96,7 +100,7 @@ impl Scalar for f64 {
         }
     }
     fn same(&self, other: &Self) -> bool {
-        // 0 and −0 are equal, but not the same to what is computed from them.
+        // Zero and −0 are equal, but results computed from them can differ.
         self.to_bits() == other.to_bits()
     }
     fn is_presentable(&self) -> bool {
@@ -180,7 +184,8 @@ impl Instance {
         }
     }
 
-    /// Runs the body of a call: refuses it in a wrong state, reports what went wrong, and ends every panic here.
+    /// Runs the body of a call: it refuses a call in a wrong state, reports failures, and stops
+    /// every panic here.
     pub(crate) fn run(&mut self, call: &Call, body: impl FnOnce(&mut Self) -> Outcome) -> Status {
         if self.progress.state == State::Fatal {
             return Status::Fatal;
@@ -206,7 +211,7 @@ impl Instance {
                 self.progress.state = State::Fatal;
                 let text = format!("{}: defect in the unit: {}", call.name, panic_text(panic.as_ref()));
                 self.logger.log(Category::Fatal, &text);
-                // Dropping what was thrown could run code of the unit again.
+                // Dropping the panic's payload could run code of the unit again.
                 mem::forget(panic);
                 Status::Fatal
             }
@@ -281,7 +286,8 @@ impl Instance {
         self.logger.log(Category::Events, "terminated");
     }
 
-    /// Makes the instance what fmi2Instantiate returned, but for the logging and the saved states.
+    /// Brings the instance back to its state after fmi2Instantiate, apart from the logging and the
+    /// saved states.
     pub(crate) fn reset(&mut self) {
         self.unit.reset();
         let extrapolations = mem::take(&mut self.progress.extrapolations);
@@ -292,7 +298,8 @@ impl Instance {
         self.logger.log(Category::Events, "reset");
     }
 
-    /// Takes up the parameters, unless this was done since the last of them was set.
+    /// Initializes the model with the parameters, unless this was done since the last of them was
+    /// set.
     fn initialize(&mut self) -> Outcome {
         if !self.progress.initialized {
             let context = Context {
@@ -307,7 +314,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Brings calculated variables up to date. After an error they stay as they are, for looking at only.
+    /// Updates the calculated variables. After an error they keep their values, so that they can
+    /// still be read.
     fn refresh(&mut self) -> Outcome {
         if self.progress.state == State::Error {
             return Ok(());
@@ -336,7 +344,7 @@ impl Instance {
         )
     }
 
-    /// Why there is no field of type `T` behind the value reference.
+    /// Says why there is no field of type `T` for the value reference.
     fn misfit<T: Scalar>(&self, reference: u32) -> Failure {
         match self.variable(reference) {
             Ok(Variable { name, .. }) => {
@@ -350,7 +358,7 @@ impl Instance {
         T::look(self.unit.as_mut(), reference as usize, |_| ()).ok_or_else(|| self.misfit::<T>(reference))
     }
 
-    /// Hands the values of the variables to `sink`, with their positions.
+    /// Gives the values of the variables to `sink`, each with its position in `references`.
     pub(crate) fn get<T: Scalar>(&mut self, references: &[u32], mut sink: impl FnMut(usize, &T)) -> Outcome {
         let calculated = |&reference: &u32| {
             self.description.variables.get(reference as usize).is_some_and(Variable::is_calculated)
@@ -375,7 +383,8 @@ impl Instance {
         Ok(())
     }
 
-    /// A calculated value is not finite. In model exchange it may come from an integrator's trial state.
+    /// Reports a calculated value that is not finite. In model exchange it is only discarded, as it
+    /// may come from an integrator's trial state.
     fn overflow(&self, reference: u32) -> Failure {
         let name = self.variable(reference).map_or("", |variable| &variable.name);
         let text = format!("'{name}' is not a finite number; an input or a parameter is too large");
@@ -415,8 +424,9 @@ impl Instance {
         Ok(())
     }
 
-    /// A discrete Real input is taken in continuous-time mode too, though the standard has it set in event mode: FMPy sets all
-    /// inputs whenever it asks for event indicators. It is without effect until the next event.
+    /// Checks that a variable may be set now. A discrete Real input is accepted in continuous-time
+    /// mode too, although the standard has it set in event mode, because FMPy sets all inputs
+    /// whenever it asks for event indicators. It has no effect until the next event.
     fn settable(&self, variable: &Variable) -> Outcome {
         let name = &variable.name;
         let state = self.progress.state;
@@ -431,7 +441,7 @@ impl Instance {
         }
     }
 
-    /// Keeps texts alive for the importer until the next call of this.
+    /// Returns texts that stay valid for the importer until the next call of this function.
     pub(crate) fn get_strings(&mut self, references: &[u32]) -> Result<&[CString], Failure> {
         let mut strings = mem::take(&mut self.strings);
         strings.clear();
@@ -444,7 +454,8 @@ impl Instance {
 
     // Saved states
 
-    /// A handle of the present state. With `reuse` the state behind that handle is overwritten.
+    /// Returns a handle of the present state. With `reuse`, the state behind that handle is
+    /// overwritten.
     pub(crate) fn save(&mut self, reuse: Option<*const Saved>) -> Result<*const Saved, Failure> {
         let payload = self.unit.save(&self.progress)?;
         let bytes = saved::wrap(&self.guid, self.interface, &payload);
@@ -542,8 +553,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Derivatives of inputs hold for one step. The step begins exactly where the last one ended, however the importer
-    /// adds up its time.
+    /// Performs a step. The derivatives of inputs hold for one step. The step begins exactly where
+    /// the last one ended, however the importer accumulates its time.
     pub(crate) fn do_step(&mut self, point: f64, size: f64) -> Outcome {
         if !point.is_finite() || !size.is_finite() || size < 0.0 {
             return error(format!("cannot step from {point} s by {size} s"));
@@ -631,7 +642,7 @@ impl Instance {
         Self::expect_length("continuous states", states.len(), self.states.len())?;
         if let Some(i) = states.iter().position(|x| !x.is_finite()) {
             let name = &self.description.variables[self.states[i].0].name;
-            // Not an error: an integrator that went too far tries a smaller step.
+            // This is no error: an integrator that went too far tries a smaller step.
             return Err(Failure::Discard(format!(
                 "state '{name}' = {} is not finite; it keeps its value",
                 states[i]

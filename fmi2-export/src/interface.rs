@@ -1,7 +1,8 @@
-//! The functions of FMI 2.0 with their C signatures: pointers are checked here and nowhere else.
+//! Functions of FMI 2.0 with their C signatures. Pointers are checked here and nowhere else.
 //!
-//! [`export_fmus!`](crate::export_fmus) makes an exported function of the same name out of each. They are `unsafe` as any
-//! C function is: a pointer that is neither null nor what the standard says cannot be recognized.
+//! [`export_fmus!`](crate::export_fmus) makes an exported function of the same name from each of
+//! them. They are `unsafe` like any C function, because a pointer that is neither null nor as the
+//! standard demands cannot be recognized.
 #![allow(unsafe_code, non_snake_case, clippy::missing_safety_doc, clippy::too_many_arguments, missing_docs)]
 #![allow(clippy::not_unsafe_ptr_arg_deref)]
 
@@ -21,21 +22,22 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr::null_mut;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// `fmi2Component`.
+/// C type `fmi2Component`, a pointer to [`Shared`].
 type Component = *mut c_void;
 
-/// What `fmi2Component` points at: an instance that one call at a time may use. The standard leaves that to the importer, but a
-/// logger that calls its unit back, or a second thread, must not find an instance that is being changed.
+/// Target of `fmi2Component`: an instance that only one call at a time may use. The standard makes
+/// the importer responsible for that, but a logger that calls its unit back, or a second thread,
+/// must not find an instance that is being changed.
 struct Shared {
     busy: AtomicBool,
     instance: UnsafeCell<Instance>,
 }
 
-/// The instance is free again when this is dropped, also by a panic.
+/// Guard of a call under way. Dropping it, also during a panic, releases the instance.
 struct Busy<'a>(&'a AtomicBool);
 
 impl<'a> Busy<'a> {
-    /// `None` if a call is under way.
+    /// Claims the instance, or returns `None` if a call is under way.
     fn begin(busy: &'a AtomicBool) -> Option<Self> {
         busy.compare_exchange(false, true, Ordering::Acquire, Ordering::Relaxed).is_ok().then(|| Self(busy))
     }
@@ -47,13 +49,17 @@ impl Drop for Busy<'_> {
     }
 }
 
-/// Runs a call on the instance behind `component`. A null component has no logger to report to, and that of an instance which
-/// another call is using must not be touched: both are refused without a word.
+/// Runs a call on the instance behind `component`. A null component has no logger, and the logger
+/// of an instance that another call is using must not be touched, so both are refused without a
+/// message. The caller promises that `component` is null or came from [`fmi2Instantiate`] and was
+/// not freed.
 unsafe fn run(component: Component, call: &Call, body: impl FnOnce(&mut Instance) -> Outcome) -> Status {
-    // SAFETY: not null means that it came from fmi2Instantiate and was not freed.
+    // SAFETY: if not null, `component` came from fmi2Instantiate, which leaked a `Box<Shared>`, and
+    // was not freed. Only a shared reference is made, so other calls may hold one too.
     let Some(shared) = (unsafe { component.cast::<Shared>().as_ref() }) else { return Status::Error };
     let Some(_busy) = Busy::begin(&shared.busy) else { return Status::Error };
-    // SAFETY: whoever has set the flag is alone until it is cleared, which is after the last use of this reference.
+    // SAFETY: `_busy` holds the flag, so no other call has a reference to the instance. The flag is
+    // cleared when `_busy` is dropped, after the last use of this reference.
     let instance = unsafe { &mut *shared.instance.get() };
     instance.run(call, body)
 }
@@ -68,48 +74,57 @@ fn check_room<T>(name: &str, is_null: bool, n: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The `n` values at `pointer`, which may be null if there are none.
+/// Returns the `n` values at `pointer`, which may be null if `n` is 0. The caller promises that
+/// they are initialized and do not change during the call.
 unsafe fn slice<'a, T>(name: &str, pointer: *const T, n: usize) -> Result<&'a [T], Failure> {
     if n == 0 {
         return Ok(&[]);
     }
     check_room::<T>(name, pointer.is_null(), n)?;
-    // SAFETY: not null, and the importer vouches for n elements during the call.
+    // SAFETY: `check_room` refused null and lengths beyond `isize::MAX` bytes; the importer vouches
+    // for n aligned and initialized elements that do not change during the call.
     Ok(unsafe { std::slice::from_raw_parts(pointer, n) })
 }
 
-/// The room for `n` values at `pointer`, which may be null if there are none.
+/// Returns the room for `n` values at `pointer`, which may be null if `n` is 0. The caller promises
+/// that nobody else uses it during the call.
 unsafe fn room<'a, T>(name: &str, pointer: *mut T, n: usize) -> Result<&'a mut [T], Failure> {
     if n == 0 {
         return Ok(&mut []);
     }
     check_room::<T>(name, pointer.is_null(), n)?;
-    // SAFETY: not null, and the importer vouches for n elements that nobody else uses during the call. The types
-    // used here have no invalid bit patterns.
+    // SAFETY: `check_room` refused null and lengths beyond `isize::MAX` bytes; the importer vouches
+    // for n aligned elements that nobody else uses during the call. Every bit pattern is valid for
+    // the types used here.
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, n) })
 }
 
-/// Writes the one result of a call.
+/// Writes the single result of a call to `pointer`. The caller promises that it is null or points
+/// to room for one value.
 unsafe fn put<T>(name: &str, pointer: *mut T, value: T) -> Outcome {
     check_room::<T>(name, pointer.is_null(), 1)?;
-    // SAFETY: not null, and the importer vouches for room for one value, which may be uninitialized.
+    // SAFETY: `check_room` refused null, and the importer vouches for aligned room for one value.
+    // The write does not read the old content, which may be uninitialized.
     unsafe { pointer.write(value) };
     Ok(())
 }
 
-/// Text of the importer.
+/// Reads a text of the importer. The caller promises that `pointer` is null or a NUL-terminated
+/// text that lives during the call.
 unsafe fn text<'a>(name: &str, pointer: *const c_char) -> Result<&'a str, String> {
     if pointer.is_null() {
         return Err(format!("argument '{name}' is NULL"));
     }
-    // SAFETY: not null, so it is NUL-terminated and lives during the call.
+    // SAFETY: null was refused above, so by the importer's promise the text is NUL-terminated and
+    // lives unchanged during the call.
     let text = unsafe { CStr::from_ptr(pointer) };
     text.to_str().map_err(|_| format!("'{}' is not UTF-8", text.to_string_lossy()))
 }
 
 // Common functions
 
-/// The descriptions of `exports` as a JSON list in memory of this library; null if that fails.
+/// Returns the descriptions of `exports` as a JSON list in memory of this library, or null if that
+/// fails.
 pub fn fmu_model_descriptions(exports: &[Export]) -> *mut c_char {
     let json = || {
         let descriptions: Vec<_> = exports.iter().map(|export| &*export.described().description).collect();
@@ -120,7 +135,8 @@ pub fn fmu_model_descriptions(exports: &[Export]) -> *mut c_char {
 
 pub unsafe fn fmu_free_model_descriptions(descriptions: *mut c_char) {
     if !descriptions.is_null() {
-        // SAFETY: not null, so it came from fmu_model_descriptions, and is given back once.
+        // SAFETY: not null, so it came from `CString::into_raw` in fmu_model_descriptions, and the
+        // caller gives it back only once.
         drop(unsafe { CString::from_raw(descriptions) });
     }
 }
@@ -143,9 +159,10 @@ pub unsafe fn fmi2Instantiate(
     _visible: c_int,
     logging_on: c_int,
 ) -> Component {
-    // SAFETY: null or a struct that lives during the call.
+    // SAFETY: the standard demands null or a pointer to a callback structure that lives and stays
+    // unchanged during the call.
     let callbacks = unsafe { callbacks.as_ref() };
-    // SAFETY: null or NUL-terminated.
+    // SAFETY: the standard demands a NUL-terminated text, and `text` refuses null.
     let name = unsafe { text("instanceName", instance_name) };
     let c_name = CString::new(name.as_deref().unwrap_or_default()).unwrap_or_default();
     let logger = || Logger::new(callbacks, c_name.clone(), logging_on != 0);
@@ -153,7 +170,7 @@ pub unsafe fn fmi2Instantiate(
         if name?.is_empty() {
             return Err("the instance name is empty".to_string());
         }
-        // SAFETY: null or NUL-terminated.
+        // SAFETY: the standard demands a NUL-terminated text, and `text` refuses null.
         let guid = unsafe { text("fmuGUID", guid) }?;
         let interface = Interface::from_c(fmu_type).ok_or_else(|| {
             format!("fmuType {fmu_type} is neither 0 (model exchange) nor 1 (co-simulation)")
@@ -175,7 +192,7 @@ pub unsafe fn fmi2Instantiate(
         let resources = if resource_location.is_null() {
             None
         } else {
-            // SAFETY: not null, so NUL-terminated.
+            // SAFETY: the standard demands a NUL-terminated text if the pointer is not null.
             Some(resource::folder(unsafe { text("fmuResourceLocation", resource_location) }?)?)
         };
         let setting = Setting { guid, interface, logger: logger(), resources };
@@ -196,14 +213,17 @@ pub unsafe fn fmi2Instantiate(
     }
 }
 
-/// Does nothing while another call uses the instance: a logger cannot free the unit that calls it.
+/// Frees the instance. It does nothing while another call uses the instance: a logger cannot free
+/// the unit that calls it.
 pub unsafe fn fmi2FreeInstance(component: Component) {
-    // SAFETY: not null means that it came from fmi2Instantiate and was not freed.
+    // SAFETY: if not null, `component` came from fmi2Instantiate, which leaked a `Box<Shared>`, and
+    // was not freed. Only a shared reference is made, so other calls may hold one too.
     let Some(shared) = (unsafe { component.cast::<Shared>().as_ref() }) else { return };
     let Some(busy) = Busy::begin(&shared.busy) else { return };
-    // The flag stays set for good.
+    // The guard is never dropped, because the flag goes with the instance.
     std::mem::forget(busy);
-    // SAFETY: not null, so it came from fmi2Instantiate and is freed once; no call is under way.
+    // SAFETY: `component` came from `Box::into_raw` in fmi2Instantiate and is freed once, as the
+    // standard demands. The flag is set, so no call is under way that uses the instance.
     let instance = unsafe { Box::from_raw(component.cast::<Shared>()) };
     if let Err(panic) = catch_unwind(AssertUnwindSafe(|| drop(instance))) {
         std::mem::forget(panic);
@@ -217,9 +237,9 @@ pub unsafe fn fmi2SetDebugLogging(
     categories: *const *const c_char,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: see `slice`.
+        // SAFETY: the importer vouches for the array, as `slice` requires.
         let categories = unsafe { slice("categories", categories, n_categories) }?;
-        // SAFETY: null or NUL-terminated.
+        // SAFETY: the standard demands NUL-terminated texts, and `text` refuses null.
         let names =
             categories.iter().map(|&name| unsafe { text("categories", name) }).collect::<Result<Vec<_>, _>>();
         let names = names.map_err(Failure::Error)?;
@@ -228,7 +248,7 @@ pub unsafe fn fmi2SetDebugLogging(
         }
         Ok(())
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SET_DEBUG_LOGGING, body) }
 }
 
@@ -243,7 +263,7 @@ pub unsafe fn fmi2SetupExperiment(
     let tolerance = (tolerance_defined != 0).then_some(tolerance);
     let stop = (stop_time_defined != 0).then_some(stop_time);
     let body = |instance: &mut Instance| instance.setup_experiment(start_time, stop, tolerance);
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SETUP_EXPERIMENT, body) }
 }
 
@@ -252,12 +272,12 @@ pub unsafe fn fmi2EnterInitializationMode(component: Component) -> Status {
         instance.enter_initialization_mode();
         Ok(())
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::ENTER_INITIALIZATION_MODE, body) }
 }
 
 pub unsafe fn fmi2ExitInitializationMode(component: Component) -> Status {
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::EXIT_INITIALIZATION_MODE, Instance::exit_initialization_mode) }
 }
 
@@ -266,7 +286,7 @@ pub unsafe fn fmi2Terminate(component: Component) -> Status {
         instance.terminate();
         Ok(())
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::TERMINATE, body) }
 }
 
@@ -275,7 +295,7 @@ pub unsafe fn fmi2Reset(component: Component) -> Status {
         instance.reset();
         Ok(())
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::RESET, body) }
 }
 
@@ -283,35 +303,35 @@ pub unsafe fn fmi2Reset(component: Component) -> Status {
 
 pub unsafe fn fmi2GetReal(component: Component, vr: *const u32, n: usize, value: *mut f64) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: see `slice` and `room`.
+        // SAFETY: the importer vouches for both arrays, as `slice` and `room` require.
         let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
         instance.get::<f64>(references, |i, value| values[i] = *value)
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_REAL, body) }
 }
 
 pub unsafe fn fmi2GetInteger(component: Component, vr: *const u32, n: usize, value: *mut c_int) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: see `slice` and `room`.
+        // SAFETY: the importer vouches for both arrays, as `slice` and `room` require.
         let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
         instance.get::<i32>(references, |i, value| values[i] = *value)
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_INTEGER, body) }
 }
 
 pub unsafe fn fmi2GetBoolean(component: Component, vr: *const u32, n: usize, value: *mut c_int) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: see `slice` and `room`.
+        // SAFETY: the importer vouches for both arrays, as `slice` and `room` require.
         let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
         instance.get::<bool>(references, |i, value| values[i] = c_int::from(*value))
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_BOOLEAN, body) }
 }
 
-/// The texts live until the next call of this function on the same instance.
+/// Hands out texts that live until the next call of this function on the same instance.
 pub unsafe fn fmi2GetString(
     component: Component,
     vr: *const u32,
@@ -319,40 +339,40 @@ pub unsafe fn fmi2GetString(
     value: *mut *const c_char,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: see `slice` and `room`.
+        // SAFETY: the importer vouches for both arrays, as `slice` and `room` require.
         let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
         for (value, text) in values.iter_mut().zip(instance.get_strings(references)?) {
             *value = text.as_ptr();
         }
         Ok(())
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_STRING, body) }
 }
 
 pub unsafe fn fmi2SetReal(component: Component, vr: *const u32, n: usize, value: *const f64) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: see `slice`.
+        // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
         instance.set(references, |i| Ok(values[i]))
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SET_REAL, body) }
 }
 
 pub unsafe fn fmi2SetInteger(component: Component, vr: *const u32, n: usize, value: *const c_int) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: see `slice`.
+        // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
         instance.set(references, |i| Ok(values[i]))
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SET_INTEGER, body) }
 }
 
 pub unsafe fn fmi2SetBoolean(component: Component, vr: *const u32, n: usize, value: *const c_int) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: see `slice`.
+        // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
         instance.set(references, |i| match values[i] {
             0 => Ok(false),
@@ -360,7 +380,7 @@ pub unsafe fn fmi2SetBoolean(component: Component, vr: *const u32, n: usize, val
             other => Err(format!("{other} is neither fmi2False (0) nor fmi2True (1)")),
         })
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SET_BOOLEAN, body) }
 }
 
@@ -371,28 +391,29 @@ pub unsafe fn fmi2SetString(
     value: *const *const c_char,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: see `slice`.
+        // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
-        // SAFETY: null or NUL-terminated.
+        // SAFETY: the standard demands NUL-terminated texts, and `text` refuses null.
         instance.set(references, |i| unsafe { text("value", values[i]) }.map(String::from))
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SET_STRING, body) }
 }
 
-// Saved states. The handle is an address that is compared, never followed.
+// Saved states. Their handles are addresses that are compared and never dereferenced.
 
-/// Overwrites the state behind `*state` if that is not null.
+/// Saves the present state. It overwrites the state behind `*state` if `*state` is not null.
 pub unsafe fn fmi2GetFMUstate(component: Component, state: *mut *mut c_void) -> Status {
     let body = |instance: &mut Instance| {
         check_room::<*mut c_void>("FMUstate", state.is_null(), 1)?;
-        // SAFETY: not null, and the standard wants it initialized.
+        // SAFETY: `check_room` refused null, and the standard demands that `*state` is initialized,
+        // with null or a handle.
         let present = unsafe { state.read() };
         let handle = instance.save((!present.is_null()).then(|| present.cast::<Saved>().cast_const()))?;
-        // SAFETY: see `put`.
+        // SAFETY: the importer vouches for the result pointer, as `put` requires.
         unsafe { put("FMUstate", state, handle.cast_mut().cast()) }
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_FMU_STATE, body) }
 }
 
@@ -401,14 +422,16 @@ pub unsafe fn fmi2SetFMUstate(component: Component, state: *mut c_void) -> Statu
         check_room::<Saved>("FMUstate", state.is_null(), 1)?;
         instance.restore(state.cast())
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SET_FMU_STATE, body) }
 }
 
-/// Sets `*state` to null; does nothing if it, or `state`, is null already.
+/// Frees the saved state and sets `*state` to null. It does nothing if `*state` or `state` is null
+/// already.
 pub unsafe fn fmi2FreeFMUstate(component: Component, state: *mut *mut c_void) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: null or a handle variable of the importer.
+        // SAFETY: the standard demands null or a pointer to an initialized handle that nobody else
+        // uses during the call.
         let Some(state) = (unsafe { state.as_mut() }) else { return Ok(()) };
         if !state.is_null() {
             instance.free_saved(state.cast())?;
@@ -416,7 +439,7 @@ pub unsafe fn fmi2FreeFMUstate(component: Component, state: *mut *mut c_void) ->
         }
         Ok(())
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::FREE_FMU_STATE, body) }
 }
 
@@ -428,10 +451,10 @@ pub unsafe fn fmi2SerializedFMUstateSize(
     let body = |instance: &mut Instance| {
         check_room::<Saved>("FMUstate", state.is_null(), 1)?;
         let length = instance.serialized(state.cast())?.len();
-        // SAFETY: see `put`.
+        // SAFETY: the importer vouches for the result pointer, as `put` requires.
         unsafe { put("size", size, length) }
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SERIALIZED_SIZE, body) }
 }
 
@@ -447,15 +470,15 @@ pub unsafe fn fmi2SerializeFMUstate(
         if size < bytes.len() {
             return error(format!("room for {size} bytes, but the state has {}", bytes.len()));
         }
-        // SAFETY: see `room`.
+        // SAFETY: the importer vouches for the array, as `room` requires.
         unsafe { room("serializedState", serialized.cast::<u8>(), bytes.len()) }?.copy_from_slice(bytes);
         Ok(())
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SERIALIZE, body) }
 }
 
-/// Always makes a new state: what `*state` was before is not looked at.
+/// Makes a new state from the bytes. It ignores the previous value of `*state`.
 pub unsafe fn fmi2DeSerializeFMUstate(
     component: Component,
     serialized: *const c_char,
@@ -464,13 +487,13 @@ pub unsafe fn fmi2DeSerializeFMUstate(
 ) -> Status {
     let body = |instance: &mut Instance| {
         check_room::<*mut c_void>("FMUstate", state.is_null(), 1)?;
-        // SAFETY: see `slice`.
+        // SAFETY: the importer vouches for the array, as `slice` requires.
         let handle =
             instance.deserialize(unsafe { slice("serializedState", serialized.cast::<u8>(), size) }?)?;
-        // SAFETY: see `put`.
+        // SAFETY: the importer vouches for the result pointer, as `put` requires.
         unsafe { put("FMUstate", state, handle.cast_mut().cast()) }
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::DESERIALIZE, body) }
 }
 
@@ -484,7 +507,7 @@ pub unsafe fn fmi2GetDirectionalDerivative(
     dv_unknown: *mut f64,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: see `slice`.
+        // SAFETY: the importer vouches for the array, as `slice` requires.
         let (unknowns, knowns, seed) = unsafe {
             (
                 slice("vUnknown_ref", unknown, n_unknown)?,
@@ -492,11 +515,11 @@ pub unsafe fn fmi2GetDirectionalDerivative(
                 slice("dvKnown", dv_known, n_known)?,
             )
         };
-        // SAFETY: see `room`.
+        // SAFETY: the importer vouches for the array, as `room` requires.
         let derivative = unsafe { room("dvUnknown", dv_unknown, n_unknown) }?;
         instance.directional_derivative(unknowns, knowns, seed, derivative)
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::DIRECTIONAL_DERIVATIVE, body) }
 }
 
@@ -507,7 +530,7 @@ pub unsafe fn fmi2EnterEventMode(component: Component) -> Status {
         instance.enter_event_mode();
         Ok(())
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::ENTER_EVENT_MODE, body) }
 }
 
@@ -521,10 +544,10 @@ pub unsafe fn fmi2NewDiscreteStates(component: Component, event_info: *mut CEven
             next_event_time: event.next_event_time.unwrap_or_default(),
             ..CEventInfo::default()
         };
-        // SAFETY: see `put`.
+        // SAFETY: the importer vouches for the result pointer, as `put` requires.
         unsafe { put("fmi2eventInfo", event_info, info) }
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::NEW_DISCRETE_STATES, body) }
 }
 
@@ -533,58 +556,59 @@ pub unsafe fn fmi2EnterContinuousTimeMode(component: Component) -> Status {
         instance.enter_continuous_time_mode();
         Ok(())
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::ENTER_CONTINUOUS_TIME, body) }
 }
 
-/// The units know their events by time or indicator, so a completed step never asks for event mode.
+/// Completes an integrator step. The units find their events by time or indicator, so a completed
+/// step never asks for event mode.
 pub unsafe fn fmi2CompletedIntegratorStep(
     component: Component,
     _no_set_state_prior: c_int,
     enter_event_mode: *mut c_int,
     terminate: *mut c_int,
 ) -> Status {
-    // SAFETY: see `put`.
+    // SAFETY: the importer vouches for the result pointer, as `put` requires.
     let body = |_: &mut Instance| unsafe {
         put("enterEventMode", enter_event_mode, 0)?;
         put("terminateSimulation", terminate, 0)
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::COMPLETED_STEP, body) }
 }
 
 pub unsafe fn fmi2SetTime(component: Component, time: f64) -> Status {
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SET_TIME, |instance| instance.set_time(time)) }
 }
 
 pub unsafe fn fmi2SetContinuousStates(component: Component, x: *const f64, nx: usize) -> Status {
-    // SAFETY: see `slice`.
+    // SAFETY: the importer vouches for the array, as `slice` requires.
     let body = |instance: &mut Instance| instance.set_continuous_states(unsafe { slice("x", x, nx) }?);
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SET_CONTINUOUS_STATES, body) }
 }
 
 pub unsafe fn fmi2GetDerivatives(component: Component, derivatives: *mut f64, nx: usize) -> Status {
-    // SAFETY: see `room`.
+    // SAFETY: the importer vouches for the array, as `room` requires.
     let body =
         |instance: &mut Instance| instance.derivatives(unsafe { room("derivatives", derivatives, nx) }?);
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_DERIVATIVES, body) }
 }
 
 pub unsafe fn fmi2GetEventIndicators(component: Component, indicators: *mut f64, ni: usize) -> Status {
     let body =
-        // SAFETY: see `room`.
+        // SAFETY: the importer vouches for the array, as `room` requires.
         |instance: &mut Instance| instance.event_indicators(unsafe { room("eventIndicators", indicators, ni) }?);
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_EVENT_INDICATORS, body) }
 }
 
 pub unsafe fn fmi2GetContinuousStates(component: Component, x: *mut f64, nx: usize) -> Status {
-    // SAFETY: see `room`.
+    // SAFETY: the importer vouches for the array, as `room` requires.
     let body = |instance: &mut Instance| instance.continuous_states(unsafe { room("x", x, nx) }?);
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_CONTINUOUS_STATES, body) }
 }
 
@@ -593,15 +617,16 @@ pub unsafe fn fmi2GetNominalsOfContinuousStates(
     nominals: *mut f64,
     nx: usize,
 ) -> Status {
-    // SAFETY: see `room`.
+    // SAFETY: the importer vouches for the array, as `room` requires.
     let body = |instance: &mut Instance| instance.nominals(unsafe { room("x_nominal", nominals, nx) }?);
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_NOMINALS, body) }
 }
 
 // Co-simulation
 
-/// Orders 1 to [`MAX_INPUT_DERIVATIVE_ORDER`](crate::MAX_INPUT_DERIVATIVE_ORDER), for the next step only.
+/// Sets derivatives of inputs of order 1 to
+/// [`MAX_INPUT_DERIVATIVE_ORDER`](crate::MAX_INPUT_DERIVATIVE_ORDER), for the next step only.
 pub unsafe fn fmi2SetRealInputDerivatives(
     component: Component,
     vr: *const u32,
@@ -610,12 +635,12 @@ pub unsafe fn fmi2SetRealInputDerivatives(
     value: *const f64,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: see `slice`.
+        // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, orders, values) =
             unsafe { (slice("vr", vr, n)?, slice("order", order, n)?, slice("value", value, n)?) };
         instance.set_input_derivatives(references, orders, values)
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SET_INPUT_DERIVATIVES, body) }
 }
 
@@ -630,17 +655,17 @@ pub unsafe fn fmi2GetRealOutputDerivatives(
         0 => Ok(()),
         _ => error("the units offer no output derivatives (maxOutputDerivativeOrder is 0)"),
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_OUTPUT_DERIVATIVES, body) }
 }
 
 pub unsafe fn fmi2DoStep(component: Component, point: f64, size: f64, _no_set_state_prior: c_int) -> Status {
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::DO_STEP, |instance| instance.do_step(point, size)) }
 }
 
 pub unsafe fn fmi2CancelStep(component: Component) -> Status {
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::CANCEL_STEP, |_| Ok(())) }
 }
 
@@ -650,45 +675,45 @@ fn no_status(kind: c_int) -> Outcome {
 
 pub unsafe fn fmi2GetStatus(component: Component, kind: c_int, value: *mut Status) -> Status {
     let body = |instance: &mut Instance| match kind {
-        // SAFETY: see `put`.
+        // SAFETY: the importer vouches for the result pointer, as `put` requires.
         DO_STEP_STATUS => unsafe { put("value", value, instance.last_step()) },
         _ => no_status(kind),
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_STATUS, body) }
 }
 
 pub unsafe fn fmi2GetRealStatus(component: Component, kind: c_int, value: *mut f64) -> Status {
     let body = |instance: &mut Instance| match kind {
-        // SAFETY: see `put`.
+        // SAFETY: the importer vouches for the result pointer, as `put` requires.
         LAST_SUCCESSFUL_TIME => unsafe { put("value", value, instance.time()) },
         _ => no_status(kind),
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_REAL_STATUS, body) }
 }
 
 pub unsafe fn fmi2GetIntegerStatus(component: Component, kind: c_int, _value: *mut c_int) -> Status {
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_INTEGER_STATUS, |_| no_status(kind)) }
 }
 
 pub unsafe fn fmi2GetBooleanStatus(component: Component, kind: c_int, value: *mut c_int) -> Status {
     let body = |_: &mut Instance| match kind {
-        // SAFETY: see `put`.
+        // SAFETY: the importer vouches for the result pointer, as `put` requires.
         TERMINATED => unsafe { put("value", value, 0) },
         _ => no_status(kind),
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_BOOLEAN_STATUS, body) }
 }
 
 pub unsafe fn fmi2GetStringStatus(component: Component, kind: c_int, value: *mut *const c_char) -> Status {
     let body = |_: &mut Instance| match kind {
-        // SAFETY: see `put`.
+        // SAFETY: the importer vouches for the result pointer, as `put` requires.
         PENDING_STATUS => unsafe { put("value", value, c"no step is pending".as_ptr()) },
         _ => no_status(kind),
     };
-    // SAFETY: see `run`.
+    // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_STRING_STATUS, body) }
 }

@@ -1,4 +1,5 @@
-//! The FMI 2.0 C interface, written once: a unit implements [`Model`], and [`export_fmus!`] makes a library of it.
+//! The FMI 2.0 C interface, written once: a unit implements [`Model`], and [`export_fmus!`] makes a
+//! library of it.
 //!
 //! | module | what it knows |
 //! |---|---|
@@ -9,9 +10,9 @@
 //! | [`interface`], [`types`] | the C signatures and the checks of pointers |
 //! | `logger`, `resource`, `saved` | messages, the resource URI, the bytes of a saved state |
 //!
-//! Every entry point ends a panic: it returns `fmi2Fatal`, says so in the log, and leaves the process and all other
-//! instances alone. The process-wide panic hook is not touched, so the standard one writes a line to stderr, once, for what
-//! is always a defect.
+//! Every entry point stops a panic: it returns `fmi2Fatal`, reports it in the log, and leaves the
+//! process and all other instances alone. The process-wide panic hook is not changed, so the
+//! standard hook writes one line to stderr, and a panic is always a defect.
 
 mod call;
 mod export;

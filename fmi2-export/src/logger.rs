@@ -1,15 +1,15 @@
-//! Messages to the importer, through its callback and nowhere else.
+//! Messages to the importer, which leave the unit through the importer's callback only.
 //!
-//! Errors and fatal errors are always reported, as nobody wants to search for them a second time with logging on.
-//! Everything else is reported only while logging is on (`loggingOn` of fmi2Instantiate, fmi2SetDebugLogging), and of
-//! this only the categories chosen.
+//! Errors and fatal errors are always reported, so that nobody has to repeat a run with logging on
+//! to find them. Everything else is reported only while logging is on (`loggingOn` of
+//! fmi2Instantiate, fmi2SetDebugLogging), and then only in the chosen categories.
 #![allow(unsafe_code)]
 
 use crate::types::{Callbacks, LogCallback, Status};
 use model_description::LOG_CATEGORIES;
 use std::ffi::{CString, c_void};
 
-/// A row of [`LOG_CATEGORIES`].
+/// Log category, one for each row of [`LOG_CATEGORIES`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Category {
     All,
@@ -43,12 +43,12 @@ impl Category {
     }
 }
 
-/// The importer's logger with what it wants to hear.
+/// Logger of the importer, with the categories that it wants to receive.
 pub(crate) struct Logger {
     callback: Option<LogCallback>,
     environment: *mut c_void,
     instance: CString,
-    /// One bit for every category that is reported.
+    /// Bit set of the categories that are reported.
     active: u8,
 }
 
@@ -56,7 +56,8 @@ const EVERYTHING: u8 = u8::MAX;
 const ALWAYS: u8 = 1 << Category::Error as u8 | 1 << Category::Fatal as u8;
 
 impl Logger {
-    /// Copies what is needed of `callbacks`, which the importer may free afterwards.
+    /// Copies the parts of `callbacks` that are needed, because the importer may free them
+    /// afterwards.
     pub(crate) fn new(callbacks: Option<&Callbacks>, instance: CString, on: bool) -> Self {
         Self {
             callback: callbacks.and_then(|callbacks| callbacks.logger),
@@ -66,7 +67,8 @@ impl Logger {
         }
     }
 
-    /// Switches the named categories, or all if none is named. Returns a name that is not a category.
+    /// Switches the named categories on or off, or all if none is named. Returns a name that is not
+    /// a category.
     pub(crate) fn choose<'a>(&mut self, on: bool, names: &[&'a str]) -> Option<&'a str> {
         let mut unknown = None;
         let mut chosen = if names.is_empty() { EVERYTHING } else { 0 };
@@ -77,7 +79,8 @@ impl Logger {
                 None => unknown = Some(*name),
             }
         }
-        // Switching categories on means these and no others; switching off leaves the others as they were.
+        // Switching categories on selects these and no others; switching off leaves the others as
+        // they were.
         self.active = ALWAYS | if on { chosen } else { self.active & !chosen };
         unknown
     }
@@ -89,8 +92,9 @@ impl Logger {
         }
         let message = to_c(text);
         let category_name = to_c(category.name());
-        // SAFETY: the importer's function with its own environment; all strings live until it returns, and the message
-        // holds no `%`, so no further argument is read.
+        // SAFETY: the callback is the importer's function and gets its own environment. All strings
+        // live until it returns. The message holds no `%`, so the variadic function reads no
+        // further argument.
         unsafe {
             callback(
                 self.environment,
@@ -103,7 +107,8 @@ impl Logger {
     }
 }
 
-/// The importer reads the text as a printf format, so it must not hold a `%`.
+/// Converts a text for the importer. The importer reads it as a printf format, so it must not hold
+/// a `%`.
 fn to_c(text: &str) -> CString {
     CString::new(text.replace('%', "percent").replace('\0', " ")).unwrap_or_default()
 }

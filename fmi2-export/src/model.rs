@@ -1,92 +1,99 @@
-//! What a unit must offer to become an FMU.
+//! Interface that a unit must offer to become an FMU.
 
 use crate::table::Description;
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::Path;
 
-/// Why a call could not be done. The text reaches the user through the FMI logger.
+/// Reason why a call failed. Its text reaches the user through the FMI logger.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Failure {
-    /// The call was refused but the unit is unchanged and can go on (`fmi2Discard`).
+    /// The call was refused, but the unit is unchanged and can continue (`fmi2Discard`).
     #[error("{0}")]
     Discard(String),
-    /// The simulation cannot go on, the process and other units can (`fmi2Error`).
+    /// The simulation cannot continue, but the process and other units can (`fmi2Error`).
     #[error("{0}")]
     Error(String),
 }
 
-/// What surrounds a unit while it initializes.
+/// Data about the experiment that a unit may use while it initializes.
 #[derive(Clone, Copy, Debug)]
 pub struct Context<'a> {
     /// Start time of the experiment, s.
     pub start_time: f64,
-    /// Stop time, if the importer defined one, s.
+    /// Stop time in s, if the importer defined one.
     pub stop_time: Option<f64>,
-    /// The unpacked `resources` folder, if the importer gave one.
+    /// Path of the unpacked `resources` folder, if the importer gave one.
     pub resources: Option<&'a Path>,
 }
 
 /// Inputs during a step: constant, or extrapolated with the derivatives that the importer gave.
 pub trait Inputs<M> {
-    /// Sets the model's real inputs to their values at `time` (s). Returns at once if no derivatives were given.
+    /// Sets the model's real inputs to their values at `time` (s). It returns at once if no
+    /// derivatives were given.
     fn advance(&self, model: &mut M, time: f64);
 }
 
 /// Outcome of an event iteration in model exchange.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EventInfo {
-    /// The next time at which an event is due, s.
+    /// Next time at which an event is due, s.
     pub next_event_time: Option<f64>,
-    /// Whether continuous states were changed by the event.
+    /// Whether the event changed continuous states.
     pub states_changed: bool,
 }
 
-/// What surrounds a model that was restored from a saved state.
+/// Data about a saved state from which a model was restored.
 #[derive(Debug)]
 pub struct Restoration<'a, M> {
-    /// The model whose place it takes.
+    /// Model that the restored one replaces.
     pub before: &'a mut M,
     /// Time of the saved state, s.
     pub time: f64,
     /// Start time of its experiment, s.
     pub start_time: f64,
-    /// Whether the model was initialized with the parameters that it has; else it will be before anything is asked of it.
+    /// Whether the model was initialized with its present parameters; otherwise it will be before
+    /// it is used.
     pub initialized: bool,
-    /// Whether the state is one of a step that may have failed in the middle.
+    /// Whether the saved state may come from a step that failed half-way.
     pub failed: bool,
 }
 
-/// A unit: parameters, inputs, state and outputs in one value, whose fields the [`Description`]'s table points at.
+/// A unit: one value that holds the parameters, inputs, state and outputs. The table of the
+/// [`Description`] points at its fields.
 ///
-/// The shell owns call order, value checks, logging and memory; a model only computes. Everything that determines the
-/// future is serialised: a model that is restored in another process goes on bit for bit. Scratch space is
-/// `#[serde(skip)]` and made again in [`Model::restored`].
+/// The shell takes care of call order, value checks, logging and memory; a model only computes.
+/// Everything that determines the future is serialised: a model that is restored in another process
+/// continues bit for bit. Scratch space is `#[serde(skip)]` and made again in [`Model::restored`].
 pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
-    /// Name, documentation, experiment and the one table of variables.
+    /// Returns name, documentation, default experiment and the table of variables.
     fn description() -> Description<Self>;
 
-    /// A model with every parameter and input at its start value. Start values in the XML are read from here.
+    /// Makes a model with every parameter and input at its start value. The start values in the XML
+    /// are read from here.
     fn new() -> Self;
 
-    /// Checks the parameters, loads files, computes what they determine and sets the initial state. Called on leaving
-    /// and, if an output is asked for earlier, during initialization mode; again whenever a parameter changed meanwhile.
+    /// Checks the parameters, loads files, computes the values that follow from them and sets the
+    /// initial state. The shell calls it on leaving initialization mode, and earlier in that mode
+    /// if an output is requested; it calls it again whenever a parameter changed meanwhile.
     ///
     /// # Errors
     /// Names the parameter at fault.
     fn initialize(&mut self, context: &Context) -> Result<(), Failure>;
 
-    /// Brings all outputs and local variables up to date with state, inputs and `time`. Must not change anything that a
-    /// later call depends on. The shell calls it before a read, and only if something changed since.
+    /// Updates all outputs and local variables to the state, the inputs and `time`. It must not
+    /// change anything on which a later call depends. The shell calls it before a read, and only if
+    /// something changed since.
     ///
     /// # Errors
-    /// Says what could not be computed.
+    /// Says which value could not be computed.
     fn calculate(&mut self, time: f64) -> Result<(), Failure>;
 
-    /// Co-simulation: from communication point `from` to `to` (both s). Never called with `to < from`; `to == from` is
-    /// a step of zero length. Outputs are not read from here but from [`Model::calculate`] afterwards. `log` takes warnings.
+    /// Performs a co-simulation step from communication point `from` to `to` (both s). It is never
+    /// called with `to < from`; `to == from` is a step of zero length. Outputs are not read here
+    /// but after a call of [`Model::calculate`]. `log` takes warnings.
     ///
     /// # Errors
-    /// Says what went wrong.
+    /// Says why the step failed.
     fn step(
         &mut self,
         from: f64,
@@ -95,38 +102,43 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
         log: &mut dyn FnMut(&str),
     ) -> Result<(), Failure>;
 
-    /// Called after the model was restored from a saved state, before it takes the place of another one: makes scratch space
-    /// again, or takes over that of the other, which is not used any more if this succeeds.
+    /// Prepares a model that was restored from a saved state, before it replaces another one. It
+    /// makes scratch space again or takes over that of the other model, which is no longer used if
+    /// this succeeds.
     ///
     /// # Errors
-    /// If the state cannot be used. The other model is then as it was.
+    /// Refuses a state that cannot be used. The other model must then be unchanged.
     fn restored(&mut self, _from: Restoration<'_, Self>) -> Result<(), Failure> {
         Ok(())
     }
 
-    /// Model exchange: copies the continuous states out, in the order of the state variables in the table.
+    /// Copies the continuous states for model exchange, in the order of the state variables in the
+    /// table.
     fn continuous_states(&self, _states: &mut [f64]) {}
 
-    /// Model exchange: sets the continuous states.
+    /// Sets the continuous states in model exchange.
     fn set_continuous_states(&mut self, _states: &[f64]) {}
 
-    /// Model exchange: the event at `time`: takes discrete inputs and what else changes there, and tells when the next one is
-    /// due. Importers may call it where no event is, and more than once.
+    /// Handles the event at `time` in model exchange: it takes discrete inputs, makes the changes
+    /// that are due, and returns the time of the next event. Importers may call it where no event
+    /// is, and more than once.
     ///
     /// # Errors
-    /// Says what went wrong.
+    /// Says why the event could not be handled.
     fn new_discrete_states(&mut self, _time: f64) -> Result<EventInfo, Failure> {
         Ok(EventInfo::default())
     }
 
-    /// Model exchange: event indicators as of the last [`Model::calculate`], which the shell calls before if something changed.
+    /// Copies the event indicators for model exchange as of the last [`Model::calculate`], which
+    /// the shell calls before if something changed.
     fn event_indicators(&self, _indicators: &mut [f64]) {}
 
-    /// Partial derivative of the variable with value reference `unknown` by the one with value reference `known`, at
-    /// the current `time`, state and inputs. Only offered if the description says so.
+    /// Returns the partial derivative of the variable with value reference `unknown` with respect
+    /// to the one with value reference `known`, at the current `time`, state and inputs. The unit
+    /// offers it only if the description says so.
     ///
     /// # Errors
-    /// Names a pair for which there is none.
+    /// Names a pair of variables that has no derivative.
     fn partial_derivative(&mut self, _time: f64, _unknown: usize, _known: usize) -> Result<f64, Failure> {
         Err(Failure::Error("this unit offers no directional derivatives".into()))
     }

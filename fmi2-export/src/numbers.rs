@@ -1,4 +1,4 @@
-//! Whether all numbers of a value are numbers, found by serialising it to nowhere.
+//! Check that a value holds no NaN, made by serialising it without any output.
 
 use serde::ser::{
     Serialize, SerializeMap, SerializeSeq, SerializeStruct, SerializeStructVariant, SerializeTuple,
@@ -6,12 +6,13 @@ use serde::ser::{
 };
 use std::fmt::{self, Display};
 
-/// Whether no Real in `value`, however deep, is NaN. Infinite ones may stand for what has no end.
+/// Whether no Real in `value`, however deep, is NaN. Infinite ones are allowed, as they may stand
+/// for an interval without end.
 pub(crate) fn are_numbers<T: Serialize>(value: &T) -> bool {
     value.serialize(&mut Search).is_ok()
 }
 
-/// Ends at the first NaN.
+/// Serialiser that stops at the first NaN.
 struct Search;
 
 #[derive(Debug)]

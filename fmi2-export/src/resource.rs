@@ -1,15 +1,16 @@
-//! The resource location that an importer passes: a file URI in one of the forms found in the wild.
+//! The resource location that an importer passes, a file URI in one of the forms that importers
+//! use.
 
 use percent_encoding::percent_decode_str;
 use std::path::PathBuf;
 
-/// The folder `uri` points at, without a trailing separator.
+/// Returns the folder to which `uri` points, without a trailing separator.
 ///
-/// Takes `file:/p`, `file:///p`, `file:////p` and `file://localhost/p` with percent encoding, and a plain path. `file:p` and
-/// `p` are relative to the working directory.
+/// The function accepts `file:/p`, `file:///p`, `file:////p` and `file://localhost/p` with percent
+/// encoding, and a plain path. `file:p` and `p` are relative to the working directory.
 ///
 /// # Errors
-/// Says what is wrong with the URI.
+/// Says why the URI cannot be used.
 pub(crate) fn folder(uri: &str) -> Result<PathBuf, String> {
     let Some(rest) = strip_scheme(uri) else {
         return match uri.split_once("://") {
@@ -18,7 +19,7 @@ pub(crate) fn folder(uri: &str) -> Result<PathBuf, String> {
         };
     };
     let path = match rest.strip_prefix("//") {
-        // An authority: only this machine's can be read.
+        // If the URI names an authority, it must be this machine.
         Some(after) if !after.starts_with('/') => match after.split_once('/') {
             Some((host, path)) if host.eq_ignore_ascii_case("localhost") => path,
             _ => return Err(format!("resource location '{uri}' names another machine")),

@@ -1,4 +1,5 @@
-//! A saved state as bytes: a header that tells whether they fit, then the postcard encoding of shell and model.
+//! A saved state as bytes: a header that tells whether the state fits, then the postcard encoding
+//! of shell and model.
 //!
 //! | bytes | content |
 //! |---|---|
@@ -32,7 +33,7 @@ pub(crate) fn wrap(guid: &str, interface: Interface, payload: &[u8]) -> Box<[u8]
     .into()
 }
 
-/// The payload of `bytes`.
+/// Returns the payload of `bytes` after checking the header.
 ///
 /// # Errors
 /// Says why the bytes are not a state of this unit.

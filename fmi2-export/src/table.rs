@@ -1,4 +1,5 @@
-//! The one table of a unit's variables: what FMI says of each, and the field of the model that holds its value.
+//! Table of a unit's variables: the FMI attributes of each, and the field of the model that holds
+//! its value.
 
 use crate::instance::Scalar;
 use model_description::DefaultExperiment;
@@ -11,33 +12,34 @@ type Setter<M, T> = Box<dyn Fn(&mut M, T) + Send + Sync>;
 /// Access to the field that holds a variable's value.
 pub(crate) enum Access<M> {
     Real(Lens<M, f64>),
-    /// Of an integer or an enumeration.
+    /// Access to an integer or enumeration field.
     Integer(Integer<M>),
     Boolean(Lens<M, bool>),
     String(Lens<M, String>),
 }
 
-/// A field of some type that FMI sees as an integer.
+/// Access to a field of some type that FMI sees as an integer.
 pub(crate) struct Integer<M> {
     pub(crate) get: Box<dyn Fn(&mut M) -> i32 + Send + Sync>,
-    /// Called with values only that the declaration allows.
+    /// Setter that is called only with values that the declaration allows.
     pub(crate) set: Setter<M, i32>,
 }
 
-/// An enumeration type: the values of a Rust type, each with its FMI name and a description. FMI numbers the items from 1 in
-/// this order. Every value that a model can hold must be listed.
+/// An enumeration type: the values of a Rust type, each with its FMI name and a description. FMI
+/// numbers the items from 1 in this order. Every value that a model can hold must be listed.
 #[derive(Debug)]
 pub struct Enumeration<T: 'static> {
-    /// Name of the type.
+    /// Name of the enumeration type.
     pub name: &'static str,
-    /// One line: what the type is for.
+    /// Purpose of the type, in one line.
     pub description: &'static str,
-    /// Value, name, description.
+    /// Items of the type, each with value, name and description.
     pub items: &'static [(T, &'static str, &'static str)],
 }
 
 impl<T: PartialEq> Enumeration<T> {
-    /// The item number of `value`; 0, which importers and the check of descriptions refuse, if it is not listed.
+    /// Returns the item number of `value`, or 0 if it is not listed; importers and the check of
+    /// descriptions refuse 0.
     pub(crate) fn number(&self, value: &T) -> i32 {
         (1..).zip(self.items).find(|(_, item)| item.0 == *value).map_or(0, |(number, _)| number)
     }
@@ -55,7 +57,7 @@ pub struct Entry<M> {
 }
 
 impl<M> Entry<M> {
-    /// What is wrong with the value that the model holds, if it is one that is set from outside.
+    /// Says why the model's value is not allowed, if the variable is set from outside.
     pub(crate) fn problem(&self, model: &mut M) -> Option<String> {
         let Variable { name, kind, .. } = &self.variable;
         if self.variable.is_calculated() {
@@ -70,27 +72,27 @@ impl<M> Entry<M> {
     }
 }
 
-/// All that makes a unit: the texts, the proposed experiment and the table.
+/// Description of a unit: its texts, its default experiment and its table of variables.
 pub struct Description<M> {
     /// Model name and archive name, for example `CRMPC`.
     pub name: &'static str,
-    /// One line: what the unit is.
+    /// Purpose of the unit, in one line.
     pub description: &'static str,
-    /// HTML fragment: what the unit computes, with equations and sources.
+    /// HTML fragment that says what the unit computes, with equations and sources.
     pub documentation: String,
-    /// Crate version.
+    /// Version of the unit's crate.
     pub version: &'static str,
-    /// Whether the unit is also a model exchange unit (then it has states and derivatives).
+    /// Whether the unit is also a model exchange unit, with states and derivatives.
     pub model_exchange: bool,
-    /// Number of event indicators.
+    /// Number of event indicators in model exchange.
     pub event_indicators: usize,
-    /// Proposed experiment.
+    /// Default experiment that the unit proposes.
     pub default_experiment: DefaultExperiment,
-    /// The variables.
+    /// Table of the unit's variables.
     pub table: Table<M>,
 }
 
-/// The variables in order; the position is the value reference.
+/// The variables of a unit in order; the position of each is its value reference.
 pub struct Table<M> {
     pub(crate) entries: Vec<Entry<M>>,
 }
@@ -102,12 +104,12 @@ impl<M> Default for Table<M> {
 }
 
 impl<M: 'static> Table<M> {
-    /// An empty table.
+    /// Makes an empty table.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds a real variable.
+    /// Adds a real variable to the table.
     #[must_use]
     pub fn real(
         mut self,
@@ -126,8 +128,9 @@ impl<M: 'static> Table<M> {
         self
     }
 
-    /// Adds an integer variable, whose field may have any integer type: what is set from outside is checked against the
-    /// limits, and a type without negative numbers sets the lower one to zero.
+    /// Adds an integer variable, whose field may have any integer type. Values set from outside are
+    /// checked against the limits, and a type without negative numbers raises the lower limit to
+    /// zero.
     #[must_use]
     pub fn integer<I>(
         mut self,
@@ -152,7 +155,7 @@ impl<M: 'static> Table<M> {
         self
     }
 
-    /// Adds a boolean variable.
+    /// Adds a boolean variable to the table.
     #[must_use]
     pub fn boolean(
         mut self,
@@ -163,7 +166,7 @@ impl<M: 'static> Table<M> {
         self
     }
 
-    /// Adds an enumeration variable, whose field has the type that is enumerated.
+    /// Adds an enumeration variable, whose field has the enumerated type.
     #[must_use]
     pub fn enumeration<T: Copy + PartialEq + Send + Sync>(
         mut self,
@@ -184,7 +187,7 @@ impl<M: 'static> Table<M> {
         self
     }
 
-    /// Adds a text variable.
+    /// Adds a text variable to the table.
     #[must_use]
     pub fn string(
         mut self,
@@ -202,7 +205,7 @@ impl<M: 'static> Table<M> {
     }
 }
 
-/// What every declaration says: name, text, role.
+/// Common part of every declaration: name, description and role.
 #[derive(Clone, Debug)]
 pub struct Common {
     name: String,
@@ -223,41 +226,44 @@ impl Common {
         }
     }
 
-    /// For a calculated variable: the inputs and states its value at an instant depends on.
+    /// Declares the inputs and states on which the value of a calculated variable depends at the
+    /// same instant.
     #[must_use]
     pub fn depends_on<'a>(mut self, names: impl IntoIterator<Item = &'a str>) -> Self {
         self.dependencies.extend(names.into_iter().map(String::from));
         self
     }
 
-    /// As a real variable.
+    /// Continues the declaration as that of a real variable.
     pub fn real(self) -> Real {
         Real { common: self, unit: None, min: None, max: None, nominal: None, derivative_of: None }
     }
 }
 
-/// A fixed parameter with a start value.
+/// Declares a fixed parameter with a start value.
 pub fn parameter(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Parameter, Variability::Fixed)
 }
-/// A continuous input.
+/// Declares a continuous input.
 pub fn input(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Input, Variability::Continuous)
 }
-/// An input that changes at events or communication points only. It has no input derivatives. In model exchange a model takes
-/// it in [`Model::new_discrete_states`](crate::Model::new_discrete_states) and nowhere else.
+/// Declares an input that changes only at events or communication points. It has no input
+/// derivatives. In model exchange a model takes it in
+/// [`Model::new_discrete_states`](crate::Model::new_discrete_states) and nowhere else.
 pub fn discrete_input(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Input, Variability::Discrete)
 }
-/// A continuous output.
+/// Declares a continuous output.
 pub fn output(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Output, Variability::Continuous)
 }
-/// An output that changes at events or communication points only: anything sampled, integers, booleans.
+/// Declares an output that changes only at events or communication points: anything sampled,
+/// integers, booleans.
 pub fn discrete_output(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Output, Variability::Discrete)
 }
-/// A continuous variable for looking at.
+/// Declares a continuous local variable, which can be observed.
 pub fn local(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Local, Variability::Continuous)
 }
@@ -274,25 +280,25 @@ pub struct Real {
 }
 
 impl Real {
-    /// Physical unit.
+    /// Declares the physical unit of the variable.
     #[must_use]
     pub fn unit(mut self, unit: Unit) -> Self {
         self.unit = Some(unit);
         self
     }
-    /// Smallest allowed value.
+    /// Declares the smallest allowed value.
     #[must_use]
     pub fn min(mut self, min: f64) -> Self {
         self.min = Some(min);
         self
     }
-    /// Largest allowed value.
+    /// Declares the largest allowed value.
     #[must_use]
     pub fn max(mut self, max: f64) -> Self {
         self.max = Some(max);
         self
     }
-    /// Typical magnitude.
+    /// Declares the typical magnitude of the variable.
     #[must_use]
     pub fn nominal(mut self, nominal: f64) -> Self {
         self.nominal = Some(nominal);

@@ -1,65 +1,67 @@
-//! The C types of FMI 2.0 (fmi2TypesPlatform.h, fmi2FunctionTypes.h).
+//! C types of FMI 2.0, from fmi2TypesPlatform.h and fmi2FunctionTypes.h.
 
 use serde::{Deserialize, Serialize};
 use std::ffi::{c_char, c_int, c_void};
 
-/// `fmi2Status`.
+/// C type `fmi2Status`, the result of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[repr(C)]
 pub enum Status {
-    /// `fmi2OK`
+    /// Status `fmi2OK`: the call succeeded.
     Ok,
-    /// `fmi2Warning`
+    /// Status `fmi2Warning`: the call succeeded with a warning.
     Warning,
-    /// `fmi2Discard`
+    /// Status `fmi2Discard`: the call was refused, and the simulation can go on.
     Discard,
-    /// `fmi2Error`
+    /// Status `fmi2Error`: the instance cannot go on as it is.
     Error,
-    /// `fmi2Fatal`
+    /// Status `fmi2Fatal`: the instance can only be freed.
     Fatal,
-    /// `fmi2Pending`: never returned, every step is done when `fmi2DoStep` returns.
+    /// Status `fmi2Pending`, which is never returned, because a step is finished when `fmi2DoStep`
+    /// returns.
     Pending,
 }
 
-/// `fmi2EventInfo`.
+/// C type `fmi2EventInfo`, the result of an event iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct CEventInfo {
-    /// Whether the event iteration goes on.
+    /// Whether the event iteration must go on.
     pub new_discrete_states_needed: c_int,
     /// Whether the unit asks for the end of the simulation.
     pub terminate_simulation: c_int,
-    /// Whether nominal values of states changed.
+    /// Whether the event changed nominal values of states.
     pub nominals_of_continuous_states_changed: c_int,
-    /// Whether states changed.
+    /// Whether the event changed values of states.
     pub values_of_continuous_states_changed: c_int,
-    /// Whether the next field holds a time.
+    /// Whether `next_event_time` holds a time.
     pub next_event_time_defined: c_int,
     /// Time of the next time event, s.
     pub next_event_time: f64,
 }
 
-/// `fmi2CallbackLogger`; variadic, but this crate passes no further arguments and messages without `%`.
+/// C type `fmi2CallbackLogger`. It is variadic, but this crate passes no further arguments and
+/// messages without `%`.
 pub type LogCallback =
     unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...);
 
-/// `fmi2CallbackFunctions`. Memory and step callbacks are not used and may be null.
+/// C type `fmi2CallbackFunctions`. The memory and step callbacks are not used and may be null.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Callbacks {
-    /// Receives log messages.
+    /// Function that receives the log messages.
     pub logger: Option<LogCallback>,
-    /// Not used.
+    /// Memory allocator of the importer, which is not used.
     pub allocate_memory: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
-    /// Not used.
+    /// Memory release of the importer, which is not used.
     pub free_memory: Option<unsafe extern "C" fn(*mut c_void)>,
-    /// Not used: steps are synchronous.
+    /// Notification of a finished step, which is not used because steps are synchronous.
     pub step_finished: Option<unsafe extern "C" fn(*mut c_void, Status)>,
-    /// Handed back to the logger.
+    /// Pointer that is handed back to the logger.
     pub component_environment: *mut c_void,
 }
 
-/// `fmi2Type`: what an instance is used for.
+/// C type `fmi2Type`, the interface for which an instance is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Interface {
     ModelExchange,
@@ -76,7 +78,7 @@ impl Interface {
     }
 }
 
-/// `fmi2StatusKind` as the importer passes it.
+/// Values of the C type `fmi2StatusKind`, as the importer passes them.
 pub(crate) const DO_STEP_STATUS: c_int = 0;
 pub(crate) const PENDING_STATUS: c_int = 1;
 pub(crate) const LAST_SUCCESSFUL_TIME: c_int = 2;

@@ -1,4 +1,4 @@
-//! A model bound to its table, seen without its type: what the shell works with.
+//! A model bound to its table behind a trait that hides the model's type, for use by the shell.
 
 use crate::call::State;
 use crate::model::{Context, EventInfo, Failure, Inputs, Model, Restoration};
@@ -10,21 +10,21 @@ use model_description::variable::{Causality, Kind, Variability, Variable};
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
 
-/// Highest order of fmi2SetRealInputDerivatives.
+/// Highest order of derivatives that fmi2SetRealInputDerivatives accepts.
 pub const MAX_INPUT_DERIVATIVE_ORDER: usize = 3;
 
 /// An input that is extrapolated during the next step: u(t) = u₀ + Σ u⁽ᵏ⁾ (t − t₀)ᵏ / k!.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Extrapolation {
     pub(crate) reference: usize,
-    /// Value at the start of the step.
+    /// Value u₀ at the start of the step.
     pub(crate) base: f64,
-    /// Derivatives of order 1, 2, ….
+    /// Derivatives u⁽ᵏ⁾ of order 1, 2, ….
     pub(crate) derivatives: [f64; MAX_INPUT_DERIVATIVE_ORDER],
 }
 
 impl Extrapolation {
-    /// Value after the time `dt` by Horner's rule.
+    /// Value of the input at the time `dt` after the start of the step, by Horner's rule.
     pub(crate) fn at(&self, dt: f64) -> f64 {
         let mut sum = 0.0;
         for (i, derivative) in self.derivatives.iter().enumerate().rev() {
@@ -34,14 +34,14 @@ impl Extrapolation {
     }
 }
 
-/// The shell's own part of what determines the future.
+/// The shell's own part of the state that determines the future.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Progress {
     pub(crate) state: State,
     pub(crate) time: f64,
     pub(crate) start_time: f64,
     pub(crate) stop_time: Option<f64>,
-    /// Whether the model was initialized with the parameters now set.
+    /// Whether the model was initialized with its present parameters.
     pub(crate) initialized: bool,
     pub(crate) extrapolations: Vec<Extrapolation>,
 }
@@ -60,7 +60,7 @@ impl Default for Progress {
 }
 
 impl Progress {
-    /// Why this cannot be where an instance stands.
+    /// Says why no instance can have this progress, or `None` if one can.
     fn problem<M>(&self, table: &Table<M>, interface: Interface) -> Option<String> {
         let Self { state, time, start_time, stop_time, initialized, extrapolations } = self;
         if !(time.is_finite() && start_time.is_finite() && !stop_time.is_some_and(f64::is_nan)) {
@@ -94,12 +94,12 @@ impl Progress {
     }
 }
 
-/// A model with its table.
+/// A model together with its table, seen without the model's type.
 pub(crate) trait Unit: Send {
     fn real(&mut self, reference: usize) -> Option<&mut f64>;
-    /// Integers and enumerations.
+    /// Returns the value of an integer or enumeration variable.
     fn integer(&mut self, reference: usize) -> Option<i32>;
-    /// Sets one of them to a value that its declaration allows.
+    /// Sets an integer or enumeration variable to a value that its declaration allows.
     fn set_integer(&mut self, reference: usize, value: i32);
     fn boolean(&mut self, reference: usize) -> Option<&mut bool>;
     fn string(&mut self, reference: usize) -> Option<&mut String>;
@@ -107,7 +107,7 @@ pub(crate) trait Unit: Send {
     fn reset(&mut self);
     fn initialize(&mut self, context: &Context) -> Result<(), Failure>;
     fn calculate(&mut self, time: f64) -> Result<(), Failure>;
-    /// Leaves the inputs at their values at `to`.
+    /// Performs a step and leaves the inputs at their values at `to`.
     fn step(
         &mut self,
         from: f64,
@@ -117,7 +117,7 @@ pub(crate) trait Unit: Send {
     ) -> Result<(), Failure>;
 
     fn save(&self, progress: &Progress) -> Result<Vec<u8>, Failure>;
-    /// On an error the model is as it was.
+    /// Restores a saved state. On an error the model is unchanged.
     fn restore(&mut self, payload: &[u8], interface: Interface) -> Result<Progress, Failure>;
 
     fn continuous_states(&self, states: &mut [f64]);
@@ -132,7 +132,7 @@ struct Bound<M> {
     table: Table<M>,
 }
 
-/// Inputs of one step for the typed model.
+/// Inputs of one step, for the model with its type.
 struct Extrapolated<'a, M> {
     table: &'a Table<M>,
     from: f64,
@@ -267,19 +267,19 @@ pub struct Export {
     described: OnceLock<Described>,
 }
 
-/// What importers know of a unit.
+/// Description of a unit as importers see it, with its GUID.
 pub(crate) struct Described {
     pub(crate) guid: String,
     pub(crate) description: Arc<ModelDescription>,
 }
 
 impl Export {
-    /// The unit that `M` is the model of.
+    /// Makes the export of the unit whose model is `M`.
     pub const fn of<M: Model>() -> Self {
         Self { describe: describe::<M>, create: create::<M>, described: OnceLock::new() }
     }
 
-    /// Its description, which is made once in a process.
+    /// Returns the description, which is made once per process.
     pub(crate) fn described(&self) -> &Described {
         self.described.get_or_init(|| {
             let description = (self.describe)();
@@ -292,7 +292,8 @@ fn create<M: Model>() -> Box<dyn Unit> {
     Box::new(Bound { model: M::new(), table: M::description().table })
 }
 
-/// The description of the unit that `M` is the model of. Start values of parameters and inputs are those of `M::new()`.
+/// Returns the description of the unit whose model is `M`. The start values of parameters and
+/// inputs are those of `M::new()`.
 pub fn describe<M: Model>() -> ModelDescription {
     let Description {
         name,

@@ -1,4 +1,4 @@
-//! A step and the calls around it allocate nothing.
+//! Test that a step and the calls around it allocate no memory.
 #![allow(unsafe_code, clippy::borrow_as_ptr)]
 
 #[path = "../examples/lag/model.rs"]
@@ -17,18 +17,20 @@ thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
 }
 
-/// The system's allocator, counting per thread.
+/// Allocator that passes requests to the system and counts them for each thread.
 struct Counting;
 
-// SAFETY: everything is passed on to the system's allocator.
+// SAFETY: every request goes unchanged to the system's allocator, which fulfils the contract of
+// `GlobalAlloc`.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.set(COUNT.get() + 1);
-        // SAFETY: the caller's promise is passed on.
+        // SAFETY: the caller keeps the contract of `alloc`, and `layout` is passed on unchanged.
         unsafe { System.alloc(layout) }
     }
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise is passed on.
+        // SAFETY: the caller keeps the contract of `dealloc`, and the pointer came from
+        // `System.alloc` with this layout.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -41,13 +43,13 @@ fn a_step_allocates_nothing() {
     let guid = CString::new(fmi2_export::describe::<lag::Lag>().guid()).unwrap();
     let references = [9u32, 10, 12, 13];
     let mut values = [0.0; 4];
-    // SAFETY: all pointers are null or valid during their calls.
+    // SAFETY: every pointer is null or points to valid memory for the duration of its call.
     unsafe {
         let c = fmi2::fmi2Instantiate(c"it".as_ptr(), 1, guid.as_ptr(), null(), null(), 0, 0);
         assert!(!c.is_null());
         assert_eq!(fmi2::fmi2EnterInitializationMode(c), Status::Ok);
         assert_eq!(fmi2::fmi2ExitInitializationMode(c), Status::Ok);
-        // The first calculation may grow what it keeps.
+        // The first calculation may enlarge buffers that are kept.
         assert_eq!(fmi2::fmi2GetReal(c, references.as_ptr(), 4, values.as_mut_ptr()), Status::Ok);
         let before = COUNT.get();
         for k in 0..10 {
@@ -57,7 +59,7 @@ fn a_step_allocates_nothing() {
             assert_eq!(fmi2::fmi2GetReal(c, references.as_ptr(), 4, values.as_mut_ptr()), Status::Ok);
         }
         assert_eq!(COUNT.get(), before);
-        // The counter counts.
+        // A reset allocates, which shows that the counter works.
         assert_eq!(fmi2::fmi2Reset(c), Status::Ok);
         assert!(COUNT.get() > before);
         fmi2::fmi2FreeInstance(c);

@@ -1,5 +1,6 @@
-//! Time of one step of 0.04 s of the unit `ReentryPlant`, called from Rust: what its `fmi2DoStep` does behind the C interface, with the
-//! white noise of Chai 2022, and with the next outputs as well.
+//! Benchmark of one 0.04 s step of the unit `ReentryPlant`, called from Rust. It measures the work
+//! of `fmi2DoStep` behind the C interface, with the white noise of Chai 2022, once without and once
+//! with the next outputs.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use fmi2_export::{Context, Inputs, Model};
@@ -7,10 +8,11 @@ use fmu_plant::ReentryPlant;
 use std::hint::black_box;
 
 const STEP: f64 = 0.04;
-/// Steps after which the unit starts again, so that without a controller it stays near where it started.
+/// Number of steps after which the unit starts again, so that it stays near its start without a
+/// controller.
 const STEPS: u32 = 25;
 
-/// Inputs that stay as they are.
+/// Inputs that keep their values during a step.
 struct Held;
 
 impl Inputs<ReentryPlant> for Held {

@@ -1,4 +1,5 @@
-//! The FMI 2.0 unit `ReentryPlant`, for co-simulation and model exchange: the crate `vehicle` behind a table of variables.
+//! The FMI 2.0 unit `ReentryPlant` for co-simulation and model exchange: the crate `vehicle` behind
+//! a table of variables.
 
 mod parameters;
 mod plant;

@@ -1,4 +1,4 @@
-//! The unit's parameters, with their default: the scenario of Chai 2022.
+//! Parameters of the unit. Their defaults are the scenario of Chai 2022.
 
 use fmi2_export::Enumeration;
 use nalgebra::Vector3;
@@ -18,12 +18,13 @@ use vehicle::sensor_data::SensorData;
 use vehicle::sensors::{self, Line};
 use vehicle::triad::Triad;
 
-/// Longest integration step by default, s.
+/// Default of the longest integration step, s.
 const STEP: f64 = 0.01;
-/// A time (s) that no simulation reaches; FMI importers do not all read an infinite number.
+/// Time (s) that no simulation reaches. It replaces an infinite number, which not all FMI importers
+/// can read.
 const NEVER: f64 = 1e15;
 
-/// The courses of the disturbance.
+/// Kinds of disturbance as an FMI enumeration.
 pub(crate) static KINDS: Enumeration<Kind> = Enumeration {
     name: "DisturbanceKind",
     description: "Course of the disturbance",
@@ -54,7 +55,7 @@ pub(crate) static KINDS: Enumeration<Kind> = Enumeration {
     ],
 };
 
-/// How the control moment comes about.
+/// Source of the control moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Actuation {
     #[default]
@@ -62,7 +63,7 @@ pub(crate) enum Actuation {
     SurfacesAndJets,
 }
 
-/// The ways in which the control moment comes about.
+/// Sources of the control moment as an FMI enumeration.
 pub(crate) static ACTUATIONS: Enumeration<Actuation> = Enumeration {
     name: "Actuation",
     description: "How the control moment comes about",
@@ -76,7 +77,7 @@ pub(crate) static ACTUATIONS: Enumeration<Actuation> = Enumeration {
     ],
 };
 
-/// The attitude kinematics.
+/// Forms of the attitude kinematics as an FMI enumeration.
 pub(crate) static KINEMATICS: Enumeration<Kinematics> = Enumeration {
     name: "Kinematics",
     description: "The matrix R of the attitude kinematics",
@@ -90,14 +91,14 @@ pub(crate) static KINEMATICS: Enumeration<Kinematics> = Enumeration {
     ],
 };
 
-/// `sensor.set`: what they feel is shown as it is.
+/// Value of `sensor.set` without sampling: the unit outputs the readings of ideal sensors.
 pub(crate) const NO_SENSORS: i32 = 0;
-/// `sensor.set`: sampled without errors.
+/// Value of `sensor.set` for sampled sensors without errors.
 const IDEAL_SENSORS: i32 = 1;
-/// `sensor.set`: sampled with the errors that are set.
+/// Value of `sensor.set` for sampled sensors with the errors given by the parameters.
 pub(crate) const MEMS_SENSORS: i32 = 2;
 
-/// What a user sets before the simulation, named as in the table.
+/// Parameters that a user sets before the simulation, named as in the table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Parameters {
     pub(crate) inertia: Inertia,
@@ -181,7 +182,7 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// The dynamic pressure of the flight, Pa.
+    /// Dynamic pressure of the flight with the density scale, Pa.
     ///
     /// # Errors
     /// Names the parameter that is out of range.
@@ -189,7 +190,7 @@ impl Parameters {
         Ok(self.flight.dynamic_pressure()? * self.density_scale)
     }
 
-    /// The actuators, if the control moment is not an input.
+    /// Configuration of the actuators, or `None` if the control moment is an input.
     fn actuators(&self) -> Result<Option<actuators::Config>, Error> {
         if self.actuation == Actuation::Moment {
             return Ok(None);
@@ -203,13 +204,14 @@ impl Parameters {
         }))
     }
 
-    /// The sensors, if what they feel is not shown as it is.
+    /// Configuration of the sampled sensors, or `None` if the unit outputs the readings of ideal
+    /// sensors.
     fn sensors(&self) -> Option<sensors::Config> {
         let triads = match self.sensor_set {
             NO_SENSORS => return None,
             IDEAL_SENSORS => {
                 let ideal = SensorData::embedded().ideal;
-                // Freezing is no error of the set.
+                // Freezing is not an error of the sensor set, so the ideal set keeps it.
                 std::array::from_fn(|i| Triad { freeze: self.triads[i].freeze, ..ideal[i] })
             }
             _ => self.triads,
@@ -217,7 +219,7 @@ impl Parameters {
         Some(sensors::Config { triads, line: self.line, seed: self.sensor_seed })
     }
 
-    /// The plant they describe.
+    /// Configuration of the plant that these parameters describe.
     ///
     /// # Errors
     /// Names the parameter that is out of range.

@@ -10,27 +10,29 @@ use vehicle::effectors::Surfaces;
 use vehicle::plant::{Held, Input, Plant, State, check};
 use vehicle::sensors::Sample;
 
-/// Number of states that describe the motion: attitude and rates. Behind them come the deflections.
+/// Number of states that describe the motion, attitude and rates. The deflections follow after
+/// them.
 const MOTION: usize = 6;
-/// Event indicator (s) of a deflection at rest.
+/// Event indicator (s) of a deflection that is at rest.
 const AT_REST: f64 = 1.0;
 
-/// The re-entry vehicle.
+/// FMI unit of the re-entry vehicle.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ReentryPlant {
     pub(crate) parameters: Parameters,
     pub(crate) input: Input,
     pub(crate) command: Command,
     pub(crate) output: Output,
-    /// From initialization on.
+    /// Simulated plant, which exists from initialization on.
     plant: Option<Plant>,
-    /// Of the flight, Pa.
+    /// Dynamic pressure of the flight, Pa.
     dynamic_pressure: f64,
-    /// Model exchange: what is held changes at events only, not when time passes a tick or an input is set.
+    /// Whether the unit runs in model exchange: held quantities then change at events only, and not
+    /// when time passes a tick or an input is set.
     event_driven: bool,
 }
 
-/// What the unit shows.
+/// Outputs of the unit at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Output {
     pub(crate) angles: Vector3<f64>,
@@ -52,14 +54,14 @@ impl ReentryPlant {
         self.plant.as_ref().ok_or_else(|| Failure::Error("the plant is not initialized".into()))
     }
 
-    /// What is in force at `time` (s): disturbance and commands.
+    /// Disturbance and commands that act at `time` (s).
     fn held(&self, plant: &Plant, time: f64) -> Held {
         let held = if self.event_driven { plant.held() } else { None };
         held.unwrap_or_else(|| plant.in_force(time, &self.input, &self.command))
     }
 
-    /// Refuses a state at which the equations do not hold. In model exchange it may be an integrator's trial, which the
-    /// importer can take back.
+    /// Refuses a state at which the equations do not hold. In model exchange the refusal is only a
+    /// discard, as the state may be an integrator's trial that the importer can take back.
     fn check(&self, state: &State, time: f64) -> Result<(), Failure> {
         let failure = if self.event_driven { Failure::Discard } else { Failure::Error };
         check(state, time).map_err(|error| failure(error.to_string()))
@@ -141,8 +143,9 @@ impl Model for ReentryPlant {
         result.map_err(|error| Failure::Error(error.to_string()))
     }
 
-    /// What is made of the parameters is not believed but compared: with the plant that was there before, if that has the same
-    /// parameters, else with a new one.
+    /// Checks the restored plant instead of trusting it. Everything that follows from the
+    /// parameters is compared with the plant that was there before, if that has the same
+    /// parameters, and otherwise with a new one.
     fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
         let Some(plant) = self.plant.as_ref().filter(|_| from.initialized) else { return Ok(()) };
         let failed = |error: vehicle::Error| Failure::Error(error.to_string());
@@ -178,8 +181,9 @@ impl Model for ReentryPlant {
         }
     }
 
-    /// Of each deflection: the time until it comes to rest, or a second where it rests. So they are positive between events,
-    /// and fall through zero with slope −1.
+    /// Copies the indicators, one for each deflection: the time until it comes to rest, or one
+    /// second while it is at rest. They are positive between events and fall through zero with
+    /// slope −1.
     fn event_indicators(&self, indicators: &mut [f64]) {
         indicators.copy_from_slice(self.output.indicators.as_slice());
     }
@@ -205,7 +209,7 @@ impl Model for ReentryPlant {
         let held = self.held(plant, time);
         let (partials, turn_rate_by_trajectory) = plant.partial_derivatives(time, &self.input, &held);
         let (applied_by_moment, applied_by_deflections) = plant.applied_moment_by_moment_and_deflections();
-        // In model exchange commands are taken at events.
+        // In model exchange, commands are taken at events only.
         let applied_by_jets =
             if self.event_driven { SMatrix::zeros() } else { plant.applied_moment_by_jets(&self.command) };
         let by_applied = |column: Vector3<f64>, i: usize| (partials.by_moment * column)[i];

@@ -1,5 +1,5 @@
-//! The one table of the unit's variables. The first 69 positions are those of outputs and inputs, see [`Unknown`] and
-//! [`Known`]; parameters follow, then [`sensors`].
+//! Table of the unit's variables. Outputs and inputs have the first 69 positions, as [`Unknown`]
+//! and [`Known`] list them; parameters follow, then [`sensors`].
 
 mod sensors;
 
@@ -23,7 +23,8 @@ const ANGLES: [(&str, &str); 3] =
 const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
 const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
 
-/// A calculated variable, by position in the table. States and derivatives count attitude, rates and deflections.
+/// A calculated variable, identified by its position in the table. States and derivatives are
+/// counted in the order attitude, rates, deflections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Unknown {
     State(usize),
@@ -33,7 +34,7 @@ pub(crate) enum Unknown {
     DisturbanceMoment(usize),
     DynamicPressure,
     Measured(usize),
-    /// The sample's time, which depends on nothing.
+    /// Time of the sample, which depends on nothing.
     MeasuredTime,
 }
 
@@ -55,7 +56,7 @@ impl Unknown {
     }
 }
 
-/// A state or an input, by position in the table.
+/// A state or an input, identified by its position in the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Known {
     State(usize),
@@ -81,7 +82,7 @@ impl Known {
     }
 }
 
-/// The unit as FMI sees it.
+/// Returns the description of the unit for FMI.
 pub(crate) fn description() -> Description<ReentryPlant> {
     let scenario = Scenario::crmpc2022();
     let variables = trajectory(deflection_rates(commands(actuated(inputs(outputs(Table::new()))))));
@@ -109,7 +110,7 @@ pub(crate) fn description() -> Description<ReentryPlant> {
 
 type Plant = Table<ReentryPlant>;
 
-/// Adds the three components of a vector; `declare` gets name and meaning of each axis.
+/// Adds the three components of a vector; `declare` gets the name and the meaning of each axis.
 fn vector(
     mut table: Plant,
     axes: [(&'static str, &'static str); 3],
@@ -137,7 +138,7 @@ fn outputs(table: Plant) -> Plant {
         output(&format!("rate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
     };
     let angle_rate = |axis: &str, meaning: &str| {
-        // The attitude kinematics of each angle, Wu 2015 (1); sigma through the trajectory.
+        // The rates of the angles follow Wu 2015 (1); they depend on sigma through the trajectory.
         let depends =
             if axis == "beta" { vec!["attitude.alpha", "rate.p", "rate.r"] } else { motion.to_vec() };
         let common = output(&format!("attitudeRate.{axis}"), &format!("Time derivative of the {meaning}"))
@@ -203,7 +204,7 @@ fn inputs(table: Plant) -> Plant {
     vector(table, AXES, external, |m| &mut m.input.disturbance_moment)
 }
 
-/// Where the surfaces are, and the flight condition.
+/// Adds the deflections of the surfaces and the flight condition.
 fn actuated(mut table: Plant) -> Plant {
     for (i, name) in Effectors::published().names.iter().enumerate() {
         let common = output(&format!("deflection[{}]", i + 1), &format!("Deflection of the {name}"));
@@ -241,7 +242,7 @@ fn deflection_rates(mut table: Plant) -> Plant {
     table
 }
 
-/// Inputs of the trajectory: name, meaning, whether it is a rate, field.
+/// Input of the trajectory: its name, its meaning, whether it is a rate, and its field.
 type TrajectoryInput = (&'static str, &'static str, bool, fn(&mut Trajectory) -> &mut f64);
 const TRAJECTORY_INPUTS: [TrajectoryInput; 7] = [
     ("trajectory.flightPathAngle", "Flight path angle above the horizon", false, |t| {
@@ -403,7 +404,7 @@ fn sine(table: Plant, which: &'static str, i: usize) -> Plant {
         .real(phase.real().unit(unit::angle()).nominal(1.0), move |m| &mut m.parameters.waves[i].phase)
 }
 
-/// With a capital.
+/// Returns the text with a capital letter at its beginning.
 fn sentence(text: &str) -> String {
     let mut characters = text.chars();
     characters.next().map(|first| first.to_ascii_uppercase()).into_iter().chain(characters).collect()

@@ -1,4 +1,4 @@
-//! The unit through the interface that the shell uses.
+//! Tests of the unit through the interface that the shell uses.
 
 mod sensors;
 
@@ -15,14 +15,14 @@ use vehicle::kinematics::{Kinematics, Trajectory};
 
 const CONTEXT: Context = Context { start_time: 0.0, stop_time: None, resources: None };
 
-/// Inputs that the importer gave no derivatives for.
+/// Inputs for which the importer gave no derivatives.
 struct Constant;
 
 impl Inputs<ReentryPlant> for Constant {
     fn advance(&self, _: &mut ReentryPlant, _: f64) {}
 }
 
-/// A pitch moment that rises with time.
+/// Pitch moment that rises with time.
 struct Ramp(f64);
 
 impl Inputs<ReentryPlant> for Ramp {
@@ -47,10 +47,10 @@ fn outputs(unit: &mut ReentryPlant, time: f64) -> Output {
     unit.output
 }
 
-/// Position of the first of the readings of sensors.
+/// Position of the first sensor reading in the table.
 const MEASURED: usize = 113;
 
-/// The calculated variables with their position in the table.
+/// Calculated variables with their positions in the table.
 fn calculated(unit: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {
     let o = outputs(unit, time);
     let all = [
@@ -180,16 +180,17 @@ fn the_description_holds() {
     }
 }
 
-/// A general attitude and rates, surfaces not quite at zero.
+/// A general attitude with general rates, and surfaces slightly away from zero.
 const STATES: [f64; 14] =
     [0.3, 0.2, -0.5, 0.08, -0.05, 0.06, -0.01, -0.02, -0.01, -0.01, 0.01, -0.01, 0.01, 0.01];
 
-/// Every course of the disturbance.
+/// Iterates over all kinds of disturbance.
 fn all_kinds() -> impl Iterator<Item = Kind> {
     KINDS.items.iter().map(|(kind, ..)| *kind)
 }
 
-/// A unit in model exchange, after the first event, in a general attitude, with all kinds in turn.
+/// Returns a unit in model exchange after the first event, in a general attitude, with a
+/// disturbance of this kind.
 fn in_model_exchange(kind: Kind) -> ReentryPlant {
     let mut unit = started(|unit| unit.parameters.kind = kind);
     unit.input.moment = Vector3::new(3e4, -2e4, 1e4);
@@ -199,14 +200,14 @@ fn in_model_exchange(kind: Kind) -> ReentryPlant {
     unit
 }
 
-/// Asks for surfaces and jets instead of a moment.
+/// Selects surfaces and jets as the source of the control moment.
 fn actuate(unit: &mut ReentryPlant) {
     unit.parameters.actuation = Actuation::SurfacesAndJets;
     unit.command.surfaces = Surfaces::from([-5.0, -2.0, -1.0, -4.0, 3.0, -6.0, 1.0, 2.0]) * 0.02;
     unit.command.jets = Jets::repeat(0.5);
 }
 
-/// The same with actuators; the jets take a duty cycle or switch.
+/// Returns a unit with actuators in model exchange; its jets take a duty cycle or switch.
 fn actuated_in_model_exchange(duty: bool) -> ReentryPlant {
     let mut unit = in_model_exchange(Kind::None);
     unit.parameters.jet_duty = duty;
@@ -217,7 +218,7 @@ fn actuated_in_model_exchange(duty: bool) -> ReentryPlant {
     unit
 }
 
-/// The exact kinematics along a trajectory that turns in every way.
+/// Returns a unit in model exchange on a trajectory that turns in every way.
 fn along_a_trajectory(kind: Kind, kinematics: Kinematics) -> ReentryPlant {
     let mut unit = in_model_exchange(kind);
     unit.parameters.kinematics = kinematics;
@@ -237,7 +238,7 @@ fn along_a_trajectory(kind: Kind, kinematics: Kinematics) -> ReentryPlant {
     unit
 }
 
-/// In co-simulation, at a communication point, with jets that take a duty cycle.
+/// Returns a unit in co-simulation at a communication point, with jets that take a duty cycle.
 fn at_a_communication_point() -> ReentryPlant {
     let mut unit = started(|unit| {
         unit.parameters.kind = Kind::None;
@@ -248,7 +249,7 @@ fn at_a_communication_point() -> ReentryPlant {
     unit
 }
 
-/// In co-simulation, under a moment that was commanded before.
+/// Returns a unit in co-simulation on which a moment commanded earlier acts.
 fn under_a_delayed_moment() -> ReentryPlant {
     let mut unit = delayed(0.01);
     unit.input.moment = Vector3::new(3e4, -2e4, 1e4);
@@ -260,7 +261,7 @@ fn known_positions() -> impl Iterator<Item = usize> {
     (0..69).filter(|&position| Known::of(position).is_some())
 }
 
-/// Adds to a state or input by its position in the table.
+/// Adds a number to the state or input at a position in the table.
 fn nudge(unit: &mut ReentryPlant, known: usize, by: f64) {
     match Known::of(known).unwrap() {
         Known::State(i) => {
@@ -355,7 +356,7 @@ fn outputs_are_right_from_initialization_on() {
     let output = outputs(&mut unit, 0.0);
     assert_eq!((output.angles, output.rates), (scenario.initial_angles, scenario.initial_rates));
     assert!(output.delta.amax() > 0.0 && output.delta.amax() <= scenario.disturbance.bound);
-    // At rest ω̇ = R⁻¹ Δ
+    // At rest ω̇ = R⁻¹ Δ holds.
     let expected = vehicle::kinematics::r_inverse(&output.angles) * output.delta;
     assert!((output.angular_acceleration - expected).amax() < 1e-15);
 }
@@ -405,7 +406,8 @@ fn indicators(unit: &mut ReentryPlant, time: f64) -> [f64; 8] {
     indicators
 }
 
-/// An accurate integration to `end`, or to the state event before it, located by bisection. Returns the time.
+/// Integrates accurately to `end`, or to the state event before it, which is located by bisection.
+/// Returns the time reached.
 fn integrate(unit: &mut ReentryPlant, begin: f64, end: f64) -> f64 {
     let crossed = |unit: &mut ReentryPlant, time| indicators(unit, time).iter().any(|z| *z <= 0.0);
     assert!(!crossed(unit, begin), "an event is due at {begin} s");
@@ -437,7 +439,7 @@ fn integrate(unit: &mut ReentryPlant, begin: f64, end: f64) -> f64 {
     end
 }
 
-/// Model exchange to `end`; returns the times of the events.
+/// Runs model exchange to `end` and returns the times of the events.
 fn exchange(unit: &mut ReentryPlant, begin: f64, end: f64) -> Vec<f64> {
     let mut times = vec![begin];
     loop {
@@ -505,7 +507,7 @@ fn oracle_model_exchange_agrees_with_co_simulation_under_surfaces_and_jets() {
     }
 }
 
-/// Beyond the limits, to them, to commands within them.
+/// Commands beyond the limits, at the limits and within them.
 const FAR: [f64; 8] = [-90.0, 4.0, -3.0, 0.0, 90.0, 0.0, 0.0, 0.0];
 
 fn commanded(degrees: [f64; 8]) -> ReentryPlant {
@@ -518,7 +520,7 @@ fn commanded(degrees: [f64; 8]) -> ReentryPlant {
 
 #[test]
 fn published_rate_limit_and_state_events_where_surfaces_stop() {
-    // Wu 2015, (63): 10 deg/s; commands beyond the limits of -25, 0 and 30 deg stop there
+    // Wu 2015, (63): 10 deg/s; commands beyond the limits of -25, 0 and 30 deg stop there.
     let mut unit = commanded(FAR);
     let events = exchange(&mut unit, 0.0, 4.0);
     let expected = [0.0, 0.3, 2.5, 3.0];
@@ -556,7 +558,7 @@ fn between_events_indicators_are_the_time_left_whatever_trial_states_are_set() {
 
 #[test]
 fn an_event_puts_a_deflection_on_its_target_however_it_was_located() {
-    // The third surface is at -3 deg after 0.3 s. An importer stops before, at, or behind that.
+    // The third surface is at -3 deg after 0.3 s. An importer stops before, at, or after that.
     for (late, arrives) in
         [(-1e-3, false), (-1e-8, false), (-1e-12, true), (0.0, true), (1e-9, true), (0.04, true)]
     {
@@ -577,7 +579,8 @@ fn an_event_puts_a_deflection_on_its_target_however_it_was_located() {
             assert_eq!(found.deflections[2], (-3f64).to_radians(), "{late}");
         }
         assert!(indicators(&mut unit, 0.3 + late).iter().all(|z| *z > 0.0), "{late}");
-        // At the same time again, and without an event: nothing changes but the time of what sensors feel.
+        // A second event at the same time, or a later one, changes nothing but the readings of the
+        // sensors.
         let after = (states(&unit), found);
         for time in [0.3 + late, 0.3 + late + 1e-6] {
             assert!(!unit.new_discrete_states(time).unwrap().states_changed);
@@ -627,7 +630,7 @@ fn a_restored_unit_goes_on_with_moving_surfaces() {
 
 #[test]
 fn published_moments_of_jets_act_from_the_communication_point_on() {
-    // Wu 2015, (64), column 4 as printed and as the mirror image of column 8
+    // Wu 2015, (64): column 4 as printed and as the mirror image of column 8.
     for (symmetric, pitch) in [(false, 10944.0), (true, 11798.0)] {
         let mut unit = started(|unit| {
             unit.parameters.actuation = Actuation::SurfacesAndJets;
@@ -668,7 +671,7 @@ fn oracle_dynamic_pressure_and_biases_of_aerodynamics_and_density() {
         outputs(&mut unit, 1.0)
     };
     let [nominal, biased] = [1.0, 0.9].map(flaps);
-    // 55 km, Mach 9.8 in the US Standard Atmosphere 1976
+    // Flight at 55 km and Mach 9.8 in the US Standard Atmosphere 1976.
     assert!((nominal.dynamic_pressure - 2858.9).abs() < 0.05, "{}", nominal.dynamic_pressure);
     assert!((biased.dynamic_pressure / nominal.dynamic_pressure - 0.9).abs() < 1e-14);
     let pitch = -2.0 * 5100.0 * 0.1f64.to_degrees() * 2858.9 / 2859.0;
@@ -716,7 +719,7 @@ fn an_event_iteration_sees_the_latest_moment() {
 
 #[test]
 fn oracle_input_derivatives_are_integrated() {
-    // At beta = 0 a pitch moment k t alone gives q = k t² / 2 Iyy
+    // At beta = 0 a pitch moment k t alone gives q = k t² / 2 Iyy.
     let mut unit = started(|unit| {
         unit.parameters.kind = Kind::None;
         unit.parameters.initial_angles = Vector3::new(0.1, 0.0, 0.2);
@@ -818,7 +821,7 @@ fn oracle_a_delayed_moment_is_shown_when_it_acts() {
     for k in 0..20_u32 {
         let time = 0.04 * f64::from(k);
         unit.input.moment = pitch(k);
-        // 0.1 s are two and a half steps.
+        // The delay of 0.1 s is two and a half steps.
         let acts = if k < 3 { Vector3::zeros() } else { pitch(k - 3) };
         assert_eq!(outputs(&mut unit, time).applied_moment, acts, "{k}");
         step(&mut unit, time, time + 0.04).unwrap();

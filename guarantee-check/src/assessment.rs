@@ -1,4 +1,5 @@
-//! From the bounds to the inequality that decides whether the guarantee can be given, anew and rounded outwards.
+//! The sums and the inequality that decides whether the guarantee can be given, computed anew from
+//! the bounds and rounded outwards.
 
 use crate::interval::Interval;
 use crate::lemmas::{Finding, ROUNDING};
@@ -6,7 +7,7 @@ use crate::sums::{Axis, Bounds};
 use control::crmpc::{Deviation, InitialState, Lemmas, Settings, Tightening};
 use control::error_dynamics::SampledError;
 
-/// What drives the deviation.
+/// Quantities that drive the deviation from the nominal motion.
 struct Drive {
     mismatch: Interval,
     varying: Interval,
@@ -14,7 +15,7 @@ struct Drive {
     norm: Interval,
     norm_of_two: Interval,
     turning: Interval,
-    /// Relative error of the moment.
+    /// Relative error of the moment due to the inertia error.
     inertia: Interval,
 }
 
@@ -50,7 +51,7 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
     }
 }
 
-/// The fields of a [`Deviation`] in their order.
+/// Fields of a [`Deviation`] in their order.
 type Deviations = [Interval; 7];
 
 fn values(deviation: &Deviation) -> [f64; 7] {
@@ -84,8 +85,8 @@ fn deviation(
     ]
 }
 
-/// The rate (rad/s) and the moment (N m) that are needed for ‖x‖ ≤ `x` beyond the horizon, where the motion brakes. Both grow with `x`, so that the limits
-/// are kept for all smaller ones as well.
+/// Rate (rad/s) and moment (N m) needed for ‖x‖ ≤ `x` beyond the horizon, where the motion brakes.
+/// Both grow with `x`, so limits that hold for `x` hold for all smaller ones as well.
 fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
     let number = Interval::from;
     let half = number(0.5);
@@ -120,8 +121,9 @@ fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
     [rates, moment]
 }
 
-/// Checks the sums and the inequality for a tightening with its terminal rate (rad/s). `None` where the dynamics are not certain to be stable, or the
-/// initial state is `tube`, whose invariant set is not checked.
+/// Checks the sums and the inequality for a tightening with its terminal rate (rad/s). Returns
+/// `None` if the dynamics are not certain to be stable, or if the initial state is `tube`, whose
+/// invariant set is not checked.
 pub fn check(
     s: &Settings,
     lemmas: &Lemmas,
@@ -169,7 +171,7 @@ pub fn check(
     for ((name, bound), truth) in names.into_iter().zip(values(tightening.forever())).zip(forever) {
         note(&format!("{name}, for ever"), bound, *truth);
     }
-    // Of all ticks and fields, the largest share of the bound that is needed.
+    // The largest share of its bound that any field needs at any tick.
     let mut share = Interval::ZERO;
     for (n, truths) in all.iter().enumerate() {
         for (bound, truth) in values(tightening.at(n)).into_iter().zip(truths) {
@@ -185,7 +187,8 @@ pub fn check(
     Some(findings)
 }
 
-/// Checks that the terminal weight of the robust set satisfies (11c) of Chai 2022 with the sampled law, up to rounding.
+/// Checks that the terminal weight of the robust set satisfies (11c) of Chai 2022 with the sampled
+/// law, up to rounding.
 pub fn check_terminal_weight(s: &Settings) -> Vec<Finding> {
     let axes = crate::sums::terminal_decrease(s);
     axes.into_iter()

@@ -1,16 +1,18 @@
-//! Intervals with their derivatives by the coordinates of a box (forward differentiation).
+//! Intervals with their derivatives with respect to the coordinates of a box (forward
+//! differentiation).
 
 use crate::interval::Interval;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What the formulas are written in: intervals, intervals with derivatives, or plain numbers.
+/// Numbers in which the formulas can be evaluated: intervals, intervals with derivatives, or plain
+/// numbers.
 pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// A constant.
+    /// Makes a number that does not depend on the coordinates.
     fn constant(value: f64) -> Self;
 
-    /// x².
+    /// Returns the square x² of the number.
     #[must_use]
     fn squared(self) -> Self;
 }
@@ -33,22 +35,22 @@ impl Number for Interval {
     }
 }
 
-/// The values of a function on a box, and those of its N partial derivatives.
+/// Enclosure of the values of a function on a box and of its N partial derivatives.
 #[derive(Clone, Copy, Debug)]
 pub struct Dual<const N: usize> {
-    /// Values.
+    /// Enclosure of the function's values.
     pub value: Interval,
-    /// Partial derivatives.
+    /// Enclosures of the partial derivatives.
     pub slope: [Interval; N],
 }
 
 impl<const N: usize> Dual<N> {
-    /// A constant.
+    /// Makes a value that does not depend on the coordinates.
     pub fn known(value: Interval) -> Self {
         Self { value, slope: [Interval::ZERO; N] }
     }
 
-    /// Coordinate `i` of a box.
+    /// Makes coordinate `i` of a box, whose range is `value`.
     pub fn coordinate(i: usize, value: Interval) -> Self {
         let mut slope = [Interval::ZERO; N];
         slope[i] = Interval::ONE;
@@ -92,7 +94,7 @@ impl<const N: usize> Sub for Dual<N> {
 
 impl<const N: usize> Mul for Dual<N> {
     type Output = Self;
-    // The product rule.
+    // Multiplies two functions by the product rule.
     #[allow(clippy::suspicious_arithmetic_impl)]
     fn mul(self, other: Self) -> Self {
         Self {
@@ -104,7 +106,7 @@ impl<const N: usize> Mul for Dual<N> {
 
 impl<const N: usize> Div for Dual<N> {
     type Output = Self;
-    // The quotient rule.
+    // Divides two functions by the quotient rule.
     #[allow(clippy::suspicious_arithmetic_impl)]
     fn div(self, other: Self) -> Self {
         let value = self.value / other.value;
@@ -118,7 +120,8 @@ mod tests {
 
     #[test]
     fn oracle_derivatives_of_a_quotient() {
-        // x²/(x + y) at (2, 1): value 4/3, derivatives (x² + 2xy)/(x + y)² = 8/9 and −x²/(x + y)² = −4/9.
+        // The function x²/(x + y) has at (2, 1) the value 4/3 and the derivatives
+        // (x² + 2xy)/(x + y)² = 8/9 and −x²/(x + y)² = −4/9.
         let [x, y] = [2.0, 1.0].map(Interval::point);
         let (x, y) = (Dual::<2>::coordinate(0, x), Dual::coordinate(1, y));
         let f = x.squared() / (x + y);

@@ -1,7 +1,9 @@
-//! The bounds of the dynamics: from the verified inequalities, and from below by a search for the worst state.
+//! Bounds of the dynamics: from above by the verified inequalities, and from below by a search for
+//! the worst state.
 //!
-//! F = R G with G = I⁻¹ (m − g) − Ẇ x, g = ω × I ω, ω = W x, and ∂R = −R ∂W R. The derivatives of F and of m are taken by the product rule, and each
-//! factor is replaced by its verified bound. g″ is bilinear and symmetric, so that its norm is twice that of g on the unit sphere.
+//! The acceleration is F = R G with G = I⁻¹ (m − g) − Ẇ x, g = ω × I ω, ω = W x, and ∂R = −R ∂W R.
+//! The derivatives of F and of m are taken by the product rule, and each factor is replaced by its
+//! verified bound. As g″ is bilinear and symmetric, its norm is twice that of g on the unit sphere.
 
 use crate::dual::Number;
 use crate::interval::Interval;
@@ -11,7 +13,7 @@ use control::crmpc::{Lemmas, Settings};
 use std::f64::consts::PI;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// c₀ + c₁ t + c₂ t² + …
+/// Truncated power series c₀ + c₁ t + c₂ t² + ….
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Series([f64; 3]);
 
@@ -88,7 +90,7 @@ fn norm(value: &Vector<f64>) -> f64 {
     crate::kinematics::square(value).sqrt()
 }
 
-/// A rigid body in series.
+/// Rigid body whose matrices are series, for use with angles and rates that are series.
 struct Body {
     inertia: [Vector<Series>; 3],
     inverse: [Vector<Series>; 3],
@@ -102,13 +104,13 @@ impl Body {
         Self { inertia: rows(&s.body.inertia), inverse: rows(&s.body.inverse) }
     }
 
-    /// ω.
+    /// Body rates ω of the angles and x.
     fn rates(angles: &[Series; 2], x: &Vector<Series>) -> Vector<Series> {
         let ((sa, ca), (sb, cb)) = (angles[0].sin_cos(), angles[1].sin_cos());
         turned(sa, ca, &Turn::new(sb, cb).along(&[], x))
     }
 
-    /// F(Θ, x, m).
+    /// Acceleration F(Θ, x, m) of the attitude angles.
     fn acceleration(&self, angles: &[Series; 2], x: &Vector<Series>, m: &Vector<Series>) -> Vector<Series> {
         let ((sa, ca), (sb, cb)) = (angles[0].sin_cos(), angles[1].sin_cos());
         let turn = Turn::new(sb, cb);
@@ -119,7 +121,7 @@ impl Body {
         turn.r(&sum(turned(sa, ca, &driven), turn.drift(x).map(Neg::neg)))
     }
 
-    /// m(Θ, x, a).
+    /// Moment m(Θ, x, a) that gives the acceleration a.
     fn moment(&self, angles: &[Series; 2], x: &Vector<Series>, a: &Vector<Series>) -> Vector<Series> {
         let ((sa, ca), (sb, cb)) = (angles[0].sin_cos(), angles[1].sin_cos());
         let turn = Turn::new(sb, cb);
@@ -129,17 +131,18 @@ impl Body {
     }
 }
 
-/// A vector of the ball of this radius from coordinates in [−1, 1].
+/// Maps coordinates in [−1, 1] to a vector in the ball of this radius.
 fn ball(z: &[f64], radius: f64) -> Vector<f64> {
     let value = [z[0], z[1], z[2]];
     let size = norm(&value);
     scaled(radius / size.max(1.0), value)
 }
 
-/// Coordinates of what is tried: β, α, ω or x, m or a, a direction of the angles, one of the rates.
+/// Number of coordinates of a trial point: β, α, ω or x, m or a, a direction of the angles, and one
+/// of the rates.
 const COORDINATES: usize = 13;
 
-/// The largest value of `f` that a repeated ascent by random steps finds.
+/// Returns the largest value of `f` that repeated ascents by random steps find.
 fn ascent(f: impl Fn(&[f64; COORDINATES]) -> f64) -> f64 {
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = move || {
@@ -166,7 +169,7 @@ fn ascent(f: impl Fn(&[f64; COORDINATES]) -> f64) -> f64 {
     largest
 }
 
-/// Largest values that have been found, in the order of [`from_lemmas`].
+/// Returns the largest values that the search found, in the order of [`from_lemmas`].
 fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
     let body = Body::new(s);
     let angles = |z: &[f64; COORDINATES]| [PI * z[1], s.sideslip_domain * z[0]];
@@ -178,7 +181,7 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
         let size = z[8].hypot(z[9]).max(1e-9);
         [z[8] / size, z[9] / size]
     };
-    // The state (α, β), x and m, with x = R ω.
+    // This gives the state (α, β), x and m, with x = R ω.
     let state = |z: &[f64; COORDINATES]| {
         let [alpha, beta] = angles(z);
         let (omega, m) = (ball(&z[2..5], s.limit_rate), ball(&z[5..8], s.limit_moment));
@@ -226,7 +229,7 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
         let (angles, x, a) = nominal(z, sizes);
         norm(&coefficient(&body.moment(&held(angles), &vector(&x), &vector(&a)), 0))
     };
-    // A motion with a held.
+    // This gives a motion along which a is held.
     let motion = |z: &[f64; COORDINATES]| {
         let (from, x, a) = nominal(z, curved);
         let angles: [Series; 2] = std::array::from_fn(|i| Series([from[i], x[i], 0.5 * a[i]]));
@@ -253,7 +256,8 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
     ]
 }
 
-/// The same from the verified inequalities, as true bounds.
+/// Returns bounds of the same nine quantities from the verified inequalities, which hold with
+/// certainty.
 fn from_lemmas(s: &Settings, sup: &Suprema, sizes: (f64, f64), curved: (f64, f64)) -> [Interval; 9] {
     let number = Interval::from;
     let (two, half) = (number(2.0), number(0.5));
@@ -264,7 +268,7 @@ fn from_lemmas(s: &Settings, sup: &Suprema, sizes: (f64, f64), curved: (f64, f64
         [sup.largest, sup.inverse, two * sup.spin, two * sup.spin_inverse].map(upper);
     let (limit, moment) = (number(s.limit_rate), number(s.limit_moment));
     let rate = r * limit;
-    // ‖G‖, ‖∂G/∂(α, β)‖.
+    // These are the bounds of ‖G‖ and ‖∂G/∂(α, β)‖.
     let inner = inverse * moment + half * bilinear_inverse * limit.square() + drift * rate.square();
     let inner_by_angles = curvature * rate.square() + bilinear_inverse * limit * turn * rate;
     let acceleration = r * inner;
@@ -273,7 +277,7 @@ fn from_lemmas(s: &Settings, sup: &Suprema, sizes: (f64, f64), curved: (f64, f64
     let second = r * (bilinear_inverse + two * drift);
     let both = r * turn * by_rates
         + r * (mixed * rate + bilinear_inverse * turn * rate + bilinear_inverse * limit * turn);
-    // ∂²R = 2 R ∂W R ∂W R − R ∂²W R, and R G = F.
+    // The terms follow from ∂²R = 2 R ∂W R ∂W R − R ∂²W R and R G = F.
     let angles_twice = (two * (r * turn).square() + r * curvature) * acceleration
         + two * r * turn * r * inner_by_angles
         + r * (third * rate.square()
@@ -307,7 +311,8 @@ fn from_lemmas(s: &Settings, sup: &Suprema, sizes: (f64, f64), curved: (f64, f64
     ]
 }
 
-/// Checks the bounds of F and m. What depends on sizes is checked at the ones with which the horizon may end, and at the largest ones.
+/// Checks the bounds of F and m. Bounds that depend on the sizes of x and a are checked at the
+/// sizes with which the horizon may end, and at the largest ones.
 pub fn check(s: &Settings, lemmas: &Lemmas, sup: &Suprema, terminal_rate: f64) -> Vec<Finding> {
     let sizes = (terminal_rate, lemmas.braking * terminal_rate);
     let curved = (lemmas.rate, lemmas.acceleration);

@@ -1,8 +1,10 @@
-//! Lemma 1 exactly: WᵀW = diag(cos²β, 1, 1), as an identity of polynomials with whole coefficients.
+//! Exact proof of Lemma 1: WᵀW = diag(cos²β, 1, 1), as an identity of polynomials with integer
+//! coefficients.
 //!
-//! It says ‖W‖ = 1, attained by all (0, y₂, y₃) at every β, and ‖R‖ = sec β. An inequality with equality on whole surfaces cannot be shown by halving boxes.
+//! The identity gives ‖W‖ = 1, attained by all (0, y₂, y₃) at every β, and ‖R‖ = sec β. An
+//! inequality that is an equality on whole surfaces cannot be shown by halving boxes.
 
-/// A polynomial in u = tan(β/2), the coefficient of uⁱ at i.
+/// Polynomial in u = tan(β/2), with the coefficient of uⁱ at index i.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Polynomial(Vec<i64>);
 
@@ -31,9 +33,10 @@ impl Polynomial {
     }
 }
 
-/// Whether the identity holds.
+/// Whether the identity of Lemma 1 holds.
 pub(crate) fn lemma1() -> bool {
-    // n sin β = 2u, n cos β = 1 − u², n = 1 + u². The columns of n² V, with T left out as it is orthogonal.
+    // With n = 1 + u², n sin β = 2u and n cos β = 1 − u². The columns are those of n² V; T is left
+    // out because it is orthogonal.
     let (n, s, c) = (Polynomial(vec![1, 0, 1]), Polynomial(vec![0, 2]), Polynomial(vec![1, 0, -1]));
     let (zero, square) = (Polynomial(vec![0]), n.times(&n));
     let columns = [

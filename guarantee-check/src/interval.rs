@@ -1,38 +1,40 @@
 //! Interval arithmetic that is rounded outwards.
 //!
-//! An operation rounded to nearest is off by at most half a unit in the last place, so that the next number below and above the
-//! rounded result enclose the exact one. That needs no control of the processor's rounding and no particular processor.
+//! An operation rounded to nearest is off by at most half a unit in the last place, so the next
+//! numbers below and above the rounded result enclose the exact one. This needs no control of the
+//! processor's rounding and no particular processor.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// All real numbers from `low` to `high`.
+/// Interval of all real numbers from `low` to `high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// Smallest number.
+    /// Smallest number of the interval.
     pub low: f64,
-    /// Largest number.
+    /// Largest number of the interval.
     pub high: f64,
 }
 
 impl Interval {
-    /// Zero.
+    /// Interval that contains only zero.
     pub const ZERO: Self = Self::point(0.0);
-    /// One.
+    /// Interval that contains only one.
     pub const ONE: Self = Self::point(1.0);
-    /// Every number: the result where nothing is known.
+    /// Interval of all numbers, the result if nothing is known.
     pub const ALL: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
-    /// The number `value` alone.
+    /// Makes the interval that contains only `value`.
     pub const fn point(value: f64) -> Self {
         Self { low: value, high: value }
     }
 
-    /// From `low` to `high`.
+    /// Makes the interval from `low` to `high`.
     pub const fn new(low: f64, high: f64) -> Self {
         Self { low, high }
     }
 
-    /// Encloses the rounded ends of an exact result; [`Interval::ALL`] if they are no numbers.
+    /// Encloses an exact result, given its rounded ends; the result is [`Interval::ALL`] if an end
+    /// is NaN.
     fn outward(low: f64, high: f64) -> Self {
         if low.is_nan() || high.is_nan() {
             Self::ALL
@@ -41,24 +43,24 @@ impl Interval {
         }
     }
 
-    /// A number within.
+    /// Returns a number within the interval, near its middle.
     pub fn middle(self) -> f64 {
         f64::midpoint(self.low, self.high)
     }
 
-    /// Upper bound of `high − low`.
+    /// Upper bound of the width `high − low`.
     pub fn width(self) -> f64 {
         (self.high - self.low).next_up()
     }
 
-    /// x².
+    /// Encloses the square x².
     #[must_use]
     pub fn square(self) -> Self {
         let size = self.abs();
         Self { low: (size * size).low.max(0.0), high: (size * size).high }
     }
 
-    /// |x|.
+    /// Encloses the absolute value |x|.
     #[must_use]
     pub fn abs(self) -> Self {
         if self.low >= 0.0 {
@@ -70,37 +72,37 @@ impl Interval {
         }
     }
 
-    /// √x of what is not negative in x.
+    /// Encloses √x for the part of the interval that is not negative.
     #[must_use]
     pub fn sqrt(self) -> Self {
         let root = Self::outward(self.low.max(0.0).sqrt(), self.high.max(0.0).sqrt());
         Self { low: root.low.max(0.0), high: root.high }
     }
 
-    /// max(x, y).
+    /// Encloses the maximum max(x, y).
     #[must_use]
     pub fn max(self, other: Self) -> Self {
         Self { low: self.low.max(other.low), high: self.high.max(other.high) }
     }
 
-    /// min(x, y).
+    /// Encloses the minimum min(x, y).
     #[must_use]
     pub fn min(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.min(other.high) }
     }
 
-    /// The smallest interval that contains both.
+    /// Smallest interval that contains both intervals.
     #[must_use]
     pub fn hull(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Whether `value` is one of its numbers.
+    /// Whether `value` lies in the interval.
     pub fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
 
-    /// eˣ for 0 ≤ x ≤ 1; [`Interval::ALL`] outside.
+    /// Encloses eˣ for 0 ≤ x ≤ 1; the result is [`Interval::ALL`] outside.
     #[must_use]
     pub fn exp(self) -> Self {
         if !(self.low >= 0.0 && self.high <= 1.0) {
@@ -115,12 +117,13 @@ impl Interval {
         sum + Self::new(0.0, term.high)
     }
 
-    /// sin x and cos x for 0 ≤ x ≤ 1; [`Interval::ALL`] outside.
+    /// Encloses sin x and cos x for 0 ≤ x ≤ 1; the result is [`Interval::ALL`] outside.
     pub fn sin_cos(self) -> (Self, Self) {
         if !(self.low >= 0.0 && self.high <= 1.0) {
             return (Self::ALL, Self::ALL);
         }
-        // Both series alternate with falling terms, so that each remainder is smaller than the first term left out.
+        // Both series alternate with decreasing terms, so each remainder is smaller than the first
+        // term left out.
         let square = self.square();
         let (mut sine, mut cosine) = (Self::ZERO, Self::ZERO);
         let (mut odd, mut even) = (self, Self::ONE);
@@ -148,7 +151,8 @@ impl Neg for Interval {
     }
 }
 
-// Zero is passed through exactly, so that no numbers arise that are too small for fast arithmetic.
+// A zero operand is passed through exactly, so that no subnormal numbers arise, which would be
+// slow.
 impl Add for Interval {
     type Output = Self;
     fn add(self, other: Self) -> Self {
@@ -210,7 +214,7 @@ mod tests {
     #[test]
     fn oracle_operations_enclose_exact_results() {
         let (third, tenth) = (Interval::ONE / Interval::from(3.0), Interval::ONE / Interval::from(10.0));
-        // 3 · (1/3) = 1 and 0.3 − 3 · 0.1 = 0 as real numbers, though not as rounded ones.
+        // As real numbers, 3 · (1/3) = 1 and 0.3 − 3 · 0.1 = 0, though not as rounded ones.
         assert!((third * Interval::from(3.0)).contains(1.0));
         assert!(tenth.contains(0.1) && tenth.low < tenth.high && tenth.width() < 1e-16);
         let zero = tenth + tenth + tenth - Interval::from(3.0) * tenth;

@@ -1,15 +1,16 @@
-//! W = R⁻¹ and its derivatives, and the gyroscopic moment, written anew for the check.
+//! W = R⁻¹ with its derivatives, and the gyroscopic moment, written anew for this check.
 //!
-//! W y = T(α) V(β) y with V y = [p, t, q] = [−c (s y₁ + y₃), c² y₁ − s y₃, y₂], s = sin β, c = cos β. T is orthogonal and turns p and q into each
-//! other, ∂T/∂α = T J with J [p, t, q] = [q, 0, −p]. So ∂ⁱ⁺ʲ(W y)/∂αⁱ∂βʲ = T Jⁱ ∂ʲ(V y)/∂βʲ: norms of what does not hold the inertia depend on β alone,
-//! and all of them are computed with T = 1.
+//! W y = T(α) V(β) y with V y = [p, t, q] = [−c (s y₁ + y₃), c² y₁ − s y₃, y₂], s = sin β, c = cos
+//! β. T is orthogonal and turns p and q into each other: ∂T/∂α = T J with J [p, t, q] = [q, 0, −p].
+//! Hence ∂ⁱ⁺ʲ(W y)/∂αⁱ∂βʲ = T Jⁱ ∂ʲ(V y)/∂βʲ. Norms without the inertia therefore depend on β
+//! alone, and all of them are computed with T = 1.
 
 use crate::dual::Number;
 
-/// A vector.
+/// Vector with three components.
 pub type Vector<T> = [T; 3];
 
-/// Sine and cosine of an angle δ from u = tan(δ/2).
+/// Returns the sine and cosine of an angle δ from u = tan(δ/2).
 pub fn sine_cosine<T: Number>(u: T) -> (T, T) {
     let one = T::constant(1.0);
     let square = u.squared();
@@ -17,53 +18,54 @@ pub fn sine_cosine<T: Number>(u: T) -> (T, T) {
     ((u + u) * scale, (one - square) * scale)
 }
 
-/// Scalar product.
+/// Returns the scalar product of a and b.
 pub fn dot<T: Number>(a: &Vector<T>, b: &Vector<T>) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// ‖a‖².
+/// Returns the squared norm ‖a‖².
 pub fn square<T: Number>(a: &Vector<T>) -> T {
     a[0].squared() + a[1].squared() + a[2].squared()
 }
 
-/// a + b.
+/// Returns the sum a + b.
 pub fn sum<T: Number>(a: Vector<T>, b: Vector<T>) -> Vector<T> {
     std::array::from_fn(|i| a[i] + b[i])
 }
 
-/// a x.
+/// Returns the product a x of a number and a vector.
 pub fn scaled<T: Number>(a: T, x: Vector<T>) -> Vector<T> {
     x.map(|x| a * x)
 }
 
-/// Vector product.
+/// Returns the vector product of a and b.
 pub fn cross<T: Number>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// M x, for the rows of M.
+/// Returns the product M x, given the rows of M.
 pub fn times<T: Number>(rows: &[Vector<T>; 3], x: &Vector<T>) -> Vector<T> {
     std::array::from_fn(|i| dot(&rows[i], x))
 }
 
-/// W and its derivatives at a sideslip angle, all without T.
+/// W and its derivatives at one sideslip angle, all without T.
 #[derive(Clone, Copy, Debug)]
 pub struct Turn<T> {
     sine: T,
     cosine: T,
-    /// sin 2β and cos 2β.
+    /// Values of sin 2β and cos 2β.
     double: (T, T),
 }
 
 impl<T: Number> Turn<T> {
-    /// At the angle with this sine and cosine.
+    /// Makes W at the sideslip angle with this sine and cosine.
     pub fn new(sine: T, cosine: T) -> Self {
         let product = sine * cosine;
         Self { sine, cosine, double: (product + product, cosine.squared() - sine.squared()) }
     }
 
-    /// ∂ʲ(V y)/∂βʲ for j ≤ 3, from V y = [−½ y₁ sin 2β − y₃ cos β, ½ y₁ (1 + cos 2β) − y₃ sin β, y₂].
+    /// Derivative ∂ʲ(V y)/∂βʲ for j ≤ 3, from V y = [−½ y₁ sin 2β − y₃ cos β, ½ y₁ (1 + cos 2β) −
+    /// y₃ sin β, y₂].
     pub fn by_sideslip(&self, order: usize, y: &Vector<T>) -> Vector<T> {
         let Self { sine: s, cosine: c, double: (s2, c2) } = *self;
         let (two, four) = (T::constant(2.0), T::constant(4.0));
@@ -75,7 +77,7 @@ impl<T: Number> Turn<T> {
         }
     }
 
-    /// ∂ⁱ⁺ʲ(W y)/∂αⁱ∂βʲ.
+    /// Partial derivative ∂ⁱ⁺ʲ(W y)/∂αⁱ∂βʲ, without T.
     pub fn derivative(&self, by_alpha: usize, by_beta: usize, y: &Vector<T>) -> Vector<T> {
         let mut value = self.by_sideslip(by_beta, y);
         for _ in 0..by_alpha {
@@ -84,7 +86,7 @@ impl<T: Number> Turn<T> {
         value
     }
 
-    /// The derivative of W y along each of some changes of (α, β) in turn: ∂ⁿW[o, o′, …] y.
+    /// Derivative ∂ⁿW[o, o′, …] y of W y along the given changes of (α, β), one after the other.
     pub fn along(&self, directions: &[[T; 2]], y: &Vector<T>) -> Vector<T> {
         self.partly(directions, (0, 0), y)
     }
@@ -100,19 +102,19 @@ impl<T: Number> Turn<T> {
         }
     }
 
-    /// R y of y without T.
+    /// Product R y for a vector y without T.
     pub fn r(&self, y: &Vector<T>) -> Vector<T> {
         let Self { sine: s, cosine: c, .. } = *self;
         [y[1] - y[0] * s / c, y[2], -(y[0] * c) - y[1] * s]
     }
 
-    /// Ẇ x = ∂W[x₁, x₂] x.
+    /// Drift term Ẇ x = ∂W[x₁, x₂] x.
     pub fn drift(&self, x: &Vector<T>) -> Vector<T> {
         self.along(&[[x[0], x[1]]], x)
     }
 }
 
-/// T(α) [p, t, q].
+/// Product T(α) [p, t, q], given the sine and cosine of α.
 pub fn turned<T: Number>(sine: T, cosine: T, y: &Vector<T>) -> Vector<T> {
     [cosine * y[0] + sine * y[2], y[1], sine * y[0] - cosine * y[2]]
 }
@@ -149,7 +151,7 @@ mod tests {
             let at = |size: f64| {
                 let (alpha, beta) = (size * direction[0], beta + size * direction[1]);
                 let turn = Turn::new(beta.sin(), beta.cos());
-                // The turn by a small α in the frame without T: T(0)⁻¹ T(α).
+                // The turn by a small α in the frame without T is T(0)⁻¹ T(α).
                 let y: Vector<f64> = turn.along(&before, &x);
                 let (s, c) = alpha.sin_cos();
                 Vector3::new(c * y[0] + s * y[2], y[1], c * y[2] - s * y[0])

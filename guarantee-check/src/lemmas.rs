@@ -1,8 +1,11 @@
-//! The inequalities of the geometry and of the inertia, each by branch and bound over its whole domain.
+//! Inequalities of the geometry and of the inertia, each checked by branch and bound over its whole
+//! domain.
 //!
-//! Directions are points of the cube's surface: what is checked is homogeneous in each vector, and even, so that three faces cover all directions of space
-//! and two those of the plane. The domain of β is that of u = tan(β/2). A symmetric multilinear map has its norm at equal arguments (Banach 1938),
-//! therefore ‖∂²W[o, x̂] v + ∂²W[o, v̂] x‖ ≤ b ‖o‖ ‖x‖ ‖v‖ for all x and v follows from that for x = v, and the same for third derivatives.
+//! Directions are points on the surface of a cube. Each checked expression is homogeneous and even
+//! in each vector, so three faces cover all directions of space and two sides those of the plane.
+//! The domain of β is that of u = tan(β/2). A symmetric multilinear map attains its norm at equal
+//! arguments (Banach 1938). Therefore ‖∂²W[o, x̂] v + ∂²W[o, v̂] x‖ ≤ b ‖o‖ ‖x‖ ‖v‖ for all x and v
+//! follows from the case x = v, and likewise for third derivatives.
 
 use crate::dual::{Dual, Number};
 use crate::identity;
@@ -12,18 +15,19 @@ use crate::search::{Effort, supremum};
 use control::crmpc::{Lemmas, Settings};
 use nalgebra::Matrix3;
 
-/// Relative rounding error that the bounds are allowed, as the controller allows it in its own checks.
+/// Relative rounding error that the bounds are allowed, as in the controller's own checks.
 pub const ROUNDING: f64 = 1e-9;
 
-/// A bound held against what is known of the true value.
+/// Result for one bound: the bound and an enclosure of the true value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// What is bounded, and how.
+    /// Inequality or quantity that is checked.
     pub statement: String,
-    /// The bound that the proof uses.
+    /// Bound b that the proof uses.
     pub bound: f64,
-    /// Encloses the smallest bound that would be true. The upper end is rounded outwards; the lower end of what [`crate::dynamics`] checks comes from a
-    /// search in plain floating-point numbers and only tells how tight the bound is.
+    /// Enclosure of the smallest bound that would be true. The upper end is rounded outwards. For
+    /// the bounds of [`crate::dynamics`] the lower end comes from a search in plain floating-point
+    /// numbers and only tells how tight the bound is.
     pub truth: Interval,
 }
 
@@ -38,46 +42,47 @@ impl Finding {
         self.truth.low > self.bound * (1.0 + ROUNDING)
     }
 
-    /// By how much the bound could be smaller with certainty, over the bound.
+    /// Relative amount by which the bound could certainly be smaller.
     pub fn margin(&self) -> f64 {
         1.0 - self.truth.high / self.bound
     }
 }
 
-/// The enclosures that branch and bound has found: what the bounds of the dynamics are checked with.
+/// Enclosures of the largest values found by branch and bound, with which the bounds of the
+/// dynamics are checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Suprema {
-    /// Of ‖Ẇ x‖.
+    /// Largest ‖Ẇ x‖ over unit vectors x.
     pub drift: Interval,
-    /// Of ‖∂²W[o, o′] y‖.
+    /// Largest ‖∂²W[o, o′] y‖ over unit vectors.
     pub curvature: Interval,
-    /// Of ‖∂W[o] y‖.
+    /// Largest ‖∂W[o] y‖ over unit vectors.
     pub turn: Interval,
-    /// Of ‖∂²W[o, v̂] x + ∂²W[o, x̂] v‖.
+    /// Largest ‖∂²W[o, v̂] x + ∂²W[o, x̂] v‖ over unit vectors.
     pub mixed: Interval,
-    /// Of ‖∂³W[o, o, x̂] x‖.
+    /// Largest ‖∂³W[o, o, x̂] x‖ over unit vectors.
     pub twice: Interval,
-    /// Of ‖ω × I ω‖, kg m².
+    /// Largest ‖ω × I ω‖ over unit vectors ω, kg m².
     pub spin: Interval,
-    /// Of ‖I⁻¹ (ω × I ω)‖.
+    /// Largest ‖I⁻¹ (ω × I ω)‖ over unit vectors ω.
     pub spin_inverse: Interval,
-    /// Of ‖I y‖, kg m².
+    /// Largest ‖I y‖ over unit vectors y, kg m².
     pub largest: Interval,
-    /// Of ‖I⁻¹ y‖, 1/(kg m²).
+    /// Largest ‖I⁻¹ y‖ over unit vectors y, 1/(kg m²).
     pub inverse: Interval,
-    /// Of ‖R y‖.
+    /// Largest ‖R y‖ over unit vectors y.
     pub r: Interval,
-    /// Of ‖I W s‖ over the corners of the unit box.
+    /// Largest ‖I W s‖ over the corners s of the unit box.
     pub bearing: Interval,
 }
 
-/// A direction of the plane on side `chart` < 2 of the square.
+/// Direction in the plane, on side `chart` < 2 of the square.
 fn plane<const N: usize>(chart: usize, a: Dual<N>) -> [Dual<N>; 2] {
     let one = Dual::constant(1.0);
     if chart == 0 { [one, a] } else { [a, one] }
 }
 
-/// A direction of space on face `chart` < 3 of the cube.
+/// Direction in space, on face `chart` < 3 of the cube.
 fn space<const N: usize>(chart: usize, a: Dual<N>, b: Dual<N>) -> Vector<Dual<N>> {
     let one = Dual::constant(1.0);
     match chart {
@@ -93,9 +98,9 @@ fn length<const N: usize>(o: &[Dual<N>; 2]) -> Dual<N> {
 
 const SIDE: Interval = Interval::new(-1.0, 1.0);
 
-/// The search of one inequality at a time.
+/// Search that checks one inequality at a time and collects the findings.
 struct Search {
-    /// tan(β/2) of the domain.
+    /// Domain of u = tan(β/2).
     u: Interval,
     gap: f64,
     boxes: usize,
@@ -103,7 +108,8 @@ struct Search {
 }
 
 impl Search {
-    /// Notes that √f ≤ `bound` is to hold in `charts` charts of `sides`; gives the enclosure of the largest √f. `scale` is the unit of `bound`.
+    /// Checks √f ≤ `bound` over the box `sides` in each of `charts` charts, records the finding and
+    /// returns the enclosure of the largest √f. `scale` is the unit of `bound`.
     fn check<const N: usize>(
         &mut self,
         statement: &str,
@@ -126,19 +132,19 @@ fn turn<const N: usize>(u: Dual<N>) -> Turn<Dual<N>> {
     Turn::new(sine, cosine)
 }
 
-/// tan(β/2) for |β| ≤ `sideslip`.
+/// Interval of tan(β/2) for |β| ≤ `sideslip` (rad).
 pub fn half_angles(sideslip: f64) -> Interval {
     let (sine, cosine) = Interval::point(sideslip).sin_cos();
     let u = (sine / (Interval::ONE + cosine)).high;
     Interval::new(-u, u)
 }
 
-/// The rows of I over `scale`, for the inertia exactly as the settings hold it.
+/// Rows of I divided by `scale`, for the inertia exactly as the settings hold it.
 pub fn rows(inertia: &Matrix3<f64>, scale: f64) -> [Vector<Interval>; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| Interval::from(inertia[(i, j)]) / Interval::from(scale)))
 }
 
-/// The inverse by cofactors: columns are vector products of rows over the determinant.
+/// Inverse by cofactors: its columns are vector products of the rows, divided by the determinant.
 pub fn inverse(rows: &[Vector<Interval>; 3]) -> [Vector<Interval>; 3] {
     let columns = [cross(&rows[1], &rows[2]), cross(&rows[2], &rows[0]), cross(&rows[0], &rows[1])];
     let determinant = dot(&rows[0], &columns[0]);
@@ -149,7 +155,7 @@ fn known<const N: usize>(rows: &[Vector<Interval>; 3]) -> [Vector<Dual<N>>; 3] {
     rows.map(|row| row.map(Dual::known))
 }
 
-/// The rows of ∂(ω × I ω)/∂ω: columns e × I ω + ω × I e.
+/// Rows of ∂(ω × I ω)/∂ω, whose columns are e × I ω + ω × I e.
 fn gyroscopic<const N: usize>(
     inertia: &[Vector<Dual<N>>; 3],
     omega: &Vector<Dual<N>>,
@@ -161,7 +167,8 @@ fn gyroscopic<const N: usize>(
     })
 }
 
-/// Checks the bounds of the geometry and of the inertia. `gap` is the relative width of the enclosures that is aimed for.
+/// Checks the bounds of the geometry and of the inertia. The search aims for enclosures of the
+/// relative width `gap`.
 pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema) {
     let u = half_angles(s.sideslip_domain);
     let mut search = Search { u, gap, boxes: 4_000_000, findings: Vec::new() };
@@ -231,7 +238,7 @@ fn geometry(search: &mut Search, lemmas: &Lemmas) -> (Interval, Interval, Interv
     (drift, curvature, by_turn, mixed, twice)
 }
 
-/// ‖W‖ and ‖R‖.
+/// Checks the bounds of ‖W‖ and ‖R‖.
 fn lemma1(search: &mut Search, lemmas: &Lemmas, sideslip: f64) -> Interval {
     let proven = identity::lemma1();
     let (one, r) = if proven {
@@ -249,7 +256,7 @@ fn lemma1(search: &mut Search, lemmas: &Lemmas, sideslip: f64) -> Interval {
 }
 
 fn inertia(search: &mut Search, s: &Settings, lemmas: &Lemmas) -> (Interval, Interval, Interval, Interval) {
-    // Over the largest moment of inertia, so that all numbers are near one.
+    // The inertia is divided by its largest moment, so that all numbers are near one.
     let unit = lemmas.largest;
     let rows = rows(&s.body.inertia, unit);
     let inverse = known::<2>(&inverse(&rows));
@@ -295,7 +302,7 @@ fn inertia(search: &mut Search, s: &Settings, lemmas: &Lemmas) -> (Interval, Int
 fn bearing(search: &mut Search, s: &Settings, lemmas: &Lemmas) -> Interval {
     let unit = lemmas.largest;
     let rows = known::<2>(&rows(&s.body.inertia, unit));
-    // Two charts of α, which are half a turn apart, and four corners up to their common sign.
+    // There are two charts of α, half a turn apart, and four corners up to their common sign.
     let sides = [search.u, SIDE];
     let statement = "‖I W s‖ ≤ b over the corners s of the unit box";
     search.check(statement, lemmas.bearing, unit, 8, sides, |chart, &[u, v]| {

@@ -1,11 +1,13 @@
-//! Machine check of the bounds that the guarantee of CRMPC's robust set rests on.
+//! Machine check of the bounds on which the guarantee of CRMPC's robust set rests.
 //!
-//! The proof uses bounds of the kinematics and dynamics over a domain, sums over all sampling instants, and one inequality that decides whether the guarantee can
-//! be given. This crate checks all of them for given settings in interval arithmetic that is rounded outwards: what it calls true is true for
-//! the exact numbers, but for the errors that this program or the compiler may have. The formulas are written anew; only the bounds come from
-//! the controller.
+//! The proof uses bounds of the kinematics and dynamics over a domain, sums over all sampling
+//! instants, and one inequality that decides whether the guarantee can be given. This crate checks
+//! all of them for given settings in interval arithmetic that is rounded outwards. A bound that it
+//! calls true is true for the exact numbers, apart from errors in this program or the compiler. The
+//! formulas are written anew; only the bounds come from the controller.
 //!
-//! Not checked: the steps of the proof that lead from one inequality to the next, the invariant set of the initial state `tube`, and the optimisation.
+//! The crate does not check the steps of the proof that lead from one inequality to the next, the
+//! invariant set of the initial state `tube`, or the optimisation.
 
 pub mod assessment;
 pub mod dual;
@@ -22,28 +24,29 @@ use control::crmpc::{Design, Lemmas, Settings};
 use interval::Interval;
 use lemmas::Finding;
 
-/// Everything that has been checked for some settings.
+/// Findings of all checks for one set of settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// Of the geometry and the inertia.
+    /// Findings about the geometry and the inertia.
     pub lemmas: Vec<Finding>,
-    /// Of the dynamics.
+    /// Findings about the dynamics.
     pub dynamics: Vec<Finding>,
-    /// Of the sums and the final inequality; `None` where they are not checked.
+    /// Findings about the sums and the final inequality, or `None` if they are not checked.
     pub assessment: Option<Vec<Finding>>,
-    /// Of the terminal weight of the robust set.
+    /// Findings about the terminal weight of the robust set.
     pub terminal: Vec<Finding>,
-    /// Largest eigenvalue of (11c) per axis with the printed weight, which belongs to the continuous law.
+    /// Largest eigenvalue of (11c) for each axis with the printed weight, which belongs to the
+    /// continuous law.
     pub printed_terminal: [Interval; 3],
-    /// ‖x‖ with which the horizon may end, rad/s.
+    /// Norm ‖x‖ with which the horizon may end, rad/s.
     pub terminal_rate: f64,
 }
 
 impl Report {
-    /// Checks `settings`, with enclosures of this relative width.
+    /// Checks `settings` with enclosures of the relative width `gap`.
     ///
     /// # Errors
-    /// The settings cannot be designed for.
+    /// Reports settings for which no controller can be designed.
     pub fn new(settings: &Settings, gap: f64) -> Result<Self, DesignError> {
         let design = Design::new(settings)?;
         let bounds = Lemmas::new(settings);
@@ -59,7 +62,7 @@ impl Report {
         })
     }
 
-    /// All that has been checked, by section.
+    /// Returns the findings of all checks by section, each with its title.
     pub fn sections(&self) -> [(&'static str, &[Finding]); 4] {
         [
             ("Geometry and inertia", &self.lemmas),
@@ -69,7 +72,7 @@ impl Report {
         ]
     }
 
-    /// Whether all has been checked and is true.
+    /// Whether everything was checked and is true.
     pub fn holds(&self) -> bool {
         self.assessment.is_some()
             && self.sections().iter().all(|(_, findings)| findings.iter().all(Finding::holds))

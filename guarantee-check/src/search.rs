@@ -1,17 +1,17 @@
-//! Branch and bound: encloses the largest value of a function on boxes.
+//! Branch and bound, which encloses the largest value of a function on boxes.
 
 use crate::dual::Dual;
 use crate::interval::Interval;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// A box of one of the charts that the domain is covered with.
+/// Box in one of the charts that cover the domain.
 struct Piece<const N: usize> {
     chart: usize,
     sides: [Interval; N],
-    /// No value of the function on the box is larger.
+    /// Upper bound of the function's values on the box.
     upper: f64,
-    /// Side that is halved next.
+    /// Index of the side that is halved next.
     cut: usize,
 }
 
@@ -35,26 +35,28 @@ impl<const N: usize> Ord for Piece<N> {
     }
 }
 
-/// The function whose largest value is sought, given the chart and its coordinates.
+/// Function whose largest value is sought, given the chart and the coordinates in it.
 pub trait Objective<const N: usize>: Fn(usize, &[Dual<N>; N]) -> Dual<N> {}
 
 impl<const N: usize, F: Fn(usize, &[Dual<N>; N]) -> Dual<N>> Objective<N> for F {}
 
-/// How far the search goes.
+/// Effort after which the search ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// It ends when the ends of the enclosure are this close, relative to the larger one, and `goal` is decided.
+    /// Relative width of the enclosure, measured by its larger end. The search ends when this width
+    /// is reached and `goal` is decided.
     pub gap: f64,
-    /// Value that the function must not exceed, where that is to be decided.
+    /// Value that the function must not exceed, if that is to be decided.
     pub goal: f64,
-    /// Most boxes that are looked at.
+    /// Largest number of boxes that are examined.
     pub boxes: usize,
 }
 
 /// Encloses the largest value of `f` over the box `sides` in each of `charts` charts.
 ///
-/// The function on a box is enclosed by its natural extension and by the mean value form, f(c) + f′(X) (X − c). Along a coordinate by which
-/// the derivative keeps its sign, the largest value is at an end, and the box shrinks to that end.
+/// The function on a box is enclosed by its natural extension and by the mean value form, f(c) +
+/// f′(X) (X − c). Along a coordinate in which the derivative keeps its sign, the largest value is
+/// at an end, and the box shrinks to that end.
 pub fn supremum<const N: usize>(
     f: &impl Objective<N>,
     charts: usize,
@@ -85,7 +87,7 @@ pub fn supremum<const N: usize>(
     Interval::ALL
 }
 
-/// `None` if the side cannot be halved.
+/// Halves the box at side `cut`, or returns `None` if that side cannot be halved.
 fn halves<const N: usize>(sides: [Interval; N], cut: usize) -> Option<[[Interval; N]; 2]> {
     let Interval { low, high } = sides[cut];
     let middle = sides[cut].middle();
@@ -129,7 +131,7 @@ fn look<const N: usize>(
             (cut, most) = (i, width);
         }
     }
-    // Infinite derivatives make the mean value form useless, not wrong.
+    // Infinite derivatives make the mean value form useless, but not wrong.
     let upper = on_box.value.high.min(mean.high);
     Piece { chart, sides, upper, cut }
 }
@@ -141,7 +143,7 @@ mod tests {
 
     #[test]
     fn oracle_largest_value_of_a_polynomial() {
-        // x y (1 − x − y) is largest at x = y = 1/3, where it is 1/27.
+        // The function x y (1 − x − y) is largest at x = y = 1/3, where it is 1/27.
         let f = |_: usize, [x, y]: &[Dual<2>; 2]| *x * *y * (Dual::constant(1.0) - *x - *y);
         let unit = Interval::new(0.0, 1.0);
         let effort = Effort { gap: 1e-9, goal: f64::INFINITY, boxes: 100_000 };

@@ -1,7 +1,9 @@
-//! The sums over all sampling instants: how far disturbances and errors can drive the deviation, and the terminal weight.
+//! Sums over all sampling instants, which bound how far disturbances and errors can drive the
+//! deviation, and the terminal weight.
 //!
-//! Φⁿ is Φʳ (Φᵇ)ᵐ with n = m b + r and ‖Φᵇ‖ ≤ ½ in the norm of the largest row sum, so that the width of the intervals fades with the power, and what is
-//! left out after n periods is bounded by a geometric series.
+//! Φⁿ is computed as Φʳ (Φᵇ)ᵐ with n = m b + r and ‖Φᵇ‖ ≤ ½ in the norm of the largest row sum. The
+//! width of the intervals therefore fades with the power, and a geometric series bounds what is
+//! left out after n periods.
 
 use crate::interval::Interval;
 use control::crmpc::{Settings, held_terminal_weight, terminal_weight};
@@ -27,12 +29,13 @@ fn transposed(a: &Matrix) -> Matrix {
     [[a[0][0], a[1][0]], [a[0][1], a[1][1]]]
 }
 
-/// The largest row sum of the sizes.
+/// Largest row sum of the absolute values.
 fn norm(a: &Matrix) -> Interval {
     (a[0][0].abs() + a[0][1].abs()).max(a[1][0].abs() + a[1][1].abs())
 }
 
-/// ∫ |c₀ + c₁ u| du from `low` over `width`: where the sign changes, the two triangles are (a² + b²)/(|a| + |b|) of half the width.
+/// Integral ∫ |c₀ + c₁ u| du from `low` over `width`. Where the sign changes, the two triangles
+/// have the area (a² + b²)/(|a| + |b|) times half the width.
 fn integral_of_size([c1, c0]: &Pair, low: Interval, width: Interval) -> Interval {
     let (a, b) = (*c0 + *c1 * low, *c0 + *c1 * (low + width));
     let half = Interval::from(0.5) * width;
@@ -51,16 +54,17 @@ pub struct Axis {
     gain: Pair,
     period: Interval,
     latency: Interval,
-    /// Φⁿ for n < b.
+    /// Powers Φⁿ for n < b.
     powers: Vec<Matrix>,
-    /// Φᵇ.
+    /// Power Φᵇ, which at least halves every vector.
     block: Matrix,
 }
 
-/// Bounds on what a drive can do by the end of some period: angle, rate, both as the law sees them, feedback, and the feedback times its age.
+/// Bounds on the effect of a drive by the end of some period: angle, rate, both as the law sees
+/// them, feedback, and the feedback times its age.
 pub type Bounds = [Interval; 6];
 
-/// b is at most this: stable dynamics that fade more slowly are refused.
+/// Largest b that is allowed: stable dynamics that fade more slowly are refused.
 const LONGEST_BLOCK: usize = 4000;
 
 fn step(gain: Gain, period: f64) -> Matrix {
@@ -70,7 +74,7 @@ fn step(gain: Gain, period: f64) -> Matrix {
 }
 
 impl Axis {
-    /// `None` if no power of Φ is certain to halve every vector.
+    /// Makes the dynamics of an axis, or `None` if no power of Φ is certain to halve every vector.
     pub fn new(gain: Gain, period: f64, latency: f64) -> Option<Self> {
         let phi = step(gain, period);
         let unit = [[Interval::ONE, Interval::ZERO], [Interval::ZERO, Interval::ONE]];
@@ -91,7 +95,7 @@ impl Axis {
         })
     }
 
-    /// Φⁿ for n < `count`.
+    /// Returns the powers Φⁿ for n < `count`.
     fn transitions(&self, count: usize) -> impl Iterator<Item = Matrix> + '_ {
         let mut block = [[Interval::ONE, Interval::ZERO], [Interval::ZERO, Interval::ONE]];
         (0..count).map(move |n| {
@@ -113,7 +117,7 @@ impl Axis {
         (first / rest, first * length / rest.square())
     }
 
-    /// What any |Δ| ≤ 1 can do within 0, 1, …, `steps` periods, and at last for ever.
+    /// Bounds on the effect of any |Δ| ≤ 1 within 0, 1, …, `steps` periods, and last for ever.
     pub fn reach(&self, steps: usize) -> Vec<Bounds> {
         let unseen = [Interval::from(0.5) * self.latency.square(), self.latency];
         let (mut seen, mut feedback, mut age) = ([Interval::ZERO; 2], Interval::ZERO, Interval::ZERO);
@@ -131,7 +135,7 @@ impl Axis {
             age = age + fed * (end + Interval::from(n as f64) * self.period);
             all.push(bounds(&seen, feedback, age));
         }
-        // ‖Φⁿ [u, 1]‖ ≤ ‖Φⁿ‖ max(u, 1).
+        // The tail uses ‖Φⁿ [u, 1]‖ ≤ ‖Φⁿ‖ max(u, 1).
         let scale = self.period * end.max(Interval::ONE);
         let (tail, moment) = self.tails(steps);
         let (tail, moment) = (tail * scale, moment * scale * self.period);
@@ -143,7 +147,7 @@ impl Axis {
         all
     }
 
-    /// Σ |Φʲ x| and Σ |K Φʲ x| over j < 0, 1, …, `steps`, and at last over all j.
+    /// Sums Σ |Φʲ x| and Σ |K Φʲ x| over j < 0, 1, …, `steps`, and last over all j.
     fn series(&self, x: &Pair, steps: usize) -> Vec<[Interval; 3]> {
         let mut sum = [Interval::ZERO; 3];
         let mut all = vec![sum];
@@ -160,18 +164,20 @@ impl Axis {
         all
     }
 
-    /// What errors of the angle and of the rate of up to 1 at every tick can do, as [`Self::reach`].
+    /// Bounds on the effect of errors of up to 1 at every tick, of the angle and of the rate, as in
+    /// [`Self::reach`].
     pub fn errors(&self, steps: usize) -> [Vec<Bounds>; 2] {
         [[Interval::ONE, Interval::ZERO], [self.latency, Interval::ONE]]
             .map(|newest| self.errors_along(&newest, steps))
     }
 
-    /// The predicted state is off by `newest`.
+    /// Bounds on the effect of errors along one direction: at every tick the predicted state is off
+    /// by up to `newest`.
     fn errors_along(&self, newest: &Pair, steps: usize) -> Vec<Bounds> {
         let half = Interval::from(0.5) * self.period.square();
         let held = along(&self.gain, newest);
         let sums = self.series(&[half * held, self.period * held], steps);
-        // −Φⁿ⁻¹ A A_d e₀.
+        // The first error contributes −Φⁿ⁻¹ A A_d e₀.
         let first = [newest[0] + self.period * newest[1], newest[1]];
         let fed = held.abs();
         let bounds = |sum: &[Interval; 3], first: &[Interval; 3]| {
@@ -188,7 +194,8 @@ impl Axis {
             all.push(bounds(&sums[n], &sizes));
             largest = sizes;
         }
-        // From the last period on, no power of Φ makes the first error larger than this: ‖Φᵐᵇ⁺ʳ‖ ≤ ‖Φʳ‖.
+        // After the last period no power of Φ makes the first error larger than this, because
+        // ‖Φᵐᵇ⁺ʳ‖ ≤ ‖Φʳ‖.
         let after = self.powers.iter().fold(Interval::ZERO, |most, power| most.max(norm(power)));
         let faded = after * largest[0].max(largest[1]);
         let gain = self.gain[0].abs() + self.gain[1].abs();
@@ -196,7 +203,8 @@ impl Axis {
         all
     }
 
-    /// What shifts of the angle by up to the period at every tick can do, as [`Self::reach`].
+    /// Bounds on the effect of shifts of the angle by up to the period at every tick, as in
+    /// [`Self::reach`].
     pub fn shifts(&self, steps: usize) -> Vec<Bounds> {
         let sums = self.series(&[self.period, Interval::ZERO], steps);
         sums.into_iter()
@@ -205,9 +213,11 @@ impl Axis {
     }
 }
 
-/// Largest eigenvalue of Φᵀ G Φ − G + h (P + K̃ᵀ Q K̃) per axis with the sampled terminal law: (11c) of Chai 2022 demands that it is not positive.
+/// Largest eigenvalue of Φᵀ G Φ − G + h (P + K̃ᵀ Q K̃) for each axis with the sampled terminal law:
+/// (11c) of Chai 2022 demands that it is not positive.
 ///
-/// The first is that of the robust set's G, the second that of the printed G, which belongs to the continuous law.
+/// The first value is that of the robust set's G, the second that of the printed G, which belongs
+/// to the continuous law.
 pub fn terminal_decrease(s: &Settings) -> [[Interval; 2]; 3] {
     let held = SampledError::new(s.terminal, s.period_optimisation);
     std::array::from_fn(|axis| {

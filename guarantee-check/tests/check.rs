@@ -1,4 +1,4 @@
-//! The check for published and other settings, and that it can fail.
+//! Tests that the check succeeds for published and other settings, and that it can fail.
 
 use control::crmpc::{Constraints, Guarantee, InitialState, Lemmas, Settings};
 use control::error_dynamics::Gain;
@@ -61,7 +61,7 @@ fn bounds_of_the_geometry_hold_in_the_widest_domain_and_for_another_vehicle() {
 fn bounds_that_are_too_small_are_found_false() {
     let settings = Settings::new(Constraints::Robust);
     let mut bounds = Lemmas::new(&settings);
-    // The first two are attained; the others have margins of 2.4 % and 1.3 %.
+    // The first two bounds are attained; the others have margins of 2.4 % and 1.3 %.
     bounds.drift_by_rates *= 0.99;
     bounds.gyroscopic.1 *= 0.99;
     bounds.drift *= 0.97;

@@ -1,4 +1,4 @@
-//! The check for the settings of every experiment that claims the guarantee, as its file has them.
+//! Check of the settings of every experiment that claims the guarantee, as its file gives them.
 
 use control::crmpc::{Constraints, Settings};
 use guarantee_check::Report;
@@ -7,7 +7,7 @@ use toml::{Table, Value};
 
 const GAP: f64 = 3e-3;
 
-/// A value in SI units.
+/// Converts a value of the file to SI units.
 fn quantity(value: &Value) -> f64 {
     match value {
         Value::Float(number) => *number,
@@ -58,7 +58,7 @@ fn settings(experiment: &str) -> Settings {
             "horizon" => assert_eq!(value.as_integer(), i64::try_from(s.horizon).ok()),
             "period.feedback" => s.period_feedback = quantity(value),
             "period.optimisation" => s.period_optimisation = quantity(value),
-            // What the bounds do not depend on.
+            // The bounds do not depend on the other parameters, which have these prefixes.
             _ => {
                 let free = ["reference.", "weight.", "terminal.", "tube.", "inertia.I", "saturation"];
                 assert!(free.iter().any(|prefix| name.starts_with(prefix)), "{name}");

@@ -1,4 +1,4 @@
-//! Contradictions in a table, found before an importer finds them.
+//! Search for contradictions in a table, so that they are found before an importer meets them.
 
 use crate::unit::Unit;
 use crate::variable::{Causality, EnumerationType, Kind, Variability, Variable};
@@ -9,7 +9,7 @@ impl ModelDescription {
     /// Checks the description against itself and against FMI 2.0.
     ///
     /// # Errors
-    /// Names the first variable at fault and what is wrong with it.
+    /// Names the first variable at fault and says what is wrong with it.
     pub fn check(&self) -> Result<(), Error> {
         self.find_problem()
             .map_or(Ok(()), |problem| Err(Error::Description { unit: self.name.clone(), problem }))
@@ -130,7 +130,8 @@ fn within<T: PartialOrd>(min: Option<T>, value: Option<T>, max: Option<T>) -> bo
     value.is_none_or(|value| min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max))
 }
 
-/// FMI's structured naming convention without quoted names: `a.b[1,2].c`, or `der(a.b)`.
+/// Whether a name follows FMI's structured naming convention without quoted names: `a.b[1,2].c`, or
+/// `der(a.b)`.
 fn structured(name: &str) -> bool {
     let inner = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')')).unwrap_or(name);
     inner.split('.').all(|part| {

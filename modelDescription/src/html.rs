@@ -1,4 +1,4 @@
-//! `documentation/index.html` of a unit, from its table.
+//! The page `documentation/index.html` of a unit, made from its table.
 
 use crate::variable::{Causality, Kind, Variable};
 use crate::{AUTHOR, LICENSE, ModelDescription};
@@ -20,10 +20,11 @@ dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.2rem}dd{margin
 ";
 
 impl ModelDescription {
-    /// The page `documentation/index.html`: the unit's own text, then tables of its variables. Needs no network.
+    /// Returns the page `documentation/index.html`: the unit's own text, then tables of its
+    /// variables. The page needs no network.
     ///
     /// # Panics
-    /// Never: writing to a string does not fail.
+    /// This never panics, because writing to a string does not fail.
     pub fn to_html(&self) -> String {
         let mut page = String::new();
         self.write_html(&mut page).expect("writing to a string");
@@ -112,7 +113,8 @@ impl ModelDescription {
     }
 }
 
-/// Ten significant digits without trailing zeros: π/180 shown in degrees reads 1, not 1.0000000000000002.
+/// Formats a number with ten significant digits and no trailing zeros: π/180 shown in degrees reads
+/// 1, not 1.0000000000000002.
 fn number(x: f64) -> String {
     let rounded: f64 = format!("{x:.9e}").parse().expect("a number");
     let text = rounded.to_string();

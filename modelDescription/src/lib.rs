@@ -1,5 +1,5 @@
-//! The description of an FMI 2.0 unit as data, the XML made from it, and the packing of `.fmu` archives.
-//! Knows no physics.
+//! Description of an FMI 2.0 unit as data, the XML made from it, and the packing of `.fmu`
+//! archives. The crate knows no physics.
 
 pub mod check;
 pub mod html;
@@ -16,12 +16,12 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use variable::Variable;
 
-/// Who answers for the units, as `modelDescription.xml` names them.
+/// Author of the units, as `modelDescription.xml` names them.
 pub const AUTHOR: &str = "Re-entry Attitude Control contributors";
 /// SPDX expression of the licence of every unit.
 pub const LICENSE: &str = env!("CARGO_PKG_LICENSE");
 
-/// Log categories every unit declares: name and what is reported under it.
+/// Log categories that every unit declares, each with its name and the messages reported under it.
 pub const LOG_CATEGORIES: [(&str, &str); 6] = [
     ("logAll", "Everything below"),
     ("logEvents", "Changes of the call state: initialized, reset, state restored, terminated"),
@@ -34,31 +34,31 @@ pub const LOG_CATEGORIES: [(&str, &str); 6] = [
     ("logStatusFatal", "A defect in the unit: free it; reported even if logging is off"),
 ];
 
-/// Why a unit could not be described or packed.
+/// Reason why a unit could not be described or packed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The table of variables contradicts itself or FMI 2.0.
     #[error("unit '{unit}': {problem}")]
     Description {
-        /// The unit's name.
+        /// Name of the unit at fault.
         unit: String,
-        /// What is wrong, with the variable's name.
+        /// Description of the fault, with the variable's name.
         problem: String,
     },
     /// The file is not a library that can be opened.
     #[error("cannot open library '{}': {source}", path.display())]
     Open {
-        /// The library.
+        /// Path of the library file.
         path: PathBuf,
-        /// The loader's reason.
+        /// Reason that the loader gave.
         source: libloading::Error,
     },
     /// The library does not hand out descriptions.
     #[error("'{}' hands out no unit descriptions ({problem}): build it with fmi2-export's export_fmus!", path.display())]
     NoDescriptions {
-        /// The library.
+        /// Path of the library file.
         path: PathBuf,
-        /// What is missing.
+        /// Description of what the library lacks.
         problem: String,
     },
     /// Two libraries, or two units of one library, have the same name.
@@ -67,64 +67,66 @@ pub enum Error {
     /// A file could not be read or written.
     #[error("'{}': {source}", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's reason.
+        /// Reason that the system gave.
         source: std::io::Error,
     },
     /// The archive could not be written.
     #[error("archive '{}': {source}", path.display())]
     Archive {
-        /// The archive.
+        /// Path of the archive.
         path: PathBuf,
-        /// The archiver's reason.
+        /// Reason that the archiver gave.
         source: zip::result::ZipError,
     },
 }
 
-/// Everything `modelDescription.xml` says of a unit. Handed out by a built library as JSON, through its exported function
-/// `fmu_model_descriptions`.
+/// Content of a unit's `modelDescription.xml`. A built library hands it out as JSON through its
+/// exported function `fmu_model_descriptions`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelDescription {
-    /// Model name, also the model identifier and the archive's name: `CRMPC`.
+    /// Model name, which is also the model identifier and the archive's name, for example `CRMPC`.
     pub name: String,
-    /// One line: what the unit is.
+    /// Purpose of the unit, in one line.
     pub description: String,
-    /// HTML fragment for `documentation/index.html`: what the unit computes, with equations and their source.
+    /// HTML fragment for `documentation/index.html` that says what the unit computes, with
+    /// equations and their sources.
     pub documentation: String,
-    /// Version of the crate that made it.
+    /// Version of the crate that made the unit.
     pub version: String,
-    /// Whether it can be used for co-simulation.
+    /// Whether the unit can be used for co-simulation.
     pub co_simulation: bool,
-    /// Whether it can be used for model exchange.
+    /// Whether the unit can be used for model exchange.
     pub model_exchange: bool,
-    /// Number of event indicators (model exchange).
+    /// Number of event indicators in model exchange.
     pub event_indicators: usize,
-    /// The experiment a tool proposes.
+    /// Experiment that a tool proposes to its user.
     pub default_experiment: DefaultExperiment,
-    /// All variables; a variable's value reference is its index here.
+    /// All variables of the unit; the value reference of each is its index here.
     pub variables: Vec<Variable>,
 }
 
-/// What a tool offers as simulation settings.
+/// Simulation settings that a tool proposes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DefaultExperiment {
-    /// Start time, s.
+    /// Start time of the experiment, s.
     pub start: f64,
-    /// Stop time, s.
+    /// Stop time of the experiment, s.
     pub stop: f64,
-    /// Relative tolerance for model exchange integrators.
+    /// Relative tolerance for the integrators of model exchange.
     pub tolerance: f64,
-    /// Communication step, s.
+    /// Communication step of the experiment, s.
     pub step: f64,
 }
 
 impl ModelDescription {
-    /// The GUID: SHA-256 over the description as JSON, cut to 128 bits and written as a UUID (version 8). Two libraries
-    /// have the same GUID exactly if their tables, texts and versions agree.
+    /// Returns the GUID: SHA-256 over the description as JSON, cut to 128 bits and written as a
+    /// UUID (version 8). Two libraries have the same GUID exactly if their tables, texts and
+    /// versions agree.
     ///
     /// # Panics
-    /// Never: the description holds nothing that JSON cannot.
+    /// This never panics, because JSON can express every part of the description.
     pub fn guid(&self) -> String {
         let json = serde_json::to_vec(self).expect("plain data");
         let mut bytes: [u8; 16] = std::array::from_fn({

@@ -1,4 +1,5 @@
-//! Writes a unit's `.fmu` archive. The same input gives the same bytes: entries are sorted, times and permissions fixed.
+//! Packing of a unit's `.fmu` archive. The same input gives the same bytes, because entries are
+//! sorted and times and permissions are fixed.
 
 use crate::{Error, LICENSE, ModelDescription};
 use std::fs::{self, File};
@@ -7,21 +8,22 @@ use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-/// What goes into the archives besides the unit itself.
+/// Contents of the archives besides the unit itself.
 #[derive(Clone, Debug, Default)]
 pub struct Extras {
     /// Folder whose files go under `resources/`.
     pub resources: Option<PathBuf>,
-    /// Licence texts, for `documentation/licenses/`.
+    /// Paths of licence texts for `documentation/licenses/`.
     pub licenses: Vec<PathBuf>,
-    /// Folder of icons, `NAME.png` for the unit of that name.
+    /// Folder of icons, with `NAME.png` for the unit of that name.
     pub icons: Option<PathBuf>,
 }
 
-/// Some importers pass no resource location for a unit without the folder.
+/// Text that keeps the folder in the archive, because some importers pass no resource location for
+/// a unit without it.
 const RESOURCES_README: &str = "Files that the unit reads while it initializes. This unit needs none.\n";
 
-/// Folder and file suffix of the libraries of the platform this program was built for.
+/// Folder and file suffix of libraries on the platform for which this program was built.
 fn platform() -> (&'static str, &'static str) {
     match (std::env::consts::OS, cfg!(target_pointer_width = "64")) {
         ("windows", true) => ("win64", "dll"),
@@ -32,10 +34,11 @@ fn platform() -> (&'static str, &'static str) {
     }
 }
 
-/// Writes `NAME.fmu` of one unit of `library` into the folder `output` and returns its path.
+/// Writes the archive `NAME.fmu` of one unit of `library` into the folder `output` and returns its
+/// path.
 ///
 /// # Errors
-/// If the description contradicts itself, or a file cannot be read or written.
+/// Reports a description that contradicts itself, or a file that cannot be read or written.
 pub fn pack(
     description: &ModelDescription,
     library: &Path,
@@ -60,11 +63,11 @@ pub fn pack(
     if entries.len() == before {
         entries.push(("resources/README.txt".into(), RESOURCES_README.into()));
     }
-    // The description first, as readers of streams expect; the rest by name.
+    // The description comes first, as readers of streams expect; the rest is sorted by name.
     entries[1..].sort();
 
     let path = output.join(format!("{name}.fmu"));
-    // Written under another name first: nobody ever opens half an archive.
+    // The archive gets another name first, so that nobody ever opens half an archive.
     let partial = output.join(format!("{name}.fmu.part"));
     let file = File::create(&partial).map_err(|source| Error::File { path: partial.clone(), source })?;
     write_archive(BufWriter::new(file), &entries)
@@ -87,7 +90,8 @@ fn write_archive(file: BufWriter<File>, entries: &[(String, Vec<u8>)]) -> zip::r
     Ok(())
 }
 
-/// FMI wants one entry point `license.txt`; several texts stand beside it.
+/// Adds the licence texts. FMI demands one entry point `license.txt`; several texts stand beside
+/// it.
 fn add_licenses(entries: &mut Vec<(String, Vec<u8>)>, licenses: &[PathBuf]) -> Result<(), Error> {
     let folder = "documentation/licenses";
     if let [only] = licenses {

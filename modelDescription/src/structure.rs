@@ -1,4 +1,5 @@
-//! What follows from the table: which variables are calculated, states, derivatives, and who depends on whom.
+//! Structure that follows from the table: calculated variables, states, derivatives, and
+//! dependencies.
 
 use crate::ModelDescription;
 use crate::variable::{Causality, Kind, Variable};
@@ -9,7 +10,7 @@ impl Variable {
         !matches!(self.causality, Causality::Parameter | Causality::Input)
     }
 
-    /// Name of the state this variable is the time derivative of.
+    /// Name of the state whose time derivative this variable is.
     pub fn derivative_of(&self) -> Option<&str> {
         match &self.kind {
             Kind::Real { derivative_of, .. } => derivative_of.as_deref(),
@@ -19,12 +20,13 @@ impl Variable {
 }
 
 impl ModelDescription {
-    /// Value reference of the variable `name`.
+    /// Value reference of the variable `name`, if there is one.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.variables.iter().position(|variable| variable.name == name)
     }
 
-    /// Continuous states and their derivatives as pairs of value references, in the order of the states in the table.
+    /// Continuous states and their derivatives as pairs of value references, in the order of the
+    /// states in the table.
     pub fn states(&self) -> Vec<(usize, usize)> {
         let mut states: Vec<_> = self
             .variables
@@ -38,13 +40,14 @@ impl ModelDescription {
         states
     }
 
-    /// Whether directional derivatives are offered: exactly for units with continuous states.
+    /// Whether the unit offers directional derivatives, which is so exactly for units with
+    /// continuous states.
     pub fn directional_derivatives(&self) -> bool {
         self.variables.iter().any(|variable| variable.derivative_of().is_some())
     }
 
-    /// Value references of the inputs and states that the variable at `reference` depends on at an instant, ascending.
-    /// A state depends on itself alone.
+    /// Value references, ascending, of the inputs and states on which the variable at `reference`
+    /// depends at the same instant. A state depends on itself alone.
     pub(crate) fn dependencies(&self, reference: usize, states: &[(usize, usize)]) -> Vec<usize> {
         if states.iter().any(|&(state, _)| state == reference) {
             return vec![reference];
@@ -56,7 +59,8 @@ impl ModelDescription {
         known
     }
 
-    /// The same at initialization, where the knowns are inputs and parameters: states follow from the parameters.
+    /// Value references, ascending, of the inputs and parameters on which the variable at
+    /// `reference` depends at initialization, where the states follow from the parameters.
     pub(crate) fn initial_dependencies(&self, reference: usize, states: &[(usize, usize)]) -> Vec<usize> {
         let inputs = self.dependencies(reference, states);
         let known = |(i, variable): (usize, &Variable)| match variable.causality {
@@ -67,7 +71,8 @@ impl ModelDescription {
         self.variables.iter().enumerate().filter_map(known).collect()
     }
 
-    /// Value references of what initialization computes: calculated outputs, states and derivatives, ascending.
+    /// Value references, ascending, of the unknowns of initialization: calculated outputs, states
+    /// and derivatives.
     pub(crate) fn initial_unknowns(&self, states: &[(usize, usize)]) -> Vec<usize> {
         let listed = |i: usize| {
             self.variables[i].causality == Causality::Output

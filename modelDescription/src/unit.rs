@@ -1,34 +1,35 @@
-//! Physical units as SI exponents, and the display units engineers read.
+//! Physical units as exponents of SI base units, and the display units that engineers read.
 
 use serde::{Deserialize, Serialize};
 
-/// A unit another one can be shown in: `display = factor · base + offset` with `offset = 0` throughout.
+/// Unit in which another one can be displayed: `display = factor · base + offset` with `offset = 0`
+/// throughout.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DisplayUnit {
-    /// Name, for example `deg`.
+    /// Name of the display unit, for example `deg`.
     pub name: String,
-    /// Multiplier from the unit to the display unit, for example 180/π.
+    /// Factor from the unit to the display unit, for example 180/π.
     pub factor: f64,
 }
 
-/// A unit named as FMI tools expect, with exponents of the SI base units.
+/// Unit with a name that FMI tools expect and the exponents of the SI base units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Unit {
-    /// Name, for example `rad/s`.
+    /// Name of the unit, for example `rad/s`.
     pub name: String,
-    /// Exponent of the kilogram.
+    /// Exponent of the kilogram in the unit.
     pub kg: i32,
-    /// Exponent of the metre.
+    /// Exponent of the metre in the unit.
     pub m: i32,
-    /// Exponent of the second.
+    /// Exponent of the second in the unit.
     pub s: i32,
-    /// Exponent of the ampere.
+    /// Exponent of the ampere in the unit.
     pub ampere: i32,
-    /// Exponent of the kelvin.
+    /// Exponent of the kelvin in the unit.
     pub kelvin: i32,
-    /// Exponent of the radian.
+    /// Exponent of the radian in the unit.
     pub rad: i32,
-    /// What the value is shown in, if not in the unit itself.
+    /// Unit in which the value is displayed, if not in the unit itself.
     pub display: Option<DisplayUnit>,
 }
 
@@ -37,59 +38,59 @@ fn unit(name: &str, [kg, m, s, rad]: [i32; 4], display: Option<&str>) -> Unit {
     Unit { name: name.into(), kg, m, s, ampere: 0, kelvin: 0, rad, display }
 }
 
-/// Angle, shown in degrees.
+/// Unit of an angle, rad, displayed in degrees.
 pub fn angle() -> Unit {
     unit("rad", [0, 0, 0, 1], Some("deg"))
 }
-/// Angular rate, shown in degrees per second.
+/// Unit of an angular rate, rad/s, displayed in degrees per second.
 pub fn angular_rate() -> Unit {
     unit("rad/s", [0, 0, -1, 1], Some("deg/s"))
 }
-/// Angular acceleration, shown in degrees per second squared.
+/// Unit of an angular acceleration, rad/s², displayed in degrees per second squared.
 pub fn angular_acceleration() -> Unit {
     unit("rad/s2", [0, 0, -2, 1], Some("deg/s2"))
 }
-/// Moment of force.
+/// Unit of a moment of force, N m.
 pub fn moment() -> Unit {
     unit("N.m", [1, 2, -2, 0], None)
 }
-/// Moment of inertia.
+/// Unit of a moment of inertia, kg m².
 pub fn inertia() -> Unit {
     unit("kg.m2", [1, 2, 0, 0], None)
 }
-/// Length.
+/// Unit of a length, m.
 pub fn length() -> Unit {
     unit("m", [0, 1, 0, 0], None)
 }
-/// Acceleration, specific force.
+/// Unit of an acceleration or specific force, m/s².
 pub fn acceleration() -> Unit {
     unit("m/s2", [0, 1, -2, 0], None)
 }
-/// Magnetic flux density.
+/// Unit of a magnetic flux density, T.
 pub fn flux_density() -> Unit {
     Unit { ampere: -1, ..unit("T", [1, 0, -2, 0], None) }
 }
-/// Time.
+/// Unit of a time, s.
 pub fn time() -> Unit {
     unit("s", [0, 0, 1, 0], None)
 }
-/// Frequency in cycles per second.
+/// Unit of a frequency in cycles per second, Hz.
 pub fn frequency() -> Unit {
     unit("Hz", [0, 0, -1, 0], None)
 }
-/// Gain from an angle to its second derivative.
+/// Unit of a gain from an angle to its second derivative, 1/s².
 pub fn gain_angle() -> Unit {
     unit("1/s2", [0, 0, -2, 0], None)
 }
-/// Gain from a rate to its derivative.
+/// Unit of a gain from a rate to its derivative, 1/s.
 pub fn gain_rate() -> Unit {
     unit("1/s", [0, 0, -1, 0], None)
 }
-/// Pressure.
+/// Unit of a pressure, Pa.
 pub fn pressure() -> Unit {
     unit("Pa", [1, -1, -2, 0], None)
 }
-/// Moment of force by angle.
+/// Unit of a moment of force per angle, N m/rad.
 pub fn moment_by_angle() -> Unit {
     unit("N.m/rad", [1, 2, -2, -1], None)
 }

@@ -1,4 +1,5 @@
-//! One variable of a unit: everything that `modelDescription.xml` says of it, and nothing of how it is computed.
+//! One variable of a unit: everything that `modelDescription.xml` says about it, and nothing about
+//! how it is computed.
 
 use crate::unit::Unit;
 use serde::{Deserialize, Serialize};
@@ -6,100 +7,102 @@ use serde::{Deserialize, Serialize};
 /// Role of a variable, FMI 2.0 section 2.2.7.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Causality {
-    /// Set by the user before the simulation, constant during it.
+    /// The user sets it before the simulation, and it stays constant.
     Parameter,
-    /// Provided by another unit.
+    /// Another unit provides its value.
     Input,
-    /// Computed by this unit for others.
+    /// This unit computes it for others.
     Output,
-    /// Computed by this unit, for looking at only.
+    /// This unit computes it for observation only.
     Local,
-    /// The simulation time.
+    /// It is the simulation time.
     Independent,
 }
 
-/// When a variable may change, FMI 2.0 section 2.2.7.
+/// Times at which a variable may change, FMI 2.0 section 2.2.7.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Variability {
-    /// Constant after initialization.
+    /// It is constant after initialization.
     Fixed,
-    /// Changes at events or communication points only.
+    /// It changes at events or communication points only.
     Discrete,
-    /// May change at any time.
+    /// It may change at any time.
     Continuous,
 }
 
-/// Names of an enumeration's items, counted from 1 as FMI does.
+/// Enumeration type with its items, which are counted from 1 as in FMI.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct EnumerationType {
     /// Name of the `SimpleType`, for example `DisturbanceKind`.
     pub name: String,
-    /// What the enumeration chooses.
+    /// Description of the choice that the enumeration offers.
     pub description: String,
-    /// Item names with their descriptions, in the order of their values 1, 2, ….
+    /// Names and descriptions of the items, in the order of their values 1, 2, ….
     pub items: Vec<(String, String)>,
 }
 
-/// Type of a variable with the attributes that only this type has. Limits and start values are in the unit itself,
-/// never in its display unit.
+/// Type of a variable, with the attributes that only this type has. Limits and start values are in
+/// the unit itself, never in its display unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Kind {
-    /// A 64-bit float.
+    /// A floating-point number of 64 bits.
     Real {
-        /// Physical unit; `None` for a plain number.
+        /// Physical unit of the value, or `None` for a plain number.
         unit: Option<Unit>,
-        /// Smallest allowed value.
+        /// Smallest allowed value of the variable.
         min: Option<f64>,
-        /// Largest allowed value.
+        /// Largest allowed value of the variable.
         max: Option<f64>,
-        /// Typical magnitude.
+        /// Typical magnitude of the variable.
         nominal: Option<f64>,
-        /// Start value; present exactly where FMI wants one.
+        /// Start value, which is present exactly where FMI demands one.
         start: Option<f64>,
-        /// Name of the variable this one is the time derivative of.
+        /// Name of the state whose time derivative this variable is.
         derivative_of: Option<String>,
     },
-    /// A 32-bit integer.
+    /// A signed integer of 32 bits.
     Integer {
-        /// Smallest allowed value.
+        /// Smallest allowed value of the variable.
         min: Option<i32>,
-        /// Largest allowed value.
+        /// Largest allowed value of the variable.
         max: Option<i32>,
-        /// Start value; present exactly where FMI wants one.
+        /// Start value, which is present exactly where FMI demands one.
         start: Option<i32>,
     },
-    /// A truth value.
+    /// A truth value, true or false.
     Boolean {
-        /// Start value; present exactly where FMI wants one.
+        /// Start value, which is present exactly where FMI demands one.
         start: Option<bool>,
     },
-    /// One of named items.
+    /// One item of an enumeration type.
     Enumeration {
-        /// The items.
+        /// Enumeration type with the allowed items.
         of: EnumerationType,
-        /// Start value (1-based item number); present exactly where FMI wants one.
+        /// Start value as the item's number, counted from 1; it is present exactly where FMI
+        /// demands one.
         start: Option<i32>,
     },
-    /// Text.
+    /// A text of any length.
     String {
-        /// Start value; present exactly where FMI wants one.
+        /// Start value, which is present exactly where FMI demands one.
         start: Option<String>,
     },
 }
 
-/// A variable as `modelDescription.xml` declares it. Its value reference is its position in the table, for all types.
+/// A variable as `modelDescription.xml` declares it. Its value reference is its position in the
+/// table, for all types.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Variable {
-    /// Structured name, dotted.
+    /// Structured name with dots, for example `inertia.scale`.
     pub name: String,
-    /// One line: what it is.
+    /// Description of the variable, in one line.
     pub description: String,
-    /// Role.
+    /// Role of the variable in the unit.
     pub causality: Causality,
-    /// When it may change.
+    /// Times at which the variable may change.
     pub variability: Variability,
-    /// Type, unit, limits, start.
+    /// Type of the variable with unit, limits and start value.
     pub kind: Kind,
-    /// For calculated variables: names of the inputs and states that its value at an instant depends on.
+    /// Names of the inputs and states on which a calculated variable depends at the same instant.
     pub dependencies: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! `modelDescription.xml` of a unit, FMI 2.0 section 2.2.
+//! Text of a unit's `modelDescription.xml`, FMI 2.0 section 2.2.
 
 use crate::unit::Unit;
 use crate::variable::{Causality, EnumerationType, Kind, Variability, Variable};
@@ -9,17 +9,17 @@ use std::borrow::Cow;
 use std::io;
 
 type Xml = Writer<Vec<u8>>;
-/// Attributes in the order of the schema.
+/// Attributes of an element in the order of the schema.
 type Attributes = Vec<(&'static str, String)>;
 
 impl ModelDescription {
-    /// The text of `modelDescription.xml`.
+    /// Returns the text of `modelDescription.xml`.
     ///
     /// # Errors
-    /// If [`ModelDescription::check`] finds a contradiction.
+    /// Reports the contradictions that [`ModelDescription::check`] finds.
     ///
     /// # Panics
-    /// Never: writing to memory does not fail and everything written is text.
+    /// This never panics, because writing to memory does not fail and everything written is text.
     pub fn to_xml(&self) -> Result<String, Error> {
         self.check()?;
         let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
@@ -32,7 +32,7 @@ impl ModelDescription {
     fn write(&self, xml: &mut Xml) -> io::Result<()> {
         xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
         let mut attributes: Attributes = vec![
-            // Several importers compare this text; "2.0.4" would be refused.
+            // Several importers compare this text; they would refuse "2.0.4".
             ("fmiVersion", "2.0".into()),
             ("modelName", self.name.clone()),
             ("guid", self.guid()),
@@ -176,7 +176,8 @@ impl ModelDescription {
 
     fn write_variable(&self, xml: &mut Xml, reference: usize) -> io::Result<()> {
         let variable = &self.variables[reference];
-        // `initial` is left out: parameters are exact and outputs and locals calculated by the standard's own defaults.
+        // The attribute `initial` is left out, because the standard's defaults fit: parameters are
+        // exact, and outputs and locals are calculated.
         let attributes = vec![
             ("name", variable.name.clone()),
             ("valueReference", reference.to_string()),
@@ -228,7 +229,8 @@ impl ModelDescription {
     }
 }
 
-/// One list of ModelStructure. FMI counts variables from 1 here; an empty `dependencies` says that there are none.
+/// Writes one list of ModelStructure. FMI counts variables from 1 here; an empty `dependencies`
+/// means that there are none.
 fn unknowns(
     xml: &mut Xml,
     name: &str,
@@ -264,7 +266,7 @@ fn variability(variable: &Variable) -> &'static str {
     }
 }
 
-/// The shortest text that reads back as the same number.
+/// Returns the shortest text that reads back as the same number.
 fn real(x: f64) -> String {
     format!("{x:?}")
 }

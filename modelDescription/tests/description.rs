@@ -1,4 +1,4 @@
-//! A small unit described by hand: its GUID, checks, XML, page and archive.
+//! Tests with a small unit described by hand: its GUID, checks, XML, page and archive.
 
 use model_description::pack::{Extras, pack};
 use model_description::unit::{angle, angular_rate};
@@ -17,7 +17,8 @@ fn real(start: Option<f64>) -> Kind {
     Kind::Real { unit: Some(angle()), min: None, max: None, nominal: None, start, derivative_of: None }
 }
 
-/// Position 0: parameter, 1: enumeration, 2: input, 3: state, 4: derivative, 5: output with feedthrough.
+/// A unit with these positions: 0 parameter, 1 enumeration, 2 input, 3 state, 4 derivative, 5
+/// output with feedthrough.
 fn unit() -> ModelDescription {
     use Causality::{Input, Local, Output, Parameter};
     use Variability::{Continuous, Discrete, Fixed};
@@ -259,7 +260,7 @@ fn the_archive_is_complete_and_the_same_every_time() {
     assert_eq!(content[1].1, "machine code");
     assert_eq!(content[0].1, unit().to_xml().unwrap());
 
-    // Other times and another order of the folder: still the same bytes.
+    // Another time and another order of the folder still give the same bytes.
     std::thread::sleep(std::time::Duration::from_millis(20));
     fs::write(at("data/z.csv"), "1").unwrap();
     pack(&unit(), &at("library"), folder.path(), &extras).unwrap();

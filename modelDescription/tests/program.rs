@@ -1,4 +1,4 @@
-//! The program `fmu-pack` from outside: exit codes and messages.
+//! Tests of the program `fmu-pack` from outside: its exit codes and messages.
 
 use std::process::{Command, Output};
 
@@ -33,7 +33,7 @@ fn a_wrong_library_ends_with_1_and_is_named() {
 #[cfg(target_os = "linux")]
 fn a_library_without_units_is_told_how_to_get_some() {
     let folder = tempfile::tempdir().unwrap();
-    // A library that is there for certain: one that this test itself runs with.
+    // The library is certain to exist, because this test itself runs with it.
     let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
     let Some(library) = maps.split_whitespace().find(|path| path.contains("libc.so")) else { return };
     let output = fmu_pack(&[library, "--output", folder.path().to_str().unwrap()]);

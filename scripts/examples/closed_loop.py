@@ -20,7 +20,7 @@ REFERENCE = ["reference.alpha", "reference.beta", "reference.sigma"]  # rad
 
 
 class Unit:
-    """An FMU that is read and set by the names of its variables, which are real or integer."""
+    """An FMU whose variables, real or integer, are read and set by name."""
 
     def __init__(self, path, parameters=None):
         description = read_model_description(path)
@@ -53,7 +53,8 @@ class Unit:
 
 
 def simulate(controller, stop=50.0, step=0.04, parameters=None, fmus=FMUS):
-    """Rows of time, attitude, rate, moment and reference. The parameters are those of the plant."""
+    """Steps the loop and returns rows of time, attitude, rate, moment and reference. The parameters
+    are those of the plant."""
     plant = Unit(str(fmus / "ReentryPlant.fmu"), parameters)
     law = Unit(str(fmus / f"{controller}.fmu"))
     rows = []
@@ -61,7 +62,8 @@ def simulate(controller, stop=50.0, step=0.04, parameters=None, fmus=FMUS):
         if k > 0:
             law.fmu.doStep((k - 1) * step, step)
             plant.fmu.doStep((k - 1) * step, step)
-        # The controller answers to the state of this very instant: no delay in the loop.
+        # The controller answers to the state of this very instant, so there is no delay in the
+        # loop.
         state = plant.get(ATTITUDE + RATE)
         law.set(ATTITUDE + RATE, state)
         moment = law.get(MOMENT)
@@ -73,7 +75,8 @@ def simulate(controller, stop=50.0, step=0.04, parameters=None, fmus=FMUS):
 
 
 def mean_error(rows):
-    """Root of the mean of |attitude - reference|^2 over the instants at which steps begin, in degrees: EMS of the papers."""
+    """Figure of merit EMS of the papers, in degrees: the root of the mean of
+    |attitude - reference|^2 over the instants at which steps begin."""
     squares = [sum((row[1 + i] - row[10 + i]) ** 2 for i in range(3)) for row in rows[:-1]]
     return math.degrees(math.sqrt(sum(squares) / len(squares)))
 

@@ -1,4 +1,5 @@
-//! Actuators: from commands to surfaces and jets, to the moment that acts. What acts on a command, in this order:
+//! Actuators turn commands to surfaces and jets into the control moment. A command passes through
+//! these effects, in this order:
 //!
 //! 1. surface: position limits on the command, Wu 2015 (63)
 //! 2. surface: rate limit, (63); the deflection moves to the limited command and stops there
@@ -6,8 +7,9 @@
 //! 4. jet: on from a command of one half, or a duty cycle cut off at 0 and 1
 //! 5. jet: moment D_RCS δ_RCS, (57)
 //!
-//! Commands are taken at instants and held in between. Until a deflection comes to rest its rate is constant: right side of
-//! its differential equation and, from one instant to another, its exact solution.
+//! Commands are taken at instants and held in between. The rate of a deflection is constant until
+//! the deflection comes to rest, so the right side of its differential equation and its exact
+//! solution are both available.
 
 use crate::effectors::{Effectors, JETS, Jets, SURFACES, Surfaces};
 use crate::error::Error;
@@ -15,64 +17,64 @@ use crate::time::tolerance;
 use nalgebra::{SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// The command from which on a jet that only switches is on.
+/// Command from which on a jet in on-off mode is switched on.
 pub const THRESHOLD: f64 = 0.5;
 
-/// What a jet makes of its command when commands are taken.
+/// Meaning of a jet's command at the instant at which it is taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum JetMode {
-    /// On from [`THRESHOLD`], else off.
+    /// The jet gives full thrust for commands from [`THRESHOLD`] on and none below.
     #[default]
     OnOff,
     /// The command is the mean thrust as a fraction of the full one.
     Duty,
 }
 
-/// All that determines the actuators.
+/// Configuration that determines the actuators completely.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
-    /// Surfaces and jets.
+    /// Moments and limits of the surfaces and jets.
     pub effectors: Effectors,
-    /// What the jets do.
+    /// Meaning of the commands to the jets.
     pub jet_mode: JetMode,
-    /// Dynamic pressure, Pa.
+    /// Dynamic pressure of the flight condition, Pa.
     pub dynamic_pressure: f64,
-    /// Factor from the nominal to the vehicle's surface effectiveness.
+    /// Factor from the nominal surface effectiveness to that of the vehicle.
     pub aerodynamics_scale: f64,
 }
 
-/// Commands to the actuators.
+/// Commands to the surfaces and jets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Command {
-    /// Deflection of each surface, rad.
+    /// Commanded deflection of each surface, rad.
     pub surfaces: Surfaces,
-    /// Each jet: 0 off, 1 full thrust.
+    /// Command to each jet: 0 is off, 1 is full thrust.
     pub jets: Jets,
 }
 
 impl Command {
-    /// What holds a value that is not finite.
+    /// Returns the name of the command if one of its values is not finite.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let broken = self.surfaces.iter().chain(&self.jets).any(|value| !value.is_finite());
         broken.then_some("actuator command")
     }
 }
 
-/// What the actuators do since commands were taken or a deflection came to rest last.
+/// Motion of the actuators since commands were last taken or a deflection last came to rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Drive {
-    /// Deflections they move to, rad.
+    /// Target of each deflection, rad.
     target: Surfaces,
-    /// 1 up, −1 down, 0 at rest.
+    /// Direction in which each deflection moves: 1 up, −1 down, 0 at rest.
     direction: Surfaces,
-    /// Thrust of each jet, 0 to 1.
+    /// Thrust of each jet as a fraction from 0 to 1.
     thrust: Jets,
 }
 
-/// Surfaces and jets at a flight condition.
+/// Surfaces and jets at one flight condition.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Actuators {
-    /// D_A in flight, N m/rad.
+    /// Surface effectiveness D_A at the dynamic pressure of the flight, N m/rad.
     surface_moments: SMatrix<f64, 3, SURFACES>,
     jet_moments: SMatrix<f64, 3, JETS>,
     min: Surfaces,
@@ -82,7 +84,7 @@ pub struct Actuators {
 }
 
 impl Actuators {
-    /// At rest with all deflections zero.
+    /// Makes the actuators of a configuration.
     ///
     /// # Errors
     /// Names the value that is out of range.
@@ -103,7 +105,8 @@ impl Actuators {
         })
     }
 
-    /// What a command taken at `time` (s) sets off from given deflections (rad).
+    /// Returns the motion that a command taken at `time` (s) starts from the given deflections
+    /// (rad).
     pub fn commanded(&self, time: f64, command: &Command, deflections: &Surfaces) -> Drive {
         let target = Surfaces::from_fn(|i, _| command.surfaces[i].clamp(self.min[i], self.max[i]));
         let thrust = command.jets.map(|jet| match self.jet_mode {
@@ -114,28 +117,30 @@ impl Actuators {
         self.directed(time, Drive { target, thrust, ..Drive::default() }, deflections)
     }
 
-    /// The drive with each direction as the way left at `time` (s) says.
+    /// Returns the drive with the direction of each surface set from the distance left at `time`
+    /// (s).
     pub fn directed(&self, time: f64, drive: Drive, deflections: &Surfaces) -> Drive {
         let way = drive.target - deflections;
-        // A way that is gone at the same instant is none.
+        // A distance that would be covered within the time tolerance counts as zero.
         let least = self.rate * tolerance(time);
         let direction =
             Surfaces::from_fn(|i, _| if way[i].abs() <= least[i] { 0.0 } else { way[i].signum() });
         Drive { direction, ..drive }
     }
 
-    /// Whether this can be a drive of actuators.
+    /// Whether a restored drive holds only values that a drive can have.
     pub(crate) fn fits(drive: &Drive) -> bool {
         (0..SURFACES).all(|i| drive.target[i].is_finite() && [-1.0, 0.0, 1.0].contains(&drive.direction[i]))
             && drive.thrust.iter().all(|value| value.is_finite())
     }
 
-    /// Rates of the deflections, rad/s.
+    /// Rate of each deflection, rad/s.
     pub fn rates(&self, drive: &Drive) -> Surfaces {
         self.rate.component_mul(&drive.direction)
     }
 
-    /// Time (s) until each deflection that moves comes to rest; negative behind its target, infinite at rest.
+    /// Time (s) until each moving deflection comes to rest: negative if it is beyond its target,
+    /// infinite if it is at rest.
     pub fn time_left(&self, drive: &Drive, deflections: &Surfaces) -> Surfaces {
         let way = drive.target - deflections;
         Surfaces::from_fn(|i, _| match drive.direction[i] {
@@ -144,7 +149,8 @@ impl Actuators {
         })
     }
 
-    /// Puts every deflection that has come to its target by `time` (s), or has gone beyond it, on the target.
+    /// Sets every deflection that has reached its target by `time` (s), or has passed it, to the
+    /// target.
     pub fn settle(&self, time: f64, drive: &Drive, deflections: &mut Surfaces) {
         let way = drive.target - *deflections;
         for i in 0..SURFACES {
@@ -155,17 +161,18 @@ impl Actuators {
         }
     }
 
-    /// The moment (N m) of surfaces and jets.
+    /// Control moment (N m) of the surfaces and jets.
     pub fn moment(&self, drive: &Drive, deflections: &Surfaces) -> Vector3<f64> {
         self.surface_moments * deflections + self.jet_moments * drive.thrust
     }
 
-    /// Partial derivative of [`Actuators::moment`] by the deflections, N m/rad.
+    /// Partial derivative of [`Actuators::moment`] with respect to the deflections, N m/rad.
     pub fn moment_by_deflections(&self) -> &SMatrix<f64, 3, SURFACES> {
         &self.surface_moments
     }
 
-    /// Partial derivative of the moment (N m) by the commands to the jets when they are taken.
+    /// Partial derivative of the moment (N m) with respect to the jet commands at the instant at
+    /// which they are taken.
     pub fn moment_by_jets(&self, command: &Command) -> SMatrix<f64, 3, JETS> {
         let mut derivative = self.jet_moments;
         for (j, mut column) in derivative.column_iter_mut().enumerate() {
@@ -197,7 +204,8 @@ mod tests {
 
     const FAR: [f64; SURFACES] = [-90.0, -20.0, 5.0, -3.0, 90.0, -90.0, 90.0, -90.0];
 
-    /// The exact motion from rest at zero: from one arrival to the next, the last one being `end`.
+    /// Returns the exact motion from rest at zero until `end`, followed from one arrival to the
+    /// next, and the times of the arrivals.
     fn moved(actuators: &Actuators, command: &Command, begin: f64, end: f64) -> (Surfaces, Vec<f64>) {
         let mut deflections = Surfaces::zeros();
         let (mut time, mut arrivals) = (begin, Vec::new());
@@ -237,7 +245,7 @@ mod tests {
 
     #[test]
     fn the_position_limit_acts_before_the_rate_limit() {
-        // A command far beyond the limit does not wind up: the way back begins at once
+        // A command far beyond the limit does not wind up: the way back begins at once.
         let actuators = actuators(JetMode::OnOff);
         let away = moved(&actuators, &surfaces([-90.0; SURFACES]), 0.0, 10.0).0;
         let back = actuators.commanded(10.0, &surfaces([0.0; SURFACES]), &away);

@@ -14,26 +14,27 @@ const SEA_LEVEL: (f64, f64) = (288.15, 101_325.0); // K, Pa
 const LAYERS: [(f64, f64); 7] =
     [(0.0, -6.5e-3), (11e3, 0.0), (20e3, 1e-3), (32e3, 2.8e-3), (47e3, 0.0), (51e3, -2.8e-3), (71e3, -2e-3)];
 
-/// Largest geometric altitude, m.
+/// Largest geometric altitude of the model, m.
 pub const TOP: f64 = 86e3;
 
-/// The air at one altitude.
+/// State of the air at one altitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {
-    /// Molecular-scale temperature, K: up to 80 km the temperature itself, at 86 km 0.04 % above it.
+    /// Molecular-scale temperature, K: it equals the temperature up to 80 km and is 0.04 % above it
+    /// at 86 km.
     pub temperature: f64,
-    /// Pressure, Pa.
+    /// Static pressure of the air, Pa.
     pub pressure: f64,
-    /// Density, kg/m³.
+    /// Mass density of the air, kg/m³.
     pub density: f64,
-    /// Speed of sound, m/s.
+    /// Speed of sound in the air, m/s.
     pub sound_speed: f64,
 }
 
-/// The air at a geometric altitude (m) from 0 to [`TOP`].
+/// Returns the state of the air at a geometric altitude (m) from 0 to [`TOP`].
 ///
 /// # Errors
-/// If the altitude lies outside.
+/// Names the altitude if it lies outside this range.
 pub fn air(altitude: f64) -> Result<Air, Error> {
     if !(0.0..=TOP).contains(&altitude) {
         let problem = format!("= {altitude} m must lie between 0 and {TOP} m");
@@ -57,18 +58,18 @@ pub fn air(altitude: f64) -> Result<Air, Error> {
     Ok(Air { temperature, pressure, density, sound_speed: (HEAT_RATIO * specific).sqrt() })
 }
 
-/// Where and how fast the vehicle flies.
+/// Flight condition of the vehicle: altitude and Mach number.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Flight {
-    /// Geometric altitude, m.
+    /// Geometric altitude of the vehicle, m.
     pub altitude: f64,
-    /// Mach number.
+    /// Mach number of the vehicle, dimensionless.
     pub mach: f64,
 }
 
 impl Flight {
-    /// ½ ρ V², Pa.
+    /// Dynamic pressure ½ ρ V² of the flight condition, Pa.
     ///
     /// # Errors
     /// Names the value that is out of range.
@@ -90,14 +91,14 @@ mod tests {
         assert!((value / expected - 1.0).abs() < relative, "{value}, not {expected}");
     }
 
-    /// Geometric altitude (m) of a geopotential one.
+    /// Converts a geopotential altitude (m) to the geometric altitude (m).
     fn geometric(height: f64) -> f64 {
         EARTH_RADIUS * height / (EARTH_RADIUS - height)
     }
 
     #[test]
     fn oracle_pressures_at_the_layers_bases() {
-        // Table of the base pressures as derived from the standard's definition
+        // The table holds the base pressures as derived from the standard's definition.
         for (height, pressure) in [
             (0.0, 101_325.0),
             (11e3, 22_632.06),
@@ -109,7 +110,8 @@ mod tests {
         ] {
             close(air(geometric(height)).unwrap().pressure, pressure, 2e-7);
         }
-        // The top of the last layer is 86 km geometric, 84.852 km geopotential
+        // The top of the last layer is at 86 km geometric, which is 84.852 km geopotential
+        // altitude.
         close(air(TOP).unwrap().pressure, 0.373_38, 2e-5);
         close(air(TOP).unwrap().temperature, 186.946, 2e-6);
     }

@@ -1,5 +1,5 @@
-//! A rotation sequence for the calibration of sensors: the platform turns so that every direction in space is seen from the
-//! body in every direction.
+//! Rotation sequence for the calibration of sensors. The platform turns so that every direction
+//! fixed in space points along every direction of the body at some time.
 
 use crate::error::Error;
 use crate::kinematics::Kinematics;
@@ -7,22 +7,23 @@ use crate::plant::{BETA_LIMIT, State, state};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// α and σ turn at constant rates, β swings: β = β₀ + amplitude · sin(frequency · t).
+/// Calibration sequence: α and σ turn at constant rates, and β swings as β₀ + amplitude ·
+/// sin(frequency · t).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sequence {
-    /// Rate of α, rad/s.
+    /// Constant rate of α, rad/s.
     pub alpha_rate: f64,
-    /// Rate of σ, rad/s.
+    /// Constant rate of σ, rad/s.
     pub sigma_rate: f64,
-    /// Amplitude of β, rad.
+    /// Amplitude of the swing of β, rad.
     pub beta_amplitude: f64,
-    /// Angular frequency of β, rad/s.
+    /// Angular frequency of the swing of β, rad/s.
     pub beta_frequency: f64,
 }
 
 impl Sequence {
-    /// Refuses a sequence that comes to the singular sideslip from `initial` angles (rad).
+    /// Refuses a sequence that reaches the singular sideslip angle from the `initial` angles (rad).
     ///
     /// # Errors
     /// Names the value at fault as the units do.
@@ -44,7 +45,8 @@ impl Sequence {
         Ok(())
     }
 
-    /// Θ, Θ̇ and Θ̈ (rad, s) at `time` (s) after the start at the angles `initial` (rad).
+    /// Attitude angles Θ and their derivatives Θ̇ and Θ̈ (rad, s) at `time` (s) after the start at
+    /// the angles `initial` (rad).
     pub fn angles_and_derivatives(&self, initial: &Vector3<f64>, time: f64) -> [Vector3<f64>; 3] {
         let (sine, cosine) = (self.beta_frequency * time).sin_cos();
         let (amplitude, frequency) = (self.beta_amplitude, self.beta_frequency);
@@ -56,7 +58,8 @@ impl Sequence {
         ]
     }
 
-    /// State and its derivative at `time` (s) after the start. ω belongs to Θ̇ by the R in force, the trajectory at rest.
+    /// State and its derivative at `time` (s) after the start. The rates ω follow from Θ̇ with the
+    /// matrix R in use and a trajectory that does not turn.
     pub fn motion(&self, kinematics: Kinematics, initial: &Vector3<f64>, time: f64) -> (State, State) {
         let [angles, angle_rates, angle_accelerations] = self.angles_and_derivatives(initial, time);
         let r_inverse = kinematics.r_inverse(&angles);

@@ -1,4 +1,5 @@
-//! Disturbances: Δ on ẋ_ω of Chai 2022 (4b) in rad/s², bounded in each component, and a sinusoidal moment in N m.
+//! Disturbances: an acceleration Δ that enters ẋ_ω in Chai 2022 (4b), in rad/s² and bounded in each
+//! component, and a sinusoidal moment in N m.
 
 use crate::dynamics::RigidBody;
 use crate::error::Error;
@@ -8,92 +9,95 @@ use crate::time::{tick, tick_time, tolerance};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// What the disturbance does.
+/// Kind of disturbance, which decides its course over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Kind {
-    /// Nothing.
+    /// No disturbance acts on the vehicle.
     #[default]
     None,
-    /// Each component of Δ uniform in [−bound, bound], drawn anew at every tick.
+    /// Each component of Δ is uniform in [−bound, bound] and is drawn anew at every tick.
     White,
-    /// Δ = bound · direction.
+    /// Δ = bound · direction holds all the time.
     Constant,
-    /// A moment: offset + Σ amplitude · sin(frequency · t + phase).
+    /// A moment offset + Σ amplitude · sin(frequency · t + phase) acts, and Δ is zero.
     Sine,
-    /// Δ = ± bound · direction, the sign changing every half square period, + first.
+    /// Δ = ± bound · direction; it begins with + and changes sign every half square period.
     Square,
-    /// Each component of Δ = ± bound with the sign that increases ‖ω‖ fastest, chosen at every tick.
+    /// Each component of Δ is ± bound, with the sign that increases ‖ω‖ fastest, chosen at every
+    /// tick.
     AlongRate,
-    /// Each component of Δ = ± bound against the control moment's R I⁻¹ m, chosen at every tick.
+    /// Each component of Δ is ± bound, opposite in sign to the control acceleration R I⁻¹ m, chosen
+    /// at every tick.
     AgainstMoment,
 }
 
-/// A disturbance and all that determines it.
+/// Disturbance with all the values that determine it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Disturbance {
-    /// What it does.
+    /// Kind of the disturbance, which selects the values below that are used.
     pub kind: Kind,
-    /// Bound on each component of Δ, rad/s².
+    /// Bound on the magnitude of each component of Δ, rad/s².
     pub bound: f64,
     /// Time between the ticks of white noise and of the state-dependent kinds, s.
     pub period: f64,
-    /// Seed of the white noise.
+    /// Seed of the white noise's random numbers.
     pub seed: u64,
-    /// Factors of constant and square wave per component, in [−1, 1].
+    /// Factors by which the constant and the square wave scale each component, in [−1, 1].
     pub direction: Vector3<f64>,
-    /// Period of the square wave, s.
+    /// Full period of the square wave, s.
     pub square_period: f64,
-    /// The sinusoidal moment.
+    /// Moment of the sinusoidal kind, N m.
     pub sine: SineMoment,
-    /// The disturbance acts for start ≤ t < end, s. The square wave begins at `start`.
+    /// Start of the interval start ≤ t < end in which the disturbance acts, s. The square wave
+    /// begins here.
     pub start: f64,
-    /// See `start`, s.
+    /// End of the interval start ≤ t < end in which the disturbance acts, s.
     pub end: f64,
 }
 
-/// A moment offset + Σ amplitude · sin(frequency · t + phase), N m.
+/// Sinusoidal moment offset + Σ amplitude · sin(frequency · t + phase), N m.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SineMoment {
-    /// Constant part, N m.
+    /// Constant part of the moment, N m.
     #[serde(default)]
     pub offset: Vector3<f64>,
-    /// The sinusoids.
+    /// Sinusoids that are added to the constant part.
     #[serde(default, rename = "wave")]
     pub waves: Vec<MomentWave>,
 }
 
-/// One sinusoid of a moment.
+/// One sinusoid of the disturbance moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MomentWave {
     /// Amplitude about each body axis, N m.
     pub amplitude: Vector3<f64>,
-    /// Angular frequency, rad/s.
+    /// Angular frequency of the sinusoid, rad/s.
     pub frequency: f64,
-    /// Phase, rad.
+    /// Phase of the sinusoid at t = 0, rad.
     #[serde(default)]
     pub phase: f64,
 }
 
-/// What the state-dependent kinds look at when they choose.
+/// State of the vehicle that the state-dependent kinds use to choose Δ.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// The vehicle.
+    /// Rigid body of the vehicle, with its inertia.
     pub body: &'a RigidBody,
-    /// With the R in force.
+    /// Attitude kinematics, with the matrix R in use.
     pub kinematics: Kinematics,
-    /// Θ, rad.
+    /// Attitude angles Θ of the vehicle, rad.
     pub angles: Vector3<f64>,
-    /// ω, rad/s.
+    /// Body rates ω of the vehicle, rad/s.
     pub rates: Vector3<f64>,
-    /// Control moment, N m.
+    /// Control moment m about the body axes, N m.
     pub moment: Vector3<f64>,
 }
 
 impl Default for Disturbance {
-    /// None, with the other values neutral.
+    /// Returns a disturbance that does nothing, with neutral values in the other fields.
     fn default() -> Self {
         Self {
             kind: Kind::None,
@@ -110,7 +114,7 @@ impl Default for Disturbance {
 }
 
 impl Disturbance {
-    /// Refuses what the definitions above do not allow.
+    /// Refuses values that the definitions of the fields do not allow.
     ///
     /// # Errors
     /// Names the value at fault as the units do.
@@ -153,7 +157,8 @@ impl Disturbance {
         self.kind != Kind::None && time + tolerance(time) >= self.start && time + tolerance(time) < self.end
     }
 
-    /// Origin and length of the intervals over which Δ is held; `origin` is the start of the experiment (s).
+    /// Origin (s) and length (s) of the intervals over which Δ is held; `origin` is the start of
+    /// the experiment (s).
     pub(crate) fn intervals(&self, origin: f64) -> Option<(f64, f64)> {
         match self.kind {
             Kind::None | Kind::Constant | Kind::Sine => None,
@@ -162,12 +167,12 @@ impl Disturbance {
         }
     }
 
-    /// Number of the interval of constant Δ that holds `time` (s).
+    /// Number of the interval with constant Δ that contains `time` (s).
     pub fn tick(&self, origin: f64, time: f64) -> i64 {
         self.intervals(origin).map_or(0, |(start, length)| tick(time, start, length))
     }
 
-    /// The first time (s) after `time` at which the disturbance may change by a jump.
+    /// First time (s) after `time` at which the disturbance may jump.
     pub fn next_change(&self, origin: f64, time: f64) -> Option<f64> {
         if self.kind == Kind::None || time + tolerance(time) >= self.end {
             return None;
@@ -182,7 +187,7 @@ impl Disturbance {
         next.is_finite().then_some(next)
     }
 
-    /// Δ (rad/s²) of the interval with number `tick`, as long as the disturbance acts.
+    /// Value of Δ (rad/s²) in the interval with number `tick`, provided that the disturbance acts.
     pub fn sample(&self, tick: i64, view: &View) -> Vector3<f64> {
         match self.kind {
             Kind::None | Kind::Sine => Vector3::zeros(),
@@ -199,7 +204,7 @@ impl Disturbance {
         }
     }
 
-    /// The disturbance moment (N m) at `time` (s), as long as the disturbance acts.
+    /// Disturbance moment (N m) at `time` (s), provided that the disturbance acts.
     pub fn moment(&self, time: f64) -> Vector3<f64> {
         if self.kind != Kind::Sine {
             return Vector3::zeros();
@@ -209,7 +214,7 @@ impl Disturbance {
     }
 }
 
-/// Sign of each component, + for 0.
+/// Returns the sign of each component, with + for 0.
 fn signs(vector: &Vector3<f64>) -> Vector3<f64> {
     vector.map(|component| if component < 0.0 { -1.0 } else { 1.0 })
 }

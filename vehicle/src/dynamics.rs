@@ -1,36 +1,37 @@
-//! Rigid-body attitude dynamics, Chai 2022 (1)–(5).
+//! Rigid-body attitude dynamics of Chai 2022, (1)–(5).
 
 use crate::error::Error;
 use crate::kinematics;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Inertia tensor with the products of inertia in the sign convention of Chai 2022 (3): off-diagonal entries are −I_ij.
+/// Moments and products of inertia in the sign convention of Chai 2022 (3): the off-diagonal
+/// entries of the tensor are −I_ij.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)]
 pub struct Inertia {
-    /// Roll moment of inertia, kg m².
+    /// Moment of inertia about the roll axis, kg m².
     pub Ixx: f64,
-    /// Pitch moment of inertia, kg m².
+    /// Moment of inertia about the pitch axis, kg m².
     pub Iyy: f64,
-    /// Yaw moment of inertia, kg m².
+    /// Moment of inertia about the yaw axis, kg m².
     pub Izz: f64,
-    /// Roll-yaw product of inertia, kg m².
+    /// Product of inertia of the roll and yaw axes, kg m².
     pub Ixz: f64,
 }
 
 impl Inertia {
-    /// The tensor I, kg m².
+    /// Returns the inertia tensor I, kg m².
     pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::new(self.Ixx, 0.0, -self.Ixz, 0.0, self.Iyy, 0.0, -self.Ixz, 0.0, self.Izz)
     }
 
-    /// The rigid body of `scale` times this inertia.
+    /// Returns the rigid body whose inertia is `scale` times this one.
     ///
     /// # Errors
-    /// Names the moment or product of inertia that no body can have: I must be positive definite, and no principal
-    /// moment may exceed the sum of the other two.
+    /// Names the moment or product of inertia that no body can have: I must be positive definite,
+    /// and no principal moment may exceed the sum of the other two.
     pub fn body(&self, scale: f64) -> Result<RigidBody, Error> {
         let refuse = |name, problem: String| Err(Error::Parameter { name, problem });
         for (name, value) in [("inertia.Ixx", self.Ixx), ("inertia.Iyy", self.Iyy), ("inertia.Izz", self.Izz)]
@@ -57,35 +58,37 @@ impl Inertia {
     }
 }
 
-/// A rigid body: its inertia tensor and the inverse.
+/// Rigid body, given by its inertia tensor and the inverse of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RigidBody {
-    /// I, kg m².
+    /// Inertia tensor I about the body axes, kg m².
     pub inertia: Matrix3<f64>,
-    /// I⁻¹.
+    /// Inverse I⁻¹ of the inertia tensor, 1/(kg m²).
     pub inverse: Matrix3<f64>,
 }
 
 impl RigidBody {
-    /// From an inertia tensor (kg m²); `None` if it is not symmetric positive definite.
+    /// Makes a body from its inertia tensor (kg m²), or `None` if the tensor is not symmetric
+    /// positive definite.
     pub fn new(inertia: Matrix3<f64>) -> Option<Self> {
         let inverse = inertia.cholesky().filter(|_| inertia == inertia.transpose())?.inverse();
         Some(Self { inertia, inverse })
     }
 
-    /// ω̇ = I⁻¹ (m − ω × I ω), Chai 2022 (1b) without Δ_m; `rates` rad/s, `moment` N m.
+    /// Angular acceleration ω̇ = I⁻¹ (m − ω × I ω) in rad/s², Chai 2022 (1b) without Δ_m; `rates`
+    /// in rad/s, `moment` in N m.
     pub fn angular_acceleration(&self, rates: &Vector3<f64>, moment: &Vector3<f64>) -> Vector3<f64> {
         self.inverse * (moment - rates.cross(&(self.inertia * rates)))
     }
 
-    /// f(Θ, x_ω) = Ṙ ω − R I⁻¹ Ω I ω of Chai 2022 (4b), the drift of ẍ_Θ = f + u, in rad/s².
+    /// Drift f(Θ, x_ω) = Ṙ ω − R I⁻¹ Ω I ω of ẍ_Θ = f + u, Chai 2022 (4b), in rad/s².
     pub fn drift(&self, angles: &Vector3<f64>, angle_rates: &Vector3<f64>) -> Vector3<f64> {
         let rates = kinematics::r_inverse(angles) * angle_rates;
         let gyroscopic = self.inverse * rates.cross(&(self.inertia * rates));
         kinematics::r_dot(angles, angle_rates) * rates - kinematics::r(angles) * gyroscopic
     }
 
-    /// The moment behind the input u = R I⁻¹ m of Chai 2022 (4): m = I R⁻¹ u, N m.
+    /// Moment m = I R⁻¹ u (N m) that gives the input u = R I⁻¹ m of Chai 2022 (4).
     pub fn moment(&self, angles: &Vector3<f64>, u: &Vector3<f64>) -> Vector3<f64> {
         self.inertia * (kinematics::r_inverse(angles) * u)
     }

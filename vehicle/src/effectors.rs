@@ -1,66 +1,71 @@
-//! What turns the vehicle: eight aerodynamic surfaces and ten jets, Wu 2015 (57)–(59), (63)–(65).
+//! Effectors of the vehicle: eight aerodynamic surfaces and ten jets, Wu 2015 (57)–(59), (63)–(65).
 
 use crate::error::Error;
 use nalgebra::{SMatrix, SVector, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
-/// Number of aerodynamic surfaces.
+/// Number of aerodynamic surfaces of the vehicle.
 pub const SURFACES: usize = 8;
-/// Number of jets.
+/// Number of reaction control jets of the vehicle.
 pub const JETS: usize = 10;
 
-/// One number per surface.
+/// Vector with one number for each surface.
 pub type Surfaces = SVector<f64, SURFACES>;
-/// One number per jet.
+/// Vector with one number for each jet.
 pub type Jets = SVector<f64, JETS>;
 
 const EFFECTORS: (&str, &str) = ("effectors.toml", include_str!("../data/effectors.toml"));
 
-/// Moments and limits of surfaces and jets. Moments act about the body axes x forward, y right, z down; a deflection with
-/// the trailing edge down is positive.
+/// Moments and limits of the surfaces and jets. Moments act about the body axes x forward, y right,
+/// z down; a deflection with the trailing edge down is positive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Effectors {
-    /// D_A of Wu 2015 (58) at the reference dynamic pressure, N m/rad. Representative values: the paper prints none.
+    /// Surface effectiveness D_A of Wu 2015 (58) at the reference dynamic pressure, N m/rad. The
+    /// values are representative, as the paper prints none.
     pub effectiveness: SMatrix<f64, 3, SURFACES>,
-    /// Dynamic pressure that the effectiveness belongs to, Pa.
+    /// Dynamic pressure for which `effectiveness` holds, Pa.
     pub reference_pressure: f64,
     /// Lower limit of each deflection, rad.
     pub min: Surfaces,
     /// Upper limit of each deflection, rad.
     pub max: Surfaces,
-    /// Largest deflection rate of each surface either way, rad/s.
+    /// Largest deflection rate of each surface in either direction, rad/s.
     pub rate: Surfaces,
-    /// Whether control may use the surface, Wu 2015 (65).
+    /// Whether control may use each surface, Wu 2015 (65).
     pub allowed: [bool; SURFACES],
-    /// Names of the surfaces.
+    /// Name of each aerodynamic surface.
     pub names: [String; SURFACES],
-    /// D_RCS of Wu 2015 (64): moment of each jet at full thrust, N m.
+    /// Jet effectiveness D_RCS of Wu 2015 (64): the moment of each jet at full thrust, N m.
     pub jet_moments: SMatrix<f64, 3, JETS>,
-    /// Thrust of one jet, N.
+    /// Thrust of one jet when it is on, N.
     pub jet_force: f64,
-    /// A fourth column for `jet_moments` that mirrors the eighth, N m; see [`Effectors::symmetric`].
+    /// Replacement for the fourth column of `jet_moments` that mirrors the eighth, N m;
+    /// [`Effectors::symmetric`] uses it.
     pub symmetric_jet_4: Vector3<f64>,
 }
 
 impl Effectors {
-    /// Wu 2015, section 6, as printed; with a representative effectiveness of the surfaces.
+    /// Effectors of Wu 2015, section 6, as printed, with a representative effectiveness of the
+    /// surfaces.
     pub fn published() -> Self {
         static READ: LazyLock<Effectors> = LazyLock::new(|| embedded(EFFECTORS));
         READ.clone()
     }
 
-    /// The same with jet 4 as the mirror image of jet 8: the printed 10944 N m breaks the symmetry of the other columns.
+    /// Returns these effectors with jet 4 as the mirror image of jet 8: the printed 10944 N m
+    /// breaks the symmetry of the other columns.
     #[must_use]
     pub fn symmetric(mut self) -> Self {
         self.jet_moments.set_column(3, &self.symmetric_jet_4);
         self
     }
 
-    /// From the text of a file in the form of `data/effectors.toml`; `file` names it in messages.
+    /// Reads the effectors from a text in the form of `data/effectors.toml`; `file` names it in
+    /// messages.
     ///
     /// # Errors
-    /// Says what is missing, unknown or out of range.
+    /// Says which entry is missing, unknown or out of range.
     pub fn from_toml(file: &str, text: &str) -> Result<Self, Error> {
         let refuse = |problem: String| Error::Effectors { file: file.into(), problem };
         let File { surfaces, jets } = toml::from_str(text).map_err(|error| refuse(error.to_string()))?;
@@ -92,7 +97,7 @@ impl Effectors {
             return Err(format!("jets.force = {} N must be positive", self.jet_force));
         }
         for (i, name) in self.names.iter().enumerate() {
-            // Deflections start at zero.
+            // Zero must lie within the limits because deflections start there.
             let holds_zero = self.min[i] <= 0.0 && 0.0 <= self.max[i];
             if !(holds_zero && self.min[i].is_finite() && self.max[i].is_finite()) {
                 return Err(format!(
@@ -113,28 +118,28 @@ impl Effectors {
         Ok(())
     }
 
-    /// D_A of Wu 2015 (58) at a dynamic pressure (Pa), N m/rad.
+    /// Surface effectiveness D_A of Wu 2015 (58) at a dynamic pressure (Pa), N m/rad.
     pub fn effectiveness_at(&self, dynamic_pressure: f64) -> SMatrix<f64, 3, SURFACES> {
         self.effectiveness * (dynamic_pressure / self.reference_pressure)
     }
 
-    /// D_A δ_A of Wu 2015 (57), N m, of `deflections` (rad) at a dynamic pressure (Pa).
+    /// Moment D_A δ_A of Wu 2015 (57) in N m, for `deflections` (rad) at a dynamic pressure (Pa).
     pub fn moment_of_surfaces(&self, deflections: &Surfaces, dynamic_pressure: f64) -> Vector3<f64> {
         self.effectiveness * deflections * (dynamic_pressure / self.reference_pressure)
     }
 
-    /// D_RCS δ_RCS of Wu 2015 (57), N m; `duty` from 0 (off) to 1 (full thrust).
+    /// Moment D_RCS δ_RCS of Wu 2015 (57) in N m; `duty` runs from 0 (off) to 1 (full thrust).
     pub fn moment_of_jets(&self, duty: &Jets) -> Vector3<f64> {
         self.jet_moments * duty
     }
 }
 
 fn embedded((file, text): (&str, &str)) -> Effectors {
-    // Cannot fail: a test reads the embedded file.
+    // This cannot fail: a test reads the embedded file.
     Effectors::from_toml(file, text).unwrap_or_else(|error| panic!("{error}"))
 }
 
-// The file's form: the units printed in the paper, named in the keys.
+// The structures below mirror the file, with the units printed in the paper named in the keys.
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -252,7 +257,7 @@ mod tests {
         near(effectors.moment_of_surfaces(&deflections, 0.0), [0.0; 3]);
     }
 
-    /// Columns of mirrored surfaces pair up like those of the jets.
+    /// The columns of mirrored surfaces form pairs like those of the jets.
     #[test]
     fn left_and_right_surfaces_are_mirror_images() {
         let effectors = Effectors::published();

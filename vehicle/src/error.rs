@@ -1,50 +1,50 @@
-//! What can go wrong in this crate.
+//! Errors that this crate reports.
 
-/// Why a vehicle, its data or a simulation cannot be used.
+/// Reason why a vehicle, its data or a simulation cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// A scenario file that cannot be read or understood.
+    /// The scenario file cannot be read or understood.
     #[error("scenario {file}: {problem}")]
     Scenario {
-        /// File or embedded name.
+        /// Path of the file, or the name of an embedded one.
         file: String,
-        /// What is wrong with it.
+        /// Description of the fault in the file.
         problem: String,
     },
-    /// A file of surfaces and jets that cannot be read or understood.
+    /// The file of surfaces and jets cannot be read or understood.
     #[error("effectors {file}: {problem}")]
     Effectors {
-        /// File or embedded name.
+        /// Path of the file, or the name of an embedded one.
         file: String,
-        /// What is wrong with it.
+        /// Description of the fault in the file.
         problem: String,
     },
-    /// A reference table that cannot be read or understood.
+    /// The reference table cannot be read or understood.
     #[error("reference table {file}{}: {problem}", place(*line, column.as_deref()))]
     Table {
-        /// File name.
+        /// Name of the table's file.
         file: String,
-        /// Line, counted from 1, if the problem has one.
+        /// Number of the line, counted from 1, if the problem belongs to one.
         line: Option<u64>,
-        /// Column heading, if the problem has one.
+        /// Heading of the column, if the problem belongs to one.
         column: Option<String>,
-        /// What is wrong and what is expected.
+        /// Description of the fault and of the expected content.
         problem: String,
     },
-    /// A configuration value outside what the equations allow.
+    /// A configuration value lies outside the range that the equations allow.
     #[error("{name} {problem}")]
     Parameter {
         /// Name of the value, as in the data files and units.
         name: &'static str,
-        /// What is wrong with it.
+        /// Description of the fault in the value.
         problem: String,
     },
-    /// The sideslip angle came to ±90°, where the attitude angles are singular.
+    /// The sideslip angle reached ±90°, where the attitude angles are singular.
     #[error("sideslip beta = {beta_deg:.3} deg at t = {time} s: the attitude angles are singular at 90 deg")]
     Singular {
-        /// Time, s.
+        /// Time at which this happened, s.
         time: f64,
-        /// Sideslip angle, deg.
+        /// Sideslip angle at that time, deg.
         beta_deg: f64,
     },
     /// A state or an input is no longer a finite number.
@@ -52,9 +52,9 @@ pub enum Error {
         "{what} is not finite or beyond all bounds at t = {time} s: wrong input, unstable loop, or too long a step"
     )]
     NotFinite {
-        /// Time, s.
+        /// Time at which this happened, s.
         time: f64,
-        /// The quantity at fault.
+        /// Name of the quantity at fault.
         what: &'static str,
     },
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 
-/// One step of the classic fourth-order Runge–Kutta method from `time` over `h` (both s).
+/// Takes one step of the classic fourth-order Runge–Kutta method, from `time` over `h` (both in s).
 pub fn rk4<const N: usize>(
     f: &mut impl FnMut(f64, &SVector<f64, N>) -> SVector<f64, N>,
     time: f64,
@@ -16,7 +16,8 @@ pub fn rk4<const N: usize>(
     y + (k1 + (k2 + k3) * 2.0 + k4) * (h / 6.0)
 }
 
-/// Number of equal steps, none longer than `step` (beyond rounding), that make up `length`; at least one.
+/// Number of equal steps, at least one, that make up `length`, none of them longer than `step`
+/// beyond rounding.
 pub fn equal_steps(length: f64, step: f64) -> u64 {
     ((length / step * (1.0 - crate::time::TOLERANCE)).ceil() as u64).max(1)
 }

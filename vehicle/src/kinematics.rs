@@ -1,13 +1,15 @@
-//! Attitude kinematics: the matrix R of Chai 2022 (2), its inverse and its derivatives; Wu 2015 (1) with the trajectory.
+//! Attitude kinematics: the matrix R of Chai 2022 (2), its inverse and its derivatives, and Wu 2015
+//! (1), which includes the trajectory.
 //!
-//! Angles `[alpha, beta, sigma]` (angle of attack, sideslip, bank) in rad, body rates `[p, q, r]` in rad/s. The matrices R
-//! do not depend on the bank angle. R is printed without the term α̇ sin β in its bank row; the functions have it as printed,
-//! [`Kinematics`] has both.
+//! The attitude angles `[alpha, beta, sigma]` are angle of attack, sideslip and bank in rad; the
+//! body rates are `[p, q, r]` in rad/s. R does not depend on the bank angle. The papers print R
+//! without the term α̇ sin β in its bank row; the free functions have it as printed, and
+//! [`Kinematics`] offers both forms.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// R(Θ) of Chai 2022 (2): Θ̇ = R ω. Singular at β = ±π/2.
+/// Matrix R(Θ) of Chai 2022 (2), with which Θ̇ = R ω. It is singular at β = ±π/2.
 pub fn r(angles: &Vector3<f64>) -> Matrix3<f64> {
     let (sa, ca) = angles.x.sin_cos();
     let (sb, cb) = angles.y.sin_cos();
@@ -15,14 +17,14 @@ pub fn r(angles: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(-ca * tb, 1.0, -sa * tb, sa, 0.0, -ca, -ca * cb, -sb, -cb * sa)
 }
 
-/// R⁻¹(Θ), Chai 2022, proof of Lemma 1: ω = R⁻¹ Θ̇. Regular for every Θ.
+/// Inverse R⁻¹(Θ) of Chai 2022, proof of Lemma 1, with which ω = R⁻¹ Θ̇. It is regular for every Θ.
 pub fn r_inverse(angles: &Vector3<f64>) -> Matrix3<f64> {
     let (sa, ca) = angles.x.sin_cos();
     let (sb, cb) = angles.y.sin_cos();
     Matrix3::new(-sb * ca * cb, sa, -cb * ca, cb * cb, 0.0, -sb, -sa * cb * sb, -ca, -cb * sa)
 }
 
-/// ∂R/∂α.
+/// Partial derivative ∂R/∂α of the printed R.
 pub fn r_alpha(angles: &Vector3<f64>) -> Matrix3<f64> {
     let (sa, ca) = angles.x.sin_cos();
     let (sb, cb) = angles.y.sin_cos();
@@ -30,7 +32,7 @@ pub fn r_alpha(angles: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(sa * tb, 0.0, -ca * tb, ca, 0.0, sa, sa * cb, 0.0, -cb * ca)
 }
 
-/// ∂R/∂β.
+/// Partial derivative ∂R/∂β of the printed R.
 pub fn r_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
     let (sa, ca) = angles.x.sin_cos();
     let (sb, cb) = angles.y.sin_cos();
@@ -38,13 +40,14 @@ pub fn r_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(-ca * sec2, 0.0, -sa * sec2, 0.0, 0.0, 0.0, ca * sb, -cb, sb * sa)
 }
 
-/// Ṙ = R_α α̇ + R_β β̇. Corrects two entries of the print (Chai 2022, proof of Lemma 1): (1,3) is
-/// −α̇ cos α **tan β** − β̇ sin α / cos² β, and (3,1) has the term **+ β̇ cos α sin β**.
+/// Time derivative Ṙ = R_α α̇ + R_β β̇ of the printed R. It corrects two entries of the print (Chai
+/// 2022, proof of Lemma 1): (1,3) is −α̇ cos α **tan β** − β̇ sin α / cos² β, and (3,1) has the
+/// term **+ β̇ cos α sin β**.
 pub fn r_dot(angles: &Vector3<f64>, angle_rates: &Vector3<f64>) -> Matrix3<f64> {
     r_alpha(angles) * angle_rates.x + r_beta(angles) * angle_rates.y
 }
 
-/// ∂²R/∂α².
+/// Second partial derivative ∂²R/∂α² of the printed R.
 pub fn r_alpha_alpha(angles: &Vector3<f64>) -> Matrix3<f64> {
     let (sa, ca) = angles.x.sin_cos();
     let (sb, cb) = angles.y.sin_cos();
@@ -52,7 +55,7 @@ pub fn r_alpha_alpha(angles: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(ca * tb, 0.0, sa * tb, -sa, 0.0, ca, ca * cb, 0.0, cb * sa)
 }
 
-/// ∂²R/∂α∂β.
+/// Second partial derivative ∂²R/∂α∂β of the printed R.
 pub fn r_alpha_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
     let (sa, ca) = angles.x.sin_cos();
     let (sb, cb) = angles.y.sin_cos();
@@ -60,7 +63,7 @@ pub fn r_alpha_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(sa * sec2, 0.0, -ca * sec2, 0.0, 0.0, 0.0, -sa * sb, 0.0, sb * ca)
 }
 
-/// ∂²R/∂β².
+/// Second partial derivative ∂²R/∂β² of the printed R.
 pub fn r_beta_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
     let (sa, ca) = angles.x.sin_cos();
     let (sb, cb) = angles.y.sin_cos();
@@ -69,19 +72,20 @@ pub fn r_beta_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(-2.0 * ca * sec2 * tb, 0.0, -2.0 * sa * sec2 * tb, 0.0, 0.0, 0.0, ca * cb, sb, cb * sa)
 }
 
-/// How the bank rate comes about.
+/// Form of the attitude kinematics, which differ in the bank rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kinematics {
-    /// R of Chai 2022 (2) and Wu 2015 (4), which lacks α̇ sin β in the bank row.
+    /// R of Chai 2022 (2) and Wu 2015 (4), which lacks the term α̇ sin β in the bank row.
     #[default]
     Printed,
-    /// With + α̇ sin β in the bank row, Wu 2015 (1).
+    /// R with the term + α̇ sin β in the bank row, as in Wu 2015 (1).
     Exact,
 }
 
 impl Kinematics {
-    /// + α̇ sin β in the bank row.
+    /// Adds `factor` times the alpha row to the bank row, which gives + α̇ sin β with `factor` =
+    /// sin β.
     fn with_alpha_rate(mut matrix: Matrix3<f64>, factor: f64) -> Matrix3<f64> {
         for j in 0..3 {
             matrix[(2, j)] += factor * matrix[(0, j)];
@@ -89,8 +93,8 @@ impl Kinematics {
         matrix
     }
 
-    /// The derivative of `matrix` with its alpha row times sin β added to its bank row, given the `slope` of `matrix` and
-    /// that of sin β.
+    /// Returns the derivative of `matrix` plus sin β times its alpha row in the bank row, given the
+    /// derivatives `slope` of `matrix` and `sb_slope` of sin β. The printed form has no such term.
     fn complete(self, slope: Matrix3<f64>, matrix: &Matrix3<f64>, sb: f64, sb_slope: f64) -> Matrix3<f64> {
         match self {
             Self::Printed => slope,
@@ -104,7 +108,7 @@ impl Kinematics {
         }
     }
 
-    /// R in force: Θ̇ = R ω where the trajectory does not turn.
+    /// Matrix R in use, with which Θ̇ = R ω if the trajectory does not turn.
     pub fn r(self, angles: &Vector3<f64>) -> Matrix3<f64> {
         match self {
             Self::Printed => r(angles),
@@ -112,7 +116,7 @@ impl Kinematics {
         }
     }
 
-    /// R⁻¹ of the R in force.
+    /// Inverse R⁻¹ of the matrix R in use.
     pub fn r_inverse(self, angles: &Vector3<f64>) -> Matrix3<f64> {
         let mut inverse = r_inverse(angles);
         if self == Self::Exact {
@@ -123,18 +127,19 @@ impl Kinematics {
         inverse
     }
 
-    /// ∂R/∂α of the R in force.
+    /// Partial derivative ∂R/∂α of the matrix R in use.
     pub fn r_alpha(self, angles: &Vector3<f64>) -> Matrix3<f64> {
         self.complete(r_alpha(angles), &Matrix3::zeros(), angles.y.sin(), 0.0)
     }
 
-    /// ∂R/∂β of the R in force.
+    /// Partial derivative ∂R/∂β of the matrix R in use.
     pub fn r_beta(self, angles: &Vector3<f64>) -> Matrix3<f64> {
         let (sb, cb) = angles.y.sin_cos();
         self.complete(r_beta(angles), &r(angles), sb, cb)
     }
 
-    /// What a turning trajectory adds to Θ̇ = R ω, Wu 2015 (1): a matrix times [`Trajectory::turn_rate`].
+    /// Matrix that maps [`Trajectory::turn_rate`] to the part of Θ̇ that a turning trajectory adds
+    /// to R ω, Wu 2015 (1).
     pub fn turn(self, angles: &Vector3<f64>) -> Matrix3<f64> {
         let matrix = turn(angles);
         match self {
@@ -143,7 +148,7 @@ impl Kinematics {
         }
     }
 
-    /// ∂/∂β of [`Kinematics::turn`].
+    /// Partial derivative ∂/∂β of [`Kinematics::turn`].
     pub fn turn_beta(self, angles: &Vector3<f64>) -> Matrix3<f64> {
         let (sb, cb) = angles.y.sin_cos();
         let (ss, cs) = angles.z.sin_cos();
@@ -151,7 +156,7 @@ impl Kinematics {
         self.complete(slope, &turn(angles), sb, cb)
     }
 
-    /// ∂/∂σ of [`Kinematics::turn`].
+    /// Partial derivative ∂/∂σ of [`Kinematics::turn`].
     pub fn turn_sigma(self, angles: &Vector3<f64>) -> Matrix3<f64> {
         let (sb, cb) = angles.y.sin_cos();
         let (ss, cs) = angles.z.sin_cos();
@@ -160,29 +165,29 @@ impl Kinematics {
     }
 }
 
-/// The trajectory's terms of Wu 2015 (1), without those of α̇ sin β.
+/// Terms of the trajectory in Wu 2015 (1), without those of α̇ sin β.
 fn turn(angles: &Vector3<f64>) -> Matrix3<f64> {
     let cb = angles.y.cos();
     let (ss, cs) = angles.z.sin_cos();
     Matrix3::new(0.0, -cs / cb, ss / cb, 0.0, ss, cs, 1.0, 0.0, 0.0)
 }
 
-/// Where the vehicle flies to and how that changes: the trajectory's angles and rates in Wu 2015 (1).
+/// Direction of flight and its change: the angles and rates of the trajectory in Wu 2015 (1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Trajectory {
     /// Flight path angle γ above the horizon, rad.
     pub flight_path_angle: f64,
-    /// Heading ψ, from north to east, rad.
+    /// Heading ψ, counted from north to east, rad.
     pub heading: f64,
-    /// Latitude φ, rad.
+    /// Latitude φ of the vehicle, rad.
     pub latitude: f64,
-    /// γ̇, rad/s.
+    /// Rate γ̇ of the flight path angle, rad/s.
     pub flight_path_angle_rate: f64,
-    /// ψ̇, rad/s.
+    /// Rate ψ̇ of the heading, rad/s.
     pub heading_rate: f64,
-    /// Longitude rate θ̇, east positive, rad/s.
+    /// Longitude rate θ̇, positive to the east, rad/s.
     pub longitude_rate: f64,
-    /// φ̇, rad/s.
+    /// Rate φ̇ of the latitude, rad/s.
     pub latitude_rate: f64,
 }
 
@@ -190,7 +195,7 @@ pub struct Trajectory {
 pub const TRAJECTORY: usize = 7;
 
 impl Trajectory {
-    /// All values, in the order of the fields.
+    /// Returns all values in the order of the fields.
     pub fn values(&self) -> [f64; TRAJECTORY] {
         [
             self.flight_path_angle,
@@ -203,9 +208,10 @@ impl Trajectory {
         ]
     }
 
-    /// Angular velocity (rad/s) of the trajectory's axes over inertial space, about these axes: x along the velocity, y to
-    /// the right in the horizontal plane, z down. `earth_rate` is the Earth's, rad/s. Corrects the sign of sin φ sin γ in the
-    /// bank row of Wu 2015 (1), which is printed −.
+    /// Angular velocity (rad/s) of the trajectory's axes relative to inertial space, about these
+    /// axes: x along the velocity, y to the right in the horizontal plane, z down. `earth_rate` is
+    /// the angular rate of the Earth, rad/s. The sign of sin φ sin γ in the bank row corrects Wu
+    /// 2015 (1), which prints −.
     pub fn turn_rate(&self, earth_rate: f64) -> Vector3<f64> {
         let around = self.longitude_rate + earth_rate;
         let (climb, turn, north) = (self.flight_path_angle_rate, self.heading_rate, self.latitude_rate);
@@ -222,7 +228,7 @@ impl Trajectory {
         )
     }
 
-    /// Partial derivatives of [`Trajectory::turn_rate`] by the fields in their order.
+    /// Partial derivatives of [`Trajectory::turn_rate`] with respect to the fields, in their order.
     pub fn turn_rate_by_fields(&self, earth_rate: f64) -> SMatrix<f64, 3, TRAJECTORY> {
         let around = self.longitude_rate + earth_rate;
         let (turn, north) = (self.heading_rate, self.latitude_rate);

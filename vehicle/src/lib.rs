@@ -1,5 +1,6 @@
-//! The vehicle: attitude kinematics and dynamics, inertia, atmosphere, effectors and actuators, reference profiles, disturbances, sensors and integrators.
-//! Knows neither control nor FMI. SI units and radians throughout.
+//! Vehicle model: attitude kinematics and dynamics, inertia, atmosphere, effectors and actuators,
+//! reference profiles, disturbances, sensors and integrators. The crate knows neither control nor
+//! FMI and uses SI units and radians throughout.
 
 pub mod actuators;
 pub mod atmosphere;

@@ -1,19 +1,22 @@
-//! Random numbers as pure functions of seed and tick: the same whoever asks, in whatever order, and how often.
+//! Random numbers as pure functions of seed and tick: they do not depend on who asks for them, in
+//! which order, or how often.
 
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-/// `N` numbers uniform in [−1, 1), by jumping ahead in the generator's sequence.
+/// Returns the `N` numbers of a tick, uniform in [−1, 1), by jumping ahead in the generator's
+/// sequence.
 pub fn uniform<const N: usize>(seed: u64, tick: i64) -> [f64; N] {
     let mut generator = Pcg64::seed_from_u64(seed);
-    // Backwards before tick 0, modulo 2¹²⁸.
+    // Ticks before 0 step the generator backwards, because the distance is taken modulo 2¹²⁸.
     generator.advance((N as i128 * i128::from(tick)) as u128);
     std::array::from_fn(|_| (generator.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0)
 }
 
-/// Two independent normal numbers of variance 1 from two uniform in [−1, 1), by the method of Box and Muller.
+/// Turns two uniform numbers in [−1, 1) into two independent normal ones of variance 1 by the
+/// method of Box and Muller.
 pub fn normal_pair([u, v]: [f64; 2]) -> [f64; 2] {
-    // In (0, 1], so that the logarithm is finite.
+    // The argument of the logarithm lies in (0, 1], so the logarithm is finite.
     let radius = (-2.0 * ((1.0 - u) / 2.0).ln()).sqrt();
     let (sine, cosine) = (std::f64::consts::PI * v).sin_cos();
     [radius * cosine, radius * sine]
@@ -49,7 +52,8 @@ mod tests {
             }
             product += pair[0] * pair[1] / COUNT as f64;
         }
-        // Five standard deviations of each estimate: variances 1, 2, 15 and 96 over the number of values
+        // The bounds are five standard deviations of each estimate: variances 1, 2, 15 and 96 over
+        // the number of values.
         let n = 2.0 * COUNT as f64;
         for (found, expected, variance) in [
             (moments[0], 0.0, 1.0),

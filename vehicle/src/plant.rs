@@ -1,5 +1,5 @@
-//! The vehicle in motion: Θ̇ = R ω and what a turning trajectory adds, ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ; integrated from one
-//! communication point to the next.
+//! Plant: the vehicle in motion. It integrates Θ̇ = R ω, plus the effect of a turning trajectory,
+//! and ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ from one communication point to the next.
 
 mod sensing;
 
@@ -18,39 +18,40 @@ use crate::transport::Transport;
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, SMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
-/// `[alpha, beta, sigma, p, q, r]` in rad and rad/s.
+/// State vector `[alpha, beta, sigma, p, q, r]` in rad and rad/s.
 pub type State = Vector6<f64>;
 
-/// Largest |β| (rad) at which the attitude angles are used; R is singular at π/2.
+/// Largest |β| (rad) at which the attitude angles are used, because R is singular at π/2.
 pub const BETA_LIMIT: f64 = std::f64::consts::FRAC_PI_2 - 1e-6;
 
-/// Θ of a state, rad.
+/// Returns the attitude angles Θ of a state, rad.
 pub fn angles(state: &State) -> Vector3<f64> {
     state.fixed_rows::<3>(0).into()
 }
 
-/// ω of a state, rad/s.
+/// Returns the body rates ω of a state, rad/s.
 pub fn rates(state: &State) -> Vector3<f64> {
     state.fixed_rows::<3>(3).into()
 }
 
-/// The state of given angles (rad) and rates (rad/s).
+/// Returns the state with the given angles (rad) and rates (rad/s).
 pub fn state(angles: &Vector3<f64>, rates: &Vector3<f64>) -> State {
     Vector6::new(angles.x, angles.y, angles.z, rates.x, rates.y, rates.z)
 }
 
-/// What the right side needs to know besides the state, at an instant.
+/// Loads at one instant, which the right side needs besides the state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
-    /// Sum of all moments, N m.
+    /// Sum of all moments about the body axes, N m.
     pub moment: Vector3<f64>,
-    /// Δ on ẋ_ω, rad/s².
+    /// Disturbance Δ that enters ẋ_ω, rad/s².
     pub delta: Vector3<f64>,
-    /// Turn rate of the trajectory's axes, [`Trajectory::turn_rate`], rad/s.
+    /// Turn rate of the trajectory's axes from [`Trajectory::turn_rate`], rad/s.
     pub turn_rate: Vector3<f64>,
 }
 
-/// State derivative. Angles: Wu 2015 (1). Rates: Chai 2022 (1) with Δ = Δ_f-dot + R Δ_m of (4b) put into the rate equation.
+/// State derivative. The angles follow Wu 2015 (1), and the rates Chai 2022 (1) with Δ = Δ_f-dot +
+/// R Δ_m of (4b) put into the rate equation.
 pub fn derivative(body: &RigidBody, kinematics: Kinematics, state: &State, load: &Load) -> State {
     let (angles, rates) = (angles(state), rates(state));
     let acceleration =
@@ -62,18 +63,18 @@ pub fn derivative(body: &RigidBody, kinematics: Kinematics, state: &State, load:
     self::state(&angle_rates, &acceleration)
 }
 
-/// Partial derivatives of [`derivative`].
+/// Partial derivatives of the state derivative [`derivative`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Partials {
-    /// By the state.
+    /// Derivative with respect to the state (6 × 6).
     pub by_state: Matrix6<f64>,
-    /// By the moment.
+    /// Derivative with respect to the moment (6 × 3).
     pub by_moment: Matrix6x3<f64>,
-    /// By the trajectory's turn rate.
+    /// Derivative with respect to the trajectory's turn rate (6 × 3).
     pub by_turn_rate: Matrix6x3<f64>,
 }
 
-/// Partial derivatives of [`derivative`].
+/// Returns the partial derivatives of [`derivative`].
 pub fn partial_derivatives(body: &RigidBody, kinematics: Kinematics, state: &State, load: &Load) -> Partials {
     let (angles, rates) = (angles(state), rates(state));
     let (r, r_inverse) = (kinematics.r(&angles), kinematics.r_inverse(&angles));
@@ -101,19 +102,21 @@ pub fn partial_derivatives(body: &RigidBody, kinematics: Kinematics, state: &Sta
     Partials { by_state, by_moment, by_turn_rate }
 }
 
-/// What acts on the vehicle from outside at any time. Commands to the actuators are taken at instants and stand apart.
+/// Continuous inputs of the plant. Commands to the actuators are taken at instants and are
+/// therefore not among them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Input {
-    /// Control moment about the body axes, N m. Acts as it comes, unless there are actuators or it is delayed.
+    /// Control moment about the body axes, N m. It acts at once unless there are actuators or a
+    /// transport delay.
     pub moment: Vector3<f64>,
     /// Further moment about the body axes, N m.
     pub disturbance_moment: Vector3<f64>,
-    /// The trajectory, which turns the axes that the angles are counted from.
+    /// Trajectory of the vehicle, which turns the axes from which the angles are counted.
     pub trajectory: Trajectory,
 }
 
 impl Input {
-    /// What holds a value that is not finite.
+    /// Returns the name of the input that holds a value that is not finite.
     fn fault(&self) -> Option<&'static str> {
         let broken = |values: &[f64]| values.iter().any(|value| !value.is_finite());
         if broken(self.moment.as_slice()) || broken(self.disturbance_moment.as_slice()) {
@@ -124,75 +127,77 @@ impl Input {
 }
 
 impl From<Vector3<f64>> for Input {
-    /// A control moment (N m) alone.
+    /// Returns an input with this control moment (N m) and nothing else.
     fn from(moment: Vector3<f64>) -> Self {
         Self { moment, ..Self::default() }
     }
 }
 
-/// All that determines a plant's motion but the inputs.
+/// Configuration that determines the motion of a plant, apart from the inputs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
-    /// Nominal inertia.
+    /// Nominal inertia of the vehicle.
     pub inertia: Inertia,
-    /// Factor from the nominal to the vehicle's inertia.
+    /// Factor from the nominal inertia to that of the vehicle.
     pub inertia_scale: f64,
-    /// State at the start.
+    /// State at the start of the experiment.
     pub initial: State,
-    /// The disturbance.
+    /// Disturbance that acts on the vehicle.
     pub disturbance: Disturbance,
-    /// The R in force.
+    /// Attitude kinematics, with the matrix R in use.
     pub kinematics: Kinematics,
     /// Angular rate ω_e of the Earth, rad/s.
     pub earth_rate: f64,
-    /// Surfaces and jets that make the control moment; without them it is an input.
+    /// Surfaces and jets that make the control moment; without them the moment is an input.
     pub actuators: Option<actuators::Config>,
-    /// Time (s, from 0 to [`crate::transport::LONGEST`]) after which the input moment acts; zero with actuators. A delayed
-    /// moment is taken at the beginning of each communication step.
+    /// Time (s, from 0 to [`crate::transport::LONGEST`]) after which the input moment acts; it is
+    /// zero with actuators. A delayed moment is taken at the beginning of each communication step.
     pub moment_delay: f64,
-    /// A prescribed motion from the initial angles on, in place of the dynamics.
+    /// Prescribed motion that starts at the initial angles and replaces the dynamics.
     pub calibration: Option<Sequence>,
-    /// What the sensors feel.
+    /// Gravity and magnetic field that the sensors measure.
     pub surroundings: Surroundings,
-    /// Sampled sensors; without them what they would feel is shown as it is.
+    /// Configuration of sampled sensors; without it the plant outputs the readings of ideal
+    /// sensors.
     pub sensors: Option<sensors::Config>,
-    /// Longest integration step, s.
+    /// Longest step of the integration, s.
     pub step: f64,
 }
 
-/// What is held for a while: the disturbance from a tick or a change of its course to the next, and what the actuators do
-/// from one instant at which commands are taken or a deflection comes to rest to the next.
+/// Quantities that are held for a while. The disturbance is held from one tick or change of its
+/// course to the next, and the motion of the actuators until commands are taken or a deflection
+/// comes to rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Held {
-    /// Number of the interval.
+    /// Number of the interval over which the disturbance is held.
     tick: i64,
-    /// When it was drawn, s.
+    /// Time at which the disturbance was drawn, s.
     since: f64,
-    /// Δ drawn at its beginning, rad/s².
+    /// Value of Δ drawn at the beginning of the interval, rad/s².
     sample: Vector3<f64>,
-    /// Whether the disturbance acts.
+    /// Whether the disturbance acts at present.
     acts: bool,
-    /// What the actuators do.
+    /// Present motion of the actuators.
     drive: Drive,
-    /// The moment that acts if the input moment is delayed, N m.
+    /// Moment that acts at present if the input moment is delayed, N m.
     delayed: Option<Vector3<f64>>,
 }
 
 impl Held {
-    /// Δ in force, rad/s².
+    /// Disturbance Δ that acts at present, rad/s².
     pub fn delta(&self) -> Vector3<f64> {
         if self.acts { self.sample } else { Vector3::zeros() }
     }
 }
 
-/// The motion that takes the place of the dynamics.
+/// Prescribed motion that replaces the dynamics.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Calibration {
     sequence: Sequence,
     initial: Vector3<f64>,
 }
 
-/// The vehicle with its state.
+/// Plant: the vehicle with its state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plant {
     body: RigidBody,
@@ -207,14 +212,14 @@ pub struct Plant {
     step: f64,
     start_time: f64,
     held: Option<Held>,
-    /// The state now.
+    /// Present state of the vehicle, rad and rad/s.
     pub state: State,
-    /// Deflections of the surfaces now, rad; zero without actuators.
+    /// Present deflections of the surfaces, rad; zero without actuators.
     pub deflections: Surfaces,
 }
 
 impl Plant {
-    /// At the initial state at `start_time` (s).
+    /// Makes a plant in the initial state at `start_time` (s).
     ///
     /// # Errors
     /// Names the value of the configuration that is out of range.
@@ -277,8 +282,9 @@ impl Plant {
         })
     }
 
-    /// Whether this can be what `built`, made of the same configuration and start time, has become at `time` (s): a plant that was
-    /// restored may be forged. A step that has `failed` may have gone beyond that time.
+    /// Whether this plant can be a later state, at `time` (s), of `built`, which has the same
+    /// configuration and start time. A restored plant is checked in this way because its data may
+    /// be corrupt. A step that has `failed` may have gone beyond `time`.
     pub fn fits(&self, built: &Self, time: f64, failed: bool) -> bool {
         let held = self.held.as_ref().is_none_or(|held| {
             held.since.is_finite() && (self.actuators.is_none() || Actuators::fits(&held.drive))
@@ -310,41 +316,41 @@ impl Plant {
             && self.start_time == other.start_time
     }
 
-    /// Start of the experiment, s.
+    /// Start time of the experiment, s.
     pub fn start_time(&self) -> f64 {
         self.start_time
     }
 
-    /// The vehicle's rigid body.
+    /// Rigid body of the vehicle, with its inertia.
     pub fn body(&self) -> &RigidBody {
         &self.body
     }
 
-    /// Θ, rad.
+    /// Present attitude angles Θ, rad.
     pub fn angles(&self) -> Vector3<f64> {
         angles(&self.state)
     }
 
-    /// ω, rad/s.
+    /// Present body rates ω, rad/s.
     pub fn rates(&self) -> Vector3<f64> {
         rates(&self.state)
     }
 
-    /// The next time (s) after `time` at which the disturbance jumps, or a sample is taken or arrives.
+    /// Next time (s) after `time` at which the disturbance jumps or a sample is taken or arrives.
     pub fn next_event(&self, time: f64) -> Option<f64> {
         let jump = self.disturbance.next_change(self.start_time, time);
         let sample = self.sensors.as_ref().map(|sensors| sensors.next_event(time));
         jump.into_iter().chain(sample).min_by(f64::total_cmp)
     }
 
-    /// Time (s) until each deflection comes to rest; infinite where it rests.
+    /// Time (s) until each deflection comes to rest, infinite for one that is at rest.
     pub fn time_left(&self, held: &Held) -> Surfaces {
         self.actuators.as_ref().map_or(Surfaces::repeat(f64::INFINITY), |actuators| {
             actuators.time_left(&held.drive, &self.deflections)
         })
     }
 
-    /// The next time (s) after `time` at which the right side may not be smooth or a sample is taken.
+    /// Next time (s) after `time` at which the right side may not be smooth or a sample is taken.
     fn next_change(&self, time: f64, held: &Held) -> Option<f64> {
         let jump = self.disturbance.next_change(self.start_time, time);
         let rest = self.actuators.is_some().then(|| time + self.time_left(held).min());
@@ -353,8 +359,9 @@ impl Plant {
         jump.into_iter().chain(rest).chain(sample).chain(arrival).min_by(f64::total_cmp)
     }
 
-    /// What holds from `time` (s) on if commands are taken then: the disturbance is drawn from the present state and `input`
-    /// if a tick has come (again, if asked again at the tick), and is the one already held otherwise.
+    /// Returns the quantities that hold from `time` (s) on if commands are taken then. If a tick
+    /// has come, the disturbance is drawn from the present state and `input`, each time anew at the
+    /// same tick; otherwise the one already held stays.
     pub fn in_force(&self, time: f64, input: &Input, command: &Command) -> Held {
         let commanded = |actuators: &Actuators| actuators.commanded(time, command, &self.deflections);
         self.drawn(time, input, self.actuators.as_ref().map_or_else(Drive::default, commanded))
@@ -377,8 +384,9 @@ impl Plant {
         }
     }
 
-    /// Takes over what [`Plant::in_force`] says: commands hold until they are taken again, the disturbance until the next tick.
-    /// Deflections that have come to their target, or a little beyond it, are put on it. A sample that is due is taken.
+    /// Adopts the result of [`Plant::in_force`]: commands hold until they are taken again, and the
+    /// disturbance until the next tick. Deflections that have reached or just passed their target
+    /// are set to it, and a sample that is due is taken.
     pub fn hold(&mut self, time: f64, input: &Input, command: &Command) -> Held {
         self.sense(time, input);
         if let Some(held) = self.held {
@@ -389,7 +397,8 @@ impl Plant {
         *self.held.insert(held)
     }
 
-    /// The same on the way from one communication point to the next, where no commands are taken.
+    /// Does the work of [`Plant::hold`] between two communication points, where no commands are
+    /// taken.
     fn hold_between(&mut self, time: f64, input: &Input, before: &Held) -> Held {
         self.sense(time, input);
         let directed = |actuators: &Actuators| actuators.directed(time, before.drive, &self.deflections);
@@ -403,18 +412,20 @@ impl Plant {
         }
     }
 
-    /// What is held now, if anything was yet.
+    /// Quantities that are held at present, or `None` before the first call of [`Plant::hold`].
     pub fn held(&self) -> Option<Held> {
         self.held
     }
 
-    /// The disturbing moment (N m) at `time` (s): the external one and that of the disturbance.
+    /// Disturbing moment (N m) at `time` (s): the sum of the external moment and that of the
+    /// disturbance.
     pub fn disturbance_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
         let own = if held.acts { self.disturbance.moment(time) } else { Vector3::zeros() };
         input.disturbance_moment + own
     }
 
-    /// The control moment (N m) at the time `elapsed` (s) after the present one; until then the drive stays as it is.
+    /// Control moment (N m) at the time `elapsed` (s) after the present one, provided that the
+    /// drive does not change until then.
     fn control_moment(
         &self,
         input: &Input,
@@ -428,17 +439,18 @@ impl Plant {
         )
     }
 
-    /// The control moment (N m) that acts now.
+    /// Control moment (N m) that acts at present.
     pub fn applied_moment(&self, input: &Input, held: &Held) -> Vector3<f64> {
         self.control_moment(input, held.delayed, &held.drive, 0.0)
     }
 
-    /// Rates of the deflections, rad/s: the rate limit either way, or zero.
+    /// Rate of each deflection, rad/s: plus or minus the rate limit, or zero.
     pub fn deflection_rates(&self, held: &Held) -> Surfaces {
         self.actuators.as_ref().map_or_else(Surfaces::zeros, |all| all.rates(&held.drive))
     }
 
-    /// Partial derivatives of [`Plant::applied_moment`]: by the input moment (3 × 3) and by the deflections (3 × 8).
+    /// Partial derivatives of [`Plant::applied_moment`] with respect to the input moment (3 × 3)
+    /// and the deflections (3 × 8).
     pub fn applied_moment_by_moment_and_deflections(&self) -> (Matrix3<f64>, SMatrix<f64, 3, SURFACES>) {
         let at_once = if self.transport.is_some() { Matrix3::zeros() } else { Matrix3::identity() };
         self.actuators
@@ -446,12 +458,13 @@ impl Plant {
             .map_or((at_once, SMatrix::zeros()), |all| (Matrix3::zeros(), *all.moment_by_deflections()))
     }
 
-    /// Partial derivative of the moment that acts by the commands to the jets, when they are taken (3 × 10).
+    /// Partial derivative of the applied moment with respect to the jet commands at the instant at
+    /// which they are taken (3 × 10).
     pub fn applied_moment_by_jets(&self, command: &Command) -> SMatrix<f64, 3, JETS> {
         self.actuators.as_ref().map_or_else(SMatrix::zeros, |all| all.moment_by_jets(command))
     }
 
-    /// The trajectory's turn rate (rad/s); the calibration sequence is flown over one that rests.
+    /// Turn rate (rad/s) of the trajectory, which is zero during the calibration sequence.
     fn turn_rate(&self, input: &Input) -> Vector3<f64> {
         if self.calibration.is_some() {
             return Vector3::zeros();
@@ -459,7 +472,7 @@ impl Plant {
         input.trajectory.turn_rate(self.earth_rate)
     }
 
-    /// At `time`, which is `elapsed` after the time of the deflections.
+    /// Returns the loads at `time` (s), which is `elapsed` (s) after the time of the deflections.
     fn load(&self, time: f64, input: &Input, held: &Held, elapsed: f64) -> Load {
         Load {
             moment: self.control_moment(input, held.delayed, &held.drive, elapsed)
@@ -469,7 +482,7 @@ impl Plant {
         }
     }
 
-    /// State derivative at `time` (s).
+    /// State derivative at `time` (s) for a given state.
     fn derivative_at(&self, time: f64, state: &State, load: &Load) -> State {
         match &self.calibration {
             None => derivative(&self.body, self.kinematics, state, load),
@@ -479,12 +492,13 @@ impl Plant {
         }
     }
 
-    /// State derivative at `time` (s), at the present state.
+    /// State derivative at `time` (s) for the present state.
     pub fn derivative(&self, time: f64, input: &Input, held: &Held) -> State {
         self.derivative_at(time, &self.state, &self.load(time, input, held, 0.0))
     }
 
-    /// Partial derivatives of [`Plant::derivative`], and of the turn rate by the trajectory (3 × 7).
+    /// Partial derivatives of [`Plant::derivative`], and those of the turn rate with respect to the
+    /// trajectory (3 × 7).
     pub fn partial_derivatives(
         &self,
         time: f64,
@@ -499,22 +513,25 @@ impl Plant {
         (partials, input.trajectory.turn_rate_by_fields(self.earth_rate))
     }
 
-    /// From `from` to `to` (s) under a constant control moment (N m).
+    /// Moves the plant from `from` to `to` (s) under a constant control moment (N m).
     ///
     /// # Errors
-    /// If the attitude becomes singular or a value is not finite; the state is then the last good one.
+    /// Reports that the attitude becomes singular or a value is not finite; the state is then the
+    /// last good one.
     pub fn advance(&mut self, from: f64, to: f64, moment: Vector3<f64>) -> Result<(), Error> {
         self.advance_with(from, to, &Command::default(), |_| moment.into())
     }
 
-    /// From `from` to `to` (s) under an input that is a function of time; `command` is taken at `from`, and so is the moment if
-    /// it is delayed. The interval is cut where the disturbance jumps, where a deflection comes to rest and where a delayed
-    /// moment arrives, and every piece is integrated in equal steps, so the end is met exactly. Deflections are linear in time
-    /// within a piece.
+    /// Moves the plant from `from` to `to` (s) under an input that is a function of time. The
+    /// `command`, and a delayed moment, are taken at `from`. The interval is cut where the
+    /// disturbance jumps, a deflection comes to rest or a delayed moment arrives. Every piece is
+    /// integrated in equal steps, so the end is met exactly. Deflections are linear in time within
+    /// a piece.
     ///
     /// # Errors
-    /// If the attitude becomes singular or a value is not finite; the state is then the last good one. If a delayed moment is not
-    /// held over the interval, or too many of its changes are under way.
+    /// Reports that the attitude becomes singular or a value is not finite; the state is then the
+    /// last good one. Also refuses a delayed moment that is not held over the interval, or too many
+    /// changes of it under way at once.
     pub fn advance_with(
         &mut self,
         from: f64,
@@ -525,7 +542,8 @@ impl Plant {
         if let Some(transport) = self.transport.as_mut().filter(|_| from < to) {
             let begin = input(from).moment;
             transport.command(from, begin)?;
-            // A cubic, the highest order of input derivatives, with four equal values is constant.
+            // Inputs have derivatives up to order three, and a cubic with four equal values is
+            // constant.
             for part in [1.0 / 3.0, 2.0 / 3.0, 1.0] {
                 transport.check_held(&begin, &input(from + part * (to - from)).moment)?;
             }
@@ -565,10 +583,10 @@ impl Plant {
     }
 }
 
-/// Whether the equations hold at a state.
+/// Checks that the equations hold at a state.
 ///
 /// # Errors
-/// If it is not finite or its sideslip angle is ±90°.
+/// Reports a state that is not finite or has a sideslip angle of ±90°.
 pub fn check(state: &State, time: f64) -> Result<(), Error> {
     if !state.iter().all(|value| value.is_finite()) {
         return Err(Error::NotFinite { time, what: "attitude or rate" });

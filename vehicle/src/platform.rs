@@ -1,29 +1,29 @@
-//! What ideal sensors on a platform feel whose orientation the attitude angles give: angular rate, specific force and the
-//! Earth's magnetic field, about the body axes.
+//! Readings of ideal sensors about the body axes: angular rate, specific force and the Earth's
+//! magnetic field. They stand on a platform whose orientation is given by the attitude angles.
 //!
-//! Level axes are north, east, down. The trajectory's axes come from them by heading and flight path angle, the body axes by
-//! sideslip, angle of attack and a bank angle that grows *against* the right-hand rule about the velocity, as the signs of R
-//! say.
+//! The level axes are north, east and down. Heading and flight path angle lead from them to the
+//! trajectory's axes; sideslip, angle of attack and bank angle lead on to the body axes. The bank
+//! angle grows *against* the right-hand rule about the velocity, as the signs of R require.
 
 use crate::error::Error;
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// What the three sensors feel or show: angular rate (rad/s), specific force (m/s²), magnetic field (T).
+/// Readings of the three sensors: angular rate (rad/s), specific force (m/s²), magnetic field (T).
 pub type Readings = [Vector3<f64>; 3];
 
-/// The fields around the platform.
+/// Gravity and magnetic field around the platform.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Surroundings {
-    /// Gravity, m/s², down.
+    /// Acceleration of gravity, which points down, m/s².
     pub gravity: f64,
-    /// Magnetic field north, east and down, T.
+    /// Magnetic field to the north, to the east and down, T.
     pub field: Vector3<f64>,
 }
 
 impl Surroundings {
-    /// Refuses what is not finite, and gravity upwards.
+    /// Refuses values that are not finite, and gravity that points up.
     ///
     /// # Errors
     /// Names the value at fault as the units do.
@@ -39,7 +39,8 @@ impl Surroundings {
     }
 }
 
-/// Rotation from the trajectory's to the body axes. Its change is ω of [`Kinematics::Exact`].
+/// Rotation from the trajectory's axes to the body axes. Its rate of change corresponds to ω of
+/// [`Kinematics::Exact`].
 pub fn body_from_velocity(angles: &Vector3<f64>) -> Matrix3<f64> {
     let (sa, ca) = angles.x.sin_cos();
     let (sb, cb) = angles.y.sin_cos();
@@ -50,7 +51,7 @@ pub fn body_from_velocity(angles: &Vector3<f64>) -> Matrix3<f64> {
     attack * sideslip * bank
 }
 
-/// Rotation from the level to the trajectory's axes.
+/// Rotation from the level axes to the trajectory's axes.
 pub fn velocity_from_level(trajectory: &Trajectory) -> Matrix3<f64> {
     let (sg, cg) = trajectory.flight_path_angle.sin_cos();
     let (sp, cp) = trajectory.heading.sin_cos();
@@ -59,32 +60,33 @@ pub fn velocity_from_level(trajectory: &Trajectory) -> Matrix3<f64> {
     climb * turn
 }
 
-/// Unit vector against the velocity: the axis of a growing bank angle, in body axes.
+/// Unit vector against the velocity in body axes, about which the bank angle grows.
 fn bank_axis(angles: &Vector3<f64>) -> Vector3<f64> {
     let (sa, ca) = angles.x.sin_cos();
     let (sb, cb) = angles.y.sin_cos();
     Vector3::new(-ca * cb, -sb, -sa * cb)
 }
 
-/// Where the platform is and how it moves.
+/// Orientation of the platform and its motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// The kinematics that the motion obeys.
+    /// Attitude kinematics that the motion obeys.
     pub kinematics: Kinematics,
-    /// Θ, rad.
+    /// Attitude angles Θ of the platform, rad.
     pub angles: Vector3<f64>,
-    /// ω of the model, rad/s.
+    /// Body rates ω of the model, rad/s.
     pub rates: Vector3<f64>,
-    /// α̇, rad/s.
+    /// Rate α̇ of the angle of attack, rad/s.
     pub alpha_rate: f64,
-    /// The trajectory.
+    /// Trajectory that gives the platform's direction of flight.
     pub trajectory: Trajectory,
 }
 
 impl Pose {
-    /// What ideal sensors feel. The gyroscope's is the platform's rate, which belongs to the change of its orientation: where
-    /// the bank row of R lacks α̇ sin β, it is ω less that much about the bank axis. The platform's centre moves steadily, so
-    /// the specific force is that of gravity.
+    /// Returns the readings of ideal sensors. The gyroscope measures the rate at which the
+    /// orientation changes. Where the bank row of R lacks α̇ sin β, that rate is ω less α̇ sin β
+    /// about the bank axis. The platform's centre moves steadily, so gravity alone gives the
+    /// specific force.
     pub fn felt(&self, surroundings: &Surroundings) -> Readings {
         let mut rate = self.rates;
         if self.kinematics == Kinematics::Printed {
@@ -94,14 +96,15 @@ impl Pose {
         [rate, force, field]
     }
 
-    /// Specific force and magnetic field in body axes.
+    /// Specific force (m/s²) and magnetic field (T) in body axes.
     fn fields(&self, surroundings: &Surroundings) -> [Vector3<f64>; 2] {
         let body_from_level = body_from_velocity(&self.angles) * velocity_from_level(&self.trajectory);
         let lift = Vector3::new(0.0, 0.0, -surroundings.gravity);
         [body_from_level * lift, body_from_level * surroundings.field]
     }
 
-    /// Partial derivatives of [`Pose::felt`] by state (9 × 6) and trajectory (9 × 7), given those of α̇.
+    /// Partial derivatives of [`Pose::felt`] with respect to the state (9 × 6) and the trajectory
+    /// (9 × 7), given those of α̇.
     pub fn felt_by_state_and_trajectory(
         &self,
         surroundings: &Surroundings,
@@ -123,7 +126,7 @@ impl Pose {
             beta -= (Vector3::new(ca * sb, -cb, sa * sb) * sb + axis * cb) * self.alpha_rate;
             by_trajectory.fixed_rows_mut::<3>(0).copy_from(&(axis * alpha_rate_by_trajectory * -sb));
         }
-        // A field at rest turns against the body: v̇ = −ω × v.
+        // A field that is fixed in space turns against the body: v̇ = −ω × v.
         let by_angles = Kinematics::Exact.r_inverse(&self.angles);
         let body_from_velocity = body_from_velocity(&self.angles);
         let (sg, cg) = self.trajectory.flight_path_angle.sin_cos();

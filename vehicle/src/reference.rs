@@ -5,67 +5,70 @@ use crate::time::tolerance;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// The reference at one instant, `[alpha, beta, sigma]`.
+/// Reference attitude `[alpha, beta, sigma]` and its derivatives at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Reference {
-    /// Θ_r, rad.
+    /// Reference angles Θ_r, rad.
     pub angles: Vector3<f64>,
-    /// Θ̇_r, rad/s.
+    /// Reference angle rates Θ̇_r, rad/s.
     pub rates: Vector3<f64>,
-    /// Θ̈_r, rad/s².
+    /// Reference angle accelerations Θ̈_r, rad/s².
     pub accelerations: Vector3<f64>,
 }
 
-/// A reference over time.
+/// Reference attitude as a function of time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Profile {
-    /// Pieces in order of time; the first one that has not ended applies, and the last one never ends.
+    /// Segments in order of time: the first one that has not ended applies, and the last one never
+    /// ends.
     Piecewise(Vec<Segment>),
-    /// Interpolated between given points.
+    /// Spline through given points over time.
     Table(Table),
 }
 
-/// One piece: constant plus sinusoids in each angle.
+/// One segment, in which each angle is a constant plus sinusoids.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
-    /// The piece applies for t ≤ `until` (s).
+    /// Time up to which the segment applies, t ≤ `until`, s.
     pub until: f64,
-    /// α, β, σ.
+    /// Courses of the angles α, β and σ.
     pub angles: [Course; 3],
 }
 
-/// Course of one angle: c + Σ (a sin ω t + b cos ω t).
+/// Course of one angle, c + Σ (a sin ω t + b cos ω t).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Course {
-    /// c, rad.
+    /// Constant part c of the angle, rad.
     pub constant: f64,
-    /// The sinusoids.
+    /// Sinusoids that are added to the constant part.
     pub waves: Vec<Wave>,
 }
 
-/// One sinusoid a sin ω t + b cos ω t.
+/// One sinusoid a sin ω t + b cos ω t of an angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wave {
-    /// ω, rad/s.
+    /// Angular frequency ω of the sinusoid, rad/s.
     pub frequency: f64,
-    /// a, rad.
+    /// Coefficient a of the sine, rad.
     pub sine: f64,
-    /// b, rad.
+    /// Coefficient b of the cosine, rad.
     pub cosine: f64,
 }
 
 impl Profile {
-    /// Constant `angles` (rad).
+    /// Returns a reference that keeps the `angles` (rad) constant.
     pub fn constant(angles: Vector3<f64>) -> Self {
         Self::Piecewise(vec![Segment::constant(f64::INFINITY, angles)])
     }
 
-    /// `before` (rad) for t ≤ `time` (s), `after` (rad) for t > `time`.
+    /// Returns a reference that is `before` (rad) for t ≤ `time` (s) and `after` (rad) for t >
+    /// `time`.
     pub fn step(before: Vector3<f64>, after: Vector3<f64>, time: f64) -> Self {
         Self::Piecewise(vec![Segment::constant(time, before), Segment::constant(f64::INFINITY, after)])
     }
 
-    /// `mean + amplitude · sin(frequency · t + phase)` in rad, rad/s, rad.
+    /// Returns the reference `mean + amplitude · sin(frequency · t + phase)`, with angles and phase
+    /// in rad and the frequency in rad/s.
     pub fn sine(mean: Vector3<f64>, amplitude: Vector3<f64>, frequency: f64, phase: f64) -> Self {
         let (sine, cosine) = (phase.cos(), phase.sin());
         let angles = [0, 1, 2].map(|i| Course {
@@ -75,7 +78,7 @@ impl Profile {
         Self::Piecewise(vec![Segment { until: f64::INFINITY, angles }])
     }
 
-    /// The reference at `time` (s). A piece applies up to and including its end.
+    /// Returns the reference at `time` (s). A segment applies up to and including its end.
     pub fn at(&self, time: f64) -> Reference {
         match self {
             Self::Piecewise(segments) => {
@@ -89,7 +92,7 @@ impl Profile {
         }
     }
 
-    /// Times (s, ascending) right after which the reference may be discontinuous.
+    /// Times (s, ascending) right after which the reference may jump.
     pub fn jumps(&self) -> impl Iterator<Item = f64> + '_ {
         let segments = match self {
             Self::Piecewise(segments) => segments.as_slice(),

@@ -1,4 +1,5 @@
-//! Scenarios: vehicle, start, limits, disturbance and reference as data, the papers' ones embedded.
+//! Scenarios: vehicle, initial state, limits, disturbance and reference as data. Those of the
+//! papers are embedded.
 
 use crate::atmosphere::Flight;
 use crate::disturbance::{Disturbance, Kind, SineMoment};
@@ -16,54 +17,55 @@ const CRMPC_2022: (&str, &str) = ("crmpc-2022.toml", include_str!("../data/crmpc
 const TVSMC_2015: (&str, &str) = ("tvsmc-2015.toml", include_str!("../data/tvsmc-2015.toml"));
 const TWO_LOOP_SMC: (&str, &str) = ("two-loop-smc.toml", include_str!("../data/two-loop-smc.toml"));
 
-/// A vehicle and what is asked of it. SI units and radians.
+/// Scenario: a vehicle and the manoeuvre that it has to fly, in SI units and radians.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scenario {
     /// Length of the experiment, s.
     pub duration: f64,
-    /// Nominal inertia, which a controller knows.
+    /// Nominal inertia, which is the one that a controller knows.
     pub inertia: Inertia,
-    /// Factor from the nominal to the vehicle's inertia.
+    /// Factor from the nominal inertia to that of the vehicle.
     pub inertia_scale: f64,
-    /// Flight condition, if one is stated.
+    /// Flight condition, if the scenario states one.
     pub flight: Option<Flight>,
-    /// Θ at the start, rad.
+    /// Attitude angles Θ at the start, rad.
     pub initial_angles: Vector3<f64>,
-    /// ω at the start, rad/s.
+    /// Body rates ω at the start, rad/s.
     pub initial_rates: Vector3<f64>,
-    /// Limit on ‖ω‖, rad/s; infinite if none is stated.
+    /// Limit on ‖ω‖, rad/s; infinite if the scenario states none.
     pub limit_rate: f64,
-    /// Limit on ‖m‖, N m; infinite if none is stated.
+    /// Limit on ‖m‖, N m; infinite if the scenario states none.
     pub limit_moment: f64,
-    /// The disturbance, with its bound (rad/s²) and period (s).
+    /// Disturbance of the vehicle, with its bound (rad/s²) and period (s).
     pub disturbance: Disturbance,
-    /// Θ_r over time.
+    /// Reference attitude Θ_r over time.
     pub reference: Profile,
 }
 
 impl Scenario {
-    /// Chai 2022, section 5.1.
+    /// Scenario of Chai 2022, section 5.1.
     pub fn crmpc2022() -> Self {
         static READ: LazyLock<Scenario> = LazyLock::new(|| embedded(CRMPC_2022));
         READ.clone()
     }
 
-    /// Wu 2015, section 6.
+    /// Scenario of Wu 2015, section 6.
     pub fn tvsmc2015() -> Self {
         static READ: LazyLock<Scenario> = LazyLock::new(|| embedded(TVSMC_2015));
         READ.clone()
     }
 
-    /// Jia, Zhou, Zhou, section V.
+    /// Scenario of Jia, Zhou, Zhou, section V.
     pub fn two_loop() -> Self {
         static READ: LazyLock<Scenario> = LazyLock::new(|| embedded(TWO_LOOP_SMC));
         READ.clone()
     }
 
-    /// From the text of a scenario file; `file` names it in messages. The files in `data/` show the form.
+    /// Reads a scenario from the text of a file, which `file` names in messages. The files in
+    /// `data/` show the form.
     ///
     /// # Errors
-    /// Says what is missing, unknown or out of range, and where.
+    /// Says which entry is missing, unknown or out of range, and where it stands.
     pub fn from_toml(file: &str, text: &str) -> Result<Self, Error> {
         let refuse = |problem: String| Error::Scenario { file: file.into(), problem };
         let parsed: File = toml::from_str(text).map_err(|error| refuse(error.to_string()))?;
@@ -83,7 +85,8 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The plant of this scenario under a control moment, integrated in steps no longer than `step` (s).
+    /// Returns the plant's configuration for this scenario, with a control moment as input and
+    /// integration steps no longer than `step` (s).
     pub fn config(&self, step: f64) -> Config {
         Config {
             inertia: self.inertia,
@@ -103,11 +106,11 @@ impl Scenario {
 }
 
 fn embedded((file, text): (&str, &str)) -> Scenario {
-    // Cannot fail: a test reads every embedded file.
+    // This cannot fail: a test reads every embedded file.
     Scenario::from_toml(file, text).unwrap_or_else(|error| panic!("{error}"))
 }
 
-// The files' form: the units printed in the papers, named in the keys.
+// The structures below mirror the files, with the units printed in the papers named in the keys.
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -268,7 +271,8 @@ mod tests {
     #[test]
     fn published_reference_of_crmpc2022() {
         let reference = Scenario::crmpc2022().reference;
-        // Chai 2022, section 5.1, evaluated by hand at t = 0 and, with sin and cos of the printed arguments, elsewhere
+        // Chai 2022, section 5.1, evaluated by hand at t = 0 and, with sin and cos of the printed
+        // arguments, elsewhere
         let expected = [
             (0.0, 10.0, -25.0),
             (10.0, 10.0 + 2.5 * 5f64.sin(), -30.0 + 5.0 * 5f64.cos()),
@@ -288,7 +292,7 @@ mod tests {
         assert_eq!(reference.jumps().collect::<Vec<_>>(), [25.0]);
         let jump = degrees(&reference, 25.0 + 2e-7) - degrees(&reference, 25.0);
         assert!((jump - Vector3::new(0.67, 0.0, -5.0)).amax() < 0.006, "{jump}");
-        // The first piece applies at the jump, however the 625th tick of 0.04 s is rounded.
+        // The first segment applies at the jump, however the 625th tick of 0.04 s is rounded.
         let accumulated = (0..625).fold(0.0, |time, _| time + 0.04);
         for time in [625.0 * 0.04, 125.0 * 0.2, 25f64.next_up(), accumulated] {
             assert!((reference.at(time).angles - reference.at(25.0).angles).norm() < 1e-9, "{time}");

@@ -1,4 +1,5 @@
-//! Sets of sensors, the fields around them and the calibration sequence as data.
+//! Data of the embedded file of sensors: sensor sets, the surrounding fields and the calibration
+//! sequence.
 
 use crate::calibration::Sequence;
 use crate::platform::Surroundings;
@@ -10,23 +11,23 @@ use std::sync::LazyLock;
 
 const TEXT: &str = include_str!("../data/sensors.toml");
 
-/// What the file of sensors holds, in SI units and radians.
+/// Content of the file of sensors, in SI units and radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorData {
-    /// Gravity and the Earth's field.
+    /// Gravity and the magnetic field of the Earth.
     pub surroundings: Surroundings,
-    /// Sample period and transport delay; nothing is dropped.
+    /// Sample period and transport delay of a line that drops no samples.
     pub line: Line,
-    /// A typical MEMS set: gyroscope, accelerometer, magnetometer.
+    /// Typical MEMS set of gyroscope, accelerometer and magnetometer.
     pub mems: [Triad; 3],
-    /// The set without errors.
+    /// Sensor set without any errors.
     pub ideal: [Triad; 3],
-    /// The calibration sequence.
+    /// Rotation sequence for calibrating the sensors.
     pub calibration: Sequence,
 }
 
 impl SensorData {
-    /// The embedded file.
+    /// Returns the data of the embedded file.
     pub fn embedded() -> Self {
         let file = file();
         let Calibration { alpha_rate_deg_s, sigma_rate_deg_s, beta_amplitude_deg, beta_frequency_deg_s } =
@@ -55,7 +56,7 @@ impl SensorData {
 }
 
 fn file() -> &'static File {
-    // Cannot fail: a test reads it.
+    // This cannot fail: a test reads the embedded file.
     static READ: LazyLock<File> =
         LazyLock::new(|| toml::from_str(TEXT).unwrap_or_else(|error| panic!("sensors.toml: {error}")));
     &READ
@@ -120,7 +121,7 @@ enum Unit {
 }
 
 impl Unit {
-    /// In SI units.
+    /// Factor from this unit to the SI unit.
     fn factor(self) -> f64 {
         match self {
             Self::DegreePerSecond => 1f64.to_radians(),
@@ -134,7 +135,7 @@ impl Unit {
 #[serde(deny_unknown_fields)]
 struct Sensor {
     unit: Unit,
-    /// By rows.
+    /// Matrix of scale and misalignment, by rows.
     matrix: Option<[[f64; 3]; 3]>,
     #[serde(default)]
     bias: Vector3<f64>,

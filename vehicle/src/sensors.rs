@@ -1,7 +1,9 @@
-//! Gyroscope, accelerometer and magnetometer, sampled together, and the serial line that brings their samples.
+//! Gyroscope, accelerometer and magnetometer, which are sampled together, and the serial line that
+//! transmits their samples.
 //!
-//! Samples are taken at the ticks start + k · period and arrive a delay later. A sample is evaluated from what was committed
-//! before its tick, so that it can be evaluated again at the tick; it is committed when time goes on.
+//! Samples are taken at the ticks start + k · period and arrive a fixed delay later. A sample is
+//! evaluated from the state committed before its tick, so it can be evaluated again at the same
+//! tick. It is committed when time moves on.
 
 use crate::error::Error;
 use crate::noise::{normal_pair, uniform};
@@ -11,7 +13,7 @@ use crate::triad::{Memory, Names, Triad, Window};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// Most samples that may be on their way at a time.
+/// Largest number of samples that may be on their way at a time.
 pub const IN_FLIGHT: usize = 1000;
 
 const NAMES: [Names; 3] = [
@@ -41,46 +43,46 @@ const NAMES: [Names; 3] = [
     },
 ];
 
-/// Three sensors and their line.
+/// Configuration of the three sensors and their line.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
-    /// Gyroscope (rad/s), accelerometer (m/s²), magnetometer (T).
+    /// Errors of gyroscope (rad/s), accelerometer (m/s²) and magnetometer (T).
     pub triads: [Triad; 3],
-    /// The line.
+    /// Timing and drops of the serial line.
     pub line: Line,
-    /// Seed of noise and drops.
+    /// Seed of the random noise and drops.
     pub seed: u64,
 }
 
-/// When samples are taken, arrive, and are dropped.
+/// Serial line: when samples are taken, when they arrive, and which are dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
-    /// Time between samples, s.
+    /// Time between two samples, s.
     pub period: f64,
     /// Time from taking a sample to its arrival, s.
     pub delay: f64,
-    /// Probability that a sample is dropped, while `drop_window` holds.
+    /// Probability that a sample is dropped if it is taken within `drop_window`.
     pub drop_probability: f64,
-    /// When samples can be dropped, by the time at which they are taken.
+    /// Window of the sampling times at which samples can be dropped.
     pub drop_window: Window,
 }
 
-/// What arrives.
+/// Sample of the three sensors as it arrives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
-    /// Counts the samples from 1; 0 before the first arrives.
+    /// Number of the sample, counted from 1; it is 0 before the first arrives.
     pub number: i32,
-    /// When it was taken, s.
+    /// Time at which the sample was taken, s.
     pub time: f64,
-    /// What the sensors said.
+    /// Readings of the three sensors, with their errors.
     pub readings: Readings,
 }
 
-/// A sample that was taken.
+/// Sample that was taken, whether or not it has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Taken {
     tick: i64,
-    /// By the clock of the line, s.
+    /// Time at which it was taken, by the clock of the line, s.
     time: f64,
     memories: [Memory; 3],
     dropped: bool,
@@ -93,18 +95,18 @@ impl Taken {
     }
 }
 
-/// The sensors with their state.
+/// The three sensors with their state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensors {
     config: Config,
     start: f64,
-    /// Before the last tick.
+    /// Sample of the tick before the last one.
     before: Option<Taken>,
-    /// Of the last tick.
+    /// Sample of the last tick.
     last: Option<Taken>,
-    /// On their way, by tick modulo length.
+    /// Samples on their way, indexed by tick modulo length.
     line: Vec<Option<Taken>>,
-    /// The newest that has arrived.
+    /// Newest sample that has arrived.
     arrived: Sample,
 }
 
@@ -126,9 +128,10 @@ impl Config {
         self.triads.iter().zip(&NAMES).try_for_each(|(triad, names)| triad.check(names))
     }
 
-    /// Normal noise of the three sensors and a chance in [0, 1) to be dropped, of the tick.
+    /// Draws the normal noise of the three sensors at a tick, and a random number in [0, 1) that
+    /// decides whether its sample is dropped.
     fn draw(&self, tick: i64) -> ([Vector3<f64>; 3], f64) {
-        // Another sequence than that of a disturbance with the same seed.
+        // The inverted seed gives another sequence than that of a disturbance with the same seed.
         let [a, b, c, d, e, f, g, h, i, j, chance] = uniform(!self.seed, tick);
         let [first, second, third, fourth, fifth] = [[a, b], [c, d], [e, f], [g, h], [i, j]].map(normal_pair);
         let noise = [
@@ -141,7 +144,7 @@ impl Config {
 }
 
 impl Sensors {
-    /// Before the first sample, which is taken at `start` (s).
+    /// Makes the sensors in the state before their first sample, which is taken at `start` (s).
     ///
     /// # Errors
     /// Names the value of the configuration that is out of range.
@@ -153,12 +156,13 @@ impl Sensors {
         Ok(Self { config: *config, start, before: None, last: None, line: vec![None; length], arrived })
     }
 
-    /// Whether both are made of the same configuration and begin at the same time.
+    /// Whether both have the same configuration and start time.
     pub(crate) fn same_configuration(&self, other: &Self) -> bool {
         self.config == other.config && self.start == other.start && self.line.len() == other.line.len()
     }
 
-    /// Whether these can be the sensors at `time` (s): nothing that they have taken is of the future.
+    /// Whether restored sensors are possible at `time` (s), which means that none of their samples
+    /// lies in the future. A step that has `failed` may have gone beyond `time`.
     pub(crate) fn fits(&self, time: f64, failed: bool) -> bool {
         let latest = if failed { i64::MAX / 2 } else { self.tick_at(time) };
         let past = |taken: &Taken| (0..=latest).contains(&taken.tick) && taken.time.is_finite();
@@ -171,24 +175,25 @@ impl Sensors {
         tick(time, self.start, self.config.line.period)
     }
 
-    /// The first time (s) after `time` at which a sample is taken.
+    /// First time (s) after `time` at which a sample is taken.
     pub fn next_sample(&self, time: f64) -> f64 {
         tick_time(self.tick_at(time) + 1, self.start, self.config.line.period)
     }
 
-    /// The first time (s) after `time` at which a sample is taken or arrives.
+    /// First time (s) after `time` at which a sample is taken or arrives.
     pub fn next_event(&self, time: f64) -> f64 {
         let arrival = tick_time(self.tick_arrived(time) + 1, self.start, self.config.line.period);
         self.next_sample(time).min(arrival.max(self.start) + self.config.line.delay)
     }
 
-    /// The last tick whose sample has had the time to arrive.
+    /// Last tick whose sample has had the time to arrive by `time` (s).
     fn tick_arrived(&self, time: f64) -> i64 {
         let Line { period, delay, .. } = self.config.line;
         ((time - delay - self.start + tick_tolerance(time, period)) / period).floor() as i64
     }
 
-    /// The sample that is due at `time` (s), if its tick has come and has not gone.
+    /// Sample that is due at `time` (s), or `None` if the sample of the present tick was taken at
+    /// an earlier time.
     fn due(&self, time: f64, felt: &Readings) -> Option<Taken> {
         let tick = self.tick_at(time);
         let tolerance = tick_tolerance(time, self.config.line.period);
@@ -198,7 +203,7 @@ impl Sensors {
             last => last,
         };
         let Config { triads, line, .. } = &self.config;
-        // An importer may have missed the tick's time; the sample is then taken late.
+        // An importer may have missed the time of the tick; the sample is then taken late.
         let nominal = tick_time(tick, self.start, line.period);
         let taken = if time > nominal + tolerance { time } else { nominal };
         let (noise, chance) = self.config.draw(tick);
@@ -214,7 +219,7 @@ impl Sensors {
         tick as usize % self.line.len()
     }
 
-    /// The newest sample that has arrived at `time` (s) of those taken.
+    /// Newest of the samples taken that has arrived by `time` (s).
     fn newest(&self, time: f64) -> Sample {
         let Some(last) = self.last else { return self.arrived };
         let newest = self.tick_arrived(time).min(last.tick);
@@ -225,7 +230,8 @@ impl Sensors {
         on_the_line.map_or(self.arrived, |taken| taken.sample())
     }
 
-    /// Takes the sample that is due at `time` (s), if one is, and what has arrived; again, if asked again at the tick.
+    /// Takes the sample that is due at `time` (s), if there is one, and receives what has arrived.
+    /// A call repeated at the same tick replaces the sample.
     pub fn take(&mut self, time: f64, felt: &Readings) {
         self.arrived = self.newest(time);
         if let Some(taken) = self.due(time, felt) {
@@ -239,12 +245,12 @@ impl Sensors {
         }
     }
 
-    /// What had arrived when [`Sensors::take`] was called last.
+    /// Newest sample that had arrived at the last call of [`Sensors::take`].
     pub fn arrived(&self) -> Sample {
         self.arrived
     }
 
-    /// What [`Sensors::take`] at `time` (s) would show.
+    /// Newest sample that would have arrived after a call of [`Sensors::take`] at `time` (s).
     pub fn shown(&self, time: f64, felt: &Readings) -> Sample {
         let due =
             self.due(time, felt).filter(|taken| taken.tick <= self.tick_arrived(time) && !taken.dropped);

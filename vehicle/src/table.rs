@@ -1,4 +1,5 @@
-//! Reference given as points over time: a twice continuously differentiable cubic spline (not-a-knot) through them.
+//! Reference table: points over time and the cubic spline through them, which is twice continuously
+//! differentiable and ends with the not-a-knot condition.
 
 use crate::error::Error;
 use crate::reference::Reference;
@@ -7,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use std::io::Read;
 use std::path::Path;
 
-/// Points and the spline's second derivatives there. Before the first and after the last point the angles are held.
+/// Points and the second derivatives of the spline there. Before the first and after the last point
+/// the angles are held.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     times: Vec<f64>,
@@ -15,32 +17,36 @@ pub struct Table {
     curvatures: Vec<Vector3<f64>>,
 }
 
-/// Headings that give a quantity, each with its factor to SI.
+/// Column headings allowed for each quantity, each with its factor to SI units.
 const COLUMNS: [(&str, &[(&str, f64)]); 4] = [
     ("time", &[("time_s", 1.0)]),
     ("alpha", &[("alpha_rad", 1.0), ("alpha_deg", DEGREE)]),
     ("beta", &[("beta_rad", 1.0), ("beta_deg", DEGREE)]),
     ("sigma", &[("sigma_rad", 1.0), ("sigma_deg", DEGREE)]),
 ];
-/// Most points of a table: 10 000 s at 10 Hz.
+/// Largest number of points in a table: 10 000 s at 10 Hz.
 const MOST_POINTS: usize = 100_000;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 impl Table {
-    /// Through `angles` (rad) at strictly increasing `times` (s), as many of either.
+    /// Makes the spline through `angles` (rad) at strictly increasing `times` (s); both have the
+    /// same length.
     ///
     /// # Errors
-    /// If there are no points, their numbers differ, one is not finite, or the times do not increase.
+    /// Refuses a table without points, with unequal lengths, with a value that is not finite, or
+    /// with times that do not increase.
     pub fn new(times: Vec<f64>, angles: Vec<Vector3<f64>>) -> Result<Self, Error> {
         check(&times, &angles)?;
         let curvatures = curvatures(&times, &angles);
         Ok(Self { times, angles, curvatures })
     }
 
-    /// Refuses what [`Table::new`] would not have made: a table that was restored may be forged.
+    /// Refuses a table that [`Table::new`] could not have made, because a restored table may be
+    /// corrupt.
     ///
     /// # Errors
-    /// As those of [`Table::new`].
+    /// Reports the same errors as [`Table::new`], and second derivatives that are missing or not
+    /// finite.
     pub fn check(&self) -> Result<(), Error> {
         check(&self.times, &self.angles)?;
         let finite = self.curvatures.iter().flatten().all(|value| value.is_finite());
@@ -51,11 +57,11 @@ impl Table {
         Err(Error::Parameter { name: "reference table", problem })
     }
 
-    /// From a CSV file with the headings `time_s` and, in any order, `alpha_deg` or `alpha_rad`, likewise `beta_…` and
-    /// `sigma_…`. Lines that begin with `#` are comments.
+    /// Reads a CSV file with the headings `time_s` and, in any order, `alpha_deg` or `alpha_rad`,
+    /// and likewise `beta_…` and `sigma_…`. Lines that begin with `#` are comments.
     ///
     /// # Errors
-    /// Names file, line and column of what cannot be used.
+    /// Names the file, line and column at fault.
     pub fn from_csv_file(path: &Path) -> Result<Self, Error> {
         let file = path.display().to_string();
         match std::fs::File::open(path) {
@@ -64,10 +70,11 @@ impl Table {
         }
     }
 
-    /// As [`Table::from_csv_file`], from anything that can be read; `file` names it in messages.
+    /// Reads a table in the form of [`Table::from_csv_file`] from any reader; `file` names it in
+    /// messages.
     ///
     /// # Errors
-    /// Names file, line and column of what cannot be used.
+    /// Names the file, line and column at fault.
     pub fn from_csv(file: &str, reader: impl Read) -> Result<Self, Error> {
         let refuse = |line: Option<u64>, column: Option<&str>, problem: String| Error::Table {
             file: file.into(),
@@ -155,7 +162,7 @@ impl Table {
         Self::new(times, angles)
     }
 
-    /// The reference at `time` (s).
+    /// Returns the reference at `time` (s).
     pub fn at(&self, time: f64) -> Reference {
         let last = self.times.len() - 1;
         if !(time >= self.times[0] && time <= self.times[last]) || last == 0 {
@@ -200,8 +207,8 @@ fn too_many() -> String {
     format!("has more than {MOST_POINTS} points; keep fewer, the spline is smooth between them")
 }
 
-/// Second derivatives at the knots. The third derivative is continuous at the second and at the last but one knot; three
-/// points give a parabola, two a line.
+/// Second derivatives of the spline at the knots `x`. The third derivative is continuous at the
+/// second knot and at the last but one. Three points give a parabola, two a line.
 fn curvatures(x: &[f64], y: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let n = x.len();
     let mut c = vec![Vector3::zeros(); n];
@@ -214,7 +221,8 @@ fn curvatures(x: &[f64], y: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         c.fill((slope(1) - slope(0)) * (2.0 / (h(0) + h(1))));
         return c;
     }
-    // Interior knots i: h₋ c[i-1] + 2 (h₋ + h₊) c[i] + h₊ c[i+1] = 6 (slope₊ − slope₋); the end knots are eliminated.
+    // Interior knots i: h₋ c[i-1] + 2 (h₋ + h₊) c[i] + h₊ c[i+1] = 6 (slope₊ − slope₋); the end
+    // knots are eliminated.
     let (mut upper, mut right) = (vec![0.0; n], vec![Vector3::zeros(); n]);
     for i in 1..n - 1 {
         let (before, after) = (h(i - 1), h(i));

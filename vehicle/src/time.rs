@@ -1,31 +1,34 @@
-//! Comparison of times and ticks: t = start + k · period with an integer k, never accumulated.
+//! Comparison of times and ticks. The time of a tick is start + k · period with an integer k and is
+//! never accumulated.
 
 use crate::error::Error;
 
-/// Instants closer than this are one, relative to their size or absolute in s below 1 s.
+/// Instants closer than this count as equal: relative to their size, or in s for times below 1 s.
 pub const TOLERANCE: f64 = 1e-9;
-/// Instants further apart than this (s) are never one, however large they are.
+/// Instants further apart than this (s) never count as equal, however large they are.
 const LONGEST: f64 = 1e-4;
-/// An instant and a tick that lie further apart than this share of the period are never one.
+/// An instant and a tick further apart than this fraction of the period never count as equal.
 const SHARE_OF_PERIOD: f64 = 0.1;
-/// What rounding does to times, relative to their size.
+/// Rounding error of times, relative to their size.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// The distance (s) below which another instant is the same as `time` (s).
+/// Distance (s) within which another instant counts as equal to `time` (s).
 pub fn tolerance(time: f64) -> f64 {
     (TOLERANCE * time.abs().max(1.0)).min(LONGEST).max(ROUNDING * time.abs())
 }
 
-/// The distance (s) below which a tick is at `time` (s), if there is one every `period` (s). Importers add up time, so that it
-/// grows with time, but never so far that one tick is taken for the next.
+/// Distance (s) within which a tick, one every `period` (s), counts as being at `time` (s).
+/// Importers accumulate time, so the distance grows with it, but never so far that one tick is
+/// taken for the next.
 pub fn tick_tolerance(time: f64, period: f64) -> f64 {
     (TOLERANCE * time.abs().max(1.0)).min(SHARE_OF_PERIOD * period)
 }
 
-/// Refuses an experiment that starts where rounding is as large as the tolerance of ticks.
+/// Refuses an experiment that starts at a time whose rounding error is as large as the tolerance of
+/// ticks.
 ///
 /// # Errors
-/// Names start time and period.
+/// Names the start time and the period.
 pub fn check_resolution(start: f64, period: f64) -> Result<(), Error> {
     let latest = SHARE_OF_PERIOD * period / ROUNDING;
     if start.abs() <= latest {
@@ -42,7 +45,7 @@ pub fn tick(time: f64, start: f64, period: f64) -> i64 {
     ((time - start + tick_tolerance(time, period)) / period).floor() as i64
 }
 
-/// Time of a tick, s.
+/// Time of the tick with this number, s.
 pub fn tick_time(tick: i64, start: f64, period: f64) -> f64 {
     start + tick as f64 * period
 }

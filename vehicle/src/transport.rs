@@ -1,5 +1,5 @@
-//! Transport delay of the commanded moment: what is commanded at t acts from t + delay on, and is held until the next change
-//! arrives. Before the first command no moment acts.
+//! Transport delay of the commanded moment. A moment commanded at t acts from t + delay on and is
+//! held until the next change arrives. No moment acts before the first command arrives.
 
 use crate::error::Error;
 use crate::time::tolerance;
@@ -7,33 +7,33 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// Longest delay, s.
+/// Longest delay that is allowed, s.
 pub const LONGEST: f64 = 1.0;
-/// Most changes of the command that can be under way at a time.
+/// Largest number of changes of the command that can be under way at a time.
 pub const UNDER_WAY: usize = 10_000;
-/// Name of the delay in messages.
+/// Name of the delay in error messages.
 const NAME: &str = "actuation.delay";
 
-/// A command that differs from the one before it.
+/// Commanded moment that differs from the one before it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Change {
-    /// When it was given, s.
+    /// Time at which the command was given, s.
     time: f64,
-    /// N m.
+    /// Commanded moment about the body axes, N m.
     moment: Vector3<f64>,
 }
 
-/// The commands that are under way, and the one in force.
+/// Commands that are under way, and the one that acts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Transport {
-    /// s.
+    /// Transport delay of the moment, s.
     delay: f64,
-    /// Oldest first. All but the first are under way.
+    /// Changes in order of time, oldest first. All but the first are under way.
     changes: VecDeque<Change>,
 }
 
 impl Transport {
-    /// With a delay in s; `None` if it is zero.
+    /// Makes a transport with a delay in s, or `None` if the delay is zero.
     ///
     /// # Errors
     /// Refuses a delay that is negative or longer than [`LONGEST`].
@@ -45,12 +45,13 @@ impl Transport {
         Ok((delay > 0.0).then(|| Self { delay, changes: VecDeque::new() }))
     }
 
-    /// s.
+    /// Transport delay of the moment, s.
     pub(crate) fn delay(&self) -> f64 {
         self.delay
     }
 
-    /// Whether these can be the commands under way at `time` (s).
+    /// Whether restored commands are possible at `time` (s). A step that has `failed` may have gone
+    /// beyond `time`.
     pub(crate) fn fits(&self, time: f64, failed: bool) -> bool {
         let past =
             |change: &Change| failed && change.time.is_finite() || change.time <= time + tolerance(time);
@@ -61,21 +62,22 @@ impl Transport {
             && self.changes.iter().all(|change| past(change) && finite(change))
     }
 
-    /// Whether what was commanded at `commanded` (s) acts at `time` (s). Instants that differ by rounding are one, but a
-    /// command never acts at the instant at which it is given.
+    /// Whether a moment commanded at `commanded` (s) acts at `time` (s). Instants that differ by
+    /// rounding count as equal, but a command never acts at the instant at which it is given.
     fn acts(&self, commanded: f64, time: f64) -> bool {
         commanded + self.delay <= time + tolerance(time).min(0.5 * self.delay)
     }
 
-    /// Number of the changes that have arrived at `time` (s).
+    /// Number of changes that have arrived by `time` (s).
     fn arrived(&self, time: f64) -> usize {
         self.changes.partition_point(|change| self.acts(change.time, time))
     }
 
-    /// Takes the moment (N m) that is commanded from `time` (s) on, in place of one that was given at the same time.
+    /// Takes the moment (N m) that is commanded from `time` (s) on. It replaces one that was given
+    /// at the same time.
     ///
     /// # Errors
-    /// If it is not finite, or more than [`UNDER_WAY`] changes would be under way.
+    /// Refuses a moment that is not finite, or more than [`UNDER_WAY`] changes under way at a time.
     pub fn command(&mut self, time: f64, moment: Vector3<f64>) -> Result<(), Error> {
         if !moment.iter().all(|value| value.is_finite()) {
             return Err(Error::NotFinite { time, what: "moment" });
@@ -99,10 +101,11 @@ impl Transport {
         Ok(())
     }
 
-    /// Checks that the moment is held over a communication step, given its values at the beginning and later in it.
+    /// Checks that the moment is held over a communication step, given its value at the beginning
+    /// and one at a later time in the step.
     ///
     /// # Errors
-    /// If it is not held.
+    /// Reports a moment that is not held.
     pub fn check_held(&self, begin: &Vector3<f64>, later: &Vector3<f64>) -> Result<(), Error> {
         if begin == later {
             return Ok(());
@@ -114,12 +117,12 @@ impl Transport {
         Err(Error::Parameter { name: NAME, problem })
     }
 
-    /// The moment (N m) that acts at `time` (s).
+    /// Moment (N m) that acts at `time` (s).
     pub fn moment(&self, time: f64) -> Vector3<f64> {
         self.arrived(time).checked_sub(1).map_or_else(Vector3::zeros, |last| self.changes[last].moment)
     }
 
-    /// When the next change arrives after `time` (s), if one is under way.
+    /// Time (s) at which the next change after `time` arrives, if one is under way.
     pub fn next_arrival(&self, time: f64) -> Option<f64> {
         self.changes.get(self.arrived(time)).map(|change| change.time + self.delay)
     }
@@ -204,7 +207,7 @@ mod tests {
         }
         let text = last.unwrap_err().to_string();
         assert!(text.contains("actuation.delay") && text.contains("10000"), "{text}");
-        // The first is zero, which is no change.
+        // The first moment is zero, which is no change.
         assert_eq!(count as usize, UNDER_WAY + 2);
         for delay in [-0.1, 1.1, f64::NAN] {
             assert!(Transport::new(delay).unwrap_err().to_string().contains("actuation.delay"));

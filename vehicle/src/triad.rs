@@ -1,41 +1,43 @@
-//! One sensor with three axes, and what lies between what it feels and what it says, in the order in which it acts:
-//! scale, misalignment and bias; bandwidth; white noise; range; resolution of the converter.
+//! One sensor with three axes and its errors, in the order in which they act on the measured
+//! quantity: scale, misalignment and bias; bandwidth; white noise; range; resolution of the
+//! converter.
 
 use crate::error::Error;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Errors of a sensor; the unit is that of what it measures.
+/// Errors of one sensor, in the unit of the quantity that it measures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Triad {
-    /// Scale on the diagonal, misalignment beside it; of a magnetometer with soft iron.
+    /// Matrix with scale on the diagonal and misalignment beside it; for a magnetometer it includes
+    /// soft iron.
     pub matrix: Matrix3<f64>,
-    /// Bias; of a magnetometer with hard iron.
+    /// Bias of each axis; for a magnetometer it includes hard iron.
     pub bias: Vector3<f64>,
     /// Standard deviation of the white noise on each sample.
     pub noise: f64,
-    /// Frequency at which a first-order low-pass filter takes 3 dB, Hz; 0 for none.
+    /// Frequency at which a first-order low-pass filter attenuates by 3 dB, Hz; 0 for no filter.
     pub bandwidth: f64,
-    /// Largest value, either way; 0 for no limit.
+    /// Largest magnitude of a value; 0 for no limit.
     pub range: f64,
-    /// Step of the converter; 0 for none.
+    /// Step of the converter; 0 for no quantization.
     pub resolution: f64,
-    /// When it repeats its last value.
+    /// Window in which the sensor repeats its last value.
     pub freeze: Window,
 }
 
-/// start ≤ t < end, s.
+/// Time window start ≤ t < end, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Window {
-    /// From this time on, s.
+    /// Start of the window, included, s.
     pub start: f64,
-    /// Until this time, s.
+    /// End of the window, excluded, s.
     pub end: f64,
 }
 
 impl Window {
-    /// Whether it holds `time` (s).
+    /// Whether the window contains `time` (s).
     pub fn holds(&self, time: f64) -> bool {
         let tolerance = crate::time::tolerance(time);
         time + tolerance >= self.start && time + tolerance < self.end
@@ -43,7 +45,7 @@ impl Window {
 }
 
 impl Default for Triad {
-    /// Without errors.
+    /// Returns a sensor without errors.
     fn default() -> Self {
         Self {
             matrix: Matrix3::identity(),
@@ -67,19 +69,19 @@ pub(crate) struct Names {
     pub(crate) resolution: &'static str,
 }
 
-/// What a sensor keeps from one sample to the next.
+/// Memory that a sensor keeps from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
-    /// What came to the low-pass filter.
+    /// Input of the low-pass filter.
     input: Vector3<f64>,
-    /// What came out of it.
+    /// Output of the low-pass filter.
     filtered: Vector3<f64>,
-    /// What the sensor said.
+    /// Value that the sensor output.
     pub value: Vector3<f64>,
 }
 
 impl Triad {
-    /// Refuses negative values and what is not finite.
+    /// Refuses negative values and values that are not finite.
     pub(crate) fn check(&self, names: &Names) -> Result<(), Error> {
         for (name, value) in [
             (names.noise, self.noise),
@@ -102,8 +104,9 @@ impl Triad {
         Ok(())
     }
 
-    /// The sample at `time` (s), which is `elapsed` (s) after the one before, if there was one. The filter is exact for a
-    /// signal that is linear in time between samples. `noise` is normal with variance 1.
+    /// Takes the sample at `time` (s), which is the given time (s) after the one in `before`, if
+    /// there was one. The filter is exact for a signal that is linear in time between samples.
+    /// `noise` is normal with variance 1.
     pub fn sample(
         &self,
         time: f64,
@@ -120,7 +123,8 @@ impl Triad {
         Memory { input, filtered, value }
     }
 
-    /// τ ẏ = u − y with u from `before.input` to `input` along a straight line.
+    /// Solves τ ẏ = u − y over `elapsed` (s), with u on a straight line from `before.input` to
+    /// `input`.
     fn filtered(&self, input: &Vector3<f64>, before: &Memory, elapsed: f64) -> Vector3<f64> {
         if self.bandwidth == 0.0 {
             return *input;

@@ -1,4 +1,4 @@
-//! Disturbances: bounds, reproducibility, signs, course over time.
+//! Tests of disturbances: bounds, reproducibility, signs and course over time.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -114,7 +114,7 @@ fn oracle_white_noise_has_the_moments_of_a_uniform_distribution_and_no_memory() 
         let variance = samples.iter().map(|s| s.component_mul(s)).sum::<Vector3<f64>>() / n as f64;
         let next = samples.windows(2).map(|w| w[0].component_mul(&w[1])).sum::<Vector3<f64>>() / n as f64;
         let across = samples.iter().map(|s| s.x * s.y + s.y * s.z).sum::<f64>() / n as f64;
-        // Five standard deviations of each estimate
+        // The bounds are five standard deviations of each estimate.
         assert!(mean.amax() < 0.0092, "{mean}");
         assert!((variance - Vector3::repeat(1.0 / 3.0)).amax() < 0.0048, "{variance}");
         assert!(next.amax() < 0.0053, "{next}");

@@ -1,5 +1,5 @@
-//! R of Chai 2022 (2) against its properties and against numerical differentiation, Wu 2015 (1) against a composition of
-//! rotations.
+//! Tests of R of Chai 2022 (2) against its properties and numerical differentiation, and of Wu 2015
+//! (1) against a composition of rotations.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
@@ -57,7 +57,7 @@ proptest! {
     }
 }
 
-/// A path with all angles and rates of order one.
+/// A path on which all angles and rates are of order one.
 fn path(t: f64) -> (Vector3<f64>, Vector3<f64>) {
     let angles = Vector3::new(0.5 + 0.3 * (0.7 * t).sin(), 0.4 * t.cos(), 0.2 * t);
     let rates = Vector3::new(0.21 * (0.7 * t).cos(), -0.4 * t.sin(), 0.2);
@@ -79,7 +79,8 @@ fn oracle_r_dot_against_differences_along_a_path() {
     }
 }
 
-/// Ṙ as Chai 2022 prints it (proof of Lemma 1) differs from the derivative in the entries (1,3) and (3,1) alone.
+/// Ṙ as Chai 2022 prints it (proof of Lemma 1) differs from the derivative in the entries (1,3) and
+/// (3,1) only.
 #[test]
 fn published_r_dot_is_wrong_in_two_entries() {
     let (angles, rates) = path(1.0);
@@ -107,8 +108,8 @@ fn published_r_dot_is_wrong_in_two_entries() {
 
 // Wu 2015, (1)
 
-/// Body axes to north, east, down at the meridian θ = 0, as a product of rotations. The bank angle grows against the right-hand
-/// rule about the velocity, which is what the signs of R say.
+/// Rotation from body axes to north, east, down at the meridian θ = 0, as a product of rotations.
+/// The bank angle grows against the right-hand rule about the velocity, as the signs of R require.
 fn attitude_in_space(trajectory: &Trajectory, longitude: f64, angles: &Vector3<f64>) -> Rotation3<f64> {
     let [x, y, z] = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
     let about = Rotation3::from_axis_angle;
@@ -120,7 +121,7 @@ fn attitude_in_space(trajectory: &Trajectory, longitude: f64, angles: &Vector3<f
     to_the_vehicle * to_north_east_down * to_the_velocity * to_the_body
 }
 
-/// ω about the body axes from the attitude's change, by a central difference.
+/// Body rates ω from the change of the attitude, by a central difference.
 fn body_rates(
     trajectory: &Trajectory,
     earth_rate: f64,
@@ -156,7 +157,7 @@ fn trajectory() -> impl Strategy<Value = Trajectory> {
     })
 }
 
-/// (1) as printed, with `sign` before sin φ sin γ in the bank row.
+/// Wu 2015 (1) as printed, with `sign` before sin φ sin γ in the bank row.
 fn printed_1(
     trajectory: &Trajectory,
     earth_rate: f64,
@@ -202,14 +203,15 @@ proptest! {
         let found = exact.r(&angles) * rates + exact.turn(&angles) * turn_rate;
         let scale = 1.0 / angles.y.cos();
         prop_assert!((found - angle_rates).amax() < 1e-9 * scale, "{}", found - angle_rates);
-        // The other item lacks α̇ sin β and nothing else.
+        // The printed kinematics lack α̇ sin β and nothing else.
         let printed = Kinematics::Printed;
         let mut found = printed.r(&angles) * rates + printed.turn(&angles) * turn_rate;
         found.z += angle_rates.x * angles.y.sin();
         prop_assert!((found - angle_rates).amax() < 1e-9 * scale, "{}", found - angle_rates);
     }
 
-    /// (1) as printed differs from that in one sign, that of sin φ sin γ in the bank row.
+    /// Wu 2015 (1) as printed differs from the true kinematics in one sign, that of sin φ sin γ in
+    /// the bank row.
     #[test]
     fn published_kinematics_1_are_wrong_in_one_sign(
         angles in attitude(),
@@ -284,7 +286,8 @@ proptest! {
     }
 }
 
-/// Where R is the R of (3) and (4): level and straight, or at rest over an Earth that does not turn.
+/// The R of (3) and (4) is complete where the trajectory does not turn, for example at rest over an
+/// Earth that does not turn.
 #[test]
 fn a_trajectory_that_does_not_turn_leaves_r_alone() {
     let still = Trajectory { flight_path_angle: -0.1, heading: 0.7, latitude: 0.5, ..Trajectory::default() };

@@ -1,4 +1,4 @@
-//! The plant: conservation laws, order, cuts, reproducibility, refusals.
+//! Tests of the plant: conservation laws, order, cuts, reproducibility and refusals.
 
 use nalgebra::{Vector3, Vector6};
 use proptest::prelude::*;
@@ -19,7 +19,7 @@ fn undisturbed(initial: State, step: f64) -> Config {
 
 const TUMBLING: [f64; 6] = [0.2, 0.1, -0.5, 0.08, -0.05, 0.06];
 
-/// All kinds, each over the crmpc-2022 data.
+/// One plant for each kind of disturbance, all with the data of crmpc-2022.
 fn kinds() -> impl Iterator<Item = Config> {
     use Kind::{AgainstMoment, AlongRate, Constant, None, Sine, Square, White};
     [None, White, Constant, Sine, Square, AlongRate, AgainstMoment].into_iter().map(|kind| {
@@ -73,7 +73,8 @@ fn oracle_integration_has_order_four() {
 
 #[test]
 fn oracle_constant_moment_about_a_principal_axis() {
-    // About the pitch axis at beta = 0, sigma free: q = M t / Iyy, alpha = alpha_0 + M t² / 2 Iyy
+    // Motion about the pitch axis at beta = 0, sigma free: q = M t / Iyy, alpha = alpha_0 + M t² /
+    // 2 Iyy.
     let mut plant = Plant::new(&undisturbed(Vector6::new(0.1, 0.0, 0.3, 0.0, 0.0, 0.0), 0.01), 0.0).unwrap();
     let inertia = plant.body().inertia[(1, 1)];
     assert_eq!(inertia, 1303212.0 * 1.05);
@@ -88,7 +89,7 @@ fn oracle_delta_is_an_acceleration_of_x_omega() {
     let (state, moment, delta) =
         (State::from(TUMBLING), Vector3::new(1e4, 2e4, 3e4), Vector3::new(0.03, -0.02, 0.01));
     for kinematics in [Kinematics::Printed, Kinematics::Exact] {
-        // d(Rω)/dt by differences along the motion, with and without Δ
+        // Differences along the motion give d(Rω)/dt, with and without Δ.
         let x_omega_rate = |delta: Vector3<f64>| {
             let h = 1e-5;
             let f = derivative(&body, kinematics, &state, &Load { moment, delta, ..Load::default() });
@@ -208,7 +209,7 @@ fn serialised_mid_run_it_goes_on_bit_for_bit() {
 
 #[test]
 fn singular_attitude_and_wrong_input_stop_the_plant_with_a_reason() {
-    // Without Ixz the yaw rate alone carries beta straight into 90°.
+    // Without Ixz the yaw rate alone carries beta straight to 90°.
     let mut straight = undisturbed(Vector6::new(0.0, 1.5, 0.0, 0.0, 0.0, -0.5), 0.01);
     straight.inertia.Ixz = 0.0;
     let mut plant = Plant::new(&straight, 0.0).unwrap();
@@ -308,7 +309,8 @@ proptest! {
 
 #[test]
 fn oracle_a_steady_climb_over_a_still_earth_shows_in_alpha_alone() {
-    // Without bank and sideslip, level and to the north: α̇ = q − γ̇. So under γ̇ the angle of attack falls.
+    // In level flight to the north without bank and sideslip, α̇ = q − γ̇, so a positive γ̇ lowers
+    // the angle of attack.
     let mut plant = Plant::new(&undisturbed(State::new(0.3, 0.0, 0.0, 0.0, 0.0, 0.0), 0.01), 0.0).unwrap();
     let climb = Trajectory { flight_path_angle_rate: 0.02, ..Trajectory::default() };
     plant
@@ -340,12 +342,13 @@ fn oracle_the_bank_angles_differ_by_the_integral_of_alpha_rate_times_sin_beta() 
         plant.angles()
     };
     let difference = end(Kinematics::Exact) - end(Kinematics::Printed);
-    // The torque-free rates are the same, and α, β do not depend on σ; σ differs by the integral of α̇ sin β.
+    // The torque-free rates are equal, and α, β do not depend on σ; σ differs by the integral of α̇
+    // sin β.
     assert_eq!((difference.x, difference.y), (0.0, 0.0));
     assert!((difference.z - 0.02 * 0.2f64.sin()).abs() < 1e-4, "{}", difference.z);
 }
 
-/// The undisturbed vehicle with actuators at the published flight condition.
+/// Configuration of the undisturbed vehicle with actuators at the published flight condition.
 fn actuated(initial: State, jet_mode: JetMode) -> Config {
     let dynamic_pressure = Effectors::published().reference_pressure;
     let actuators = actuators::Config {
@@ -366,7 +369,8 @@ fn flaps(deflection_deg: f64) -> Command {
 
 #[test]
 fn oracle_flaps_turn_the_nose_at_their_rate_and_then_stay() {
-    // At beta = 0 both flaps pitch alone: M = -2 · 5100 N m/deg · 10 deg/s · t up to -2 deg at 0.2 s, then constant
+    // At beta = 0 both flaps give a pure pitching moment: M = -2 · 5100 N m/deg · 10 deg/s · t up
+    // to -2 deg at 0.2 s, then constant.
     let config = actuated(State::new(0.1, 0.0, 0.2, 0.0, 0.0, 0.0), JetMode::OnOff);
     let inertia = config.inertia.Iyy * config.inertia_scale;
     let mut plant = Plant::new(&config, 0.0).unwrap();
@@ -441,7 +445,8 @@ fn noise_does_not_depend_on_actuators() {
 
 #[test]
 fn oracle_a_delayed_moment_acts_that_much_later() {
-    // The same moments given without delay to a plant whose steps begin where they arrive.
+    // The comparison plant gets the same moments without delay, in steps that begin where they
+    // arrive.
     for delay in [1e-3, 0.04, 0.1, 0.117, 0.12, 1.0] {
         for config in kinds() {
             let mut delayed = Plant::new(&Config { moment_delay: delay, ..config.clone() }, 0.0).unwrap();

@@ -1,4 +1,5 @@
-//! What the platform's sensors feel, against readings by hand and against rotations that are differentiated numerically.
+//! Tests of the platform's sensor readings against values by hand and numerically differentiated
+//! rotations.
 
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
@@ -11,7 +12,7 @@ use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
 
 const G: f64 = 9.80665;
-/// North, east, down.
+/// Magnetic field to the north, to the east and down, T.
 const FIELD: Vector3<f64> = Vector3::new(2e-5, -0.5e-5, 4.6e-5);
 const AROUND: Surroundings = Surroundings { gravity: G, field: FIELD };
 
@@ -29,13 +30,14 @@ fn at_rest(degrees: [f64; 3]) -> Pose {
 fn oracle_static_readings_by_hand() {
     let [north, east, down] = [FIELD.x, FIELD.y, FIELD.z];
     for (degrees, force, field) in [
-        // Level, to the north
+        // Level flight to the north.
         ([0.0, 0.0, 0.0], [0.0, 0.0, -G], [north, east, down]),
-        // Nose up: the belly looks north
+        // With the nose up, the belly looks north.
         ([90.0, 0.0, 0.0], [G, 0.0, 0.0], [-down, east, north]),
-        // Sideslip: the wind comes from the right, the nose points to the left of north, to the west
+        // With sideslip the wind comes from the right, so the nose points left of north, to the
+        // west.
         ([0.0, 90.0, 0.0], [0.0, 0.0, -G], [-east, north, down]),
-        // Bank against the right-hand rule: the right wing is up
+        // The bank turns against the right-hand rule: the right wing is up.
         ([0.0, 0.0, 90.0], [0.0, G, 0.0], [north, -down, east]),
     ] {
         let [rate, found_force, found_field] = at_rest(degrees).felt(&AROUND);
@@ -50,12 +52,12 @@ fn oracle_heading_and_climb_turn_what_is_felt() {
     let mut pose = at_rest([0.0; 3]);
     pose.trajectory.heading = FRAC_PI_2;
     let [_, force, field] = pose.felt(&AROUND);
-    // To the east: north is on the left
+    // In flight to the east, north is on the left.
     assert!((force - Vector3::new(0.0, 0.0, -G)).amax() < 1e-14);
     assert!((field - Vector3::new(FIELD.y, -FIELD.x, FIELD.z)).amax() < 1e-19);
     pose.trajectory = Trajectory { flight_path_angle: FRAC_PI_2, ..Trajectory::default() };
     let [_, force, field] = pose.felt(&AROUND);
-    // Straight up: the belly looks north
+    // In flight straight up, the belly looks north.
     assert!((force - Vector3::new(G, 0.0, 0.0)).amax() < 1e-14);
     assert!((field - Vector3::new(-FIELD.z, FIELD.y, FIELD.x)).amax() < 1e-19);
 }
@@ -64,7 +66,7 @@ fn attitude() -> impl Strategy<Value = Vector3<f64>> {
     (-3.0..3.0, -1.4..1.4, -3.0..3.0).prop_map(|(alpha, beta, sigma)| Vector3::new(alpha, beta, sigma))
 }
 
-/// ω from C and Ċ: Ċ Cᵀ = −ω^×.
+/// Body rates ω from the rotation C and its derivative Ċ: Ċ Cᵀ = −ω^×.
 fn rate_of(rotation: impl Fn(f64) -> Matrix3<f64>) -> Vector3<f64> {
     let h = 1e-3;
     let slope =
@@ -83,7 +85,7 @@ proptest! {
         }
     }
 
-    /// Whatever R the motion obeys, the gyroscope's rate is that of the orientation's change.
+    /// The gyroscope measures the change of the orientation, whichever R the motion obeys.
     #[test]
     fn oracle_the_gyroscope_against_differences_of_the_orientation(
         angles in attitude(),
@@ -102,7 +104,7 @@ proptest! {
             let turn_rate = trajectory.turn_rate(0.0);
             let angle_rates = kinematics.r(&angles) * rates + kinematics.turn(&angles) * turn_rate;
             let pose = Pose { kinematics, angles, rates, alpha_rate: angle_rates.x, trajectory };
-            // About an Earth that neither turns nor curves, level axes are inertial.
+            // Over an Earth that neither turns nor curves, the level axes are inertial.
             let expected = rate_of(|t| {
                 let course = Trajectory {
                     flight_path_angle: trajectory.flight_path_angle + t * trajectory.flight_path_angle_rate,
@@ -118,7 +120,7 @@ proptest! {
     }
 }
 
-/// A plant that flies the sequence.
+/// A plant that flies the calibration sequence.
 fn calibrating(sequence: Sequence, kinematics: Kinematics) -> Plant {
     let mut config = Scenario::crmpc2022().config(0.01);
     config.calibration = Some(sequence);
@@ -147,7 +149,7 @@ fn oracle_along_the_calibration_sequence_the_gyroscope_is_the_change_of_orientat
     }
 }
 
-/// `count` directions spread evenly over the sphere.
+/// Returns `count` directions spread evenly over the sphere.
 fn directions(count: u32) -> impl Iterator<Item = Vector3<f64>> {
     (0..count).map(move |k| {
         let z = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(count);

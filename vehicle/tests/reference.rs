@@ -1,11 +1,13 @@
-//! Reference profiles: derivatives against differences, the spline against closed forms, tables that are refused.
+//! Tests of reference profiles: derivatives against differences, the spline against closed forms,
+//! and tables that are refused.
 
 use nalgebra::Vector3;
 use vehicle::reference::{Course, Segment, Wave};
 use vehicle::table::Table;
 use vehicle::{Profile, Reference, Scenario};
 
-/// Largest difference between the profile's rates and accelerations and those of its angles, at times away from jumps.
+/// Largest difference between the profile's rates and accelerations and the numerical derivatives
+/// of its angles, at times away from jumps.
 fn derivative_error(profile: &Profile, from: f64, to: f64) -> f64 {
     let h = 1e-3;
     let jumps: Vec<f64> = profile.jumps().collect();
@@ -48,7 +50,7 @@ fn oracle_derivatives_of_every_profile_against_differences() {
         let error = derivative_error(&profile, 0.0, 50.0);
         assert!(error < 1e-11, "{name}: {error}");
     }
-    // Across knots the spline's third derivative jumps.
+    // The third derivative of the spline jumps across knots.
     let error = derivative_error(&Profile::Table(smooth_table(200)), 0.1, 19.9);
     assert!(error < 1e-4, "table: {error}");
 }

@@ -1,4 +1,5 @@
-//! Sensors and their line, effect by effect, against values by hand and the statistics of their noise.
+//! Tests of the sensors and their line, effect by effect, against values by hand and the statistics
+//! of the noise.
 
 use nalgebra::{Matrix3, Vector3};
 use vehicle::platform::Readings;
@@ -8,7 +9,7 @@ use vehicle::triad::{Triad, Window};
 
 const PERIOD: f64 = 1.0 / 128.0;
 
-/// Sensors without errors on a line without delay.
+/// Configuration of sensors without errors on a line without delay.
 fn ideal() -> Config {
     Config {
         triads: [Triad::default(); 3],
@@ -28,12 +29,12 @@ fn with(change: impl Fn(&mut Config)) -> Sensors {
     Sensors::new(&config, 0.0).unwrap()
 }
 
-/// Every sensor feels `value` along every axis.
+/// Readings in which every sensor measures `value` along every axis.
 fn all(value: f64) -> Readings {
     [Vector3::repeat(value); 3]
 }
 
-/// What is shown at `count` ticks of a signal of time.
+/// Samples output at `count` ticks while the sensors measure a signal of time.
 fn run(sensors: &mut Sensors, count: u32, signal: impl Fn(f64) -> Readings) -> Vec<Sample> {
     (0..count)
         .map(|k| {
@@ -71,7 +72,8 @@ fn published_data_sheet_values_of_the_mems_set() {
     for (triad, scale, bias) in [
         (&gyroscope, 0.015, 5f64.to_radians()),
         (&accelerometer, 0.005, 0.05 * 9.80665),
-        // The tolerance of the sensor alone; scale and soft iron are assumed
+        // The magnetometer's tolerance is that of the sensor alone; scale and soft iron are
+        // assumed.
         (&magnetometer, 0.1, 300e-6),
     ] {
         let off = triad.matrix - Matrix3::identity();
@@ -112,13 +114,13 @@ fn oracle_noise_has_the_standard_deviation_that_is_set_and_no_memory() {
     });
     let samples = run(&mut sensors, COUNT, |_| all(0.0));
     let n = f64::from(COUNT);
-    // All nine, each with variance 1
+    // All nine noise values have variance 1.
     let values = |sample: &Sample| -> [f64; 9] {
         std::array::from_fn(|i| sample.readings[i / 3][i % 3] / sigma[i / 3])
     };
     let mean = |product: &dyn Fn(usize) -> f64| (0..samples.len()).map(product).sum::<f64>() / n;
     for i in 0..9 {
-        // Five standard deviations of each estimate
+        // The bounds are five standard deviations of each estimate.
         assert!(mean(&|k| values(&samples[k])[i]).abs() < 5.0 / n.sqrt(), "{i}");
         let variance = mean(&|k| values(&samples[k])[i].powi(2));
         assert!((variance - 1.0).abs() < 5.0 * (2.0 / n).sqrt(), "{i}: {variance}");
@@ -146,12 +148,14 @@ fn the_seed_determines_the_noise() {
     assert_ne!(noisy(5)[0].readings[0], noisy(6)[0].readings[0]);
 }
 
-/// First-order lag with the signal held and growing, by integration in small steps.
+/// The oracle for the first-order lag integrates the filter in small steps, with the signal held
+/// and growing.
 #[test]
 fn oracle_bandwidth_against_integration_of_the_filter() {
     let bandwidth = 5.0;
     let mut sensors = with(|config| config.triads[1].bandwidth = bandwidth);
-    // A step at tick 0 would be felt from the start; the first sample finds the filter at rest.
+    // A step at tick 0 would be measured from the start, because the first sample finds the filter
+    // at rest.
     let signal = |time: f64| (3.0 * time).sin() + 20.0 * time;
     let found = run(&mut sensors, 200, |time| all(signal(time)));
     let (mut y, fine) = (signal(0.0), 2000);
@@ -188,10 +192,10 @@ fn oracle_range_is_applied_before_resolution_and_after_noise() {
     assert_eq!([shown(5.0, limited), shown(-5.0, limited), shown(3.9, limited)], [4.0, -4.0, 3.9]);
     let steps: fn(&mut Triad) = |triad| triad.resolution = 0.25;
     assert_eq!([shown(0.12, steps), shown(0.13, steps), shown(-0.4, steps)], [0.0, 0.25, -0.5]);
-    // 4.1 is limited to 4.0, whose nearest step of 0.3 is 3.9
+    // The value 4.1 is limited to 4.0, whose nearest multiple of 0.3 is 3.9.
     let both: fn(&mut Triad) = |triad| (triad.range, triad.resolution) = (4.0, 0.3);
     assert!((shown(4.1, both) - 3.9).abs() < 1e-15);
-    // Noise does not get out of the range nor off the steps
+    // Noise leaves neither the range nor the converter's steps.
     let mut sensors = with(|config| {
         config.triads[0] = Triad { noise: 3.0, range: 2.0, resolution: 0.5, ..Triad::default() };
     });
@@ -253,7 +257,7 @@ fn a_dropped_sample_leaves_a_gap_in_the_numbers_and_the_one_before_in_place() {
         let mut numbers: Vec<i32> =
             found.iter().map(|sample| sample.number).filter(|&number| number > 0).collect();
         numbers.dedup();
-        // Ticks 10, 11 and 12 have the numbers 11, 12 and 13
+        // Ticks 10, 11 and 12 have the numbers 11, 12 and 13.
         assert_eq!(
             numbers,
             (1..=*numbers.last().unwrap()).filter(|k| !(11..14).contains(k)).collect::<Vec<_>>()
@@ -289,7 +293,7 @@ fn a_frozen_sensor_repeats_its_value_while_the_samples_count_on() {
         let repeats = k > 0 && sample.readings[2] == found[k - 1].readings[2];
         assert_eq!(repeats, (5..8).contains(&k), "{k}");
     }
-    // From the start on it repeats the first
+    // A window from the start on repeats the first sample.
     let mut sensors = with(|config| config.triads[0].freeze = Window { start: 0.0, end: 1.0 });
     let found = run(&mut sensors, 4, |time| all(1.0 + time));
     assert!(found.iter().all(|sample| sample.readings[0] == Vector3::repeat(1.0)));
@@ -309,7 +313,7 @@ fn a_sample_is_taken_again_when_asked_again_at_its_tick_and_looking_takes_none()
         once.take(time, &all(time));
         assert_eq!(once.shown(time, &all(time)), once.arrived());
         assert_eq!(once.arrived(), often.arrived(), "{k}");
-        // Between ticks nothing is taken
+        // Between ticks no sample is taken.
         often.take(time + PERIOD / 3.0, &all(7.0));
         assert_eq!(often.shown(time + PERIOD / 2.0, &all(8.0)), once.arrived());
     }

@@ -1,4 +1,5 @@
-//! The smallest complete unit: `cargo build --example lag`, then `fmu-pack liblag.so --output DIR`.
+//! The smallest complete unit. Build it with `cargo build --example lag` and pack it with
+//! `fmu-pack liblag.so --output DIR`.
 
 pub mod model;
 

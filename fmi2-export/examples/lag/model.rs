@@ -1,4 +1,5 @@
-//! A first-order lag x' = (k u − x) / T whose gain changes at a time event and which tells when x crosses 1. Every kind of variable occurs in it.
+//! A first-order lag x' = (k u − x) / T. Its gain changes at a time event, and an event indicator
+//! tells when x crosses 1. Every kind of variable occurs in it.
 
 use fmi2_export::table::{discrete_input, discrete_output, input, local, output, parameter};
 use fmi2_export::{Context, Description, Enumeration, EventInfo, Failure, Inputs, Model, Table};
@@ -6,9 +7,9 @@ use model_description::DefaultExperiment;
 use model_description::unit;
 use serde::{Deserialize, Serialize};
 
-/// Runge–Kutta steps in a communication step.
+/// Number of Runge–Kutta steps in a communication step.
 const SUBSTEPS: i32 = 4;
-/// What is done to the output.
+/// Limiter at the output of the lag.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 enum Shape {
     Linear,
@@ -21,7 +22,7 @@ static SHAPES: Enumeration<Shape> = Enumeration {
     items: &[(Shape::Linear, "linear", "Nothing"), (Shape::Saturated, "saturated", "Kept between -1 and 1")],
 };
 
-/// The model: parameters, input, state, outputs.
+/// Model of the lag: its parameters, input, state and outputs.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Lag {
     time_constant: f64,
@@ -38,7 +39,7 @@ pub struct Lag {
     x: f64,
     switched: bool,
     offset: f64,
-    /// Model exchange: the offset as of the last event.
+    /// Offset as of the last event in model exchange.
     offset_held: Option<f64>,
 
     derivative: f64,
@@ -57,7 +58,7 @@ impl Lag {
         (gain * self.u - x) / self.time_constant
     }
 
-    /// From one time to another without an event between them.
+    /// Integrates the state between two times that have no event between them.
     fn integrate(&mut self, from: f64, to: f64, inputs: &dyn Inputs<Self>) {
         let gain = self.gain(from);
         let h = (to - from) / f64::from(SUBSTEPS);

@@ -1,11 +1,12 @@
-//! Which call is allowed in which state.
+//! Tests of the calls that are allowed in each state.
 
 use crate::support::{CO_SIMULATION, Instance, MODEL_EXCHANGE, U, X, c};
 use fmi2_export::types::{CEventInfo, Status};
 use std::ffi::{c_int, c_void};
 use std::ptr::{null, null_mut};
 
-/// States with their letters in the tables below. Each makes a new instance in that state.
+/// Function that makes a new instance in one of the states. Letters stand for the states in the
+/// tables below.
 type Maker = fn() -> Instance;
 
 const CS_STATES: &[(char, Maker)] = &[
@@ -62,8 +63,8 @@ const ME_STATES: &[(char, Maker)] = &[
 
 type Caller = fn(*mut c_void) -> Status;
 
-/// Every function that takes a component and returns a status, with arguments that are right, and the states of
-/// co-simulation and of model exchange in which FMI 2.0 (4.2.4, 3.2.3) allows it.
+/// Functions that take a component and return a status, with valid arguments, and the states of
+/// co-simulation and model exchange in which FMI 2.0 (4.2.4, 3.2.3) allows each.
 const FUNCTIONS: &[(&str, Caller, &str, &str)] = &[
     ("fmi2SetDebugLogging", |c| c!(fmi2SetDebugLogging(c, 1, 0, null())), "INSFTX", "INECTX"),
     ("fmi2SetupExperiment", |c| c!(fmi2SetupExperiment(c, 0, 0.0, 0.0, 0, 0.0)), "I", "I"),
@@ -150,7 +151,7 @@ fn check(
             let text = &messages[before].text;
             assert!(text.starts_with(name), "{text}");
             assert!(text.contains("not allowed in state") || text.contains("not available"), "{text}");
-            // After that the instance is usable again.
+            // After that call the instance is usable again.
             assert_eq!(c!(fmi2Reset(instance.component)), Status::Ok);
             instance.initialize();
             assert_eq!(instance.real(X), 0.5);

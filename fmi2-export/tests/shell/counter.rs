@@ -1,4 +1,5 @@
-//! The second unit of the library: for co-simulation only, with a defect for every place where a panic can start.
+//! The second unit of the library, for co-simulation only. It has a defect for every place where a
+//! panic can start.
 
 use fmi2_export::table::{discrete_output, input, parameter};
 use fmi2_export::{Context, Description, Failure, Inputs, Model, Table};
@@ -6,7 +7,7 @@ use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Counts its steps.
+/// Model that counts its steps.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct Counter {
     defect: String,

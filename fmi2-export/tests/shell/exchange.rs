@@ -1,4 +1,4 @@
-//! Model exchange: states, derivatives, events, directional derivatives.
+//! Tests of model exchange: states, derivatives, events and directional derivatives.
 
 use crate::support::*;
 use fmi2_export::types::Status;
@@ -42,7 +42,7 @@ fn oracle_an_euler_loop_with_the_time_event_agrees_with_the_closed_form() {
     }
     let at_switch = 2.0 + (0.5 - 2.0) * (-1.25f64 / 0.5).exp();
     let exact = 1.0 + (at_switch - 1.0) * (-0.75f64 / 0.5).exp();
-    // Explicit Euler: error of the order of h.
+    // The error of the explicit Euler method is of the order of h.
     assert!((state(&instance) - exact).abs() < 2.0 * h, "{} {exact}", state(&instance));
     assert_eq!(instance.real(X), state(&instance));
 }
@@ -82,7 +82,7 @@ fn a_discrete_input_is_taken_at_events() {
     instance.event_info();
     assert_eq!(instance.real(Y), 0.5 + 5.0);
     assert_eq!(c!(fmi2EnterContinuousTimeMode(component)), Status::Ok);
-    // Not what the standard asks of importers, but what FMPy does.
+    // The standard does not ask importers for this order of calls, but FMPy uses it.
     assert_eq!(instance.set_real(OFFSET, 7.0), Status::Ok);
     assert_eq!((instance.real(OFFSET), instance.real(Y)), (7.0, 0.5 + 5.0));
     assert_eq!(c!(fmi2EnterEventMode(component)), Status::Ok);
@@ -124,7 +124,7 @@ fn oracle_directional_derivatives_agree_with_differences() {
     let values = || unknown.map(|reference| instance.real(reference));
     let before = values();
     assert_eq!(c!(fmi2EnterContinuousTimeMode(component)), Status::Ok);
-    // The model is linear: one difference of any size is exact but for rounding.
+    // The model is linear, so a difference of any size is exact but for rounding.
     let x = state(&instance) + seed[1];
     assert_eq!(instance.set_real(U, seed[0]), Status::Ok);
     assert_eq!(c!(fmi2SetContinuousStates(component, &x, 1)), Status::Ok);

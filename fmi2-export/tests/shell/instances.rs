@@ -1,4 +1,4 @@
-//! Instantiation, several instances and units side by side, panics.
+//! Tests of instantiation, of several instances and units side by side, and of panics.
 
 use crate::support::*;
 use fmi2_export::types::{Callbacks, LogCallback, Status};
@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicPtr, Ordering};
 #[test]
 #[allow(unsafe_code)]
 fn the_library_says_what_it_is() {
-    // SAFETY: both are texts of the library itself.
+    // SAFETY: both functions return static NUL-terminated texts of the library.
     let texts = [crate::fmi2::fmi2GetVersion(), crate::fmi2::fmi2GetTypesPlatform()]
         .map(|text| unsafe { CStr::from_ptr(text) });
     assert_eq!(texts, [c"2.0", c"default"]);
@@ -114,7 +114,7 @@ fn a_panic_is_fatal_for_the_instance_only() {
         assert_eq!(provoke(&instance), Status::Fatal);
         instance.said(&["defect in the unit: defect in", place.to_str().unwrap()]);
         assert_eq!(instance.messages().last().unwrap().status, Status::Fatal);
-        // From now on it only says so again, until it is freed.
+        // From now on every call returns the same status until the instance is freed.
         assert_eq!(c!(fmi2Reset(instance.component)), Status::Fatal);
         assert_eq!(instance.get_real(COUNT).0, Status::Fatal);
         assert_eq!(instance.step(0.0, 0.1), Status::Fatal);
@@ -122,12 +122,12 @@ fn a_panic_is_fatal_for_the_instance_only() {
     assert_eq!(bystander.step(0.0, 0.1), Status::Ok);
 }
 
-/// What a logger does that calls its unit back, and what it was answered.
+/// State of a logger that calls its unit back, with the answers that it got.
 #[derive(Default)]
 struct Caller {
     component: AtomicPtr<c_void>,
     answers: Mutex<Vec<Status>>,
-    /// Another thread that calls at the same time.
+    /// Answers to another thread that calls at the same time.
     other: Mutex<Option<Vec<Status>>>,
 }
 
@@ -150,7 +150,8 @@ extern "C" fn calls_back(
     _: *const c_char,
     _: *const c_char,
 ) {
-    // SAFETY: the environment is the caller, which the test keeps alive.
+    // SAFETY: the environment is the address of a `Caller` that the test keeps alive, and whose
+    // fields change only by atomic operations or behind locks.
     let caller = unsafe { &*environment.cast::<Caller>() };
     let component = caller.component.load(Ordering::SeqCst);
     caller.answers.lock().unwrap().extend(call_all(component));
@@ -165,7 +166,8 @@ extern "C" fn calls_back(
 fn calls_during_a_call_are_refused_whoever_makes_them() {
     type Fixed = extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char);
     let caller = Caller::default();
-    // SAFETY: a variadic call without variadic arguments passes the fixed ones like any other on the supported platforms.
+    // SAFETY: the two types differ only in the variadic part, and on the supported platforms a
+    // variadic call without variadic arguments passes the fixed ones like any other call.
     let logger = unsafe { std::mem::transmute::<Fixed, LogCallback>(calls_back) };
     let callbacks = Callbacks {
         logger: Some(logger),
@@ -182,11 +184,12 @@ fn calls_during_a_call_are_refused_whoever_makes_them() {
     assert_eq!(c!(fmi2EnterInitializationMode(component)), Status::Ok);
     assert_eq!(c!(fmi2ExitInitializationMode(component)), Status::Ok);
     assert!(caller.answers.lock().unwrap().is_empty(), "nothing was said yet");
-    // An error is said, and everything that the logger and the other thread try meanwhile is refused.
+    // The error is logged, and every call that the logger and the other thread try meanwhile is
+    // refused.
     assert_eq!(c!(fmi2SetReal(component, &X, 1, &1.0)), Status::Error);
     assert_eq!(*caller.answers.lock().unwrap(), [Status::Error; 4]);
     assert_eq!(*caller.other.lock().unwrap(), Some(vec![Status::Error; 4]));
-    // The instance is as it was, and free again.
+    // The instance is unchanged and free again.
     let mut value = f64::NAN;
     assert_eq!(c!(fmi2GetReal(component, &U, 1, &mut value)), Status::Ok);
     assert_eq!(c!(fmi2Reset(component)), Status::Ok);

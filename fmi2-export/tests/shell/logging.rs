@@ -1,4 +1,4 @@
-//! What reaches the importer's logger, and under which category.
+//! Tests of the messages that reach the importer's logger, and of their categories.
 
 use crate::support::*;
 use fmi2_export::types::Status;

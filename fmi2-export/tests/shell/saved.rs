@@ -1,10 +1,11 @@
-//! Saved states: in memory, as bytes, in another instance; what does not fit is refused.
+//! Tests of saved states: in memory, as bytes and in another instance; states that do not fit are
+//! refused.
 
 use crate::support::*;
 use fmi2_export::types::Status;
 use std::ptr::null_mut;
 
-/// Drives an instance over three steps from `k` on and returns the bits of everything it says.
+/// Drives an instance over three steps from `k` on and returns the bits of all its outputs.
 fn run(instance: &Instance, from: i32) -> Vec<u64> {
     let h = 0.3;
     let mut bits = vec![];
@@ -95,7 +96,7 @@ fn every_damaged_byte_and_every_truncation_is_refused() {
     }
     let longer = [bytes.as_slice(), &[0]].concat();
     refused(&longer, "one byte more");
-    // The instance is as it was.
+    // The instance is unchanged.
     assert_eq!(instance.serialize(), bytes);
     run(&instance, 3);
 }
@@ -127,7 +128,7 @@ fn a_handle_that_is_not_ones_own_is_refused() {
     assert_eq!(c!(fmi2FreeFMUstate(one.component, &mut twice)), Status::Error);
     let mut size = 0;
     assert_eq!(c!(fmi2SerializedFMUstateSize(one.component, state, &mut size)), Status::Error);
-    // None of this ends the simulation.
+    // None of these refusals ends the simulation.
     assert_eq!(one.step(0.0, 0.1), Status::Ok);
     assert_eq!(other.step(0.0, 0.1), Status::Ok);
 }

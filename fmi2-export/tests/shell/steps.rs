@@ -1,4 +1,4 @@
-//! Co-simulation: time, input derivatives, status.
+//! Tests of co-simulation: time, input derivatives and status.
 
 use crate::support::*;
 use fmi2_export::types::Status;
@@ -13,7 +13,7 @@ fn oracle_the_step_response_is_the_exponential() {
     for k in 0..100 {
         assert_eq!(instance.step(f64::from(k) * h, h), Status::Ok);
     }
-    // x(t) = k u + (x₀ − k u) e^(−t/T)
+    // The solution is x(t) = k u + (x₀ − k u) e^(−t/T).
     let exact = 2.0 + (0.5 - 2.0) * (-1.0f64 / 0.5).exp();
     assert!((instance.real(X) - exact).abs() < 1e-10);
 }
@@ -26,7 +26,7 @@ fn the_last_step_may_be_shorter_by_rounding_or_empty() {
     let before = instance.real(X);
     assert_eq!(instance.step(0.2, 0.0), Status::Ok);
     assert_eq!(instance.real(X), before);
-    // A master that adds up its time: ten times 0.1 is not 1.
+    // A master that accumulates its time does not reach 1 with ten steps of 0.1.
     let mut time = 0.2;
     for _ in 0..300 {
         assert_eq!(instance.step(time, 0.1), Status::Ok);
@@ -89,7 +89,7 @@ fn oracle_input_derivatives_make_a_ramp() {
         assert_eq!(instance.set_real(U, 3.0 * t), Status::Ok);
         assert_eq!(instance.step(t, h), Status::Ok);
     }
-    // Ramp u = a t: x(t) = k a (t − T) + (x₀ + k a T) e^(−t/T)
+    // The ramp u = a t gives x(t) = k a (t − T) + (x₀ + k a T) e^(−t/T).
     let (k, a, time_constant) = (2.0, 3.0, 0.5);
     let exact =
         k * a * (1.0 - time_constant) + (0.5 + k * a * time_constant) * (-1.0f64 / time_constant).exp();
@@ -161,7 +161,7 @@ fn status_of_other_kinds_is_discarded() {
     let instance = Instance::stepping();
     let mut text = null();
     assert_eq!(c!(fmi2GetStringStatus(instance.component, 1, &mut text)), Status::Ok);
-    // SAFETY: the call succeeded.
+    // SAFETY: the call succeeded, so `text` points to a static NUL-terminated text of the library.
     assert_eq!(unsafe { CStr::from_ptr(text) }, c"no step is pending");
     let mut integer = 0;
     assert_eq!(c!(fmi2GetIntegerStatus(instance.component, 2, &mut integer)), Status::Discard);

@@ -1,4 +1,4 @@
-//! An importer in a few lines: an instance with its log, and calls that return what they answer.
+//! A small importer: an instance with its log, and calls that return their results.
 #![allow(unsafe_code)]
 
 use crate::fmi2;
@@ -10,7 +10,7 @@ use std::sync::Mutex;
 pub(crate) const MODEL_EXCHANGE: c_int = 0;
 pub(crate) const CO_SIMULATION: c_int = 1;
 
-/// Value references of the unit `Lag`.
+/// Value references of the variables of the unit `Lag`.
 pub(crate) const TIME_CONSTANT: u32 = 0;
 pub(crate) const GAIN: u32 = 1;
 pub(crate) const INITIAL: u32 = 4;
@@ -26,7 +26,7 @@ pub(crate) const SWITCHED: u32 = 14;
 pub(crate) const TEXT: u32 = 15;
 pub(crate) const OFFSET: u32 = 16;
 
-/// What the importer's logger was told.
+/// Message that the importer's logger received.
 #[derive(Clone, Debug)]
 pub(crate) struct Message {
     pub(crate) status: Status,
@@ -44,7 +44,8 @@ extern "C" fn log(
     category: *const c_char,
     message: *const c_char,
 ) {
-    // SAFETY: the environment is the log that `Instance` keeps alive, the texts are NUL-terminated.
+    // SAFETY: the environment is the log that `Instance` keeps alive, and the shell passes
+    // NUL-terminated texts that live during the call.
     let (log, [instance, category, text]) = unsafe {
         let texts =
             [instance, category, message].map(|text| CStr::from_ptr(text).to_str().unwrap().to_owned());
@@ -55,7 +56,8 @@ extern "C" fn log(
 
 pub(crate) fn callbacks(log_to: *const Log) -> Callbacks {
     type Fixed = extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char);
-    // SAFETY: a variadic call without variadic arguments passes the fixed ones like any other on the supported platforms.
+    // SAFETY: the two types differ only in the variadic part, and on the supported platforms a
+    // variadic call without variadic arguments passes the fixed ones like any other call.
     let logger = unsafe { std::mem::transmute::<Fixed, LogCallback>(log) };
     Callbacks {
         logger: Some(logger),
@@ -66,10 +68,11 @@ pub(crate) fn callbacks(log_to: *const Log) -> Callbacks {
     }
 }
 
-/// Calls an exported function.
+/// Calls an exported function with the given arguments.
 macro_rules! c {
     ($function:ident($($argument:expr),* $(,)?)) => {{
-        // SAFETY: every pointer that a test passes is null or valid for the call, as the standard wants it.
+        // SAFETY: every pointer that a test passes is null or valid for the duration of the call,
+        // as the standard demands.
         #[allow(unsafe_code)]
         let result = unsafe { crate::fmi2::$function($($argument),*) };
         result
@@ -89,11 +92,12 @@ impl Drop for Instance {
     }
 }
 
-/// GUID of the unit of this library with that name.
+/// Returns the GUID of the unit with that name in this library.
 pub(crate) fn guid(name: &str) -> CString {
     let text = fmi2::fmu_model_descriptions();
     assert!(!text.is_null());
-    // SAFETY: not null, NUL-terminated.
+    // SAFETY: fmu_model_descriptions returned a NUL-terminated text, which is freed only after this
+    // use.
     let json = unsafe { CStr::from_ptr(text) }.to_str().unwrap().to_owned();
     c!(fmu_free_model_descriptions(text));
     let units: Vec<model_description::ModelDescription> = serde_json::from_str(&json).unwrap();
@@ -101,7 +105,7 @@ pub(crate) fn guid(name: &str) -> CString {
     CString::new(unit.guid()).unwrap()
 }
 
-/// Instantiates; the component is null if that was refused.
+/// Makes an instance; its component is null if the library refused it.
 pub(crate) fn instantiate(
     name: Option<&CStr>,
     fmu_type: c_int,
@@ -111,7 +115,7 @@ pub(crate) fn instantiate(
 ) -> Instance {
     let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
     let log: Box<Log> = Box::default();
-    // Lives during the call only, as with some importers.
+    // The callbacks live only during the call, as with some importers.
     let callbacks = Box::new(callbacks(&raw const *log));
     let component = c!(fmi2Instantiate(
         pointer(name),
@@ -137,14 +141,14 @@ impl Instance {
         instance
     }
 
-    /// A `Lag` for co-simulation at t = 0.
+    /// Returns a `Lag` for co-simulation at t = 0.
     pub(crate) fn stepping() -> Self {
         let instance = Self::lag(CO_SIMULATION);
         instance.initialize();
         instance
     }
 
-    /// A `Lag` for model exchange in event mode at t = 0.
+    /// Returns a `Lag` for model exchange in event mode at t = 0.
     pub(crate) fn in_event_mode() -> Self {
         let instance = Self::lag(MODEL_EXCHANGE);
         instance.initialize();
@@ -165,7 +169,7 @@ impl Instance {
         self.log.lock().unwrap().clone()
     }
 
-    /// The last message, which must hold all of `parts`.
+    /// Checks that the last message holds all of `parts`.
     #[track_caller]
     pub(crate) fn said(&self, parts: &[&str]) {
         let messages = self.messages();
@@ -219,7 +223,8 @@ impl Instance {
     pub(crate) fn string(&self, reference: u32) -> String {
         let mut value = null();
         assert_eq!(c!(fmi2GetString(self.component, &reference, 1, &mut value)), Status::Ok);
-        // SAFETY: the call succeeded, so this is NUL-terminated until the next one.
+        // SAFETY: the call succeeded, so `value` points to a text that is NUL-terminated and lives
+        // until the next fmi2GetString.
         unsafe { CStr::from_ptr(value) }.to_str().unwrap().to_owned()
     }
 

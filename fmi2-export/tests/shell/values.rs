@@ -1,4 +1,4 @@
-//! Getting and setting: types, limits, causality, laziness.
+//! Tests of getting and setting values: types, limits, causality and laziness.
 
 use crate::support::*;
 use fmi2_export::types::Status;
@@ -97,7 +97,7 @@ fn parameters_set_in_initialization_mode_are_taken_up_before_the_next_read() {
     assert_eq!(instance.real(X), 3.0);
     assert_eq!(instance.set_real(U, 1.0), Status::Ok);
     assert_eq!(instance.real(Y), 4.0);
-    // der(x) = (k u − x) / T
+    // The derivative is der(x) = (k u − x) / T.
     assert_eq!(instance.real(DERIVATIVE), (2.0 * 1.0 - 3.0) / 0.5);
     assert_eq!(instance.set_real(INITIAL, -1.0), Status::Ok);
     assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), Status::Ok);

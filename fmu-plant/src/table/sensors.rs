@@ -1,22 +1,22 @@
-//! The variables of the sensors and of their calibration.
+//! Variables of the sensors and of their calibration.
 
 use super::{AXES, Plant, RATES, TRAJECTORY_INPUTS, vector};
 use crate::parameters::{MEMS_SENSORS, NO_SENSORS};
 use fmi2_export::table::{Common, Real, discrete_output, output, parameter};
 use model_description::unit::{self, Unit};
 
-/// Position of the first of the nine readings.
+/// Position of the first of the nine readings in the table.
 pub(super) const FIRST: usize = 113;
-/// Position of the sample's time.
+/// Position of the sample's time in the table.
 pub(super) const TIME: usize = FIRST + 9;
 
 struct Sensor {
     name: &'static str,
-    /// What it measures.
+    /// Name of the quantity that the sensor measures.
     quantity: &'static str,
     unit: fn() -> Unit,
     nominal: f64,
-    /// What its matrix and bias hold besides.
+    /// Effects that the sensor's matrix contains, as text for the description.
     matrix: &'static str,
     bias: &'static str,
 }

@@ -1,4 +1,4 @@
-//! Sensors and the calibration sequence through the unit's interface.
+//! Tests of the sensors and the calibration sequence through the unit's interface.
 
 use super::{Constant, assert_same_motion, exchange, integrate, outputs, started, step};
 use crate::plant::ReentryPlant;
@@ -9,7 +9,8 @@ use vehicle::kinematics::{Kinematics, r_inverse};
 use vehicle::sensors::Sample;
 use vehicle::triad::Window;
 
-/// A typical MEMS set with everything that can happen to samples, on ticks that are exact numbers.
+/// Selects a typical MEMS set with every effect that samples can have, on ticks that are exact
+/// numbers.
 fn mems(unit: &mut ReentryPlant) {
     let p = &mut unit.parameters;
     p.kind = Kind::None;
@@ -26,7 +27,7 @@ fn sample(unit: &mut ReentryPlant, time: f64) -> Sample {
     outputs(unit, time).measured
 }
 
-/// What is shown at every 1/16 s until 2 s, in communication steps of `length` s.
+/// Returns the sample shown at every 1/16 s until 2 s, in communication steps of `length` s.
 fn stepped(unit: &mut ReentryPlant, length: f64) -> Vec<Sample> {
     let mut shown = vec![sample(unit, 0.0)];
     let mut time = 0.0;
@@ -50,7 +51,7 @@ fn without_sensors_what_they_would_feel_is_shown_at_all_times() {
     let output = outputs(&mut unit, 0.37);
     let [rate, force, field] = output.measured.readings;
     assert_eq!((output.measured.number, output.measured.time), (0, 0.37));
-    // ω less α̇ sin β about the bank axis, whose R⁻¹ column is that of σ
+    // The gyroscope shows ω less α̇ sin β about the bank axis, which is the R⁻¹ column of σ.
     let expected =
         output.rates - r_inverse(&output.angles).column(2) * (output.angle_rates.x * output.angles.y.sin());
     assert!((rate - expected).amax() < 1e-16 && (rate - output.rates).amax() > 1e-4);
@@ -81,7 +82,7 @@ fn ideal_sensors_show_the_truth_of_their_ticks_and_leave_the_line_as_it_is() {
         }
         felt.push(sample(&mut truth, to));
         let shown = sample(&mut unit, to);
-        // Of two and a half ticks before
+        // The sample shown was taken two and a half ticks before.
         let Some(number) = (k + 1i32).checked_sub(2).filter(|&number| number > 0) else {
             assert_eq!((shown.number, shown.readings), (0, Sample::default().readings));
             continue;
@@ -97,10 +98,11 @@ fn samples_are_the_same_bits_whatever_the_communication_step() {
     let expected = stepped(&mut started(mems), 1.0 / 64.0);
     assert!(expected.last().unwrap().number > 100);
     for length in [1.0 / 256.0, 1.0 / 128.0, 1.0 / 32.0, 1.0 / 16.0] {
-        // A step shorter than that of the integration changes the trajectory's last bits, not the sample's, which are coarser.
+        // A step shorter than that of the integration changes the trajectory's last bits, but not
+        // the samples, which are coarser.
         assert_eq!(stepped(&mut started(mems), length), expected, "{length}");
     }
-    // One that meets no tick
+    // The next communication step meets no tick.
     let mut unit = started(mems);
     let mut time = 0.0;
     while time < 2.0 {
@@ -150,7 +152,8 @@ fn oracle_model_exchange_takes_the_samples_of_co_simulation_at_time_events() {
             assert!(difference.amax() < step, "{to}: at most a step of the converter");
         }
     }
-    // Between taking at each tick and arriving half a tick after one, 128 of either in 2 s
+    // Samples are taken at each tick and arrive half a tick after one: up to 128 events of either
+    // kind in 2 s.
     events.sort_by(f64::total_cmp);
     events.dedup();
     let on_ticks = events.iter().filter(|&&time| (64.0 * time).fract() == 0.0).count();

@@ -1,8 +1,9 @@
-//! Times through the C interface: `fmi2DoStep` of plant and controller, and the whole 50 s loop of Chai 2022 through both libraries
-//! (white noise, inertia + 5 %).
+//! Benchmarks through the C interface: `fmi2DoStep` of plant and controller, and the whole 50 s
+//! loop of Chai 2022 through both libraries (white noise, inertia + 5 %).
 //!
-//! The loop is what a master cannot do without: the controller's inputs set, its moment asked for and set, both stepped, 1250 times.
-//! Instantiation and initialization are not timed, and nothing is recorded.
+//! The loop contains only the work that every master must do, 1250 times: set the controller's
+//! inputs, read its moment, set the plant's moment and step both. Instantiation and initialization
+//! are not timed, and nothing is recorded.
 
 use conformance::interface::CO_SIMULATION;
 use conformance::{Instance, Unit, c, unit};
@@ -11,7 +12,7 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 const STEP: f64 = 0.04;
 const TICKS: u32 = 1250;
 
-/// A vector's value references.
+/// Value references of a vector's components.
 fn vector(unit: &Unit, name: &str, axes: [&str; 3]) -> [u32; 3] {
     axes.map(|axis| unit.reference(&format!("{name}.{axis}")))
 }
@@ -26,11 +27,11 @@ fn set<const N: usize>(to: &Instance, references: &[u32; N], values: &[f64; N]) 
     to.ok(c!(to, fmi2SetReal(to.component, references.as_ptr(), N, values.as_ptr())));
 }
 
-/// Plant and controller, connected.
+/// Plant and controller in a closed loop.
 struct Loop {
     plant: Instance,
     controller: Instance,
-    /// Attitude and rate, of the plant and of the controller.
+    /// Value references of attitude and rates, of the plant and of the controller.
     motion: [[u32; 6]; 2],
     moment: [[u32; 3]; 2],
 }
@@ -52,7 +53,7 @@ impl Loop {
         Self { plant: plant.initialized(), controller: controller.initialized(), motion, moment }
     }
 
-    /// What the controller sees, and its moment.
+    /// Passes attitude and rates to the controller, and its moment to the plant.
     fn pass_on(&self) {
         set(&self.controller, &self.motion[1], &get(&self.plant, &self.motion[0]));
         set(&self.plant, &self.moment[0], &get(&self.controller, &self.moment[1]));
@@ -79,7 +80,7 @@ fn loops(criterion: &mut Criterion) {
     let (start, mut tick) = (alone.save(), 0);
     group.bench_function("ReentryPlant", |bencher| {
         bencher.iter(|| {
-            // Without a controller it is to stay near where it started.
+            // The plant starts again, so that it stays near its start without a controller.
             if tick == 25 {
                 alone.restore(start);
                 tick = 0;
@@ -88,7 +89,7 @@ fn loops(criterion: &mut Criterion) {
             tick += 1;
         });
     });
-    // At tick 5 CRMPC optimises, at the next it only feeds back.
+    // CRMPC optimises at tick 5; at the next tick it only applies feedback.
     for (name, tick) in [("CRMPC, optimising", 5), ("CRMPC, between", 6)] {
         let closed = Loop::new(&plant, &crmpc, None);
         for before in 0..tick {
@@ -98,7 +99,7 @@ fn loops(criterion: &mut Criterion) {
         let motion = get(&closed.plant, &closed.motion[0]);
         let state = closed.controller.save();
         group.bench_function(name, |bencher| {
-            // The work is done when the step is asked for, as no output was.
+            // The step itself does the work, because no output was requested before it.
             bencher.iter_batched(
                 || {
                     closed.controller.restore(state);

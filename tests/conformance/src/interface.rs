@@ -1,34 +1,34 @@
-//! The C interface as an importer declares it: fmi2TypesPlatform.h, fmi2FunctionTypes.h and fmi2Functions.h, without a word
-//! of the crate under test.
+//! The C interface as an importer declares it, from fmi2TypesPlatform.h, fmi2FunctionTypes.h and
+//! fmi2Functions.h. It uses nothing of the crate under test.
 #![allow(non_snake_case, clippy::missing_safety_doc)]
 
 use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;
 
-/// `fmi2Component`.
+/// C type `fmi2Component`, a pointer to an instance.
 pub type Component = *mut c_void;
-/// `fmi2FMUstate`.
+/// C type `fmi2FMUstate`, a handle of a saved state.
 pub type FmuState = *mut c_void;
-/// `fmi2String`.
+/// C type `fmi2String`, a NUL-terminated text.
 pub type Text = *const c_char;
-/// `fmi2Status`: a plain number, as a library may answer anything.
+/// C type `fmi2Status` as a plain number, because a library may return any value.
 pub type Status = c_int;
 
-/// `fmi2OK`
+/// Status `fmi2OK`: the call succeeded.
 pub const OK: Status = 0;
-/// `fmi2Discard`
+/// Status `fmi2Discard`: the call was refused, and the simulation can go on.
 pub const DISCARD: Status = 2;
-/// `fmi2Error`
+/// Status `fmi2Error`: the instance cannot go on as it is.
 pub const ERROR: Status = 3;
-/// `fmi2Fatal`
+/// Status `fmi2Fatal`: the instance cannot be used any more.
 pub const FATAL: Status = 4;
 
-/// `fmi2ModelExchange`
+/// Interface type `fmi2ModelExchange` of an instance.
 pub const MODEL_EXCHANGE: c_int = 0;
-/// `fmi2CoSimulation`
+/// Interface type `fmi2CoSimulation` of an instance.
 pub const CO_SIMULATION: c_int = 1;
 
-/// `fmi2EventInfo`.
+/// C type `fmi2EventInfo`, the result of an event iteration.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
 #[allow(missing_docs)]
@@ -41,10 +41,10 @@ pub struct EventInfo {
     pub next_event_time: f64,
 }
 
-/// `fmi2CallbackLogger`.
+/// C type `fmi2CallbackLogger`, which is variadic.
 pub type Logger = unsafe extern "C" fn(*mut c_void, Text, Status, Text, Text, ...);
 
-/// `fmi2CallbackFunctions`.
+/// C type `fmi2CallbackFunctions`, the callbacks of the importer.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 #[allow(missing_docs)]
@@ -58,11 +58,11 @@ pub struct Callbacks {
 
 macro_rules! interface {
     ($($name:ident($($argument:ty),*) -> $result:ty;)*) => {
-        /// The functions of one opened library.
+        /// Functions of one opened library, which stays open with them.
         #[allow(missing_docs)]
         pub struct Interface {
             $(pub $name: unsafe extern "C" fn($($argument),*) -> $result,)*
-            // Behind the functions, as fields are dropped in order.
+            // The library comes after the functions, because fields are dropped in order.
             _library: libloading::Library,
         }
 
@@ -73,9 +73,10 @@ macro_rules! interface {
             /// Opens a library that has all functions.
             ///
             /// # Errors
-            /// The loader's: also names a function that is missing.
+            /// Returns the loader's error, which also names a function that is missing.
             pub fn open(path: &Path) -> Result<Self, libloading::Error> {
-                // SAFETY: initializers of the library under test run.
+                // SAFETY: opening runs the initializers of the library under test, which are
+                // trusted here.
                 let library = unsafe { libloading::Library::new(path) }?;
                 Ok(Self {
                     // SAFETY: the types are those that the standard gives to these names.

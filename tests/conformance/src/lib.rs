@@ -1,6 +1,8 @@
-//! An importer for testing: the FMU libraries that cargo has built, opened at run time and called through FMI 2.0's C interface.
+//! An importer for testing. It opens the FMU libraries that cargo has built at run time and calls
+//! them through the C interface of FMI 2.0.
 //!
-//! It knows of the units what their description says, and of the crates that make them nothing.
+//! It knows of a unit only what the unit's description says, and nothing of the crates that make
+//! the units.
 #![allow(unsafe_code)]
 #![allow(clippy::borrow_as_ptr, reason = "calls read better as in C")]
 #![allow(clippy::missing_panics_doc, reason = "a test fails by panicking")]
@@ -16,19 +18,22 @@ use std::path::PathBuf;
 use std::ptr::{null, null_mut};
 use std::sync::{Arc, Mutex};
 
-/// Calls a function of the library that an instance, or unit, belongs to: `c!(instance, fmi2Reset(component))`.
+/// Calls a function of the library to which an instance or unit belongs:
+/// `c!(instance, fmi2Reset(component))`.
 #[macro_export]
 macro_rules! c {
     ($on:expr, $function:ident($($argument:expr),* $(,)?)) => {{
         let function = $on.interface.$function;
-        // SAFETY: every pointer that a test passes is null or valid for the call, as the standard wants it.
+        // SAFETY: every pointer that a test passes is null or valid for the duration of the call,
+        // as the standard demands.
         #[allow(unsafe_code, clippy::macro_metavars_in_unsafe)]
         let result = unsafe { function($($argument),*) };
         result
     }};
 }
 
-/// The library of a crate, where cargo puts it for this program: beside it or in its folder `deps`.
+/// Path of a crate's library, where cargo puts it for this program: beside it or in its folder
+/// `deps`.
 pub fn library(krate: &str) -> PathBuf {
     let file = format!("{}{krate}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let program = std::env::current_exe().expect("the path of this program");
@@ -40,9 +45,9 @@ pub fn library(krate: &str) -> PathBuf {
 /// One unit of a library.
 #[derive(Clone)]
 pub struct Unit {
-    /// The functions of its library.
+    /// Functions of the library that holds the unit.
     pub interface: Arc<Interface>,
-    /// What it says of itself.
+    /// Description that the unit gives of itself.
     pub description: ModelDescription,
     guid: CString,
 }
@@ -63,23 +68,23 @@ pub fn units() -> Vec<Unit> {
     ["fmu_plant", "fmu_controller"].into_iter().flat_map(open).collect()
 }
 
-/// The unit with that name.
+/// Returns the unit with that name.
 pub fn unit(name: &str) -> Unit {
     units().into_iter().find(|unit| unit.name() == name).unwrap_or_else(|| panic!("no unit {name}"))
 }
 
 impl Unit {
-    /// Model name.
+    /// Model name of the unit.
     pub fn name(&self) -> &str {
         &self.description.name
     }
 
-    /// GUID as C text.
+    /// GUID of the unit as C text.
     pub fn guid(&self) -> &CStr {
         &self.guid
     }
 
-    /// The interfaces it offers.
+    /// Interface types that the unit offers.
     pub fn interfaces(&self) -> &[c_int] {
         if self.description.model_exchange {
             &[interface::MODEL_EXCHANGE, CO_SIMULATION]
@@ -99,7 +104,7 @@ impl Unit {
         *self.references(|variable| variable.name == name).first().unwrap_or_else(|| panic!("no {name}"))
     }
 
-    /// A continuous input: one whose change every unit notices.
+    /// Value reference of a continuous input whose change affects every unit.
     pub fn input(&self) -> u32 {
         let is_input =
             |name: &&str| !self.references(|v| v.name == *name && v.causality == Causality::Input).is_empty();
@@ -107,22 +112,22 @@ impl Unit {
         self.reference(name.expect("an input that is known here"))
     }
 
-    /// Everything that is calculated but wall-clock times.
+    /// Value references of all calculated variables except wall-clock times.
     pub fn results(&self) -> Vec<u32> {
         self.references(|variable| {
             variable.is_calculated() && !variable.description.starts_with("Wall-clock time")
         })
     }
 
-    /// Instantiates with a folder of resources that is not there.
+    /// Makes an instance whose folder of resources does not exist.
     pub fn instance(&self, fmu_type: c_int) -> Instance {
         let instance = self.instantiate(Some(c"it"), fmu_type, Some(&self.guid), Some(c"file:///nowhere"));
         assert!(!instance.component.is_null(), "{}: {:?}", self.name(), instance.messages());
         instance
     }
 
-    /// As it says; the component is null if that was refused. The callbacks are freed as soon as the call returns, as
-    /// some importers do.
+    /// Makes an instance with these arguments; its component is null if the unit refused. The
+    /// callbacks are freed as soon as the call returns, as some importers do.
     pub fn instantiate(
         &self,
         name: Option<&CStr>,
@@ -149,22 +154,23 @@ impl Unit {
     }
 }
 
-/// What the importer's logger was told.
+/// Message that the importer's logger received.
 #[derive(Clone, Debug)]
 pub struct Message {
-    /// Status as passed.
+    /// Status as passed to the logger.
     pub status: Status,
-    /// Category as passed.
+    /// Category as passed to the logger.
     pub category: String,
-    /// The text.
+    /// Text of the message.
     pub text: String,
 }
 
-/// Where messages are collected.
+/// List in which messages are collected.
 pub type Log = Mutex<Vec<Message>>;
 
 extern "C" fn log(environment: *mut c_void, _instance: Text, status: Status, category: Text, message: Text) {
-    // SAFETY: the environment is the log that `Instance` keeps alive, the texts are NUL-terminated.
+    // SAFETY: the environment is the log that `Instance` keeps alive, and the library passes
+    // NUL-terminated texts that live during the call.
     let (log, [category, text]) = unsafe {
         let texts = [category, message].map(|text| CStr::from_ptr(text).to_string_lossy().into_owned());
         (&*environment.cast::<Log>(), texts)
@@ -172,10 +178,11 @@ extern "C" fn log(environment: *mut c_void, _instance: Text, status: Status, cat
     log.lock().expect("no other thread panicked").push(Message { status, category, text });
 }
 
-/// Callbacks with a logger and nothing else.
+/// Returns callbacks with a logger and nothing else.
 pub fn callbacks(log_to: &Log) -> Callbacks {
     type Fixed = extern "C" fn(*mut c_void, Text, Status, Text, Text);
-    // SAFETY: a variadic call without variadic arguments passes the fixed ones like any other on the supported platforms.
+    // SAFETY: the two types differ only in the variadic part, and on the supported platforms a
+    // variadic call without variadic arguments passes the fixed ones like any other call.
     let logger = unsafe { std::mem::transmute::<Fixed, Logger>(log) };
     Callbacks {
         logger: Some(logger),
@@ -186,13 +193,13 @@ pub fn callbacks(log_to: &Log) -> Callbacks {
     }
 }
 
-/// An instance with its log. Freed when dropped, in whatever state.
+/// An instance with its log. Dropping it frees the instance, whatever its state.
 pub struct Instance {
-    /// The functions of its library.
+    /// Functions of the library that holds the unit.
     pub interface: Arc<Interface>,
-    /// What it is an instance of.
+    /// Unit to which the instance belongs.
     pub unit: Unit,
-    /// `fmi2Component`.
+    /// Pointer `fmi2Component` of the instance.
     pub component: Component,
     log: Box<Log>,
 }
@@ -207,27 +214,28 @@ impl Drop for Instance {
     }
 }
 
-/// What an instance says of its calculated variables: the bits of every value.
+/// Bits of all calculated variables of an instance, in order.
 pub type Bits = Vec<u64>;
 
 impl Instance {
-    /// Everything the logger was told.
+    /// Returns all messages that the logger received.
     pub fn messages(&self) -> Vec<Message> {
         self.log.lock().expect("no other thread panicked").clone()
     }
 
-    /// Forgets all messages.
+    /// Deletes all messages of the log.
     pub fn forget(&self) {
         self.log.lock().expect("no other thread panicked").clear();
     }
 
-    /// The call must have succeeded.
+    /// Asserts that the call succeeded.
     #[track_caller]
     pub fn ok(&self, status: Status) {
         assert_eq!(status, OK, "{}: {:?}", self.unit.name(), self.messages().last());
     }
 
-    /// The call must have been refused with `wanted`, and the last message hold all of `parts`.
+    /// Asserts that the call was refused with the status `wanted`, and that the last message holds
+    /// all of `parts`.
     #[track_caller]
     pub fn refused(&self, status: Status, wanted: Status, parts: &[&str]) {
         let messages = self.messages();
@@ -238,13 +246,13 @@ impl Instance {
         }
     }
 
-    /// To initialization mode, from 0 s without an end.
+    /// Enters initialization mode, with start time 0 s and no stop time.
     pub fn enter_initialization(&self) {
         self.ok(c!(self, fmi2SetupExperiment(self.component, 0, 0.0, 0.0, 0, 0.0)));
         self.ok(c!(self, fmi2EnterInitializationMode(self.component)));
     }
 
-    /// Through initialization mode.
+    /// Enters and leaves initialization mode.
     #[must_use]
     pub fn initialized(self) -> Self {
         self.enter_initialization();
@@ -252,12 +260,12 @@ impl Instance {
         self
     }
 
-    /// Sets a Real.
+    /// Sets a Real variable to a value.
     pub fn set_real(&self, reference: u32, value: f64) -> Status {
         c!(self, fmi2SetReal(self.component, &reference, 1, &value))
     }
 
-    /// A Real.
+    /// Returns the value of a Real variable.
     #[track_caller]
     pub fn real(&self, reference: u32) -> f64 {
         let mut value = f64::NAN;
@@ -277,18 +285,18 @@ impl Instance {
         self.ok(c!(self, fmi2SetInteger(self.component, &reference, 1, &value)));
     }
 
-    /// Sets a String.
+    /// Sets a String variable to a value.
     pub fn set_string(&self, name: &str, value: &CStr) -> Status {
         let value = value.as_ptr();
         c!(self, fmi2SetString(self.component, &self.unit.reference(name), 1, &value))
     }
 
-    /// `fmi2DoStep`.
+    /// Performs a step with `fmi2DoStep`.
     pub fn step(&self, point: f64, size: f64) -> Status {
         c!(self, fmi2DoStep(self.component, point, size, 1))
     }
 
-    /// The bits of the variables, asked for with one call per type.
+    /// Returns the bits of the variables, read with one call per type.
     pub fn bits(&self, references: &[u32]) -> Bits {
         let variables = &self.unit.description.variables;
         let mut bits = vec![0; references.len()];
@@ -318,7 +326,8 @@ impl Instance {
         let mut texts = vec![null(); list.len()];
         self.ok(c!(self, fmi2GetString(self.component, list.as_ptr(), list.len(), texts.as_mut_ptr())));
         for (&place, text) in places.iter().zip(texts) {
-            // SAFETY: the call succeeded, so it is NUL-terminated until the next one.
+            // SAFETY: the call succeeded, so the text is NUL-terminated and lives until the next
+            // fmi2GetString.
             bits[place] = unsafe { CStr::from_ptr(text) }
                 .to_bytes()
                 .iter()
@@ -327,15 +336,15 @@ impl Instance {
         bits
     }
 
-    /// The input at a tick of [`Instance::drive`]: small, and never the same twice.
+    /// Value of the input at a tick of [`Instance::drive`]: small, and different at every tick.
     pub fn course(&self, tick: u32) -> f64 {
         let name = &self.unit.description.variables[self.unit.input() as usize].name;
         let size = if name == "moment.y" { 1e3 } else { 1e-4 };
         size * f64::from(tick)
     }
 
-    /// Co-simulation by the proposed step over `ticks` with a moving input: the results at each tick, after the inputs of this
-    /// tick were set.
+    /// Runs co-simulation with the proposed step over `ticks` and a moving input. Returns the
+    /// results at each tick, read after the inputs of this tick were set.
     pub fn drive(&self, ticks: std::ops::Range<u32>) -> Vec<Bits> {
         let h = self.unit.description.default_experiment.step;
         let (input, results) = (self.unit.input(), self.unit.results());
@@ -348,7 +357,8 @@ impl Instance {
         rows
     }
 
-    /// Model exchange by Euler steps of the proposed length, from event mode to event mode: the results at each tick.
+    /// Runs model exchange with Euler steps of the proposed length, each from event mode to event
+    /// mode. Returns the results at each tick.
     pub fn integrate(&self, ticks: std::ops::Range<u32>) -> Vec<Bits> {
         let h = self.unit.description.default_experiment.step;
         let n = self.unit.description.states().len();
@@ -388,13 +398,13 @@ impl Instance {
         state
     }
 
-    /// Goes back to a saved state.
+    /// Returns to a saved state.
     #[track_caller]
     pub fn restore(&self, state: interface::FmuState) {
         self.ok(c!(self, fmi2SetFMUstate(self.component, state)));
     }
 
-    /// The present state as bytes.
+    /// Returns the present state as bytes.
     pub fn serialize(&self) -> Vec<u8> {
         let mut state = self.save();
         let mut size = 0;
@@ -405,7 +415,7 @@ impl Instance {
         bytes
     }
 
-    /// `fmi2DeSerializeFMUstate`.
+    /// Makes a state from bytes with `fmi2DeSerializeFMUstate`.
     pub fn deserialize(&self, bytes: &[u8]) -> (Status, interface::FmuState) {
         let mut state = null_mut();
         let (from, size) = (bytes.as_ptr().cast(), bytes.len());

@@ -1,22 +1,26 @@
-//! Instances and libraries that come and go leave nothing behind. Alone in its process, so that nobody else's memory is counted.
+//! Test that instances and libraries that come and go leave nothing behind. It is alone in its
+//! process, so that no other test's memory is counted.
 #![cfg(all(target_os = "linux", target_env = "gnu"))]
 
 use conformance::interface::CO_SIMULATION;
 use conformance::{Instance, Unit, units};
 
-/// Bytes that were handed out by the C library's allocator and not given back. Rust's allocations go through it too. Resident
-/// memory would count its free lists as well, which grow by fits and starts.
+/// Bytes that the C library's allocator handed out and did not get back. Rust's allocations go
+/// through it too. Resident memory would also count its free lists, which grow irregularly.
 #[expect(unsafe_code, reason = "a call of the C library without arguments")]
 fn in_use() -> usize {
-    // SAFETY: reads the allocator's own counters under its locks.
+    // SAFETY: mallinfo2 has no preconditions; it reads the allocator's own counters under its
+    // locks.
     let info = unsafe { libc::mallinfo2() };
     info.uordblks + info.hblkhd
 }
 
-/// The smallest block takes 32 bytes: one lost per library would be 9600, one per instance 96000. Without losses it is none or two.
+/// Bytes that may remain. The smallest block takes 32 bytes, so one lost per library would be 9600
+/// and one per instance 96000. Without losses none or two blocks remain.
 const ALLOWED: usize = 4 << 10;
 
-/// What `cycles` repetitions leave in use, once `warm_up` have filled what is allocated once and kept.
+/// Bytes that `cycles` repetitions leave in use after `warm_up` repetitions, which fill what is
+/// allocated once and kept.
 fn growth(warm_up: usize, cycles: usize, mut cycle: impl FnMut(usize)) -> usize {
     (0..warm_up).for_each(&mut cycle);
     let before = in_use();
@@ -24,7 +28,8 @@ fn growth(warm_up: usize, cycles: usize, mut cycle: impl FnMut(usize)) -> usize 
     in_use().saturating_sub(before)
 }
 
-/// From instantiation to a first step with its outputs, and a saved state that the importer forgets.
+/// Runs an instance from instantiation to a first step with its outputs, and a saved state that the
+/// importer does not free.
 fn live(instance: Instance) {
     let instance = instance.initialized();
     instance.drive(0..1);
@@ -51,7 +56,7 @@ fn three_thousand_instances_and_three_hundred_libraries_leave_nothing_behind() {
     drop(units);
     let libraries = growth(60, 300, |i| {
         let name = names[i % names.len()].clone();
-        // The thread ends after the libraries were closed, and with it what the thread kept for them.
+        // The thread ends after the libraries are closed, and releases what it kept for them.
         std::thread::spawn(move || live(conformance::unit(&name).instance(CO_SIMULATION))).join().unwrap();
     });
     assert!(libraries < ALLOWED, "300 libraries have left {libraries} bytes");

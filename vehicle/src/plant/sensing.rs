@@ -1,4 +1,5 @@
-//! What the plant's sensors feel and show.
+//! Measurements of the plant: the readings of ideal sensors and the samples that the sensors
+//! output.
 
 use super::{Held, Input, Load, Plant};
 use crate::kinematics::TRAJECTORY;
@@ -7,7 +8,7 @@ use crate::sensors::{Sample, Sensors};
 use nalgebra::SMatrix;
 
 impl Plant {
-    /// Takes the sample that is due at `time` (s), if one is.
+    /// Takes the sample that is due at `time` (s), if there is one.
     pub(super) fn sense(&mut self, time: f64, input: &Input) {
         if let Some(mut sensors) = self.sensors.take() {
             sensors.take(time, &self.felt(time, input));
@@ -26,26 +27,27 @@ impl Plant {
         }
     }
 
-    /// What ideal sensors feel at `time` (s).
+    /// Readings of ideal sensors at `time` (s).
     pub fn felt(&self, time: f64, input: &Input) -> Readings {
         self.pose(time, input).felt(&self.surroundings)
     }
 
-    /// What the sensors show at `time` (s), with a sample that is due then though not taken yet. Without sampled sensors: what
-    /// they feel, with the number 0.
+    /// Newest sample that the sensors output at `time` (s), including one that is due then but not
+    /// yet taken. Without sampled sensors it holds the readings of ideal ones and the number 0.
     pub fn measured(&self, time: f64, input: &Input) -> Sample {
         let felt = self.felt(time, input);
         let truth = Sample { number: 0, time, readings: felt };
         self.sensors.as_ref().map_or(truth, |sensors| sensors.shown(time, &felt))
     }
 
-    /// What the sensors show at `time` (s) since [`Plant::hold`].
+    /// Sample that the sensors output at `time` (s) after the last call of [`Plant::hold`].
     pub fn measured_since_held(&self, time: f64, input: &Input) -> Sample {
         self.sensors.as_ref().map_or_else(|| self.measured(time, input), Sensors::arrived)
     }
 
-    /// Partial derivatives of what [`Plant::measured`] shows, in the order of its readings: by state (9 × 6) and trajectory
-    /// (9 × 7). Samples depend on neither, or do so at an instant only.
+    /// Partial derivatives of the readings of [`Plant::measured`], in their order, with respect to
+    /// the state (9 × 6) and the trajectory (9 × 7). They are zero for sampled sensors, whose
+    /// samples depend on either only at the instant of sampling.
     pub fn measured_by_state_and_trajectory(
         &self,
         time: f64,

@@ -1,10 +1,11 @@
-//! A short life of the units named as arguments, or of all: co-simulation, model exchange, saved states, refusals. Prints
-//! nothing and fails by panicking, so that it can run under a memory checker.
+//! A short run of the units named as arguments, or of all: co-simulation, model exchange, saved
+//! states and refusals. It prints nothing and fails by panicking, so that it can run under a memory
+//! checker.
 
 use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE};
 use conformance::{Unit, c};
 
-/// As many ticks as the slowest law needs for its first optimisation.
+/// Number of ticks after which even the slowest law has optimised once.
 const TICKS: u32 = 6;
 
 fn main() {
@@ -28,7 +29,7 @@ fn simulate(unit: &Unit) {
     let bytes = instance.serialize();
     instance.restore(state);
     assert_eq!(instance.drive(0..TICKS), rows);
-    // A refusal, and back to a state from bytes.
+    // A refused call is followed by a return to a state from bytes.
     assert_eq!(instance.set_real(unit.input(), f64::NAN), ERROR);
     assert_eq!(instance.deserialize(&bytes[1..]).0, ERROR);
     let (status, state) = instance.deserialize(&bytes);

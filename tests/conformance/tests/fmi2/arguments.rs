@@ -1,4 +1,5 @@
-//! NULL for everything that is a pointer: an error that names the argument, or fine where the standard or importers have it so.
+//! Tests with NULL for every pointer argument: the call reports an error that names the argument,
+//! or it succeeds where the standard or importers need that.
 
 use conformance::interface::{CO_SIMULATION, Callbacks, ERROR, MODEL_EXCHANGE, OK, Status};
 use conformance::{Instance, c, units};
@@ -8,7 +9,8 @@ use std::ptr::{null, null_mut};
 
 type Call = fn(&Instance) -> Status;
 
-/// Calls of both interfaces with a NULL too many, and what the message must hold.
+/// Calls of both interfaces with one pointer NULL that must not be, and the text that the message
+/// must hold.
 #[rustfmt::skip]
 const NULLS: &[(Call, &str)] = &[
     (|i| c!(i, fmi2SetDebugLogging(i.component, 1, 1, null())), "fmi2SetDebugLogging: argument 'categories' is NULL"),
@@ -42,11 +44,11 @@ const NULLS: &[(Call, &str)] = &[
     (|i| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, null(), 1, &1.0, &mut 0.0)), "fmi2GetDirectionalDerivative: argument 'vKnown_ref' is NULL"),
     (|i| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, &0, 1, null(), &mut 0.0)), "fmi2GetDirectionalDerivative: argument 'dvKnown' is NULL"),
     (|i| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, &0, 1, &1.0, null_mut())), "fmi2GetDirectionalDerivative: argument 'dvUnknown' is NULL"),
-    // More than fits into the address space.
+    // This count exceeds the address space.
     (|i| c!(i, fmi2GetReal(i.component, &0, usize::MAX, &mut 0.0)), "fmi2GetReal: argument 'vr' cannot have"),
 ];
 
-/// The same in event mode.
+/// Such calls in event mode, for model exchange only.
 #[rustfmt::skip]
 const NULLS_OF_EXCHANGE: &[(Call, &str)] = &[
     (|i| c!(i, fmi2NewDiscreteStates(i.component, null_mut())), "fmi2NewDiscreteStates: argument 'fmi2eventInfo' is NULL"),
@@ -54,14 +56,14 @@ const NULLS_OF_EXCHANGE: &[(Call, &str)] = &[
     (|i| c!(i, fmi2GetEventIndicators(i.component, null_mut(), 1)), "fmi2GetEventIndicators: argument 'eventIndicators' is NULL"),
     (|i| c!(i, fmi2GetContinuousStates(i.component, null_mut(), 1)), "fmi2GetContinuousStates: argument 'x' is NULL"),
     (|i| c!(i, fmi2GetNominalsOfContinuousStates(i.component, null_mut(), 1)), "fmi2GetNominalsOfContinuousStates: argument 'x_nominal' is NULL"),
-    // No values, but there are some.
+    // No values are requested, although the unit has some.
     (|i| c!(i, fmi2GetDerivatives(i.component, null_mut(), 0)), "fmi2GetDerivatives: room for 0"),
     (|i| c!(i, fmi2GetEventIndicators(i.component, null_mut(), 0)), "fmi2GetEventIndicators: room for 0"),
     (|i| c!(i, fmi2GetContinuousStates(i.component, null_mut(), 0)), "fmi2GetContinuousStates: room for 0"),
     (|i| c!(i, fmi2GetNominalsOfContinuousStates(i.component, null_mut(), 0)), "fmi2GetNominalsOfContinuousStates: room for 0"),
 ];
 
-/// The same in continuous-time mode.
+/// Such calls in continuous-time mode.
 #[rustfmt::skip]
 const NULLS_OF_CONTINUOUS_TIME: &[(Call, &str)] = &[
     (|i| c!(i, fmi2CompletedIntegratorStep(i.component, 1, null_mut(), &mut 0)), "fmi2CompletedIntegratorStep: argument 'enterEventMode' is NULL"),
@@ -70,7 +72,7 @@ const NULLS_OF_CONTINUOUS_TIME: &[(Call, &str)] = &[
     (|i| c!(i, fmi2SetContinuousStates(i.component, null(), 0)), "fmi2SetContinuousStates: room for 0"),
 ];
 
-/// The same between steps.
+/// Such calls between the steps of co-simulation.
 #[rustfmt::skip]
 const NULLS_OF_SIMULATION: &[(Call, &str)] = &[
     (|i| c!(i, fmi2SetRealInputDerivatives(i.component, null(), 1, &1, &0.0)), "fmi2SetRealInputDerivatives: argument 'vr' is NULL"),
@@ -83,7 +85,7 @@ const NULLS_OF_SIMULATION: &[(Call, &str)] = &[
     (|i| c!(i, fmi2GetStringStatus(i.component, 1, null_mut())), "fmi2GetStringStatus: argument 'value' is NULL"),
 ];
 
-/// No values, so no pointers.
+/// Calls without any values, which need no pointers.
 const NOTHING: &[Call] = &[
     |i| c!(i, fmi2SetDebugLogging(i.component, 1, 0, null())),
     |i| c!(i, fmi2GetReal(i.component, null(), 0, null_mut())),
@@ -163,14 +165,14 @@ fn no_callbacks_or_none_of_their_functions_are_fine() {
             };
             let component = instantiate(c"it".as_ptr());
             assert!(!component.is_null(), "{}", unit.name());
-            // A step too early has nobody to complain to.
+            // A premature step is refused, and there is no logger to report it to.
             assert_eq!(c!(unit, fmi2DoStep(component, 0.0, 0.1, 1)), ERROR);
             assert_eq!(c!(unit, fmi2Reset(component)), OK);
             assert_eq!(c!(unit, fmi2EnterInitializationMode(component)), OK);
             assert_eq!(c!(unit, fmi2ExitInitializationMode(component)), OK);
             assert_eq!(c!(unit, fmi2DoStep(component, 0.0, 0.01, 1)), OK);
             c!(unit, fmi2FreeInstance(component));
-            // And neither has a refused instantiation.
+            // A refused instantiation has no logger either.
             assert!(instantiate(null()).is_null());
         }
     }

@@ -1,5 +1,5 @@
-//! Which function may be called in which state, and for which variables: the tables of FMI 2.0.4, sections 3.2.3 (model
-//! exchange) and 4.2.4 (co-simulation).
+//! Tests of the functions that may be called in each state, and for which variables: the tables of
+//! FMI 2.0.4, sections 3.2.3 (model exchange) and 4.2.4 (co-simulation).
 
 use conformance::interface::{
     CO_SIMULATION, DISCARD, ERROR, EventInfo, FUNCTIONS, FmuState, MODEL_EXCHANGE, OK, Status,
@@ -9,8 +9,8 @@ use model_description::variable::{Causality, Kind, Variable};
 use std::ffi::{CString, c_int};
 use std::ptr::{null, null_mut};
 
-/// The columns of the tables that an instance can be in; `start` has none, `fatal` is not reached, and steps are never in
-/// progress, as no unit computes them asynchronously.
+/// Columns of the tables that an instance can be in. The column `start` has no instance, `fatal` is
+/// not reached, and steps are never in progress, because no unit computes them asynchronously.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Instantiated,
@@ -37,14 +37,14 @@ const STATES: [(State, char); 7] = [
     (Error, 'X'),
 ];
 
-/// The states of an interface.
+/// Returns the states of an interface.
 fn states(fmu_type: c_int) -> Vec<(State, char)> {
     let foreign =
         if fmu_type == MODEL_EXCHANGE { vec![StepComplete] } else { vec![EventMode, ContinuousTimeMode] };
     STATES.into_iter().filter(|(state, _)| !foreign.contains(state)).collect()
 }
 
-/// A new instance brought to that state.
+/// Makes a new instance and brings it to that state.
 fn instance_in(unit: &Unit, fmu_type: c_int, state: State) -> Instance {
     let instance = unit.instance(fmu_type);
     let component = instance.component;
@@ -74,15 +74,17 @@ fn instance_in(unit: &Unit, fmu_type: c_int, state: State) -> Instance {
     }
 }
 
-/// A call with right arguments.
+/// Call of a function with valid arguments.
 type Caller = fn(&Instance, FmuState) -> Status;
 
-/// A row: function, call, the states of model exchange and of co-simulation in which it is allowed (empty: not a function of
-/// that interface), what it answers where it is allowed. `fmi2FreeInstance` returns nothing and has a test of its own, as
-/// have the functions that need no instance.
+/// A row has the function, a call, the states of model exchange and of co-simulation in which it is
+/// allowed (empty: not a function of that interface), and the status that it returns where it is
+/// allowed. `fmi2FreeInstance` returns nothing and has its own test, as have the functions that
+/// need no instance.
 ///
-/// The variables that may be set are fewer: see [`settable`]. The standard has `fmi2GetXXX` in initialization mode for outputs,
-/// states and derivatives only; the units tell every variable.
+/// The variables that may be set are fewer, as [`settable`] tells. The standard allows `fmi2GetXXX`
+/// in initialization mode for outputs, states and derivatives only; the units return every
+/// variable.
 #[rustfmt::skip]
 const TABLE: &[(&str, Caller, &str, &str, Status)] = &[
     ("fmi2SetDebugLogging",               |i, _| c!(i, fmi2SetDebugLogging(i.component, 1, 0, null())),        "INECTX", "INSTX", OK),
@@ -124,7 +126,7 @@ const TABLE: &[(&str, Caller, &str, &str, Status)] = &[
     ("fmi2CancelStep",                    |i, _| c!(i, fmi2CancelStep(i.component)),                           "",       "",      OK),
     ("fmi2GetStatus",                     |i, _| c!(i, fmi2GetStatus(i.component, 0, &mut 0)),                 "",       "ST",    OK),
     ("fmi2GetRealStatus",                 |i, _| c!(i, fmi2GetRealStatus(i.component, 2, &mut 0.0)),           "",       "ST",    OK),
-    // There is no status of type Integer.
+    // FMI defines no status of type Integer.
     ("fmi2GetIntegerStatus",              |i, _| c!(i, fmi2GetIntegerStatus(i.component, 2, &mut 0)),          "",       "ST",    DISCARD),
     ("fmi2GetBooleanStatus",              |i, _| c!(i, fmi2GetBooleanStatus(i.component, 3, &mut 0)),          "",       "ST",    OK),
     ("fmi2GetStringStatus",               |i, _| c!(i, fmi2GetStringStatus(i.component, 1, &mut null())),      "",       "ST",    OK),
@@ -164,7 +166,8 @@ fn serialize(i: &Instance, state: FmuState) -> Status {
     c!(i, fmi2SerializeFMUstate(i.component, state, bytes.as_mut_ptr().cast(), bytes.len()))
 }
 
-/// Of the first derivative by the first state; of nothing where there are none.
+/// Asks for the derivative of the first state derivative with respect to the first state, or for
+/// none if the unit has no states.
 fn directional_derivative(i: &Instance) -> Status {
     let states = i.unit.description.states();
     let (known, unknown): (Vec<_>, Vec<_>) =
@@ -178,10 +181,11 @@ fn with_states(i: &Instance, call: fn(&Instance, *mut f64, usize) -> Status) -> 
     call(i, x.as_mut_ptr(), x.len())
 }
 
-/// To their present values.
+/// Sets the continuous states to their present values.
 fn set_states(i: &Instance) -> Status {
     with_states(i, |i, x, n| {
-        // Where they cannot be asked for they cannot be set either: the second call is the one that must say so.
+        // In states where they cannot be read they cannot be set either; the second call must be
+        // the one that reports it.
         let here = i.save();
         if c!(i, fmi2GetContinuousStates(i.component, x, n)) != OK {
             i.restore(here);
@@ -205,13 +209,13 @@ fn the_table_has_every_function_that_answers_for_an_instance() {
     }
 }
 
-/// Rows whose arguments come from the instance itself.
+/// Functions whose arguments come from the instance itself.
 const OWN_ARGUMENTS: [&str; 3] = ["fmi2FreeFMUstate", "fmi2DeSerializeFMUstate", "fmi2SetContinuousStates"];
 
 #[test]
 fn without_an_instance_every_call_is_an_error() {
     for unit in units() {
-        // NULL, as a refused instantiation leaves it.
+        // A refused instantiation leaves NULL.
         let nobody = unit.instantiate(None, CO_SIMULATION, None, None);
         assert!(nobody.component.is_null());
         nobody.forget();
@@ -236,7 +240,7 @@ fn check(fmu_type: c_int) {
             for &(name, call, exchange, simulation, answer) in TABLE {
                 let what = format!("{}: {name} in {state:?}", unit.name());
                 let allowed = if fmu_type == MODEL_EXCHANGE { exchange } else { simulation }.contains(letter);
-                // The one function that not every unit offers.
+                // This is the one function that not every unit offers.
                 let offered =
                     name != "fmi2GetDirectionalDerivative" || unit.description.directional_derivatives();
                 instance.forget();
@@ -252,7 +256,8 @@ fn check(fmu_type: c_int) {
                         assert!(reasons.iter().any(|reason| text.contains(reason)), "{what}: {text}");
                     }
                 }
-                // Whatever was refused: back to where it was, bit for bit.
+                // The instance returns to its state before the call, bit for bit, whatever was
+                // refused.
                 instance.restore(here);
                 assert!(instance.serialize() == before, "{what}");
             }
@@ -291,18 +296,21 @@ fn a_unit_can_be_freed_in_every_state() {
     for unit in units() {
         for &fmu_type in unit.interfaces() {
             for (state, _) in states(fmu_type) {
-                // Freed at the end of its scope, with a saved state that was not.
+                // The instance is freed at the end of its scope, with a saved state that was not
+                // freed.
                 instance_in(&unit, fmu_type, state).save();
             }
         }
     }
 }
 
-/// Where a variable may be set: conditions 1, 3, 4, 5 and 6 of the tables. No unit has tunable parameters or constants.
+/// Whether a variable may be set in a state: conditions 1, 3, 4, 5 and 6 of the tables. No unit has
+/// tunable parameters or constants.
 ///
-/// Two differences. An input may be set before initialization too: importers set all start values there, and section 2.2.7 gives
-/// inputs one. And condition 5 has only continuous inputs set in continuous-time mode, but FMPy sets all inputs there: a discrete
-/// Real is taken, and waits for the next event.
+/// There are two differences from the tables. An input may also be set before initialization,
+/// because importers set all start values there, and section 2.2.7 gives inputs one. Condition 5
+/// allows only continuous inputs in continuous-time mode, but FMPy sets all inputs there: a
+/// discrete Real is accepted and waits for the next event.
 fn settable(variable: &Variable, state: State) -> bool {
     let real = matches!(variable.kind, Kind::Real { .. });
     match variable.causality {
@@ -316,7 +324,7 @@ fn settable(variable: &Variable, state: State) -> bool {
     }
 }
 
-/// Sets a variable to its start value; a calculated one to anything.
+/// Sets a variable to its start value, and a calculated one to any value.
 fn set(instance: &Instance, reference: u32) -> (&'static str, Status) {
     let component = instance.component;
     match &instance.unit.description.variables[reference as usize].kind {

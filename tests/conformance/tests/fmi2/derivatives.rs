@@ -1,4 +1,5 @@
-//! Derivatives of inputs and outputs by time in co-simulation, and where directional derivatives are offered.
+//! Tests of the time derivatives of inputs and outputs in co-simulation, and of the units that
+//! offer directional derivatives.
 
 use conformance::interface::{CO_SIMULATION, ERROR, Status};
 use conformance::{Instance, c, is_continuous_real, units};
@@ -49,14 +50,14 @@ fn oracle_inputs_follow_their_derivatives_for_one_step() {
             let instance = unit.instance(CO_SIMULATION).initialized();
             let name = &unit.description.variables[reference as usize].name;
             let start = instance.real(reference);
-            // Small, and not away from zero.
+            // The derivatives are small and together do not move the value away from zero.
             let [first, second, third] = [1e-4, 2e-4, -3e-4].map(|value: f64| -value * start.signum());
             let (references, orders, values) = ([reference; 3], [3, 1, 2], [third, first, second]);
             let (component, list) = (instance.component, references.as_ptr());
             let (orders, values) = (orders.as_ptr(), values.as_ptr());
             instance.ok(c!(instance, fmi2SetRealInputDerivatives(component, list, 3, orders, values)));
             instance.ok(instance.step(0.0, h));
-            // 4.2.1: u + u' h + u'' h² / 2 + u''' h³ / 6
+            // By section 4.2.1 the value is u + u' h + u'' h² / 2 + u''' h³ / 6.
             let expected = start + first * h + second * h * h / 2.0 + third * h * h * h / 6.0;
             let end = instance.real(reference);
             let near = (end - expected).abs() <= 2.0 * f64::EPSILON * expected.abs();
@@ -71,13 +72,13 @@ fn oracle_inputs_follow_their_derivatives_for_one_step() {
 #[test]
 fn a_derivative_acts_within_the_step() {
     for unit in units() {
-        // The end is no tick of any unit: what was sampled within the step is held there.
+        // The end is no tick of any unit, so values sampled within the step are still held there.
         let (input, size) = (unit.input(), 4.33 * unit.description.default_experiment.step);
         let after = |slope: f64| {
             let instance = unit.instance(CO_SIMULATION).initialized();
             instance.ok(set(&instance, input, 1, slope));
             instance.ok(instance.step(0.0, size));
-            // So that only what happened on the way can make a difference.
+            // The input is reset, so that only its course within the step can make a difference.
             instance.ok(instance.set_real(input, 0.0));
             instance.bits(&unit.results())
         };

@@ -1,4 +1,4 @@
-//! The libraries as such.
+//! Tests of the libraries themselves.
 
 use conformance::interface::CO_SIMULATION;
 use conformance::{c, units};
@@ -9,7 +9,7 @@ use std::process::Command;
 fn both_libraries_have_every_function_and_say_what_they_are() {
     for unit in units() {
         let texts = [c!(unit, fmi2GetVersion()), c!(unit, fmi2GetTypesPlatform())];
-        // SAFETY: both are texts of the library itself.
+        // SAFETY: both functions return static NUL-terminated texts of the library.
         #[allow(unsafe_code)]
         let texts = texts.map(|text| unsafe { CStr::from_ptr(text) });
         assert_eq!(texts, [c"2.0", c"default"]);
@@ -22,7 +22,7 @@ fn the_guid_picks_the_unit() {
     assert_eq!(units.len(), 11);
     for unit in &units {
         assert_eq!(units.iter().filter(|other| other.guid() == unit.guid()).count(), 1, "{}", unit.name());
-        // A saved state says whose it is.
+        // A saved state tells to which unit it belongs.
         let state = unit.instance(CO_SIMULATION).serialize();
         let guid = unit.guid().to_bytes();
         assert!(state.windows(guid.len()).any(|part| part == guid), "{}", unit.name());

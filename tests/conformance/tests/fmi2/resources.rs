@@ -1,4 +1,4 @@
-//! The resource location in every form that importers pass.
+//! Tests of the resource location in every form that importers pass.
 #![cfg(unix)]
 
 use conformance::interface::{CO_SIMULATION, ERROR};
@@ -8,7 +8,7 @@ use std::path::Path;
 
 const TABLE: &str = "time_s,alpha_deg,beta_deg,sigma_deg\n0,40,0,0\n10,30,1,2\n";
 
-/// A unit in initialization mode, told to read a file that is in its resources only.
+/// Returns a unit in initialization mode that must read a file found only in its resources.
 fn reading(unit: &Unit, uri: Option<&str>, file: &str) -> Instance {
     let uri = uri.map(|uri| CString::new(uri).unwrap());
     let instance = unit.instantiate(Some(c"it"), CO_SIMULATION, Some(unit.guid()), uri.as_deref());
@@ -19,7 +19,7 @@ fn reading(unit: &Unit, uri: Option<&str>, file: &str) -> Instance {
     instance
 }
 
-/// An absolute path as seen from the working directory.
+/// Returns an absolute path as seen from the working directory.
 fn relative(path: &str) -> String {
     let (from, path) = (std::env::current_dir().unwrap(), Path::new(path));
     let common = from.components().zip(path.components()).take_while(|(a, b)| a == b).count();
@@ -28,7 +28,7 @@ fn relative(path: &str) -> String {
     up.chain(down).collect::<Vec<_>>().join("/")
 }
 
-/// With everything encoded that may be.
+/// Returns a path in which every character that may be encoded is encoded.
 fn percent(path: &str) -> String {
     let encode = |byte: u8| {
         if byte.is_ascii_alphanumeric() || b"/.-_".contains(&byte) {

@@ -1,5 +1,6 @@
-//! Saved states of every unit: taken back bit for bit, and refused if anything is wrong with them. That they go on in another
-//! process is tested with the packed archives (tests/test_states.py).
+//! Tests of the saved states of every unit: they restore the unit bit for bit, and are refused if
+//! anything is wrong with them. Their use in another process is tested with the packed archives
+//! (tests/test_states.py).
 
 use conformance::interface::{CO_SIMULATION, ERROR, FATAL, MODEL_EXCHANGE, OK};
 use conformance::{Bits, Instance, Unit, c, units};
@@ -13,7 +14,7 @@ fn driver(fmu_type: i32) -> fn(&Instance, Range<u32>) -> Vec<Bits> {
     if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive }
 }
 
-/// In the midst of things.
+/// Returns an instance in the middle of a simulation.
 fn running(unit: &Unit, fmu_type: i32) -> Instance {
     let instance = unit.instance(fmu_type).initialized();
     driver(fmu_type)(&instance, 0..4);
@@ -31,20 +32,20 @@ fn handles_and_bytes_bring_back_the_same_future() {
             let expected = drive(&instance, 4..12);
             instance.restore(handle);
             assert!(drive(&instance, 4..12) == expected, "{}", unit.name());
-            // The same handle, written over with the present state.
+            // The same handle is overwritten with the present state.
             let (before, present) = (handle, instance.serialize());
             instance.ok(c!(instance, fmi2GetFMUstate(instance.component, &mut handle)));
             assert_eq!(handle, before);
             instance.ok(c!(instance, fmi2Reset(instance.component)));
             instance.restore(handle);
             assert!(instance.serialize() == present, "{}", unit.name());
-            // From bytes, in an instance that was never initialized.
+            // A state from bytes works in an instance that was never initialized.
             let other = unit.instance(fmu_type);
             let (status, state) = other.deserialize(&bytes);
             other.ok(status);
             other.restore(state);
             assert!(drive(&other, 4..12) == expected, "{}", unit.name());
-            // Freed, the handle is NULL, and freeing that is fine.
+            // Freeing sets the handle to NULL, and freeing NULL is allowed.
             instance.ok(c!(instance, fmi2FreeFMUstate(instance.component, &mut handle)));
             assert!(handle.is_null());
             instance.ok(c!(instance, fmi2FreeFMUstate(instance.component, &mut handle)));
@@ -54,7 +55,8 @@ fn handles_and_bytes_bring_back_the_same_future() {
     }
 }
 
-/// The medians of 201 calls, s. Once as the state is and once with the one from before the first step: the parameters are the same.
+/// Medians of the durations of 201 calls, s: of saving, and of restoring the last and the first
+/// state in turn. The parameters are the same in both states.
 fn durations(unit: &Unit, fmu_type: i32) -> [f64; 2] {
     let instance = unit.instance(fmu_type).initialized();
     let first = instance.save();
@@ -80,7 +82,7 @@ fn durations(unit: &Unit, fmu_type: i32) -> [f64; 2] {
     [get, set]
 }
 
-/// `cargo test --release -p conformance --test fmi2 -- --ignored --nocapture taking_back`
+/// Run with `cargo test --release -p conformance --test fmi2 -- --ignored --nocapture taking_back`.
 #[test]
 #[ignore = "measures time"]
 fn taking_back_a_state_takes_little_time() {
@@ -110,7 +112,7 @@ fn every_truncation_and_every_damaged_byte_is_refused() {
             }
             let mut damaged = bytes.clone();
             for i in 0..bytes.len() {
-                // One bit of each byte; that every bit counts is tested with the shell.
+                // One bit of each byte is changed; the shell's tests change every bit.
                 damaged[i] ^= 1 << (i % 8);
                 refuse(&damaged, &format!("byte {i} damaged"));
                 damaged[i] = bytes[i];
@@ -119,7 +121,7 @@ fn every_truncation_and_every_damaged_byte_is_refused() {
             for message in instance.messages() {
                 assert!(message.text.starts_with("fmi2DeSerializeFMUstate: "), "{}", message.text);
             }
-            // None of this left a trace.
+            // None of these attempts left a trace.
             assert!(instance.serialize() == bytes, "{}", unit.name());
             driver(fmu_type)(&instance, 4..6);
         }
@@ -137,7 +139,7 @@ fn states_of_other_units_and_interfaces_are_refused() {
             let part =
                 if instance.unit.guid() == other.unit.guid() { "other interface" } else { "with GUID" };
             instance.refused(instance.deserialize(&other.serialize()).0, ERROR, &[part]);
-            // Nor is a handle of another instance taken, whatever it is of.
+            // A handle of another instance is refused too, whatever its unit.
             let mut foreign = other.save();
             let refused = |status| instance.refused(status, ERROR, &["not made by this instance"]);
             refused(c!(instance, fmi2SetFMUstate(component, foreign)));
@@ -172,7 +174,7 @@ fn bytes_fill_the_room_that_was_asked_for_and_no_more() {
     }
 }
 
-/// CRC-32 as in zip files.
+/// CRC-32 as used in zip files.
 fn checksum(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0, |crc, &byte| {
         (0..8)
@@ -180,10 +182,11 @@ fn checksum(bytes: &[u8]) -> u32 {
     })
 }
 
-/// Length of the header, whose last four bytes are the checksum of what follows.
+/// Length of the header, whose last four bytes are the checksum of the rest.
 const HEADER: usize = 61;
 
-/// Restores each forgery and steps on, as far as the unit takes it. What is done last is left in `doing`.
+/// Restores each forgery and, where the unit accepts it, steps on. `doing` holds a description of
+/// the last attempt. Returns the number of forgeries accepted.
 fn survive_forgeries(unit: &Unit, fmu_type: i32, prepare: fn(&Instance), doing: &Mutex<String>) -> usize {
     let instance = unit.instance(fmu_type);
     prepare(&instance);
@@ -247,7 +250,7 @@ fn survive_forgeries(unit: &Unit, fmu_type: i32, prepare: fn(&Instance), doing: 
     taken
 }
 
-/// Forgeries of each unit, about.
+/// Approximate number of forgeries for each unit.
 const FORGERIES: usize = 6000;
 
 #[test]

@@ -1,11 +1,11 @@
-//! The experiment, and the steps of co-simulation.
+//! Tests of the experiment's definition and of the steps of co-simulation.
 
 use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE};
 use conformance::{Bits, Instance, Unit, c, units};
 use model_description::variable::Kind;
 use std::ffi::c_int;
 
-/// Tolerance, start time, stop time; NaN stands for what is not defined, and is passed.
+/// Tolerance, start time and stop time; NaN is passed for a value that is not defined.
 type Experiment = (Option<f64>, f64, Option<f64>);
 
 fn set_up(instance: &Instance, (tolerance, start, stop): Experiment) -> c_int {
@@ -41,7 +41,7 @@ fn neither_tolerance_nor_stop_time_changes_a_result() {
             let with = begun(&unit, (tolerance, 0.0, stop)).drive(0..6);
             assert!(with == without, "{}: {tolerance:?} {stop:?}", unit.name());
         }
-        // Some importers leave the call out.
+        // Some importers do not call this function.
         let instance = unit.instance(CO_SIMULATION);
         through_initialization(&instance);
         assert!(instance.drive(0..6) == without, "{}", unit.name());
@@ -104,7 +104,8 @@ fn a_last_step_that_is_short_by_rounding_ends_in_the_same_place() {
         };
         let exact = after(h);
         assert!(after(h - 1e-17) == exact, "{}", unit.name());
-        // 1e-17 is lost in the step's length. What is not: the difference of two instants, and a step next to it.
+        // A change of 1e-17 is lost in the step's length. The difference of two instants and the
+        // neighbouring lengths are not lost.
         for near in [10.0 * h - 9.0 * h, h.next_down(), h.next_up()] {
             for (&a, &b) in after(near).iter().zip(&exact) {
                 let (a, b) = (f64::from_bits(a), f64::from_bits(b));
@@ -140,7 +141,7 @@ fn a_step_of_no_length_changes_nothing() {
             assert!(instance.bits(&unit.results()) == before, "{}", unit.name());
         }
         instance.drive(3..6);
-        // The smallest length there is.
+        // This is the smallest positive length.
         instance.ok(instance.step(6.0 * h, f64::from_bits(1)));
     }
 }
@@ -167,13 +168,13 @@ fn steps_without_sense_are_refused() {
             (now, 1e300, "beyond the stop time"),
         ] {
             instance.refused(instance.step(point, size), ERROR, &["fmi2DoStep", part]);
-            // In state error, until the state is restored or the unit reset.
+            // The unit is in state error until its state is restored or it is reset.
             instance.refused(instance.step(now, h), ERROR, &["fmi2DoStep", "not allowed in state error"]);
             instance.restore(here);
             assert!(instance.serialize() == before, "{}: {point} {size}", unit.name());
         }
         instance.drive(5..10);
-        // At the stop time nothing is left but a step of no length.
+        // At the stop time only a step of zero length is possible.
         instance.ok(instance.step(10.0 * h, 0.0));
         instance.refused(instance.step(10.0 * h, h), ERROR, &["beyond the stop time"]);
     }
@@ -191,7 +192,7 @@ fn a_defined_stop_time_may_be_the_start_time() {
 #[test]
 fn times_of_model_exchange_are_checked() {
     for unit in units().iter().filter(|unit| unit.description.model_exchange) {
-        // Solvers look back, even behind the start, and disturbances are functions of time.
+        // Solvers look back, even before the start, and disturbances are functions of time.
         for time in [-1e-3, -1.0, -1e300, 1e300] {
             let instance = unit.instance(MODEL_EXCHANGE);
             instance.choose("disturbance.kind", "white");
@@ -211,7 +212,8 @@ fn times_of_model_exchange_are_checked() {
     }
 }
 
-/// What the results are after 50 s from `start` on, stepped by 0.04 s with a clock that the importer adds up.
+/// Results after 50 s from `start` on, in steps of 0.04 s with a clock that the importer
+/// accumulates.
 fn after_50_seconds(unit: &Unit, start: f64, names: &[&str]) -> Vec<f64> {
     let instance = begun(unit, (None, start, None));
     let component = instance.component;

@@ -1,10 +1,10 @@
-//! Instances in several threads of one process.
+//! Tests of instances in several threads of one process.
 
 use conformance::interface::CO_SIMULATION;
 use conformance::{Bits, Instance, Unit, units};
 use std::sync::Barrier;
 
-/// Long enough for the threads to meet in the midst of optimisations.
+/// Number of ticks, large enough for the threads to overlap within optimisations.
 const TICKS: u32 = 30;
 
 fn run(unit: &Unit) -> Vec<Bits> {
@@ -43,7 +43,7 @@ fn different_units_in_threads_do_not_see_each_other() {
 
 struct Moving(Instance);
 
-// SAFETY: one thread at a time uses it: the one that is joined before the next begins.
+// SAFETY: only one thread at a time uses it, because each thread is joined before the next begins.
 #[allow(unsafe_code)]
 unsafe impl Sync for Moving {}
 

@@ -1,4 +1,5 @@
-//! Value references: one by one or all at once, wrong ones, repeated ones, values at the limits.
+//! Tests of value references: one by one or all at once, wrong ones, repeated ones, and values at
+//! the limits.
 
 use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE, OK, Status};
 use conformance::{Instance, c, units};
@@ -18,7 +19,7 @@ fn one_reference_per_call_gives_what_all_in_one_call_give() {
                 instance.ok(instance.set_real(input, value));
                 let here = instance.save();
                 let all = instance.bits(&everything);
-                // The first that is asked for must bring all up to date, whichever it is.
+                // The first request must update all variables, whichever it is for.
                 instance.restore(here);
                 let forwards: Vec<_> = everything.iter().flat_map(|&one| instance.bits(&[one])).collect();
                 instance.restore(here);
@@ -37,7 +38,7 @@ fn one_reference_per_call_gives_what_all_in_one_call_give() {
     }
 }
 
-/// Getting or setting one variable of any type.
+/// Call that gets or sets one variable of any type.
 type Access = fn(&Instance, u32) -> Status;
 
 fn of_type(kind: &Kind) -> usize {
@@ -49,7 +50,7 @@ fn of_type(kind: &Kind) -> usize {
     }
 }
 
-/// Name, type as [`of_type`] numbers it, call.
+/// Each row has the function's name, the type as [`of_type`] numbers it, and a call.
 #[rustfmt::skip]
 const ACCESS: &[(&str, usize, Access)] = &[
     ("fmi2GetReal",    0, |i, r| c!(i, fmi2GetReal(i.component, &r, 1, &mut 0.0))),
@@ -88,7 +89,7 @@ fn references_that_do_not_exist_are_named() {
                     refused(status, "fmi2GetDirectionalDerivative");
                 }
             }
-            // Behind a right one, which keeps its value.
+            // The wrong reference stands behind a right one, which keeps its value.
             let (references, values) = ([unit.input(), wrong], [0.02, 0.02]);
             let before = instance.real(unit.input());
             let status = c!(instance, fmi2SetReal(component, references.as_ptr(), 2, values.as_ptr()));
@@ -200,7 +201,7 @@ fn what_is_calculated_from_the_largest_inputs_is_a_number_or_an_error() {
         });
         let results = unit.references(|v| v.is_calculated() && matches!(v.kind, Kind::Real { .. }));
         for value in large.into_iter().flat_map(|value| [value, -value]) {
-            // Each input alone, then all of them.
+            // Each input is set alone, and then all of them.
             for set in inputs.chunks(1).chain([inputs.as_slice()]) {
                 let instance = unit.instance(CO_SIMULATION).initialized();
                 for tick in 0..2 {
