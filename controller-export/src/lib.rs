@@ -48,10 +48,10 @@
 //! | module | what it knows |
 //! |---|---|
 //! | [`law`] | what a controller adds to the unit that all of them share |
-//! | [`unit`] | that unit |
+//! | [`mod@unit`] | that unit |
 //! | [`sampled`] | any unit that works at ticks: steps, saved states |
 //! | [`table`] | the table of variables that all controllers have, and declarations that laws share |
-//! | [`reference`] | where the reference comes from |
+//! | [`mod@reference`] | where the reference comes from |
 
 pub mod law;
 pub mod reference;

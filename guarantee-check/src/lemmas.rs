@@ -56,7 +56,7 @@ pub struct Suprema {
     pub drift: Interval,
     /// Largest ‖∂²W[o, o′] y‖ over unit vectors.
     pub curvature: Interval,
-    /// Largest ‖∂W[o] y‖ over unit vectors.
+    /// Largest ‖`∂W[o] y`‖ over unit vectors.
     pub turn: Interval,
     /// Largest ‖∂²W[o, v̂] x + ∂²W[o, x̂] v‖ over unit vectors.
     pub mixed: Interval,

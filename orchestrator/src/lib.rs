@@ -2,7 +2,7 @@
 //! but the names by which an experiment's figures of merit and the live view find their variables.
 //!
 //! [`experiment`] is read ([`document`]), [`run::Plan`] resolves it ([`wiring`], [`settings`], [`delay`]) against what the archives say
-//! ([`fmu`], [`archive`], [`description`], [`quantity`]), [`master`] steps the units ([`unit`]) on integer ticks
+//! ([`fmu`], [`archive`], [`description`], [`quantity`]), [`master`] steps the units ([`mod@unit`]) on integer ticks
 //! ([`clock`]), in [`realtime`] if it is asked to, and observers look on: [`recorder`], [`metrics`], [`plot`], [`progress`],
 //! [`live`]. [`report`] and [`sidecar`] tell what came of it.
 //!
