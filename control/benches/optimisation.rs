@@ -1,4 +1,5 @@
-//! Time of one optimisation of CRMPC and of DLMPC's outer layer on the scenario of Chai 2022 (white noise, inertia + 5 %).
+//! Time of one optimisation of CRMPC and of DLMPC's outer layer on the scenario of Chai 2022
+//! (white noise, inertia + 5 %).
 //!
 //! First the distribution over every sample of 50 s is printed, with the exits that come before the
 //! cone program of the whole horizon, and without them. Each sample is repeated from the same

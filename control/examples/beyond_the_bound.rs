@@ -5,9 +5,9 @@
 //! cargo run --release -p control --example beyond_the_bound
 //! ```
 //!
-//! prints a line for each size and family of disturbances, with the mean and largest EMS of the
-//! three controllers, the largest ‖ω‖ relative to its limit, and the number of runs that lost the
-//! attitude.
+//! The example prints a line for each size and family of disturbances, with the mean and largest
+//! EMS of the three controllers, the largest ‖ω‖ relative to its limit, and the number of runs that
+//! lost the attitude.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;

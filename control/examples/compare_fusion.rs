@@ -5,8 +5,8 @@
 //! ```
 //!
 //! It also prints the errors of the estimator with its defaults. The output contains attitude
-//! errors at rest and in the scenario of Chai 2022, with the gyroscope's bias known and with 0.2
-//! deg/s of it left on each axis, and time and allocations of an update.
+//! errors at rest and in the scenario of Chai 2022, with the gyroscope's bias known and with
+//! 0.2 deg/s of it left on each axis, and time and allocations of an update.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;

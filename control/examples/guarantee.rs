@@ -5,8 +5,8 @@
 //! cargo run --release -p control --example guarantee
 //! ```
 //!
-//! prints the largest disturbance bound that is accepted, and the share of the moment that is left
-//! at the published one.
+//! The example prints the largest disturbance bound that is accepted, and the share of the moment
+//! that is left at the published one.
 
 use control::crmpc::{Constraints, Design, Guarantee, Settings};
 use control::error_dynamics::Gain;

@@ -1,5 +1,5 @@
-//! Searches the gains q, p, Γ, ρ of DLMPC's inner layer on the scenario of Chai 2022 (white noise,
-//! inertia + 5 %, 50 s). The outer layer stays as printed:
+//! Searches the gains q, p, Γ, ρ of DLMPC's inner layer on the scenario of Chai 2022
+//! (white noise, inertia + 5 %, 50 s). The outer layer stays as printed:
 //!
 //! ```text
 //! cargo run --release -p control --example tune_dlmpc -- [SEEDS]
@@ -9,8 +9,10 @@
 //! SEEDS (10) seeds, halved until none leads further. There are two criteria, both of means over
 //! the seeds and of the largest rate in any of them (‖m‖ keeps its limit by construction):
 //!
-//! - `tuned`: the least CMS of all gains that are no worse than the published ones in EMS and in the largest ‖ω‖;
-//! - `within limits`: the least EMS of all gains that keep ‖ω‖ ≤ 5°/s, which the published ones do not.
+//! - `tuned`: the least CMS of all gains that are no worse than the published ones in EMS and in
+//!   the largest ‖ω‖;
+//! - `within limits`: the least EMS of all gains that keep ‖ω‖ ≤ 5°/s, which the published ones do
+//!   not.
 //!
 //! The output is the Pareto front of EMS against CMS of all sets that were tried, and the gains
 //! found, also with seeds that the search has not seen.

@@ -17,7 +17,8 @@ pub enum DesignError {
         /// Spectral radius of the sampled error dynamics.
         radius: f64,
     },
-    /// The terminal gain does not stabilise the nominal motion when it is held between two optimisations.
+    /// The terminal gain does not stabilise the nominal motion when it is held between two
+    /// optimisations.
     #[error(
         "terminal gain K~ = [{k1}, {k2}] held for {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter period.optimisation"
     )]

@@ -1,14 +1,15 @@
 //! Sampled error dynamics under the feedback law: the effect of a bounded disturbance.
 //!
-//! Per axis the deviation o = (angle, rate) of the vehicle from the nominal motion obeys ö = K o +
-//! Δ (Chai 2022, (22)), with K o computed every `period` and held. The bounds here are exact: they
-//! are sums of absolute impulse responses (L1 norms) under zero-order hold. The paper's c̄ is the
-//! peak of the step response instead, which holds for a constant Δ only.
+//! Per axis the deviation o = (angle, rate) of the vehicle from the nominal motion obeys
+//! ö = K o + Δ (Chai 2022, (22)), with K o computed every `period` and held. The bounds here are
+//! exact: they are sums of absolute impulse responses (L1 norms) under zero-order hold. The paper's
+//! c̄ is the peak of the step response instead, which holds for a constant Δ only.
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Feedback gain of one axis with the paper's signs: u = k1 · angle + k2 · rate, both negative (1/s², 1/s).
+/// Feedback gain of one axis with the paper's signs: u = k1 · angle + k2 · rate, both negative
+/// (1/s², 1/s).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gain {
     /// Gain on the angle, 1/s².
@@ -195,8 +196,8 @@ impl SampledError {
         if discriminant < 0.0 { det.sqrt() } else { 0.5 * trace.abs() + discriminant.sqrt() }
     }
 
-    /// Returns the largest effect of any measurable |Δ| ≤ 1 within 0, 1, …, `steps` periods from o
-    /// = 0.
+    /// Returns the largest effect of any measurable |Δ| ≤ 1 within 0, 1, …, `steps` periods from
+    /// o = 0.
     ///
     /// A pulse at time v moves the vehicle freely, to [u; 1] after u seconds, until the first tick
     /// whose measurement was taken after v; then `latency` ≤ u < `latency` + `period`. From there

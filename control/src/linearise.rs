@@ -1,11 +1,13 @@
-//! Body rates, control moment and input as functions of the nominal motion (Θ, x_ω, a), a = ẋ_ω, with exact derivatives.
+//! Body rates, control moment and input as functions of the nominal motion (Θ, x_ω, a), a = ẋ_ω,
+//! with exact derivatives.
 //!
-//! ω = W x_ω with W = R⁻¹ (Chai 2022, proof of Lemma 1), hence ω̇ = W a + Ẇ x_ω, and from Euler's equation and u = R I⁻¹ m (4)
+//! ω = W x_ω with W = R⁻¹ (Chai 2022, proof of Lemma 1), hence ω̇ = W a + Ẇ x_ω, and from Euler's
+//! equation and u = R I⁻¹ m (4)
 //!
 //! m = I ω̇ + ω × I ω,  u = R I⁻¹ m = a − f.
 //!
-//! The angle of attack turns W about the pitch axis: ∂W/∂α = W × e_y, column by column, so that every derivative by α is a cross
-//! product and only those by β are written out.
+//! The angle of attack turns W about the pitch axis: ∂W/∂α = W × e_y, column by column, so that
+//! every derivative by α is a cross product and only those by β are written out.
 
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 use std::f64::consts::SQRT_2;
@@ -134,8 +136,8 @@ impl InverseKinematics {
         self.w(a) + by_angles[0] * x.x + by_angles[1] * x.y
     }
 
-    /// Returns R y = [y_y − p tan β, q, −p cos β − y_y sin β] with p = y_x cos α + y_z sin α, q =
-    /// y_x sin α − y_z cos α.
+    /// Returns R y = [y_y − p tan β, q, −p cos β − y_y sin β] with p = y_x cos α + y_z sin α,
+    /// q = y_x sin α − y_z cos α.
     fn r(&self, y: &Vector3<f64>) -> Vector3<f64> {
         let ((sa, ca), (sb, cb)) = (self.alpha, self.beta);
         let (p, q) = (ca * y.x + sa * y.z, sa * y.x - ca * y.z);
@@ -275,9 +277,9 @@ impl MomentSlopeBounds {
     /// the smallest moment of inertia.
     ///
     /// The columns above give, in Frobenius' norm, ‖∂W/∂α‖² ≤ 2 and ‖∂W/∂β‖² = 2, orthogonal to
-    /// each other, hence ‖Ẇ‖² ≤ 2 ‖x‖². They also give ‖∂W/∂α y‖² + ‖∂W/∂β y‖² ≤ 5/2 ‖y‖², and ‖∂²W
-    /// y‖² ≤ (1 + 2 · 2 + 5) ‖y‖² over α², twice αβ, and β². With principal axes, ‖∂(ω × I ω)/∂ω‖²
-    /// ≤ 2 (I_max − I_min)² ‖ω‖², and ‖ω‖ ≤ ‖x‖ as ‖W‖ = 1 (Lemma 1).
+    /// each other, hence ‖Ẇ‖² ≤ 2 ‖x‖². They also give ‖∂W/∂α y‖² + ‖∂W/∂β y‖² ≤ 5/2 ‖y‖², and
+    /// ‖∂²W y‖² ≤ (1 + 2 · 2 + 5) ‖y‖² over α², twice αβ, and β². With principal axes,
+    /// ‖∂(ω × I ω)/∂ω‖² ≤ 2 (I_max − I_min)² ‖ω‖², and ‖ω‖ ≤ ‖x‖ as ‖W‖ = 1 (Lemma 1).
     pub fn new(x: f64, a: f64, ratio: f64) -> Self {
         let gyroscopic = SQRT_2 * (1.0 - 1.0 / ratio);
         Self {
@@ -290,8 +292,8 @@ impl MomentSlopeBounds {
 /// Returns a bound on ‖u‖ at any α and this β, with ‖x_ω‖ = `x` and ‖a‖ = `a`. `ratio` is that of
 /// the largest to the smallest moment of inertia.
 ///
-/// u = a − f with f = −R (Ẇ x_ω + I⁻¹ (ω × I ω)); ‖R‖² ≤ 2 + 1/cos²β in Frobenius' norm, and ‖ω × I
-/// ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
+/// u = a − f with f = −R (Ẇ x_ω + I⁻¹ (ω × I ω)); ‖R‖² ≤ 2 + 1/cos²β in Frobenius' norm, and
+/// ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
 pub fn input_bound(beta: f64, x: f64, a: f64, ratio: f64) -> f64 {
     let cosine = (1.0 - 0.5 * beta * beta).max(0.0);
     let r = (2.0 + 1.0 / (cosine * cosine)).sqrt();

@@ -3,10 +3,10 @@
 //! attitude, and an inner one commands the moment that follows them.
 //!
 //! The paper orders its angles φ = [γ, β, α], bank first, and its γ grows with the roll rate; ours
-//! are Θ = [α, β, σ] with σ̇ = −p cos α − … Hence φ = P Θ with P = [[0, 0, −1], [0, 1, 0], [1, 0,
-//! 0]], and the paper's R is P R(Θ). Both loops act on each angle separately and are odd functions,
-//! so they commute with P. The law is therefore written in our order, and gains are those of α, β,
-//! σ.
+//! are Θ = [α, β, σ] with σ̇ = −p cos α − … Hence φ = P Θ with
+//! P = [[0, 0, −1], [0, 1, 0], [1, 0, 0]], and the paper's R is P R(Θ). Both loops act on each
+//! angle separately and are odd functions, so they commute with P. The law is therefore written in
+//! our order, and gains are those of α, β, σ.
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;

@@ -1,4 +1,5 @@
-//! Control allocation against the limits and the optimum of Wu et al. (2015) and the selector of Jia et al.
+//! Control allocation compared with the limits and the optimum of Wu et al. (2015) and with the
+//! selector of Jia et al.
 
 use control::allocation::pwpf::Modulator;
 use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Settings, Status};

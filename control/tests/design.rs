@@ -52,7 +52,8 @@ fn published_terminal_weight_satisfies_15_with_equality() {
 
 #[test]
 fn oracle_terminal_law_never_leaves_a_ball_in_the_norm_of_g_but_a_euclidean_one() {
-    // (12) and (14): d/dt ‖E‖²_G = Eᵀ (AᵀG + GA) E is never positive; d/dt ‖E‖² = Eᵀ (Aᵀ + A) E can be.
+    // (12) and (14): d/dt ‖E‖²_G = Eᵀ (AᵀG + GA) E is never positive; d/dt ‖E‖² = Eᵀ (Aᵀ + A) E can
+    // be.
     let settings = Settings { constraints: Constraints::Paper, ..settings() };
     let a = Matrix2::new(0.0, 1.0, settings.terminal.k1, settings.terminal.k2);
     for g in Design::new(&settings).unwrap().g {
@@ -372,7 +373,8 @@ fn oracle_errors_of_the_rate_ask_for_moment_at_once() {
 
 #[test]
 fn oracle_sampled_terminal_weight_decreases_where_the_continuous_one_does_not() {
-    // (11c) with the cost and the law held for h: ΦᵀGΦ − G + h (P + K̃ᵀQK̃). The printed G leaves eigenvalues of +1.6 and +50.
+    // (11c) with the cost and the law held for h: ΦᵀGΦ − G + h (P + K̃ᵀQK̃). The printed G leaves
+    // eigenvalues of +1.6 and +50.
     let settings = Settings::new(Constraints::Robust);
     let Settings { terminal, period_optimisation: h, p, q, .. } = settings;
     let held = SampledError::new(terminal, h);

@@ -151,7 +151,7 @@ fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
             })
             .collect();
         let jacobian = DMatrix::from_columns(&columns).transpose();
-        // At the optimum ∇J + Σ λ ∇c = 0 with λ ≥ 0.
+        // The optimum satisfies ∇J + Σ λ ∇c = 0 with λ ≥ 0.
         let normal = (jacobian.transpose() * &jacobian).cholesky().unwrap();
         let multipliers = normal.solve(&(-jacobian.transpose() * &gradient));
         let residual = (&gradient + jacobian * &multipliers).norm();

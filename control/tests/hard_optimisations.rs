@@ -38,7 +38,8 @@ fn listed(law: &str) -> Vec<(u64, [u32; 3])> {
         .collect()
 }
 
-/// The list was made by `cargo run --release -p control --example worst_time -- list LAW 200000 20000`.
+/// The list was made by
+/// `cargo run --release -p control --example worst_time -- list LAW 200000 20000`.
 fn assert_takes_no_more<C: Optimising>(name: &str, law: &mut C) {
     let rows = listed(name);
     assert_eq!(rows.len(), 40);
@@ -60,8 +61,8 @@ fn regress_the_longest_of_20000_random_optimisations_take_no_more_iterations() {
 
 #[test]
 fn regress_starts_that_once_took_hundreds_of_iterations_take_some_thirty() {
-    // The cases include a first guess with ‖y‖² of 118 and one that a unit was given. They once took
-    // 228, 241 and 249 iterations.
+    // The cases include a first guess with ‖y‖² of 118 and one that a unit was given. They once
+    // took 228, 241 and 249 iterations.
     let scenario = Scenario::crmpc2022();
     let angles = scenario.reference.at(31.35).angles + degrees([-14.34, -1.84, 0.35]);
     let body_rates = kinematics::r(&angles) * degrees([1.91, -3.46, 0.31]);

@@ -173,7 +173,8 @@ fn sliding_and_its_rate(settings: &TwoLoopSettings) -> [(Vector3<f64>, Vector3<f
 
 #[test]
 fn oracle_reaching_law_of_the_inner_loop() {
-    // With M as commanded and no disturbance, ds_n/dt = −ρ f SAT(s_n/ε): the sign of the last term of (10) is +.
+    // With M as commanded and no disturbance, ds_n/dt = −ρ f SAT(s_n/ε): the sign of the last term
+    // of (10) is +.
     let settings = TwoLoopSettings { filter: 0.0, ..TwoLoopSettings::ours() };
     let [_, (s, rate)] = sliding_and_its_rate(&settings);
     let expected = -settings.inner.layer.value(&s);
@@ -182,7 +183,7 @@ fn oracle_reaching_law_of_the_inner_loop() {
 
 #[test]
 fn oracle_with_the_sign_of_10_the_inner_sliding_variable_grows() {
-    // With the printed sign ds_n/dt = +ρ f SAT(s_n/ε).
+    // The printed sign gives ds_n/dt = +ρ f SAT(s_n/ε).
     let settings = TwoLoopSettings { filter: 0.0, form: Form::PrintedSign, ..TwoLoopSettings::ours() };
     let [_, (s, rate)] = sliding_and_its_rate(&settings);
     let expected = settings.inner.layer.value(&s);

@@ -121,8 +121,7 @@ pub struct Settings {
 /// The constants printed in Chai 2022, section 5.1, computed from the raw data.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PaperConstants {
-    /// Bound r̄₀ = √(1 + tan β̄). The proof of Lemma 1 has tan²; the printed number lacks the
-    /// square.
+    /// Bound r̄₀ = √(1 + tan β̄). The proof of Lemma 1 has tan²; the printed number lacks the square.
     pub r0: f64,
     /// Bound r̄₁: the rate limit in rad/s. It is not a bound of ‖Ṙ‖ for all |β| ≤ 10°.
     pub r1: f64,
@@ -161,8 +160,8 @@ pub fn terminal_weight(gain: Gain, p: Vector2<f64>, q: f64) -> Matrix2<f64> {
     Matrix2::new(g11, g12, g12, g22)
 }
 
-/// Returns G of (15) for a terminal law that is held over h, with equality: ΦᵀG Φ − G + h (P + K̃ᵀQ
-/// K̃) = 0. With it (11c) holds for the sampled cost.
+/// Returns G of (15) for a terminal law that is held over h, with equality:
+/// ΦᵀG Φ − G + h (P + K̃ᵀQ K̃) = 0. With it (11c) holds for the sampled cost.
 pub fn held_terminal_weight(held: &SampledError, gain: Gain, p: Vector2<f64>, q: f64) -> Matrix2<f64> {
     let mut load = (Matrix2::from_diagonal(&p) + gain.row().transpose() * gain.row() * q) * held.period();
     let mut power = *held.transition();

@@ -102,7 +102,8 @@ impl Tightening {
 
 /// Bounds that depend on |sin β| ≤ s alone.
 ///
-/// With e₁, e₂, e₃ turned by α, Ẇ x_ω = [s x₂ (2 s x₁ + x₃), −c x₂ (2 s x₁ + x₃), c x₁ (s x₁ + x₃)], s = sin β, c = cos β, x = x_ω.
+/// With e₁, e₂, e₃ turned by α, Ẇ x_ω = [s x₂ (2 s x₁ + x₃), −c x₂ (2 s x₁ + x₃),
+/// c x₁ (s x₁ + x₃)], where s = sin β, c = cos β, x = x_ω.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
     /// Factor in the bound ‖Ẇ x‖ ≤ `drift` ‖x‖².
@@ -118,14 +119,14 @@ const CURVATURE: f64 = 3.162_277_660_168_379_5;
 /// Bound on ‖W(Θ + o) − W(Θ)‖ relative to ‖o‖: ∂W/∂α and ∂W/∂β are orthogonal and no longer than √2
 /// (Frobenius).
 pub(super) const TURN: f64 = SQRT_2;
-/// Bound on the mixed second derivative of Ẇ x by angles and rates, relative to ‖x‖. Ẇ x = ∂W x α̇
-/// + ∂W x β̇ takes one more derivative of W.
+/// Bound on the mixed second derivative of Ẇ x by angles and rates, relative to ‖x‖.
+/// Ẇ x = ∂W x α̇ + ∂W x β̇ takes one more derivative of W.
 const DRIFT_MIXED: f64 = 2.0 * CURVATURE;
 /// Bound on the second derivative of Ẇ x by the angles, relative to ‖x‖², from the third
 /// derivatives of W.
 const DRIFT_BY_ANGLES_TWICE: f64 = 8.0;
-/// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; for the sideslip
-/// it is the smallest rate. See [`braking`].
+/// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; for the sideslip it
+/// is the smallest rate. See [`braking`].
 pub(super) const BRAKING: f64 = 0.01;
 
 impl Geometry {
@@ -147,8 +148,8 @@ impl Geometry {
     }
 }
 
-/// Bounds on the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain ‖ω‖ ≤
-/// ω̄, ‖m‖ ≤ M̄, |β| ≤ β̄.
+/// Bounds on the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain ‖ω‖ ≤ ω̄,
+/// ‖m‖ ≤ M̄, |β| ≤ β̄.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Dynamics {
     pub geometry: Geometry,
@@ -201,8 +202,8 @@ impl Dynamics {
             + angles_twice * rate * rate
             + by_angles * acceleration
             + by_rates * (by_rates * acceleration + by_angles * rate);
-        // I Ẅ a gives ∂²W [x, x] a + ∂W [a] a. The rest is as in `MomentLoss`, with ẋ_ω = a and Θ̈
-        // = a.
+        // I Ẅ a gives ∂²W [x, x] a + ∂W [a] a. The rest is as in `MomentLoss`, with ẋ_ω = a and
+        // Θ̈ = a.
         let twisted = largest - smallest;
         let curvature = [
             largest * TURN + 2.0 * (largest * drift + 0.5 * twisted),
@@ -278,8 +279,8 @@ pub struct Assessment {
     /// Share of the moment limit that is left after a constant corner of Δ̄, the errors and the
     /// delay, at the attitude that needs most.
     pub moment_left: f64,
-    /// Largest ‖x̃_ω‖ at the end of the horizon, rad/s. From there the motion brakes and keeps
-    /// every limit for ever.
+    /// Largest ‖x̃_ω‖ at the end of the horizon, rad/s. From there the motion brakes and keeps every
+    /// limit for ever.
     pub terminal_rate: f64,
 }
 
@@ -290,8 +291,8 @@ impl Assessment {
     }
 }
 
-/// Smallest acceptable bound on ‖x̃_ω‖ at the end of the horizon, 0.2°/s in rad/s; below it there
-/// is no room to move at all.
+/// Smallest acceptable bound on ‖x̃_ω‖ at the end of the horizon, 0.2°/s in rad/s; below it there is
+/// no room to move at all.
 const SMALLEST_TERMINAL_RATE: f64 = 3.5e-3;
 
 /// Computes tightening and assessment of `settings`.
@@ -403,7 +404,8 @@ impl Parts {
         let root3 = 3.0_f64.sqrt();
         let drive = root3 * s.disturbance_bound + of_inertia;
         let (mismatch, varying) = dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error);
-        // |∫ g (e − ē)| ≤ ¼ τ ½ (range of g) (range of e) for the response g to a pulse, which is linear within a period.
+        // |∫ g (e − ē)| ≤ ¼ τ ½ (range of g) (range of e) for the response g to a
+        // pulse, which is linear within a period.
         let swing = dynamics.swing(s) + 0.125 * s.period_feedback * varying;
         // Bound of ‖I (W − W′) R′ I⁻¹‖ for angles that lie `age` apart, per unit of `age`.
         let turning = largest / smallest * TURN * geometry.r * rate;
@@ -490,9 +492,9 @@ fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessm
 
 use crate::linearise::TURN_BY_ANGLES as TURN_OF_RATES;
 
-/// Returns the largest ‖I W s‖ over the corners s of the unit box at any α and |β| ≤ β̄, kg m².
-/// With the larger eigenvalue λ of I² in the plane of symmetry, ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy²
-/// y_y² for y = W s. α turns y in that plane, and y_x² + y_z² = cos²β (s₁ sin β + s₃)² + s₂².
+/// Returns the largest ‖I W s‖ over the corners s of the unit box at any α and |β| ≤ β̄, kg m². With
+/// the larger eigenvalue λ of I² in the plane of symmetry, ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy² y_y²
+/// for y = W s. α turns y in that plane, and y_x² + y_z² = cos²β (s₁ sin β + s₃)² + s₂².
 fn bearing(s: &Settings) -> f64 {
     let square = s.body.inertia * s.body.inertia;
     let any = s.body.inertia.symmetric_eigenvalues().max() * 3.0_f64.sqrt();
@@ -507,8 +509,7 @@ fn bearing(s: &Settings) -> f64 {
     (3.0 * yy + (plane - yy).max(0.0) * across).sqrt().min(any)
 }
 
-/// Loss of the rate limit by a deviation, rad/s: ‖W (x̃_ω + o_ω)‖ ≤ ‖W̃ x̃_ω‖ + ‖(W − W̃) x̃_ω‖ +
-/// ‖o_ω‖.
+/// Loss of the rate limit by a deviation, rad/s: ‖W (x̃_ω + o_ω)‖ ≤ ‖W̃ x̃_ω‖ + ‖(W − W̃) x̃_ω‖ + ‖o_ω‖.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RateLoss {
     constant: f64,
@@ -528,8 +529,8 @@ impl RateLoss {
     }
 }
 
-/// Loss of the moment limit by a deviation, N m: m(x̃ + ô, a + K ô) = m(x̃, a) + I W K ô + ∂m ô +
-/// terms of second order in ô.
+/// Loss of the moment limit by a deviation, N m: m(x̃ + ô, a + K ô) = m(x̃, a) + I W K ô +
+/// ∂m ô + terms of second order in ô.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MomentLoss {
     angle: f64,
@@ -604,8 +605,8 @@ impl Dynamics {
         aa * a * a + x * x * (xxa * a + xxxx * x * x)
     }
 
-    /// Returns a bound on ‖d²ω/dt²‖ of a nominal motion with a held and these sizes, rad/s³: 2 Ẇ a
-    /// + ∂²W [x, x] x + ∂W [a] x.
+    /// Returns a bound on ‖d²ω/dt²‖ of a nominal motion with a held and these sizes, rad/s³:
+    /// 2 Ẇ a + ∂²W [x, x] x + ∂W [a] x.
     pub(super) fn rate_curvature(x: f64, a: f64) -> f64 {
         3.0 * TURN * x * a + CURVATURE * x.powi(3)
     }

@@ -1,9 +1,9 @@
 //! Centralised robust MPC of Chai et al. (2022): an optimisation plans a nominal motion, and a
 //! feedback law keeps the vehicle near it.
 //!
-//! The prediction is made in x̃ = (Θ̃, x̃_ω), where the nominal model (7) under ũ = a − f is an
-//! exact double integrator. The error E = x̃ − x_r is formed afterwards, so that a jump of the
-//! reference is seen in the preview and never enters the dynamics.
+//! The prediction is made in x̃ = (Θ̃, x̃_ω), where the nominal model (7) under ũ = a − f is an exact
+//! double integrator. The error E = x̃ − x_r is formed afterwards, so that a jump of the reference
+//! is seen in the preview and never enters the dynamics.
 
 mod design;
 mod guarantee;
@@ -462,8 +462,8 @@ impl Crmpc {
         plan.states[n] = plan::advance(&last, &a, self.settings.period_optimisation);
     }
 
-    /// Returns the acceleration under the terminal law (14): ũ^f = −f + K̃ Ẽ + Θ̈_r, hence a = K̃ Ẽ
-    /// + Θ̈_r.
+    /// Returns the acceleration under the terminal law (14): ũ^f = −f + K̃ Ẽ + Θ̈_r, hence
+    /// a = K̃ Ẽ + Θ̈_r.
     fn terminal_acceleration(&self, state: &Vector6<f64>, reference: &Reference) -> Vector3<f64> {
         let gain = self.settings.terminal;
         let angles = state.fixed_rows::<3>(0) - reference.angles;

@@ -463,8 +463,8 @@ impl Robust {
         (self.rate[k].max(EMPTY * limit_rate), moment)
     }
 
-    /// Returns the bounds on ‖ω̃‖ and ‖m̃‖ about the linearised motion at stage `k`, with ‖m̃‖ =
-    /// `after` at the interval's end.
+    /// Returns the bounds on ‖ω̃‖ and ‖m̃‖ about the linearised motion at stage `k`, with
+    /// ‖m̃‖ = `after` at the interval's end.
     fn bounds_about(&self, k: usize, at: &Linearisation, here: &Point, after: f64) -> (f64, f64) {
         let Settings { limit_rate, limit_moment, .. } = self.settings;
         let moment = if k < self.moment.len() {
@@ -508,9 +508,9 @@ impl Robust {
         moment <= self.moment[k] && rates <= self.rate[k + 1]
     }
 
-    /// Sets bounds that are at most those of [`Self::tighten`], and returns upper bounds of ‖m̃‖
-    /// and ‖ω̃‖. Along the way from `anchor` to `here` and on to `next`, every change is bounded by
-    /// the largest derivatives there.
+    /// Sets bounds that are at most those of [`Self::tighten`], and returns upper bounds of ‖m̃‖ and
+    /// ‖ω̃‖. Along the way from `anchor` to `here` and on to `next`, every change is bounded by the
+    /// largest derivatives there.
     fn tighten_by_size(&mut self, k: usize, here: &Point, next: &Point, anchor: &Anchor) -> (f64, f64) {
         let Design { largest_inertia, inertia_ratio, .. } = &self.design;
         let a = &here.acceleration;
@@ -544,8 +544,8 @@ impl Robust {
         self.design.tightening.at(self.tick(k))
     }
 
-    /// Returns the bound on ‖ω̃‖ at prediction step k for which ‖ω‖ keeps its limit there and in
-    /// the intervals before and after, whatever the error dynamics do. `by_angles` is the norm of
+    /// Returns the bound on ‖ω̃‖ at prediction step k for which ‖ω‖ keeps its limit there and in the
+    /// intervals before and after, whatever the error dynamics do. `by_angles` is the norm of
     /// ∂ω/∂(α, β), and `before` is the point before.
     fn rate_bound(&self, k: usize, by_angles: f64, here: &Point, before: &Point) -> f64 {
         let Settings { limit_rate, limit_moment, period_optimisation: h, horizon, .. } = self.settings;
@@ -568,10 +568,10 @@ impl Robust {
         }
     }
 
-    /// Returns the bound on ‖m̃‖ at the start of prediction interval k for which ‖m‖ keeps its
-    /// limit at each of its feedback ticks. With a held, ‖m̃‖ moves from `value` to `after` within
-    /// the interval. `feedback` is the largest ‖I R⁻¹ s‖ over the corners s of the shape, and
-    /// `slopes` are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖.
+    /// Returns the bound on ‖m̃‖ at the start of prediction interval k for which ‖m‖ keeps its limit
+    /// at each of its feedback ticks. With a held, ‖m̃‖ moves from `value` to `after` within the
+    /// interval. `feedback` is the largest ‖I R⁻¹ s‖ over the corners s of the shape, and `slopes`
+    /// are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖.
     fn moment_bound(
         &self,
         k: usize,

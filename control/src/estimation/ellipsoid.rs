@@ -1,10 +1,10 @@
 //! Calibration of a three-axis sensor that measures a field of constant size: least-squares fit of
 //! an ellipsoid.
 //!
-//! Li, Griffiths: *Least squares ellipsoid specific fitting*, Geometric Modeling and Processing
-//! 2004. The readings m = A h + b + noise of a turning field h lie on an ellipsoid. Its matrix
-//! gives W = A⁻¹ and b, so that W (m − b) is the field divided by its size. W is the symmetric
-//! solution: readings alone cannot reveal a rotation within A.
+//! Li, Griffiths: *Least squares ellipsoid specific fitting*, Geometric Modeling and
+//! Processing 2004. The readings m = A h + b + noise of a turning field h lie on an ellipsoid. Its
+//! matrix gives W = A⁻¹ and b, so that W (m − b) is the field divided by its size. W is the
+//! symmetric solution: readings alone cannot reveal a rotation within A.
 
 use nalgebra::{
     Matrix3, Matrix3x4, Matrix4, Matrix6, RowVector4, SMatrix, SVector, Vector3, Vector4, Vector6,

@@ -17,9 +17,9 @@ struct Gain<const O: usize> {
     next_weight: PerAxis<O>,
 }
 
-/// One stage of the forward recursion. The cost of getting from E_0 to E_k is (E_k − Ē)ᵀ Π⁻¹ (E_k −
-/// Ē) + const, as for a Kalman filter with v as process noise of variance V⁻¹ and the stage cost as
-/// a measurement of E = 0 with information W.
+/// One stage of the forward recursion. The cost of getting from E_0 to E_k is (E_k − Ē)ᵀ Π⁻¹
+/// (E_k − Ē) + const, as for a Kalman filter with v as process noise of variance V⁻¹ and the stage
+/// cost as a measurement of E = 0 with information W.
 #[derive(Clone, Copy, Debug)]
 struct Arrival<const O: usize> {
     /// Factor in Ē⁺ = discount·Ē, which includes the stage's own cost.
@@ -219,8 +219,8 @@ impl<const O: usize> Unconstrained<O> {
         (&self.arrivals[k - 1].next_weight, self.means[k])
     }
 
-    /// Computes the optimum from the start of [`Self::arrive`] to the state of `motion` at stage `k`.
-    /// The inputs are those that lead the last derivative exactly through the states.
+    /// Computes the optimum from the start of [`Self::arrive`] to the state of `motion` at stage
+    /// `k`. The inputs are those that lead the last derivative exactly through the states.
     pub fn trace_back(&self, k: usize, affine: &[State<O>], motion: &mut Motion<O>) {
         for (j, Arrival { discount, smoother, .. }) in self.arrivals[..k].iter().enumerate().rev() {
             let (counted, after) = (apply(discount, &self.means[j]), motion.states[j + 1]);

@@ -59,8 +59,7 @@ const NEWLY: f64 = 0.3;
 /// Warm start, with the multipliers of a similar problem: smallest slack, and Σ sλ relative to half
 /// the cost.
 const WARM: (f64, f64) = (3e-4, 1e-6);
-/// First guess that violates a ball by far: smallest slack, and Σ sλ relative to half
-/// the cost.
+/// First guess that violates a ball by far: smallest slack, and Σ sλ relative to half the cost.
 const FAR: (f64, f64) = (3.0, 10.0);
 /// A first guess violates a ball by far when c exceeds this value.
 const FAR_OUTSIDE: f64 = 1.5;

@@ -229,8 +229,8 @@ pub(crate) fn all_positive(name: &str, values: &[f64]) -> Result<(), DesignError
     }
 }
 
-/// Returns an error for a rate of decay (1/s) that becomes growth with ticks of `period` (s): 1 −
-/// rate·period must exceed −1.
+/// Returns an error for a rate of decay (1/s) that becomes growth with ticks of `period` (s):
+/// 1 − rate·period must exceed −1.
 pub(crate) fn sampled_decay(name: &'static str, rate: f64, period: f64) -> Result<(), DesignError> {
     let high = 2.0 / period;
     if rate < high { Ok(()) } else { Err(DesignError::OutOfRange { name, value: rate, low: 0.0, high }) }

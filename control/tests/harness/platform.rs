@@ -127,8 +127,8 @@ pub fn estimates(settings: &Settings, lines: &[estimation::Line]) -> Vec<Estimat
     (0..).zip(lines).map(&mut update).collect()
 }
 
-/// Returns the correction that recovers the true values from the readings: least squares of y = A x
-/// + b.
+/// Returns the correction that recovers the true values from the readings: least squares of y = A
+/// x + b.
 fn regression(felt: &[Vector3<f64>], readings: &[Vector3<f64>]) -> Correction {
     let mut normal = Matrix4::zeros();
     let mut right = SMatrix::<f64, 4, 3>::zeros();
