@@ -144,7 +144,7 @@ fn grid() -> Vec<SlidingMode> {
     all
 }
 
-/// Returns the gains changed by this share, up to `changes` at a time, within the range that the
+/// Returns the gains changed by this share, `changes` of them at a time, within the range that the
 /// controller accepts. A gain of zero starts from `share`.
 fn neighbours(of: &SlidingMode, share: f64, changes: usize) -> Vec<SlidingMode> {
     let moved = |value: f64, direction: i32| match direction {

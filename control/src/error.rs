@@ -84,7 +84,7 @@ pub enum DesignError {
         name: &'static str,
         /// Value of the setting.
         value: f64,
-        /// Smallest allowed value.
+        /// Smallest value that is allowed.
         low: f64,
         /// Upper end of the range; it is not allowed itself.
         high: f64,
@@ -94,7 +94,7 @@ pub enum DesignError {
     Delay {
         /// Value of the delay, s.
         value: f64,
-        /// Largest allowed value, s.
+        /// Largest value that is allowed, s.
         longest: f64,
     },
     /// The two periods do not fit together.
@@ -144,7 +144,7 @@ pub enum DesignError {
     Setting {
         /// Name of the setting.
         name: String,
-        /// The value at fault.
+        /// Value of the setting.
         value: f64,
     },
     /// A matrix must have an inverse.

@@ -327,7 +327,7 @@ impl Running {
     }
 }
 
-/// The attitude estimator.
+/// The attitude estimator: settings and low-pass filter.
 ///
 /// ```
 /// use control::estimation::{Estimator, Health, Line, Settings};

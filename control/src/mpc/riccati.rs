@@ -38,7 +38,7 @@ const STALLED_STEPS: u32 = 4;
 const PATIENCE: (u32, f64) = (30, 1e3);
 const PATIENCE_FOLLOWING: (u32, f64) = (16, f64::INFINITY);
 /// A search runs in a cycle when its residual has not been halved in `CIRCLING` iterations; its
-/// steps are then shortened by `DAMPING`.
+/// steps are then multiplied by `DAMPING`.
 const CIRCLING: u32 = 8;
 const DAMPING: f64 = 0.5;
 /// A first guess is misleading when the residual of the balls exceeds the least one so far by this
