@@ -1,4 +1,4 @@
-//! Keeps the library loaded.
+//! The link options keep the library loaded.
 
 fn main() {
     fmi2_build::link();

@@ -1,17 +1,19 @@
-//! Time of one control allocation, with the effectors of Wu 2015 and moments as in its figures: the distribution over 20 s at
-//! 0.01 s. Each sample is repeated from the same memory; printed are the smallest time of each and the mean over all.
+//! Time of one control allocation, with the effectors of Wu 2015 and moments as in its figures: the
+//! distribution over 20 s at 0.01 s. Each sample is repeated from the same memory. The smallest
+//! time of each sample and the mean over all are printed.
 
 use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Settings};
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Vector3;
 use std::hint::black_box;
 
-/// Repetitions of each sample.
+/// Number of repetitions of each sample.
 const REPETITIONS: usize = 20;
-/// Samples of 20 s.
+/// Number of samples in 20 s.
 const SAMPLES: u32 = 2000;
 
-/// A large moment that decays, with the disturbance (66) of Wu 2015 to be held against: from saturation to rest.
+/// Returns a large moment that decays, with the disturbance (66) of Wu 2015 to be cancelled: from
+/// saturation to rest.
 fn command(sample: u32) -> Command {
     let t = f64::from(sample) * 0.01;
     let disturbance = 1e4 * (0.5 + (0.1 * t).sin() + t.sin());

@@ -1,8 +1,10 @@
-//! Time of one optimisation of CRMPC and of DLMPC's outer layer on the scenario of Chai 2022 (white noise, inertia + 5 %).
+//! Time of one optimisation of CRMPC and of DLMPC's outer layer on the scenario of Chai 2022
+//! (white noise, inertia + 5 %).
 //!
-//! First the distribution over every sample of 50 s is printed, with the exits that come before the cone program of the whole
-//! horizon, and without. Each sample is repeated from the same memory, and the smallest time counts: what else the machine
-//! does can only add to it. Then Criterion takes single samples of CRMPC apart.
+//! First the distribution over every sample of 50 s is printed, with the exits that come before the
+//! cone program of the whole horizon, and without them. Each sample is repeated from the same
+//! memory, and the smallest time counts, because other load on the machine can only add to it. Then
+//! Criterion times single samples of CRMPC.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
@@ -18,10 +20,10 @@ use std::hint::black_box;
 use vehicle::disturbance::Kind;
 use vehicle::scenario::Scenario;
 
-/// Repetitions of each sample.
+/// Number of repetitions of each sample.
 const REPETITIONS: usize = 20;
 
-/// What goes into one tick of the run, and how its optimisation came out.
+/// Input of one tick of the run, and the result of its optimisation.
 struct Tick<Memory> {
     number: u64,
     before: Memory,
@@ -92,7 +94,7 @@ fn print_distribution<C: Optimising>(name: &str, controller: &mut C, ticks: &[Ti
     );
 }
 
-/// The ways to solve that are compared.
+/// The ways of solving that are compared.
 const WAYS: [(&str, SolverSettings); 4] = [
     ("exits, then riccati", WAY),
     ("riccati", SolverSettings { exits: false, ..WAY }),
@@ -108,7 +110,7 @@ const WAY: SolverSettings = SolverSettings {
     iteration_budget: 0,
 };
 
-/// The distributions of one controller, over the samples of one run.
+/// Prints the distributions of one controller over the samples of one run.
 fn print_all<C: Optimising>(name: &str, new: impl Fn(SolverSettings) -> C) {
     let ticks = run(&mut new(WAY));
     for (way, settings) in WAYS {

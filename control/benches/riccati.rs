@@ -1,9 +1,10 @@
-//! Time of the Riccati method alone, on CRMPC's first problem of Chai 2022 with its reference at rest: the balls of rates and moment,
-//! exact, and the terminal ball.
+//! Time of the Riccati method alone, on CRMPC's first problem of Chai 2022 with its reference at
+//! rest: the exact balls of rates and moment, and the terminal ball.
 //!
-//! It stops after a given number of iterations. What two of these times differ by per iteration is the time of one: balls with
-//! derivatives, one factorisation, predictor and corrector. The rest is the beginning. The sweeps without balls, whose factors are known
-//! beforehand, stand beside them.
+//! The method stops after a given number of iterations. The difference between two of these times,
+//! per iteration, is the time of one: balls with derivatives, one factorisation, predictor and
+//! corrector. The rest is the start. The sweeps without balls, whose factors are known beforehand,
+//! are measured for comparison.
 
 #[path = "../tests/harness/balls.rs"]
 mod balls;
@@ -30,7 +31,7 @@ fn riccati(criterion: &mut Criterion) {
     let crmpc = Crmpc::new(settings).unwrap();
     let design = crmpc.design();
     let chain = Chain::new(h);
-    // (10), sampled
+    // Cost (10), sampled.
     let [p1, p2, p3, p4, p5, p6] = settings.p;
     let cost = Cost {
         state: [Vector3::new(p1, p2, p3) * h, Vector3::new(p4, p5, p6) * h],
@@ -84,7 +85,7 @@ fn iterations<'a, C: mpc::Constraints<2> + 'a>(
     {
         let mut riccati = Riccati::new(problem.affine.len(), 0, most);
         let outcome = riccati.solve(&problem, &mut cold.clone(), 0, false, &mut Budget::unlimited(), None);
-        // Fewer would not be what the name says.
+        // With fewer iterations the benchmark's name would be wrong.
         assert!(outcome.solved() == (most == 50), "{outcome:?}");
         group.bench_function(name, |bencher| {
             bencher.iter_batched_ref(

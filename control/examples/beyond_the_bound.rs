@@ -1,11 +1,13 @@
-//! What CRMPC's robust set does where the disturbance exceeds its bound, beside an LQR whose moment is scaled into the limit as well:
+//! Behaviour of CRMPC's robust set if the disturbance exceeds its bound, compared with an LQR whose
+//! moment is also scaled into the limit:
 //!
 //! ```text
 //! cargo run --release -p control --example beyond_the_bound
 //! ```
 //!
-//! prints a line for each size and family of disturbances: of the three mean and largest EMS, the largest ‖ω‖ over its limit, and how many of the
-//! runs lost the attitude.
+//! The example prints a line for each size and family of disturbances, with the mean and largest
+//! EMS of the three controllers, the largest ‖ω‖ relative to its limit, and the number of runs that
+//! lost the attitude.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
@@ -22,7 +24,7 @@ use nalgebra::Vector3;
 /// Runs with an EMS above this count as lost, deg.
 const LOST: f64 = 20.0;
 
-/// An LQR with the moment that there is.
+/// An LQR whose moment is scaled into the limit.
 struct Saturated(Lqr, f64);
 
 impl Controller for Saturated {

@@ -1,5 +1,5 @@
-//! Calibrates the MEMS set of the vehicle's data on a flight of its calibration sequence, and prints the file
-//! `control/data/sensor-calibration.toml`:
+//! Calibrates the MEMS set of the vehicle's data on a flight of its calibration sequence, and
+//! prints the file `control/data/sensor-calibration.toml`:
 //!
 //! ```text
 //! cargo run --release -p control --example calibrate_sensors >control/data/sensor-calibration.toml

@@ -1,10 +1,12 @@
-//! Closed loops of CRMPC and LQR over many disturbances, 50 s each, with both inertia errors of 5 %:
+//! This example flies closed loops of CRMPC and LQR over many disturbances, 50 s each, with both
+//! inertia errors of 5 %:
 //!
 //! ```text
 //! cargo run --release -p control --example campaign -- [SEEDS]
 //! ```
 //!
-//! prints one line for each controller and family of disturbances. 200 seeds of white noise are the default.
+//! It prints one line for each controller and family of disturbances. The default is 200 seeds of
+//! white noise.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;

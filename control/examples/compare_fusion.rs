@@ -1,11 +1,12 @@
-//! Fusion filters of several crates on the same calibrated readings of the MEMS set:
+//! Compares fusion filters of several crates on the same calibrated readings of the MEMS set:
 //!
 //! ```text
 //! cargo run --release -p control --example compare_fusion
 //! ```
 //!
-//! and the errors of the estimator with its defaults. Printed are errors of attitude at rest and in the scenario of Chai 2022, with the gyroscope's bias known and with 0.2 deg/s of it
-//! left on each axis; time and allocations of an update.
+//! It also prints the errors of the estimator with its defaults. The output contains attitude
+//! errors at rest and in the scenario of Chai 2022, with the gyroscope's bias known and with
+//! 0.2 deg/s of it left on each axis, and time and allocations of an update.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
@@ -24,7 +25,7 @@ use std::time::Instant;
 use vehicle::platform::Readings;
 use vehicle::sensor_data::SensorData;
 
-/// Counts what is allocated.
+/// An allocator that counts allocations.
 struct Counting;
 
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
@@ -34,11 +35,11 @@ static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.fetch_add(1, Relaxed);
-        // SAFETY: as the caller promised.
+        // SAFETY: the caller's promise is passed on.
         unsafe { System.alloc(layout) }
     }
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as the caller promised.
+        // SAFETY: the caller's promise is passed on.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -46,13 +47,13 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Attitude after a sample: body axes from magnetic north, east, down.
+/// A function that returns the attitude after a sample: body axes from magnetic north, east, down.
 type Step = Box<dyn FnMut(&Readings) -> Rotation3<f64>>;
 
-/// A filter from an attitude on.
+/// A function that starts a filter from an attitude.
 type Begin = Box<dyn Fn(&Rotation3<f64>) -> Step>;
 
-/// A filter to compare.
+/// A filter that takes part in the comparison.
 struct Filter {
     name: String,
     begin: Begin,
@@ -70,7 +71,8 @@ fn east_north_up() -> Matrix3<f64> {
     Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0)
 }
 
-/// Body axes from north, east, down, from a quaternion (w, x, y, z) that leads from the body to other Earth axes.
+/// Returns the rotation to body axes from north, east, down, from a quaternion (w, x, y, z) that
+/// leads from the body to other Earth axes.
 fn from_quaternion([w, x, y, z]: [f64; 4], earth: &Matrix3<f64>) -> Rotation3<f64> {
     let to_earth = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix();
     Rotation3::from_matrix_unchecked(to_earth.matrix().transpose() * earth)
@@ -155,7 +157,8 @@ fn vqf(tau_acc: f64, tau_mag: f64, rest: bool) -> Filter {
             tau_acc,
             tau_mag,
             rest_bias_est_enabled: rest,
-            // It takes a field for known after turning at 20 deg/s only, and leaves it out until then.
+            // The filter accepts a field as known only after turning at 20 deg/s, and leaves it out
+            // until then.
             mag_dist_rejection_enabled: false,
             ..vqf_rs::Params::default()
         };
@@ -168,7 +171,8 @@ fn vqf(tau_acc: f64, tau_mag: f64, rest: bool) -> Filter {
     })
 }
 
-/// Errors of angles (root mean square in deg of their norm) after the first second, ns and allocations of an update.
+/// Returns the attitude errors (root mean square of their norm, deg) after the first second, and
+/// nanoseconds and allocations of an update.
 fn run(filter: &Filter, motion: &[Truth], readings: &[Readings]) -> (f64, f64, f64) {
     let declination = {
         let field = SensorData::embedded().surroundings.field;
@@ -257,7 +261,8 @@ fn main() {
     println!("ellipsoid: largest norm of W A - I {:.1e}", left.fold(0.0, f64::max));
 }
 
-/// Calibrated readings at the tick at which they were taken, with `bias` (deg/s) left on each axis.
+/// Returns calibrated readings at the tick at which they were taken, with `bias` (deg/s) left on
+/// each axis.
 fn samples(
     motion: &[Truth],
     corrections: &[control::estimation::ellipsoid::Correction; 3],

@@ -1,10 +1,12 @@
-//! What the robust set can guarantee for the published vehicle and limits, by gains, delay and errors of measurement:
+//! Disturbance bounds that the robust set can guarantee for the published vehicle and limits, by
+//! gains, delay and measurement errors:
 //!
 //! ```text
 //! cargo run --release -p control --example guarantee
 //! ```
 //!
-//! prints the largest bound of the disturbance that is accepted, and what is left of the moment at the published one.
+//! The example prints the largest disturbance bound that is accepted, and the share of the moment
+//! that is left at the published one.
 
 use control::crmpc::{Constraints, Design, Guarantee, Settings};
 use control::error_dynamics::Gain;

@@ -1,11 +1,12 @@
-//! Random settings of CRMPC with the robust set:
+//! This example tries random settings of CRMPC with the robust set:
 //!
 //! ```text
 //! cargo run --release -p control --example random_settings -- FIRST COUNT
 //! ```
 //!
-//! tries COUNT settings, with the seeds from FIRST on. Those that the design accepts are flown for 15 s and must keep the guarantee. Where
-//! the design refuses to give the guarantee, it must accept each bound that its message names, as it is printed.
+//! It tries COUNT settings, with the seeds from FIRST on. Settings that the design accepts are
+//! flown for 15 s and must keep the guarantee. If the design refuses to give the guarantee, it must
+//! accept each bound that its message names, as printed.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;

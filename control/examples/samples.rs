@@ -1,8 +1,10 @@
-//! Every optimisation of CRMPC over the 50 s scenario of Chai 2022 (white noise, inertia + 5 %), as one JSON object per line: what
-//! another solver needs to solve the same problem, our optimum, and how long each of our ways takes. `scripts/bench` reads it.
+//! Prints every optimisation of CRMPC over the 50 s scenario of Chai 2022
+//! (white noise, inertia + 5 %), as one JSON object per line: the data that another solver needs to
+//! solve the same problem, our optimum, and the time of each of our ways. `scripts/bench` reads the
+//! output.
 //!
-//! Each sample is repeated from the same memory, and the smallest time counts. The ways are timed in turns, so that whatever else the
-//! machine does falls on all alike.
+//! Each sample is repeated from the same memory, and the smallest time counts. The ways are timed
+//! in turns, so that other load on the machine affects all alike.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
@@ -17,7 +19,7 @@ use std::io::{self, Write};
 use vehicle::disturbance::Kind;
 use vehicle::scenario::Scenario;
 
-/// Repetitions of each sample, if the first argument gives none.
+/// Number of repetitions of each sample, if the first argument gives none.
 const REPETITIONS: usize = 20;
 
 /// Relative inertia error of the vehicle.
@@ -102,12 +104,13 @@ fn write_samples(out: &mut impl Write, set: &str, settings: &Settings, repetitio
         let sample = json!({
             "set": set,
             "time": time,
-            // (Theta, x_omega)
+            // The start is (Theta, x_omega).
             "start": start,
             "references": references,
-            // On the stages' rates, the intervals' inputs, and the last error in the G-norm.
+            // The bounds are on the stages' rates, on the intervals' inputs, and on the last error
+            // in the G-norm.
             "bounds": { "rate": bounds.rate, "input": bounds.input, "terminal": bounds.terminal },
-            // The plan of the optimisation before, not shifted; nothing at first.
+            // This is the plan of the optimisation before, not shifted; it is empty at first.
             "previous": previous,
             "ways": own,
         });

@@ -1,18 +1,21 @@
-//! Searches the gains q, p, Γ, ρ of DLMPC's inner layer on the scenario of Chai 2022 (white noise, inertia + 5 %, 50 s); the
-//! outer layer stays as printed:
+//! Searches the gains q, p, Γ, ρ of DLMPC's inner layer on the scenario of Chai 2022
+//! (white noise, inertia + 5 %, 50 s). The outer layer stays as printed:
 //!
 //! ```text
 //! cargo run --release -p control --example tune_dlmpc -- [SEEDS]
 //! ```
 //!
-//! A coarse grid over three seeds, then steps from the best of it over SEEDS (10) seeds, halved until none leads further.
-//! Two criteria, both of means over the seeds and of the largest rate in any of them (‖m‖ keeps its limit by construction):
+//! The search consists of a coarse grid over three seeds, then of steps from its best sets over
+//! SEEDS (10) seeds, halved until none leads further. There are two criteria, both of means over
+//! the seeds and of the largest rate in any of them (‖m‖ keeps its limit by construction):
 //!
-//! - `tuned`: the least CMS of all gains that are no worse than the published ones in EMS and in the largest ‖ω‖;
-//! - `within limits`: the least EMS of all gains that keep ‖ω‖ ≤ 5°/s, which the published ones do not.
+//! - `tuned`: the least CMS of all gains that are no worse than the published ones in EMS and in
+//!   the largest ‖ω‖;
+//! - `within limits`: the least EMS of all gains that keep ‖ω‖ ≤ 5°/s, which the published ones do
+//!   not.
 //!
-//! Printed are the Pareto front of EMS against CMS of all that was tried, and the gains found, with seeds that the search has
-//! not seen too.
+//! The output is the Pareto front of EMS against CMS of all sets that were tried, and the gains
+//! found, also with seeds that the search has not seen.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
@@ -23,7 +26,8 @@ use harness::{disturbance, in_parallel, simulate};
 use std::ops::RangeInclusive;
 use vehicle::disturbance::{Disturbance, Kind};
 
-/// Sets of the grid that are looked at again, and steps taken from how many of those.
+/// Number of sets of the grid that are evaluated again, and number of those from which steps are
+/// taken.
 const STARTS: usize = 16;
 const DESCENTS: usize = 2;
 
@@ -77,7 +81,8 @@ fn front(scores: &[Score]) -> Vec<Score> {
     front
 }
 
-/// What is looked for: whether a set is allowed, beside the published one, and what is to be small.
+/// Criterion of the search: whether a set is allowed, compared with the published one, and the
+/// quantity to be minimised.
 #[derive(Clone, Copy)]
 struct Criterion {
     name: &'static str,
@@ -95,7 +100,7 @@ const CRITERIA: [Criterion; 2] = [
 ];
 
 impl Criterion {
-    /// The allowed ones among `scores`, best first.
+    /// Returns the allowed sets among `scores`, best first.
     fn sorted(&self, scores: &[Score], published: &Score) -> Vec<Score> {
         let mut allowed: Vec<Score> =
             scores.iter().filter(|own| (self.allows)(own, published)).copied().collect();
@@ -103,7 +108,8 @@ impl Criterion {
         allowed
     }
 
-    /// Steps from `start` until none leads further; adds what it tries to `tried`.
+    /// Takes steps from `start` until none leads further, and adds the sets that it tries to
+    /// `tried`.
     fn search(&self, start: Score, published: &Score, seeds: u64, tried: &mut Vec<Score>) -> Score {
         let mut chosen = start;
         let mut share = 0.4;
@@ -138,7 +144,8 @@ fn grid() -> Vec<SlidingMode> {
     all
 }
 
-/// Gains changed by this share, as many at a time as `changes` says, within what the controller accepts. A gain of zero starts from `share`.
+/// Returns the gains changed by this share, `changes` of them at a time, within the range that the
+/// controller accepts. A gain of zero starts from `share`.
 fn neighbours(of: &SlidingMode, share: f64, changes: usize) -> Vec<SlidingMode> {
     let moved = |value: f64, direction: i32| match direction {
         0 => value,
@@ -176,7 +183,8 @@ fn main() {
     let mut tried = vec![published];
     let mut found = Vec::new();
     for criterion in CRITERIA {
-        // The coarse ones again with all seeds, as the largest rate of three is a weak bound.
+        // The best sets of the grid are evaluated again with all seeds, as the largest rate of
+        // three seeds is a weak bound.
         let starts: Vec<SlidingMode> =
             criterion.sorted(&coarse, &coarse_published).iter().take(STARTS).map(|own| own.gains).collect();
         tried.extend(in_parallel(&starts, |&gains| score(gains, 1..=seeds)));
@@ -193,7 +201,7 @@ fn main() {
     println!("Pareto front of {} sets with {seeds} seeds:", tried.len());
     let mut last = f64::INFINITY;
     for score in front(&tried) {
-        // Steps at the end of a descent hardly differ.
+        // The steps at the end of a descent hardly differ.
         if score.cms < 0.99 * last {
             score.print("");
             last = score.cms;

@@ -1,13 +1,14 @@
-//! Looks for flights in which the guarantee of the robust set fails, for each of several loops:
+//! Searches for flights in which the guarantee of the robust set fails, for each of several loops:
 //!
 //! ```text
 //! cargo run --release -p control --example worst_case -- random LOOP FIRST COUNT
 //! cargo run --release -p control --example worst_case -- search LOOP FIRST COUNT EVALUATIONS
 //! ```
 //!
-//! `random` flies COUNT random flights with the seeds from FIRST on. `search` starts COUNT searches for the worst disturbance, start and
-//! inertia by CMA-ES (N. Hansen, "The CMA evolution strategy: a tutorial", arXiv:1604.00772), with EVALUATIONS flights each. LOOP is the name of a loop, or `all`. A line shows
-//! each defect with its seed, from which it repeats.
+//! `random` flies COUNT random flights with the seeds from FIRST on. `search` starts COUNT searches
+//! for the worst disturbance, start and inertia by CMA-ES (N. Hansen, "The CMA evolution strategy:
+//! a tutorial", arXiv:1604.00772), with EVALUATIONS flights each. LOOP is the name of a loop, or
+//! `all`. A line shows each defect with its seed, from which it can be repeated.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
@@ -20,12 +21,12 @@ use harness::flight::{Course, Flight, Random, Shown, Sight};
 use harness::in_parallel;
 use nalgebra::Vector3;
 
-/// A loop to fly in.
+/// A loop in which the flights take place.
 struct Loop {
     name: &'static str,
-    /// K.
+    /// Feedback gain K of the loop.
     gain: (f64, f64),
-    /// s.
+    /// Delay of the loop, s.
     delay: f64,
     /// Bounds on the errors of the angles (deg) and rates (deg/s).
     errors: (f64, f64),
@@ -43,7 +44,7 @@ const fn erroneous(name: &'static str, gain: (f64, f64), delay: f64, errors: (f6
     Loop { errors, ..bare(name, gain, delay) }
 }
 
-/// A flight with more fallbacks than this gets a line of its own.
+/// A flight with more fallbacks than this is printed on a line of its own.
 const MANY: u32 = 20;
 /// Bounds on the errors of the estimator, deg and deg/s.
 const ESTIMATED: (f64, f64) = (0.25, 0.25);
@@ -62,7 +63,8 @@ const LOOPS: [Loop; 10] = [
 ];
 
 impl Loop {
-    /// With the published disturbance bound, or the largest that the design accepts if that is less.
+    /// Returns the settings with the published disturbance bound, or with the largest that the
+    /// design accepts if that is smaller.
     fn settings(&self) -> Option<Settings> {
         let (k1, k2) = self.gain;
         let robust = Settings::new(Constraints::Robust);
@@ -92,7 +94,7 @@ impl Loop {
         if self.estimator {
             flight.sight = Sight::Estimator(seed);
             flight.age = self.delay;
-            // The estimator knows the attitude at the start, and takes the vehicle for at rest.
+            // The estimator knows the attitude at the start, and assumes that the vehicle rests.
             flight.rates = Vector3::zeros();
         }
         flight
@@ -176,18 +178,19 @@ fn report(name: &str, settings: &Settings, seeds: &[u64], all: &[Shown]) {
     );
 }
 
-/// Pieces of the disturbance that a search chooses.
+/// Number of pieces of the disturbance that a search chooses.
 const PIECES: usize = 20;
-/// Start (six numbers), inertia, and the mean length of a piece; then three components and a length of each piece.
+/// Number of unknowns: start (six), inertia, and the mean length of a piece, then three components
+/// and a length of each piece.
 const UNKNOWNS: usize = 8 + 4 * PIECES;
 
-/// The flight that these numbers of size 1 stand for, with the rest of it as in `flight`.
+/// Returns the flight that these numbers of size 1 define; the other values are those of `flight`.
 fn decoded(flight: &Flight, x: &DVector<f64>) -> Flight {
     let limited = |i: usize| x[i].clamp(-1.0, 1.0);
     let of_three = |i: usize| Vector3::new(limited(i), limited(i + 1), limited(i + 2));
     let Settings { limit_rate, inertia_error, .. } = flight.settings;
     let span = Vector3::new(10.0, 8.0, 12.0).map(f64::to_radians);
-    // Pieces of 0.2 to 2 s on average.
+    // The pieces last 0.2 to 2 s on average.
     let mean = 0.2 * 10.0_f64.powf(0.5 + 0.5 * limited(7));
     let mut end = 0.0;
     let pieces = (0..PIECES).map(|i| {
@@ -208,7 +211,8 @@ fn decoded(flight: &Flight, x: &DVector<f64>) -> Flight {
     }
 }
 
-/// What a search makes as large as it can. A guarantee that fails counts more than any limit that is kept.
+/// Returns the value that a search maximises. A failed guarantee counts more than any limit that is
+/// kept.
 fn badness(shown: &Shown) -> f64 {
     shown.rate.max(shown.moment) + f64::from(u8::from(shown.defective()))
 }

@@ -1,4 +1,4 @@
-//! Looks for the optimisation that takes longest, of CRMPC with either set and of DLMPC's outer layer:
+//! Searches for the slowest optimisation, of CRMPC with either set and of DLMPC's outer layer:
 //!
 //! ```text
 //! cargo run --release -p control --example worst_time -- random LAW FIRST COUNT [SIZE [BUDGET_MS]]
@@ -7,11 +7,13 @@
 //! cargo run --release -p control --example worst_time -- one LAW SEED [SIZE]
 //! ```
 //!
-//! A case is a reference, a start, and a second state to which the vehicle is kicked one optimisation later: errors of up to 15 deg and rates of up to
-//! 4.5 deg/s, both times SIZE. Three optimisations of it count: the first one (cold), the one after the kick, and the one that follows.
-//! `random` draws COUNT cases from seed FIRST on, `search` starts COUNT searches by CMA-ES for the most iterations. Each optimisation is repeated from the same
-//! memory, and the smallest time counts. `list` prints the cases with the most iterations for control/tests/data/worst_draws.csv. `one` does a single case once, for
-//! a profiler.
+//! A case is a reference, a start, and a second state to which the vehicle is kicked one
+//! optimisation later. Its errors are up to 15 deg and its rates up to 4.5 deg/s, both times SIZE.
+//! Three optimisations of a case count: the first one (cold), the one after the kick, and the one
+//! that follows. `random` draws COUNT cases from seed FIRST on, and `search` starts COUNT searches
+//! by CMA-ES for the most iterations. Each optimisation is repeated from the same memory, and the
+//! smallest time counts. `list` prints the cases with the most iterations for
+//! control/tests/data/worst_draws.csv. `one` runs a single case once, for a profiler.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
@@ -25,11 +27,11 @@ use harness::flight::Random;
 use harness::{Optimising, in_parallel, settings};
 use std::collections::BTreeMap;
 
-/// Repetitions of each optimisation.
+/// Number of repetitions of each optimisation.
 const REPETITIONS: usize = 5;
-/// Cases that are listed of each law.
+/// Number of cases that are listed for each law.
 const LISTED: usize = 40;
-/// The optimisations of a case.
+/// Names of the three optimisations of a case.
 const SITUATIONS: [&str; 3] = ["cold", "after a kick", "the next one"];
 
 fn main() {
@@ -69,7 +71,8 @@ fn go<C: Optimising>(
     match what {
         "random" => {
             let (size, budget) = (number(4).unwrap_or(1.0), number(5).unwrap_or(0.0) * 1e-3);
-            // One after the other, as times of two at once disturb each other.
+            // The cases run one after the other, as the times of two at once would disturb each
+            // other.
             let law = &mut new(budget);
             let repetitions = if budget > 0.0 { 1 } else { REPETITIONS };
             let reports: Vec<[Report; 3]> =
@@ -107,7 +110,7 @@ fn go<C: Optimising>(
     }
 }
 
-/// The reports of the worst optimisations that a search found, one for each situation.
+/// Returns the reports of the worst optimisations that a search found, one for each situation.
 fn search<C: Optimising>(law: &mut C, seed: u64, evaluations: usize, size: f64) -> [Report; 3] {
     let random = &mut Random::new(seed);
     let start = DVector::from_fn(UNKNOWNS, |_, _| random.between(-1.0, 1.0));

@@ -1,4 +1,4 @@
-//! A controller that flies a scenario in one process: the shortest way from a law to its errors.
+//! A closed loop in one process: a controller flies a scenario, and the tracking errors result.
 //!
 //! ```
 //! use control::closed_loop::fly;
@@ -23,7 +23,7 @@ use vehicle::error::Error;
 use vehicle::plant::Plant;
 use vehicle::reference::Reference;
 
-/// Longest time between two looks at the rates within a tick, and longest integration step, s.
+/// Longest time between two checks of the rates within a tick, and longest integration step, s.
 pub const CHECK: f64 = 0.01;
 
 /// One tick of a flight.
@@ -33,34 +33,36 @@ pub struct Sample<'a, Memory> {
     pub tick: u64,
     /// Time of the tick, s.
     pub time: f64,
-    /// What the controller is told.
+    /// Measurement that the controller receives.
     pub measured: Measurement,
-    /// The reference at this time.
+    /// Reference at the time of the tick.
     pub reference: Reference,
-    /// The moment that is held until the next tick, N m.
+    /// Moment that is held until the next tick, N m.
     pub moment: Vector3<f64>,
-    /// What the controller carries into the next tick.
+    /// Memory that the controller carries into the next tick.
     pub memory: &'a Memory,
 }
 
-/// What a flight amounts to.
+/// Figures of merit of a whole flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summary {
     /// Root mean square of ‖Θ − Θ_r‖ over the ticks, rad: the EMS of Chai 2022.
     pub error_rms: f64,
-    /// Root mean square of ‖m‖ over the ticks, N m: as a share of the limit the CMS of Chai 2022.
+    /// Root mean square of ‖m‖ over the ticks, N m; as a share of the limit it is the CMS of Chai
+    /// 2022.
     pub moment_rms: f64,
-    /// Largest ‖ω‖, looked at every [`CHECK`], rad/s.
+    /// Largest ‖ω‖, checked every [`CHECK`], rad/s.
     pub largest_rate: f64,
-    /// Largest ‖m‖, N m.
+    /// Largest ‖m‖ of all commands, N m.
     pub largest_moment: f64,
 }
 
-/// Flies `scenario` with ideal measurement: inertia, start, disturbance and reference are those that it states. `observe` sees each
-/// tick after the controller's update.
+/// Flies `scenario` with ideal measurement. Inertia, initial state, disturbance and reference are
+/// those of the scenario. `observe` is called at each tick after the controller's update.
 ///
 /// # Errors
-/// Says which value of the scenario is at fault, or when the attitude was lost: beyond the singularity of its angles.
+/// Returns an error that names the value of the scenario at fault, or says when the attitude was
+/// lost, which means beyond the singularity of its angles.
 pub fn fly<C: Controller>(
     controller: &mut C,
     memory: &mut C::Memory,

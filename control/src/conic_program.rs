@@ -1,10 +1,11 @@
-//! Second-order cone programmes for Clarabel that are set up once and then updated in place: only numbers change from sample
-//! to sample, never the sparsity.
+//! Second-order cone programs for Clarabel that are set up once and then updated in place. Only
+//! numbers change from sample to sample, never the sparsity.
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 
-/// Collects a sparse matrix entry by entry, remembering where each entry ends up in compressed columns.
+/// A sparse matrix that is collected entry by entry; the position of each entry in compressed
+/// columns is recorded.
 #[derive(Default)]
 pub(crate) struct Triplets {
     entries: Vec<(usize, usize, f64)>,
@@ -16,7 +17,7 @@ impl Triplets {
         self.entries.len() - 1
     }
 
-    /// The matrix, and for each pushed entry its position among the values.
+    /// Returns the matrix, and for each pushed entry its position among the values.
     pub(crate) fn compress(&self, rows: usize, columns: usize) -> (CscMatrix<f64>, Vec<usize>) {
         let mut order: Vec<usize> = (0..self.entries.len()).collect();
         order.sort_by_key(|&i| (self.entries[i].1, self.entries[i].0));
@@ -37,31 +38,32 @@ impl Triplets {
     }
 }
 
-/// Minimise ½ xᵀP x + qᵀx subject to A x + s = b, s in a product of cones. The vectors are the solver's data, to be changed
-/// between solves.
+/// The program: minimise ½ xᵀP x + qᵀx subject to A x + s = b, with s in a product of cones. The
+/// vectors are the solver's data, which may be changed between solutions.
 pub(crate) struct ConicProgram {
     solver: DefaultSolver<f64>,
     /// Values of P, upper triangle in compressed columns.
     pub(crate) cost: Vec<f64>,
-    /// q.
+    /// Linear cost vector q.
     pub(crate) linear_cost: Vec<f64>,
     /// Values of A in compressed columns.
     pub(crate) matrix: Vec<f64>,
-    /// b.
+    /// Right side vector b.
     pub(crate) right_side: Vec<f64>,
 }
 
-/// An optimum: x and the duals of the rows of A.
+/// An optimum: the vector x and the duals of the rows of A.
 pub(crate) struct Optimum<'a> {
     pub(crate) x: &'a [f64],
     pub(crate) duals: &'a [f64],
 }
 
 impl ConicProgram {
-    /// Sets the solver up for these patterns.
+    /// Sets up the solver for these sparsity patterns.
     ///
     /// # Errors
-    /// The solver's own message if it refuses the data, for example weights that are not positive semidefinite.
+    /// Returns the solver's own message if it refuses the data, for example weights that are not
+    /// positive semidefinite.
     pub(crate) fn new(
         cost: CscMatrix<f64>,
         matrix: CscMatrix<f64>,
@@ -79,15 +81,16 @@ impl ConicProgram {
     /// Limits the iterations and the time (s) of the next solutions.
     pub(crate) fn limit(&mut self, iterations: u32, seconds: f64) {
         let settings = self.solver.settings();
-        // Without limits nothing changes, and nothing is allocated.
+        // Unchanged limits need no update, which would allocate.
         if (settings.max_iter, settings.time_limit) != (iterations, seconds) {
             let settings = DefaultSettings { max_iter: iterations, time_limit: seconds, ..settings.clone() };
-            // Both may be changed at any time.
+            // Both settings may be changed at any time.
             let _ = self.solver.update_settings(settings);
         }
     }
 
-    /// Solves with the data as they are now: the optimum and its duals, if there is one, and the iterations.
+    /// Solves with the present data. Returns the optimum with its duals, if there is one, and the
+    /// iterations.
     pub(crate) fn solve(&mut self) -> (Option<Optimum<'_>>, u32) {
         let accepted = self.solver.update_P(&self.cost).is_ok()
             && self.solver.update_q(&self.linear_cost).is_ok()
@@ -103,10 +106,11 @@ impl ConicProgram {
     }
 }
 
-/// Gap and residuals of a solution that is accepted.
+/// Largest gap and residuals of a solution that is accepted.
 const ACCEPTED: f64 = 1e-6;
 
-/// Data are updated in place, which forbids presolve, and scaled by hand.
+/// Returns the solver's settings: data are updated in place, which forbids presolve, and they are
+/// scaled by hand.
 fn solver_settings(max_iter: u32) -> DefaultSettings<f64> {
     DefaultSettings {
         verbose: false,
@@ -115,10 +119,11 @@ fn solver_settings(max_iter: u32) -> DefaultSettings<f64> {
         equilibrate_enable: false,
         input_sparse_dropzeros: false,
         iterative_refinement_enable: true,
-        // Steps to a relative 1e-8 need no more, and every refinement costs a solve.
+        // Steps to a relative 1e-8 need no more, and every refinement costs a solution.
         iterative_refinement_reltol: 1e-9,
         iterative_refinement_abstol: 1e-9,
-        // Where rounding stops it short of its 1e-8, this is still an optimum; anything coarser is none.
+        // A solution of this accuracy, which rounding stopped short of 1e-8, still counts as an
+        // optimum; anything coarser does not.
         reduced_tol_gap_abs: ACCEPTED,
         reduced_tol_gap_rel: ACCEPTED,
         reduced_tol_feas: ACCEPTED,

@@ -1,34 +1,37 @@
-//! What every controller is: a function of memory, tick and measurement.
+//! The interface of every controller: a function of memory, tick and measurement.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use vehicle::reference::{Profile, Reference};
 
-/// What a controller is told about the vehicle.
+/// The measured state of the vehicle that a controller receives at a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
-    /// Θ = [α, β, σ], rad.
+    /// Angles of attack, sideslip and bank, Θ = [α, β, σ], rad.
     pub angles: Vector3<f64>,
-    /// ω = [p, q, r], rad/s.
+    /// Body rates, ω = [p, q, r], rad/s.
     pub rates: Vector3<f64>,
-    /// The moment that acted since the last tick, N m, if it is measured; else a controller takes its own command for it.
+    /// The moment that acted since the last tick, N m, if it is measured. Without it a controller
+    /// assumes that its own command acted.
     pub achieved_moment: Option<Vector3<f64>>,
 }
 
-/// The reference as a function of time (s): a controller with preview asks for the future too.
+/// The reference as a function of time (s), so that a controller with preview can also ask for the
+/// future.
 pub type ReferenceAt<'a> = &'a dyn Fn(f64) -> Reference;
 
-/// What is known of the reference at a tick.
+/// The knowledge of the reference that is available at a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Preview<'a> {
-    /// All of it, which does not change during an experiment.
+    /// The whole reference is known in advance and does not change during an experiment.
     Profile(&'a Profile),
-    /// The reference that is given from outside, valid until a time (s). Of what follows nothing is known: its angles are taken to stay.
+    /// The reference is given from outside and valid until a time (s). Nothing is known of what
+    /// follows; its angles are assumed to stay constant.
     External(Reference, f64),
 }
 
 impl Preview<'_> {
-    /// The reference at `time` (s).
+    /// Returns the reference at `time` (s).
     pub fn at(&self, time: f64) -> Reference {
         match self {
             Self::Profile(profile) => profile.at(time),
@@ -37,7 +40,7 @@ impl Preview<'_> {
         }
     }
 
-    /// The part of it that may change during an experiment.
+    /// Returns the part of the preview that may change during an experiment.
     pub(crate) fn external(&self) -> Option<Reference> {
         match self {
             Self::Profile(_) => None,
@@ -46,26 +49,29 @@ impl Preview<'_> {
     }
 }
 
-/// A sampled attitude controller. `update` changes nothing but `memory` that a later call could notice, so that a tick can be
-/// evaluated again with other inputs from the same memory, and a saved memory continues bit for bit.
+/// A sampled attitude controller. `update` changes nothing that a later call could notice except
+/// `memory`. A tick can therefore be evaluated again with other inputs from the same memory, and a
+/// saved memory continues bit for bit.
 pub trait Controller {
-    /// What is carried from tick to tick.
+    /// The state of the controller that is carried from tick to tick.
     type Memory: Clone + Default + Serialize + DeserializeOwned + Send;
 
-    /// Time between ticks, s.
+    /// Returns the time between ticks, s.
     fn period(&self) -> f64;
 
-    /// What is carried into the first tick, with room for all that later ticks put into it.
+    /// Returns the memory for the first tick, with room for everything that later ticks store in
+    /// it.
     fn memory(&self) -> Self::Memory {
         Self::Memory::default()
     }
 
-    /// Whether `memory` can be one of this controller's, or has another shape: one that was restored may be forged.
+    /// Returns whether the shape of `memory` fits this controller. A restored memory may be forged.
     fn fits(&self, _memory: &Self::Memory) -> bool {
         true
     }
 
-    /// The tick with number `tick` at `time` (s): the moment to hold until the next one, N m.
+    /// Evaluates the tick with number `tick` at `time` (s). Returns the moment to hold until the
+    /// next tick, N m.
     fn update(
         &mut self,
         memory: &mut Self::Memory,

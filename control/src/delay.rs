@@ -1,16 +1,17 @@
-//! A known delay between a measurement and the moment that it leads to, made up for by prediction.
+//! Compensation of a known delay between a measurement and the resulting moment, by prediction.
 //!
-//! A measurement may also be old already when it arrives, by the delay of a filter. The state is then predicted over both, and the law is asked
-//! for the moment of the time at which it acts.
+//! A measurement may also be old when it arrives, because of a filter's delay. The state is then
+//! predicted over both delays, and the law is evaluated for the time at which its moment acts.
 //!
-//! The command of the tick at time t acts over [t + delay, t + delay + period). What acts on the vehicle before, over
-//! [t, t + delay), was commanded earlier and is known. So the state at t + delay can be computed from the measured one by the
-//! nominal equations of motion, and the law is asked for the moment of that state and that time. Without disturbances and with
-//! the right inertia the loop then moves as the one without delay does, only later by the delay.
+//! The command of the tick at time t acts over [t + delay, t + delay + period). The moments that
+//! act on the vehicle before, over [t, t + delay), were commanded earlier and are known. The state
+//! at t + delay can therefore be computed from the measured one by the nominal equations of motion,
+//! and the law is evaluated for that state and that time. Without disturbances and with the right
+//! inertia the loop then moves as it would without delay, only later by the delay.
 //!
-//! This is the prediction of the Smith predictor for a model in state-space form, as in Z. Artstein, "Linear systems with
-//! delayed controls: a reduction", IEEE Transactions on Automatic Control 27 (1982), with the nonlinear equations of motion in
-//! place of the linear ones.
+//! This is the prediction of the Smith predictor for a model in state-space form, as in Z.
+//! Artstein, "Linear systems with delayed controls: a reduction", IEEE Transactions on Automatic
+//! Control 27 (1982), with the nonlinear equations of motion in place of the linear ones.
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
@@ -22,47 +23,47 @@ use vehicle::kinematics::Kinematics;
 use vehicle::plant::{self, Load};
 use vehicle::time::TOLERANCE;
 
-/// Longest delay, s.
+/// Longest delay that is accepted, s.
 pub const LONGEST: f64 = 1.0;
-/// Most commands that can be under way at a time.
+/// Largest number of commands that can be under way at a time.
 pub const UNDER_WAY: usize = 10_000;
-/// Longest step of the prediction, s.
+/// Longest integration step of the prediction, s.
 const STEP: f64 = 0.01;
 
-/// What lies between the instant that a measurement tells of and the moment that it leads to.
+/// The parts of the time from the instant of a measurement to the moment that results from it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Latency {
-    /// How old a measurement is when the law gets it, s.
+    /// Age of a measurement when it reaches the law, s.
     pub measurement: f64,
-    /// How much later the command acts, s.
+    /// Time from the tick until its command acts, s.
     pub action: f64,
 }
 
 impl Latency {
-    /// Of the command alone, s.
+    /// Returns a latency of the command alone, s.
     pub fn of_action(action: f64) -> Self {
         Self { measurement: 0.0, action }
     }
 
-    /// Both, s.
+    /// Returns the sum of both parts, s.
     pub fn total(&self) -> f64 {
         self.measurement + self.action
     }
 }
 
-/// Number of ticks that begin within a delay (s).
+/// Returns the number of ticks that begin within a delay (s).
 pub fn ticks(delay: f64, period: f64) -> usize {
-    // A whole multiple of the period may be off by rounding.
+    // A whole multiple of the period may be inexact by rounding.
     (delay / period * (1.0 - TOLERANCE)).ceil() as usize
 }
 
-/// Scales a moment (N m) into ‖m‖ ≤ `limit` (N m, infinite for none) and keeps its direction.
+/// Scales a moment (N m) into ‖m‖ ≤ `limit` (N m, infinite for none); its direction is kept.
 pub fn saturated(moment: Vector3<f64>, limit: f64) -> Vector3<f64> {
     let excess = moment.norm() / limit;
     if excess > 1.0 { moment / excess } else { moment }
 }
 
-/// Computes the state after the delay from the measured one and the moments that act until then.
+/// Computes the state after the delay from the measured state and the moments that act until then.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Predictor {
     body: RigidBody,
@@ -72,10 +73,12 @@ pub struct Predictor {
 }
 
 impl Predictor {
-    /// For a vehicle that is believed to be `body`, and for commands every `period` (s) that act after `delay` (s, any number).
+    /// Sets up the prediction with `body` as model of the vehicle, for commands every `period` (s)
+    /// that act after `delay` (s, any number).
     ///
     /// # Errors
-    /// Refuses a delay that is negative, or longer than [`LONGEST`] or than [`UNDER_WAY`] periods.
+    /// Returns an error for a delay that is negative, or longer than [`LONGEST`] or than
+    /// [`UNDER_WAY`] periods.
     pub fn new(body: RigidBody, delay: f64, period: f64) -> Result<Self, DesignError> {
         let longest = LONGEST.min(UNDER_WAY as f64 * period);
         if !(0.0..=longest).contains(&delay) {
@@ -84,18 +87,19 @@ impl Predictor {
         Ok(Self { body, delay, period, count: ticks(delay, period) })
     }
 
-    /// Time from a measurement to the moment that it leads to, s.
+    /// Returns the time from a measurement to the resulting moment, s.
     pub fn delay(&self) -> f64 {
         self.delay
     }
 
-    /// Number of commands that determine the motion over the delay.
+    /// Returns the number of commands that determine the motion over the delay.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// The state after the delay. `under_way` ends with the last [`Predictor::count`] moments that were commanded before this
-    /// tick, oldest first, N m; those that are missing are zero. The achieved moment is passed on as it is.
+    /// Returns the state after the delay. `under_way` ends with the last [`Predictor::count`]
+    /// moments that were commanded before this tick, oldest first, N m; missing ones count as zero.
+    /// The achieved moment is passed on unchanged.
     pub fn predict(&self, under_way: &[Vector3<f64>], measured: &Measurement) -> Measurement {
         let mut state = plant::state(&measured.angles, &measured.rates);
         for age in (1..=self.count).rev() {
@@ -117,12 +121,13 @@ impl Predictor {
     }
 }
 
-/// What a controller with prediction carries from tick to tick.
+/// The state that a controller with prediction carries from tick to tick.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory<M> {
-    /// Memory of the law.
+    /// Memory of the law behind the prediction.
     pub inner: M,
-    /// Commands that have not acted to their end yet, oldest first, N m. Zero until there were as many ticks.
+    /// Commands whose action has not ended yet, oldest first, N m. They are zero until enough ticks
+    /// have passed.
     pub under_way: Vec<Vector3<f64>>,
 }
 
@@ -138,8 +143,9 @@ impl<M: Clone> Clone for Memory<M> {
     }
 }
 
-/// A controller whose moments act later than its measurements by a known delay. Asks the law behind it for the moment of the
-/// predicted state, at the time at which that moment acts. Without delay it is that law, bit for bit.
+/// A controller whose moments act later than its measurements by a known delay. It evaluates the
+/// law behind it for the predicted state and for the time at which the moment acts. Without delay
+/// it equals that law bit for bit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Delayed<C> {
     inner: C,
@@ -149,11 +155,13 @@ pub struct Delayed<C> {
 }
 
 impl<C: Controller> Delayed<C> {
-    /// Puts a delay in front of `inner`. `body` is the vehicle as the law believes it to be. `moment_limit` (N m) is the
-    /// limit that commands are scaled into behind the controller, infinite for none: the prediction counts what is left of them.
+    /// Puts a delay in front of `inner`. `body` is the model of the vehicle. `moment_limit` (N m,
+    /// infinite for none) is the limit into which commands are scaled behind the controller; the
+    /// prediction uses the scaled commands.
     ///
     /// # Errors
-    /// Refuses what [`Predictor::new`] refuses, either part of the latency if it is negative, and a limit that is not positive.
+    /// Returns the errors of [`Predictor::new`], and errors for a negative part of the latency and
+    /// for a limit that is not positive.
     pub fn new(inner: C, body: RigidBody, latency: Latency, moment_limit: f64) -> Result<Self, DesignError> {
         if moment_limit.is_nan() || moment_limit <= 0.0 {
             return Err(DesignError::NotPositive { name: "limit.moment", value: moment_limit });
@@ -170,22 +178,22 @@ impl<C: Controller> Delayed<C> {
         Ok(Self { inner, predictor, latency, moment_limit })
     }
 
-    /// How much later than its tick a command acts, s.
+    /// Returns the time from a tick until its command acts, s.
     pub fn acts_after(&self) -> f64 {
         self.latency.action
     }
 
-    /// What is left of a command (N m) behind the controller.
+    /// Returns a command (N m) after the scaling behind the controller.
     pub fn saturated(&self, moment: Vector3<f64>) -> Vector3<f64> {
         saturated(moment, self.moment_limit)
     }
 
-    /// The law.
+    /// Returns the law behind the prediction.
     pub fn inner(&self) -> &C {
         &self.inner
     }
 
-    /// What computes the state that the law sees.
+    /// Returns the predictor of the state on which the law acts.
     pub fn predictor(&self) -> &Predictor {
         &self.predictor
     }
@@ -220,7 +228,7 @@ impl<C: Controller> Controller for Delayed<C> {
         }
         let predicted = self.predictor.predict(under_way, measured);
         let moment = self.inner.update(inner, tick, time + self.latency.action, &predicted, reference);
-        // A memory by default has no room yet.
+        // A default memory has no room yet.
         under_way.resize(self.predictor.count, Vector3::zeros());
         under_way.rotate_left(1);
         if let Some(newest) = under_way.last_mut() {

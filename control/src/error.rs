@@ -1,6 +1,6 @@
-//! What can be wrong with a controller's settings.
+//! Errors in the settings of a controller.
 
-/// A setting that the design refuses. Names follow the FMUs' parameters.
+/// A setting that the design refuses. Names follow the parameters of the FMUs.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DesignError {
     /// The feedback gain does not stabilise the sampled error dynamics.
@@ -17,7 +17,8 @@ pub enum DesignError {
         /// Spectral radius of the sampled error dynamics.
         radius: f64,
     },
-    /// The terminal gain does not stabilise the nominal motion when it is held between two optimisations.
+    /// The terminal gain does not stabilise the nominal motion when it is held between two
+    /// optimisations.
     #[error(
         "terminal gain K~ = [{k1}, {k2}] held for {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter period.optimisation"
     )]
@@ -28,25 +29,26 @@ pub enum DesignError {
         k2: f64,
         /// Optimisation period, s.
         period: f64,
-        /// Spectral radius.
+        /// Spectral radius of the held terminal law.
         radius: f64,
     },
-    /// The limits leave no room to guarantee them.
+    /// The limits leave too little room for a guarantee.
     #[error("constraints = robust cannot be guaranteed: {}", no_guarantee(self))]
     NoGuarantee {
-        /// Share of the moment limit that is left, negative where it is not enough.
+        /// Share of the moment limit that is left; negative if there is not enough.
         moment_left: f64,
         /// Share of the rate limit that is left.
         rate_left: f64,
-        /// N m.
+        /// Limit on the moment, N m.
         limit_moment: f64,
-        /// rad/s.
+        /// Limit on the rate, rad/s.
         limit_rate: f64,
-        /// Largest disturbance.bound that is accepted, the rest as it is, rad/s²; `None` if not even 0 is.
+        /// Largest accepted disturbance.bound with the other settings unchanged, rad/s²; `None` if
+        /// not even 0 is accepted.
         disturbance: Option<f64>,
-        /// Largest errors of angles (rad) and rates (rad/s) in the proportion given.
+        /// Largest accepted errors of angles (rad) and rates (rad/s) in the given proportion.
         errors: Option<(f64, f64)>,
-        /// Largest delay, s.
+        /// Largest accepted delay, s.
         delay: Option<f64>,
     },
     /// A gain violates Lemma 2 or 3 of Chai 2022.
@@ -54,48 +56,48 @@ pub enum DesignError {
         "{name}.k1 and {name}.k2 need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)"
     )]
     NotReal {
-        /// Which gain.
+        /// Name of the gain.
         name: &'static str,
     },
     /// A quantity must be positive and finite.
     #[error("{name} = {value} must be positive and finite")]
     NotPositive {
-        /// Which setting.
+        /// Name of the setting.
         name: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
     },
     /// A weight must not be negative, and weights on the input must be positive.
     #[error("weight.{name}[{index}] = {value} is not allowed: P must not be negative, Q must be positive")]
     Weight {
-        /// P or Q.
+        /// Name of the weight, P or Q.
         name: &'static str,
         /// Position on the diagonal, from 1.
         index: usize,
-        /// Its value.
+        /// Value of the weight.
         value: f64,
     },
     /// A quantity is outside its range.
     #[error("{name} = {value} must be at least {low} and below {high}")]
     OutOfRange {
-        /// Which setting.
+        /// Name of the setting.
         name: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
-        /// Smallest allowed value.
+        /// Smallest value that is allowed.
         low: f64,
-        /// First value no longer allowed.
+        /// Upper end of the range; it is not allowed itself.
         high: f64,
     },
-    /// The delay that a prediction makes up for is out of its range.
+    /// The delay that a prediction compensates for is out of its range.
     #[error("delay = {value} s must lie between 0 and {longest} s")]
     Delay {
-        /// Its value, s.
+        /// Value of the delay, s.
         value: f64,
-        /// Largest allowed value, s.
+        /// Largest value that is allowed, s.
         longest: f64,
     },
-    /// The two rates do not fit.
+    /// The two periods do not fit together.
     #[error(
         "period.optimisation = {optimisation} s must be a whole multiple of period.feedback = {feedback} s"
     )]
@@ -105,21 +107,21 @@ pub enum DesignError {
         /// Feedback period, s.
         feedback: f64,
     },
-    /// A control surface's limits do not fit.
+    /// The limits of a control surface are inconsistent.
     #[error(
         "surface {index}: the limits limit.surfaceMin = {min} and limit.surfaceMax = {max} must be finite and hold zero, and limit.surfaceRate = {rate} must be finite and not negative"
     )]
     Surface {
-        /// Which surface, from 1.
+        /// Number of the surface, from 1.
         index: usize,
-        /// Least deflection, rad.
+        /// Smallest deflection, rad.
         min: f64,
-        /// Greatest deflection, rad.
+        /// Largest deflection, rad.
         max: f64,
-        /// Greatest deflection rate, rad/s.
+        /// Largest deflection rate, rad/s.
         rate: f64,
     },
-    /// The modulator does not fit into the allocator's period.
+    /// The period of the allocation is not a multiple of the modulator's.
     #[error("period = {period} s must be a whole multiple of pwpf.period = {pwpf} s")]
     Modulation {
         /// Period of the allocation, s.
@@ -127,38 +129,38 @@ pub enum DesignError {
         /// Period of the modulator, s.
         pwpf: f64,
     },
-    /// Nothing is left of one of the paper's sets after tightening.
+    /// One of the paper's sets is empty after tightening.
     #[error(
         "nothing is left of the paper's set: {name} = {value:.4}; lower disturbance.bound or the reference bounds, or raise the limits"
     )]
     EmptySet {
-        /// Which set's size.
+        /// Symbol of the set's size.
         name: &'static str,
-        /// Its value.
+        /// Value of the set's size.
         value: f64,
     },
     /// A gain, given by its name, must be positive and finite.
     #[error("{name} must be positive and finite throughout, not {value}")]
     Setting {
-        /// Which setting.
+        /// Name of the setting.
         name: String,
-        /// The value at fault.
+        /// Value of the setting.
         value: f64,
     },
     /// A matrix must have an inverse.
     #[error("{name} must be finite and have an inverse")]
     Singular {
-        /// Which matrix.
+        /// Name of the matrix.
         name: String,
     },
     /// A quantity must exceed a bound.
     #[error("{name} = {value} must be finite and above {bound}")]
     NotAbove {
-        /// Which setting.
+        /// Name of the setting.
         name: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
-        /// What it must exceed.
+        /// Bound that the value must exceed.
         bound: f64,
     },
     /// Condition (46) of Wu 2015 does not hold.
@@ -178,9 +180,9 @@ pub enum DesignError {
     WeakReaching {
         /// Axis, from 1: roll, pitch, yaw.
         index: usize,
-        /// ρ_n, rad/s².
+        /// Gain ρ_n of the reaching law, rad/s².
         rho: f64,
-        /// What it must exceed, rad/s².
+        /// Acceleration that ρ_n must exceed, rad/s².
         needed: f64,
     },
     /// The solver refuses the problem.
@@ -188,7 +190,7 @@ pub enum DesignError {
     Solver(String),
 }
 
-/// What is missing, and what would be accepted.
+/// Returns what is missing for a guarantee, and which values would be accepted.
 fn no_guarantee(error: &DesignError) -> String {
     let DesignError::NoGuarantee {
         moment_left,
@@ -243,7 +245,8 @@ fn no_guarantee(error: &DesignError) -> String {
     )
 }
 
-/// Rounded down to four digits after the point, so that the number printed is accepted.
+/// Returns the value rounded down to four digits after the point, so that the printed number is
+/// accepted.
 fn down(value: f64) -> f64 {
     (value * 1e4).floor() / 1e4
 }

@@ -1,13 +1,15 @@
-//! Error dynamics under the feedback law, sampled: what a bounded disturbance can do to them.
+//! Sampled error dynamics under the feedback law: the effect of a bounded disturbance.
 //!
-//! Per axis the deviation o = (angle, rate) of the vehicle from the nominal motion obeys ö = K o + Δ (Chai 2022, (22)),
-//! with K o computed every `period` and held. The bounds here are exact: sums of absolute impulse responses (L1 norms)
-//! under zero-order hold, not the peak of the step response that the paper's c̄ is (that one holds for a constant Δ only).
+//! Per axis the deviation o = (angle, rate) of the vehicle from the nominal motion obeys
+//! ö = K o + Δ (Chai 2022, (22)), with K o computed every `period` and held. The bounds here are
+//! exact: they are sums of absolute impulse responses (L1 norms) under zero-order hold. The paper's
+//! c̄ is the peak of the step response instead, which holds for a constant Δ only.
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Feedback gain of one axis with the paper's signs: u = k1 · angle + k2 · rate, both negative (1/s², 1/s).
+/// Feedback gain of one axis with the paper's signs: u = k1 · angle + k2 · rate, both negative
+/// (1/s², 1/s).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gain {
     /// Gain on the angle, 1/s².
@@ -17,13 +19,13 @@ pub struct Gain {
 }
 
 impl Gain {
-    /// The gain as a row.
+    /// Returns the gain as a row vector.
     pub fn row(&self) -> RowVector2<f64> {
         RowVector2::new(self.k1, self.k2)
     }
 
-    /// Eigenvalues (slower, faster) of the continuous error dynamics, if they are real, distinct and stable, as
-    /// Lemma 3 of Chai 2022 demands: k1 < 0, k2 < 0, k2² + 4 k1 > 0.
+    /// Returns the eigenvalues (slower, faster) of the continuous error dynamics if they are real,
+    /// distinct and stable, as Lemma 3 of Chai 2022 requires: k1 < 0, k2 < 0, k2² + 4 k1 > 0.
     pub fn eigenvalues(&self) -> Option<(f64, f64)> {
         let discriminant = self.k2 * self.k2 + 4.0 * self.k1;
         (self.k1 < 0.0 && self.k2 < 0.0 && discriminant > 0.0).then(|| {
@@ -33,12 +35,12 @@ impl Gain {
     }
 }
 
-/// State transition of the double integrator over `h`.
+/// Returns the state transition of the double integrator over `h`.
 pub fn transition(h: f64) -> Matrix2<f64> {
     Matrix2::new(1.0, h, 0.0, 1.0)
 }
 
-/// ∫ |c₀ + c₁ u| du over `within`.
+/// Returns ∫ |c₀ + c₁ u| du over `within`.
 fn integral_of_size(c0: f64, c1: f64, within: (f64, f64)) -> f64 {
     let primitive = |u: f64| c0 * u + 0.5 * c1 * u * u;
     let (low, high) = within;
@@ -50,30 +52,32 @@ fn integral_of_size(c0: f64, c1: f64, within: (f64, f64)) -> f64 {
     }
 }
 
-/// Response of the double integrator to a unit acceleration held over `h`.
+/// Returns the response of the double integrator to a unit acceleration held over `h`.
 pub fn response(h: f64) -> Vector2<f64> {
     Vector2::new(0.5 * h * h, h)
 }
 
-/// Bounds on the deviation of one axis, per unit of the bound on what drives it. Units are for a disturbance in rad/s².
+/// Bounds on the deviation of one axis, per unit of the bound on its cause. The units are those for
+/// a disturbance in rad/s².
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub struct Reach {
     /// Largest deviation of the angle, s².
     pub angle: f64,
-    /// Largest deviation of its rate, s.
+    /// Largest deviation of the rate, s.
     pub rate: f64,
-    /// Largest deviation of the angle that the law acts on: without what happened since the measurement, s².
+    /// Largest deviation of the angle in the predicted state on which the law acts, s². It excludes
+    /// the effects since the measurement.
     pub seen_angle: f64,
-    /// The same of the rate, s.
+    /// Largest deviation of the rate in the predicted state on which the law acts, s.
     pub seen_rate: f64,
     /// Largest |K o| that the law commands, dimensionless.
     pub feedback: f64,
-    /// What the feedback holds, each part times how long ago it was caused, s.
+    /// Sum of the parts of the feedback, each multiplied by the time since it was caused, s.
     pub feedback_age: f64,
 }
 
 impl Reach {
-    /// The sum of each.
+    /// Returns the sum of each bound and its counterpart.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Self {
         Self {
@@ -86,7 +90,7 @@ impl Reach {
         }
     }
 
-    /// The larger of each.
+    /// Returns the larger of each bound and its counterpart.
     #[must_use]
     pub fn or(&self, other: &Self) -> Self {
         Self {
@@ -99,7 +103,7 @@ impl Reach {
         }
     }
 
-    /// Every bound times `size`.
+    /// Returns every bound multiplied by `size`.
     #[must_use]
     pub fn times(&self, size: f64) -> Self {
         Self {
@@ -113,24 +117,26 @@ impl Reach {
     }
 }
 
-/// Error dynamics of one axis with the feedback sampled every `period` seconds. The law acts `latency` seconds after its measurement, on
-/// the state predicted for that instant.
+/// Error dynamics of one axis with the feedback sampled every `period` seconds. The law acts
+/// `latency` seconds after its measurement, on the state predicted for that instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledError {
     gain: Gain,
     period: f64,
     latency: f64,
-    /// o⁺ = Φ o + Γ Δ for a held Δ.
+    /// Matrices of o⁺ = Φ o + Γ Δ for a held Δ.
     phi: Matrix2<f64>,
     gamma: Vector2<f64>,
 }
 
-/// Impulse responses that an invariant set holds one by one; the rest of them is bounded along the eigenvectors.
+/// Number of impulse responses that an invariant set holds one by one; the remaining ones are
+/// bounded along the eigenvectors.
 const EXPLICIT: usize = 30;
 
-/// A zonotope {Σ c_i g_i : |c_i| ≤ 1}: the impulse responses Φⁱ Γ for i < n, and the sum of all later ones bounded along the two
-/// eigenvectors. One step of the error dynamics leads from it into itself, exactly: the first of the later responses
-/// moves into the place that the step makes free.
+/// A zonotope {Σ c_i g_i : |c_i| ≤ 1}. Its generators are the impulse responses Φⁱ Γ for i < n, and
+/// the sum of all later ones bounded along the two eigenvectors. One step of the error dynamics
+/// leads exactly from the set into itself: the first of the later responses takes the place that
+/// the step vacates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InvariantSet {
     generators: Vec<Vector2<f64>>,
@@ -139,18 +145,19 @@ pub struct InvariantSet {
 }
 
 impl InvariantSet {
-    /// max nᵀo over the set.
+    /// Returns the support max nᵀo over the set.
     pub fn support(&self, normal: &Vector2<f64>) -> f64 {
         self.generators.iter().map(|g| normal.dot(g).abs()).sum()
     }
 
-    /// The set as {o : |nᵀo| ≤ 1 for each n}.
+    /// Returns normals n with which the set is {o : |nᵀo| ≤ 1 for each n}.
     pub fn normals(&self) -> Vec<Vector2<f64>> {
         let across = self.generators.iter().map(|g| Vector2::new(-g.y, g.x));
         across.map(|normal| normal / self.support(&normal)).collect()
     }
 
-    /// Its largest angle, rate and feedback, and what happens besides while a command is under way.
+    /// Returns the largest angle, rate and feedback of the set, including the effects while a
+    /// command is under way.
     pub fn reach(&self) -> Reach {
         let (angle, rate) = (self.support(&Vector2::x()), self.support(&Vector2::y()));
         Reach {
@@ -164,32 +171,37 @@ impl InvariantSet {
     }
 }
 
-/// Largest spectral radius of sampled dynamics that count as stable: what is slower than 10⁴ periods cannot be told from what stays.
+/// Largest spectral radius of sampled dynamics that count as stable: a decay slower than 10⁴
+/// periods cannot be distinguished from none.
 const LARGEST_RADIUS: f64 = 1.0 - 1e-4;
 
 impl SampledError {
-    /// Error dynamics under `gain` sampled every `period` s, acting at once.
+    /// Returns the error dynamics under `gain` sampled every `period` s, acting at once.
     pub fn new(gain: Gain, period: f64) -> Self {
         let gamma = response(period);
         Self { gain, period, latency: 0.0, phi: transition(period) + gamma * gain.row(), gamma }
     }
 
-    /// The same, acting `latency` s after the measurement.
+    /// Returns the error dynamics under `gain` sampled every `period` s, acting `latency` s after
+    /// the measurement.
     pub fn delayed(gain: Gain, period: f64, latency: f64) -> Self {
         Self { latency, ..Self::new(gain, period) }
     }
 
-    /// Largest magnitude of the closed-loop eigenvalues; stable if below 1.
+    /// Returns the largest magnitude of the closed-loop eigenvalues; the dynamics are stable if it
+    /// is below 1.
     pub fn spectral_radius(&self) -> f64 {
         let (trace, det) = (self.phi.trace(), self.phi.determinant());
         let discriminant = 0.25 * trace * trace - det;
         if discriminant < 0.0 { det.sqrt() } else { 0.5 * trace.abs() + discriminant.sqrt() }
     }
 
-    /// What any measurable |Δ| ≤ 1 can do within 0, 1, …, `steps` periods from o = 0.
+    /// Returns the largest effect of any measurable |Δ| ≤ 1 within 0, 1, …, `steps` periods from
+    /// o = 0.
     ///
-    /// A pulse at time v moves the vehicle freely, to [u; 1] after u seconds, until the first tick whose measurement was taken after v: then
-    /// `latency` ≤ u < `latency` + `period`. From there on it fades by Φ. The bounds are the integrals of the absolute responses.
+    /// A pulse at time v moves the vehicle freely, to [u; 1] after u seconds, until the first tick
+    /// whose measurement was taken after v; then `latency` ≤ u < `latency` + `period`. From there
+    /// on it fades by Φ. The bounds are the integrals of the absolute responses.
     pub fn reach(&self, steps: usize) -> Vec<Reach> {
         let unseen =
             Reach { angle: 0.5 * self.latency * self.latency, rate: self.latency, ..Reach::default() };
@@ -199,7 +211,7 @@ impl SampledError {
         all.push(reach);
         let mut power = Matrix2::identity();
         for n in 0..steps {
-            // [u; 1] has become Φⁿ [u; 1].
+            // By now [u; 1] has become Φⁿ [u; 1].
             let size = |row: RowVector2<f64>| integral_of_size(row.y, row.x, within);
             let (angle, rate) = (size(power.row(0).into()), size(power.row(1).into()));
             let feedback = size(self.gain.row() * power);
@@ -217,27 +229,31 @@ impl SampledError {
         all
     }
 
-    /// The limit of [`Self::reach`] for infinitely many periods; `None` if the dynamics are not stable.
+    /// Returns the limit of [`Self::reach`] for infinitely many periods; `None` if the dynamics are
+    /// not stable.
     pub fn reach_forever(&self) -> Option<Reach> {
         self.reach(self.settling()?).pop()
     }
 
-    /// Periods after which a response has fallen below rounding; `None` if the dynamics are not stable.
+    /// Returns the number of periods after which a response has fallen below rounding; `None` if
+    /// the dynamics are not stable.
     pub fn settling(&self) -> Option<usize> {
         let radius = self.spectral_radius();
-        // Falls at least as fast as n·radiusⁿ.
+        // The response falls at least as fast as n·radiusⁿ.
         (radius <= LARGEST_RADIUS).then(|| (60.0 / -radius.max(0.5).ln()).ceil() as usize)
     }
 
-    /// What errors of the measured angle and of the measured rate can do within 0, 1, …, `steps` periods, per unit of their bound; they may be anything
-    /// within it at every tick. The motion begins at the measured state.
+    /// Returns the largest effect of errors of the measured angle and of the measured rate within
+    /// 0, 1, …, `steps` periods, per unit of their bound. The errors may take any value within the
+    /// bound at every tick. The motion begins at the measured state.
     pub fn errors(&self, steps: usize) -> [Vec<Reach>; 2] {
         [Vector2::new(1.0, 0.0), Vector2::new(self.latency, 1.0)]
             .map(|newest| self.errors_along(newest, steps))
     }
 
-    /// With an error e of the measurement the predicted state is off by `newest` = A_d e (A_d: `latency`), and so
-    /// ô_n = A_d e_n + Σ_{0<j<n} Φ^{n−1−j} Γ K A_d e_j − Φ^{n−1} A A_d e_0. The vehicle itself deviates by o_n = ô_n − A_d e_n.
+    /// With an error e of the measurement the predicted state is wrong by `newest` = A_d e, where
+    /// A_d is the transition over `latency`. Then ô_n = A_d e_n + Σ_{0<j<n} Φ^{n−1−j} Γ K A_d e_j −
+    /// Φ^{n−1} A A_d e_0, and the vehicle itself deviates by o_n = ô_n − A_d e_n.
     fn errors_along(&self, newest: Vector2<f64>, steps: usize) -> Vec<Reach> {
         let Self { gain, period, phi, gamma, .. } = *self;
         let feedback = |deviation: &Vector2<f64>| (gain.row() * deviation).x.abs();
@@ -267,7 +283,8 @@ impl SampledError {
         all
     }
 
-    /// What shifts of the angle alone, by no more than the period at each tick, can do within 0, 1, …, `steps` periods, in s, 1 and 1/s.
+    /// Returns the largest effect of shifts of the angle alone, by at most the period at each tick,
+    /// within 0, 1, …, `steps` periods, in s, 1 and 1/s.
     pub fn shifts(&self, steps: usize) -> Vec<Reach> {
         let mut shift = Vector2::new(self.period, 0.0);
         let mut reach = Reach::default();
@@ -288,10 +305,12 @@ impl SampledError {
         all
     }
 
-    /// A set that |Δ| ≤ 1, held over each period, can never drive the deviation out of, together with shifts of the angle by up to `lateral` (s²) at
-    /// each tick. `None` if the dynamics are not stable with real, distinct eigenvalues.
+    /// Returns a set that the deviation never leaves under any |Δ| ≤ 1 that is held over each
+    /// period, together with shifts of the angle by up to `lateral` (s²) at each tick. The result
+    /// is `None` if the dynamics are not stable with real, distinct eigenvalues.
     ///
-    /// A Δ that changes within the period does what its mean does, and shifts the angle by no more than τ²/4 besides.
+    /// A Δ that changes within the period acts as its mean does, and also shifts the angle by no
+    /// more than τ²/4.
     pub fn invariant_set(&self, lateral: f64) -> Option<InvariantSet> {
         let (trace, det) = (self.phi.trace(), self.phi.determinant());
         let discriminant = 0.25 * trace * trace - det;
@@ -303,7 +322,7 @@ impl SampledError {
         let basis = Matrix2::from_columns(&vectors).try_inverse()?;
 
         let mut generators = Vec::with_capacity(EXPLICIT + 2);
-        // Free until a measurement has seen it.
+        // The response is free until a measurement has seen it.
         let mut impulse = transition(self.latency) * self.gamma;
         for _ in 0..EXPLICIT {
             generators.push(impulse);
@@ -316,17 +335,17 @@ impl SampledError {
         Some(InvariantSet { generators, gain: self.gain, latency: self.latency })
     }
 
-    /// Sampling period, s.
+    /// Returns the sampling period, s.
     pub fn period(&self) -> f64 {
         self.period
     }
 
-    /// Φ, the transition over one period under the held feedback.
+    /// Returns Φ, the transition over one period under the held feedback.
     pub fn transition(&self) -> &Matrix2<f64> {
         &self.phi
     }
 
-    /// One period: o⁺ = Φ o + Γ Δ.
+    /// Returns the deviation after one period: o⁺ = Φ o + Γ Δ.
     pub fn advance(&self, deviation: &Vector2<f64>, disturbance: f64) -> Vector2<f64> {
         self.phi * deviation + self.gamma * disturbance
     }
@@ -338,7 +357,7 @@ mod tests {
 
     #[test]
     fn oracle_no_step_leads_out_of_the_invariant_set() {
-        // Support functions: h(Φᵀn) + |nᵀΓ| ≤ h(n) for every facet of the set.
+        // Condition on the support function h: h(Φᵀn) + |nᵀΓ| ≤ h(n) for every facet of the set.
         for (k, period) in [(-5.0, 0.04), (-5.0, 0.2), (-10.0, 0.04), (-4.5, 0.1)] {
             let error = SampledError::new(Gain { k1: k, k2: k }, period);
             let lateral = 0.25 * period * period;
@@ -351,7 +370,8 @@ mod tests {
                 let after = set.support(&(error.phi.transpose() * normal)) + driven;
                 assert!(after <= 1.0 + 1e-12, "K = {k} at {period} s: {after}");
             }
-            // Without shifts it is that of held disturbances, which reach no further than those that change at any time.
+            // Without shifts the set is that of held disturbances, which reach no further than
+            // disturbances that change at any time.
             let (set, held) = (set.reach(), error.invariant_set(0.0).unwrap().reach());
             let reach = error.reach_forever().unwrap();
             for (outer, held, exact) in [
@@ -364,7 +384,8 @@ mod tests {
         }
     }
 
-    /// Largest |angle|, |rate| and |K ô| at each tick over all signs of what `drive` gives for a source: by superposition the sum over the sources.
+    /// Largest |angle|, |rate| and |K ô| at each tick over all signs of the sources' responses
+    /// (`respond`): by superposition this is the sum over the sources.
     fn superposed(steps: usize, sources: usize, respond: impl Fn(usize) -> Vec<[f64; 5]>) -> Vec<[f64; 5]> {
         let mut sums = vec![[0.0; 5]; steps + 1];
         for source in 0..sources {
@@ -414,7 +435,8 @@ mod tests {
 
     #[test]
     fn oracle_pulses_add_up_as_in_a_simulation() {
-        // Pulses of a thousandth of a period, each seen by the first measurement after it, `latency` before the tick that it leads to.
+        // Each pulse lasts a thousandth of a period. It is seen by the first measurement after it,
+        // `latency` before the tick of the resulting command.
         let (period, fine) = (0.04, 1000);
         let pulse = period / f64::from(fine);
         for late in [0, 1000, 2925] {
@@ -430,7 +452,7 @@ mod tests {
                     .map(|n| {
                         let time = f64::from(n) * period;
                         let free = (time - begins).max(0.0);
-                        // Before a measurement has seen it, it moves freely.
+                        // Before a measurement has seen the pulse, the motion is free.
                         let fresh = if free > 0.0 && free < latency {
                             Vector2::new(free, 1.0)
                         } else {
@@ -453,14 +475,16 @@ mod tests {
 
     #[test]
     fn oracle_a_held_disturbance_reaches_as_far_as_one_that_changes_within_the_period() {
-        // Where the response does not change its sign within a period. (26) is for constant ones.
+        // Here the response does not change its sign within a period. (26) is for constant
+        // disturbances.
         let reach = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04).reach_forever().unwrap();
         assert!((reach.angle - 0.2).abs() < 1e-4 && (reach.feedback - 1.2473).abs() < 1e-4, "{reach:?}");
     }
 
     #[test]
     fn the_papers_box_is_not_invariant() {
-        // From the corner (1/|k1|, 0) of (26), where the rate may still be c̄: the angle leaves the box within one tick.
+        // The start is the corner (1/|k1|, 0) of (26), where the rate may still be c̄: the angle
+        // leaves the box within one tick.
         let error = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04);
         let (angle, rate) = (0.2, 0.1525);
         let next = error.advance(&Vector2::new(angle, rate), 1.0);

@@ -1,4 +1,5 @@
-//! Attitude controllers of the papers. Knows the vehicle, not FMI. SI units and radians throughout.
+//! Attitude control laws of the papers, with estimation and allocation. The crate knows the vehicle
+//! but not FMI. SI units and radians are used throughout.
 
 pub mod allocation;
 pub mod closed_loop;

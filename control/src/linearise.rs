@@ -1,30 +1,34 @@
-//! Body rates, control moment and input as functions of the nominal motion (Θ, x_ω, a), a = ẋ_ω, with exact derivatives.
+//! Body rates, control moment and input as functions of the nominal motion (Θ, x_ω, a), a = ẋ_ω,
+//! with exact derivatives.
 //!
-//! ω = W x_ω with W = R⁻¹ (Chai 2022, proof of Lemma 1), hence ω̇ = W a + Ẇ x_ω, and from Euler's equation and u = R I⁻¹ m (4)
+//! ω = W x_ω with W = R⁻¹ (Chai 2022, proof of Lemma 1), hence ω̇ = W a + Ẇ x_ω, and from Euler's
+//! equation and u = R I⁻¹ m (4)
 //!
 //! m = I ω̇ + ω × I ω,  u = R I⁻¹ m = a − f.
 //!
-//! The angle of attack turns W about the pitch axis: ∂W/∂α = W × e_y, column by column, so that every derivative by α is a cross
-//! product and only those by β are written out.
+//! The angle of attack turns W about the pitch axis: ∂W/∂α = W × e_y, column by column, so that
+//! every derivative by α is a cross product and only those by β are written out.
 
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 use std::f64::consts::SQRT_2;
 use vehicle::dynamics::RigidBody;
 
-/// A vector quantity y(Θ, x_ω, a) at a point, and its partial derivatives. Nothing depends on the bank angle.
+/// A vector quantity y(Θ, x_ω, a) at a point with its partial derivatives. Nothing depends on the
+/// bank angle.
 #[derive(Clone, Copy, Debug)]
 pub struct Linear {
-    /// y.
+    /// Value of y at the point.
     pub value: Vector3<f64>,
-    /// ∂y/∂(α, β).
+    /// Derivative ∂y/∂(α, β) of the quantity.
     pub by_angles: Matrix3x2<f64>,
-    /// ∂y/∂x_ω.
+    /// Derivative ∂y/∂x_ω of the quantity.
     pub by_rates: Matrix3<f64>,
-    /// ∂y/∂a.
+    /// Derivative ∂y/∂a of the quantity.
     pub by_acceleration: Matrix3<f64>,
 }
 
-/// W = R⁻¹ at given angles, and its derivatives by β: W x = T(α) V(β) x, where T turns about the pitch axis.
+/// The matrix W = R⁻¹ at given angles with its derivatives by β: W x = T(α) V(β) x, where T turns
+/// about the pitch axis.
 #[derive(Clone, Copy, Debug)]
 pub struct InverseKinematics {
     /// Sine and cosine of α.
@@ -34,40 +38,40 @@ pub struct InverseKinematics {
 }
 
 impl InverseKinematics {
-    /// At these angles, rad.
+    /// Computes the kinematics at these angles, rad.
     pub fn at(angles: &Vector3<f64>) -> Self {
         Self { alpha: angles.x.sin_cos(), beta: angles.y.sin_cos() }
     }
 
-    /// T [p, t, q].
+    /// Returns the turned vector T [p, t, q].
     #[inline]
     fn turn(&self, p: f64, t: f64, q: f64) -> Vector3<f64> {
         let (sa, ca) = self.alpha;
         Vector3::new(ca * p + sa * q, t, sa * p - ca * q)
     }
 
-    /// W x.
+    /// Returns the product W x.
     #[inline]
     fn w(&self, x: &Vector3<f64>) -> Vector3<f64> {
         let (sb, cb) = self.beta;
         self.turn(-cb * (sb * x.x + x.z), cb * cb * x.x - sb * x.z, x.y)
     }
 
-    /// ∂W/∂β x.
+    /// Returns the product ∂W/∂β x.
     #[inline]
     fn w_beta(&self, x: &Vector3<f64>) -> Vector3<f64> {
         let (sb, cb) = self.beta;
         self.turn(sb * x.z - (cb * cb - sb * sb) * x.x, -cb * (2.0 * sb * x.x + x.z), 0.0)
     }
 
-    /// ∂²W/∂β² x.
+    /// Returns the product ∂²W/∂β² x.
     #[inline]
     fn w_beta_beta(&self, x: &Vector3<f64>) -> Vector3<f64> {
         let (sb, cb) = self.beta;
         self.turn(cb * (4.0 * sb * x.x + x.z), sb * x.z - 2.0 * (cb * cb - sb * sb) * x.x, 0.0)
     }
 
-    /// The columns of W and of ∂W/∂β.
+    /// Returns the columns of W and of ∂W/∂β.
     #[inline]
     fn columns(&self) -> ([Vector3<f64>; 3], [Vector3<f64>; 3]) {
         let (sb, cb) = self.beta;
@@ -77,18 +81,18 @@ impl InverseKinematics {
         (w, w_beta)
     }
 
-    /// W.
+    /// Returns the matrix W = R⁻¹.
     pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::from_columns(&self.columns().0)
     }
 
-    /// ω and ∂ω/∂(α, β).
+    /// Returns ω and ∂ω/∂(α, β) for the given x_ω.
     pub fn body_rates(&self, angle_rates: &Vector3<f64>) -> (Vector3<f64>, [Vector3<f64>; 2]) {
         let rates = self.w(angle_rates);
         (rates, [by_alpha(&rates), self.w_beta(angle_rates)])
     }
 
-    /// m, as [`moment`].
+    /// Returns the moment m, as [`moment`] does.
     pub fn moment(
         &self,
         body: &RigidBody,
@@ -100,7 +104,7 @@ impl InverseKinematics {
         body.inertia * omega_dot + rates.cross(&(body.inertia * rates))
     }
 
-    /// ω with its derivatives by (α, β), and the moment that each acceleration takes.
+    /// Returns ω with its derivatives by (α, β), and the moment as a function of the acceleration.
     pub fn motion(&self, body: &RigidBody, angle_rates: &Vector3<f64>) -> BodyMotion {
         let (rates, by_angles) = self.body_rates(angle_rates);
         let omega_dot = self.acceleration(angle_rates, &Vector3::zeros(), &by_angles);
@@ -112,7 +116,7 @@ impl InverseKinematics {
         }
     }
 
-    /// u = R I⁻¹ m, as [`input`].
+    /// Returns the input u = R I⁻¹ m, as [`input`] does.
     pub fn input(
         &self,
         body: &RigidBody,
@@ -122,7 +126,7 @@ impl InverseKinematics {
         self.r(&(body.inverse * self.moment(body, angle_rates, acceleration)))
     }
 
-    /// ω̇ = W a + Ẇ x_ω, Ẇ x_ω = ∂ω/∂α α̇ + ∂ω/∂β β̇.
+    /// Returns ω̇ = W a + Ẇ x_ω with Ẇ x_ω = ∂ω/∂α α̇ + ∂ω/∂β β̇.
     fn acceleration(
         &self,
         x: &Vector3<f64>,
@@ -132,7 +136,8 @@ impl InverseKinematics {
         self.w(a) + by_angles[0] * x.x + by_angles[1] * x.y
     }
 
-    /// R y = [y_y − p tan β, q, −p cos β − y_y sin β] with p = y_x cos α + y_z sin α, q = y_x sin α − y_z cos α.
+    /// Returns R y = [y_y − p tan β, q, −p cos β − y_y sin β] with p = y_x cos α + y_z sin α,
+    /// q = y_x sin α − y_z cos α.
     fn r(&self, y: &Vector3<f64>) -> Vector3<f64> {
         let ((sa, ca), (sb, cb)) = (self.alpha, self.beta);
         let (p, q) = (ca * y.x + sa * y.z, sa * y.x - ca * y.z);
@@ -140,37 +145,38 @@ impl InverseKinematics {
     }
 }
 
-/// What a motion is like at some angles and their rates, whatever its acceleration.
+/// Properties of a motion at given angles and rates, for any acceleration.
 #[derive(Clone, Copy, Debug)]
 pub struct BodyMotion {
-    /// ω, rad/s.
+    /// Body rates ω, rad/s.
     pub rates: Vector3<f64>,
-    /// ∂ω/∂(α, β).
+    /// Derivative ∂ω/∂(α, β), column by column.
     pub rates_by_angles: [Vector3<f64>; 2],
-    /// ∂m/∂a = I W.
+    /// Derivative of the moment, ∂m/∂a = I W.
     pub moment_by_acceleration: Matrix3<f64>,
-    /// I Ẇ x_ω + ω × I ω: m for a = 0, N m.
+    /// Moment m for a = 0, which is I Ẇ x_ω + ω × I ω, N m.
     pub moment_at_rest: Vector3<f64>,
 }
 
 impl BodyMotion {
-    /// m for this acceleration, N m.
+    /// Returns the moment for this acceleration, N m.
     pub fn moment(&self, acceleration: &Vector3<f64>) -> Vector3<f64> {
         self.moment_by_acceleration * acceleration + self.moment_at_rest
     }
 }
 
-/// y × e_y: the derivative by α of a vector that α turns with W.
+/// Returns y × e_y: the derivative by α of a vector that α turns together with W.
 fn by_alpha(y: &Vector3<f64>) -> Vector3<f64> {
     Vector3::new(-y.z, 0.0, y.x)
 }
 
-/// Body rates ω = R⁻¹(Θ) x_ω, rad/s.
+/// Returns the body rates ω = R⁻¹(Θ) x_ω, rad/s.
 pub fn body_rates(angles: &Vector3<f64>, angle_rates: &Vector3<f64>) -> Vector3<f64> {
     InverseKinematics::at(angles).w(angle_rates)
 }
 
-/// Control moment that gives the nominal motion the acceleration `a` (rad/s²): m = I R⁻¹ (a − f), N m.
+/// Returns the control moment that gives the nominal motion the acceleration `a` (rad/s²): m = I
+/// R⁻¹ (a − f), N m.
 pub fn moment(
     body: &RigidBody,
     angles: &Vector3<f64>,
@@ -180,7 +186,7 @@ pub fn moment(
     InverseKinematics::at(angles).moment(body, angle_rates, acceleration)
 }
 
-/// The input u = R I⁻¹ m = a − f of Chai 2022 (4), rad/s².
+/// Returns the input u = R I⁻¹ m = a − f of Chai 2022 (4), rad/s².
 pub fn input(
     body: &RigidBody,
     angles: &Vector3<f64>,
@@ -190,16 +196,16 @@ pub fn input(
     InverseKinematics::at(angles).input(body, angle_rates, acceleration)
 }
 
-/// Body rates and moment together with their derivatives at one point of a motion.
+/// Body rates and moment with their derivatives at one point of a motion.
 #[derive(Clone, Copy, Debug)]
 pub struct Linearisation {
-    /// ω, rad/s.
+    /// Body rates ω with derivatives, rad/s.
     pub rates: Linear,
-    /// m, N m.
+    /// Control moment m with derivatives, N m.
     pub moment: Linear,
 }
 
-/// Derivatives of ω and m at (Θ, x_ω, a).
+/// Returns ω and m with their derivatives at (Θ, x_ω, a).
 pub fn linearise(
     body: &RigidBody,
     angles: &Vector3<f64>,
@@ -210,7 +216,7 @@ pub fn linearise(
 }
 
 impl InverseKinematics {
-    /// Derivatives of ω and m, as [`linearise`].
+    /// Returns ω and m with their derivatives, as [`linearise`] does.
     pub fn linearise(&self, body: &RigidBody, x: &Vector3<f64>, a: &Vector3<f64>) -> Linearisation {
         let (rates, rates_by_angles) = self.body_rates(x);
         let omega_dot = self.acceleration(x, a, &rates_by_angles);
@@ -218,13 +224,13 @@ impl InverseKinematics {
             self.w_beta(a) + by_alpha(&rates_by_angles[1]) * x.x + self.w_beta_beta(x) * x.y;
         let omega_dot_by_angles = [by_alpha(&omega_dot), omega_dot_by_beta];
         let (w, w_beta) = self.columns();
-        // Ẇ, and what α̇ and β̇ in it contribute.
+        // Ẇ, and the contributions of α̇ and β̇ in it.
         let mut omega_dot_by_rates: [Vector3<f64>; 3] =
             std::array::from_fn(|i| by_alpha(&w[i]) * x.x + w_beta[i] * x.y);
         omega_dot_by_rates[0] += rates_by_angles[0];
         omega_dot_by_rates[1] += rates_by_angles[1];
 
-        // ∂(ω × I ω) = ∂ω × I ω + ω × I ∂ω
+        // Product rule: ∂(ω × I ω) = ∂ω × I ω + ω × I ∂ω.
         let momentum = body.inertia * rates;
         let moment_by = |omega_dot: &Vector3<f64>, omega: &Vector3<f64>, momentum_by: &Vector3<f64>| {
             body.inertia * omega_dot + omega.cross(&momentum) + rates.cross(momentum_by)
@@ -251,11 +257,13 @@ impl InverseKinematics {
     }
 }
 
-/// Bound on ‖∂(W y)/∂(α, β)‖ over ‖y‖ (Frobenius): √(5/2). The largest eigenvalue λ of what is quadratic in y solves
-/// λ² − (2 + c²(1 + s²)) λ + c²(1 + c²) = 0 with s = sin β, c = cos β, and is below 5/2 at any β.
+/// Bound on ‖∂(W y)/∂(α, β)‖ relative to ‖y‖ (Frobenius): √(5/2). The largest eigenvalue λ of the
+/// quadratic form in y solves λ² − (2 + c²(1 + s²)) λ + c²(1 + c²) = 0 with s = sin β, c = cos β,
+/// and is below 5/2 at any β.
 pub const TURN_BY_ANGLES: f64 = 1.581_138_830_084_189_8;
 
-/// What the size of a motion alone says about the derivatives of its moment, over the largest moment of inertia.
+/// Bounds on the derivatives of the moment that follow from the size of a motion alone, relative to
+/// the largest moment of inertia.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentSlopeBounds {
     /// Bound on ‖∂m/∂(α, β)‖ (Frobenius).
@@ -265,10 +273,12 @@ pub struct MomentSlopeBounds {
 }
 
 impl MomentSlopeBounds {
-    /// At any angles, with ‖x_ω‖ ≤ x, ‖a‖ ≤ a and this ratio of the largest to the smallest moment of inertia.
+    /// Computes the bounds for any angles, with ‖x_ω‖ ≤ x, ‖a‖ ≤ a and this ratio of the largest to
+    /// the smallest moment of inertia.
     ///
-    /// From the columns above, in Frobenius' norm: ‖∂W/∂α‖² ≤ 2 and ‖∂W/∂β‖² = 2, orthogonal to each other, hence ‖Ẇ‖² ≤ 2 ‖x‖²;
-    /// ‖∂W/∂α y‖² + ‖∂W/∂β y‖² ≤ 5/2 ‖y‖²; ‖∂²W y‖² ≤ (1 + 2 · 2 + 5) ‖y‖² over α², twice αβ, and β². With principal axes,
+    /// The columns above give, in Frobenius' norm, ‖∂W/∂α‖² ≤ 2 and ‖∂W/∂β‖² = 2, orthogonal to
+    /// each other, hence ‖Ẇ‖² ≤ 2 ‖x‖². They also give ‖∂W/∂α y‖² + ‖∂W/∂β y‖² ≤ 5/2 ‖y‖², and
+    /// ‖∂²W y‖² ≤ (1 + 2 · 2 + 5) ‖y‖² over α², twice αβ, and β². With principal axes,
     /// ‖∂(ω × I ω)/∂ω‖² ≤ 2 (I_max − I_min)² ‖ω‖², and ‖ω‖ ≤ ‖x‖ as ‖W‖ = 1 (Lemma 1).
     pub fn new(x: f64, a: f64, ratio: f64) -> Self {
         let gyroscopic = SQRT_2 * (1.0 - 1.0 / ratio);
@@ -279,9 +289,11 @@ impl MomentSlopeBounds {
     }
 }
 
-/// Bound on ‖u‖ at any α and this β with these ‖x_ω‖ and ‖a‖, where `ratio` is that of the largest to the smallest moment of inertia.
+/// Returns a bound on ‖u‖ at any α and this β, with ‖x_ω‖ = `x` and ‖a‖ = `a`. `ratio` is that of
+/// the largest to the smallest moment of inertia.
 ///
-/// u = a − f with f = −R (Ẇ x_ω + I⁻¹ (ω × I ω)). ‖R‖² ≤ 2 + 1/cos²β in Frobenius' norm, ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
+/// u = a − f with f = −R (Ẇ x_ω + I⁻¹ (ω × I ω)); ‖R‖² ≤ 2 + 1/cos²β in Frobenius' norm, and
+/// ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
 pub fn input_bound(beta: f64, x: f64, a: f64, ratio: f64) -> f64 {
     let cosine = (1.0 - 0.5 * beta * beta).max(0.0);
     let r = (2.0 + 1.0 / (cosine * cosine)).sqrt();
@@ -289,8 +301,8 @@ pub fn input_bound(beta: f64, x: f64, a: f64, ratio: f64) -> f64 {
 }
 
 impl InverseKinematics {
-    /// The input u = R I⁻¹ m with its derivatives, from those of the moment. With γ = I⁻¹m and R = W⁻¹, column by column,
-    /// ∂u = R (∂γ) + (∂R) γ.
+    /// Returns the input u = R I⁻¹ m with its derivatives, from those of the moment. With γ = I⁻¹m
+    /// and R = W⁻¹, ∂u = R (∂γ) + (∂R) γ, column by column.
     pub fn input_of_moment(&self, body: &RigidBody, moment: &Linear) -> Linear {
         let ((sa, ca), (sb, cb)) = (self.alpha, self.beta);
         let (tb, sec2) = (sb / cb, 1.0 / (cb * cb));
@@ -305,7 +317,7 @@ impl InverseKinematics {
             value: r * gamma,
             by_angles: torque_to_input * moment.by_angles + Matrix3x2::from_columns(&[by_alpha, by_beta]),
             by_rates: torque_to_input * moment.by_rates,
-            // R I⁻¹ I R⁻¹
+            // This derivative is R I⁻¹ I R⁻¹.
             by_acceleration: Matrix3::identity(),
         }
     }
@@ -324,7 +336,7 @@ mod tests {
 
     #[test]
     fn oracle_moment_is_that_of_the_printed_equations() {
-        // m = I R⁻¹ (a − f), Chai 2022, (4) and (7).
+        // Chai 2022, (4) and (7): m = I R⁻¹ (a − f).
         let body = body();
         let angles = Vector3::new(0.17, 0.12, -0.5);
         let (x, a) = (Vector3::new(0.05, -0.06, 0.04), Vector3::new(0.1, -0.08, 0.05));
@@ -339,7 +351,7 @@ mod tests {
     fn oracle_slopes_of_the_moment_and_the_input_stay_within_their_bounds() {
         let body = body();
         let inertia = body.inertia.symmetric_eigenvalues();
-        // A lattice of directions and sizes from a low-discrepancy sequence.
+        // The directions and sizes form a lattice from a low-discrepancy sequence.
         let at = |i: usize, j: usize| {
             let irrational =
                 [0.754_877_7, 0.569_840_3, 0.430_159_7, 0.324_717_9, 0.245_122_3, 0.185_037_6, 0.139_680_6];

@@ -1,4 +1,5 @@
-//! The linear-quadratic regulator that Chai 2022, section 5 compares with: "an unconstrained version of MPC", same P and Q.
+//! The linear-quadratic regulator of the comparison in Chai 2022, section 5: "an unconstrained
+//! version of MPC" with the same P and Q.
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
@@ -12,11 +13,11 @@ use vehicle::kinematics;
 /// Settings of the regulator. Units SI, angles rad.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LqrSettings {
-    /// The vehicle as the controller believes it to be.
+    /// Model of the vehicle that the controller uses.
     pub body: RigidBody,
-    /// P, diagonal: angles, rates.
+    /// Diagonal of the weight P: angles, then rates.
     pub p: [f64; 6],
-    /// Q, diagonal.
+    /// Diagonal of the weight Q on the input.
     pub q: [f64; 3],
     /// Time between ticks, s.
     pub period: f64,
@@ -40,21 +41,22 @@ pub struct LqrSettings {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lqr {
     settings: LqrSettings,
-    /// K per axis, with the papers' signs (negative).
+    /// Gain K per axis, with the papers' signs (negative).
     gains: [Gain; 3],
 }
 
-/// Gain of one axis from the Riccati equation AᵀS + S A − S B Q⁻¹ Bᵀ S + P = 0 of the double integrator, which has the
-/// closed form k1 = −√(P₁/Q), k2 = −√((P₂ + 2 √(P₁ Q))/Q).
+/// Returns the gain of one axis from the Riccati equation AᵀS + S A − S B Q⁻¹ Bᵀ S + P = 0 of the
+/// double integrator. Its closed form is k1 = −√(P₁/Q), k2 = −√((P₂ + 2 √(P₁ Q))/Q).
 pub fn riccati_gain(p1: f64, p2: f64, q: f64) -> Gain {
     Gain { k1: -(p1 / q).sqrt(), k2: -((p2 + 2.0 * (p1 * q).sqrt()) / q).sqrt() }
 }
 
 impl Lqr {
-    /// Computes the gains.
+    /// Computes the gains from the settings.
     ///
     /// # Errors
-    /// Names the weight or period at fault; refuses gains that the sampling makes unstable, naming the spectral radius.
+    /// Returns an error that names the weight or period at fault, or the spectral radius of gains
+    /// that the sampling makes unstable.
     pub fn new(settings: LqrSettings) -> Result<Self, DesignError> {
         if !(settings.period > 0.0 && settings.period.is_finite()) {
             return Err(DesignError::NotPositive { name: "period.feedback", value: settings.period });
@@ -77,7 +79,7 @@ impl Lqr {
         Ok(Self { settings, gains })
     }
 
-    /// K per axis.
+    /// Returns the gain K per axis.
     pub fn gains(&self) -> [Gain; 3] {
         self.gains
     }
@@ -118,7 +120,7 @@ mod tests {
     fn oracle_gain_satisfies_the_riccati_equation() {
         for (p1, p2, q) in [(50.0, 50.0, 10.0), (3.0, 0.0, 0.7), (1.0, 200.0, 5.0)] {
             let Gain { k1, k2 } = riccati_gain(p1, p2, q);
-            // S from K = −Q⁻¹BᵀS and the (1,2) entry of the equation.
+            // S follows from K = −Q⁻¹BᵀS and the (1,2) entry of the equation.
             let s = Matrix2::new(k1 * k2 * q, -k1 * q, -k1 * q, -k2 * q);
             let (a, b) = (Matrix2::new(0.0, 1.0, 0.0, 0.0), Vector2::new(0.0, 1.0));
             let residual = a.transpose() * s + s * a - s * b * b.transpose() * s / q

@@ -1,52 +1,57 @@
-//! What an optimisation reports, whichever controller does it.
+//! Report of an optimisation, common to all controllers with one.
 
 use crate::mpc;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// How the last plan came about.
+/// The way in which the last plan was found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Status {
-    /// No optimisation yet.
+    /// No optimisation has been run yet.
     #[default]
     None,
     /// The unconstrained optimum satisfies every constraint exactly, so it is the optimum.
     Unconstrained,
-    /// The optimum with the terminal ball alone satisfies every other constraint exactly, so it is the optimum.
+    /// The optimum with the terminal ball alone satisfies every other constraint exactly, so it is
+    /// the optimum.
     TerminalBall,
-    /// The optimum by the Riccati method.
+    /// The Riccati method found the optimum.
     Constrained,
-    /// The optimum by the cone solver.
+    /// The cone solver found the optimum.
     Cone,
-    /// No solver succeeded: the shifted previous plan with the terminal law.
+    /// No solver succeeded; the shifted previous plan is followed and continued with the terminal
+    /// law.
     Fallback,
-    /// No optimum was found that keeps the conditions of the guarantee: the previous plan as it is, which keeps them.
+    /// No optimum was found that satisfies the conditions of the guarantee; the previous plan,
+    /// which satisfies them, is followed.
     Kept,
 }
 
-/// What the optimisation reports.
+/// The figures that an optimisation reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Origin of the plan in force.
     pub status: Status,
-    /// Optimal cost; of the shifted plan in a fallback.
+    /// Cost of the optimum, or of the shifted plan in a fallback.
     pub cost: f64,
     /// Iterations of the solvers, summed over their passes.
     pub iterations: u32,
-    /// Residual of the conditions of optimality, relative, of the constraints as they are; of the shifted plan in a fallback.
+    /// Relative residual of the conditions of optimality with the constraints as functions of the
+    /// motion; in a fallback that of the shifted plan.
     pub residual: f64,
-    /// Wall-clock time of the last optimisation, s. Not reproducible.
+    /// Wall-clock time of the last optimisation, s; not reproducible.
     pub time: f64,
-    /// Optimisations so far.
+    /// Number of optimisations so far.
     pub solves: u32,
-    /// Fallbacks so far.
+    /// Number of fallbacks so far.
     pub fallbacks: u32,
-    /// Optimisations so far that the budget ended early.
+    /// Number of optimisations so far that the budget ended early.
     pub exhausted: u32,
 }
 
 impl Report {
-    /// Takes over how an optimisation ended that began at `clock`, and whether its budget ended it.
+    /// Records the outcome of an optimisation that began at `clock`, and whether its budget ended
+    /// it.
     pub(crate) fn record(&mut self, ended: &mpc::Report, exhausted: bool, clock: Instant) {
         self.status = ended.status;
         self.cost = ended.certificate.cost;

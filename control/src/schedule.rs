@@ -6,30 +6,30 @@ use serde::{Deserialize, Serialize};
 use vehicle::reference::Reference;
 use vehicle::time::{check_resolution, tick_time, tick_tolerance};
 
-/// Beyond this number the time of a tick is not exact.
+/// Largest number of a tick; beyond it the time of a tick is not exact.
 const LAST_TICK: u64 = 1 << 53;
 
-/// Memory of a sampled unit and where it stands in time. At a tick the output is a function of the committed memory and of
-/// the input now given: it may be evaluated any number of times, and is committed when time leaves the tick. Attitude
-/// controllers have the default input and output.
+/// Memory of a sampled unit and its position in time. At a tick the output is a function of the
+/// committed memory and of the present input. It may be evaluated any number of times, and is
+/// committed when time leaves the tick. Attitude controllers have the default input and output.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sampled<Memory, Input = ControllerInput, Output = Vector3<f64>> {
     start: f64,
-    /// The first tick that is not committed.
+    /// Number of the first tick that is not committed.
     next: u64,
     committed: Memory,
     held: Output,
-    /// Outcome of `next`, if it was evaluated, and what it was evaluated for.
+    /// Outcome of `next`, if it was evaluated, and the input of that evaluation.
     pending: Memory,
     pending_output: Output,
     evaluated: Option<Input>,
 }
 
-/// What a controller's evaluation depends on beside the committed memory.
+/// Input on which a controller's evaluation depends, besides the committed memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ControllerInput {
     measured: Measurement,
-    /// The external reference, if that is what is followed.
+    /// The external reference, if the controller follows one.
     external: Option<Reference>,
 }
 
@@ -39,28 +39,30 @@ where
     Input: PartialEq + Default,
     Output: Copy + Default,
 {
-    /// At tick 0, which is due at `start` (s), with the memory that a controller starts with.
+    /// Returns the state before tick 0, which is due at `start` (s), with the initial memory of a
+    /// controller.
     pub fn new(start: f64, memory: Memory) -> Self {
         Self { start, committed: memory.clone(), pending: memory, ..Self::default() }
     }
 
-    /// Time of the first uncommitted tick, s.
+    /// Returns the time of the first uncommitted tick, s.
     pub fn next_time(&self, period: f64) -> f64 {
         tick_time(self.next.cast_signed(), self.start, period)
     }
 
-    /// Whether a tick is due at `time` (s).
+    /// Returns whether a tick is due at `time` (s).
     pub fn is_due(&self, time: f64, period: f64) -> bool {
         self.next_time(period) <= time + tick_tolerance(time, period)
     }
 
-    /// Time of the first uncommitted tick (s), if it comes before `time` (s).
+    /// Returns the time of the first uncommitted tick (s), if it comes before `time` (s).
     pub fn next_before(&self, time: f64, period: f64) -> Option<f64> {
         Some(self.next_time(period)).filter(|tick| *tick < time - tick_tolerance(time, period))
     }
 
-    /// Whether this can be where a unit stands at `time` (s) in an experiment that began at `start` (s): all ticks before are
-    /// committed and, unless a step has `failed` in the middle, none that come later. `fits` looks at each memory.
+    /// Returns whether a unit can be in this state at `time` (s) in an experiment that began at
+    /// `start` (s). All earlier ticks must be committed and, unless a step has `failed` in the
+    /// middle, no later ones. `fits` checks each memory.
     pub fn fits(
         &self,
         (start, time): (f64, f64),
@@ -78,8 +80,9 @@ where
             && fits(&self.pending)
     }
 
-    /// Evaluates the first uncommitted tick: `update` gets memory and number of the tick. It must be a function of these and
-    /// of `input`; nothing is computed again if `input` is the same.
+    /// Evaluates the first uncommitted tick. `update` receives the memory and the number of the
+    /// tick; it must be a function of these and of `input`. Nothing is computed again for an equal
+    /// `input`.
     pub fn evaluate_with(&mut self, input: Input, update: impl FnOnce(&mut Memory, u64) -> Output) {
         if self.evaluated.as_ref() == Some(&input) {
             return;
@@ -89,7 +92,7 @@ where
         self.evaluated = Some(input);
     }
 
-    /// Commits the evaluated tick: its outcome is held from now on.
+    /// Commits the evaluated tick; its outcome is held from now on.
     pub fn commit(&mut self) {
         if self.evaluated.take().is_some() {
             std::mem::swap(&mut self.committed, &mut self.pending);
@@ -98,14 +101,14 @@ where
         }
     }
 
-    /// Looks at the memories before and after the tick that was just committed.
+    /// Calls `look` with the memories before and after the tick that was just committed.
     pub fn last_change<T>(&self, look: impl FnOnce(&Memory, &Memory) -> T) -> T {
-        // `commit` swapped the older one into `pending`.
+        // `commit` has swapped the older memory into `pending`.
         look(&self.pending, &self.committed)
     }
 
-    /// The output in force (a controller's moment, N m) and the memory behind it: of the evaluated tick, else of the last
-    /// committed one.
+    /// Returns the output in force (a controller's moment, N m) and its memory. They are those of
+    /// the evaluated tick, or else of the last committed one.
     pub fn in_force(&self) -> (Output, &Memory) {
         if self.evaluated.is_some() {
             (self.pending_output, &self.pending)
@@ -116,8 +119,8 @@ where
 }
 
 impl<Memory: Clone + Default> Sampled<Memory> {
-    /// Evaluates the first uncommitted tick of a controller. Nothing is computed again if measurement and external reference are
-    /// the same.
+    /// Evaluates the first uncommitted tick of a controller. Nothing is computed again for an equal
+    /// measurement and external reference.
     pub fn evaluate<C: Controller<Memory = Memory>>(
         &mut self,
         controller: &mut C,
@@ -137,7 +140,8 @@ mod tests {
     use super::*;
     use crate::controller::ReferenceAt;
 
-    /// Sums what it measured, so that every evaluation that is lost or counted twice shows.
+    /// Sums its measurements, so that any evaluation that is lost or counted twice shows in the
+    /// sum.
     struct Sum;
 
     impl Controller for Sum {

@@ -1,9 +1,12 @@
-//! Two-loop sliding-mode control of Jia, Zhou and Zhou, "Re-entry attitude two-loop SMC of the spacecraft and its logic
-//! selection": an outer sliding mode commands body rates that steer the attitude, an inner one the moment that follows them.
+//! Two-loop sliding-mode control of Jia, Zhou and Zhou, "Re-entry attitude two-loop SMC of the
+//! spacecraft and its logic selection". An outer sliding mode commands body rates that steer the
+//! attitude, and an inner one commands the moment that follows them.
 //!
-//! The paper orders its angles φ = [γ, β, α], bank first, and its γ grows with the roll rate; ours are Θ = [α, β, σ] with
-//! σ̇ = −p cos α − … So φ = P Θ with P = [[0, 0, −1], [0, 1, 0], [1, 0, 0]], and its R is P R(Θ). Both loops act per angle and
-//! are odd, so they commute with P: the law stands here in our order, and gains are those of α, β, σ.
+//! The paper orders its angles φ = [γ, β, α], bank first, and its γ grows with the roll rate; ours
+//! are Θ = [α, β, σ] with σ̇ = −p cos α − … Hence φ = P Θ with
+//! P = [[0, 0, −1], [0, 1, 0], [1, 0, 0]], and the paper's R is P R(Θ). Both loops act on each
+//! angle separately and are odd functions, so they commute with P. The law is therefore written in
+//! our order, and gains are those of α, β, σ.
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
@@ -16,44 +19,45 @@ use vehicle::kinematics;
 use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
 
-/// One loop: s = e + K ∫e dt and the reaching law ṡ = −ρ f SAT(s/ε).
+/// One loop with s = e + K ∫e dt and the reaching law ṡ = −ρ f SAT(s/ε).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Loop {
-    /// K, diagonal, 1/s.
+    /// Diagonal of the integral gain K, 1/s.
     pub k: [f64; 3],
-    /// The reaching law; ρ in rad/s (outer) or rad/s² (inner).
+    /// Reaching law; its ρ is in rad/s (outer) or rad/s² (inner).
     pub layer: FiniteTimeLayer,
 }
 
-/// Signs of the reaching terms.
+/// Choice of the signs of the reaching terms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Form {
-    /// + ρ f SAT in both loops, f > 0: ṡ = −ρ f SAT(s/ε).
+    /// The sign is + ρ f SAT in both loops, f > 0: ṡ = −ρ f SAT(s/ε).
     Corrected,
-    /// − I ρ f SAT(s_n/ε) in the inner loop, the sign of (10): ṡ_n = +ρ f SAT(s_n/ε).
+    /// The sign is − I ρ f SAT(s_n/ε) in the inner loop, as in (10): ṡ_n = +ρ f SAT(s_n/ε).
     PrintedSign,
-    /// (7) and (11) with the minus sign that f is printed with: ṡ_w = +ρ f SAT(s_w/ε); in the inner loop two minus signs cancel.
+    /// The signs are those of (7) and (11) with the minus sign that f is printed with: ṡ_w = +ρ f
+    /// SAT(s_w/ε). In the inner loop two minus signs cancel.
     PrintedFactor,
 }
 
-/// What the outer loop takes for R.
+/// Choice of the matrix R in the outer loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum OuterKinematics {
-    /// R (2) of Chai 2022.
+    /// The matrix is R (2) of Chai 2022.
     Corrected,
-    /// (3) as it is printed: rows of α, β, γ against φ = [γ, β, α], for axes with y up.
+    /// The matrix is (3) as printed: rows of α, β, γ against φ = [γ, β, α], for axes with y up.
     Printed,
 }
 
 /// Settings of the controller. Units SI, angles rad.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TwoLoopSettings {
-    /// Signs of the reaching terms.
+    /// Choice of the signs of the reaching terms.
     pub form: Form,
-    /// What stands for R.
+    /// Choice of the matrix R in the outer loop.
     pub kinematics: OuterKinematics,
-    /// The vehicle as the controller believes it to be.
+    /// Model of the vehicle that the controller uses.
     pub body: RigidBody,
     /// Time between ticks, s.
     pub period: f64,
@@ -61,15 +65,15 @@ pub struct TwoLoopSettings {
     pub limit_moment: f64,
     /// Frequency of the critically damped filter of the command, rad/s; 0 for none.
     pub filter: f64,
-    /// Loop of the angles, α, β, σ.
+    /// Outer loop, of the angles α, β, σ.
     pub outer: Loop,
-    /// Loop of the body rates, p, q, r.
+    /// Inner loop, of the body rates p, q, r.
     pub inner: Loop,
     /// Bound on each component of M_d, N m.
     pub disturbance: [f64; 3],
-    /// Whether the integrals rest while the actuators saturate.
+    /// Whether the integrals are held while the actuators saturate.
     pub anti_windup: bool,
-    /// ‖R I⁻¹ (M_achieved − M)‖ from which on they do, rad/s².
+    /// Value of ‖R I⁻¹ (M_achieved − M)‖ above which the actuators count as saturated, rad/s².
     pub threshold: f64,
 }
 
@@ -103,10 +107,10 @@ struct AntiWindup {
 }
 
 impl TwoLoopSettings {
-    /// Ours for the scenario of section V; the paper prints no gains.
+    /// Returns our gains for the scenario of section V; the paper prints none.
     #[allow(clippy::missing_panics_doc)]
     pub fn ours() -> Self {
-        // Neither can fail, as the tests that use it show: the files are embedded.
+        // Neither can fail, as the tests that use them show: the files are embedded.
         static READ: LazyLock<File> = LazyLock::new(|| {
             toml::from_str(include_str!("../data/two-loop-smc.toml"))
                 .unwrap_or_else(|error| panic!("{error}"))
@@ -128,7 +132,7 @@ impl TwoLoopSettings {
         }
     }
 
-    /// Bound on each component of |I⁻¹ M_d|, rad/s².
+    /// Returns the bound on each component of |I⁻¹ M_d|, rad/s².
     pub fn disturbance_acceleration(&self) -> Vector3<f64> {
         self.body.inverse.abs() * Vector3::from(self.disturbance)
     }
@@ -167,7 +171,7 @@ impl TwoLoopSettings {
 }
 
 impl Form {
-    /// Factors on ρ f SAT in the outer and in the inner loop.
+    /// Returns the factors on ρ f SAT in the outer and in the inner loop.
     fn signs(self) -> (f64, f64) {
         match self {
             Self::Corrected => (1.0, 1.0),
@@ -178,12 +182,12 @@ impl Form {
 }
 
 impl OuterKinematics {
-    /// R: Θ̇ = R ω.
+    /// Returns the matrix R in Θ̇ = R ω.
     pub fn r(self, angles: &Vector3<f64>) -> Matrix3<f64> {
         match self {
             Self::Corrected => kinematics::r(angles),
             Self::Printed => {
-                // Jia, (3): φ̇ = R ω, and Θ = Pᵀ φ
+                // Jia, (3): φ̇ = R ω, and Θ = Pᵀ φ.
                 let (sa, ca) = angles.x.sin_cos();
                 Matrix3::new(ca, -sa, 0.0, sa, ca, 0.0, 0.0, 0.0, -1.0)
             }
@@ -222,7 +226,7 @@ impl Loop {
         sampled_decay(names[1], self.layer.steepest(), period)
     }
 
-    /// s, of the loop's units.
+    /// Returns the sliding variable s, in the units of the loop.
     fn sliding(&self, error: &Vector3<f64>, integral: &Vector3<f64>) -> Vector3<f64> {
         error + self.k().component_mul(integral)
     }
@@ -232,35 +236,35 @@ impl Loop {
     }
 }
 
-/// What the controller carries from tick to tick.
+/// The state that the controller carries from tick to tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TwoLoopMemory {
-    /// Whether there was a tick.
+    /// Whether there has been a tick.
     pub started: bool,
-    /// The filtered command at the last tick, and the reference it was filtered from.
+    /// Filtered command at the last tick, and the reference from which it was filtered.
     command: Reference,
     reference: Reference,
-    /// ∫e_w dt, rad s, up to the last tick.
+    /// Integral ∫e_w dt up to the last tick, rad s.
     pub outer_integral: Vector3<f64>,
-    /// ∫ω_e dt, rad, likewise.
+    /// Integral ∫ω_e dt up to the last tick, rad.
     pub inner_integral: Vector3<f64>,
-    /// e_w at the last tick, rad.
+    /// Angle error e_w at the last tick, rad.
     pub angle_error: Vector3<f64>,
-    /// ω_e at the last tick, rad/s.
+    /// Rate error ω_e at the last tick, rad/s.
     pub rate_error: Vector3<f64>,
-    /// s_w at the last tick, rad.
+    /// Sliding variable s_w at the last tick, rad.
     pub outer_sliding: Vector3<f64>,
-    /// s_n at the last tick, rad/s.
+    /// Sliding variable s_n at the last tick, rad/s.
     pub inner_sliding: Vector3<f64>,
-    /// ω_c at the last tick, rad/s.
+    /// Commanded rates ω_c at the last tick, rad/s.
     pub rate_command: Vector3<f64>,
-    /// The moment of the last tick.
+    /// Commanded moment of the last tick.
     pub commanded: Commanded,
-    /// Whether the actuators fell short in the interval before the last tick.
+    /// Whether the actuators saturated in the interval before the last tick.
     pub saturated: bool,
 }
 
-/// The controller.
+/// The two-loop sliding-mode controller.
 ///
 /// ```
 /// use control::closed_loop::fly;
@@ -283,24 +287,25 @@ pub struct TwoLoopSmc {
 }
 
 impl TwoLoopSmc {
-    /// Checks the settings.
+    /// Checks the settings of the controller.
     ///
     /// # Errors
-    /// Names the setting at fault, ρ_n ≤ |I⁻¹ M_d| among others.
+    /// Returns an error that names the setting at fault, including ρ_n ≤ |I⁻¹ M_d|.
     pub fn new(settings: TwoLoopSettings) -> Result<Self, DesignError> {
         settings.check()?;
         Ok(Self { settings })
     }
 
-    /// The filtered command: it starts at the measured motion and follows a smooth reference without lag.
+    /// Returns the filtered command. It starts at the measured motion and follows a smooth
+    /// reference without lag.
     fn filter(&self, memory: &TwoLoopMemory, measured: &Measurement, reference: &Reference) -> Reference {
         let TwoLoopSettings { filter: w, period, .. } = self.settings;
         if w == 0.0 {
             return *reference;
         }
         let (angles, rates) = if memory.started {
-            // x = r + d, d̈ + 2 w ḋ + w² d = 0, over the interval before this tick. Where r went is told by its derivatives, so that
-            // its jumps are filtered.
+            // Over the interval before this tick, x = r + d with d̈ + 2 w ḋ + w² d = 0. The change
+            // of r is taken from its derivatives, so that its jumps are filtered.
             let TwoLoopMemory { command, reference: before, .. } = memory;
             let (d, d_rate) = (command.angles - before.angles, command.rates - before.rates);
             let (slope, decay) = (d_rate + d * w, (-w * period).exp());
@@ -325,7 +330,8 @@ impl Controller for TwoLoopSmc {
         self.settings.period
     }
 
-    /// As with [`crate::sliding::Tvsmc`], the moment achieved before a tick acts from the next one on.
+    /// As in [`crate::sliding::Tvsmc`], the moment achieved before a tick has effect from the next
+    /// tick on.
     fn update(
         &mut self,
         memory: &mut TwoLoopMemory,
@@ -351,13 +357,13 @@ impl Controller for TwoLoopSmc {
         let angle_rates = kinematics.r(angles) * rates;
         let (outer_sign, inner_sign) = form.signs();
 
-        // Jia, (4), (7)
+        // Outer loop: Jia, (4), (7).
         let e_w = command.angles - angles;
         let e_w_dot = command.rates - angle_rates;
         let s_w = outer.sliding(&e_w, &memory.outer_integral);
         let x = command.rates + outer.k().component_mul(&e_w) + outer.layer.value(&s_w) * outer_sign;
         let omega_c = inverse * x;
-        // ω̇_c, from ω_c = R⁻¹ x
+        // The derivative ω̇_c follows from ω_c = R⁻¹ x.
         let integrand = if rests { Vector3::zeros() } else { outer.k().component_mul(&e_w) };
         let s_w_dot = e_w_dot + integrand;
         let x_dot = command.accelerations
@@ -365,7 +371,7 @@ impl Controller for TwoLoopSmc {
             + outer.layer.slope(&s_w).component_mul(&s_w_dot) * outer_sign;
         let omega_c_dot = inverse * (x_dot - kinematics.r_dot(angles, &angle_rates) * omega_c);
 
-        // Jia, (8), (11) without M_d, which is not known
+        // Inner loop: Jia, (8), (11) without M_d, which is not known.
         let omega_e = omega_c - rates;
         let s_n = inner.sliding(&omega_e, &memory.inner_integral);
         let acceleration =

@@ -1,4 +1,5 @@
-//! Control allocation against the limits and the optimum of Wu et al. (2015) and the selector of Jia et al.
+//! Control allocation compared with the limits and the optimum of Wu et al. (2015) and with the
+//! selector of Jia et al.
 
 use control::allocation::pwpf::Modulator;
 use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Settings, Status};
@@ -6,7 +7,7 @@ use control::error::DesignError;
 use nalgebra::Vector3;
 use vehicle::effectors::{Effectors, SURFACES};
 
-/// At this pressure the effectiveness is as printed, Pa.
+/// Pressure at which the effectiveness is as printed, Pa.
 const PRESSURE: f64 = 2859.0;
 const METHODS: [Method; 2] = [Method::Optimal, Method::Blending];
 
@@ -22,7 +23,7 @@ fn command(moment: [f64; 3], dynamic_pressure: f64) -> Command {
     Command { moment: Vector3::from(moment), dynamic_pressure }
 }
 
-/// The memory after so many samples of a constant command.
+/// Returns the memory after `samples` samples of a constant command.
 fn settled(allocator: &mut Allocator, samples: u64, command: &Command) -> Memory {
     let mut memory = Memory::default();
     for tick in 0..samples {
@@ -32,7 +33,7 @@ fn settled(allocator: &mut Allocator, samples: u64, command: &Command) -> Memory
     memory
 }
 
-/// Uniform in 0..1, the same in every run (splitmix64).
+/// Random numbers uniform in 0..1, the same in every run (splitmix64).
 struct Random(u64);
 
 impl Random {
@@ -45,13 +46,13 @@ impl Random {
     }
 }
 
-/// (59) with the numbers of (63), and (65), in degrees.
+/// Checks (59) with the numbers of (63), and (65), in degrees.
 fn assert_within_limits(before: &Memory, after: &Memory, what: &str) {
     let min = [-25.0, -25.0, -25.0, -25.0, -10.0, -10.0, 0.0, 0.0];
     let max = [0.0, 0.0, 0.0, 0.0, 30.0, 30.0, 0.0, 0.0];
     for i in 0..SURFACES {
         let (old, new) = (before.surfaces[i].to_degrees(), after.surfaces[i].to_degrees());
-        // Rounding of degrees alone.
+        // The tolerance covers the rounding of degrees alone.
         assert!(new >= min[i] - 1e-13 && new <= max[i] + 1e-13, "{what}: surface {i} at {new} deg");
         assert!((new - old).abs() <= 10.0 * 0.01 + 1e-13, "{what}: surface {i} from {old} to {new} deg");
     }
@@ -90,12 +91,13 @@ fn published_limits_hold_at_every_sample_of_200_random_cases() {
 
 #[test]
 fn oracle_duty_cycles_of_the_modulator() {
-    // T_on = T_m ln[(u_on + K_m (1 − r))/(u_off + K_m (1 − r))], T_off = T_m ln[(K_m r − u_off)/(K_m r − u_on)]
+    // The exact times are T_on = T_m ln[(u_on + K_m (1 − r))/(u_off + K_m (1 − r))] and T_off = T_m
+    // ln[(K_m r − u_off)/(K_m r − u_on)].
     let pwpf = Settings::published().pwpf;
     let duty_cycle = |duty: f64| {
         let mut state = Modulator::default();
         let mut fired = 0;
-        // A whole number of seconds after the first pulse.
+        // The count covers a whole number of seconds after the first pulse.
         for step in 0..101_000 {
             state = pwpf.advance(state, duty);
             fired += i32::from(state.on && step >= 1000);
@@ -108,13 +110,13 @@ fn oracle_duty_cycles_of_the_modulator() {
         let pause = time * ((gain * duty - off) / (gain * duty - on)).ln();
         let exact = pulse / (pulse + pause);
         assert!((exact - rounded).abs() <= 0.005, "{duty}: {exact}");
-        // Pulse and pause each end up to one look of 1 ms late.
+        // Pulse and pause each end up to one evaluation of 1 ms late.
         let found = duty_cycle(duty);
         let slack = pwpf.period / (pulse + pause);
         assert!((found - exact).abs() <= slack, "{duty}: {found} instead of {exact}");
         assert!((found - rounded).abs() <= 0.006, "{duty}: {found} instead of {rounded}");
     }
-    // The dead band u_on/K_m
+    // The dead band is u_on/K_m.
     assert_eq!(duty_cycle(0.0999), 0.0);
     assert!(duty_cycle(0.1001) > 0.0);
 }
@@ -142,11 +144,11 @@ fn blending_uses_surfaces_first_and_above_the_threshold_only() {
     let memory = settled(&mut blending, 300, &command(wanted, PRESSURE));
     assert!(memory.duty.sum() < 1e-6 && memory.residual.norm() < 1e-3, "{memory:?}");
 
-    // More than the position limits allow: the remainder goes to the jets.
+    // The moment exceeds the position limits, so that the remainder goes to the jets.
     let wanted = command([0.0, -3.2e5, 0.0], PRESSURE);
     let memory = settled(&mut blending, 600, &wanted);
     let effectors = Effectors::published();
-    // An interior-point solution comes close to a limit.
+    // An interior-point solution comes only close to a limit.
     assert!((memory.surfaces[4] - effectors.max[4]).abs() < 1e-6, "{}", memory.surfaces);
     let rest = wanted.moment - effectors.moment_of_surfaces(&memory.surfaces, PRESSURE);
     assert!((effectors.moment_of_jets(&memory.duty) - (rest - memory.residual)).norm() < 1e-6);
@@ -155,8 +157,9 @@ fn blending_uses_surfaces_first_and_above_the_threshold_only() {
 
 #[test]
 fn blending_asks_no_more_of_the_surfaces_than_the_jets_can_make_up_for() {
-    // Surfaces alone give 21.6 kN m on all axes at once. Cut one by one to their limits they would give roll and pitch that nobody
-    // asked for, more of it than the jets can take back.
+    // The surfaces alone give 21.6 kN m on all axes at once. If each were cut to its limit
+    // separately, they would cause roll and pitch moments that were not commanded, more than the
+    // jets can cancel.
     for moment in [[5e4; 3], [-5e4; 3]] {
         let memory = settled(&mut allocator(Method::Blending), 600, &command(moment, PRESSURE));
         assert!(memory.residual.norm() < 1.0, "{memory:?}");
@@ -209,7 +212,8 @@ fn jets_switch_between_allocations() {
         mean += memory.modulated / 20_000.0;
     }
     assert!(switched_between > 100);
-    // What the dead band of the modulator takes away: it fires less than the duty cycle that is asked of it.
+    // The dead band of the modulator reduces the moment: the jet fires less than its commanded duty
+    // cycle.
     assert!(mean.z > 0.5 * wanted.moment.z && mean.z < wanted.moment.z, "{mean}");
 }
 

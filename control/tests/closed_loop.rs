@@ -1,5 +1,5 @@
-//! The closed loop of Chai 2022, section 5: 50 s, both inertia errors, rates looked at between samples too. The example
-//! `campaign` runs the same with 200 seeds.
+//! The closed loop of Chai 2022, section 5: 50 s, both inertia errors, with the rates checked
+//! between samples too. The example `campaign` runs the same with 200 seeds.
 
 mod harness;
 
@@ -11,7 +11,8 @@ use nalgebra::{Vector2, Vector3, Vector6};
 use vehicle::disturbance::{Disturbance, Kind};
 use vehicle::scenario::Scenario;
 
-/// Largest EMS (deg) over the cases, each of which must keep both limits without a fallback.
+/// Returns the largest EMS (deg) over the cases, each of which must keep both limits without a
+/// fallback.
 fn assert_robust(cases: &[Case]) -> f64 {
     assert_keeps_limits(&settings(Constraints::Robust), cases)
 }
@@ -70,7 +71,7 @@ fn robust_with_a_free_initial_state_keeps_both_limits() {
 
 #[test]
 fn paper_set_tracks_better_and_violates_both_limits() {
-    // (6) is an outer set: it implies neither ‖ω‖ ≤ 5°/s nor ‖m‖ ≤ 1.356e5 N m (docs/errata.md).
+    // (6) is an outer set, which implies neither ‖ω‖ ≤ 5°/s nor ‖m‖ ≤ 1.356e5 N m (docs/errata.md).
     for case in white(1..=3, 0.04) {
         let (outcome, kept) =
             harness::run(&settings(Constraints::Paper), case.inertia_scale, case.disturbance);
@@ -82,7 +83,7 @@ fn paper_set_tracks_better_and_violates_both_limits() {
 
 #[test]
 fn lqr_violates_both_limits() {
-    // As Chai 2022, section 5.2 says.
+    // Chai 2022, section 5.2 says the same.
     for case in white(1..=3, 0.04) {
         let outcome =
             simulate(&mut harness::lqr(), &mut (), case.inertia_scale, case.disturbance, |(), _, _| {});
@@ -116,7 +117,8 @@ fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_se
     assert!(largest > 0.9, "the freedom is not used: {largest}");
 }
 
-/// The nominal motion at every tick, bit for bit, and the deviation O_e = x − x̃ there, with `initialState = nominal`.
+/// Returns the nominal motion at every tick, bit for bit, and the deviation O_e = x − x̃ there, with
+/// `initialState = nominal`.
 fn around_the_nominal_motion(
     constraints: Constraints,
     inertia_scale: f64,
@@ -151,8 +153,8 @@ fn a_nominal_motion_that_starts_from_its_own_plan_knows_no_disturbance() {
 
 #[test]
 fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
-    // Chai 2022, (22): O_e under a constant Δ settles at Δ/|k1|, and never leaves the reach of the sampled dynamics. A square wave
-    // drives its rate to twice what (26) allows.
+    // Chai 2022, (22): O_e under a constant Δ settles at Δ/|k1|, and never leaves the reach of the
+    // sampled dynamics. A square wave drives its rate to twice the value that (26) permits.
     for constraints in [Constraints::Robust, Constraints::Paper] {
         let design = Crmpc::new(settings(constraints)).unwrap().design().clone();
         let (reach, paper) = (design.reach, design.paper.unwrap());
@@ -161,12 +163,13 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
         let largest = |deviations: &[Vector6<f64>], components: [usize; 3]| {
             deviations.iter().flat_map(|o| components.map(|i| o[i].abs())).fold(0.0, f64::max)
         };
-        // What f does between two ticks, at which alone it is cancelled.
+        // The slack covers the change of f between two ticks, as f is cancelled at the ticks only.
         let slack = largest(&deviations(Disturbance::default()), [0, 1, 2]);
         let rate_slack = largest(&deviations(Disturbance::default()), [3, 4, 5]);
         assert!(slack < 0.01 * reach.angle * bound && rate_slack < 0.01 * reach.rate * bound);
 
-        // What else drives the deviation, docs/guarantee.md; the vehicle's inertia is the one believed here.
+        // The other part that drives the deviation is the mismatch (docs/guarantee.md); the
+        // vehicle's inertia is the one that the controller uses.
         let bound = bound + design.tightening.mismatch;
         for kind in [Kind::Constant, Kind::Square, Kind::AlongRate] {
             let direction = Vector3::new(1.0, -1.0, 1.0);

@@ -1,4 +1,5 @@
-//! Prediction over a known delay: exact with the right model, far better than none, and nothing without a delay.
+//! Prediction over a known delay: it is exact with the right model, far better than no prediction,
+//! and has no effect without a delay.
 
 mod harness;
 
@@ -29,9 +30,9 @@ struct Late {
     time: f64,
     delay: f64,
     moment_limit: f64,
-    /// Commands, with the time (s) from which they act.
+    /// Commands with the time (s) from which they act.
     commands: Vec<(f64, Vector3<f64>)>,
-    /// The state when each of them began to act.
+    /// States at which each command began to act.
     reached: Vec<State>,
 }
 
@@ -48,7 +49,7 @@ impl Late {
         Self::new(delay, 1.0, Disturbance::default())
     }
 
-    /// The moment in force, N m.
+    /// Returns the moment in force, N m.
     fn moment(&self) -> Vector3<f64> {
         self.reached.len().checked_sub(1).map_or_else(Vector3::zeros, |last| self.commands[last].1)
     }
@@ -67,8 +68,8 @@ impl Late {
         self.go(to)
     }
 
-    /// The closed loop over `duration` (s): ‖Θ − Θ_r‖ (deg) at each tick. `observe` sees memory and measurement before each
-    /// update.
+    /// Runs the closed loop over `duration` (s) and returns ‖Θ − Θ_r‖ (deg) at each tick. `observe`
+    /// receives memory and measurement before each update.
     fn run<C: Controller>(
         &mut self,
         controller: &mut C,
@@ -98,7 +99,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Largest distance (rad, rad/s) of a predicted state from the one that comes, over 10 s.
+/// Returns the largest distance (rad, rad/s) of a predicted state from the actual one, over 10 s.
 fn largest_error<C: Controller>(mut late: Late, mut controller: Delayed<C>) -> f64 {
     let mut predicted = Vec::new();
     late.run(&mut controller, 10.0, |controller, memory, measured| {
@@ -116,7 +117,7 @@ fn oracle_with_the_right_model_the_predicted_state_is_the_one_that_comes() {
     for delay in DELAYS {
         let error = largest_error(Late::undisturbed(delay), delayed(lqr(), delay));
         assert!(error < 1e-9, "{delay} s: {error:e}");
-        // Feedback every 0.01 s: as many as 12 commands are under way.
+        // With feedback every 0.01 s, up to 12 commands are under way.
         let Settings { body, p, q, .. } = settings(Constraints::Robust);
         let fast = Lqr::new(LqrSettings { body, p, q, period: 0.01 }).unwrap();
         let error = largest_error(Late::undisturbed(delay), delayed(fast, delay));
@@ -134,7 +135,8 @@ fn oracle_saturated_commands_are_predicted_as_they_act() {
     assert!(knowing < 1e-9 && unknowing > 1e-3, "{knowing:e}, {unknowing:e}");
 }
 
-/// The regulator with another weight on the input. 0.3 makes it four times as fast as the paper's 10 does.
+/// Returns the regulator with another weight on the input. A weight of 0.3 makes it four times as
+/// fast as the paper's 10.
 fn regulator(q: f64) -> Lqr {
     let Settings { body, p, .. } = settings(Constraints::Robust);
     Lqr::new(LqrSettings { body, p, q: [q; 3], period: 0.04 }).unwrap()
@@ -142,7 +144,7 @@ fn regulator(q: f64) -> Lqr {
 
 #[test]
 fn oracle_the_loop_moves_as_one_without_delay_that_begins_later() {
-    // At rest and without a moment the vehicle stays as it is until the first command acts.
+    // At rest and without a moment the vehicle's state is constant until the first command acts.
     for delay in DELAYS {
         let mut late = Late::undisturbed(delay);
         late.run(&mut delayed(lqr(), delay), 20.0, |_, _, _| {}).unwrap();
@@ -159,7 +161,8 @@ fn oracle_the_loop_moves_as_one_without_delay_that_begins_later() {
     }
 }
 
-/// What a loop of 50 s shows: EMS (deg), the same between 10 and 25 s, when what the start leaves has died down, and CMS (1).
+/// Figures of merit of a loop of 50 s: EMS (deg) over the whole time, EMS between 10 and 25 s, when
+/// the effect of the start has faded, and CMS (1).
 struct Merit {
     ems_deg: f64,
     settled_deg: f64,
@@ -179,11 +182,13 @@ fn merit(q: f64, delay: f64, predicts: bool, scale: f64, kind: Kind) -> Result<M
 fn regress_prediction_keeps_tracking_and_effort_that_a_delay_spoils() {
     let of = |delay, predicts| merit(10.0, delay, predicts, 1.0, Kind::None).unwrap();
     let (none, without, with) = (of(0.0, false), of(0.1, false), of(0.1, true));
-    // 0.0040 deg, 0.0245 deg without prediction; CMS 0.282, 0.340 without prediction
+    // The EMS between 10 and 25 s is 0.0040 deg, without prediction 0.0245 deg; the CMS is 0.282,
+    // without prediction 0.340.
     assert!(with.settled_deg < 1.01 * none.settled_deg && without.settled_deg > 6.0 * none.settled_deg);
     assert!(with.cms < 1.01 * none.cms && without.cms > 1.2 * none.cms);
-    // EMS is no measure of it: the start counts most, and a loop that knows nothing of what is under way commands more and is
-    // less damped, which hides the dead time: 1.642, 1.653 and 1.720 deg.
+    // The EMS over the whole time is no measure of it, because the start dominates. A loop that
+    // does not know the commands under way commands more and is less damped, which hides the dead
+    // time: 1.642, 1.653 and 1.720 deg.
     assert!(none.ems_deg < without.ems_deg && without.ems_deg < with.ems_deg && with.ems_deg < 1.73);
 }
 
@@ -197,7 +202,7 @@ fn a_loop_that_a_delay_makes_unstable_is_stable_with_prediction() {
     }
 }
 
-/// The moments of the disturbed loop of the harness over `ticks`.
+/// Returns the moments of the disturbed loop of the harness over `ticks`.
 fn moments<C: Controller>(controller: &mut C, ticks: u32) -> Vec<Vector3<f64>> {
     let scenario = Scenario::crmpc2022();
     let mut plant = Plant::new(&scenario.config(0.01), 0.0).unwrap();
@@ -241,12 +246,12 @@ fn a_tick_evaluated_again_gives_the_same_and_leaves_no_trace() {
         assert_eq!(once.in_force(), often.in_force(), "{k}");
         once.commit();
         often.commit();
-        // A memory that went through its saved form goes on with the same bits.
+        // A memory that was saved and restored continues with the same bits.
         often = serde_json::from_str(&serde_json::to_string(&often).unwrap()).unwrap();
     }
 }
 
-/// Notes down what it is told last.
+/// A controller that records the last input it received.
 #[derive(Default)]
 struct Probe {
     told: Option<(f64, Measurement)>,
@@ -281,12 +286,12 @@ fn the_law_is_told_the_time_at_which_its_moment_acts() {
     let measured =
         Measurement { rates: Vector3::new(0.0, 0.1, 0.0), achieved_moment, ..Measurement::default() };
     let reference = |time: f64| Reference { angles: Vector3::repeat(time), ..Reference::default() };
-    // A memory by default will do as well.
+    // A default memory works as well.
     let mut memory = Memory::default();
     controller.update(&mut memory, 50, 2.0, &measured, &reference);
     let (time, told) = controller.inner().told.unwrap();
     assert_eq!((time, controller.inner().asked), (2.1, 2.1));
-    // About the pitch axis at beta = 0: alpha = q t
+    // The motion is about the pitch axis at beta = 0: alpha = q t.
     assert!((told.angles - Vector3::new(0.01, 0.0, 0.0)).amax() < 1e-15, "{told:?}");
     assert_eq!((told.rates, told.achieved_moment), (measured.rates, achieved_moment));
     assert_eq!(memory.under_way.len(), 3);

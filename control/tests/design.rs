@@ -1,5 +1,6 @@
-//! The offline design of CRMPC against what Chai 2022, section 5.1 prints, and the exact sampled bounds against simulation.
-//! Tolerances are half a unit of the last digit that is printed.
+//! The offline design of CRMPC compared with the numbers printed in Chai 2022, section 5.1, and the
+//! exact sampled bounds compared with simulation. Tolerances are half a unit of the last digit that
+//! is printed.
 
 use control::DesignError;
 use control::crmpc::Published;
@@ -37,7 +38,7 @@ fn published_terminal_weight_satisfies_15_with_equality() {
     let Gain { k1, k2 } = settings.terminal;
     let a = Matrix2::new(0.0, 1.0, k1, k2);
     for i in 0..3 {
-        // Every number in it is an integer, so the residual is exactly zero.
+        // Every number in the equation is an integer, so the residual is exactly zero.
         let row = settings.terminal.row();
         let p = Vector2::new(settings.p[i], settings.p[3 + i]);
         let residual =
@@ -51,7 +52,8 @@ fn published_terminal_weight_satisfies_15_with_equality() {
 
 #[test]
 fn oracle_terminal_law_never_leaves_a_ball_in_the_norm_of_g_but_a_euclidean_one() {
-    // (12) and (14): d/dt ‖E‖²_G = Eᵀ (AᵀG + GA) E is never positive; d/dt ‖E‖² = Eᵀ (Aᵀ + A) E can be.
+    // (12) and (14): d/dt ‖E‖²_G = Eᵀ (AᵀG + GA) E is never positive; d/dt ‖E‖² = Eᵀ (Aᵀ + A) E can
+    // be.
     let settings = Settings { constraints: Constraints::Paper, ..settings() };
     let a = Matrix2::new(0.0, 1.0, settings.terminal.k1, settings.terminal.k2);
     for g in Design::new(&settings).unwrap().g {
@@ -97,7 +99,8 @@ fn published_peak_of_the_step_response_belongs_to_another_gain() {
 
 #[test]
 fn oracle_sets_between_the_printed_constants() {
-    // By hand from (6) and (21) with the readings of docs/errata.md; the paper prints what follows from them only.
+    // The values are calculated by hand from (6) and (21) with the readings of docs/errata.md; the
+    // paper prints only their consequences.
     let ours = constants(&settings());
     assert_digits(ours.x, 0.09465, 5);
     assert_digits(ours.u, 0.25005, 5);
@@ -126,7 +129,8 @@ fn oracle_second_terminal_radius_with_the_triangle_inequality() {
 
 #[test]
 fn published_tubes_of_the_angles() {
-    // The two cases of Fig. 6: 0.2° and 0.1°, which need Δ̄ = 1°/s², half of what section 5.1 states.
+    // The two cases of Fig. 6 are 0.2° and 0.1°. They need Δ̄ = 1°/s², half of the value in section
+    // 5.1.
     for (k, printed_deg) in [(-5.0, 0.2), (-10.0, 0.1)] {
         let with = |bound_deg: f64| {
             let settings =
@@ -138,8 +142,8 @@ fn published_tubes_of_the_angles() {
     }
 }
 
-/// Deviation of one axis simulated without the code under test: ö = K o + Δ with K o held over each period of
-/// `parts.len()` equal parts, and Δ given part by part.
+/// Deviation of one axis simulated without the code under test: ö = K o + Δ with K o held over each
+/// period of `parts.len()` equal parts, and Δ given for each part.
 struct Simulation {
     gain: Gain,
     period: f64,
@@ -164,7 +168,7 @@ impl Simulation {
         }
     }
 
-    /// Angle, rate, feedback.
+    /// Returns angle, rate and feedback.
     fn outputs(&self) -> [f64; 3] {
         [self.deviation.x, self.deviation.y, self.feedback()]
     }
@@ -178,8 +182,9 @@ const PUBLISHED_CASES: [(f64, f64, [f64; 3]); 3] = [
 
 #[test]
 fn oracle_sampled_bounds() {
-    // L1 norms under zero-order hold, by an independent calculation (docs/errata.md). A disturbance that may change at any time reaches as far or a little
-    // further: where a response changes its sign within a period.
+    // The L1 norms under zero-order hold come from an independent calculation (docs/errata.md). A
+    // disturbance that may change at any time reaches as far or slightly further, where a response
+    // changes its sign within a period.
     for (k, period, expected) in PUBLISHED_CASES {
         let mut impulse = Simulation::new(gain(k), period);
         impulse.advance(&[1.0]);
@@ -200,25 +205,27 @@ fn oracle_sampled_bounds() {
 
 #[test]
 fn oracle_marginal_gain_is_refused_with_its_spectral_radius() {
-    // Φ = [0.8 0; −2 −1]
+    // Here Φ = [0.8 0; −2 −1].
     let settings = Settings { feedback: gain(-10.0), period_feedback: 0.2, ..settings() };
     let error = Design::new(&settings).unwrap_err();
     let DesignError::Unstable { k1, k2, period, radius } = error else { panic!("{error}") };
     assert_eq!([k1, k2, period], [-10.0, -10.0, 0.2]);
     assert!((radius - 1.0).abs() < 1e-12);
     assert!(error.to_string().contains("spectral radius 1.000000"), "{error}");
-    // At 25 Hz the same gain is fine.
+    // At 25 Hz the same gain is stable.
     Design::new(&Settings { period_feedback: 0.04, ..settings }).unwrap();
 }
 
 #[test]
 fn oracle_bang_bang_disturbance_reaches_the_sampled_bounds() {
-    // It changes its sign at any of the parts of a period. Against disturbances that may change at any time that is one part in a thousand less.
+    // The disturbance changes its sign at any of the parts of a period. Compared with disturbances
+    // that may change at any time this loses one part in a thousand.
     const PARTS: usize = 40;
     for (k, period, _) in PUBLISHED_CASES {
         let n = 60;
         let reach = SampledError::new(gain(k), period).reach(n);
-        // Responses to a pulse in each part of a period, at the ends of the periods after it.
+        // These are the responses to a pulse in each part of a period, at the ends of the later
+        // periods.
         let responses: Vec<Vec<[f64; 3]>> = (0..PARTS)
             .map(|part| {
                 let mut impulse = Simulation::new(gain(k), period);
@@ -253,7 +260,8 @@ fn oracle_bang_bang_disturbance_reaches_the_sampled_bounds() {
 
 #[test]
 fn oracle_constant_disturbance_reaches_the_peak_of_the_step_response_only() {
-    // (24) and (26): c̄Δ̄ bounds the rate under a constant Δ. One change of sign after it has settled gives twice as much.
+    // (24) and (26): c̄Δ̄ bounds the rate under a constant Δ. One change of sign after settling
+    // doubles it.
     let c = Published::crmpc2022().c;
     let mut simulation = Simulation::new(gain(-10.0), 1e-4);
     let mut peak = |disturbance: f64| {
@@ -266,7 +274,7 @@ fn oracle_constant_disturbance_reaches_the_peak_of_the_step_response_only() {
     };
     assert_digits(peak(-1.0), c, 4);
     assert_digits(peak(1.0) / 2.0, c, 4);
-    // It cannot be more than that, as the exact bound tends to 2 c̄ with the period.
+    // It cannot exceed that, as the exact bound tends to 2 c̄ with the period.
     let reach = SampledError::new(gain(-10.0), 1e-4).reach_forever().unwrap();
     assert!((reach.rate / (2.0 * step_response_peak(gain(-10.0)).unwrap()) - 1.0).abs() < 1e-3);
 }
@@ -319,7 +327,7 @@ mod properties {
             let set = SampledError::new(gain(k), period).invariant_set(0.0).unwrap();
             let normals = set.normals();
             let size = |o: &Vector2<f64>| normals.iter().map(|normal| normal.dot(o).abs()).fold(0.0, f64::max);
-            // From anywhere on its border.
+            // The motion starts anywhere on the border of the set.
             let direction = Vector2::new(direction.cos(), direction.sin());
             let mut simulation = Simulation { gain: gain(k), period, deviation: direction / size(&direction) };
             let reach = set.reach();
@@ -350,7 +358,8 @@ fn oracle_invariant_set_holds_what_can_be_reached_and_is_less_than_half_larger()
 
 #[test]
 fn oracle_errors_of_the_rate_ask_for_moment_at_once() {
-    // In the first interval K ô holds k₂ e of the newest error, and (k₂ + τ k₁) e of the first one, a tick after the plan began.
+    // In the first interval K ô contains k₂ e of the newest error, and (k₂ + τ k₁) e of the first
+    // one, a tick after the plan began.
     let rate_error = 1e-3;
     let exact = settings();
     let noisy = Settings { rate_error, guarantee: Guarantee::BestEffort, disturbance_bound: 0.0, ..exact };
@@ -364,7 +373,8 @@ fn oracle_errors_of_the_rate_ask_for_moment_at_once() {
 
 #[test]
 fn oracle_sampled_terminal_weight_decreases_where_the_continuous_one_does_not() {
-    // (11c) with the cost and the law held for h: ΦᵀGΦ − G + h (P + K̃ᵀQK̃). The printed G leaves eigenvalues of +1.6 and +50.
+    // (11c) with the cost and the law held for h: ΦᵀGΦ − G + h (P + K̃ᵀQK̃). The printed G leaves
+    // eigenvalues of +1.6 and +50.
     let settings = Settings::new(Constraints::Robust);
     let Settings { terminal, period_optimisation: h, p, q, .. } = settings;
     let held = SampledError::new(terminal, h);

@@ -1,4 +1,5 @@
-//! DLMPC: the optimum of its outer layer, the sliding mode of its inner one, the loop of both.
+//! Tests of DLMPC: the optimum of its outer layer, the sliding mode of its inner layer, and the
+//! loop of both.
 
 mod harness;
 
@@ -24,12 +25,12 @@ fn dlmpc() -> Dlmpc {
     Dlmpc::new(Settings::published()).unwrap()
 }
 
-/// The memory without what a clock wrote into it.
+/// Returns the memory without values from a clock.
 fn timeless(memory: &Memory) -> Memory {
     Memory { report: Report { time: 0.0, ..memory.report }, inner_time: 0.0, ..memory.clone() }
 }
 
-/// What goes into a tick of a run.
+/// Input of one tick of a run.
 struct Recorded {
     tick: u64,
     before: Memory,
@@ -45,7 +46,7 @@ impl Recorded {
     }
 }
 
-/// All ticks of the scenario with white noise.
+/// Returns all ticks of the scenario with white noise.
 fn recorded() -> Vec<Recorded> {
     let mut before = Memory::default();
     let mut all = Vec::new();
@@ -62,9 +63,9 @@ fn optimisations() -> Vec<Recorded> {
     recorded().into_iter().filter(|sample| sample.tick % ratio == 0).collect()
 }
 
-// Outer layer
+// Tests of the outer layer.
 
-/// The program written out in its commands v_0 … v_{N−1} alone.
+/// The program written in its commands v_0 … v_{N−1} alone.
 struct ConicProgram {
     settings: Settings,
     time: f64,
@@ -99,7 +100,7 @@ impl ConicProgram {
         cost
     }
 
-    /// (‖R⁻¹(Θ_k) v_k‖² − bound²)/2 of each interval.
+    /// Returns (‖R⁻¹(Θ_k) v_k‖² − bound²)/2 of each interval.
     fn constraints(&self, v: &DVector<f64>) -> DVector<f64> {
         let angles = self.angles(v);
         DVector::from_fn(self.settings.horizon, |k, _| {
@@ -113,7 +114,8 @@ impl ConicProgram {
 fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
     let settings = Settings::published();
     let step = 1e-4;
-    // The start of the scenario; and near the jump, where a window in the middle stands for the whole.
+    // The first start is that of the scenario; the second is near the jump, where a window in the
+    // middle replaces the whole horizon.
     let offset = Vector3::new(0.02, -0.01, 0.03);
     for (time, start) in
         [(0.0, Scenario::crmpc2022().initial_angles), (15.0, reference()(15.0).angles + offset)]
@@ -149,7 +151,7 @@ fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
             })
             .collect();
         let jacobian = DMatrix::from_columns(&columns).transpose();
-        // ∇J + Σ λ ∇c = 0 with λ ≥ 0.
+        // The optimum satisfies ∇J + Σ λ ∇c = 0 with λ ≥ 0.
         let normal = (jacobian.transpose() * &jacobian).cholesky().unwrap();
         let multipliers = normal.solve(&(-jacobian.transpose() * &gradient));
         let residual = (&gradient + jacobian * &multipliers).norm();
@@ -261,10 +263,10 @@ fn a_solver_that_fails_is_outlived() {
     }
 }
 
-// Inner layer
+// Tests of the inner layer.
 
-/// Rates under the inner law alone, one sample after another: the attitude rests at a constant reference, so that the
-/// commanded rates are zero, and ω⁺ = ω + T ω̇.
+/// Returns the rates under the inner law alone, one sample after another. The attitude rests at a
+/// constant reference, so that the commanded rates are zero and ω⁺ = ω + T ω̇.
 fn inner_law(sliding_mode: SlidingMode, rates: Vector3<f64>, ticks: u64) -> Vec<(Vector3<f64>, Memory)> {
     let settings = Settings { sliding_mode, ..Settings::published() };
     let mut controller = Dlmpc::new(settings).unwrap();
@@ -285,7 +287,7 @@ fn inner_law(sliding_mode: SlidingMode, rates: Vector3<f64>, ticks: u64) -> Vec<
 
 #[test]
 fn oracle_sampled_sliding_mode_chatters_with_the_closed_form_amplitude() {
-    // −s = (1 − q T) s − p T |s|^ρ sgn s
+    // The amplitude solves −s = (1 − q T) s − p T |s|^ρ sgn s.
     let period = Settings::published().period_feedback;
     for (q, p, rho) in [(5.0, 5.0, 0.7), (0.0, 5.0, 0.7), (2.0, 3.0, 0.6)] {
         let amplitude = (p * period / (2.0 - q * period)).powf(1.0 / (1.0 - rho));
@@ -297,7 +299,7 @@ fn oracle_sampled_sliding_mode_chatters_with_the_closed_form_amplitude() {
                 assert!(now[i] * next[i] < 0.0);
             }
         }
-        // The manifold's own gain moves it little.
+        // The manifold's own gain changes it little.
         let seen = inner_law(SlidingMode { q, p, gamma: 0.15, rho }, Vector3::new(5e-3, -3e-3, 1e-3), 2000);
         for (_, memory) in &seen[1900..] {
             assert!((memory.sliding.amax() - amplitude).abs() < 0.05 * amplitude, "{}", memory.sliding);
@@ -316,7 +318,7 @@ fn the_integral_rests_while_the_moment_is_scaled_into_its_limit() {
         let before = pair[0].1.integral;
         let saturated = moment.norm() > settings.limit_moment * (1.0 - 1e-12);
         counts[usize::from(saturated)] += 1;
-        // e from s = e + Γ z
+        // The error e follows from s = e + Γ z.
         let e = memory.sliding - before * gamma;
         let growth = e.map(|e| e.abs().powf(rho).copysign(e)) * settings.period_feedback;
         let expected = if saturated { before } else { before + growth };
@@ -327,7 +329,7 @@ fn the_integral_rests_while_the_moment_is_scaled_into_its_limit() {
 
 #[test]
 fn oracle_inner_law_is_the_reaching_law() {
-    // ṡ = −q s − p sig^ρ(s), with ṡ = ω̇ + Γ sig^ρ(e) for a command that is held.
+    // The reaching law is ṡ = −q s − p sig^ρ(s), with ṡ = ω̇ + Γ sig^ρ(e) for a held command.
     let settings = Settings::published();
     let SlidingMode { q, p, gamma, rho } = settings.sliding_mode;
     let power = |x: Vector3<f64>| x.map(|x| x.abs().powf(rho).copysign(x));
@@ -348,7 +350,7 @@ fn oracle_inner_law_is_the_reaching_law() {
     }
 }
 
-// Both
+// Tests of both layers together.
 
 #[test]
 fn the_loop_tracks_and_never_exceeds_the_moment() {
@@ -370,7 +372,8 @@ fn the_loop_tracks_and_never_exceeds_the_moment() {
             let name = &case.name;
             assert!(outcome.ems_deg < 1.9, "{name}: {outcome:?}");
             assert!(outcome.moment <= 1.0, "{name}: {outcome:?}");
-            // Nothing is provided for disturbances: the command keeps the limit, the rate a little more.
+            // DLMPC reserves nothing for disturbances: the command keeps its limit, and the rate
+            // exceeds its limit slightly.
             assert!(command <= 1.0 + 1e-6 && command > 0.999, "{name}: {command}");
             assert!(outcome.rate <= 1.05, "{name}: {outcome:?}");
             assert_eq!(fallbacks, 0, "{name}");
@@ -392,7 +395,7 @@ fn tuned_gains_spend_less_moment_at_no_larger_error() {
         (ems_deg, outcomes.iter().map(|outcome| outcome.cms).sum::<f64>() / n)
     };
     let (published, tuned) = (mean(Settings::published()), mean(Settings::tuned()));
-    // Seeds that the search has not seen: equal up to noise.
+    // These seeds were not used in the search; the results are equal up to noise.
     assert!(tuned.0 <= published.0 * 1.002, "{tuned:?} {published:?}");
     assert!(tuned.1 < 0.6 * published.1, "{tuned:?} {published:?}");
 }
@@ -426,7 +429,8 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
     let mut used = dlmpc();
     let mut sampled = Sampled::new(0.0, Memory::default());
     for (tick, Recorded { measured, .. }) in recorded.iter().enumerate().take(750) {
-        // Within and at the beginning of an optimisation period, with the tick evaluated and not.
+        // The saved state is taken within and at the beginning of an optimisation period, with the
+        // tick evaluated or not.
         if tick % 7 == 3 {
             if tick % 2 == 0 {
                 sampled.evaluate(&mut used, measured, &preview);

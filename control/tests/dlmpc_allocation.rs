@@ -1,4 +1,4 @@
-//! Beside what the cone solver does inside, no tick of DLMPC allocates.
+//! No tick of DLMPC allocates memory, apart from the inside of the cone solver.
 #![allow(unsafe_code)]
 
 mod harness;
@@ -14,7 +14,7 @@ thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
 }
 
-/// The system's allocator, counting per thread.
+/// The system's allocator with a count per thread.
 struct Counting;
 
 // SAFETY: everything is passed on to the system's allocator.
@@ -54,7 +54,7 @@ fn ticks_without_the_cone_solver_allocate_nothing() {
         let allocated = COUNT.get() - counted;
         let optimised = tick % controller.ratio() == 0;
         if optimised && memory.report.status == Status::Constrained {
-            // The counter counts: the solver is known to allocate.
+            // This shows that the counter works, as the solver is known to allocate.
             solved += allocated;
         } else {
             unconstrained += usize::from(optimised);

@@ -21,7 +21,7 @@ use vehicle::sensor_data::SensorData;
 use vehicle::sensors::Config;
 use vehicle::triad::Window;
 
-/// For the MEMS set, with the corrections of the data file.
+/// Settings for the MEMS set, with the corrections of the data file.
 static CALIBRATED: LazyLock<Settings> =
     LazyLock::new(|| Settings { corrections: mems_corrections(), ..Settings::default() });
 
@@ -29,7 +29,7 @@ fn ideal() -> Config {
     config(&SensorData::embedded().ideal, 1)
 }
 
-/// No filter, and no delay but that of the line.
+/// Returns settings without filter, and without delay except that of the line.
 fn sharp() -> Settings {
     Settings { cutoff: 0.0, sensor_delay: 0.0, ..Settings::default() }
 }
@@ -47,7 +47,8 @@ proptest! {
     }
 }
 
-/// Required: ‖W A − I‖ ≤ 5e-3 at a noise of 0.5 %. The set's is 0.6 %, its converter's steps aside.
+/// Required is ‖W A − I‖ ≤ 5e-3 at a noise of 0.5 %. The noise of the set is 0.6 %, without the
+/// steps of its converter.
 #[test]
 fn oracle_the_calibration_flight_finds_the_magnetometers_errors() {
     for seed in 1..=5 {
@@ -61,7 +62,7 @@ fn oracle_the_calibration_flight_finds_the_magnetometers_errors() {
     }
 }
 
-/// To rounding, which may differ from machine to machine.
+/// The values agree except for rounding, which may differ from machine to machine.
 #[test]
 fn regress_the_corrections_in_the_data_file_are_those_of_the_flight() {
     let found = calibrated(&mems(CALIBRATION_SEED), CALIBRATION_DURATION).corrections;
@@ -100,7 +101,8 @@ fn a_calibration_flight_cut_short_is_refused() {
     assert!(found.angle_to(&wanted) < 2f64.to_radians(), "and the attitude is found with it");
 }
 
-/// Required with the MEMS set: 0.2 deg at rest, 0.5 deg in motion, 0.1 deg/s. The norm of three angles, and each rate.
+/// The requirements with the MEMS set are 0.2 deg at rest, 0.5 deg in motion and 0.1 deg/s, for the
+/// norm of the three angles and for each rate.
 #[test]
 fn oracle_errors_with_the_mems_set_are_within_what_is_required() {
     let settings = *CALIBRATED;
@@ -118,7 +120,8 @@ fn oracle_errors_with_the_mems_set_are_within_what_is_required() {
 
 #[test]
 fn oracle_without_errors_a_steady_turn_is_followed_exactly() {
-    // σ turns about the velocity with α and β held: the platform's rate is constant about a fixed axis.
+    // σ turns about the velocity with α and β held, so that the platform's rate is constant about a
+    // fixed axis.
     let rate = 5f64.to_radians();
     let turning = |time: f64| {
         let angles = Vector3::new(0.2, 0.1, rate * time);
@@ -149,7 +152,7 @@ fn without_prediction_the_angles_are_late_by_the_delays() {
     let lines = lines(&motion, &ideal());
     let settings = Settings { prediction: false, ..sharp() };
     let estimate = estimates(&settings, &lines)[900];
-    // A sample is seen one tick after it was taken.
+    // A sample arrives one tick after it was taken.
     assert!((motion[900].angles.z - estimate.angles.z - rate * PERIOD).abs() < 1e-6);
 }
 
@@ -266,7 +269,8 @@ fn settings_that_cannot_work_are_refused_by_name() {
     }
 }
 
-/// Largest error of attitude (deg) from 5 s after the sample of this number on, if `change` is done to that sample at rest.
+/// Returns the largest attitude error (deg) from 5 s after the sample with this number on, if
+/// `change` is applied to that sample at rest.
 fn error_after(
     settings: &Settings,
     good: &[estimation::Line],
@@ -290,7 +294,8 @@ fn five_seconds_after_any_single_bad_sample_the_attitude_is_known_to_a_degree() 
     let settings = *CALIBRATED;
     let given = Settings { alignment: Alignment::Given, ..settings };
     let good = lines(&rest(10.0), &mems(1));
-    // The first samples, from which all begins; later ones; and one after the mean of the first has ended.
+    // The samples are the first ones, from which the estimate begins, later ones, and one after the
+    // mean of the first has ended.
     for (settings, number) in [1, 2, 3, 300].into_iter().flat_map(|n| [(settings, n), (given, n)]) {
         for sensor in 0..3 {
             let range = settings.gates[sensor].range;

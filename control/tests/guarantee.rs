@@ -1,5 +1,5 @@
-//! The guarantee of the robust set in closed loops: in force throughout, and kept. The examples `worst_case` and `random_settings` look for
-//! its limits with many more flights.
+//! The guarantee of the robust set in closed loops: it is in force throughout, and kept. The
+//! examples `worst_case` and `random_settings` search for its limits with many more flights.
 
 mod harness;
 
@@ -10,7 +10,8 @@ use harness::{constant, in_parallel, run, settings};
 use nalgebra::Vector3;
 use vehicle::disturbance::Disturbance;
 
-/// Disturbances of every kind, with both inertia errors, from the start of Chai 2022.
+/// Returns flights with disturbances of every kind and both inertia errors, from the start of Chai
+/// 2022.
 fn flights(settings: &Settings, sights: &[Sight]) -> Vec<Flight> {
     let corner = Vector3::new(1.0, -1.0, 1.0);
     let courses = [
@@ -40,7 +41,7 @@ fn assert_kept(flights: &[Flight]) {
     let shown: Vec<Shown> = in_parallel(flights, Flight::fly);
     for (Flight { disturbance, sight, settings, duration, .. }, shown) in flights.iter().zip(shown) {
         assert!(shown.assumed && !shown.defective(), "{disturbance:?}, {sight:?}: {shown:?}");
-        // From the instant on at which the first command acts.
+        // The guarantee is in force from the instant at which the first command acts.
         let before = (settings.delay / settings.period_feedback).ceil() * settings.period_feedback;
         assert!(
             (shown.in_force - (1.0 - before / duration)).abs() < 1e-12,
@@ -68,7 +69,7 @@ fn guarantee_is_kept_with_a_long_delay_and_a_soft_gain() {
     assert_kept(&flights(&Settings { delay: 0.117, ..soft() }, &[Sight::Exact]));
 }
 
-/// Errors of every kind, within their bounds.
+/// Returns errors of every kind within their bounds.
 fn erroneous() -> [Sight; 4] {
     let courses = [Course::White, Course::Switching(0.2), Course::AlongRate(-1.0), Course::AlongMoment(1.0)];
     courses.map(Sight::Errors)
@@ -85,7 +86,7 @@ fn guarantee_is_kept_with_large_errors_a_delay_and_less_disturbance() {
     assert_kept(&flights(&estimated(), &erroneous()));
 }
 
-/// The settings of the experiment with sensors and estimator.
+/// Returns the settings of the experiment with sensors and estimator.
 fn estimated() -> Settings {
     Settings {
         feedback: Gain { k1: -0.5, k2: -1.5 },
@@ -99,7 +100,8 @@ fn estimated() -> Settings {
 
 #[test]
 fn guarantee_is_kept_with_sensors_and_estimator() {
-    // The estimate is as old as one period, and its errors keep to the bounds: nothing but the law's own assumptions.
+    // The estimate is one period old, and its errors stay within the bounds: only the law's own
+    // assumptions are used.
     let sights: Vec<Sight> = (1..=6).map(Sight::Estimator).collect();
     let flights: Vec<Flight> = flights(&estimated(), &sights)
         .into_iter()
@@ -144,7 +146,8 @@ fn accepted_settings_keep_the_guarantee_and_refused_ones_name_bounds_that_are_ac
 
 #[test]
 fn regress_a_disturbance_of_1_4_times_the_bound_does_not_cost_the_attitude() {
-    // EMS of an LQR whose moment is limited: 4.15° on average, 16.3° at most (example `beyond_the_bound`).
+    // The EMS of an LQR with limited moment is 4.15° on average and 16.3° at most (example
+    // `beyond_the_bound`).
     let published = settings(Constraints::Robust);
     let disturbance_bound = 1.4 * published.disturbance_bound;
     let told = Settings { disturbance_bound, guarantee: Guarantee::BestEffort, ..published };

@@ -1,4 +1,5 @@
-//! Optimisations that take long, and those that a budget ends: starts far from the reference, kicks, infeasible problems.
+//! Optimisations that take long, and those that a budget ends: starts far from the reference,
+//! kicks, and infeasible problems.
 
 mod harness;
 
@@ -23,7 +24,7 @@ fn has_optimum(report: &Report) -> bool {
     !matches!(report.status, Status::None | Status::Fallback | Status::Kept)
 }
 
-/// Rows of the list for `law`: seed, and iterations of the three optimisations.
+/// Returns the rows of the list for `law`: seed, and iterations of the three optimisations.
 fn listed(law: &str) -> Vec<(u64, [u32; 3])> {
     let number = |text: &str| text.parse::<u32>().unwrap();
     include_str!("data/worst_draws.csv")
@@ -37,7 +38,8 @@ fn listed(law: &str) -> Vec<(u64, [u32; 3])> {
         .collect()
 }
 
-/// The list was made by `cargo run --release -p control --example worst_time -- list LAW 200000 20000`.
+/// The list was made by
+/// `cargo run --release -p control --example worst_time -- list LAW 200000 20000`.
 fn assert_takes_no_more<C: Optimising>(name: &str, law: &mut C) {
     let rows = listed(name);
     assert_eq!(rows.len(), 40);
@@ -59,7 +61,8 @@ fn regress_the_longest_of_20000_random_optimisations_take_no_more_iterations() {
 
 #[test]
 fn regress_starts_that_once_took_hundreds_of_iterations_take_some_thirty() {
-    // From a first guess with ‖y‖² of 118, and one that a unit was given; before: 228, 241 and 249 iterations.
+    // The cases include a first guess with ‖y‖² of 118 and one that a unit was given. They once
+    // took 228, 241 and 249 iterations.
     let scenario = Scenario::crmpc2022();
     let angles = scenario.reference.at(31.35).angles + degrees([-14.34, -1.84, 0.35]);
     let body_rates = kinematics::r(&angles) * degrees([1.91, -3.46, 0.31]);
@@ -80,7 +83,7 @@ fn degrees(values: [f64; 3]) -> Vector3<f64> {
 
 #[test]
 fn every_optimum_of_the_paper_from_a_random_start_shows_that_it_is_one() {
-    // Seeds from which a first guess once began that broke the chain, and the motion with it.
+    // With these seeds a first guess once violated the chain, and so did the resulting motion.
     let mut seeds = vec![2480, 7527, 8436, 13191, 32585, 33560, 38426, 38433];
     seeds.extend(0..2000);
     let parts: Vec<&[u64]> = seeds.chunks(100).collect();
@@ -115,7 +118,7 @@ fn oracle_where_no_optimisation_is_begun_no_moment_keeps_the_rates() {
         let at_rest = moment(Vector3::zeros());
         let slope = Matrix3::from_columns(&[0, 1, 2].map(|axis| moment(Vector3::ith(axis, 1.0)) - at_rest));
         let inverse = slope.try_inverse().unwrap();
-        // The rates over their limit after an interval that begins with this moment.
+        // Returns the rates relative to their limit after an interval that begins with this moment.
         let after = |moment: Vector3<f64>| {
             let input = inverse * (moment - at_rest);
             let next = angles + (x_omega + input * (0.5 * h)) * h;
@@ -132,7 +135,8 @@ fn oracle_where_no_optimisation_is_begun_no_moment_keeps_the_rates() {
     assert!((50..350).contains(&refused), "{refused}");
 }
 
-/// The paper's scenario with a budget of iterations: outcome, last memory, most iterations of an optimisation, whether a limit was broken in force.
+/// Runs the paper's scenario with a budget of iterations. Returns the outcome, the last memory, the
+/// most iterations of an optimisation, and whether a limit was violated under guarantee.
 fn budgeted(budget: u32, kind: Kind) -> (harness::Outcome, Memory, u32, bool) {
     let settings = settings(Constraints::Robust);
     let solver = SolverSettings { iteration_budget: budget, ..settings.solver };
@@ -193,7 +197,7 @@ proptest! {
         for report in reports {
             prop_assert!(report.iterations <= budget, "{report:?}");
         }
-        // A budget that is enough changes nothing.
+        // A sufficient budget changes nothing.
         if cold.iterations < budget {
             prop_assert_eq!(Report { time: 0.0, ..reports[0] }, Report { time: 0.0, ..cold });
         } else if cold.iterations > budget {

@@ -1,4 +1,5 @@
-//! The optimisation of CRMPC: its exits, fallback (31), and that its solvers carry nothing from sample to sample.
+//! The optimisation of CRMPC: its exits, its fallback (31), and the independence of its solvers
+//! from earlier samples.
 
 mod harness;
 
@@ -27,19 +28,19 @@ fn controller(constraints: Constraints) -> Crmpc {
     Crmpc::new(settings(constraints)).unwrap()
 }
 
-/// The same with the cone program of the whole horizon at every sample.
+/// Returns the controller with the cone program of the whole horizon at every sample.
 fn cone(constraints: Constraints) -> Crmpc {
     let settings = settings(constraints);
     let solver = SolverSettings { method: Method::Cone, exits: false, ..settings.solver };
     Crmpc::new(Settings { solver, ..settings }).unwrap()
 }
 
-/// The memory without what a clock wrote into it.
+/// Returns the memory without values from a clock.
 fn timeless(memory: &Memory) -> Memory {
     Memory { report: Report { time: 0.0, ..memory.report }, ..memory.clone() }
 }
 
-/// What goes into an optimisation of a recorded run.
+/// Input of one optimisation of a recorded run.
 struct Recorded {
     tick: u64,
     before: Memory,
@@ -55,7 +56,7 @@ impl Recorded {
     }
 }
 
-/// All optimisations of the scenario with white noise.
+/// Returns all optimisations of the scenario with white noise.
 fn recorded(constraints: Constraints) -> Vec<Recorded> {
     let mut controller = controller(constraints);
     let ratio = controller.design().ratio as u64;
@@ -78,7 +79,8 @@ fn recorded(constraints: Constraints) -> Vec<Recorded> {
 
 #[test]
 fn exits_lead_to_the_optimum_of_the_whole_horizon() {
-    // First optimisations, which iterate to convergence, from random states at random times.
+    // These are first optimisations, which iterate to convergence, from random states at random
+    // times.
     let cube = |half_deg: f64| {
         let half = half_deg.to_radians();
         [-half..half, -half..half, -half..half]
@@ -118,7 +120,7 @@ fn exits_lead_to_the_optimum_of_the_whole_horizon() {
 
 #[test]
 fn oracle_terminal_constraint_is_a_ball_in_the_norm_of_g() {
-    // Chai 2022, (12); the print has the index R, which is 3×3, where E has six components.
+    // Chai 2022, (12): the print has the index R, which is 3×3, where E has six components.
     let mut controller = controller(Constraints::Paper);
     let (g, paper) = (controller.design().g, controller.design().paper.unwrap());
     let epsilon = paper.epsilon1.min(paper.epsilon2);
@@ -133,13 +135,14 @@ fn oracle_terminal_constraint_is_a_ball_in_the_norm_of_g() {
         assert!(norm <= epsilon * (1.0 + 1e-6), "tick {}: {norm}", sample.tick);
         active += usize::from(norm >= epsilon * (1.0 - 1e-6));
     }
-    // While the jump is at the end of the horizon.
+    // The ball is active while the jump is at the end of the horizon.
     assert!(active >= 3, "{active}");
 }
 
 #[test]
 fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
-    // Chai 2022, (28): û = u + f(x), and (29): û^m = û* + K O_e; the print has B O_e, which has six components.
+    // Chai 2022, (28): û = u + f(x), and (29): û^m = û* + K O_e. The print has B O_e, which has six
+    // components.
     let mut controller = controller(Constraints::Robust);
     let Settings { body, feedback, .. } = settings(Constraints::Robust);
     let mut inside = 0;
@@ -161,7 +164,8 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
         let nominal = memory.nominal;
         let (angle, rate) = (angles - nominal.fixed_rows::<3>(0), angle_rates - nominal.fixed_rows::<3>(3));
         let expected = memory.plan.accelerations[0] + angle * feedback.k1 + rate * feedback.k2;
-        // Where that acceleration takes the state by the middle of the period (docs/guarantee.md).
+        // This is the state to which that acceleration leads by the middle of the period
+        // (docs/guarantee.md).
         let half = 0.5 * controller.period();
         let middle = angles + angle_rates * half + expected * (0.5 * half * half);
         if moment.norm() > (1.0 - 1e-12) * settings(Constraints::Robust).limit_moment {
@@ -178,7 +182,8 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
 
 #[test]
 fn exits_change_nothing_along_a_run() {
-    // The balls as functions of the motion, and linearised, where the cone solver is the judge.
+    // The balls are functions of the motion in the first way, and linearised in the second, which
+    // is the cone solver's.
     let ways = [(Nonlinearity::Exact, Method::Riccati), (Nonlinearity::Frozen, Method::Cone)];
     for constraints in [Constraints::Robust, Constraints::Paper] {
         for (nonlinearity, method) in ways {
@@ -232,7 +237,8 @@ fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins(
 
 #[test]
 fn every_way_to_the_optimum_shows_that_it_is_one() {
-    // By the residual of the conditions of optimality, with the constraints as they are.
+    // The measure is the residual of the conditions of optimality, with the constraints as
+    // functions of the motion.
     for constraints in [Constraints::Robust, Constraints::Paper] {
         let mut controller = controller(constraints);
         let mut seen = Vec::new();
@@ -252,7 +258,8 @@ fn every_way_to_the_optimum_shows_that_it_is_one() {
     }
 }
 
-/// (31) written out again: the plan before without its first interval, then one under the acceleration `last` of the state before.
+/// Checks (31) independently: the plan is the one before without its first interval, followed by
+/// one interval under the acceleration `last` of the state before.
 fn assert_is_shifted(
     after: &Plan,
     before: &Plan,
@@ -295,16 +302,16 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
         let at = |k: usize| reference()(time + k as f64 * h);
         let end = at(settings.horizon - 1);
         assert_is_shifted(&after.plan, &sample.before.plan, &settings, |angle, rate, i| {
-            // (14)
+            // Terminal law (14).
             settings.terminal.k1 * (angle - end.angles[i])
                 + settings.terminal.k2 * (rate - end.rates[i])
                 + end.accelerations[i]
         });
 
-        // That it is no optimum shows.
+        // The residual shows that the plan is no optimum.
         assert!(after.report.residual > 1e-3, "{}", after.report.residual);
 
-        // Its cost, written out.
+        // The cost is calculated independently.
         let mut cost = 0.0;
         for k in 0..=settings.horizon {
             let reference = at(k);
@@ -322,7 +329,8 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
         }
         assert!((after.report.cost - cost).abs() < 1e-9 * cost, "{} {cost}", after.report.cost);
 
-        // (20) about the shifted plan: R I⁻¹ m = u = K O_e + ũ, ũ = a − f(x); the limit is kept.
+        // Feedback law (20) about the shifted plan: R I⁻¹ m = u = K O_e + ũ, ũ = a − f(x). The
+        // limit is kept.
         let Measurement { angles, rates, .. } = sample.measured;
         let angle_rates = kinematics::r(&angles) * rates;
         assert!(moment.norm() <= settings.limit_moment * (1.0 + 1e-12));
@@ -342,8 +350,9 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
 
 #[test]
 fn the_robust_plan_is_kept_where_no_optimum_is_found() {
-    // Beyond the horizon the motion brakes, docs/guarantee.md, so that the guarantee stays in force. The plan moves towards the optimum without
-    // constraints only as far as that is certified.
+    // Beyond the horizon the motion brakes (docs/guarantee.md), so that the guarantee stays in
+    // force. The plan moves towards the optimum without constraints only as far as that is
+    // certified.
     let settings = settings(Constraints::Robust);
     let solver = SolverSettings { max_iterations: 1, ..settings.solver };
     let mut failing = Crmpc::new(Settings { solver, ..settings }).unwrap();
@@ -397,7 +406,8 @@ impl Controller for Interrupted {
     }
 }
 
-/// Scenario with a solver that fails `during` some ticks: outcome, fallbacks inside and outside, last memory.
+/// Runs the scenario with a solver that fails `during` some ticks. Returns the outcome, the
+/// fallbacks inside and outside, and the last memory.
 fn run_failing(during: Range<u64>) -> (harness::Outcome, [u32; 2], Memory) {
     let settings = settings(Constraints::Robust);
     let mut controller = Interrupted {
@@ -410,7 +420,7 @@ fn run_failing(during: Range<u64>) -> (harness::Outcome, [u32; 2], Memory) {
         during: during.clone(),
     };
     let mut memory = Memory::default();
-    // Optimisations without an optimum, at which the plan was kept or given up.
+    // These are optimisations without an optimum, at which the plan was kept or given up.
     let mut fallbacks = [0, 0];
     let mut last = 0;
     let outcome =
@@ -425,7 +435,8 @@ fn run_failing(during: Range<u64>) -> (harness::Outcome, [u32; 2], Memory) {
 
 #[test]
 fn a_solver_that_fails_for_a_while_costs_no_limit() {
-    // In the manoeuvre at the start, with the jump of the reference ahead, about the jump.
+    // The failures are in the manoeuvre at the start, with the jump of the reference ahead, and
+    // about the jump.
     for during in [10..50, 200..300, 575..660] {
         let (outcome, [inside, outside], memory) = run_failing(during.clone());
         assert!(inside > 0 && outside == 0, "{during:?}: {inside} fallbacks inside, {outside} outside");
@@ -436,7 +447,8 @@ fn a_solver_that_fails_for_a_while_costs_no_limit() {
 
 #[test]
 fn a_solver_that_fails_from_the_start_is_outlived() {
-    // Without a plan there is nothing to keep: the terminal law alone. With one, it is led to the reference without a solver.
+    // Without a plan only the terminal law is left. With a plan, the vehicle is led to the
+    // reference without a solver.
     for during in [0..5, 0..u64::MAX] {
         let (outcome, [inside, outside], memory) = run_failing(during.clone());
         assert!(inside > 0 && outside < 25, "{during:?}: {inside} fallbacks inside, {outside} outside");
@@ -492,7 +504,8 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
         let mut used = controller(constraints);
         let mut sampled = Sampled::new(0.0, Memory::default());
         for (tick, measured) in truth.iter().enumerate().take(750) {
-            // Within and at the beginning of an optimisation period, with the tick evaluated and not.
+            // The saved state is taken within and at the beginning of an optimisation period, with
+            // the tick evaluated or not.
             if tick % 7 == 3 {
                 if tick % 2 == 0 {
                     sampled.evaluate(&mut used, measured, &preview);

@@ -7,17 +7,19 @@ use vehicle::kinematics;
 use vehicle::plant::Plant;
 use vehicle::scenario::Scenario;
 
-/// What one run shows.
+/// Figures of merit of one run.
 struct Outcome {
-    /// RMS of the angle errors between 10 and 20 s, deg.
+    /// Root mean square of the angle errors between 10 and 20 s, deg.
     rms: Vector3<f64>,
-    /// When each error stays within 2 % of its first value, s; infinite if never.
+    /// Time from which each error stays within 2 % of its first value, s; infinite if there is
+    /// none.
     settling: Vector3<f64>,
-    /// Largest ‖M‖ commanded, N m.
+    /// Largest commanded ‖M‖, N m.
     moment: f64,
 }
 
-/// The loop over the scenario; `actuate` turns a command into the achieved moment, which is measured if `fed`.
+/// Simulates the loop over the scenario. `actuate` turns a command into the achieved moment, which
+/// is measured if `fed`.
 fn simulate<C: Controller>(
     controller: &mut C,
     scenario: &Scenario,
@@ -58,7 +60,7 @@ fn simulate<C: Controller>(
     Outcome { rms: (squares / count).map(|x| x.sqrt().to_degrees()), settling, moment: largest }
 }
 
-/// Moments applied as commanded.
+/// Runs the scenario with moments applied as commanded.
 fn direct<C: Controller>(mut controller: C) -> Outcome {
     simulate(&mut controller, &Scenario::tvsmc2015(), false, |moment| moment, |_, _| ())
 }
@@ -71,14 +73,14 @@ fn sotvsmc_do() -> SotvsmcDo {
     Tvsmc::new(Settings::sotvsmc_do()).unwrap()
 }
 
-/// Angles in deg, to 2 % or half a unit of the last digit given.
+/// Compares angles in deg, to 2 % or half a unit of the last digit given.
 fn assert_rms(outcome: &Outcome, expected: [f64; 3], digit: f64) {
     for (found, expected) in outcome.rms.iter().zip(expected) {
         assert!((found - expected).abs() <= (0.02 * expected).max(0.5 * digit), "{:?}", outcome.rms);
     }
 }
 
-// Direct torque: what the paper's Figs 3 and 4 show, in figures.
+// Direct torque: the content of the paper's Figs 3 and 4, in figures.
 
 #[test]
 fn regress_fbl_keeps_an_error() {
@@ -117,7 +119,7 @@ fn regress_laws_with_observer() {
 
 #[test]
 fn published_sliding_variable_starts_at_zero_and_the_observer_finds_the_uncertainty() {
-    // Figs 5 and 7.
+    // Compare Figs 5 and 7.
     let scenario = Scenario::tvsmc2015();
     let (mut last, mut peak) = (Vector3::zeros(), 0.0_f64);
     simulate(
@@ -129,7 +131,8 @@ fn published_sliding_variable_starts_at_zero_and_the_observer_finds_the_uncertai
             if time == 0.0 {
                 assert_eq!(memory.sliding, Vector3::zeros());
             }
-            // "move back to zero around 4 seconds later": to a tenth of the peak then, further on to what remains.
+            // The paper says "move back to zero around 4 seconds later". From then on the bound is
+            // a tenth of the peak, because a remainder persists.
             peak = peak.max(memory.sliding.amax());
             let bound = if time < 4.0 { f64::INFINITY } else { 0.1 * peak };
             assert!(memory.sliding.amax() < bound, "{time}: {:?}", memory.sliding);
@@ -137,7 +140,8 @@ fn published_sliding_variable_starts_at_zero_and_the_observer_finds_the_uncertai
             last = memory.estimate.disturbance;
         },
     );
-    // At 20 s: K_true M + B + R I_true⁻¹ ΔM = v + Δv. The attitude rests at the reference, so M cancels ΔM, v = −Δv = K M.
+    // At 20 s, K_true M + B + R I_true⁻¹ ΔM = v + Δv. The attitude rests at the reference, so M
+    // cancels ΔM, and v = −Δv = K M.
     let nominal = scenario.inertia.body(1.0).unwrap();
     let time = 20.0_f64;
     let disturbance = Vector3::repeat(1e4 * (0.5 + (0.1 * time).sin() + time.sin()));
@@ -148,7 +152,7 @@ fn published_sliding_variable_starts_at_zero_and_the_observer_finds_the_uncertai
 
 #[test]
 fn oracle_determinant_of_k() {
-    // Wu 2015, (14), leaves out cos β and I_y.
+    // Equation (14) of Wu 2015 leaves out cos β and I_y.
     let inertia = Scenario::tvsmc2015().inertia;
     let body = inertia.body(1.0).unwrap();
     let angles = Vector3::new(0.5, 0.3, 1.0);
@@ -160,7 +164,8 @@ fn oracle_determinant_of_k() {
 
 #[test]
 fn oracle_cross_product_is_skew() {
-    // ω^× of Wu 2015, (5), with −q in its third row: power ω · (ω × I ω) is zero. As printed it is not.
+    // With −q in the third row of ω^× in Wu 2015, (5), the power ω · (ω × I ω) is zero. As printed
+    // it is not.
     let body = Scenario::tvsmc2015().inertia.body(1.0).unwrap();
     let rates = Vector3::new(0.1, -0.2, 0.3);
     let momentum = body.inertia * rates;
@@ -170,7 +175,7 @@ fn oracle_cross_product_is_skew() {
     assert!(momentum.dot(&(body.inertia * free - printed)).abs() > 1e-3 * momentum.norm_squared());
 }
 
-// Actuators that fall short
+// Tests with actuators that fall short of the command.
 
 /// Actuators that follow a command with a limited rate per axis, N m/s.
 fn rate_limited(rate: f64, period: f64) -> impl FnMut(Vector3<f64>) -> Vector3<f64> {
@@ -183,7 +188,7 @@ fn rate_limited(rate: f64, period: f64) -> impl FnMut(Vector3<f64>) -> Vector3<f
     }
 }
 
-/// SOTVSMC/DO with actuators of 1.5e5 N m/s.
+/// Runs SOTVSMC/DO with actuators of 1.5e5 N m/s.
 fn with_slow_actuators(anti_windup: bool, fed: bool) -> Outcome {
     let mut controller = Tvsmc::new(Settings { anti_windup, ..Settings::sotvsmc_do() }).unwrap();
     simulate(&mut controller, &Scenario::tvsmc2015(), fed, rate_limited(1.5e5, 0.01), |_, _| ())
@@ -210,7 +215,7 @@ fn the_observer_must_know_what_was_achieved() {
 
 #[test]
 fn a_known_limit_needs_no_measured_moment() {
-    // The controller's own limit counts as a shortfall: as good as actuators that are measured.
+    // The controller's own limit counts as a shortfall, with the same result as measured actuators.
     let scenario = Scenario::tvsmc2015();
     let limit_moment = 1.5e5;
     let mut limited = Tvsmc::new(Settings { limit_moment, ..Settings::sotvsmc_do() }).unwrap();

@@ -10,18 +10,18 @@ use vehicle::plant::{self, Load, Plant};
 use vehicle::reference::{Profile, Reference};
 use vehicle::scenario::Scenario;
 
-/// What one run shows.
+/// Figures of merit of one run.
 #[derive(Debug)]
 struct Outcome {
     /// Largest error of any angle after 12 s, deg.
     rest: f64,
-    /// When all errors stay within 0.5 deg, s.
+    /// Time from which all errors stay within 0.5 deg, s.
     settling: f64,
-    /// Largest ‖M‖, N m.
+    /// Largest ‖M‖ of the run, N m.
     moment: f64,
     /// Largest |M| of each axis, N m.
     moments: Vector3<f64>,
-    /// Largest component of either integral.
+    /// Largest component of the outer and of the inner integral.
     integrals: (f64, f64),
 }
 
@@ -69,7 +69,8 @@ fn direct(settings: &TwoLoopSettings) -> Outcome {
 #[test]
 fn regress_steps_settle_with_a_moment_within_the_actuators_reach_about_each_axis() {
     let outcome = direct(&TwoLoopSettings::ours());
-    // Reach of surfaces and jets about one axis, the others balanced (tests/reach.py). The disturbance alone takes 1e5 N m of it.
+    // The reach is that of surfaces and jets about one axis with the others balanced
+    // (tests/reach.py). The disturbance alone takes 1e5 N m of it.
     let reach = Vector3::new(179.57e3, 302.24e3, 104.54e3);
     assert!((reach - outcome.moments).min() > 0.0, "{outcome:?}");
     assert!((outcome.settling - 4.39).abs() < 0.05 && (outcome.rest - 0.087).abs() < 0.005, "{outcome:?}");
@@ -99,20 +100,21 @@ fn regress_integrals_that_rest_in_saturation_do_not_wind_up() {
     assert!((with.settling - 9.22).abs() < 0.05 && with.rest < 0.1, "{with:?}");
     assert!(with.integrals.0 < 0.02 && with.integrals.1 < 0.003, "{with:?}");
     assert!(without.rest > 90.0, "the attitude is lost: {without:?}");
-    // The same limit in actuators whose moment is measured.
+    // The same limit acts in actuators whose moment is measured.
     let free = TwoLoopSettings { limit_moment: f64::INFINITY, ..limited(true) };
     let measured = run(&free, true, |moment| moment / (moment.norm() / 1.9e5).max(1.0));
     assert!((measured.settling - with.settling).abs() < 0.011 && measured.rest < 0.3, "{measured:?}");
 }
 
-/// P of φ = P Θ.
+/// Returns the matrix P of φ = P Θ.
 fn papers_order() -> Matrix3<f64> {
     Matrix3::new(0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0)
 }
 
 #[test]
 fn oracle_papers_matrix_in_consistent_order_and_axes() {
-    // [bank, sideslip, angle of attack] by [p, q, r] at β = 0. Printed: [[0, 0, 1], [sin α, cos α, 0], [cos α, −sin α, 0]].
+    // The rows are [bank, sideslip, angle of attack] by [p, q, r] at β = 0. Printed is [[0, 0, 1],
+    // [sin α, cos α, 0], [cos α, −sin α, 0]].
     let alpha = 0.3_f64;
     let ours = papers_order() * kinematics::r(&Vector3::new(alpha, 0.0, 1.0));
     let (sa, ca) = alpha.sin_cos();
@@ -121,7 +123,7 @@ fn oracle_papers_matrix_in_consistent_order_and_axes() {
 
 #[test]
 fn oracle_rate_command_is_the_same_in_the_papers_order() {
-    // (7) with φ = P Θ at the first tick, without filter; gains differ per axis.
+    // Law (7) with φ = P Θ at the first tick, without filter; gains differ per axis.
     let mut settings = TwoLoopSettings { filter: 0.0, ..TwoLoopSettings::ours() };
     settings.outer.k = [0.5, 0.6, 0.7];
     settings.outer.layer.rho = [0.02, 0.03, 0.04];
@@ -147,7 +149,7 @@ fn oracle_rate_command_is_the_same_in_the_papers_order() {
     assert!((memory.rate_command - expected).norm() < 1e-14);
 }
 
-/// s_w and s_n, and how fast they change under the commanded moment without disturbance.
+/// Returns s_w and s_n, and their rates under the commanded moment without disturbance.
 fn sliding_and_its_rate(settings: &TwoLoopSettings) -> [(Vector3<f64>, Vector3<f64>); 2] {
     let reference = Reference { angles: Vector3::new(0.02, 0.013, -0.007), ..Reference::default() };
     let measured = Measurement { rates: Vector3::new(0.01, -0.02, 0.03), ..Measurement::default() };
@@ -155,7 +157,8 @@ fn sliding_and_its_rate(settings: &TwoLoopSettings) -> [(Vector3<f64>, Vector3<f
     let moment = TwoLoopSmc::new(*settings).unwrap().update(&mut memory, 0, 0.0, &measured, &|_| reference);
     let before = memory;
     let step = 1e-6;
-    // Short enough for a difference: the plant under that moment, then both loops' errors from its state.
+    // The step is short enough for a finite difference: the plant moves under that moment, then the
+    // errors of both loops follow from its state.
     let state = plant::state(&measured.angles, &measured.rates);
     let load = Load { moment, ..Load::default() };
     let state = state + plant::derivative(&settings.body, Kinematics::Printed, &state, &load) * step;
@@ -170,7 +173,8 @@ fn sliding_and_its_rate(settings: &TwoLoopSettings) -> [(Vector3<f64>, Vector3<f
 
 #[test]
 fn oracle_reaching_law_of_the_inner_loop() {
-    // With M as commanded and no disturbance, ds_n/dt = −ρ f SAT(s_n/ε): the sign of the last term of (10) is +.
+    // With M as commanded and no disturbance, ds_n/dt = −ρ f SAT(s_n/ε): the sign of the last term
+    // of (10) is +.
     let settings = TwoLoopSettings { filter: 0.0, ..TwoLoopSettings::ours() };
     let [_, (s, rate)] = sliding_and_its_rate(&settings);
     let expected = -settings.inner.layer.value(&s);
@@ -179,7 +183,7 @@ fn oracle_reaching_law_of_the_inner_loop() {
 
 #[test]
 fn oracle_with_the_sign_of_10_the_inner_sliding_variable_grows() {
-    // ds_n/dt = +ρ f SAT(s_n/ε)
+    // The printed sign gives ds_n/dt = +ρ f SAT(s_n/ε).
     let settings = TwoLoopSettings { filter: 0.0, form: Form::PrintedSign, ..TwoLoopSettings::ours() };
     let [_, (s, rate)] = sliding_and_its_rate(&settings);
     let expected = settings.inner.layer.value(&s);
@@ -189,10 +193,11 @@ fn oracle_with_the_sign_of_10_the_inner_sliding_variable_grows() {
 
 #[test]
 fn oracle_with_the_minus_sign_of_f_the_outer_sliding_variable_grows() {
-    // Where ω follows ω_c, ds_w/dt = R (ω_c − ω) + ρ |f| SAT(s_w/ε); in (11) two minus signs make ds_n/dt = −ρ |f| SAT(s_n/ε).
+    // If ω follows ω_c, ds_w/dt = R (ω_c − ω) + ρ |f| SAT(s_w/ε). In (11) two minus signs make
+    // ds_n/dt = −ρ |f| SAT(s_n/ε).
     let settings = TwoLoopSettings { filter: 0.0, form: Form::PrintedFactor, ..TwoLoopSettings::ours() };
     let [(s_w, rate_w), (s_n, rate_n)] = sliding_and_its_rate(&settings);
-    // No integral yet: s_n = ω_c − ω.
+    // There is no integral yet, so s_n = ω_c − ω.
     let expected = kinematics::r(&Vector3::zeros()) * s_n + settings.outer.layer.value(&s_w);
     assert!((rate_w - expected).norm() < 1e-4 * expected.norm());
     let expected = -settings.inner.layer.value(&s_n);
@@ -201,7 +206,7 @@ fn oracle_with_the_minus_sign_of_f_the_outer_sliding_variable_grows() {
 
 #[test]
 fn published_matrix_in_our_order() {
-    // (3), φ̇ = R ω, with φ = P Θ
+    // Printed is (3), φ̇ = R ω, with φ = P Θ.
     let alpha = 0.3_f64;
     let (sa, ca) = alpha.sin_cos();
     let printed = Matrix3::new(0.0, 0.0, 1.0, sa, ca, 0.0, ca, -sa, 0.0);
@@ -212,7 +217,7 @@ fn published_matrix_in_our_order() {
 #[test]
 fn regress_printed_forms_lose_the_attitude() {
     let ours = TwoLoopSettings::ours();
-    // When an angle is 30 deg off.
+    // Returns the time at which an angle error exceeds 30 deg.
     let lost = |settings: &TwoLoopSettings| {
         let scenario = Scenario::two_loop();
         let mut controller = TwoLoopSmc::new(*settings).unwrap();
@@ -271,7 +276,7 @@ fn the_filter_follows_a_smooth_reference_without_lag() {
     for tick in 0..1000_u32 {
         let time = f64::from(tick) * 0.01;
         let now = reference(time);
-        // A vehicle that is where the reference is.
+        // The vehicle is exactly on the reference.
         let rates = kinematics::r_inverse(&now.angles) * now.rates;
         let measured = Measurement { angles: now.angles, rates, ..Measurement::default() };
         controller.update(&mut memory, tick.into(), time, &measured, &reference);

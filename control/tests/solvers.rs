@@ -1,4 +1,5 @@
-//! The Riccati method with the cone solver as its judge: the same problem, the same cost, or neither finds an optimum.
+//! The Riccati method compared with the cone solver: for the same problem both find the same cost,
+//! or neither finds an optimum.
 
 #[path = "harness/balls.rs"]
 mod balls;
@@ -22,11 +23,11 @@ use std::ops::Range;
 use vehicle::scenario::Scenario;
 
 const MAX_ITERATIONS: u32 = 60;
-/// Problems per shape: their horizon and weights belong to the solvers' construction.
+/// Problems per shape; their horizon and weights are fixed when the solvers are set up.
 const PER_SHAPE: usize = 125;
 const SHAPES: u32 = 44;
 
-/// What the solvers are built for.
+/// Shape of the problems for which the solvers are set up.
 #[derive(Clone, Debug)]
 struct Shape {
     horizon: usize,
@@ -35,7 +36,7 @@ struct Shape {
 }
 
 fn shape() -> impl Strategy<Value = Shape> {
-    // Four decades of each weight about those of Chai 2022.
+    // Each weight varies over four decades about those of Chai 2022.
     let weight = || -2.0..2.0f64;
     let weights = [weight(), weight(), weight()];
     (10..=200usize, weights, any::<bool>()).prop_map(|(horizon, [angle, rate, input], terminal)| {
@@ -53,7 +54,7 @@ fn shape() -> impl Strategy<Value = Shape> {
     })
 }
 
-/// What one problem has of its own.
+/// Data of one problem.
 #[derive(Clone, Debug)]
 struct Sample {
     start: State<2>,
@@ -62,7 +63,7 @@ struct Sample {
     printed: bool,
     /// Decades of both bounds about 5 °/s and 1.356e5 N m.
     bounds: (f64, f64),
-    /// ε over ‖E_N‖_G of the motion without balls.
+    /// Radius ε relative to ‖E_N‖_G of the motion without balls.
     radius: f64,
 }
 
@@ -122,7 +123,8 @@ impl Solvers {
         }
     }
 
-    /// The sample's problem with its balls linearised about the optimum without balls, by both solvers.
+    /// Solves the sample's problem with both solvers, with its balls linearised about the optimum
+    /// without balls.
     fn solve(&mut self, sample: &Sample, normals: Option<&[Vec<SVector<f64, 2>>; 3]>) -> Verdict {
         let Self { shape, chain, unconstrained, riccati, cone, frozen, affine } = self;
         affine.fill([Vector3::zeros(); 2]);
@@ -188,7 +190,7 @@ fn oracle_riccati_and_cone_agree_on_the_cost_of_5500_random_problems() {
                     }
                     (false, false) => 1,
                     (true, false) => {
-                        // The certificate shows that it is the judge who is wrong.
+                        // The certificate shows that the cone solver is wrong.
                         prop_assert!(certificate.residual() <= 1e-5, "{}", context());
                         2
                     }
@@ -221,7 +223,7 @@ fn published() -> Shape {
     Shape { horizon: settings.horizon, cost, terminal: true }
 }
 
-/// A moderate problem from which the cases below depart.
+/// A moderate problem from which the cases below deviate.
 const MODERATE: Sample = Sample {
     start: [Vector3::new(0.1, -0.05, -0.15), Vector3::new(0.01, 0.0, -0.01)],
     jump: (0.5, [0.0; 3]),
@@ -248,15 +250,16 @@ fn oracle_riccati_and_cone_agree_wherever_the_reference_jumps() {
 #[test]
 fn oracle_riccati_and_cone_agree_in_degenerate_cases() {
     let mut solvers = Solvers::new(published(), None);
-    // The first state is as fast as it may be, so that the first input cannot but keep it there or slow it down.
+    // The first state is as fast as permitted, so that the first input must keep the rate or reduce
+    // it.
     let limit = 5.0_f64.to_radians();
     let start = [Vector3::new(0.3, 0.05, -0.2), Vector3::new(0.0, 0.0, 0.999 * limit)];
     assert_agree(solvers.solve(&Sample { start, ..MODERATE }, None), "rate at its bound at the start");
-    // Balls so large that none is active; an end that is all but given.
+    // These are balls so large that none is active, and an end that is almost given.
     assert_agree(solvers.solve(&Sample { bounds: (3.0, 3.0), ..MODERATE }, None), "no ball active");
     let jump = (0.99, [0.012, 0.0, -0.087]);
     assert_agree(solvers.solve(&Sample { radius: 1e-3, jump, ..MODERATE }, None), "tiny terminal ball");
-    // One axis has nothing to do.
+    // One axis is already at its reference.
     let start = [Vector3::new(0.3, 0.0, 0.0), Vector3::zeros()];
     assert_agree(solvers.solve(&Sample { start, ..MODERATE }, None), "one axis only");
 }
@@ -264,13 +267,13 @@ fn oracle_riccati_and_cone_agree_in_degenerate_cases() {
 #[test]
 fn an_infeasible_problem_is_recognised_within_the_iteration_limit() {
     let mut solvers = Solvers::new(published(), None);
-    // Three times as fast as allowed, and no moment to speak of.
+    // The start is three times as fast as permitted, with hardly any moment.
     let start = [Vector3::zeros(), Vector3::new(0.0, 0.26, 0.0)];
     for moment in [0.0, -1.0, -3.0] {
         let [(ours, ..), (judge, ..)] =
             solvers.solve(&Sample { start, bounds: (0.0, moment), ..MODERATE }, None);
         assert!(!ours.solved() && !judge.solved(), "{ours:?} {judge:?}");
-        // Not by the last iteration, but for what it is.
+        // The search must not end by its last iteration but because it is recognised as hopeless.
         assert!(ours.hopeless() && ours.iterations() < MAX_ITERATIONS, "{ours:?}");
     }
 }
@@ -314,7 +317,7 @@ fn oracle_balls_that_only_the_iterates_come_near_are_found() {
         constraints: &sets,
         end: End { weight: &cost.end, slope: [Vector3::zeros(); 2], radius: None },
     };
-    // One guess breaks its bounds, the other rests where it is, far from all.
+    // One guess violates its bounds, the other rests at the start, far from all bounds.
     let (mut fast, mut still) = (Solution::new(horizon), Solution::new(horizon));
     Unconstrained::new(horizon, &chain, &cost).solve(&start, &affine, &mut fast.motion);
     still.motion.states.fill(start);
@@ -336,7 +339,8 @@ fn oracle_balls_that_only_the_iterates_come_near_are_found() {
     assert!((optima[0] - optima[1]).abs() <= 1e-8 * optima[0], "{optima:?}");
 }
 
-/// Sets that the Riccati method cannot evaluate: what it meets after the first call of `tighten` is no number.
+/// Sets that the Riccati method cannot evaluate: after the first call of `tighten` their values are
+/// not numbers.
 struct Spoilt {
     sets: Sets,
     tightened: usize,
@@ -392,7 +396,7 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
     let affine = vec![[Vector3::zeros(); 2]; horizon];
     let body = Scenario::crmpc2022().inertia.body(1.0).unwrap();
     let previous = Motion::new(horizon);
-    // The spoilt sets are whole again when the cone solver asks.
+    // The spoilt sets are valid again when the cone solver asks.
     for (tightened, status) in [(0, Status::Cone), (1, Status::Constrained)] {
         let solver = SolverSettings { exits: false, ..SolverSettings::new(MAX_ITERATIONS) };
         let mut optimiser = Optimiser::new(layout.clone(), solver).unwrap();
@@ -403,7 +407,7 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
         assert_eq!(report.status, status);
         assert!(report.certificate.feasibility < 0.1, "{report:?}");
     }
-    // With no time left, neither solver is begun.
+    // With no time left, neither solver is started.
     let solver = SolverSettings { exits: false, time_budget: 1e-9, ..SolverSettings::new(MAX_ITERATIONS) };
     let mut optimiser = Optimiser::new(layout, solver).unwrap();
     let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };

@@ -1,4 +1,5 @@
-//! What one controller adds to the unit that all of them share: its own parameters, its design, its own outputs.
+//! The part of a unit that a single controller adds: its own parameters, its design and its
+//! outputs.
 
 use crate::unit::ControllerFmu;
 use control::Controller;
@@ -8,10 +9,10 @@ use fmi2_export::Table;
 use serde::{Serialize, de::DeserializeOwned};
 use vehicle::dynamics::RigidBody;
 
-/// What every controller is told about the vehicle.
+/// Data of the vehicle that every controller receives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
-    /// The rigid body as the controller believes it to be.
+    /// Rigid body of the vehicle that the controller uses.
     pub body: RigidBody,
     /// Limit on ‖ω‖, rad/s.
     pub limit_rate: f64,
@@ -19,32 +20,34 @@ pub struct Vehicle {
     pub limit_moment: f64,
     /// Whether the commanded moment is scaled into its limit.
     pub saturation: bool,
-    /// Time between the instant that a measurement describes and the action of the moment computed from it. The law sees the
-    /// state predicted over it.
+    /// Time from the instant of a measurement until the resulting moment acts. The law receives the
+    /// state predicted over this time.
     pub latency: Latency,
 }
 
 impl Vehicle {
-    /// The limit that a command is scaled into, N m; infinite for none. For laws that must know what is left of a command.
+    /// Returns the limit into which a command is scaled, N m; infinite for none. It is for laws
+    /// that need their command after the scaling.
     pub fn saturates_at(&self) -> f64 {
         if self.saturation { self.limit_moment } else { f64::INFINITY }
     }
 }
 
-/// A control law with the variables only it has. The value holds those variables; its default holds their start values.
+/// A control law with the variables that only it has. The value holds those variables; its default
+/// holds their start values.
 pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
-    /// The sampled controller behind it.
+    /// Sampled controller of the law.
     type Controller: Controller + Send;
-    /// All that the controller is built from.
+    /// All settings from which the controller is built.
     type Settings: PartialEq + Send;
 
-    /// Name of the unit.
+    /// Name of the unit in FMI.
     const NAME: &'static str;
-    /// One line: what the unit is.
+    /// Description of the unit in one line.
     const DESCRIPTION: &'static str;
-    /// What it computes, as an HTML fragment.
+    /// Description of the computation, as an HTML fragment.
     const DOCUMENTATION: &'static str = "";
-    /// Version of the unit.
+    /// Version of the unit in FMI.
     const VERSION: &'static str = env!("CARGO_PKG_VERSION");
 
     /// Adds the law's own variables to the table.
@@ -52,19 +55,19 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
         table
     }
 
-    /// The settings that the parameters make.
+    /// Returns the settings that follow from the parameters.
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings;
 
-    /// Builds the controller.
+    /// Builds the controller from its settings.
     ///
     /// # Errors
-    /// Names the parameter at fault.
+    /// Returns an error that names the parameter at fault.
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError>;
 
-    /// Takes the law's own outputs from the memory in force.
+    /// Copies the law's own outputs from the memory in force.
     fn show(&mut self, _memory: &<Self::Controller as Controller>::Memory) {}
 
-    /// A warning for the log if something went wrong between two ticks.
+    /// Returns a warning for the log if something went wrong between two ticks.
     fn warning(
         _before: &<Self::Controller as Controller>::Memory,
         _after: &<Self::Controller as Controller>::Memory,

@@ -1,7 +1,8 @@
-//! Makes an FMI 2.0 unit of a sampled attitude controller.
+//! This crate makes an FMI 2.0 unit of a sampled attitude controller.
 //!
-//! A control law implements [`control::Controller`] and [`Law`]; [`ControllerFmu`] gives it the inputs, outputs, reference
-//! profiles, limits and delays that all controllers share, so that one unit can take another's place without rewiring:
+//! A control law implements [`control::Controller`] and [`Law`]. [`ControllerFmu`] adds the inputs,
+//! outputs, reference profiles, limits and delays that all controllers share, so that one unit can
+//! replace another without rewiring:
 //!
 //! ```
 //! use control::lqr::{Lqr, LqrSettings};
@@ -45,13 +46,13 @@
 //! assert!(description.variables.iter().any(|variable| variable.name == "moment.x"));
 //! ```
 //!
-//! | module | what it knows |
+//! | module | contents |
 //! |---|---|
-//! | [`law`] | what a controller adds to the unit that all of them share |
-//! | [`mod@unit`] | that unit |
+//! | [`law`] | what a controller adds to the shared unit |
+//! | [`mod@unit`] | the unit that all controllers share |
 //! | [`sampled`] | any unit that works at ticks: steps, saved states |
-//! | [`table`] | the table of variables that all controllers have, and declarations that laws share |
-//! | [`mod@reference`] | where the reference comes from |
+//! | [`table`] | the variables that all controllers have, and declarations that laws share |
+//! | [`mod@reference`] | the source of the reference |
 
 pub mod law;
 pub mod reference;

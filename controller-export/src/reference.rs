@@ -1,4 +1,5 @@
-//! The reference a controller follows: a paper's profile, a simple course, a table, or the external inputs.
+//! The reference that a controller follows: a paper's profile, a simple course, a table, or the
+//! external inputs.
 
 use control::controller::Preview;
 use fmi2_export::{Context, Enumeration, Failure};
@@ -9,7 +10,7 @@ use vehicle::Scenario;
 use vehicle::reference::{Profile, Reference};
 use vehicle::table::Table;
 
-/// Where the reference attitude comes from.
+/// Choice of the source of the reference attitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[allow(missing_docs)] // Each item is described in [`PROFILES`].
 pub enum Choice {
@@ -23,7 +24,7 @@ pub enum Choice {
     External,
 }
 
-/// The choices of `reference.profile`.
+/// The choices of the parameter `reference.profile`.
 pub static PROFILES: Enumeration<Choice> = Enumeration {
     name: "ReferenceProfile",
     description: "Where the reference attitude comes from",
@@ -38,12 +39,12 @@ pub static PROFILES: Enumeration<Choice> = Enumeration {
     ],
 };
 
-/// The parameters of the reference.
+/// Parameters of the reference.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Parameters {
-    /// Which of the courses it is.
+    /// Choice of the course.
     pub profile: Choice,
-    /// CSV file of the table.
+    /// Path of the CSV file of the table.
     pub file: String,
     /// Constant part of the angles, rad.
     pub angle: Vector3<f64>,
@@ -69,7 +70,7 @@ impl Default for Parameters {
     }
 }
 
-/// Where the reference comes from.
+/// Source of the reference with its data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Source {
     Profile(Profile),
@@ -90,7 +91,7 @@ impl Source {
         })
     }
 
-    /// Whether it is one that these parameters lead to. The file of a table is not read again.
+    /// Returns whether these parameters lead to this source. The file of a table is not read again.
     pub(crate) fn fits(&self, parameters: &Parameters) -> bool {
         let wants_table = parameters.profile == Choice::Table;
         match self {
@@ -103,7 +104,8 @@ impl Source {
         }
     }
 
-    /// What is known of it where the external reference holds until `known` (s).
+    /// Returns the preview of the reference, where an external reference is valid until `known`
+    /// (s).
     pub(crate) fn preview(&self, known: f64, external: &Reference) -> Preview<'_> {
         match self {
             Self::Profile(profile) => Preview::Profile(profile),
@@ -112,7 +114,7 @@ impl Source {
     }
 }
 
-/// A file name as it stands, or inside the unit's resources.
+/// Reads the table from the file name as given, or from the unit's resources.
 fn table(file: &str, context: &Context) -> Result<Table, Failure> {
     if file.is_empty() {
         let text =

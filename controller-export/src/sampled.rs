@@ -1,4 +1,4 @@
-//! Any unit that works at ticks of its own: how it steps from tick to tick, and how it is restored.
+//! Any unit that works at ticks of its own: its steps from tick to tick, and its restoration.
 
 use control::schedule::Sampled;
 use fmi2_export::{Context, Description, Failure, Inputs, Model, Restoration};
@@ -9,81 +9,83 @@ use std::ops::{Deref, DerefMut};
 pub type Ticks<U> =
     Sampled<<U as SampledUnit>::Memory, <U as SampledUnit>::Input, <U as SampledUnit>::Output>;
 
-/// What works at ticks: the unit's parameters, inputs and outputs, and the device that is built from them.
+/// A unit that works at ticks: its parameters, inputs and outputs, and the device that is built
+/// from them.
 pub trait SampledUnit: Serialize + DeserializeOwned + Send + Sized + 'static {
-    /// What computes at the ticks. It keeps nothing beside the memory that a later tick could notice.
+    /// Device that computes at the ticks. Apart from the memory it keeps nothing that a later tick
+    /// could notice.
     type Device: Send;
-    /// What is carried from tick to tick.
+    /// State that is carried from tick to tick.
     type Memory: Clone + Default + Serialize + DeserializeOwned + Send;
-    /// All that a tick depends on beside the memory.
+    /// Input on which a tick depends, besides the memory.
     type Input: Clone + Default + PartialEq + Serialize + DeserializeOwned + Send;
-    /// What a tick computes beside the memory.
+    /// Output that a tick computes, besides the memory.
     type Output: Copy + Default + Serialize + DeserializeOwned + Send;
 
-    /// See [`Model::description`].
+    /// Returns the description of the unit, see [`Model::description`].
     fn description() -> Description<SampledFmu<Self>>;
 
-    /// See [`Model::new`].
+    /// Returns the unit with its start values, see [`Model::new`].
     fn new() -> Self;
 
-    /// Loads what the parameters name.
+    /// Loads the files that the parameters name.
     ///
     /// # Errors
-    /// Names the parameter at fault.
+    /// Returns an error that names the parameter at fault.
     fn load(&mut self, _context: &Context) -> Result<(), Failure> {
         Ok(())
     }
 
-    /// Builds the device.
+    /// Builds the device from the parameters.
     ///
     /// # Errors
-    /// Names the parameter at fault.
+    /// Returns an error that names the parameter at fault.
     fn design(&self) -> Result<Self::Device, Failure>;
 
-    /// Whether [`Self::design`] would build the same device.
+    /// Returns whether [`Self::design`] would build the same device again.
     fn is_designed(&self, _device: &Self::Device) -> bool {
         false
     }
 
-    /// Time between two ticks, s.
+    /// Returns the time between two ticks, s.
     fn period(device: &Self::Device) -> f64;
 
-    /// What is carried into the first tick.
+    /// Returns the memory for the first tick.
     fn memory(_device: &Self::Device) -> Self::Memory {
         Self::Memory::default()
     }
 
-    /// Evaluates the first tick that is not committed with the present inputs.
+    /// Evaluates the first uncommitted tick with the present inputs.
     ///
     /// # Errors
-    /// Says which input is at fault.
+    /// Returns an error that names the input at fault.
     fn evaluate(&self, device: &mut Self::Device, ticks: &mut Ticks<Self>) -> Result<(), Failure>;
 
-    /// A warning for the log if something went wrong between two ticks.
+    /// Returns a warning for the log if something went wrong between two ticks.
     fn warning(_before: &Self::Memory, _after: &Self::Memory) -> Option<&'static str> {
         None
     }
 
-    /// Takes the outputs at `time` (s) from what is in force.
+    /// Sets the outputs at `time` (s) from the output and memory in force.
     fn show(&mut self, time: f64, device: &Self::Device, in_force: (Self::Output, &Self::Memory));
 
-    /// Whether a restored memory can be one of this device's.
+    /// Returns whether the shape of a restored memory fits this device.
     fn fits(_device: &Self::Device, _memory: &Self::Memory) -> bool {
         true
     }
 
-    /// What is wrong with a restored unit, its ticks aside.
+    /// Returns what is wrong with a restored unit, apart from its ticks.
     fn problem(&self, _before: &Self) -> Option<&'static str> {
         None
     }
 }
 
-/// A unit that works at ticks, as FMI sees it.
+/// A unit that works at ticks, in the form that FMI requires.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct SampledFmu<U: SampledUnit> {
     unit: U,
-    /// Present from initialization on.
+    /// Ticks of the unit; present from initialization on.
     ticks: Option<Ticks<U>>,
     #[serde(skip)]
     device: Option<U::Device>,
@@ -102,13 +104,13 @@ impl<U: SampledUnit> DerefMut for SampledFmu<U> {
     }
 }
 
-/// Refuses a saved state that no unit can have been in.
+/// Returns the error for a saved state that no unit can have been in.
 fn misfit(problem: &str) -> Result<(), Failure> {
     Err(Failure::Error(format!("the saved state does not fit: {problem}")))
 }
 
 impl<U: SampledUnit> SampledFmu<U> {
-    /// Unit, device and ticks, which are there from initialization on.
+    /// Returns unit, device and ticks, which are present from initialization on.
     fn parts(&mut self) -> Result<(&U, &mut U::Device, &mut Ticks<U>), Failure> {
         match (&mut self.device, &mut self.ticks) {
             (Some(device), Some(ticks)) => Ok((&self.unit, device, ticks)),
@@ -147,7 +149,8 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
         Ok(())
     }
 
-    /// Evaluates every tick from `from` up to, but not at, `to` with the inputs as they are then, and commits it.
+    /// Evaluates and commits every tick from `from` up to, but not at, `to`, with the inputs at
+    /// that time.
     fn step(
         &mut self,
         from: f64,
@@ -180,7 +183,7 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
             self.device = Some(device);
             return Ok(());
         }
-        // The other unit goes on with what was taken from it.
+        // The other unit gets back the device that was taken from it.
         from.before.device.get_or_insert(device);
         misfit("its ticks are not those of its time, or its memory has another shape")
     }

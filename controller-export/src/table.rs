@@ -10,15 +10,15 @@ use model_description::unit;
 use nalgebra::Vector3;
 use vehicle::Scenario;
 
-/// Name and meaning of the components of Θ.
+/// Names and meanings of the components of Θ.
 pub const ANGLES: [(&str, &str); 3] =
     [("alpha", "angle of attack"), ("beta", "sideslip angle"), ("sigma", "bank angle")];
-/// Name and meaning of the components of ω.
+/// Names and meanings of the components of ω.
 pub const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
-/// Name and meaning of the components of a moment.
+/// Names and meanings of the components of a moment.
 pub const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
 
-/// Inputs that the outputs of a tick depend on.
+/// Names of the inputs on which the outputs of a tick depend.
 const MEASURED: [&str; 6] =
     ["attitude.alpha", "attitude.beta", "attitude.sigma", "rate.p", "rate.q", "rate.r"];
 const EXTERNAL: [&str; 9] = [
@@ -33,17 +33,17 @@ const EXTERNAL: [&str; 9] = [
     "reference.externalAcceleration.sigma",
 ];
 
-/// Names of the inputs that a sampled output depends on.
+/// Returns the names of the inputs on which a sampled output depends.
 fn sampled_inputs() -> impl Iterator<Item = &'static str> {
     MEASURED.into_iter().chain(EXTERNAL)
 }
 
-/// An output of a law, which changes at its ticks only.
+/// Declares an output of a law, which changes at its ticks only.
 pub fn sampled_output(name: &str, description: &str) -> Common {
     discrete_output(name, description).depends_on(sampled_inputs())
 }
 
-/// The unit as FMI sees it.
+/// Returns the description of a controller's unit for FMI.
 pub fn description<L: Law>() -> Description<ControllerFmu<L>> {
     let scenario = Scenario::crmpc2022();
     let table = L::declare(vehicle(reference(outputs(inputs(Table::new())))));
@@ -64,7 +64,7 @@ pub fn description<L: Law>() -> Description<ControllerFmu<L>> {
     }
 }
 
-/// Adds the three components of a vector; `declare` gets name and meaning of each axis.
+/// Adds the three components of a vector; `declare` receives name and meaning of each axis.
 pub fn vector<M: 'static>(
     mut table: Table<M>,
     axes: [(&'static str, &'static str); 3],
@@ -208,7 +208,7 @@ fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
         })
 }
 
-/// The parameter of laws that use the moment that the actuators give.
+/// Adds the parameter of laws that use the moment of the actuators.
 pub fn achieved_moment<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     let used = parameter(
         "achievedMoment.used",
@@ -217,7 +217,7 @@ pub fn achieved_moment<L: Law>(table: Table<ControllerFmu<L>>) -> Table<Controll
     table.boolean(used, |m| &mut m.parameters.achieved_moment_used)
 }
 
-/// The parameter period.feedback of a law with one rate.
+/// Adds the parameter period.feedback of a law with one rate.
 pub fn period<L: Law>(
     table: Table<ControllerFmu<L>>,
     nominal: f64,
@@ -227,7 +227,7 @@ pub fn period<L: Law>(
     table.real(period.unit(unit::time()).min(1e-4).max(10.0).nominal(nominal), move |m| field(&mut m.law))
 }
 
-/// Gains of the three angles, `name[1]` to `name[3]`, in the order of [`ANGLES`].
+/// Adds the gains of the three angles, `name[1]` to `name[3]`, in the order of [`ANGLES`].
 pub fn gains<L: Law>(
     mut table: Table<ControllerFmu<L>>,
     (name, text): (&str, &str),
@@ -245,7 +245,7 @@ pub fn gains<L: Law>(
     table
 }
 
-/// The weights P and Q on the tracking error and the input.
+/// Adds the weights P and Q on the tracking error and the input.
 pub fn weights<L: Law>(
     mut table: Table<ControllerFmu<L>>,
     p: impl Fn(&mut L) -> &mut [f64; 6] + Copy + Send + Sync + 'static,
@@ -269,13 +269,14 @@ pub fn weights<L: Law>(
     table
 }
 
-/// A value for looking at, which no controller depends on, as a number that can be handed out: what is beyond all numbers is
-/// shown as the largest one, and so is what cannot be calculated.
+/// Returns a finite number for a value that is only shown and on which no controller depends.
+/// Infinite values become the largest number of their sign, and values that are not a number become
+/// the largest number.
 pub fn shown(value: f64) -> f64 {
     if value.is_nan() { f64::MAX } else { value.clamp(-f64::MAX, f64::MAX) }
 }
 
-/// The same of each component.
+/// Returns the vector with [`shown`] applied to each component.
 pub fn shown_vector(value: &Vector3<f64>) -> Vector3<f64> {
     value.map(shown)
 }

@@ -1,4 +1,4 @@
-//! The unit that all controllers share: inputs, reference, limits.
+//! The unit that all controllers share: inputs, reference and limits.
 
 use crate::law::{Law, Vehicle};
 use crate::reference::{self, Source};
@@ -21,23 +21,23 @@ pub type ControllerFmu<L> = SampledFmu<ControllerUnit<L>>;
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct ControllerUnit<L: Law> {
-    /// Parameters of every controller.
+    /// Parameters that every controller has.
     pub parameters: Parameters,
-    /// Inputs of every controller.
+    /// Inputs that every controller has.
     pub input: Input,
-    /// Outputs of every controller.
+    /// Outputs that every controller has.
     pub output: Output,
-    /// The law's own parameters and outputs.
+    /// Parameters and outputs of the law alone.
     pub law: L,
     source: Source,
 }
 
-/// Parameters of every controller.
+/// Parameters that every controller has.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Parameters {
-    /// What the reference follows from.
+    /// Parameters of the reference.
     pub reference: reference::Parameters,
-    /// Inertia as the controller believes it to be, kg m².
+    /// Inertia that the controller uses, kg m².
     pub inertia: Inertia,
     /// Limit on ‖ω‖, rad/s.
     pub limit_rate: f64,
@@ -45,33 +45,34 @@ pub struct Parameters {
     pub limit_moment: f64,
     /// Whether the commanded moment is scaled into its limit.
     pub saturation: bool,
-    /// Delays that the law predicts the state over.
+    /// Delays over which the law predicts the state.
     pub latency: Latency,
-    /// Whether the input `achieved_moment` is fed; declared by laws that use it.
+    /// Whether the input `achieved_moment` is connected; only laws that use it declare this
+    /// parameter.
     pub achieved_moment_used: bool,
 }
 
-/// Inputs of every controller.
+/// Inputs that every controller has.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Input {
     /// Measured angles and rates.
     pub measured: Measurement,
-    /// The moment that the actuators give, N m.
+    /// Moment that the actuators give, N m.
     pub achieved_moment: Vector3<f64>,
-    /// The external reference.
+    /// Reference from outside the unit.
     pub reference: Reference,
 }
 
-/// Outputs of every controller.
+/// Outputs that every controller has.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Output {
-    /// The commanded moment, N m.
+    /// Commanded moment of the controller, N m.
     pub moment: Vector3<f64>,
-    /// The reference in force.
+    /// Reference that is in force.
     pub reference: Reference,
 }
 
-/// A controller with what it was designed for.
+/// A controller with the settings and the vehicle for which it was designed.
 pub struct Designed<L: Law> {
     settings: L::Settings,
     vehicle: Vehicle,
@@ -155,7 +156,8 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
         let achieved_moment = parameters.achieved_moment_used.then_some(input.achieved_moment);
         let measured = Measurement { achieved_moment, ..input.measured };
         let now = ticks.next_time(controller.period());
-        // Of an external reference the law takes the present value for that of the time at which its moment acts.
+        // An external reference is only known now; the law uses its present value for the time at
+        // which its moment acts.
         let known = now + controller.acts_after();
         ticks.evaluate(controller, &measured, &source.preview(known, &input.reference));
         if ticks.in_force().0.iter().all(|value| value.is_finite()) {

@@ -1,4 +1,4 @@
-//! `ControlAllocator`: the commanded moment divided among surfaces and jets.
+//! `ControlAllocator` divides the commanded moment among surfaces and jets.
 
 use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Report, Settings, Status};
 use controller_export::sampled::{SampledFmu, SampledUnit, Ticks};
@@ -53,7 +53,7 @@ pub struct AllocatorUnit {
     output: Output,
 }
 
-/// What the unit shows.
+/// Outputs of the allocator's unit.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Output {
     surfaces: Surfaces,

@@ -1,4 +1,4 @@
-//! `CRMPC`: its own parameters and outputs.
+//! Parameters and outputs of `CRMPC`.
 
 use crate::solver;
 use control::crmpc::{Constraints, Crmpc, Guarantee, InitialState, Margins, Memory, Settings, Standing};
@@ -16,12 +16,13 @@ use serde::{Deserialize, Serialize};
 /// Parameters and outputs of CRMPC.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CrmpcLaw {
-    /// Body, limits and delay in it are those of the vehicle.
+    /// Settings of the controller; body, limits and delay in them are replaced by those of the
+    /// vehicle.
     pub(crate) settings: Settings,
     shown: Shown,
 }
 
-/// What the outputs show.
+/// Values that the outputs show.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Shown {
     angles: Vector3<f64>,
@@ -134,7 +135,7 @@ impl Law for CrmpcLaw {
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
-        // Said the first time only; `guarantee.status` shows the others.
+        // The warning is given the first time only; `guarantee.status` shows the later ones.
         let ends = after.ended == 1 && before.ended == 0;
         match (before.standing, after.standing) {
             (_, Standing::Exceeded) if ends => Some(

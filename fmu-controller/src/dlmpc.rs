@@ -1,4 +1,4 @@
-//! `DLMPC`: its own parameters and outputs.
+//! Parameters and outputs of `DLMPC`.
 
 use crate::solver;
 use control::dlmpc::{Dlmpc, Memory, Settings};
@@ -15,12 +15,12 @@ use serde::{Deserialize, Serialize};
 /// Parameters and outputs of DLMPC.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DlmpcLaw {
-    /// Body and limits in it are those of the vehicle.
+    /// Settings of the controller; body and limits in them are replaced by those of the vehicle.
     pub(crate) settings: Settings,
     shown: Shown,
 }
 
-/// What the outputs show.
+/// Values that the outputs show.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Shown {
     rate_command: Vector3<f64>,

@@ -81,16 +81,17 @@ pub type AttitudeEstimator = SampledFmu<EstimatorUnit>;
 #[derive(Serialize, Deserialize)]
 pub struct EstimatorUnit {
     settings: Settings,
-    /// As the plant's: 0, 1 for sensors without errors, [`MEMS_SENSORS`] for those with errors.
+    /// Sensor set as in the plant: 0, 1 for sensors without errors, [`MEMS_SENSORS`] for those with
+    /// errors.
     sensor_set: i32,
     line: Line,
     output: Output,
 }
 
-/// The corrections are used.
+/// Sensor set for which the corrections are used.
 const MEMS_SENSORS: i32 = 2;
 
-/// What the unit shows.
+/// Outputs of the estimator's unit.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Output {
     estimate: Estimate,
@@ -175,7 +176,8 @@ impl SampledUnit for EstimatorUnit {
     }
 }
 
-/// What sensors without errors show at the scenario's start, where the platform rests; not counted.
+/// Returns the readings of sensors without errors at the scenario's start, where the platform
+/// rests. The sample has no number.
 fn at_rest() -> Line {
     let pose = Pose {
         kinematics: Kinematics::Printed,
@@ -187,7 +189,7 @@ fn at_rest() -> Line {
     Line { readings: pose.felt(&SensorData::embedded().surroundings), ..Line::default() }
 }
 
-/// What a tick must say to the importer.
+/// Returns the warning of a tick for the log of the importer.
 fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
     let comes = |health: Health| after.estimate.health == health && before.estimate.health != health;
     if comes(Health::Lost) {
@@ -195,7 +197,7 @@ fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
     } else if comes(Health::Frozen) {
         Some("a sensor repeats its value and is left out (health)")
     } else if comes(Health::Rejected) && before.estimate.rejected == 0 {
-        // Said the first time only; `rejectedSamples` counts on.
+        // The warning is given the first time only; `rejectedSamples` counts the later ones.
         Some(
             "a sample was left out, beyond the sensor's range or too far from the last one (health, rejectedSamples)",
         )

@@ -1,4 +1,4 @@
-//! `FBL`: its own parameters.
+//! Parameters of `FBL`.
 
 use control::error::DesignError;
 use control::sliding::{Fbl, FblSettings};

@@ -1,5 +1,6 @@
-//! The FMI 2.0 units of the controllers, for co-simulation: the crate `control` behind tables of variables. All units have the
-//! same inputs and outputs, so that one can take another's place without rewiring.
+//! The FMI 2.0 units of the controllers for co-simulation: the crate `control` behind tables of
+//! variables. All controllers have the same inputs and outputs, so that one can replace another
+//! without rewiring.
 
 mod allocator;
 mod crmpc;
@@ -25,7 +26,7 @@ pub type Dlmpc = ControllerFmu<dlmpc::DlmpcLaw>;
 pub type Fbl = ControllerFmu<fbl::FblLaw>;
 /// `BTVSMC`: time-varying sliding mode with a boundary layer.
 pub type Btvsmc = ControllerFmu<tvsmc::TvsmcLaw<tvsmc::Btvsmc>>;
-/// `BTVSMC_DO`: the same with a disturbance observer.
+/// `BTVSMC_DO`: time-varying sliding mode with a boundary layer and a disturbance observer.
 pub type BtvsmcDo = ControllerFmu<tvsmc::TvsmcLaw<tvsmc::BtvsmcDo>>;
 /// `SOTVSMC_DO`: second-order time-varying sliding mode with a disturbance observer.
 pub type SotvsmcDo = ControllerFmu<tvsmc::TvsmcLaw<tvsmc::SotvsmcDo>>;

@@ -1,4 +1,4 @@
-//! `LQR`: its own parameters.
+//! Parameters of `LQR`.
 
 use control::crmpc::{Constraints, Settings};
 use control::error::DesignError;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Parameters of the regulator.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LqrLaw {
-    /// The body in it is that of the vehicle.
+    /// Settings of the regulator; the body in them is replaced by that of the vehicle.
     settings: LqrSettings,
 }
 

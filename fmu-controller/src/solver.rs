@@ -1,4 +1,4 @@
-//! What every controller that optimises shows of its solver.
+//! Solver parameters and outputs that all controllers with an optimisation share.
 
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::report::{Report, Status};
@@ -52,12 +52,12 @@ static NONLINEARITIES: Enumeration<Nonlinearity> = Enumeration {
     ],
 };
 
-/// The report as outputs can show it.
+/// Returns the report with finite numbers, as outputs require.
 pub(crate) fn shown_report(report: &Report) -> Report {
     Report { cost: shown(report.cost), residual: shown(report.residual), ..*report }
 }
 
-/// Adds the outputs.
+/// Adds the outputs of the solver.
 pub(crate) fn outputs<L: Law>(
     table: Table<ControllerFmu<L>>,
     solver: impl Fn(&mut L) -> &mut Report + Copy + Send + Sync + 'static,
@@ -88,7 +88,7 @@ pub(crate) fn outputs<L: Law>(
         .integer(exhausted, (None, None), move |m| &mut solver(&mut m.law).exhausted)
 }
 
-/// Adds the parameters.
+/// Adds the parameters of the solver.
 pub(crate) fn parameters<L: Law>(
     table: Table<ControllerFmu<L>>,
     solver: impl Fn(&mut L) -> &mut SolverSettings + Copy + Send + Sync + 'static,
@@ -127,7 +127,7 @@ pub(crate) fn parameters<L: Law>(
         })
 }
 
-/// A warning if an optimisation failed between the two reports.
+/// Returns a warning if an optimisation failed between the two reports.
 pub(crate) fn warning(before: &Report, after: &Report) -> Option<&'static str> {
     (after.fallbacks > before.fallbacks).then_some(
         "the optimisation did not succeed: the previous plan with the terminal law is used (solver.fallbacks)",

@@ -1,4 +1,4 @@
-//! Tests of the units through the trait the FMI shell works with.
+//! Tests of the units through the trait that the FMI shell uses.
 
 use crate::crmpc::CrmpcLaw;
 use crate::dlmpc::DlmpcLaw;
@@ -16,7 +16,7 @@ use vehicle::disturbance::Disturbance;
 use vehicle::plant::{Plant, State};
 use vehicle::reference::Reference;
 
-/// Inputs that stay as they are.
+/// Inputs that stay constant.
 struct Held;
 
 impl<M> Inputs<M> for Held {
@@ -35,7 +35,7 @@ fn ready<M: Model>(change: impl FnOnce(&mut M)) -> M {
 }
 
 fn step<M: Model>(unit: &mut M, from: f64, to: f64) {
-    // Inputs that jump are no motion that CRMPC's assumptions explain.
+    // The assumptions of CRMPC do not explain the motion of inputs that jump.
     unit.step(from, to, &Held, &mut |text| assert!(text.contains("the guarantee is"), "{text}")).unwrap();
     unit.calculate(to).unwrap();
 }
@@ -109,7 +109,7 @@ fn assert_any_communication_steps_give_the_same_moments<L: Law>(delay: f64) {
 #[test]
 fn any_communication_steps_give_the_same_moments() {
     for delay in [0.0_f64, 0.117] {
-        // Beyond 0.053 s its guarantee cannot be given.
+        // Beyond 0.053 s the guarantee cannot be given.
         assert_any_communication_steps_give_the_same_moments::<CrmpcLaw>(delay.min(0.05));
         assert_any_communication_steps_give_the_same_moments::<DlmpcLaw>(delay);
         assert_any_communication_steps_give_the_same_moments::<TvsmcLaw<tvsmc::SotvsmcDo>>(delay);
@@ -208,7 +208,8 @@ fn sliding_modes_scale_into_the_limit_themselves() {
     assert!((unit.output.moment.norm() - 1e4).abs() < 1e-6);
 }
 
-/// The states at the ticks of a loop with saturation, from `start` (s), and the delay (s) that the law knows and the plant has.
+/// Returns the states at the ticks of a loop with saturation, from `start` (s). The law knows the
+/// delay (s), and the plant has it.
 fn saturated_loop(start: f64, delay: f64, ticks: u32) -> Vec<State> {
     let mut unit: Lqr = Lqr::new();
     (unit.parameters.saturation, unit.parameters.latency.action) = (true, delay);
@@ -229,7 +230,7 @@ fn saturated_loop(start: f64, delay: f64, ticks: u32) -> Vec<State> {
 
 #[test]
 fn oracle_a_known_delay_shifts_the_loop_and_does_nothing_else_even_in_saturation() {
-    // The vehicle is at rest until the first command acts.
+    // The vehicle rests until the first command acts.
     for periods in [1, 3] {
         let delay = 0.04 * f64::from(periods);
         let late = saturated_loop(0.0, delay, 500);

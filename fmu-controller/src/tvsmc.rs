@@ -10,19 +10,19 @@ use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-/// What one of the laws has of its own.
+/// The parts in which the time-varying sliding modes differ.
 pub trait Variant: Sized + Send + Sync + 'static {
-    /// Its reaching law.
+    /// Reaching law of the variant.
     type Reaching: Reaching + PartialEq + Serialize + DeserializeOwned + Send + 'static;
-    /// Name of the unit.
+    /// Name of the unit in FMI.
     const NAME: &'static str;
-    /// One line: what the unit is.
+    /// Description of the unit in one line.
     const DESCRIPTION: &'static str;
-    /// Whether it has a disturbance observer.
+    /// Whether the variant has a disturbance observer.
     const OBSERVER: bool;
-    /// The published settings.
+    /// Returns the published settings of the variant.
     fn published() -> Settings<Self::Reaching>;
-    /// Adds the reaching law's parameters.
+    /// Adds the parameters of the reaching law.
     fn reaching(table: Table<ControllerFmu<TvsmcLaw<Self>>>) -> Table<ControllerFmu<TvsmcLaw<Self>>>;
 }
 
@@ -31,7 +31,7 @@ pub trait Variant: Sized + Send + Sync + 'static {
 #[serde(bound = "")]
 pub struct TvsmcLaw<V: Variant> {
     settings: Settings<V::Reaching>,
-    /// Gains of the observer; used if the law has one.
+    /// Gains of the observer; used only if the variant has one.
     observer: Observer,
     sliding: Vector3<f64>,
     estimate: Estimate,
@@ -149,7 +149,7 @@ fn boundary_layer<V: Variant<Reaching = BoundaryLayer>>(
     table::gains(table, h, Some(&unit::angular_rate()), |law| &mut law.settings.reaching.h)
 }
 
-/// BTVSMC, (62).
+/// Variant BTVSMC of Wu 2015, (62).
 #[derive(Clone, Copy, Debug)]
 pub struct Btvsmc;
 
@@ -168,7 +168,7 @@ impl Variant for Btvsmc {
     }
 }
 
-/// BTVSMC/DO, (36).
+/// Variant BTVSMC/DO of Wu 2015, (36).
 #[derive(Clone, Copy, Debug)]
 pub struct BtvsmcDo;
 
@@ -187,7 +187,7 @@ impl Variant for BtvsmcDo {
     }
 }
 
-/// SOTVSMC/DO, (45).
+/// Variant SOTVSMC/DO of Wu 2015, (45).
 #[derive(Clone, Copy, Debug)]
 pub struct SotvsmcDo;
 

@@ -1,4 +1,4 @@
-//! `TwoLoopSMC`: its own parameters and outputs.
+//! Parameters and outputs of `TwoLoopSMC`.
 
 use control::error::DesignError;
 use control::two_loop::{Form, Loop, OuterKinematics, TwoLoopMemory, TwoLoopSettings, TwoLoopSmc};
@@ -94,7 +94,7 @@ impl Law for TwoLoopLaw {
 type Controller = Table<ControllerFmu<TwoLoopLaw>>;
 type Field = fn(&mut Loop) -> &mut [f64; 3];
 
-/// The parameters of one loop, per axis.
+/// Adds the parameters of one loop, per axis.
 fn reaching(
     mut table: Controller,
     [name, of]: [&str; 2],

@@ -1,5 +1,5 @@
-//! Control allocation: which deflections and which jets give the commanded moment. Wu et al. (2015), section 5, and the selector
-//! of Jia et al., section IV.
+//! Control allocation: deflections and jets that give the commanded moment. The methods are those
+//! of Wu et al. (2015), section 5, and the selector of Jia et al., section IV.
 
 mod optimum;
 pub mod pwpf;
@@ -15,69 +15,69 @@ use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use vehicle::effectors::{JETS, Jets, SURFACES, Surfaces};
 
-/// D_A of Wu 2015 (58), N m/rad.
+/// Effectiveness D_A of the surfaces, Wu 2015 (58), N m/rad.
 type SurfaceMatrix = SMatrix<f64, 3, SURFACES>;
-/// D_RCS, N m at full thrust.
+/// Effectiveness D_RCS of the jets, N m at full thrust.
 type JetMatrix = SMatrix<f64, 3, JETS>;
 
-/// What is to be allocated.
+/// Input of the allocation: the commanded moment and the flight condition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Command {
-    /// M_c, N m.
+    /// Commanded moment M_c, N m.
     pub moment: Vector3<f64>,
-    /// Dynamic pressure, Pa.
+    /// Dynamic pressure of the flow, Pa.
     pub dynamic_pressure: f64,
 }
 
-/// How an allocation came about.
+/// The way in which an allocation was found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Status {
-    /// No allocation yet.
+    /// No allocation has been computed yet.
     #[default]
     None,
-    /// The optimum.
+    /// The solver found the optimum.
     Optimal,
-    /// The solver did not succeed: the previous allocation, within the limits.
+    /// The solver did not succeed; the previous allocation is kept within the limits.
     Fallback,
 }
 
-/// What the allocation reports.
+/// The figures that the allocation reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Origin of the allocation in force.
     pub status: Status,
-    /// Iterations of the cone solver.
+    /// Number of iterations of the cone solver.
     pub iterations: u32,
-    /// Wall-clock time of the last allocation, s. Not reproducible.
+    /// Wall-clock time of the last allocation, s; not reproducible.
     pub time: f64,
-    /// Allocations so far that did not succeed.
+    /// Number of allocations so far that did not succeed.
     pub fallbacks: u32,
 }
 
-/// What the allocator carries from tick to tick.
+/// The state that the allocator carries from tick to tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
-    /// δ_A, rad.
+    /// Deflections δ_A of the surfaces, rad.
     pub surfaces: Surfaces,
-    /// δ_RCS of (60), before modulation: duty cycles.
+    /// Duty cycles δ_RCS of (60), before modulation.
     pub duty: Jets,
-    /// Modulators of the jets.
+    /// Modulators of the jets, one for each.
     pub modulators: [Modulator; JETS],
-    /// What goes to the jets: 0 or 1, or the duty cycle.
+    /// Commands to the jets: 0 or 1, or the duty cycle.
     pub jets: Jets,
-    /// D δ of the last allocation, with the duty cycles of the jets, N m.
+    /// Moment D δ of the last allocation, with the duty cycles of the jets, N m.
     pub achieved: Vector3<f64>,
-    /// M_c − D δ, likewise.
+    /// Residual M_c − D δ of the last allocation, with the duty cycles of the jets, N m.
     pub residual: Vector3<f64>,
-    /// D δ with the jets as they are now, N m.
+    /// Moment D δ with the present commands to the jets, N m.
     pub modulated: Vector3<f64>,
     /// Outcome of the last allocation.
     pub report: Report,
-    /// Moment of the surfaces of the last allocation, N m.
+    /// Moment of the surfaces in the last allocation, N m.
     pub by_surfaces: Vector3<f64>,
 }
 
-/// The allocator: settings and solver. Everything that matters later is in [`Memory`].
+/// The allocator: settings and solver. All state that later ticks depend on is in [`Memory`].
 ///
 /// ```
 /// use control::allocation::{Allocator, Command, Memory, Settings};
@@ -92,23 +92,23 @@ pub struct Memory {
 /// ```
 pub struct Allocator {
     settings: Settings,
-    /// Least and greatest deflections, rad.
+    /// Smallest and largest deflections, rad.
     limits: (Surfaces, Surfaces),
-    /// Ticks per allocation.
+    /// Number of ticks per allocation.
     ratio: u64,
     problem: OptimalAllocation,
-    /// The same without jets, for blending.
+    /// The allocation problem without jets, for blending.
     without_jets: OptimalAllocation,
 }
 
-/// A rest of the moment that is rounding, as a fraction of the moment.
+/// Part of the moment, as a fraction of it, that counts as rounding when it is left over.
 const NEGLIGIBLE: f64 = 1e-7;
 
 impl Allocator {
-    /// Checks the settings and sets the solver up.
+    /// Checks the settings and sets up the solver.
     ///
     /// # Errors
-    /// Names the setting at fault.
+    /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
         let ratio = settings.ratio()?;
         let limits = settings.limits();
@@ -128,12 +128,13 @@ impl Allocator {
         Ok(Self { settings, limits, ratio, problem, without_jets })
     }
 
-    /// What it was built from.
+    /// Returns the settings of the allocator.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Time between ticks, s: the modulator's period, or that of the allocation if nothing is modulated.
+    /// Returns the time between ticks, s: the modulator's period, or the period of the allocation
+    /// if nothing is modulated.
     pub fn period(&self) -> f64 {
         match self.settings.jets {
             JetCommand::Pwpf => self.settings.pwpf.period,
@@ -141,12 +142,13 @@ impl Allocator {
         }
     }
 
-    /// Ticks per allocation.
+    /// Returns the number of ticks per allocation.
     pub fn ratio(&self) -> u64 {
         self.ratio
     }
 
-    /// The tick with number `tick`. Every n-th one allocates; the jets switch at each.
+    /// Evaluates the tick with number `tick`. An allocation is computed at every [`Self::ratio`]-th
+    /// tick; the jets may switch at each.
     pub fn update(&mut self, memory: &mut Memory, tick: u64, command: &Command) {
         let modulated = self.settings.jets == JetCommand::Pwpf;
         if modulated && tick > 0 {
@@ -169,7 +171,7 @@ impl Allocator {
         let begin = Instant::now();
         let Command { moment, dynamic_pressure } = *command;
         let matrix = self.settings.effectors.effectiveness_at(dynamic_pressure);
-        // Wu 2015, (59) for one period: the range, and what the rate leaves of it.
+        // Wu 2015, (59) for one period: the range, and the part of it that the rate permits.
         let (min, max) = &self.limits;
         let change = self.settings.effectors.rate * self.settings.period;
         let before = clamp(&memory.surfaces, min, max);
@@ -178,7 +180,8 @@ impl Allocator {
         let finite = moment.iter().all(|value| value.is_finite()) && dynamic_pressure.is_finite();
         let mut first = 0;
         if finite && self.settings.method == Method::Blending {
-            // Jia et al., section IV: the surfaces to the best of their abilities; below the threshold they return to zero.
+            // Jia et al., section IV: the surfaces give as much as they can; below the threshold
+            // they return to zero.
             let mut wanted = Surfaces::zeros();
             if dynamic_pressure >= self.settings.threshold {
                 let (middle, half) = middle_and_half(&low, &high);
@@ -193,7 +196,7 @@ impl Allocator {
         let (found, iterations) = if !finite {
             (None, 0)
         } else if low == high && rest <= NEGLIGIBLE * all {
-            // Nothing is left for the jets.
+            // No moment is left for the jets.
             (Some((low, Jets::zeros())), 0)
         } else {
             let (middle, half) = middle_and_half(&low, &high);
@@ -214,8 +217,9 @@ impl Allocator {
     }
 }
 
-/// How scarce the jets' moment is about each axis, against the axis where they give most: what surfaces leave undone there
-/// weighs more. 1 everywhere without jets.
+/// Returns the scarcity of the jets' moment about each axis, relative to the axis where they give
+/// most. Moment that the surfaces do not provide about a scarce axis has a larger weight. Without
+/// jets all values are 1.
 fn scarcity(jets: &JetMatrix) -> Vector3<f64> {
     let authority = Vector3::from_fn(|i, _| {
         let (up, down) =
@@ -225,7 +229,7 @@ fn scarcity(jets: &JetMatrix) -> Vector3<f64> {
     authority.map(|own| if own > 0.0 { authority.max() / own } else { 1.0 })
 }
 
-/// The middle of an interval and half its width.
+/// Returns the middle of an interval and half its width.
 fn middle_and_half(low: &Surfaces, high: &Surfaces) -> (Surfaces, Surfaces) {
     ((low + high) / 2.0, (high - low) / 2.0)
 }

@@ -1,8 +1,8 @@
-//! (60) of Wu 2015 subject to (59), (63), (65) as a second-order cone program.
+//! The problem (60) of Wu 2015 subject to (59), (63), (65) as a second-order cone program.
 //!
-//! Unknowns are t, x and u: t bounds the norm, δ_A = middle + half ∘ x with −1 ≤ x ≤ 1, and δ_RCS = u. Between the two bounds that
-//! range and rate leave to a surface lies middle ± half; a surface that may not move has half = 0, so that the program always
-//! has an interior.
+//! The unknowns are t, x and u: t bounds the norm, δ_A = middle + half ∘ x with −1 ≤ x ≤ 1, and
+//! δ_RCS = u. The range of a surface within its limits of position and rate is middle ± half. A
+//! surface that may not move has half = 0, so that the program always has an interior.
 
 use super::SurfaceMatrix;
 use crate::conic_program::{ConicProgram, Triplets};
@@ -13,33 +13,33 @@ use vehicle::effectors::{JETS, Jets, SURFACES, Surfaces};
 /// Typical moment, by which the cone is scaled, N m.
 const MOMENT_SCALE: f64 = 1e4;
 const COLUMNS: usize = 1 + SURFACES + JETS;
-/// Rows of x ≤ 1, −x ≤ 1, u ≤ 1, −u ≤ 0.
+/// Number of rows of x ≤ 1, −x ≤ 1, u ≤ 1, −u ≤ 0.
 const BOX_ROWS: usize = 2 * (SURFACES + JETS);
 
-/// The weights of (60).
+/// The weights of problem (60).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
-    /// W₁, 1/(N m).
+    /// Weight W₁ of the moment, 1/(N m).
     pub moment: Vector3<f64>,
-    /// W₂.
+    /// Weight W₂ of the jets.
     pub jet: Jets,
-    /// Ours, on ½ (deflection/range)², per surface in 1/rad².
+    /// Our weight of ½ (deflection/range)², per surface in 1/rad².
     pub surface: Surfaces,
 }
 
-/// The program with its solver.
+/// The cone program together with its solver.
 pub(super) struct OptimalAllocation {
     program: ConicProgram,
     weights: Weights,
-    /// Where the numbers of D_A stand.
+    /// Positions of the numbers of D_A in the matrix.
     surface_slots: [[usize; 3]; SURFACES],
 }
 
 impl OptimalAllocation {
-    /// Sets the program up.
+    /// Sets up the program and its solver.
     ///
     /// # Errors
-    /// The solver's own message if it refuses the data.
+    /// Returns the solver's own message if it refuses the data.
     pub(super) fn new(
         weights: Weights,
         jets: &SMatrix<f64, 3, JETS>,
@@ -83,7 +83,8 @@ impl OptimalAllocation {
         Ok(Self { program, weights, surface_slots })
     }
 
-    /// The optimum for the moment `moment` (N m), if it is found, and the iterations. `matrix` is D_A in N m/rad.
+    /// Returns the optimum for the moment `moment` (N m), if it is found, and the iterations.
+    /// `matrix` is D_A in N m/rad.
     pub(super) fn solve(
         &mut self,
         moment: &Vector3<f64>,

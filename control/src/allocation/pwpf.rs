@@ -1,4 +1,5 @@
-//! Pulse-width pulse-frequency modulation of the jets (Wu 2015, Figure 2): a low-pass filter and a Schmitt trigger in a loop.
+//! Pulse-width pulse-frequency modulation of the jets (Wu 2015, Figure 2): a low-pass filter and a
+//! Schmitt trigger in a loop.
 
 use crate::error::DesignError;
 use serde::{Deserialize, Serialize};
@@ -7,32 +8,32 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pwpf {
-    /// K_m, gain of the filter.
+    /// Gain K_m of the filter.
     pub gain: f64,
-    /// T_m, time constant of the filter, s.
+    /// Time constant T_m of the filter, s.
     pub time_constant: f64,
-    /// u_on, at which the trigger switches on.
+    /// Level u_on at which the trigger switches on.
     pub on: f64,
-    /// u_off, at which it switches off.
+    /// Level u_off at which the trigger switches off.
     pub off: f64,
-    /// Time between two looks of the trigger, s.
+    /// Time between two evaluations of the trigger, s.
     pub period: f64,
 }
 
-/// Where a modulator stands.
+/// State of one modulator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Modulator {
     /// Output of the filter.
     pub filtered: f64,
-    /// Whether the jet fires.
+    /// Whether the jet is firing.
     pub on: bool,
 }
 
 impl Pwpf {
-    /// Refuses what cannot work.
+    /// Checks that the constants make a working modulator.
     ///
     /// # Errors
-    /// Names the constant at fault.
+    /// Returns an error that names the constant at fault.
     pub fn check(&self) -> Result<(), DesignError> {
         let positive = [
             ("pwpf.gain", self.gain),
@@ -44,7 +45,7 @@ impl Pwpf {
                 return Err(DesignError::NotPositive { name, value });
             }
         }
-        // A jet that is fully commanded has to switch on, and one that is not has to switch off.
+        // A jet with full command must switch on, and a jet without command must switch off.
         for (name, value, low, high) in
             [("pwpf.on", self.on, 0.0, self.gain), ("pwpf.off", self.off, 0.0, self.on)]
         {
@@ -55,9 +56,10 @@ impl Pwpf {
         Ok(())
     }
 
-    /// One period on, with the duty cycle `duty` in 0..=1 since the last look.
+    /// Returns the state one period later, with the duty cycle `duty` in 0..=1 since the last
+    /// evaluation.
     pub fn advance(&self, state: Modulator, duty: f64) -> Modulator {
-        // T_m df/dt = K_m (duty − on) − f, exact for constant inputs
+        // The filter obeys T_m df/dt = K_m (duty − on) − f; the step is exact for constant inputs.
         let end = self.gain * (duty - f64::from(u8::from(state.on)));
         let filtered = end + (state.filtered - end) * (-self.period / self.time_constant).exp();
         let on = if state.on { filtered > self.off } else { filtered >= self.on };

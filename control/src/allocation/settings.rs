@@ -1,4 +1,4 @@
-//! Settings of the allocator, and the published ones from `data/allocation.toml`.
+//! Settings of the allocator, with the published ones from `data/allocation.toml`.
 
 use super::pwpf::Pwpf;
 use crate::error::DesignError;
@@ -7,46 +7,46 @@ use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 use vehicle::effectors::{Effectors, SURFACES, Surfaces};
 
-/// How the moment is divided among the effectors.
+/// Choice of the method that divides the moment among the effectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Method {
-    /// (60) of Wu 2015 over surfaces and jets together.
+    /// Optimum (60) of Wu 2015 over surfaces and jets together.
     Optimal,
-    /// Jia et al., section IV: surfaces first, the remainder to the jets.
+    /// Blending of Jia et al., section IV: surfaces first, the remainder to the jets.
     Blending,
 }
 
-/// What goes to the jets.
+/// Choice of the commands to the jets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum JetCommand {
     /// On and off, by pulse-width pulse-frequency modulation.
     Pwpf,
-    /// The duty cycle.
+    /// The duty cycle, without modulation.
     Duty,
 }
 
 /// Settings of the allocator. Units SI, angles rad.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// What surfaces and jets do and may do, as the allocator believes it.
+    /// Model of surfaces and jets and of their limits that the allocator uses.
     pub effectors: Effectors,
-    /// Division among the effectors.
+    /// Method of division among the effectors.
     pub method: Method,
-    /// What goes to the jets.
+    /// Form of the commands to the jets.
     pub jets: JetCommand,
     /// Time between allocations, s.
     pub period: f64,
-    /// W₁ of (60), 1/(N m).
+    /// Weight W₁ of (60), 1/(N m).
     pub weight_moment: Vector3<f64>,
-    /// Each entry of W₂.
+    /// Value of each entry of W₂.
     pub weight_jet: f64,
-    /// Weight of ½ (deflection/range)², which (60) does not have.
+    /// Weight of ½ (deflection/range)², a term that (60) does not have.
     pub weight_surface: f64,
-    /// Dynamic pressure from which blending uses the surfaces, Pa.
+    /// Dynamic pressure above which blending uses the surfaces, Pa.
     pub threshold: f64,
-    /// The modulator of the jets.
+    /// Modulator of the jets.
     pub pwpf: Pwpf,
-    /// Iteration limit of the cone solver.
+    /// Largest number of iterations of the cone solver.
     pub max_iterations: u32,
 }
 
@@ -81,7 +81,8 @@ struct Solver {
 }
 
 impl Settings {
-    /// Wu 2015, sections 5 and 6; blending and everything else that is ours as in `data/allocation.toml`.
+    /// Returns the settings of Wu 2015, sections 5 and 6. Blending and all other values of ours are
+    /// as in `data/allocation.toml`.
     pub fn published() -> Self {
         let &File { period, ref weight, pwpf, ref blending, ref solver } = embedded();
         Self {
@@ -98,17 +99,17 @@ impl Settings {
         }
     }
 
-    /// Least and greatest deflections, rad: (63) and (65).
+    /// Returns the smallest and largest deflections, rad: (63) and (65).
     pub(super) fn limits(&self) -> (Surfaces, Surfaces) {
         let Effectors { min, max, allowed, .. } = &self.effectors;
         let within = |limits: &Surfaces| Surfaces::from_fn(|i, _| if allowed[i] { limits[i] } else { 0.0 });
         (within(min), within(max))
     }
 
-    /// Ticks per allocation, once all settings are known to work.
+    /// Checks all settings and returns the number of ticks per allocation.
     ///
     /// # Errors
-    /// Names the setting at fault.
+    /// Returns an error that names the setting at fault.
     pub(super) fn ratio(&self) -> Result<u64, DesignError> {
         let positive = [
             ("period", self.period),
@@ -158,7 +159,7 @@ impl Settings {
 }
 
 fn embedded() -> &'static File {
-    // Cannot fail: every test that uses the published settings reads it.
+    // This cannot fail: every test that uses the published settings reads the file.
     static READ: LazyLock<File> = LazyLock::new(|| {
         toml::from_str(include_str!("../../data/allocation.toml")).unwrap_or_else(|error| panic!("{error}"))
     });

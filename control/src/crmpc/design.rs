@@ -1,4 +1,5 @@
-//! Offline design of CRMPC: every constant of Chai 2022 from the raw data, and the tightening of the `robust` set.
+//! Offline design of CRMPC: every constant of Chai 2022 from the raw data, and the tightening of
+//! the `robust` set.
 
 use super::guarantee::{self, Assessment, Tightening};
 use crate::delay;
@@ -9,130 +10,138 @@ use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
 
-/// Which sets the optimisation keeps the nominal motion in.
+/// Choice of the sets within which the optimisation keeps the nominal motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Constraints {
-    /// ‖ω‖ and ‖m‖ themselves, tightened stage by stage by what the sampled error dynamics can reach.
+    /// Bounds on ‖ω‖ and ‖m‖ themselves, tightened stage by stage by what the sampled error
+    /// dynamics can reach.
     Robust,
-    /// ‖x_ω‖ ≤ x̄_tube and ‖u‖ ≤ ū_tube as printed.
+    /// Bounds ‖x_ω‖ ≤ x̄_tube and ‖u‖ ≤ ū_tube as printed.
     Paper,
 }
 
-/// Where the nominal motion may start at a sample.
+/// Choice of the state from which the nominal motion starts at a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum InitialState {
-    /// At the measured state.
+    /// The nominal motion starts at the measured state.
     Measured,
-    /// Anywhere with the measured state inside an invariant set around it.
+    /// The nominal motion starts anywhere with the measured state inside an invariant set around
+    /// it.
     Tube,
-    /// Where the previous plan put it; the first at the measured state. The nominal motion never sees a disturbance, and the
-    /// deviation obeys the error dynamics (22) alone.
+    /// The nominal motion starts where the previous plan predicted it, the first time at the
+    /// measured state. It then never depends on a disturbance, and the deviation obeys the error
+    /// dynamics (22) alone.
     Nominal,
 }
 
-/// What happens where the design of the robust set does not hold.
+/// Reaction to settings for which the design of the robust set does not hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Guarantee {
-    /// It is refused.
+    /// The settings are refused with an error.
     #[default]
     Required,
-    /// It runs all the same, tightened by as much as there is room for, and says that nothing is guaranteed.
+    /// The controller runs, tightened as far as there is room, and reports that nothing is
+    /// guaranteed.
     BestEffort,
 }
 
-/// The observer of the disturbance, by which the reference of the nominal motion is shifted so that the vehicle comes to rest on the reference.
+/// Settings of the disturbance observer, which shifts the reference of the nominal motion so that
+/// the vehicle comes to rest on the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObserverSettings {
     /// Whether the reference is shifted.
     pub active: bool,
-    /// Time constant of its filter, s.
+    /// Time constant of the observer's filter, s.
     pub time_constant: f64,
-    /// k of the shift −Δ̂/k of the reference's angles, 1/s².
+    /// Stiffness k in the shift −Δ̂/k of the reference's angles, 1/s².
     pub stiffness: f64,
 }
 
-/// Everything CRMPC is built from. Units SI, angles rad.
+/// All settings of CRMPC. Units are SI, angles in rad.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// The vehicle as the controller believes it to be.
+    /// Model of the vehicle that the controller uses.
     pub body: RigidBody,
-    /// ‖ω‖ must stay below this, rad/s.
+    /// Limit on ‖ω‖, rad/s.
     pub limit_rate: f64,
-    /// ‖m‖ must stay below this, N m.
+    /// Limit on ‖m‖, N m.
     pub limit_moment: f64,
-    /// Constraint sets.
+    /// Choice of the constraint sets.
     pub constraints: Constraints,
-    /// Initial state of the nominal motion.
+    /// Choice of the initial state of the nominal motion.
     pub initial_state: InitialState,
     /// Number of prediction steps N.
     pub horizon: usize,
     /// Optimisation period h, s; a whole multiple of the feedback period.
     pub period_optimisation: f64,
-    /// Feedback period, s.
+    /// Period of the feedback law, s.
     pub period_feedback: f64,
-    /// P, diagonal: angles, rates.
+    /// Diagonal of the weight P: angles, then rates.
     pub p: [f64; 6],
-    /// Q, diagonal.
+    /// Diagonal of the weight Q on the input.
     pub q: [f64; 3],
-    /// K of the feedback law (20).
+    /// Gain K of the feedback law (20).
     pub feedback: Gain,
-    /// K̃ of the terminal law (14).
+    /// Gain K̃ of the terminal law (14).
     pub terminal: Gain,
-    /// Gain that the paper's c̄ is computed with.
+    /// Gain with which the paper's c̄ is computed.
     pub tube: Gain,
-    /// Δ̄ per component of x_ω, rad/s².
+    /// Disturbance bound Δ̄ per component of x_ω, rad/s².
     pub disturbance_bound: f64,
-    /// Relative error of the inertia that the robust set allows for.
+    /// Relative inertia error that the robust set tolerates.
     pub inertia_error: f64,
-    /// Bound on the error of each measured angle, rad. It moves no faster than `rate_error`.
+    /// Bound on the error of each measured angle, rad. The error changes no faster than
+    /// `rate_error`.
     pub angle_error: f64,
-    /// Bound on the error of each measured component of x_ω, rad/s. It may be anything within it at each tick.
+    /// Bound on the error of each measured component of x_ω, rad/s. The error may take any value
+    /// within it at each tick.
     pub rate_error: f64,
-    /// Time from a measurement to the moment that it leads to, s. The state given to the law is the one predicted for that instant.
+    /// Time from a measurement until the resulting moment acts, s. The law receives the state
+    /// predicted for that instant.
     pub delay: f64,
-    /// |β| up to which the guarantee of the robust set is given, rad.
+    /// Largest |β| for which the robust set gives its guarantee, rad.
     pub sideslip_domain: f64,
-    /// What happens where the design of the robust set does not hold.
+    /// Reaction to settings for which the design of the robust set does not hold.
     pub guarantee: Guarantee,
-    /// Observer of the disturbance; of the robust set only.
+    /// Observer of the disturbance; used by the robust set only.
     pub observer: ObserverSettings,
-    /// |β| that the paper's bounds of Lemma 1 allow for, rad.
+    /// Largest |β| for which the paper's bounds of Lemma 1 are computed, rad.
     pub sideslip_bound: f64,
     /// Bound Θ̄₁ on ‖Θ̇_r‖, rad/s.
     pub reference_rate: f64,
     /// Bound Θ̄₂ on ‖Θ̈_r‖, rad/s².
     pub reference_acceleration: f64,
-    /// How the optimisation is solved.
+    /// Settings of the solvers of the optimisation.
     pub solver: SolverSettings,
 }
 
 /// The constants printed in Chai 2022, section 5.1, computed from the raw data.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PaperConstants {
-    /// r̄₀ = √(1 + tan β̄). The proof of Lemma 1 has tan²; the printed number lacks the square.
+    /// Bound r̄₀ = √(1 + tan β̄). The proof of Lemma 1 has tan²; the printed number lacks the square.
     pub r0: f64,
-    /// r̄₁: the rate limit in rad/s. Not a bound of ‖Ṙ‖ for all |β| ≤ 10°.
+    /// Bound r̄₁: the rate limit in rad/s. It is not a bound of ‖Ṙ‖ for all |β| ≤ 10°.
     pub r1: f64,
-    /// Ω̄ = √3 ω̄, a component-wise bound.
+    /// Component-wise bound Ω̄ = √3 ω̄.
     pub omega: f64,
-    /// Ī·Ī′, the condition number of I.
+    /// Condition number Ī·Ī′ of I.
     pub condition: f64,
-    /// x̄_ω = r̄₀ ω̄ of (6), rad/s.
+    /// Bound x̄_ω = r̄₀ ω̄ of (6), rad/s.
     pub x: f64,
-    /// ū = r̄₀ M̄ / λ_min(I) of (6), rad/s².
+    /// Bound ū = r̄₀ M̄ / λ_min(I) of (6), rad/s².
     pub u: f64,
-    /// c̄ of (21), the peak of the step response, s.
+    /// Peak of the step response, c̄ of (21), s.
     pub c: f64,
-    /// x̄_tube of (21), rad/s.
+    /// Tightened bound x̄_tube of (21), rad/s.
     pub x_tube: f64,
-    /// ū_tube of (21), rad/s².
+    /// Tightened bound ū_tube of (21), rad/s².
     pub u_tube: f64,
-    /// ε₁ of (13).
+    /// Terminal radius ε₁ of (13).
     pub epsilon1: f64,
-    /// ε₂ of (13).
+    /// Terminal radius ε₂ of (13).
     pub epsilon2: f64,
     /// Tube of the angles, Δ̄/|k₁| of (26), rad.
     pub angle_tube: f64,
@@ -140,8 +149,8 @@ pub struct PaperConstants {
     pub rate_tube: f64,
 }
 
-/// G of (15) per axis, with equality: AᵀG + G A + K̃ᵀQ K̃ + P = 0, A = [0 1; k̃₁ k̃₂]. The print demands < 0, which
-/// its own G does not satisfy.
+/// Returns G of (15) per axis, with equality: AᵀG + G A + K̃ᵀQ K̃ + P = 0, A = [0 1; k̃₁ k̃₂]. The
+/// paper requires < 0, which its printed G does not satisfy.
 pub fn terminal_weight(gain: Gain, p: Vector2<f64>, q: f64) -> Matrix2<f64> {
     let Gain { k1, k2 } = gain;
     let load = Matrix2::from_diagonal(&p) + gain.row().transpose() * gain.row() * q;
@@ -151,12 +160,13 @@ pub fn terminal_weight(gain: Gain, p: Vector2<f64>, q: f64) -> Matrix2<f64> {
     Matrix2::new(g11, g12, g12, g22)
 }
 
-/// G of (15) as it is when the terminal law is held over h, with equality: ΦᵀG Φ − G + h (P + K̃ᵀQ K̃) = 0, so that (11c) holds for the sampled cost.
+/// Returns G of (15) for a terminal law that is held over h, with equality:
+/// ΦᵀG Φ − G + h (P + K̃ᵀQ K̃) = 0. With it (11c) holds for the sampled cost.
 pub fn held_terminal_weight(held: &SampledError, gain: Gain, p: Vector2<f64>, q: f64) -> Matrix2<f64> {
     let mut load = (Matrix2::from_diagonal(&p) + gain.row().transpose() * gain.row() * q) * held.period();
     let mut power = *held.transition();
     let mut sum = Matrix2::zeros();
-    // Σ (Φᵀ)ⁱ L Φⁱ by doubling, until Φ has vanished.
+    // The sum Σ (Φᵀ)ⁱ L Φⁱ is doubled until Φ has vanished.
     for _ in 0..60 {
         let next = load + power.transpose() * load * power;
         sum = next;
@@ -169,14 +179,15 @@ pub fn held_terminal_weight(held: &SampledError, gain: Gain, p: Vector2<f64>, q:
     sum
 }
 
-/// c̄ of (21): the peak over time of G_i(τ) = (e^{λ₂τ} − e^{λ₁τ})/√(k₂² + 4k₁), with λ₁ the faster root.
+/// Returns c̄ of (21): the peak over time of G_i(τ) = (e^{λ₂τ} − e^{λ₁τ})/√(k₂² + 4k₁), with λ₁ the
+/// faster root.
 pub fn step_response_peak(gain: Gain) -> Option<f64> {
     let (slow, fast) = gain.eigenvalues()?;
     let peak_time = (slow / fast).ln() / (fast - slow);
     Some(((slow * peak_time).exp() - (fast * peak_time).exp()) / (slow - fast))
 }
 
-/// Smallest eigenvalue of a symmetric 2×2 matrix.
+/// Returns the smallest eigenvalue of a symmetric 2×2 matrix.
 fn smallest_eigenvalue(m: &Matrix2<f64>) -> f64 {
     0.5 * m.trace() - (0.25 * (m.m11 - m.m22).powi(2) + m.m12 * m.m12).sqrt()
 }
@@ -184,37 +195,40 @@ fn smallest_eigenvalue(m: &Matrix2<f64>) -> f64 {
 /// The result of the offline design.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Design {
-    /// G per axis.
+    /// Terminal weight G per axis.
     pub g: [Matrix2<f64>; 3],
-    /// The paper's constants; `None` where its assumptions (real distinct eigenvalues) do not hold.
+    /// Constants of the paper; `None` if its assumptions (real distinct eigenvalues) do not hold.
     pub paper: Option<PaperConstants>,
-    /// Exact sampled bounds of the error dynamics for all times, per unit Δ̄.
+    /// Exact sampled bounds of the error dynamics for all times, per unit of Δ̄.
     pub reach: Reach,
-    /// Invariant set of the deviation of one axis per unit of its disturbance bound; `None` if the eigenvalues are complex.
+    /// Invariant set of the deviation of one axis per unit of its disturbance bound; `None` if the
+    /// eigenvalues are complex.
     pub invariant: Option<InvariantSet>,
     /// Tightening of the robust set.
     pub tightening: Tightening,
-    /// What the tightening leaves of the limits.
+    /// Remainder of the limits after the tightening.
     pub assessment: Assessment,
-    /// Share of the disturbance bound and the errors that the tightening counts: 1 where the guarantee is given.
+    /// Share of the disturbance bound and the errors that the tightening includes; 1 if the
+    /// guarantee is given.
     pub counted: f64,
     /// Feedback ticks per optimisation.
     pub ratio: usize,
-    /// Feedback ticks that begin before a command of the first one acts.
+    /// Number of feedback ticks that begin before the command of the first of them acts.
     pub delay_ticks: u32,
     /// Largest eigenvalue of I, kg m².
     pub largest_inertia: f64,
     /// Smallest eigenvalue of I, kg m².
     pub smallest_inertia: f64,
-    /// The largest moment of inertia over the smallest.
+    /// Ratio of the largest moment of inertia to the smallest.
     pub inertia_ratio: f64,
 }
 
 impl Design {
-    /// Computes all constants.
+    /// Computes the design from the settings.
     ///
     /// # Errors
-    /// Names the setting that is out of range, or the gain and its spectral radius if it does not stabilise.
+    /// Returns an error that names the setting out of range, or the gain that does not stabilise,
+    /// with its spectral radius.
     pub fn new(s: &Settings) -> Result<Self, DesignError> {
         let ratio = ratio(s)?;
         for (name, gain) in [("feedback", s.feedback), ("terminal", s.terminal), ("tube", s.tube)] {
@@ -265,7 +279,8 @@ impl Design {
     }
 }
 
-/// Share of the bounds that is counted, tightening and what it leaves.
+/// Returns the share of the bounds that is included, the tightening, and what it leaves of the
+/// limits.
 fn robust(s: &Settings) -> Result<(f64, Tightening, Assessment), DesignError> {
     let (tightening, assessment) = guarantee::tighten(s)?;
     if s.constraints == Constraints::Paper || assessment.holds() {
@@ -347,15 +362,15 @@ fn paper_constants(s: &Settings, smallest: f64, largest: f64) -> Option<PaperCon
     let condition = largest / smallest;
     let c = step_response_peak(s.tube)?;
 
-    // (6): outer sets.
+    // Outer sets (6).
     let x = r0 * s.limit_rate;
     let u = r0 * s.limit_moment / smallest;
     // r̄₀ Ī′ Ω̄ Ī r̄₀′ with r̄₀′ = 1, the recurring product of (13), (17) and (21).
     let gyroscopic = r0 * condition * omega;
-    // (21)
+    // Tightened sets (21).
     let x_tube = x - root3 * s.disturbance_bound * c;
     let u_tube = u - 2.0 * gyroscopic * x + root3 * s.disturbance_bound * c * (r1 + gyroscopic);
-    // (13), with "− r̄₁" as printed; the triangle inequality would give "+ r̄₁".
+    // Terminal radii (13), with "− r̄₁" as printed; the triangle inequality would give "+ r̄₁".
     let terminal_gain = s.terminal.k1.hypot(s.terminal.k2);
     let epsilon1 = terminal_scale * (x_tube - s.reference_rate);
     let epsilon2 =

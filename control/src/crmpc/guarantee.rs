@@ -1,6 +1,8 @@
-//! What the guarantee of the robust set rests on: how far the vehicle can be from the plan, and whether enough of the limits is left then.
+//! The basis of the robust set's guarantee: how far the vehicle can be from the plan, and whether
+//! enough of the limits is then left.
 //!
-//! The theorem, its assumptions and its proof are in docs/guarantee.md; the numbers of its lemmas stand beside the lines that compute them.
+//! The theorem, its assumptions and its proof are in docs/guarantee.md. The comments beside the
+//! code explain the numbers of its lemmas.
 
 mod lemmas;
 
@@ -15,24 +17,25 @@ use std::f64::consts::SQRT_2;
 /// Largest deviation of the vehicle from the plan at a feedback tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
-    /// Of angle of attack and sideslip, ‖(α, β) − (α̃, β̃)‖; the bank angle changes neither ω nor m. rad.
+    /// Deviation of angle of attack and sideslip, ‖(α, β) − (α̃, β̃)‖, rad. The bank angle changes
+    /// neither ω nor m.
     pub angle: f64,
-    /// ‖x_ω − x̃_ω‖, rad/s.
+    /// Deviation of the rates, ‖x_ω − x̃_ω‖, rad/s.
     pub rate: f64,
-    /// The same of the state that the law acts on, rad.
+    /// Deviation of angle of attack and sideslip in the predicted state on which the law acts, rad.
     pub seen_angle: f64,
-    /// The same of the state that the law acts on, rad/s.
+    /// Deviation of the rates in the predicted state on which the law acts, rad/s.
     pub seen_rate: f64,
-    /// Size of the box that K o is in beside the ball below, rad/s².
+    /// Half width of the box part of K ô, rad/s²; the ball part below is added to it.
     pub feedback: f64,
-    /// Radius of a ball that K o is in as well, rad/s².
+    /// Radius of the ball part of K ô, rad/s².
     pub feedback_norm: f64,
-    /// Moment that K o asks for to make up for the inertia error, N m.
+    /// Moment that K ô requires to compensate for the inertia error, N m.
     pub feedback_moment: f64,
 }
 
 impl Deviation {
-    /// The larger of each.
+    /// Returns the larger value of each component.
     fn or(&self, other: &Self) -> Self {
         Self {
             angle: self.angle.max(other.angle),
@@ -46,22 +49,27 @@ impl Deviation {
     }
 }
 
-/// How the robust set is tightened, by feedback ticks since the nominal motion began at the measured state.
+/// Tightening of the robust set, by feedback ticks since the nominal motion began at the measured
+/// state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tightening {
-    /// Deviation at each tick; the last one holds for ever.
+    /// Deviation at each tick; the last one holds from then on.
     at: Vec<Deviation>,
-    /// What the largest within the optimisation period that begins at each tick takes of the moment.
+    /// Loss of moment by the largest deviation within the optimisation period that begins at each
+    /// tick.
     moment: Vec<MomentLoss>,
-    /// What it takes of the rate at each tick, and before and after until the next one of the plan's steps.
+    /// Loss of rate by the deviation at each tick, and in the intervals of the plan before and
+    /// after it.
     rate: Vec<RateLoss>,
     /// Largest ‖I W s‖ over the corners s of the unit box at any attitude of the domain, kg m².
     pub bearing: f64,
-    /// Bound on the norm of all that drives the deviation, rad/s².
+    /// Bound on the norm of everything that drives the deviation, rad/s².
     pub norm: f64,
-    /// The part of it that F does between two ticks beyond what the law meant, rad/s².
+    /// Part of `norm` by which F differs between two ticks from the acceleration that the law
+    /// intended, rad/s².
     pub mismatch: f64,
-    /// What the observer of the disturbance shows at most, each component, rad/s²: Δ̄, the inertia's part, the mismatch and the errors of the rates.
+    /// Largest component of an explained disturbance estimate, rad/s²: Δ̄, the part of the inertia
+    /// error, the mismatch and the errors of the rates.
     pub observable: f64,
 }
 
@@ -70,22 +78,23 @@ impl Tightening {
         tick.min(self.at.len() - 1)
     }
 
-    /// The deviation so many feedback ticks after the nominal motion began.
+    /// Returns the deviation `tick` feedback ticks after the nominal motion began.
     pub fn at(&self, tick: usize) -> &Deviation {
         &self.at[self.place(tick)]
     }
 
-    /// What the largest deviation at the feedback ticks of the optimisation period that begins with this one takes of the moment.
+    /// Returns the loss of moment by the largest deviation at the feedback ticks of the
+    /// optimisation period that begins at `tick`.
     pub(super) fn moment_loss(&self, tick: usize) -> &MomentLoss {
         &self.moment[self.place(tick)]
     }
 
-    /// What it takes of the rate at this tick and until the steps of the plan before and after it.
+    /// Returns the loss of rate at `tick` and in the intervals of the plan before and after it.
     pub(super) fn rate_loss(&self, tick: usize) -> &RateLoss {
         &self.rate[self.place(tick)]
     }
 
-    /// The deviation that is never exceeded.
+    /// Returns the deviation that is never exceeded.
     pub fn forever(&self) -> &Deviation {
         self.at(usize::MAX)
     }
@@ -93,38 +102,45 @@ impl Tightening {
 
 /// Bounds that depend on |sin β| ≤ s alone.
 ///
-/// With e₁, e₂, e₃ turned by α, Ẇ x_ω = [s x₂ (2 s x₁ + x₃), −c x₂ (2 s x₁ + x₃), c x₁ (s x₁ + x₃)], s = sin β, c = cos β, x = x_ω.
+/// With e₁, e₂, e₃ turned by α, Ẇ x_ω = [s x₂ (2 s x₁ + x₃), −c x₂ (2 s x₁ + x₃),
+/// c x₁ (s x₁ + x₃)], where s = sin β, c = cos β, x = x_ω.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
-    /// ‖Ẇ x‖ ≤ `drift` ‖x‖².
+    /// Factor in the bound ‖Ẇ x‖ ≤ `drift` ‖x‖².
     pub drift: f64,
-    /// ‖∂(Ẇ x)/∂x‖ ≤ `drift_by_rates` ‖x‖.
+    /// Factor in the bound ‖∂(Ẇ x)/∂x‖ ≤ `drift_by_rates` ‖x‖.
     pub drift_by_rates: f64,
-    /// ‖R‖ = sec β (Lemma 1).
+    /// Norm ‖R‖ = sec β (Lemma 1).
     pub r: f64,
 }
 
-/// Bound on ‖∂²(W y)/∂(α, β)²‖ over ‖y‖.
+/// Bound on ‖∂²(W y)/∂(α, β)²‖ relative to ‖y‖.
 const CURVATURE: f64 = 3.162_277_660_168_379_5;
-/// ‖W(Θ + o) − W(Θ)‖ over ‖o‖: ∂W/∂α and ∂W/∂β are orthogonal and no longer than √2 (Frobenius).
+/// Bound on ‖W(Θ + o) − W(Θ)‖ relative to ‖o‖: ∂W/∂α and ∂W/∂β are orthogonal and no longer than √2
+/// (Frobenius).
 pub(super) const TURN: f64 = SQRT_2;
-/// Bound on the mixed second derivative of Ẇ x by angles and rates over ‖x‖: Ẇ x = ∂W x α̇ + ∂W x β̇ takes one derivative of W more.
+/// Bound on the mixed second derivative of Ẇ x by angles and rates, relative to ‖x‖.
+/// Ẇ x = ∂W x α̇ + ∂W x β̇ takes one more derivative of W.
 const DRIFT_MIXED: f64 = 2.0 * CURVATURE;
-/// Bound on the second derivative of Ẇ x by the angles over ‖x‖², from the third derivatives of W.
+/// Bound on the second derivative of Ẇ x by the angles, relative to ‖x‖², from the third
+/// derivatives of W.
 const DRIFT_BY_ANGLES_TWICE: f64 = 8.0;
-/// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; the sideslip at least. See [`braking`].
+/// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; for the sideslip it
+/// is the smallest rate. See [`braking`].
 pub(super) const BRAKING: f64 = 0.01;
 
 impl Geometry {
-    /// For |β| ≤ `sideslip` (rad, below π/2).
+    /// Computes the bounds for |β| ≤ `sideslip` (rad, below π/2).
     pub fn new(sideslip: f64) -> Self {
         let (s, c) = sideslip.sin_cos();
         let (s2, c2) = (s * s, c * c);
-        // ‖Ẇ x‖² = x₂² (2 s x₁ + x₃)² + c² x₁² (s x₁ + x₃)² ≤ A u (1 − u) + E u² with u = x₁² + x₃² for ‖x‖ = 1.
+        // ‖Ẇ x‖² = x₂² (2 s x₁ + x₃)² + c² x₁² (s x₁ + x₃)² ≤ A u (1 − u) + E u² with u = x₁² + x₃²
+        // for ‖x‖ = 1.
         let a = 1.0 + 4.0 * s2;
         let e = c2 * (0.5 * (s + (1.0 + s2).sqrt())).powi(2);
         let square = if 2.0 * e < a { a * a / (4.0 * (a - e)) } else { e };
-        // The rows of its derivative: [2 s x₂, 2 s x₁ + x₃, x₂] and c [2 s x₁ + x₃, 0, x₁], squared and added up.
+        // The rows of its derivative, [2 s x₂, 2 s x₁ + x₃, x₂] and c [2 s x₁ + x₃, 0, x₁], are
+        // squared and added up.
         let trace = (1.0 + c2) * a + c2;
         let determinant = c2 * (1.0 + c2);
         let by_rates = (0.5 * (trace + (trace * trace - 4.0 * determinant).sqrt())).max(a);
@@ -132,26 +148,27 @@ impl Geometry {
     }
 }
 
-/// What bounds the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain ‖ω‖ ≤ ω̄, ‖m‖ ≤ M̄, |β| ≤ β̄.
+/// Bounds on the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain ‖ω‖ ≤ ω̄,
+/// ‖m‖ ≤ M̄, |β| ≤ β̄.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Dynamics {
     pub geometry: Geometry,
     /// Largest and smallest moment of inertia, kg m².
     pub largest: f64,
     pub smallest: f64,
-    /// ‖∂(ω × I ω)/∂ω‖ ≤ `gyroscopic` ‖ω‖ (Frobenius), kg m².
+    /// Factor in the bound ‖∂(ω × I ω)/∂ω‖ ≤ `gyroscopic` ‖ω‖ (Frobenius), kg m².
     pub gyroscopic: f64,
-    /// Bound on ‖x_ω‖, rad/s.
+    /// Bound on ‖x_ω‖ in the domain, rad/s.
     pub rate: f64,
-    /// Bound on ‖F‖, rad/s².
+    /// Bound on ‖F‖ in the domain, rad/s².
     acceleration: f64,
-    /// Bound on ‖∂F/∂x_ω‖, 1/s.
+    /// Bound on ‖∂F/∂x_ω‖ in the domain, 1/s.
     by_rates: f64,
-    /// Bound on ‖∂F/∂(α, β)‖, 1/s².
+    /// Bound on ‖∂F/∂(α, β)‖ in the domain, 1/s².
     by_angles: f64,
     /// Bound on ‖d²F/dt²‖ along the predicted motion with m held, rad/s⁴.
     jerk: f64,
-    /// Of [`Self::moment_curvature`], by ‖a‖², ‖x_ω‖² ‖a‖ and ‖x_ω‖⁴.
+    /// Coefficients of ‖a‖², ‖x_ω‖² ‖a‖ and ‖x_ω‖⁴ in [`Self::moment_curvature`].
     curvature: [f64; 3],
 }
 
@@ -164,16 +181,17 @@ impl Dynamics {
         let spread = (largest - smallest) / smallest;
         let rate = r * s.limit_rate;
         let (gyroscopic, spinning) = gyroscopic(s);
-        // ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
+        // Gyroscopic term: ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
         let spin = s.limit_moment / smallest + 0.5 * spread * s.limit_rate.powi(2);
         let acceleration = r * (spin + drift * rate * rate);
         let by_rates = r * (drift_by_rates * rate + spinning * s.limit_rate);
-        // ∂R = −R ∂W R; ∂(Ẇ x) by the angles takes second derivatives of W.
+        // The derivative of R is ∂R = −R ∂W R; that of Ẇ x by the angles takes second derivatives
+        // of W.
         let of_r = TURN * r * r;
         let by_angles = of_r * (spin + drift * rate * rate)
             + r * (CURVATURE * rate * rate + spinning * s.limit_rate * TURN * rate);
-        // F_xx [a, a] + 2 F_xθ [a, x] + F_θθ [x, x] + F_θ a + F_x ȧ with a = F and ȧ = F_x a + F_θ x, the second derivatives as the first
-        // ones with one derivative of R or W more.
+        // F_xx [a, a] + 2 F_xθ [a, x] + F_θθ [x, x] + F_θ a + F_x ȧ with a = F and ȧ = F_x a + F_θ
+        // x. The second derivatives follow from the first ones with one more derivative of R or W.
         let second = 2.0 * (by_rates / rate);
         let mixed = of_r * by_rates + r * (DRIFT_MIXED + 4.0 * spread) * rate;
         let angles_twice = 2.0 * of_r * by_angles
@@ -184,7 +202,8 @@ impl Dynamics {
             + angles_twice * rate * rate
             + by_angles * acceleration
             + by_rates * (by_rates * acceleration + by_angles * rate);
-        // I Ẅ a: ∂²W [x, x] a + ∂W [a] a. The rest as in `MomentLoss`, with ẋ_ω = a and Θ̈ = a.
+        // I Ẅ a gives ∂²W [x, x] a + ∂W [a] a. The rest is as in `MomentLoss`, with ẋ_ω = a and
+        // Θ̈ = a.
         let twisted = largest - smallest;
         let curvature = [
             largest * TURN + 2.0 * (largest * drift + 0.5 * twisted),
@@ -207,9 +226,10 @@ impl Dynamics {
         }
     }
 
-    /// How far F is from the acceleration that the law meant, on average over a period (rad/s²), and by how much it varies within one, where the
-    /// motion is driven off its prediction by `drive` (rad/s²) and began with errors of the angles and rates (rad, rad/s). Without what
-    /// [`Self::swing`] counts.
+    /// Returns two measures of how F differs from the acceleration that the law intended: the mean
+    /// over a period, and the variation within one, both rad/s². The motion is driven off its
+    /// prediction by `drive` (rad/s²) and began with errors of the angles and rates (rad, rad/s).
+    /// The part in [`Self::swing`] is not included.
     fn mismatch(&self, s: &Settings, drive: f64, angle_error: f64, rate_error: f64) -> (f64, f64) {
         let tau = s.period_feedback;
         let elapsed = s.delay + tau;
@@ -220,21 +240,24 @@ impl Dynamics {
         (mean, self.by_rates * drive * tau * growth + self.jerk * tau * tau / 8.0)
     }
 
-    /// How far apart two motions are after a time (s) over how far they are driven apart: the mismatch itself drives them (Gronwall's inequality).
+    /// Returns the ratio of the distance of two motions after a time (s) to the distance that the
+    /// drive alone would cause. The mismatch itself also drives them apart (Gronwall's inequality).
     fn growth(&self, elapsed: f64) -> f64 {
         ((self.by_rates + self.by_angles * elapsed) * elapsed).exp()
     }
 
-    /// The law cancels f at the predicted middle of the interval in which its moment acts. So what F does of first order in time adds up to
-    /// nothing over the interval in the rate, and in the angle to τ³ ‖dF/dt‖/12. Over τ, rad/s.
+    /// The law cancels f at the predicted middle of the interval in which its moment acts. The
+    /// change of F of first order in time therefore cancels in the rate over the interval, and
+    /// shifts the angle by τ³ ‖dF/dt‖/12. Returns this shift over τ, rad/s.
     fn swing(&self, s: &Settings) -> f64 {
         let slope = self.by_rates * self.acceleration + self.by_angles * self.rate;
         slope * s.period_feedback.powi(2) / 12.0
     }
 }
 
-/// Bounds on ‖∂(ω × I ω)/∂ω‖ over ‖ω‖ and on that of I⁻¹ (ω × I ω). In principal axes the rows hold a_i ω_j and a_i ω_k with
-/// a = [I₃ − I₂, I₁ − I₃, I₂ − I₁], so that each ω² meets two of the squares a_i².
+/// Returns bounds on ‖∂(ω × I ω)/∂ω‖ / ‖ω‖ and on the same ratio for I⁻¹ (ω × I ω). In principal
+/// axes the rows hold a_i ω_j and a_i ω_k with a = [I₃ − I₂, I₁ − I₃, I₂ − I₁], so that each ω²
+/// meets two of the squares a_i².
 fn gyroscopic(s: &Settings) -> (f64, f64) {
     let mut inertia: [f64; 3] = s.body.inertia.symmetric_eigenvalues().into();
     inertia.sort_by(f64::total_cmp);
@@ -248,31 +271,35 @@ fn gyroscopic(s: &Settings) -> (f64, f64) {
     (of_two(rows), of_two([rows[0] / first, rows[1] / second, rows[2] / third]))
 }
 
-/// What is left of the limits at rest and beyond the horizon.
+/// Remainder of the limits at rest and beyond the horizon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Assessment {
     /// Share of the rate limit that is left for the motion beyond the horizon.
     pub rate_left: f64,
-    /// Share of the moment limit that is left once a constant corner of Δ̄, errors and delay are borne, at the attitude that needs most.
+    /// Share of the moment limit that is left after a constant corner of Δ̄, the errors and the
+    /// delay, at the attitude that needs most.
     pub moment_left: f64,
-    /// Largest ‖x̃_ω‖ with which the horizon may end, rad/s: from there the motion brakes, and keeps every limit for ever.
+    /// Largest ‖x̃_ω‖ at the end of the horizon, rad/s. From there the motion brakes and keeps every
+    /// limit for ever.
     pub terminal_rate: f64,
 }
 
 impl Assessment {
-    /// Whether the guarantee can be given.
+    /// Returns whether the guarantee can be given.
     pub fn holds(&self) -> bool {
         self.terminal_rate >= SMALLEST_TERMINAL_RATE
     }
 }
 
-/// The horizon may end with at least this ‖x̃_ω‖, or else there is no room to move at all: 0.2°/s.
+/// Smallest acceptable bound on ‖x̃_ω‖ at the end of the horizon, 0.2°/s in rad/s; below it there is
+/// no room to move at all.
 const SMALLEST_TERMINAL_RATE: f64 = 3.5e-3;
 
-/// Tightening and assessment of `settings`.
+/// Computes tightening and assessment of `settings`.
 ///
 /// # Errors
-/// The gain and its spectral radius if it does not stabilise; the gain that an invariant set cannot be made for.
+/// Returns an error that names the gain that does not stabilise, with its spectral radius, or the
+/// gain for which no invariant set can be computed.
 pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignError> {
     let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
     let unstable = || DesignError::Unstable {
@@ -293,7 +320,8 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
             all.map(|((reach, errors), shifts)| parts.deviation(s, &reach, errors, &shifts)).collect()
         }
         InitialState::Tube => {
-            // Fully grown from the start: the plan may begin anywhere in the set that Δ cannot drive the deviation out of.
+            // The deviation is fully grown from the start, because the plan may begin anywhere in
+            // the set that Δ cannot drive the deviation out of.
             let last = |all: Vec<Reach>| all.last().copied().unwrap_or_default();
             let set =
                 error.invariant_set(lateral(s)).ok_or(DesignError::NotReal { name: "feedback" })?.reach();
@@ -308,7 +336,8 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
         let within = (n..n + ratio).fold(Deviation::default(), |largest, n| largest.or(&at[n.min(last)]));
         MomentLoss::new(&dynamics, &within, bearing)
     });
-    // Between the ends of an optimisation period the deviation can exceed what lies on the line between them by so much.
+    // Between the ends of an optimisation period the deviation can exceed the straight line between
+    // its end values by this amount.
     let bulge = |n: usize, value: fn(&Deviation) -> f64| {
         let tick = |i: usize| value(&at[(n + i).min(last)]);
         let (from, to) = (tick(0), tick(ratio));
@@ -323,8 +352,8 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
         RateLoss::new(with_bulge(|d| d.angle), with_bulge(|d| d.rate))
     });
     let (moment, rate) = (moment.collect(), rate.collect());
-    // The observer looks at predicted rates, of which each prediction is off by its own error. A filter of first order makes no more than this of the
-    // differences of errors.
+    // The observer uses predicted rates, and each prediction has its own error. The first-order
+    // filter amplifies the differences of these errors by no more than this.
     let predicted = 3.0_f64.sqrt() * s.rate_error + dynamics.by_angles * s.delay * SQRT_2 * s.angle_error;
     let observable = (s.disturbance_bound + parts.norm - 3.0_f64.sqrt() * s.disturbance_bound
         + 2.0 * predicted / s.observer.time_constant)
@@ -335,12 +364,13 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     Ok((tightening, assessment))
 }
 
-/// How far a disturbance that changes within a period can shift the angle beyond what its mean does, over its bound, s².
+/// Returns the largest shift of the angle by a disturbance that changes within a period, beyond the
+/// effect of its mean, relative to the disturbance bound, s².
 pub(super) fn lateral(s: &Settings) -> f64 {
     0.25 * s.period_feedback * s.period_feedback
 }
 
-/// These settings with this share of the disturbance bound and the errors.
+/// Returns these settings with the given share of the disturbance bound and the errors.
 pub(super) fn counting(s: &Settings, share: f64) -> Settings {
     Settings {
         disturbance_bound: share * s.disturbance_bound,
@@ -350,19 +380,19 @@ pub(super) fn counting(s: &Settings, share: f64) -> Settings {
     }
 }
 
-/// What drives the deviation, by the ways in which it adds up.
+/// The parts that drive the deviation, separated by the way in which they add up.
 struct Parts {
-    /// Relative error of the moment: I⁻¹ becomes I⁻¹/(1 ± ι).
+    /// Relative error ι/(1 − ι) of the moment: I⁻¹ becomes I⁻¹/(1 ± ι).
     inertia: f64,
-    /// The mismatch of the cancellation alone, rad/s².
+    /// Mismatch of the cancellation alone, rad/s².
     mismatch: f64,
-    /// [`Dynamics::swing`].
+    /// Shift of the angle per time, see [`Dynamics::swing`].
     swing: f64,
-    /// Bound on the norm of everything, rad/s².
+    /// Bound on the norm of all parts together, rad/s².
     norm: f64,
-    /// The same of two axes.
+    /// Bound on the norm of all parts in two of the axes, rad/s².
     norm_of_two: f64,
-    /// How the moment that the inertia error asks for grows while the vehicle turns, 1/s.
+    /// Growth rate of the moment that the inertia error requires while the vehicle turns, 1/s.
     turning: f64,
 }
 
@@ -374,9 +404,10 @@ impl Parts {
         let root3 = 3.0_f64.sqrt();
         let drive = root3 * s.disturbance_bound + of_inertia;
         let (mismatch, varying) = dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error);
-        // |∫ g (e − ē)| ≤ ¼ τ ½ (range of g) (range of e) for the response g to a pulse, which is linear within a period.
+        // |∫ g (e − ē)| ≤ ¼ τ ½ (range of g) (range of e) for the response g to a
+        // pulse, which is linear within a period.
         let swing = dynamics.swing(s) + 0.125 * s.period_feedback * varying;
-        // ‖I (W − W′) R′ I⁻¹‖ for angles that lie `age` apart.
+        // Bound of ‖I (W − W′) R′ I⁻¹‖ for angles that lie `age` apart, per unit of `age`.
         let turning = largest / smallest * TURN * geometry.r * rate;
         Self {
             inertia,
@@ -388,13 +419,14 @@ impl Parts {
         }
     }
 
-    /// `reach` is per unit of disturbance, `errors` per unit of the errors of angle and rate, `shifts` per unit of the rate at which angles are shifted.
+    /// Returns the deviation. `reach` is per unit of disturbance, `errors` per unit of the errors
+    /// of angle and rate, and `shifts` per unit of the rate at which angles are shifted.
     fn deviation(&self, s: &Settings, reach: &Reach, errors: (&Reach, &Reach), shifts: &Reach) -> Deviation {
         let root3 = 3.0_f64.sqrt();
         let errors = errors.0.times(s.angle_error).plus(&errors.1.times(s.rate_error));
         let swing = shifts.times(self.swing);
         let tau = s.period_feedback;
-        // Between two ticks an angle is off its line by no more than this.
+        // Between two ticks an angle departs from the straight line by no more than this.
         let between = tau * tau / 8.0 * (self.norm * (1.0 + reach.feedback) + root3 * errors.feedback);
         Deviation {
             angle: reach.angle * self.norm_of_two + SQRT_2 * errors.angle + swing.angle + between,
@@ -410,7 +442,8 @@ impl Parts {
     }
 }
 
-/// What is left of the limits (rad/s, N m) beyond a motion with ‖x̃_ω‖ ≤ `x` and ‖a‖ ≤ `a`, with the deviation that is never exceeded, at whatever attitude.
+/// Returns what is left of the limits (rad/s, N m) beyond a motion with ‖x̃_ω‖ ≤ `x` and ‖a‖ ≤ `a`,
+/// with the deviation that is never exceeded, at any attitude.
 fn left(s: &Settings, dynamics: &Dynamics, tightening: &Tightening, x: f64, a: f64) -> (f64, f64) {
     let Deviation { angle, rate, .. } = *tightening.forever();
     let of_rates = s.limit_rate - RateLoss::new(angle, rate).at(TURN_OF_RATES * x, x);
@@ -419,8 +452,9 @@ fn left(s: &Settings, dynamics: &Dynamics, tightening: &Tightening, x: f64, a: f
     (of_rates - x, s.limit_moment - loss - dynamics.nominal_moment(x, a))
 }
 
-/// The rate κ (1/s) at which the sideslip has to brake beyond a horizon that ends with the angle `sideslip` and the rates `rates`: β travels |β̇|/κ more, and
-/// all keeps its limits meanwhile. `None` if it cannot.
+/// Returns the rate κ (1/s) at which the sideslip has to brake beyond a horizon that ends with the
+/// angle `sideslip` and the rates `rates`. While braking, β travels by |β̇|/κ, and all limits must
+/// hold. The result is `None` if that is impossible.
 pub(super) fn braking(
     s: &Settings,
     dynamics: &Dynamics,
@@ -430,7 +464,7 @@ pub(super) fn braking(
 ) -> Option<f64> {
     let room = s.sideslip_domain - tightening.forever().angle - sideslip.abs();
     let by_room = if rates.y == 0.0 { 0.0 } else { rates.y.abs() / room };
-    // A κ beyond 1/h would turn the motion round.
+    // A κ beyond 1/h would reverse the motion.
     if room < 0.0 || by_room * s.period_optimisation > 1.0 {
         return None;
     }
@@ -440,7 +474,8 @@ pub(super) fn braking(
     (rate >= 0.0 && moment >= 0.0).then_some(braking)
 }
 
-/// What is left at rest and for the motion beyond the horizon, at whatever attitude.
+/// Computes what is left of the limits at rest and for the motion beyond the horizon, at any
+/// attitude.
 fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessment {
     let left = |x: f64| left(s, dynamics, tightening, x, BRAKING * x);
     let (rate, moment) = left(0.0);
@@ -457,8 +492,9 @@ fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessm
 
 use crate::linearise::TURN_BY_ANGLES as TURN_OF_RATES;
 
-/// Largest ‖I W s‖ over the corners s of the unit box at any α and |β| ≤ β̄, kg m²: ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy² y_y² with the larger
-/// eigenvalue λ of I² in the plane of symmetry, for y = W s, which α turns in that plane; y_x² + y_z² = cos²β (s₁ sin β + s₃)² + s₂².
+/// Returns the largest ‖I W s‖ over the corners s of the unit box at any α and |β| ≤ β̄, kg m². With
+/// the larger eigenvalue λ of I² in the plane of symmetry, ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy² y_y²
+/// for y = W s. α turns y in that plane, and y_x² + y_z² = cos²β (s₁ sin β + s₃)² + s₂².
 fn bearing(s: &Settings) -> f64 {
     let square = s.body.inertia * s.body.inertia;
     let any = s.body.inertia.symmetric_eigenvalues().max() * 3.0_f64.sqrt();
@@ -467,13 +503,13 @@ fn bearing(s: &Settings) -> f64 {
     }
     let (xx, zz, xz, yy) = (square[(0, 0)], square[(2, 2)], square[(0, 2)], square[(1, 1)]);
     let plane = 0.5 * (xx + zz) + (0.25 * (xx - zz).powi(2) + xz * xz).sqrt();
-    // (1 − x²) (1 + x)² has its peak at one half.
+    // The maximum of (1 − x²) (1 + x)² is at one half.
     let sine = s.sideslip_domain.sin().min(0.5);
     let across = 1.0 + (1.0 - sine * sine) * (1.0 + sine).powi(2);
     (3.0 * yy + (plane - yy).max(0.0) * across).sqrt().min(any)
 }
 
-/// How much of the rate limit a deviation takes, rad/s: ‖W (x̃_ω + o_ω)‖ ≤ ‖W̃ x̃_ω‖ + ‖(W − W̃) x̃_ω‖ + ‖o_ω‖.
+/// Loss of the rate limit by a deviation, rad/s: ‖W (x̃_ω + o_ω)‖ ≤ ‖W̃ x̃_ω‖ + ‖(W − W̃) x̃_ω‖ + ‖o_ω‖.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RateLoss {
     constant: f64,
@@ -486,14 +522,15 @@ impl RateLoss {
         Self { constant: rate, by_angles: angle, by_size: 0.5 * CURVATURE * angle * angle }
     }
 
-    /// At a stage with ‖∂ω/∂(α, β)‖ = `by_angles` and ‖x̃_ω‖ = `size`, rad/s.
+    /// Returns the loss at a stage with ‖∂ω/∂(α, β)‖ = `by_angles` and ‖x̃_ω‖ = `size`, rad/s.
     #[inline]
     pub(super) fn at(&self, by_angles: f64, size: f64) -> f64 {
         self.constant + by_angles * self.by_angles + size * self.by_size
     }
 }
 
-/// How much of the moment limit a deviation takes, N m: m(x̃ + ô, a + K ô) = m(x̃, a) + I W K ô + ∂m ô + what is of second order in ô.
+/// Loss of the moment limit by a deviation, N m: m(x̃ + ô, a + K ô) = m(x̃, a) + I W K ô +
+/// ∂m ô + terms of second order in ô.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MomentLoss {
     angle: f64,
@@ -507,14 +544,15 @@ pub(super) struct MomentLoss {
 }
 
 impl MomentLoss {
-    /// `bearing` is that of [`Tightening`].
+    /// Computes the loss of a deviation; `bearing` is [`Tightening::bearing`].
     fn new(dynamics: &Dynamics, deviation: &Deviation, bearing: f64) -> Self {
         let Deviation {
             seen_angle: angle, seen_rate: rate, feedback, feedback_norm, feedback_moment, ..
         } = *deviation;
         let largest = dynamics.largest;
         let spread = largest - dynamics.smallest;
-        // The second derivatives of I W a, and of I Ẇ x + ω × I ω by rates, by both, and by angles.
+        // The second derivatives are those of I W a, and of I Ẇ x + ω × I ω by rates, by both, and
+        // by angles.
         let by_rates_twice = (largest * dynamics.geometry.drift + 0.5 * spread) * rate * rate;
         Self {
             angle,
@@ -528,8 +566,9 @@ impl MomentLoss {
         }
     }
 
-    /// `feedback` is the largest ‖I W s‖ over the corners of the unit box at the stage and how much that grows with the angles at most (kg m², kg m²/rad),
-    /// `slopes` are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖ there, `sizes` are ‖x̃_ω‖ and ‖a‖.
+    /// Returns the loss at a stage, N m. `feedback` holds the largest ‖I W s‖ over the corners of
+    /// the unit box there and a bound on its growth with the angles (kg m², kg m²/rad), `slopes`
+    /// holds ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖, and `sizes` holds ‖x̃_ω‖ and ‖a‖.
     #[inline]
     pub(super) fn at(&self, feedback: (f64, f64), slopes: (f64, f64), sizes: (f64, f64)) -> f64 {
         let (x, a) = (sizes.0 + self.rate, sizes.1);
@@ -543,7 +582,8 @@ impl MomentLoss {
 }
 
 impl Dynamics {
-    /// Bounds on ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a at any attitude of the domain.
+    /// Returns bounds on ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a at any attitude of
+    /// the domain.
     fn slopes(&self, x: f64, a: f64) -> (f64, f64) {
         let Self { largest, gyroscopic, geometry, .. } = self;
         (
@@ -552,26 +592,28 @@ impl Dynamics {
         )
     }
 
-    /// Bound on ‖m‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a, N m.
+    /// Returns a bound on ‖m‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a, N m.
     fn nominal_moment(&self, x: f64, a: f64) -> f64 {
         let Self { largest, smallest, geometry, .. } = self;
         largest * (a + geometry.drift * x * x) + 0.5 * (largest - smallest) * x * x
     }
 
-    /// Bound on ‖d²m/dt²‖ of a nominal motion with a held and such sizes, N m/s².
+    /// Returns a bound on ‖d²m/dt²‖ of a nominal motion with a held and these sizes, N m/s².
     #[inline]
     pub(super) fn moment_curvature(&self, x: f64, a: f64) -> f64 {
         let [aa, xxa, xxxx] = self.curvature;
         aa * a * a + x * x * (xxa * a + xxxx * x * x)
     }
 
-    /// Bound on ‖d²ω/dt²‖ of a nominal motion with a held and such sizes, rad/s³: 2 Ẇ a + ∂²W [x, x] x + ∂W [a] x.
+    /// Returns a bound on ‖d²ω/dt²‖ of a nominal motion with a held and these sizes, rad/s³:
+    /// 2 Ẇ a + ∂²W [x, x] x + ∂W [a] x.
     pub(super) fn rate_curvature(x: f64, a: f64) -> f64 {
         3.0 * TURN * x * a + CURVATURE * x.powi(3)
     }
 }
 
-/// The largest value of a setting between 0 and `tried` for which the design holds, the others as they are; `None` if not even 0 does.
+/// Returns the largest value of a setting between 0 and `tried` for which the design holds with the
+/// other settings unchanged; `None` if not even 0 does.
 fn largest(tried: f64, with: impl Fn(f64) -> Settings) -> Option<f64> {
     let holds = |value: f64| tighten(&with(value)).is_ok_and(|(_, assessment)| assessment.holds());
     if !holds(0.0) {
@@ -585,12 +627,13 @@ fn largest(tried: f64, with: impl Fn(f64) -> Settings) -> Option<f64> {
     Some(low)
 }
 
-/// Share of Δ̄, the errors and the delay together that the design holds for, at most 1.
+/// Returns the largest share, at most 1, of Δ̄ and the errors together for which the design holds.
 pub(super) fn largest_share(s: &Settings) -> Option<f64> {
     largest(1.0, |share| counting(s, share))
 }
 
-/// Why the guarantee cannot be given, and what would be accepted.
+/// Returns the error that says why the guarantee cannot be given, and which values would be
+/// accepted.
 pub(super) fn refusal(s: &Settings, assessment: &Assessment) -> DesignError {
     let error_share = largest(1.0, |share| Settings {
         angle_error: share * s.angle_error,

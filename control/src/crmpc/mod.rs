@@ -1,7 +1,9 @@
-//! Centralised robust MPC of Chai et al. (2022): optimisation of a nominal motion, feedback law around it.
+//! Centralised robust MPC of Chai et al. (2022): an optimisation plans a nominal motion, and a
+//! feedback law keeps the vehicle near it.
 //!
-//! Prediction is in x̃ = (Θ̃, x̃_ω), where the nominal model (7) under ũ = a − f is an exact double integrator; the error
-//! E = x̃ − x_r is formed afterwards, so that a jump of the reference is seen in the preview and never enters the dynamics.
+//! The prediction is made in x̃ = (Θ̃, x̃_ω), where the nominal model (7) under ũ = a − f is an exact
+//! double integrator. The error E = x̃ − x_r is formed afterwards, so that a jump of the reference
+//! is seen in the preview and never enters the dynamics.
 
 mod design;
 mod guarantee;
@@ -35,51 +37,55 @@ use std::time::Instant;
 use vehicle::kinematics;
 use vehicle::reference::Reference;
 
-/// What CRMPC carries from tick to tick.
+/// The state that CRMPC carries from tick to tick.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
-    /// The plan in force; it starts at the last optimisation.
+    /// Plan in force, which starts at the last optimisation.
     pub plan: Plan,
-    /// Whether `plan` holds anything yet.
+    /// Whether `plan` has been filled by an optimisation.
     pub started: bool,
     /// Outcome of the last optimisation.
     pub report: Report,
     /// Nominal state (Θ̃, x̃_ω) at the last tick.
     pub nominal: Vector6<f64>,
-    /// Whether the guarantee is in force.
+    /// Status of the guarantee: in force, or the reason why not.
     pub standing: Standing,
-    /// What the plan in force leaves of the limits in its first interval.
+    /// Margins to the limits that the plan in force leaves in its first interval.
     pub margins: Margins,
-    /// Feedback ticks from the beginning of the nominal motion to that of the plan in force.
+    /// Feedback ticks from the beginning of the nominal motion to the beginning of the plan in
+    /// force.
     pub age: u32,
-    /// Feedback ticks until a guarantee that is pending is in force.
+    /// Feedback ticks until a pending guarantee is in force.
     pub pending: u32,
-    /// How often the guarantee has ended.
+    /// Number of times that the guarantee has ended.
     pub ended: u32,
-    /// What is known of the disturbance.
+    /// Estimate of the disturbance with its filter state.
     pub observed: Observed,
 }
 
-/// Whether the guarantee of the robust set is in force at a tick: ‖ω‖ and ‖m‖ keep their limits from now on for as long as the assumptions hold.
+/// Status of the guarantee of the robust set at a tick. While it is in force, ‖ω‖ and ‖m‖ keep
+/// their limits for as long as the assumptions hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Standing {
-    /// No optimisation yet, or sets that guarantee nothing.
+    /// No optimisation has been run yet, or the sets guarantee nothing.
     #[default]
     None,
-    /// A plan is certified, and the guarantee is in force once the delay has passed: until then moments act that were commanded without it.
+    /// A plan is certified, and the guarantee comes into force once the delay has passed; until
+    /// then moments act that were commanded without it.
     Pending,
-    /// In force.
+    /// The limits are guaranteed from this tick on.
     InForce,
-    /// The design does not hold for the settings, so that all is best effort.
+    /// The design does not hold for the settings, so that the controller works on best effort.
     Refused,
-    /// No plan has been found that keeps the conditions of the theorem.
+    /// No plan has been found that satisfies the conditions of the theorem.
     Uncertified,
     /// The vehicle is further from the plan than the assumptions explain.
     Exceeded,
 }
 
 impl Memory {
-    /// Whether the plan in force is certified, and the vehicle no further from it than the assumptions explain.
+    /// Returns whether the plan in force is certified and the vehicle no further from it than the
+    /// assumptions explain.
     pub fn assured(&self) -> bool {
         matches!(self.standing, Standing::Pending | Standing::InForce)
     }
@@ -92,7 +98,7 @@ impl Clone for Memory {
         clone
     }
 
-    // The derived version would allocate a new plan at every tick.
+    // The derived version would allocate memory for a plan at every tick.
     fn clone_from(&mut self, source: &Self) {
         let Self { plan, started, report, nominal, standing, margins, age, pending, ended, observed } =
             source;
@@ -109,7 +115,8 @@ impl Clone for Memory {
     }
 }
 
-/// The controller: settings, offline design, solvers and scratch space. Everything that matters later is in [`Memory`].
+/// The controller: settings, offline design, solvers and scratch memory. All state that later ticks
+/// depend on is in [`Memory`].
 ///
 /// ```
 /// use control::crmpc::{Constraints, Settings, Standing};
@@ -132,29 +139,32 @@ pub struct Crmpc {
     chain: Chain<2>,
     sets: Sets,
     optimiser: Optimiser<2>,
-    // Scratch of one optimisation.
+    // Scratch memory of one optimisation.
     affine: Vec<State<2>>,
     previous: Motion<2>,
 }
 
-/// Share of the rate limit that the terminal law steers to at most where there is no optimum.
+/// Largest share of the rate limit to which the terminal law steers if there is no optimum.
 const SHARE_OF_RATE: f64 = 0.8;
-/// Shares of the tightening that are tried where no plan is certified.
+/// Shares of the tightening that are tried if no plan is certified.
 const LESS: [f64; 2] = [0.5, 0.0];
-/// Ways from a plan that is kept towards the optimum without constraints that are tried: a half, and each half as long as the one before.
+/// Number of steps from a kept plan towards the optimum without constraints that are tried: the
+/// first covers half of the way, each further one half as much as the one before.
 const HALVINGS: usize = 6;
-/// The first optimisation has converged when no state moves by more than this (rad, rad/s) between passes.
+/// Largest change of any state (rad, rad/s) between passes at which the first optimisation has
+/// converged.
 const STANDSTILL: f64 = 1e-8;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
 const ANGLE_SCALE: f64 = 0.1;
-/// Disturbance bound (rad/s²) that the invariant set has at least, so that it keeps an inside.
+/// Smallest disturbance bound for which the invariant set is computed, rad/s², so that the set has
+/// an interior.
 const SMALLEST_DISTURBANCE: f64 = 1e-5;
 
 impl Crmpc {
-    /// Designs the controller and sets its solver up.
+    /// Designs the controller and sets up its solver.
     ///
     /// # Errors
-    /// Names the setting at fault.
+    /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
         let design = Design::new(&settings)?;
         let sets = Sets::new(&settings, &design)?;
@@ -165,7 +175,7 @@ impl Crmpc {
             std::array::from_fn(|_| normals.iter().map(|n| n / size).collect())
         });
         let chain = Chain::new(h);
-        // (10), sampled: Σ h (EᵀPE + vᵀQv) + E_NᵀG E_N
+        // Cost (10), sampled: Σ h (EᵀPE + vᵀQv) + E_NᵀG E_N.
         let cost = Cost {
             state: [Vector3::new(p[0], p[1], p[2]) * h, Vector3::new(p[3], p[4], p[5]) * h],
             input: Vector3::from(q) * h,
@@ -176,7 +186,7 @@ impl Crmpc {
             cost,
             horizon: n,
             state_balls: true,
-            // The robust set ends in a bound on the rates (docs/guarantee.md).
+            // With the robust set the horizon ends in a bound on the rates (docs/guarantee.md).
             terminal: settings.constraints == Constraints::Paper,
             start,
             scale: [ANGLE_SCALE, settings.limit_rate],
@@ -194,21 +204,23 @@ impl Crmpc {
         })
     }
 
-    /// The offline design.
+    /// Returns the result of the offline design.
     pub fn design(&self) -> &Design {
         &self.design
     }
 
-    /// The bounds that the last optimisation was under, for benchmarks and tests that solve the same problem otherwise.
+    /// Returns the bounds of the last optimisation, for benchmarks and tests that solve the same
+    /// problem by other means.
     pub fn bounds(&self) -> Bounds {
         self.sets.bounds()
     }
 
-    /// One optimisation at `time` from the measured state (Θ, x_ω): leaves the plan and the report in `memory`.
+    /// Runs one optimisation at `time` from the measured state (Θ, x_ω). The plan and the report
+    /// are left in `memory`.
     fn optimise(&mut self, memory: &mut Memory, time: f64, measured: Vector6<f64>, reference: ReferenceAt) {
         let clock = Instant::now();
         self.optimiser.begin();
-        // Without guarantee the command makes up for it instead.
+        // Without guarantee the command compensates for the disturbance instead.
         let shift = if memory.assured() { memory.observed.shift(&self.settings) } else { Vector3::zeros() };
         self.preview(time, reference, shift);
         let first = !memory.started;
@@ -228,8 +240,9 @@ impl Crmpc {
         memory.report.record(&report, self.optimiser.is_exhausted(), clock);
     }
 
-    /// Whether the vehicle is further from the plan than the assumptions explain, so that it is of no use any more: it ends the guarantee, and bounds about
-    /// it lead astray. Where the design does not hold anyway, the plan still serves as a guess.
+    /// Returns whether the vehicle is further from the plan than the assumptions explain. The plan
+    /// is then useless: the guarantee ends, and bounds about the plan would be misleading. If the
+    /// design does not hold anyway, the plan still serves as a guess, and the result is `false`.
     fn is_left_behind(&mut self, memory: &mut Memory, measured: &Vector6<f64>) -> bool {
         let (angles, rates) = split(&(measured - memory.plan.states[0]));
         let gain = self.settings.feedback;
@@ -242,7 +255,7 @@ impl Crmpc {
         left
     }
 
-    /// The optimum within the paper's sets, or the shifted previous plan (31).
+    /// Plans by the optimum within the paper's sets, or by the shifted previous plan (31).
     fn plan_as_printed(&mut self, memory: &mut Memory, measured: &Vector6<f64>, first: bool) -> mpc::Report {
         let start = match self.settings.initial_state {
             InitialState::Nominal if !first => memory.plan.states[0],
@@ -259,9 +272,11 @@ impl Crmpc {
         self.keep(memory, &start, (Status::Fallback, report.iterations))
     }
 
-    /// A plan that keeps the conditions of the theorem (docs/guarantee.md): the optimum from the measured state, or from where the previous plan put the
-    /// nominal motion, or else the previous plan as it is, which keeps them if it did before and the vehicle is no further from it than the
-    /// assumptions explain. Without any, what violates the limits least.
+    /// Finds a plan that satisfies the conditions of the theorem (docs/guarantee.md). The first
+    /// choice is the optimum from the measured state, the second the optimum from the state that
+    /// the previous plan predicted. The last is the previous plan itself, which satisfies the
+    /// conditions if it did before and the vehicle is no further from it than the assumptions
+    /// explain. Without such a plan the limits are violated as little as possible.
     fn plan_robustly(&mut self, memory: &mut Memory, measured: &Vector6<f64>, anew: bool) -> mpc::Report {
         let assured = memory.assured();
         if !self.credible(memory) {
@@ -279,7 +294,8 @@ impl Crmpc {
             let (report, certified) = self.certified(memory, &start, anew);
             iterations += report.iterations;
             let solved = report.status != Status::Fallback;
-            // Linearised constraints are there for comparison: their optimum is taken without guarantee.
+            // Linearised constraints serve for comparison, so their optimum is accepted without
+            // guarantee.
             let taken = !assured || self.settings.solver.nonlinearity == Nonlinearity::Frozen;
             if certified.is_some() || solved && taken {
                 self.follow_optimum(memory, &start);
@@ -311,8 +327,8 @@ impl Crmpc {
         }
     }
 
-    /// Moves the certified plan as far towards the optimum without constraints as is certified, so that a plan that is kept again and again still leads to
-    /// the reference.
+    /// Moves the certified plan towards the optimum without constraints as far as that is
+    /// certified, so that a plan that is kept repeatedly still leads to the reference.
     fn go_towards_the_optimum(&mut self, memory: &mut Memory) {
         self.sets.begin(memory.age as usize, 1.0);
         memory.plan.errors(&self.sets.references, &mut self.previous);
@@ -328,7 +344,8 @@ impl Crmpc {
         }
     }
 
-    /// The optimum from `start`, with its margins if it keeps the conditions of the theorem.
+    /// Returns the optimum from `start`, with its certificate if it satisfies the conditions of the
+    /// theorem.
     fn certified(
         &mut self,
         memory: &Memory,
@@ -342,7 +359,8 @@ impl Crmpc {
         (report, self.sets.certify(self.optimiser.motion(), report.settled))
     }
 
-    /// The optimum with less of the tightening, or the terminal law from the measured state, with as much of its moment as there is.
+    /// Plans by the optimum with less tightening, or by the terminal law from the measured state
+    /// within the available moment.
     fn violate_least(&mut self, memory: &mut Memory, measured: &Vector6<f64>, tried: u32) -> mpc::Report {
         memory.standing = self.without_guarantee(memory);
         memory.age = 0;
@@ -366,12 +384,12 @@ impl Crmpc {
         report
     }
 
-    /// Whether the disturbance that is observed is one that the assumptions explain.
+    /// Returns whether the assumptions explain the observed disturbance.
     fn credible(&self, memory: &Memory) -> bool {
         memory.observed.disturbance.amax() <= self.design.tightening.observable
     }
 
-    /// What is said of a plan that is not certified.
+    /// Returns the reason why a plan is not certified.
     fn without_guarantee(&self, memory: &Memory) -> Standing {
         if self.design.counted < 1.0 {
             Standing::Refused
@@ -382,7 +400,8 @@ impl Crmpc {
         }
     }
 
-    /// The optimum from `start` with the bounds about the previous plan; without one (`first`) about itself.
+    /// Returns the optimum from `start` with the bounds about the previous plan, or about itself if
+    /// there is none (`first`).
     fn solve(&mut self, memory: &Memory, start: &Vector6<f64>, first: bool) -> mpc::Report {
         let error = error(start, &self.sets.references[0]);
         let previous = (!first).then(|| {
@@ -392,7 +411,7 @@ impl Crmpc {
         self.optimiser.optimise(&mut self.sets, &error, &self.affine, previous)
     }
 
-    /// Takes the optimum over as the plan.
+    /// Makes the optimum the plan in force.
     fn follow_optimum(&mut self, memory: &mut Memory, start: &Vector6<f64>) {
         let start = (self.settings.initial_state != InitialState::Tube).then_some(*start);
         let motion = self.optimiser.motion();
@@ -401,7 +420,7 @@ impl Crmpc {
         memory.plan.multipliers.extend(self.optimiser.multipliers());
     }
 
-    /// Keeps the plan that there is, and reports on it.
+    /// Keeps the present plan and returns a report on it.
     fn keep(&mut self, memory: &Memory, start: &Vector6<f64>, ended: (Status, u32)) -> mpc::Report {
         let error = error(start, &self.sets.references[0]);
         memory.plan.errors(&self.sets.references, &mut self.previous);
@@ -409,7 +428,8 @@ impl Crmpc {
         optimiser.fall_back(sets, &error, affine, previous, ended)
     }
 
-    /// References at the prediction times, their angles shifted, and d_k = A x_r,k + B Θ̈_r,k − x_r,k+1.
+    /// Computes the references at the prediction times, with shifted angles, and d_k = A x_r,k + B
+    /// Θ̈_r,k − x_r,k+1.
     fn preview(&mut self, time: f64, reference: ReferenceAt, shift: Vector3<f64>) {
         let h = self.settings.period_optimisation;
         for (k, slot) in self.sets.references.iter_mut().enumerate() {
@@ -422,7 +442,8 @@ impl Crmpc {
         }
     }
 
-    /// (31): drops the first interval and appends one under the terminal law (14), a = K̃ E + Θ̈_r; with the robust set one that brakes.
+    /// Shifts the plan as in (31): drops the first interval and appends one under the terminal law
+    /// (14), a = K̃ E + Θ̈_r. With the robust set the appended interval brakes.
     fn shift(&self, plan: &mut Plan) {
         let n = self.settings.horizon;
         let last = *plan.states.last().unwrap_or(&Vector6::zeros());
@@ -441,7 +462,8 @@ impl Crmpc {
         plan.states[n] = plan::advance(&last, &a, self.settings.period_optimisation);
     }
 
-    /// The acceleration under the terminal law (14): ũ^f = −f + K̃ Ẽ + Θ̈_r, hence a = K̃ Ẽ + Θ̈_r.
+    /// Returns the acceleration under the terminal law (14): ũ^f = −f + K̃ Ẽ + Θ̈_r, hence
+    /// a = K̃ Ẽ + Θ̈_r.
     fn terminal_acceleration(&self, state: &Vector6<f64>, reference: &Reference) -> Vector3<f64> {
         let gain = self.settings.terminal;
         let angles = state.fixed_rows::<3>(0) - reference.angles;
@@ -449,7 +471,8 @@ impl Crmpc {
         angles * gain.k1 + rates * gain.k2 + reference.accelerations
     }
 
-    /// The same where the limits are near: the rates that it steers to, Θ̇_r − (k̃₁/k̃₂) E_θ, are limited, and so is the moment.
+    /// Returns the acceleration under the terminal law with limited rates and moment. The limited
+    /// rates are those to which the law steers, Θ̇_r − (k̃₁/k̃₂) E_θ.
     fn terminal_acceleration_within_limits(
         &self,
         state: &Vector6<f64>,
@@ -467,7 +490,8 @@ impl Crmpc {
         self.within_the_moment(state, (rates - wanted) * gain.k2 + wanted_acceleration)
     }
 
-    /// The largest share of an acceleration whose moment is within the limit, none if even that of no acceleration is not.
+    /// Returns the largest share of `acceleration` whose moment is within the limit. The share is
+    /// zero if even zero acceleration exceeds the limit.
     fn within_the_moment(&self, state: &Vector6<f64>, acceleration: Vector3<f64>) -> Vector3<f64> {
         let (angles, rates) = split(state);
         let Settings { body, limit_moment, .. } = &self.settings;
@@ -475,7 +499,7 @@ impl Crmpc {
         if motion.moment(&acceleration).norm() <= *limit_moment {
             return acceleration;
         }
-        // ‖m‖² is a parabola in the share: its larger root.
+        // ‖m‖² is a parabola in the share; its larger root is the result.
         let (slope, rest) = (motion.moment_by_acceleration * acceleration, motion.moment_at_rest);
         let (square, mixed) = (slope.norm_squared(), slope.dot(&rest));
         let discriminant = mixed * mixed - square * (rest.norm_squared() - limit_moment * limit_moment);
@@ -531,12 +555,13 @@ impl Controller for Crmpc {
         let a = memory.plan.accelerations[0];
         memory.nominal =
             plan::advance(&memory.plan.states[0], &a, within as f64 * self.settings.period_feedback);
-        // (20): with ũ* = a − f(x̃*), u = K O_e − f(x) + a, and m = I R⁻¹ u.
+        // Feedback law (20): with ũ* = a − f(x̃*), u = K O_e − f(x) + a, and m = I R⁻¹ u.
         let (nominal_angles, nominal_rates) = split(&memory.nominal);
         let (off_angles, off_rates) = (measured.angles - nominal_angles, angle_rates - nominal_rates);
         let gain = self.settings.feedback;
         let robust = self.settings.constraints == Constraints::Robust;
-        // Without guarantee the disturbance is made up for at once: no plan keeps moment back for it.
+        // Without guarantee the command compensates for the disturbance at once, because no plan
+        // reserves moment for it.
         let compensates = robust && self.settings.observer.active && !memory.assured();
         let against = if compensates { -memory.observed.disturbance } else { Vector3::zeros() };
         let commanded = a + off_angles * gain.k1 + off_rates * gain.k2 + against;
@@ -558,7 +583,7 @@ impl Controller for Crmpc {
                 memory.standing = Standing::InForce;
             }
         }
-        // Without a solution nothing keeps the moment within its limit.
+        // Without a solution nothing else keeps the moment within its limit.
         let limited = excess > 1.0 && (robust || memory.report.status == Status::Fallback);
         let moment = if limited { moment / excess } else { moment };
         if robust {
@@ -576,7 +601,8 @@ impl Controller for Crmpc {
 }
 
 impl Crmpc {
-    /// The moment that gives the commanded acceleration in the middle of the period over which it is held, so that what f does in between adds up to nothing.
+    /// Returns the moment that gives the commanded acceleration in the middle of the period over
+    /// which it is held, so that the effects of a changing f on the rate cancel over the period.
     fn moment_over_the_period(
         &self,
         angles: &Vector3<f64>,
@@ -588,7 +614,8 @@ impl Crmpc {
         linearise::moment(&self.settings.body, &angles, &(rates + commanded * half), commanded)
     }
 
-    /// Whether the assumptions explain this deviation of the seen state from the nominal one, and this K ô, so many ticks after the optimisation.
+    /// Returns whether the assumptions explain the deviation of the predicted state from the
+    /// nominal state, and this K ô, `tick` ticks after the optimisation.
     fn explains(
         &self,
         tick: u64,
@@ -606,7 +633,7 @@ impl Crmpc {
             && (0..3).all(within)
     }
 
-    /// What ‖ω‖ as it is measured may be, rad/s.
+    /// Returns the largest measured ‖ω‖ that is compatible with the limit, rad/s.
     fn rate_shown(&self) -> f64 {
         let Settings { limit_rate, rate_error, angle_error, .. } = self.settings;
         let of_rates = 3.0_f64.sqrt() * rate_error;
@@ -614,7 +641,7 @@ impl Crmpc {
     }
 }
 
-/// E = x̃ − x_r.
+/// Returns the tracking error E = x̃ − x_r.
 fn error(state: &Vector6<f64>, reference: &Reference) -> State<2> {
     let (angles, rates) = split(state);
     [angles - reference.angles, rates - reference.rates]

@@ -1,24 +1,26 @@
-//! What the rates say of the disturbance.
+//! Observer that estimates the disturbance from the rates.
 
 use super::design::{Constraints, InitialState, Settings};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// The largest estimate over the bound of the disturbance.
+/// Largest size of the estimate, relative to the bound of the disturbance.
 const BEYOND: f64 = 2.0;
 
-/// An estimate of Δ, and what the next one is made from.
+/// Estimate of the disturbance Δ, with the data for the next one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Observed {
-    /// Δ̂, rad/s².
+    /// Estimated disturbance Δ̂, rad/s².
     pub disturbance: Vector3<f64>,
-    /// x_ω at the last tick, and the acceleration commanded there; `None` before the first.
+    /// Rates x_ω at the last tick and the acceleration commanded there; `None` before the first
+    /// tick.
     last: Option<[Vector3<f64>; 2]>,
 }
 
 impl Observed {
-    /// Takes in the rates x_ω at a tick: what they changed by beyond the commanded acceleration is Δ, on average over the period. Filtered by
-    /// a lag of first order, and limited to twice what Δ should be.
+    /// Updates the estimate with the rates x_ω at a tick. Their change beyond the commanded
+    /// acceleration is the mean of Δ over the period. It is filtered by a first-order lag and
+    /// limited to twice the bound of Δ.
     pub(super) fn observe(&mut self, s: &Settings, rates: &Vector3<f64>) {
         if s.constraints != Constraints::Robust {
             return;
@@ -32,13 +34,14 @@ impl Observed {
         }
     }
 
-    /// For the next tick.
+    /// Stores rates and command for the next tick.
     pub(super) fn remember(&mut self, rates: &Vector3<f64>, commanded: &Vector3<f64>) {
         self.last = Some([*rates, *commanded]);
     }
 
-    /// What is added to the angles of the reference: under a constant Δ the vehicle comes to rest away from the nominal motion by Δ over a stiffness, so
-    /// that the nominal motion must come to rest as far on the other side.
+    /// Returns the shift of the reference's angles. Under a constant Δ the vehicle comes to rest
+    /// beside the nominal motion, at a distance of Δ over a stiffness; the nominal motion must
+    /// therefore come to rest at the same distance on the other side.
     pub(super) fn shift(&self, s: &Settings) -> Vector3<f64> {
         if !s.observer.active
             || s.constraints != Constraints::Robust

@@ -1,20 +1,21 @@
-//! A nominal motion over the horizon.
+//! The plan: a nominal motion over the horizon.
 
 use crate::mpc::Motion;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use vehicle::reference::Reference;
 
-/// States x̃_0 … x̃_N and the accelerations a_0 … a_{N−1} held between them.
+/// Nominal motion: states x̃_0 … x̃_N and the accelerations a_0 … a_{N−1} held between them.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// (Θ̃, x̃_ω), N + 1 of them.
+    /// Nominal states (Θ̃, x̃_ω), N + 1 of them.
     pub states: Vec<Vector6<f64>>,
-    /// a = ẋ̃_ω, N of them, rad/s².
+    /// Nominal accelerations a = ẋ̃_ω, N of them, rad/s².
     pub accelerations: Vec<Vector3<f64>>,
-    /// Multipliers of the balls on the state at each interval's end and on its input, from which the next optimisation begins.
+    /// Multipliers of the state ball at each interval's end and of the ball on its input, from
+    /// which the next optimisation starts.
     pub multipliers: Vec<[f64; 2]>,
-    /// κ of β̈ = −κ β̇ beyond the horizon, 1/s; with the robust set.
+    /// Braking rate κ of β̈ = −κ β̇ beyond the horizon, 1/s; used with the robust set.
     pub braking: f64,
 }
 
@@ -28,7 +29,7 @@ impl Clone for Plan {
         }
     }
 
-    // Keeps the memory it has.
+    // This keeps the allocated memory.
     fn clone_from(&mut self, source: &Self) {
         self.states.clone_from(&source.states);
         self.accelerations.clone_from(&source.accelerations);
@@ -38,7 +39,7 @@ impl Clone for Plan {
 }
 
 impl Plan {
-    /// A plan of `horizon` intervals at rest at the origin.
+    /// Returns a plan of `horizon` intervals at rest at the origin.
     pub fn new(horizon: usize) -> Self {
         Self {
             states: vec![Vector6::zeros(); horizon + 1],
@@ -54,7 +55,7 @@ impl Plan {
         self.multipliers.resize(horizon, [0.0; 2]);
     }
 
-    /// The errors E = x̃ − x_r and v = a − Θ̈_r.
+    /// Computes the errors E = x̃ − x_r and v = a − Θ̈_r of the plan.
     pub(super) fn errors(&self, references: &[Reference], motion: &mut Motion<2>) {
         for ((error, state), reference) in motion.states.iter_mut().zip(&self.states).zip(references) {
             *error = super::error(state, reference);
@@ -64,7 +65,8 @@ impl Plan {
         }
     }
 
-    /// The motion with these errors, rolled out from `start` (or from its own) so that it is an exact motion of the nominal model.
+    /// Sets the plan from a motion of the errors, rolled out from `start` (or from the motion's own
+    /// first state) so that it is an exact motion of the nominal model.
     pub(super) fn follow(
         &mut self,
         motion: &Motion<2>,
@@ -83,7 +85,7 @@ impl Plan {
     }
 }
 
-/// Exact motion of the double integrator over `h` with `a` held.
+/// Returns the exact motion of the double integrator over `h` with `a` held.
 pub(super) fn advance(state: &Vector6<f64>, a: &Vector3<f64>, h: f64) -> Vector6<f64> {
     let mut next = *state;
     for i in 0..3 {

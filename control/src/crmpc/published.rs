@@ -66,30 +66,30 @@ struct Solver {
     max_iterations: u32,
 }
 
-/// What Chai 2022, section 5.1 prints of its own design.
+/// The constants that Chai 2022, section 5.1 prints for its own design.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
-    /// G per axis: G11, G12, G22.
+    /// Terminal weight G per axis: G11, G12, G22.
     pub g: [f64; 3],
-    /// r̄₀.
+    /// Bound r̄₀ as printed.
     pub r0: f64,
-    /// r̄₁.
+    /// Bound r̄₁ as printed.
     pub r1: f64,
-    /// Ω̄.
+    /// Bound Ω̄ as printed.
     pub omega: f64,
-    /// Ī·Ī′.
+    /// Condition number Ī·Ī′ as printed.
     pub condition: f64,
-    /// c̄.
+    /// Peak c̄ of the step response as printed.
     pub c: f64,
-    /// ε₁.
+    /// Terminal radius ε₁ as printed.
     pub epsilon1: f64,
-    /// ε₂.
+    /// Terminal radius ε₂ as printed.
     pub epsilon2: f64,
 }
 
 fn embedded() -> &'static File {
-    // Cannot fail: every test that uses the published settings reads it.
+    // This cannot fail: every test that uses the published settings reads the file.
     static READ: LazyLock<File> = LazyLock::new(|| {
         toml::from_str(include_str!("../../data/crmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
     });
@@ -97,11 +97,12 @@ fn embedded() -> &'static File {
 }
 
 impl Settings {
-    /// Chai 2022, section 5.1, with its vehicle at the nominal inertia and measured initial state. With the robust set, K is ours.
+    /// Returns the settings of Chai 2022, section 5.1, with its vehicle at the nominal inertia and
+    /// measured initial state. With the robust set, K is ours.
     #[allow(clippy::missing_panics_doc)]
     pub fn new(constraints: Constraints) -> Self {
         let scenario = Scenario::crmpc2022();
-        // Cannot fail: the scenario's own tests read its inertia.
+        // This cannot fail: the scenario's own tests read its inertia.
         let body = scenario.inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
         let File { weights, schedule, gains, bounds, guarantee, solver, .. } = embedded();
         Self {
@@ -142,7 +143,7 @@ impl Settings {
 }
 
 impl Published {
-    /// The printed constants.
+    /// Returns the printed constants.
     pub fn crmpc2022() -> Self {
         embedded().published
     }

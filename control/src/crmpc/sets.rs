@@ -1,4 +1,4 @@
-//! The sets that the optimisation keeps the nominal motion in, as functions of the tracking error.
+//! The constraint sets of the nominal motion as functions of the tracking error.
 
 use super::design::{Constraints, Design, Settings};
 use super::guarantee::{self, Dynamics};
@@ -15,41 +15,45 @@ use std::ops::Range;
 use vehicle::dynamics::RigidBody;
 use vehicle::reference::Reference;
 
-/// The sets with the references of the horizon and the bounds about a motion.
+/// The sets, with the references over the horizon and the bounds about a motion.
 #[derive(Clone, Debug)]
 pub(super) struct Sets {
     kind: Kind,
     body: RigidBody,
-    /// h, s.
+    /// Optimisation period h, s.
     step: f64,
     /// References at the prediction times.
     pub(super) references: Vec<Reference>,
-    /// ε of the paper's terminal ball.
+    /// Radius ε of the paper's terminal ball.
     terminal_radius: Option<f64>,
-    /// Whether the bounds are those about the motion that is evaluated.
+    /// Whether the bounds follow the evaluated motion.
     follow: bool,
 }
 
-/// The bounds that an optimisation was under, for benchmarks and tests that solve the same problem otherwise.
+/// The bounds of an optimisation, for benchmarks and tests that solve the same problem by other
+/// means.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bounds {
-    /// Of stages 0..=N, the first without effect: on ‖ω̃‖ with the robust set, on ‖x̃_ω‖ with the paper's, rad/s.
+    /// Bounds at stages 0..=N, of which the first has no effect: on ‖ω̃‖ with the robust set, on
+    /// ‖x̃_ω‖ with the paper's, rad/s.
     pub rate: Vec<f64>,
-    /// Of intervals 0..N: on ‖m̃‖ (N m) with the robust set, on ‖ũ‖ (rad/s²) with the paper's.
+    /// Bounds in intervals 0..N: on ‖m̃‖ (N m) with the robust set, on ‖ũ‖ (rad/s²) with the
+    /// paper's.
     pub input: Vec<f64>,
-    /// ε of ‖Ẽ_N‖_G ≤ ε, with the paper's set.
+    /// Radius ε of ‖Ẽ_N‖_G ≤ ε; only with the paper's set.
     pub terminal: Option<f64>,
 }
 
 #[derive(Clone, Debug)]
 enum Kind {
-    /// ‖ω‖ and ‖m‖ with stage-wise bounds.
+    /// Stage-wise bounds on ‖ω‖ and ‖m‖.
     Robust(Box<Robust>),
-    /// Constant bounds on ‖x_ω‖ and ‖u‖ of (21), and the ratio of the largest to the smallest moment of inertia.
+    /// Constant bounds on ‖x_ω‖ and ‖u‖ of (21), and the ratio of the largest to the smallest
+    /// moment of inertia.
     Paper { x_tube: f64, u_tube: f64, inertia_ratio: f64 },
 }
 
-/// What the bounds follow from, and the bounds.
+/// The robust set: the data from which its bounds follow, and the bounds.
 #[derive(Clone, Debug)]
 struct Robust {
     settings: Settings,
@@ -57,27 +61,29 @@ struct Robust {
     dynamics: Dynamics,
     /// Feedback ticks since the nominal motion began at the measured state.
     age: usize,
-    /// Share of the tightening that is applied: 1 but for best effort.
+    /// Applied share of the tightening; below 1 only for best effort.
     share: f64,
-    /// On ‖ω̃‖ of each stage, rad/s. Negative where nothing is left.
+    /// Bounds on ‖ω̃‖ of each stage, rad/s; negative where nothing is left of the limit.
     rate: Vec<f64>,
-    /// On ‖m̃‖ of each interval, N m. Negative where nothing is left.
+    /// Bounds on ‖m̃‖ of each interval, N m; negative where nothing is left of the limit.
     moment: Vec<f64>,
-    /// The same for later.
+    /// Second pair of bounds, which stands in for `rate` and `moment` while a motion is checked.
     remembered: (Vec<f64>, Vec<f64>),
 }
 
-/// Relative slack when the paper's constraints are checked, for rounding.
+/// Relative tolerance in the check of the paper's constraints, for rounding.
 const ROUNDING: f64 = 1e-9;
-/// Share of the limits that the robust set's bounds leave, and that the check of a motion takes: an optimum's bounds are those about a motion
-/// nearby.
+/// Share of the limits that the bounds of the robust set leave free, and that the check of a motion
+/// may use. It is needed because the bounds of an optimum are those about a neighbouring motion.
 const RESERVE: f64 = 1e-3;
-/// Share of a limit that stands for an empty set in the optimisation, which needs balls with an inside. No plan within it is certified.
+/// Share of a limit that replaces an empty set in the optimisation, which needs balls with an
+/// interior. No plan within it is certified.
 const EMPTY: f64 = 1e-3;
 
 impl Sets {
     /// # Errors
-    /// Names the set of the paper that is empty, or the gain without real eigenvalues that its constants need.
+    /// Returns an error that names the empty set of the paper, or the gain whose eigenvalues are
+    /// not real as the paper's constants require.
     pub(super) fn new(settings: &Settings, design: &Design) -> Result<Self, DesignError> {
         let n = settings.horizon;
         let (kind, terminal_radius) = match settings.constraints {
@@ -117,7 +123,7 @@ impl Sets {
         })
     }
 
-    /// The bounds in force.
+    /// Returns the bounds in force.
     pub(super) fn bounds(&self) -> Bounds {
         let n = self.references.len() - 1;
         let (rate, input) = match &self.kind {
@@ -127,17 +133,18 @@ impl Sets {
         Bounds { rate, input, terminal: self.terminal_radius }
     }
 
-    /// The robust set for a nominal motion that began at the measured state so many feedback ticks ago, with this share of the tightening.
+    /// Prepares the robust set for a nominal motion that began at the measured state `age` feedback
+    /// ticks ago, with the given share of the tightening.
     pub(super) fn begin(&mut self, age: usize, share: f64) {
         if let Kind::Robust(robust) = &mut self.kind {
             (robust.age, robust.share) = (age, share);
         }
     }
 
-    /// What holds of a plan that is followed; `None` if it does not keep the conditions of the theorem (docs/guarantee.md),
-    /// which are those of the whole tightening.
+    /// Returns the certificate of a plan, or `None` if it does not satisfy the conditions of the
+    /// theorem (docs/guarantee.md), which require the whole tightening.
     ///
-    /// `checked`: [`mpc::Bounded::violated`] has found nothing in it already.
+    /// `checked` says that [`mpc::Bounded::violated`] has already found no violation in it.
     pub(super) fn certify(&mut self, motion: &Motion<2>, checked: bool) -> Option<Certified> {
         if !matches!(&self.kind, Kind::Robust(robust) if robust.design.counted >= 1.0 && robust.share >= 1.0)
         {
@@ -149,7 +156,8 @@ impl Sets {
         let Self { kind: Kind::Robust(robust), body, references, .. } = self else { return None };
         let n = motion.inputs.len();
         let points = |k| Point::at(references, motion, k);
-        // The first state, which no optimisation can change, and the last one, beyond which the motion brakes.
+        // The first state, which no optimisation can change, and the last one, beyond which the
+        // motion brakes, are checked separately.
         let (first, second) = (points(0), points(1));
         let rates = first.motion(body);
         let bound = robust.rate_bound(0, norm_of_columns(&rates.rates_by_angles), &first, &second);
@@ -166,7 +174,7 @@ impl Sets {
         Some(Certified { margins: robust.margins(body, &first, &second), braking })
     }
 
-    /// See [`Margins`]; of the robust set only.
+    /// Returns the [`Margins`] of a motion; they are zero unless the set is the robust one.
     pub(super) fn margins(&mut self, motion: &Motion<2>) -> Margins {
         let Self { kind: Kind::Robust(robust), body, references, .. } = self else {
             return Margins::default();
@@ -174,7 +182,8 @@ impl Sets {
         robust.margins(body, &Point::at(references, motion, 0), &Point::at(references, motion, 1))
     }
 
-    /// The largest deviations that the assumptions explain at `tick` ticks after the present optimisation, none for the paper's set.
+    /// Returns the largest deviations that the assumptions explain `tick` ticks after the present
+    /// optimisation; `None` with the paper's set.
     pub(super) fn explained(&self, tick: usize) -> Option<&guarantee::Deviation> {
         match &self.kind {
             Kind::Robust(robust) => Some(robust.design.tightening.at(robust.age + tick)),
@@ -182,7 +191,7 @@ impl Sets {
         }
     }
 
-    /// (Θ̃, x̃_ω, a) of an error and its input at stage `k`.
+    /// Returns (Θ̃, x̃_ω, a) for an error and its input at stage `k`.
     fn nominal(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> [Vector3<f64>; 3] {
         let Reference { angles, rates, accelerations } = &self.references[k];
         [angles + state[0], rates + state[1], accelerations + input]
@@ -280,12 +289,14 @@ impl Bounded<2> for Sets {
         self.follow || matches!(self.kind, Kind::Paper { .. })
     }
 
-    /// One interval of the whole moment, or input, does not bring the rates down to what the set allows at its end.
+    /// Returns whether the full moment (or input) over one interval cannot bring the rates down to
+    /// the bound at its end.
     fn out_of_reach(&self, start: &State<2>) -> bool {
         let [angles, rates, _] = self.nominal(0, start, &Vector3::zeros());
         let (body, h) = (&self.body, self.step);
         let kinematics = InverseKinematics::at(&angles);
-        // x_ω after an interval without input, and the most that the input adds to it.
+        // These are x_ω after an interval without input, the largest change by the input, and the
+        // bound.
         let (coasting, most, allowed) = match &self.kind {
             Kind::Robust(robust) => {
                 let Settings { limit_rate, limit_moment, .. } = robust.settings;
@@ -293,7 +304,7 @@ impl Bounded<2> for Sets {
                 let secant = 1.0 / angles.y.cos();
                 let most = secant * limit_moment / robust.design.smallest_inertia;
                 let drift = vehicle::kinematics::r(&angles) * (body.inverse * -at_rest);
-                // The sideslip is another one by then.
+                // The sideslip will have changed by then.
                 let beta = angles.y.abs() + h * (rates.norm() + h * (drift.norm() + most));
                 if beta >= std::f64::consts::FRAC_PI_3 {
                     return false;
@@ -312,48 +323,49 @@ impl Bounded<2> for Sets {
     }
 }
 
-/// What holds of a plan that keeps the conditions of the theorem.
+/// Properties of a plan that satisfies the conditions of the theorem.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Certified {
     pub margins: Margins,
-    /// See [`super::Plan::braking`].
+    /// Braking rate beyond the horizon, see [`super::Plan::braking`].
     pub braking: f64,
 }
 
-/// What the first interval of a plan leaves of the limits beyond what is reserved for the deviation from it, as shares of them.
+/// Margins that the first interval of a plan leaves to the limits, beyond the reserve for
+/// deviations from the plan, as shares of the limits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Margins {
-    /// Of the rate limit, at the interval's end.
+    /// Margin to the rate limit at the interval's end.
     pub rate: f64,
-    /// Of the moment limit.
+    /// Margin to the moment limit in the interval.
     pub moment: f64,
 }
 
-/// One stage of a motion.
+/// One stage of a motion, with its kinematics on demand.
 struct Point {
     angles: Vector3<f64>,
-    /// x_ω.
+    /// Derivative of the angles, x_ω.
     rates: Vector3<f64>,
-    /// ‖x_ω‖.
+    /// Norm of the rates, ‖x_ω‖.
     size: f64,
-    /// a; zero at the last stage.
+    /// Acceleration a; zero at the last stage.
     acceleration: Vector3<f64>,
-    /// ‖a‖.
+    /// Norm of the acceleration, ‖a‖.
     pull: f64,
     turned: OnceCell<InverseKinematics>,
 }
 
-/// A stage whose kinematics are known.
+/// A stage with known kinematics, from which neighbouring stages are estimated.
 struct Anchor {
     angles: Vector3<f64>,
-    /// x_ω.
+    /// Derivative of the angles, x_ω.
     rates: Vector3<f64>,
-    /// ‖x_ω‖.
+    /// Norm of the rates, ‖x_ω‖.
     size: f64,
     motion: BodyMotion,
     /// Largest ‖I W δ‖ over the disturbances.
     feedback: f64,
-    /// How fast that grows with the angles at most.
+    /// Upper bound on the growth of `feedback` with the angles.
     feedback_by_angles: f64,
 }
 
@@ -369,7 +381,7 @@ impl Point {
         Self::new(angles + motion.states[k][0], rates + motion.states[k][1], acceleration)
     }
 
-    /// W, computed where it is needed first.
+    /// Returns W, which is computed at its first use.
     fn turned(&self) -> &InverseKinematics {
         self.turned.get_or_init(|| InverseKinematics::at(&self.angles))
     }
@@ -380,7 +392,8 @@ impl Point {
 }
 
 impl Sets {
-    /// Those of the intervals `of` that `motion` violates, from the first to the last; sets the bounds of all others about it.
+    /// Returns the range from the first to the last of the intervals `of` that `motion` violates.
+    /// The bounds of all others are set about the motion.
     fn violated_in(&mut self, motion: &Motion<2>, of: Range<usize>) -> Option<Range<usize>> {
         let mut anchor = None;
         let mut here = Point::at(&self.references, motion, of.start);
@@ -390,7 +403,7 @@ impl Sets {
             here = next;
             violates
         })?;
-        // From the other end, as what is violated in between need not be looked at.
+        // The search runs from the other end, as intervals between two violated ones need no check.
         let mut anchor = None;
         let mut next = Point::at(&self.references, motion, of.end);
         let last = (first + 1..of.end).rev().find(|&k| {
@@ -402,8 +415,8 @@ impl Sets {
         Some(first..last.unwrap_or(first) + 1)
     }
 
-    /// Whether the input of interval `k` or the state at its end violates its constraint, with the bounds about themselves or smaller
-    /// ones. `anchor` is a stage not far away.
+    /// Returns whether the input of interval `k` or the state at its end violates its constraint,
+    /// with the bounds about themselves or smaller ones. `anchor` is a neighbouring stage.
     fn violates(&mut self, k: usize, here: &Point, next: &Point, anchor: &mut Option<Anchor>) -> bool {
         let body = &self.body;
         match &mut self.kind {
@@ -431,26 +444,27 @@ impl Sets {
 }
 
 impl Robust {
-    /// Exchanges the bounds for those that are remembered.
+    /// Exchanges the bounds with the second pair.
     fn exchange(&mut self) {
         let Self { rate, moment, remembered, .. } = self;
         std::mem::swap(rate, &mut remembered.0);
         std::mem::swap(moment, &mut remembered.1);
     }
 
-    /// What the bounds on ‖ω̃‖ and ‖m̃‖ leave of the limits.
+    /// Returns the parts of the rate limit and of the moment limit that the bounds leave free.
     fn reserves(&self) -> (f64, f64) {
         (RESERVE * self.settings.limit_rate, RESERVE * self.settings.limit_moment)
     }
 
-    /// Those on ‖ω̃‖ and ‖m̃‖ at stage `k`, with an inside.
+    /// Returns the bounds on ‖ω̃‖ and ‖m̃‖ at stage `k`, enlarged where the set is empty.
     fn bounds(&self, k: usize) -> (f64, f64) {
         let Settings { limit_rate, limit_moment, .. } = self.settings;
         let moment = self.moment.get(k).map_or(f64::INFINITY, |bound| bound.max(EMPTY * limit_moment));
         (self.rate[k].max(EMPTY * limit_rate), moment)
     }
 
-    /// The same about a motion that is linearised there, with ‖m̃‖ = `after` at the interval's end.
+    /// Returns the bounds on ‖ω̃‖ and ‖m̃‖ about the linearised motion at stage `k`, with
+    /// ‖m̃‖ = `after` at the interval's end.
     fn bounds_about(&self, k: usize, at: &Linearisation, here: &Point, after: f64) -> (f64, f64) {
         let Settings { limit_rate, limit_moment, .. } = self.settings;
         let moment = if k < self.moment.len() {
@@ -461,7 +475,7 @@ impl Robust {
         (self.rate_bound(k, at.rates.by_angles.norm(), here, here).max(EMPTY * limit_rate), moment)
     }
 
-    /// ‖m̃‖ at the end of an interval that begins so, with a held, N m.
+    /// Returns ‖m̃‖ at the end of an interval that begins at `here`, with a held, N m.
     fn moment_after(&self, here: &Point) -> f64 {
         let Settings { body, period_optimisation: h, .. } = &self.settings;
         let Point { angles, rates, acceleration: a, .. } = here;
@@ -481,20 +495,22 @@ impl Robust {
     fn anchor(&self, body: &RigidBody, here: &Point) -> Anchor {
         let motion = here.motion(body);
         let feedback = largest_over_box(&motion.moment_by_acceleration);
-        // ‖∂W/∂α‖² and ‖∂W/∂β‖² are at most 2, and orthogonal to each other.
+        // ‖∂W/∂α‖² and ‖∂W/∂β‖² are at most 2, and the two are orthogonal.
         let feedback_by_angles = self.design.largest_inertia * SQRT_2 * 3.0_f64.sqrt();
         let Point { angles, rates, size, .. } = *here;
         Anchor { angles, rates, size, motion, feedback, feedback_by_angles }
     }
 
-    /// Whether interval `k` keeps its constraints for its size alone, with the bounds that are set.
+    /// Returns whether the estimate by sizes alone shows that interval `k` satisfies the bounds
+    /// that it sets.
     fn keeps_by_size(&mut self, k: usize, here: &Point, next: &Point, anchor: &Anchor) -> bool {
         let (moment, rates) = self.tighten_by_size(k, here, next, anchor);
         moment <= self.moment[k] && rates <= self.rate[k + 1]
     }
 
-    /// Sets bounds that are at most those of [`Self::tighten`], and returns what ‖m̃‖ and ‖ω̃‖ are at most: all is bounded along the ways
-    /// from `anchor` to `here` and on to `next` by the largest size of the derivatives there.
+    /// Sets bounds that are at most those of [`Self::tighten`], and returns upper bounds of ‖m̃‖ and
+    /// ‖ω̃‖. Along the way from `anchor` to `here` and on to `next`, every change is bounded by the
+    /// largest derivatives there.
     fn tighten_by_size(&mut self, k: usize, here: &Point, next: &Point, anchor: &Anchor) -> (f64, f64) {
         let Design { largest_inertia, inertia_ratio, .. } = &self.design;
         let a = &here.acceleration;
@@ -512,14 +528,14 @@ impl Robust {
         (moment, next.size)
     }
 
-    /// [`Self::moment_bound`] about a moment that is linearised there.
+    /// Returns [`Self::moment_bound`] about a linearised moment.
     fn moment_bound_about(&self, k: usize, at: &Linear, here: &Point, after: f64) -> f64 {
         let feedback = largest_over_box(&at.by_acceleration);
         let slopes = (at.by_angles.norm(), at.by_rates.norm());
         self.moment_bound(k, at.value.norm(), after, feedback, slopes, here)
     }
 
-    /// Feedback ticks from the beginning of the nominal motion to prediction step `k`.
+    /// Returns the feedback ticks from the beginning of the nominal motion to prediction step `k`.
     fn tick(&self, k: usize) -> usize {
         self.age + k * self.design.ratio
     }
@@ -528,20 +544,23 @@ impl Robust {
         self.design.tightening.at(self.tick(k))
     }
 
-    /// What ‖ω̃‖ may be at prediction step k so that ‖ω‖ keeps its limit there and in the intervals before and after, whatever the error dynamics do,
-    /// where ∂ω/∂(α, β) has this norm. `before` is the point before.
+    /// Returns the bound on ‖ω̃‖ at prediction step k for which ‖ω‖ keeps its limit there and in the
+    /// intervals before and after, whatever the error dynamics do. `by_angles` is the norm of
+    /// ∂ω/∂(α, β), and `before` is the point before.
     fn rate_bound(&self, k: usize, by_angles: f64, here: &Point, before: &Point) -> f64 {
         let Settings { limit_rate, limit_moment, period_optimisation: h, horizon, .. } = self.settings;
         let reserve = self.reserves().0;
-        // Between two steps ‖ω̃‖ may exceed both by h²/8 times its second derivative. The optimisation knows no point before, so that both accelerations count as one that
-        // is rarely exceeded; the bound is then the same for it and for the check of its result.
+        // Between two steps ‖ω̃‖ may exceed both values by h²/8 times its second derivative. The
+        // optimisation does not know the point before, so both accelerations are replaced by one
+        // that is rarely exceeded. The bound is then the same in the optimisation and in the check
+        // of its result.
         let typical = limit_moment / self.design.largest_inertia;
         let a = here.pull.max(before.pull).max(typical);
         let size = here.size + 2.0 * h * a;
         let curved = 0.125 * h * h * Dynamics::rate_curvature(size, a);
         let loss = self.design.tightening.rate_loss(self.tick(k)).at(by_angles, here.size) + curved;
         let bound = limit_rate - reserve - self.share * loss;
-        // ‖x̃_ω‖ ≤ sec β ‖ω̃‖
+        // This uses ‖x̃_ω‖ ≤ sec β ‖ω̃‖.
         if k == horizon {
             bound.min(self.design.assessment.terminal_rate * here.angles.y.cos() - reserve)
         } else {
@@ -549,9 +568,10 @@ impl Robust {
         }
     }
 
-    /// What ‖m̃‖ may be at the start of prediction interval k so that ‖m‖ keeps its limit at each of its feedback ticks. With a held,
-    /// ‖m̃‖ moves from `value` to `after` within the interval; `feedback` is the largest ‖I R⁻¹ s‖ over the corners s of the shape, and `slopes` are
-    /// ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖.
+    /// Returns the bound on ‖m̃‖ at the start of prediction interval k for which ‖m‖ keeps its limit
+    /// at each of its feedback ticks. With a held, ‖m̃‖ moves from `value` to `after` within the
+    /// interval. `feedback` is the largest ‖I R⁻¹ s‖ over the corners s of the shape, and `slopes`
+    /// are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖.
     fn moment_bound(
         &self,
         k: usize,
@@ -571,7 +591,7 @@ impl Robust {
         limit_moment - self.reserves().1 - self.share * loss - within
     }
 
-    /// Of the first interval.
+    /// Returns the margins of the first interval.
     fn margins(&mut self, body: &RigidBody, first: &Point, second: &Point) -> Margins {
         let (moment, rate) = self.tighten(body, 0, first, second);
         let Settings { limit_rate, limit_moment, .. } = self.settings;
@@ -583,7 +603,7 @@ impl Robust {
     }
 }
 
-/// ‖y‖ ≤ bound in terms of the tracking error and v = a − Θ̈_r.
+/// Expresses ‖y‖ ≤ bound in terms of the tracking error and v = a − Θ̈_r.
 fn ball(y: &Linear, bound: f64) -> Ball<2> {
     let share = 1.0 / bound;
     let mut by_angles = Matrix3::zeros();
@@ -595,12 +615,13 @@ fn ball(y: &Linear, bound: f64) -> Ball<2> {
     }
 }
 
-/// Frobenius norm of the matrix with these columns.
+/// Returns the Frobenius norm of the matrix with these columns.
 fn norm_of_columns(columns: &[Vector3<f64>; 2]) -> f64 {
     (columns[0].norm_squared() + columns[1].norm_squared()).sqrt()
 }
 
-/// max ‖M s‖ over |s_i| ≤ 1: at a corner, where the columns' products count with the product of their signs.
+/// Returns max ‖M s‖ over |s_i| ≤ 1. The maximum is at a corner, where each product of two columns
+/// has the product of their signs.
 fn largest_over_box(m: &Matrix3<f64>) -> f64 {
     let [x, y, z] = std::array::from_fn(|i| m.column(i));
     let (xy, xz, yz) = (x.dot(&y), x.dot(&z), y.dot(&z));
@@ -621,7 +642,7 @@ mod tests {
         Sets::new(&settings, &Design::new(&settings).unwrap()).unwrap()
     }
 
-    /// A wave of (Θ̃, x̃_ω, a) over the horizon: what the check needs of a motion.
+    /// A wave of (Θ̃, x̃_ω, a) over the horizon, which is all that the check needs of a motion.
     fn wave() -> impl Strategy<Value = Motion<2>> {
         let component = || (-1.0..1.0, -1.0..1.0, 0.0..0.3, 0.0..6.3);
         let sizes = ((-2.0..0.0), (-3.0..-0.8), (-3.0..-0.8));
@@ -681,7 +702,7 @@ mod tests {
             count(&violations, found.is_some());
             let expected = expected.map(|(first, last)| first..last + 1);
             prop_assert_eq!(&found, &expected);
-            // Those in between are left as they were.
+            // Bounds of the intervals between violated ones stay unchanged.
             for k in (0..n).filter(|k| !expected.as_ref().is_some_and(|range| range.contains(k))) {
                 prop_assert!(checked.rate[k + 1] <= exact.rate[k + 1] + 1e-12, "{}", k);
                 prop_assert!(checked.input[k] <= exact.input[k] + 1e-6, "{}", k);
@@ -689,7 +710,7 @@ mod tests {
             }
             Ok(())
         });
-        // Both outcomes, and both ways to them.
+        // Both outcomes must occur, and both ways of deciding them.
         let least = |of: &Cell<[usize; 2]>| of.get().into_iter().min().unwrap();
         assert!(least(&violations) > 40 && least(&by_size) > 4000, "{violations:?} {by_size:?}");
     }

@@ -1,9 +1,10 @@
-//! Double-layered MPC (DLMPC), the comparison of Chai et al. (2022), section 5: an outer MPC commands body rates that steer the
-//! attitude, an inner terminal sliding mode follows them. The paper that defines it was not available; the reading is in
-//! docs/DLMPC.md.
+//! Double-layered MPC (DLMPC), the comparison of Chai et al. (2022), section 5. An outer MPC
+//! commands body rates that steer the attitude, and an inner terminal sliding mode follows them.
+//! The paper that defines it was not available; docs/DLMPC.md describes our reading.
 //!
-//! The outer layer predicts Θ⁺ = Θ + h v, where v = R ω is the commanded rate of the angles; the body rates R⁻¹(Θ) v that are
-//! bounded are linearised along the previous prediction, and exact in the present.
+//! The outer layer predicts Θ⁺ = Θ + h v, where v = R ω is the commanded rate of the angles. The
+//! bound is on the body rates R⁻¹(Θ) v, which are linearised along the previous prediction and
+//! exact at present.
 
 mod settings;
 
@@ -24,11 +25,12 @@ use vehicle::reference::Reference;
 /// A motion of the angles over the horizon.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// Θ_0 … Θ_N, rad.
+    /// Angles Θ_0 … Θ_N, rad.
     pub angles: Vec<Vector3<f64>>,
-    /// v_0 … v_{N−1}, held between them, rad/s.
+    /// Commanded rates v_0 … v_{N−1}, each held over one interval, rad/s.
     pub commands: Vec<Vector3<f64>>,
-    /// Multipliers of the constraint, from which the next optimisation begins; the first of each pair is zero, as angles have none.
+    /// Multipliers of the constraint, from which the next optimisation starts. The first of each
+    /// pair is zero, as the angles have no constraint.
     pub multipliers: Vec<[f64; 2]>,
 }
 
@@ -41,7 +43,7 @@ impl Clone for Plan {
         }
     }
 
-    // Keeps the memory it has.
+    // This keeps the allocated memory.
     fn clone_from(&mut self, source: &Self) {
         self.angles.clone_from(&source.angles);
         self.commands.clone_from(&source.commands);
@@ -50,7 +52,7 @@ impl Clone for Plan {
 }
 
 impl Plan {
-    /// A plan of `horizon` intervals at rest at the origin.
+    /// Returns a plan of `horizon` intervals at rest at the origin.
     pub fn new(horizon: usize) -> Self {
         Self {
             angles: vec![Vector3::zeros(); horizon + 1],
@@ -59,7 +61,7 @@ impl Plan {
         }
     }
 
-    /// The errors Θ − Θ_r and v − Θ̇_r.
+    /// Computes the errors Θ − Θ_r and v − Θ̇_r of the plan.
     fn errors(&self, references: &[Reference], motion: &mut Motion<1>) {
         for ((error, angles), reference) in motion.states.iter_mut().zip(&self.angles).zip(references) {
             *error = [angles - reference.angles];
@@ -69,7 +71,8 @@ impl Plan {
         }
     }
 
-    /// The motion with these errors, rolled out from `start` so that it is an exact motion of the model.
+    /// Sets the plan from a motion of the errors, rolled out from `start` so that it is an exact
+    /// motion of the model.
     fn follow(&mut self, motion: &Motion<1>, start: Vector3<f64>, references: &[Reference], h: f64) {
         self.angles[0] = start;
         for (k, (w, reference)) in motion.inputs.iter().zip(references).enumerate() {
@@ -79,22 +82,22 @@ impl Plan {
     }
 }
 
-/// What DLMPC carries from tick to tick.
+/// The state that DLMPC carries from tick to tick.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
-    /// The plan in force; it starts at the last optimisation.
+    /// Plan in force, which starts at the last optimisation.
     pub plan: Plan,
-    /// Whether `plan` holds anything yet.
+    /// Whether `plan` has been filled by an optimisation.
     pub started: bool,
     /// Outcome of the last optimisation.
     pub report: Report,
-    /// ω_c in force, rad/s.
+    /// Commanded body rates ω_c in force, rad/s.
     pub rate_command: Vector3<f64>,
-    /// z of the manifold.
+    /// Integral z of the sliding manifold.
     pub integral: Vector3<f64>,
-    /// s at the last tick, rad/s.
+    /// Sliding variable s at the last tick, rad/s.
     pub sliding: Vector3<f64>,
-    /// Wall-clock time of the last evaluation of the inner law, s. Not reproducible.
+    /// Wall-clock time of the last evaluation of the inner law, s; not reproducible.
     pub inner_time: f64,
 }
 
@@ -103,7 +106,7 @@ impl Clone for Memory {
         Self { plan: self.plan.clone(), ..*self }
     }
 
-    // The derived version would allocate a new plan at every tick.
+    // The derived version would allocate memory for a plan at every tick.
     fn clone_from(&mut self, source: &Self) {
         let Self { plan, started, report, rate_command, integral, sliding, inner_time } = self;
         plan.clone_from(&source.plan);
@@ -116,7 +119,8 @@ impl Clone for Memory {
     }
 }
 
-/// The controller: settings, solvers and scratch space. Everything that matters later is in [`Memory`].
+/// The controller: settings, solvers and scratch memory. All state that later ticks depend on is in
+/// [`Memory`].
 ///
 /// ```
 /// use control::closed_loop::fly;
@@ -133,27 +137,27 @@ impl Clone for Memory {
 /// ```
 pub struct Dlmpc {
     settings: Settings,
-    /// Inner ticks per optimisation.
+    /// Number of inner ticks per optimisation.
     ratio: u64,
-    /// κ of the terminal law v = Θ̇_r − κ (Θ − Θ_r).
+    /// Gains κ of the terminal law v = Θ̇_r − κ (Θ − Θ_r).
     gains: Vector3<f64>,
     rates: RateLimit,
     optimiser: Optimiser<1>,
-    // Scratch of one optimisation.
+    // Scratch memory of one optimisation.
     affine: Vec<State<1>>,
     previous: Motion<1>,
 }
 
-/// ‖R⁻¹(Θ) v‖ within its limit, as a function of the errors from these references.
+/// The limit on ‖R⁻¹(Θ) v‖ as a function of the errors from these references.
 #[derive(Clone, Debug)]
 struct RateLimit {
     limit: f64,
     references: Vec<Reference>,
 }
 
-/// The first optimisation has converged when no angle moves by more than this (rad) between passes.
+/// Largest change of any angle (rad) between passes at which the first optimisation has converged.
 const STANDSTILL: f64 = 1e-7;
-/// Relative slack when the exact constraint is checked, for rounding.
+/// Relative tolerance in the check of the exact constraint, for rounding.
 const CHECK_SLACK: f64 = 1e-9;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
 const ANGLE_SCALE: f64 = 0.1;
@@ -205,10 +209,10 @@ impl Bounded<1> for RateLimit {
 }
 
 impl Dlmpc {
-    /// Checks the settings and sets the solvers up.
+    /// Checks the settings and sets up the solvers.
     ///
     /// # Errors
-    /// Names the setting at fault.
+    /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
         let ratio = settings.ratio()?;
         let Settings { horizon: n, period_optimisation: h, p, q, .. } = settings;
@@ -236,12 +240,13 @@ impl Dlmpc {
         })
     }
 
-    /// Inner ticks per optimisation.
+    /// Returns the number of inner ticks per optimisation.
     pub fn ratio(&self) -> u64 {
         self.ratio
     }
 
-    /// One optimisation at `time` from the measured angles: leaves the plan and the report in `memory`.
+    /// Runs one optimisation at `time` from the measured angles. The plan and the report are left
+    /// in `memory`.
     fn optimise(&mut self, memory: &mut Memory, time: f64, measured: Vector3<f64>, reference: ReferenceAt) {
         let clock = Instant::now();
         self.optimiser.begin();
@@ -273,7 +278,7 @@ impl Dlmpc {
         memory.report.record(&report, self.optimiser.is_exhausted(), clock);
     }
 
-    /// References at the prediction times, and d_k = Θ_r,k + h Θ̇_r,k − Θ_r,k+1.
+    /// Computes the references at the prediction times, and d_k = Θ_r,k + h Θ̇_r,k − Θ_r,k+1.
     fn preview(&mut self, time: f64, reference: ReferenceAt) {
         let h = self.settings.period_optimisation;
         for (k, slot) in self.rates.references.iter_mut().enumerate() {
@@ -284,7 +289,7 @@ impl Dlmpc {
         }
     }
 
-    /// The plan that there is before the first optimisation: the reference.
+    /// Sets the plan before the first optimisation, which is the reference itself.
     fn follow_reference(&self, plan: &mut Plan) {
         plan.angles.clear();
         plan.angles.extend(self.rates.references.iter().map(|reference| reference.angles));
@@ -295,7 +300,8 @@ impl Dlmpc {
             .extend(self.rates.references[..self.settings.horizon].iter().map(|reference| reference.rates));
     }
 
-    /// Drops the first interval and appends one under the terminal law, within the limit.
+    /// Drops the first interval of the plan and appends one under the terminal law, within the
+    /// limit.
     fn shift(&self, plan: &mut Plan) {
         let n = self.settings.horizon;
         let (last, reference) = (plan.angles[n], &self.rates.references[n - 1]);
@@ -308,7 +314,8 @@ impl Dlmpc {
         plan.angles[n] = last + plan.commands[n - 1] * self.settings.period_optimisation;
     }
 
-    /// Follows `plan` from the measured angles with the terminal law's gain, within the limit, and makes that the plan.
+    /// Replaces `plan` by a motion that follows it from the measured angles with the terminal law's
+    /// gain, within the limit.
     fn track(&self, plan: &mut Plan, measured: Vector3<f64>) {
         let mut angles = measured;
         for k in 0..self.settings.horizon {
@@ -320,22 +327,23 @@ impl Dlmpc {
         plan.angles[self.settings.horizon] = angles;
     }
 
-    /// `command` scaled so that ‖R⁻¹(Θ) v‖ keeps its limit.
+    /// Returns `command` scaled so that ‖R⁻¹(Θ) v‖ keeps its limit.
     fn within_limit(&self, angles: &Vector3<f64>, command: Vector3<f64>) -> Vector3<f64> {
         within((kinematics::r_inverse(angles) * command).norm(), self.settings.limit_rate) * command
     }
 
-    /// The inner law at one tick; moves the manifold's integral on.
+    /// Evaluates the inner law at one tick and advances the manifold's integral.
     fn follow_command(&self, memory: &mut Memory, rates: &Vector3<f64>) -> Vector3<f64> {
         let Settings { body, sliding_mode: SlidingMode { q, p, gamma, rho }, .. } = self.settings;
-        // s = e + Γ z, ż = sig^ρ(e); with ω_c held, ω̇_c = 0 between its jumps, and ṡ = −q s − p sig^ρ(s) asks for ω̇ as below.
+        // Manifold s = e + Γ z, ż = sig^ρ(e). With ω_c held, ω̇_c = 0 between its jumps, and ṡ = −q
+        // s − p sig^ρ(s) requires the ω̇ below.
         let e = rates - memory.rate_command;
         let growth = signed_power(&e, rho);
         let s = e + memory.integral * gamma;
         let acceleration = -(growth * gamma + s * q + signed_power(&s, rho) * p);
         let moment = rates.cross(&(body.inertia * rates)) + body.inertia * acceleration;
         let share = within(moment.norm(), self.settings.limit_moment);
-        // No wind-up while the moment is less than asked for.
+        // The integral must not wind up while the moment is smaller than required.
         if share >= 1.0 {
             memory.integral += growth * self.settings.period_feedback;
         }
@@ -379,12 +387,13 @@ impl Controller for Dlmpc {
     }
 }
 
-/// The factor that scales a vector of this norm into `limit`: at most 1. Rounding does not lift the result above it.
+/// Returns the factor, at most 1, that scales a vector of this norm into `limit`. Rounding does not
+/// lift the result above the limit.
 fn within(norm: f64, limit: f64) -> f64 {
     if norm > limit { limit / norm * (1.0 - 8.0 * f64::EPSILON) } else { 1.0 }
 }
 
-/// sig^ρ(x) = |x|^ρ sgn x, by component.
+/// Returns sig^ρ(x) = |x|^ρ sgn x, component by component.
 fn signed_power(x: &Vector3<f64>, rho: f64) -> Vector3<f64> {
     x.map(|x| x.abs().powf(rho).copysign(x))
 }

@@ -1,4 +1,4 @@
-//! Settings of DLMPC, and the published and the tuned ones from `data/dlmpc-2022.toml`.
+//! Settings of DLMPC, with the published and the tuned ones from `data/dlmpc-2022.toml`.
 
 use crate::error::DesignError;
 use crate::mpc::SolverSettings;
@@ -11,38 +11,38 @@ use vehicle::scenario::Scenario;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SlidingMode {
-    /// Linear reaching gain, 1/s.
+    /// Linear reaching gain q, 1/s.
     pub q: f64,
-    /// Reaching gain of the power ρ.
+    /// Reaching gain p of the power ρ.
     pub p: f64,
-    /// Γ, gain of the manifold.
+    /// Gain Γ of the manifold.
     pub gamma: f64,
-    /// ρ, power of the manifold and of the reaching law, between 0 and 1.
+    /// Power ρ of the manifold and of the reaching law, between 0 and 1.
     pub rho: f64,
 }
 
 /// Settings of the controller. Units SI, angles rad.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// The vehicle as the controller believes it to be.
+    /// Model of the vehicle that the controller uses.
     pub body: RigidBody,
     /// Limit on ‖ω‖, rad/s.
     pub limit_rate: f64,
     /// Limit on ‖m‖, N m.
     pub limit_moment: f64,
-    /// Prediction steps of the outer layer.
+    /// Number of prediction steps of the outer layer.
     pub horizon: usize,
     /// Period of the outer layer and its prediction step, s.
     pub period_optimisation: f64,
     /// Period of the inner layer, s.
     pub period_feedback: f64,
-    /// P, diagonal: angles.
+    /// Diagonal of the weight P on the angles.
     pub p: [f64; 3],
-    /// Q, diagonal: rates.
+    /// Diagonal of the weight Q on the rates.
     pub q: [f64; 3],
     /// Gains of the inner layer.
     pub sliding_mode: SlidingMode,
-    /// How the outer optimisation is solved.
+    /// Settings of the solvers of the outer optimisation.
     pub solver: SolverSettings,
 }
 
@@ -80,11 +80,11 @@ struct Solver {
 }
 
 impl Settings {
-    /// Chai 2022, section 5.1, with its vehicle at the nominal inertia.
+    /// Returns the settings of Chai 2022, section 5.1, with its vehicle at the nominal inertia.
     #[allow(clippy::missing_panics_doc)]
     pub fn published() -> Self {
         let scenario = Scenario::crmpc2022();
-        // Cannot fail, as the tests that use it show: the files are embedded.
+        // This cannot fail, as the tests that use it show: the files are embedded.
         let body = scenario.inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
         let File { outer, inner, solver } = embedded();
         Self {
@@ -101,15 +101,15 @@ impl Settings {
         }
     }
 
-    /// The same with the gains that `examples/tune_dlmpc.rs` found.
+    /// Returns the published settings with the gains that `examples/tune_dlmpc.rs` found.
     pub fn tuned() -> Self {
         Self { sliding_mode: embedded().inner.tuned, ..Self::published() }
     }
 
-    /// Inner ticks per optimisation, once all settings are known to work.
+    /// Checks all settings and returns the number of inner ticks per optimisation.
     ///
     /// # Errors
-    /// Names the setting at fault.
+    /// Returns an error that names the setting at fault.
     pub(super) fn ratio(&self) -> Result<u64, DesignError> {
         let SlidingMode { q, p, gamma, rho } = self.sliding_mode;
         let positive = [
@@ -132,7 +132,7 @@ impl Settings {
                 }
             }
         }
-        // s⁺ = (1 − q T) s far from the manifold.
+        // Far from the manifold s⁺ = (1 − q T) s, which must not grow.
         let ranges = [
             ("slidingMode.q", q, 2.0 / self.period_feedback),
             ("slidingMode.p", p, f64::INFINITY),
@@ -154,7 +154,7 @@ impl Settings {
 }
 
 fn embedded() -> &'static File {
-    // Cannot fail: every test that uses the published settings reads it.
+    // This cannot fail: every test that uses the published settings reads the file.
     static READ: LazyLock<File> = LazyLock::new(|| {
         toml::from_str(include_str!("../../data/dlmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
     });

@@ -1,8 +1,10 @@
-//! Calibration of a sensor with three axes that measures a field of constant size: least-squares fit of an ellipsoid.
+//! Calibration of a three-axis sensor that measures a field of constant size: least-squares fit of
+//! an ellipsoid.
 //!
-//! Li, Griffiths: *Least squares ellipsoid specific fitting*, Geometric Modeling and Processing 2004. Readings m = A h + b + noise
-//! of a field h that turns lie on an ellipsoid; from its matrix come W = A⁻¹ and b, so that W (m − b) is the field over its size.
-//! W is the symmetric one: a rotation within A cannot be told from readings alone.
+//! Li, Griffiths: *Least squares ellipsoid specific fitting*, Geometric Modeling and
+//! Processing 2004. The readings m = A h + b + noise of a turning field h lie on an ellipsoid. Its
+//! matrix gives W = A⁻¹ and b, so that W (m − b) is the field divided by its size. W is the
+//! symmetric solution: readings alone cannot reveal a rotation within A.
 
 use nalgebra::{
     Matrix3, Matrix3x4, Matrix4, Matrix6, RowVector4, SMatrix, SVector, Vector3, Vector4, Vector6,
@@ -12,50 +14,51 @@ use serde::{Deserialize, Serialize};
 /// Correction of a sensor: the field is `matrix` (reading − `bias`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Correction {
-    /// W, by the reading's unit.
+    /// Matrix W, per unit of the reading.
     pub matrix: Matrix3<f64>,
-    /// b, in the reading's unit.
+    /// Bias b, in the unit of the reading.
     pub bias: Vector3<f64>,
 }
 
 impl Default for Correction {
-    /// None.
+    /// Returns the correction that changes nothing.
     fn default() -> Self {
         Self { matrix: Matrix3::identity(), bias: Vector3::zeros() }
     }
 }
 
 impl Correction {
-    /// The field behind a reading.
+    /// Returns the field behind a reading.
     pub fn apply(&self, reading: &Vector3<f64>) -> Vector3<f64> {
         self.matrix * (reading - self.bias)
     }
 }
 
-/// A calibration and how good it is.
+/// A calibration with measures of its quality.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// W for a field of size 1, and b.
+    /// Matrix W for a field of size 1, and bias b.
     pub correction: Correction,
     /// Root mean square of ‖W (m − b)‖ − 1, to first order.
     pub residual: f64,
-    /// How badly the readings tell ellipsoids apart: largest over second-smallest eigenvalue of the scatter of W (m − b). The
-    /// smallest belongs to the ellipsoid itself. 16 if all directions are seen alike.
+    /// Condition of the fit, which says how badly the readings distinguish ellipsoids: largest over
+    /// second-smallest eigenvalue of the scatter of W (m − b). The smallest eigenvalue belongs to
+    /// the ellipsoid itself. The condition is 16 if all directions are covered evenly.
     pub condition: f64,
 }
 
-/// Why readings give no calibration.
+/// Reasons why readings give no calibration.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// What fits best is no ellipsoid.
+    /// The best fit is not an ellipsoid.
     #[error("the readings do not lie on an ellipsoid")]
     NoEllipsoid,
-    /// More than one ellipsoid fits.
+    /// More than one ellipsoid fits the readings.
     #[error("the readings do not cover the sphere: condition {0:.0}")]
     Coverage(f64),
 }
 
-/// Largest condition of a fit that is taken.
+/// Largest condition of a fit that is accepted.
 const CONDITION: f64 = 1000.0;
 
 type Row = SVector<f64, 10>;
@@ -63,24 +66,25 @@ type Row = SVector<f64, 10>;
 /// Largest sum of products that is fitted.
 const LARGEST: f64 = 1e30;
 
-/// Sum of d dᵀ over the readings, d = (x², y², z², 2yz, 2xz, 2xy, 2x, 2y, 2z, 1): all that a fit needs, however many they are.
+/// Sum of d dᵀ over the readings, d = (x², y², z², 2yz, 2xz, 2xy, 2x, 2y, 2z, 1). It contains all
+/// data that a fit needs, for any number of readings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scatter {
     sum: SMatrix<f64, 10, 10>,
     count: f64,
-    /// Size of the first reading, by which all are divided.
+    /// Size of the first reading, by which all readings are divided.
     scale: f64,
 }
 
 impl Default for Scatter {
-    /// No readings.
+    /// Returns a scatter without readings.
     fn default() -> Self {
         Self { sum: SMatrix::zeros(), count: 0.0, scale: 1.0 }
     }
 }
 
 impl Scatter {
-    /// Adds a reading.
+    /// Adds a reading to the sums.
     pub fn add(&mut self, reading: &Vector3<f64>) {
         if self.count == 0.0 && reading.norm() > 0.0 {
             self.scale = reading.norm();
@@ -94,12 +98,14 @@ impl Scatter {
         self.count += 1.0;
     }
 
-    /// The ellipsoid with the least sum of squares of its quadric over the readings, subject to 4 J − I² = 1.
+    /// Fits the ellipsoid with the least sum of squares of its quadric over the readings, subject
+    /// to 4 J − I² = 1.
     ///
     /// # Errors
-    /// If the readings do not determine one.
+    /// Returns an error if the readings do not determine an ellipsoid.
     pub fn fit(&self) -> Result<Fit, FitError> {
-        // Readings are near 1; eigenvalues of what is far from that, or not finite, cannot be found.
+        // Readings are near 1; the eigenvalues of matrices far from that, or not finite, cannot be
+        // computed.
         if !(self.sum.amax() < LARGEST && self.count.is_finite()) {
             return Err(FitError::NoEllipsoid);
         }
@@ -121,7 +127,7 @@ impl Scatter {
         let roots = Matrix3::from_diagonal(&squared.eigenvalues.map(f64::sqrt));
         let matrix = squared.eigenvectors * roots * squared.eigenvectors.transpose();
 
-        // Of u = W (m − b): uᵀu − 1 is the quadric over `size`.
+        // For u = W (m − b), uᵀu − 1 is the quadric divided by `size`.
         let residual = v.dot(&(s * v)).max(0.0).sqrt() / (2.0 * size.abs());
         let seen = seen_from(&matrix, &bias, &s);
         if !seen.iter().all(|value| value.is_finite()) {
@@ -142,7 +148,8 @@ impl Scatter {
 const PRODUCTS: [(usize, usize); 10] =
     [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (0, 3), (1, 3), (2, 3), (3, 3)];
 
-/// The v with least vᵀ S v and 4 J − I² = 1, up to its size. Li, Griffiths 2004, (11)–(15).
+/// Returns the v with the least vᵀ S v and 4 J − I² = 1, up to its size. Li, Griffiths 2004,
+/// (11)–(15).
 fn quadric(s: &SMatrix<f64, 10, 10>) -> Option<Row> {
     let s11: Matrix6<f64> = s.fixed_view::<6, 6>(0, 0).into();
     let s12: SMatrix<f64, 6, 4> = s.fixed_view::<6, 4>(0, 6).into();
@@ -154,8 +161,9 @@ fn quadric(s: &SMatrix<f64, 10, 10>) -> Option<Row> {
         c[(i, j)] = 1.0;
         c[(j, i)] = 1.0;
     }
-    // reduced v1 = λ C v1: C has one positive eigenvalue, and so has the pencil. Without noise its λ is 0 but for rounding:
-    // with a trace of the unit matrix added it is positive, and 1/λ the largest eigenvalue of L⁻¹ C L⁻ᵀ.
+    // The pencil is reduced v1 = λ C v1. C has one positive eigenvalue, and so has the pencil.
+    // Without noise its λ is 0 except for rounding; with a multiple of the unit matrix added it is
+    // positive, and 1/λ is the largest eigenvalue of L⁻¹ C L⁻ᵀ.
     let reduced = (reduced + reduced.transpose()) / 2.0;
     let l = (reduced + Matrix6::identity() * (1e-13 * reduced.trace())).cholesky()?.l();
     let half = l.solve_lower_triangular(&c)?;
@@ -171,7 +179,7 @@ fn quadric(s: &SMatrix<f64, 10, 10>) -> Option<Row> {
     Some(Row::from_fn(|i, _| if i < 6 { v1[i] } else { v2[i - 6] }))
 }
 
-/// The scatter of W (m − b) from that of m.
+/// Returns the scatter of W (m − b) from that of m.
 fn seen_from(matrix: &Matrix3<f64>, bias: &Vector3<f64>, s: &SMatrix<f64, 10, 10>) -> SMatrix<f64, 10, 10> {
     let mut affine = Matrix3x4::zeros();
     affine.fixed_view_mut::<3, 3>(0, 0).copy_from(matrix);
@@ -199,7 +207,7 @@ fn seen_from(matrix: &Matrix3<f64>, bias: &Vector3<f64>, s: &SMatrix<f64, 10, 10
 mod tests {
     use super::*;
 
-    /// Uniform in [0, 1): the golden-section sequence of this number.
+    /// Golden-section sequence, which is uniform in [0, 1).
     fn spread(k: u32, step: f64) -> f64 {
         (f64::from(k) * step).fract()
     }
@@ -212,7 +220,7 @@ mod tests {
         Vector3::new(radius * cosine, radius * sine, z)
     }
 
-    /// Close to normal with variance 1: the sum of twelve hashed numbers.
+    /// Nearly normal noise with variance 1: the sum of twelve hashed numbers.
     fn noise(k: u32) -> Vector3<f64> {
         let hashed = |i: u32| {
             let mixed = u64::from(i).wrapping_mul(0x9e37_79b9_7f4a_7c15);

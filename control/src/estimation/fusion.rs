@@ -1,6 +1,8 @@
-//! Nine-axis fusion: Mahony's complementary filter, of the crate `ahrs`; state and bias are kept here.
+//! Nine-axis fusion by Mahony's complementary filter of the crate `ahrs`. State and bias are kept
+//! here.
 //!
-//! The crate takes the specific force for the direction up and an Earth frame with x to magnetic north and z up.
+//! The crate interprets the specific force as the upward direction, in an Earth frame with x to
+//! magnetic north and z up.
 
 use ahrs::{Ahrs, Mahony};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -9,37 +11,39 @@ use serde::{Deserialize, Serialize};
 /// Gains of the filter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gains {
-    /// Proportional, 1/s: the error of attitude falls with this rate.
+    /// Proportional gain, 1/s: the attitude error decays with this rate.
     pub proportional: f64,
-    /// Integral, 1/s²: the gyroscope's bias is learned with it.
+    /// Integral gain, 1/s², by which the gyroscope's bias is learned.
     pub integral: f64,
 }
 
-/// What the filter keeps between samples.
+/// The state that the filter keeps between samples.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fusion {
-    /// Body to north-west-up.
+    /// Rotation from body axes to north, west, up.
     attitude: UnitQuaternion<f64>,
-    /// Of the gyroscope, rad/s.
+    /// Bias of the gyroscope, rad/s.
     bias: Vector3<f64>,
-    /// Samples that the attitude is a mean of, as long as they are few.
+    /// Number of samples of which the attitude is a mean, as long as they are few.
     count: f64,
 }
 
-/// North-west-up and north-east-down, either from the other.
+/// Returns the matrix that converts north, west, up into north, east, down, and vice versa.
 fn flip() -> Matrix3<f64> {
     Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))
 }
 
-/// The part of the magnetic field that is perpendicular to the specific force. With it the heading is corrected as fast as the
-/// tilt, and the magnetometer cannot tilt the attitude. `None` without a force.
+/// Returns the part of the magnetic field that is perpendicular to the specific force; `None`
+/// without a force. With this part alone the heading is corrected as fast as the tilt, and the
+/// magnetometer cannot tilt the attitude.
 fn horizontal(force: &Vector3<f64>, field: &Vector3<f64>) -> Option<Vector3<f64>> {
     let up = force.try_normalize(0.0)?;
     Some(field - up * up.dot(field))
 }
 
-/// Body axes from north, east, down, out of specific force and magnetic field; `None` if they are zero or parallel. The triad of
-/// Black, *A passive system for determining the attitude of a satellite*, AIAA Journal 2 (1964).
+/// Returns the rotation to body axes from north, east, down, computed from specific force and
+/// magnetic field; `None` if these are zero or parallel. This is the triad of Black, *A passive
+/// system for determining the attitude of a satellite*, AIAA Journal 2 (1964).
 pub fn triad(force: &Vector3<f64>, field: &Vector3<f64>) -> Option<Rotation3<f64>> {
     let north = horizontal(force, field)?.try_normalize(1e-9 * field.norm())?;
     let down = -force.normalize();
@@ -47,31 +51,33 @@ pub fn triad(force: &Vector3<f64>, field: &Vector3<f64>) -> Option<Rotation3<f64
 }
 
 impl Fusion {
-    /// At an attitude (body axes from magnetic north, east, down) that stands for `count` samples.
+    /// Returns the filter at an attitude (body axes from magnetic north, east, down) that counts as
+    /// the mean of `count` samples.
     pub fn new(attitude: &Rotation3<f64>, count: f64) -> Self {
         let to_up = Rotation3::from_matrix_unchecked(flip() * attitude.matrix().transpose());
         Self { attitude: UnitQuaternion::from_rotation_matrix(&to_up), bias: Vector3::zeros(), count }
     }
 
-    /// Body axes from magnetic north, east, down.
+    /// Returns the rotation to body axes from magnetic north, east, down.
     pub fn attitude(&self) -> Rotation3<f64> {
         let from_up = self.attitude.to_rotation_matrix().transpose();
         Rotation3::from_matrix_unchecked(from_up.matrix() * flip())
     }
 
-    /// The gyroscope's bias that was learned, rad/s.
+    /// Returns the learned bias of the gyroscope, rad/s.
     pub fn bias(&self) -> Vector3<f64> {
         self.bias
     }
 
-    /// The same attitude with another bias (rad/s).
+    /// Returns the filter with another bias (rad/s).
     #[must_use]
     pub fn with_bias(self, bias: Vector3<f64>) -> Self {
         Self { bias, ..self }
     }
 
-    /// One sample of angular rate (rad/s), held over `elapsed` (s), with specific force and magnetic field of any unit if they can
-    /// be used. The first samples count alike, so that the attitude is their mean.
+    /// Processes one sample of angular rate (rad/s), held over `elapsed` (s). Specific force and
+    /// magnetic field, in any unit, are included if they are usable. The first samples have equal
+    /// weights, so that the attitude is their mean.
     pub fn step(
         &mut self,
         gains: &Gains,
@@ -82,7 +88,8 @@ impl Fusion {
         let mean = 1.0 / ((self.count + 1.0) * elapsed);
         let mut filter = Mahony::new(elapsed, mean.max(gains.proportional), 0.0);
         *filter.quat.as_mut_unchecked() = <[f64; 4]>::from(self.attitude.coords).into();
-        // The crate compares with the attitude before the turn: turn first, then correct.
+        // The crate compares with the attitude before the turn, so the turn comes first and the
+        // correction second.
         filter.update_gyro(&<[f64; 3]>::from(rate - self.bias).into());
         let corrected = seen.is_some_and(|(force, field)| {
             let Some(field) = horizontal(force, field) else { return false };

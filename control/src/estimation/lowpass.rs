@@ -1,10 +1,11 @@
-//! Low-pass filter: second-order Butterworth, by the bilinear transform with its cut-off frequency met exactly.
+//! Second-order Butterworth low-pass filter by the bilinear transform, with the cut-off frequency
+//! met exactly.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, SQRT_2};
 
-/// y_k = b₀ u_k + b₁ u_{k−1} + b₂ u_{k−2} − a₁ y_{k−1} − a₂ y_{k−2}.
+/// The filter y_k = b₀ u_k + b₁ u_{k−1} + b₂ u_{k−2} − a₁ y_{k−1} − a₂ y_{k−2}.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LowPass {
     b: [f64; 3],
@@ -12,7 +13,7 @@ pub struct LowPass {
     delay: f64,
 }
 
-/// What the filter of N signals keeps between samples (direct form II transposed).
+/// The state that the filter of N signals keeps between samples (direct form II transposed).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State<const N: usize> {
     first: SVector<f64, N>,
@@ -20,7 +21,8 @@ pub struct State<const N: usize> {
 }
 
 impl LowPass {
-    /// With `cutoff` (Hz), below half the sampling rate, for samples every `period` (s); 0 Hz for no filter.
+    /// Computes the filter with `cutoff` (Hz), below half the sampling rate, for samples every
+    /// `period` (s); 0 Hz gives no filter.
     pub fn new(cutoff: f64, period: f64) -> Self {
         if cutoff == 0.0 {
             return Self { b: [1.0, 0.0, 0.0], a: [0.0; 2], delay: 0.0 };
@@ -32,19 +34,20 @@ impl LowPass {
         Self { b: [b0, 2.0 * b0, b0], a, delay: SQRT_2 * period / (2.0 * c) }
     }
 
-    /// Time (s) by which slow signals come later, phase delay and group delay at 0 Hz: √2 period/(2 tan(π cutoff period)), which
-    /// is √2/(2π cutoff) where the cut-off is far below the sampling rate.
+    /// Returns the delay (s) of slow signals, which is phase delay and group delay at 0 Hz: √2
+    /// period/(2 tan(π cutoff period)). It is √2/(2π cutoff) if the cut-off is far below the
+    /// sampling rate.
     pub fn delay(&self) -> f64 {
         self.delay
     }
 
-    /// The state in which `input` passes unchanged if it stays.
+    /// Returns the state in which a constant `input` passes unchanged.
     pub fn settled<const N: usize>(&self, input: &SVector<f64, N>) -> State<N> {
         let second = input * (self.b[2] - self.a[1]);
         State { first: input * (self.b[1] - self.a[0]) + second, second }
     }
 
-    /// One sample.
+    /// Processes one sample and returns the output.
     pub fn step<const N: usize>(&self, state: &mut State<N>, input: &SVector<f64, N>) -> SVector<f64, N> {
         let output = input * self.b[0] + state.first;
         state.first = input * self.b[1] - output * self.a[0] + state.second;
@@ -60,7 +63,7 @@ mod tests {
 
     const PERIOD: f64 = 0.01;
 
-    /// Size of the output for a sine of size 1, after it has settled.
+    /// Returns the size of the output for a sine of size 1, after it has settled.
     fn gain(filter: &LowPass, frequency: f64) -> f64 {
         let mut state = filter.settled(&Vector1::new(0.0));
         let output = |state: &mut State<1>, k: u32| {

@@ -1,8 +1,10 @@
-//! Attitude from gyroscope, accelerometer and magnetometer, as on the platform of Chai 2022, section 5.1: low-pass filter,
-//! calibration by an ellipsoid, nine-axis fusion. Lost and frozen samples are bridged, delays are predicted away.
+//! Attitude from gyroscope, accelerometer and magnetometer, as on the platform of Chai 2022,
+//! section 5.1: low-pass filter, calibration by an ellipsoid, nine-axis fusion. Lost and frozen
+//! samples are bridged, and delays are compensated by prediction.
 //!
-//! The specific force is taken for that of gravity: the platform turns on the spot. The angles are those towards a velocity
-//! that points north and level; `declination` turns it.
+//! The specific force is interpreted as that of gravity, because the platform turns on the spot.
+//! The angles are those relative to a velocity that points north and level; `declination` rotates
+//! it.
 
 pub mod ellipsoid;
 pub mod fusion;
@@ -21,76 +23,79 @@ use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
 use vehicle::time::tick_tolerance;
 
-/// Where the magnetometer's calibration comes from.
+/// Choice of the source of the magnetometer's calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CalibrationMode {
-    /// The settings.
+    /// The calibration is taken from the settings.
     Given,
-    /// A fit to the readings of the first seconds, while the platform turns.
+    /// The calibration is a fit to the readings of the first seconds, while the platform turns.
     Fit,
 }
 
-/// Where the attitude comes from at the beginning.
+/// Choice of the source of the initial attitude.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Alignment {
-    /// The first samples.
+    /// The first samples give the initial attitude.
     Measured,
-    /// The settings: the platform was put there.
+    /// The settings give the initial attitude, in which the platform was placed.
     Given,
 }
 
-/// Everything the estimator is built from. Units SI, angles rad.
+/// All settings of the estimator. Units are SI, angles in rad.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Time between samples and between ticks, s.
     pub period: f64,
     /// Cut-off frequency of the low-pass filter, Hz; 0 for none.
     pub cutoff: f64,
-    /// Gains of the fusion.
+    /// Gains of the nine-axis fusion.
     pub gains: Gains,
-    /// Whether delays are made up for.
+    /// Whether the estimate is predicted forward over the delays of sensors, line and filter.
     pub prediction: bool,
-    /// By how much the sensors' own filters are late, s.
+    /// Delay of the sensors' own filters, s.
     pub sensor_delay: f64,
-    /// The kinematics whose body rates are wanted.
+    /// Kinematics to which the estimated body rates refer.
     pub kinematics: Kinematics,
     /// Direction of the magnetic field's horizontal part from north, east positive, rad.
     pub declination: f64,
-    /// Where the attitude comes from at the beginning.
+    /// Source of the initial attitude.
     pub alignment: Alignment,
-    /// Θ before the first sample, and at it with [`Alignment::Given`].
+    /// Angles Θ before the first sample, and at it with [`Alignment::Given`].
     pub initial: Vector3<f64>,
     /// Corrections of gyroscope, accelerometer and magnetometer.
     pub corrections: [Correction; 3],
-    /// Where the magnetometer's calibration comes from.
+    /// Source of the magnetometer's calibration.
     pub calibration: CalibrationMode,
-    /// How long readings are collected for a fit, s.
+    /// Time during which readings are collected for a fit, s.
     pub calibration_duration: f64,
-    /// For how long the platform rests at the beginning, so that the gyroscope shows its bias, s.
+    /// Time during which the platform rests at the beginning, so that the gyroscope shows its bias,
+    /// s.
     pub rest_duration: f64,
     /// Time without a usable sample after which the attitude counts as lost, s.
     pub lost_after: f64,
-    /// Equal samples in a row from which a sensor counts as frozen; 0 for never.
+    /// Number of equal samples in a row from which a sensor counts as frozen; 0 for never.
     pub frozen_samples: u32,
-    /// Which readings of gyroscope (rad/s), accelerometer (m/s²) and magnetometer (T) are believed.
+    /// Gates for the readings of gyroscope (rad/s), accelerometer (m/s²) and magnetometer (T).
     pub gates: [Gate; 3],
 }
 
-/// Which readings of a sensor are believed. What a sensor cannot show, and what no motion can bring about, is left out.
+/// Condition for accepting the readings of a sensor. Readings outside the sensor's range, and
+/// changes that no motion can cause, are left out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gate {
-    /// Largest reading along an axis, either way.
+    /// Largest reading along an axis, in either direction.
     pub range: f64,
-    /// Largest change from one sample to the next, as a norm. Readings that lie further away are believed when a second one
-    /// confirms them.
+    /// Largest change from one sample to the next, as a norm. Readings that lie further away are
+    /// accepted when a second one confirms them.
     pub jump: f64,
 }
 
-/// Largest range that can be set: squares and products of readings within it are far from overflow.
+/// Largest range that can be set; squares and products of readings within it are far from overflow.
 pub const LARGEST_RANGE: f64 = 1e9;
 
 impl Gate {
-    /// Rounding of a converter may take a reading at the end of the range beyond it by a part of a step.
+    /// Relative excess over the range that is tolerated, as the rounding of a converter may exceed
+    /// it by part of a step.
     const ROUNDING: f64 = 1e-3;
 
     fn shows(&self, reading: &Vector3<f64>) -> bool {
@@ -102,14 +107,14 @@ impl Gate {
     }
 }
 
-/// What becomes of a sensor's reading.
+/// Verdict on a sensor's reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Verdict {
-    /// It lies near the last one that was believed.
+    /// The reading is near the last one that was accepted.
     Believed,
-    /// It lies near the one before, which was not believed: the two confirm each other.
+    /// The reading is near the one before, which was not accepted: the two confirm each other.
     Confirmed,
-    /// It is left out; the last one that was believed is held in its place.
+    /// The reading is left out; the last accepted one is held in its place.
     Rejected,
 }
 
@@ -130,7 +135,8 @@ struct File {
 }
 
 impl Default for Settings {
-    /// Of `data/estimator.toml`, for the start of Chai 2022 and sensors without errors in the field of the vehicle's data.
+    /// Returns the settings of `data/estimator.toml`, for the start of Chai 2022 and sensors
+    /// without errors in the field of the vehicle's data.
     fn default() -> Self {
         static READ: LazyLock<File> = LazyLock::new(|| embedded(include_str!("../../data/estimator.toml")));
         let file = &*READ;
@@ -159,7 +165,7 @@ impl Default for Settings {
 }
 
 fn embedded<T: for<'a> Deserialize<'a>>(text: &str) -> T {
-    // Cannot fail: tests read every embedded file.
+    // This cannot fail: tests read every embedded file.
     toml::from_str(text).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -178,7 +184,8 @@ struct CorrectionFile {
     bias: Vector3<f64>,
 }
 
-/// Corrections of gyroscope, accelerometer and magnetometer of the MEMS set, from `data/sensor-calibration.toml`.
+/// Returns the corrections of gyroscope, accelerometer and magnetometer of the MEMS set, from
+/// `data/sensor-calibration.toml`.
 pub fn mems_corrections() -> [Correction; 3] {
     static READ: LazyLock<CalibrationFile> =
         LazyLock::new(|| embedded(include_str!("../../data/sensor-calibration.toml")));
@@ -186,82 +193,83 @@ pub fn mems_corrections() -> [Correction; 3] {
         .map(|each| Correction { matrix: Matrix3::from(each.matrix).transpose(), bias: each.bias })
 }
 
-/// What the line shows.
+/// The newest sample on the line from the sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     /// Number of the sample, from 1; 0 before the first. A line without numbers shows 0 throughout.
     pub sample: i32,
-    /// When the sample was taken, s.
+    /// Time at which the sample was taken, s.
     pub time: f64,
-    /// Gyroscope (rad/s), accelerometer (specific force, m/s²), magnetometer (T).
+    /// Readings of gyroscope (rad/s), accelerometer (specific force, m/s²) and magnetometer (T).
     pub readings: [Vector3<f64>; 3],
 }
 
-/// How far the estimate can be trusted.
+/// Health of the estimate: how far it can be trusted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Health {
-    /// Nothing has arrived yet.
+    /// No sample has arrived yet.
     #[default]
     Waiting,
-    /// All is well.
+    /// The estimate is based on a current sample of all sensors.
     Ok,
-    /// A sample is missing: the last rate is held.
+    /// A sample is missing; the last rate is held.
     Bridging,
-    /// A sensor repeats its value: it is left out.
+    /// A sensor repeats its value and is left out.
     Frozen,
     /// Samples have been missing or frozen for too long.
     Lost,
-    /// Readings are collected.
+    /// Readings are being collected for the calibration.
     Calibrating,
-    /// The fit was refused: the given calibration is in use.
+    /// The fit was refused; the given calibration is in use.
     Uncalibrated,
-    /// A reading of the newest sample, or the sample as a whole, cannot be believed: it is left out.
+    /// A reading of the newest sample, or the sample as a whole, was rejected and is left out.
     Rejected,
 }
 
 /// State of the magnetometer's calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CalibrationStatus {
-    /// That of the settings.
+    /// The calibration of the settings is in use.
     #[default]
     Given,
-    /// Readings are collected.
+    /// Readings are being collected for a fit.
     Collecting,
-    /// That of the fit.
+    /// The calibration of the fit is in use.
     Fitted,
-    /// The fit was refused, that of the settings is in use.
+    /// The fit was refused; the calibration of the settings is in use.
     Refused,
 }
 
-/// The calibration of the magnetometer.
+/// The calibration of the magnetometer with its origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// How it came about.
+    /// Origin and state of the calibration.
     pub status: CalibrationStatus,
-    /// In force.
+    /// Correction that is in force.
     pub correction: Correction,
-    /// Of the fit, see [`ellipsoid::Fit`].
+    /// Residual of the fit, see [`ellipsoid::Fit`].
     pub residual: f64,
-    /// Of the fit, see [`ellipsoid::Fit`].
+    /// Condition of the fit, see [`ellipsoid::Fit`].
     pub condition: f64,
 }
 
-/// What is shown at a tick.
+/// The estimate at a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// Θ, rad.
+    /// Estimated angles Θ, rad.
     pub angles: Vector3<f64>,
-    /// ω in the sense of the kinematics that are set, rad/s.
+    /// Estimated body rates ω with the kinematics of the settings, rad/s.
     pub rates: Vector3<f64>,
-    /// How far it can be trusted.
+    /// Health of the estimate: how far it can be trusted.
     pub health: Health,
     /// Time since the newest sample was taken, s.
     pub age: f64,
-    /// Samples that never arrived, so far.
+    /// Number of samples so far that never arrived.
     pub dropped: i32,
-    /// Samples that were left out as a whole or in part, so far.
+    /// Number of samples so far that were left out as a whole or in part.
     pub rejected: i32,
-    /// Bias of the gyroscope: given, of the rest, and learned, rad/s.
+    /// Bias of the gyroscope, rad/s: the sum of the given one, the one found at rest and the
+    /// learned one.
     pub gyroscope_bias: Vector3<f64>,
 }
 
@@ -269,15 +277,15 @@ type Nine = SVector<f64, 9>;
 
 const SENSORS: [&str; 3] = ["gyroscope", "accelerometer", "magnetometer"];
 
-/// Most samples that are put between two that arrived.
+/// Largest number of steps that are interpolated between two samples that arrived.
 const MOST_STEPS: f64 = 1000.0;
 
-/// What is carried from tick to tick.
+/// The state that the estimator carries from tick to tick.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
-    /// What is shown.
+    /// Estimate at the last tick.
     pub estimate: Estimate,
-    /// The magnetometer's calibration.
+    /// Calibration of the magnetometer.
     pub calibration: Calibration,
     scatter: Scatter,
     running: Option<Running>,
@@ -285,41 +293,41 @@ pub struct Memory {
     refused: i32,
 }
 
-/// From the first sample on.
+/// State from the first sample on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Running {
-    /// When the first sample was taken, s.
+    /// Time at which the first sample was taken, s.
     start: f64,
-    /// The last sample, with the readings that were believed last.
+    /// The last sample, with the readings that were last accepted.
     last: Line,
-    /// Its readings as they came.
+    /// Readings of the last sample as they arrived.
     raw: [Vector3<f64>; 3],
-    /// Whether a reading of it was left out.
+    /// Whether a reading of the last sample was left out.
     rejected: bool,
     /// Whether a second sample has confirmed the first.
     confirmed: bool,
-    /// When it was seen, s.
+    /// Time at which the last sample arrived, s.
     arrived: f64,
     filter: lowpass::State<9>,
-    /// Readings behind the filter.
+    /// Readings after the low-pass filter.
     filtered: Nine,
     fusion: Fusion,
     /// Sum and number of the rates at rest.
     rest: (Vector3<f64>, f64),
-    /// Equal readings in a row, of each sensor.
+    /// Number of equal readings in a row, for each sensor.
     equal: [u32; 3],
-    /// When a sample with all sensors alive was taken last, s.
+    /// Time at which the last sample with all sensors alive was taken, s.
     alive: f64,
 }
 
 impl Running {
-    /// Bias that the rest shows, rad/s.
+    /// Returns the bias found at rest, rad/s.
     fn rest_bias(&self) -> Vector3<f64> {
         self.rest.0 / self.rest.1.max(1.0)
     }
 }
 
-/// The estimator.
+/// The attitude estimator: settings and low-pass filter.
 ///
 /// ```
 /// use control::estimation::{Estimator, Health, Line, Settings};
@@ -337,8 +345,8 @@ pub struct Estimator {
     filter: LowPass,
 }
 
-/// Θ from the rotation of body axes from those of the velocity; see [`body_from_velocity`]. The bank angle grows against
-/// the right-hand rule about the velocity.
+/// Returns Θ from the rotation of body axes relative to those of the velocity; see
+/// [`body_from_velocity`]. The bank angle grows against the right-hand rule about the velocity.
 pub fn angles(rotation: &Rotation3<f64>) -> Vector3<f64> {
     let c = rotation.matrix();
     let beta = c[(1, 0)].clamp(-1.0, 1.0).asin();
@@ -346,10 +354,10 @@ pub fn angles(rotation: &Rotation3<f64>) -> Vector3<f64> {
 }
 
 impl Estimator {
-    /// Refuses settings that cannot work.
+    /// Checks the settings and sets up the filter.
     ///
     /// # Errors
-    /// Names the setting at fault.
+    /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
         let s = &settings;
         let positive = [
@@ -392,17 +400,17 @@ impl Estimator {
         Ok(Self { settings, filter: LowPass::new(s.cutoff, s.period) })
     }
 
-    /// Time between ticks, s.
+    /// Returns the time between ticks, s.
     pub fn period(&self) -> f64 {
         self.settings.period
     }
 
-    /// By how much filters make slow signals late, s: the sensors' own and the low-pass filter's.
+    /// Returns the delay of slow signals by the sensors' own filters and by the low-pass filter, s.
     pub fn filter_delay(&self) -> f64 {
         self.settings.sensor_delay + self.filter.delay()
     }
 
-    /// The memory before the first tick.
+    /// Returns the memory before the first tick.
     pub fn memory(&self) -> Memory {
         let status = match self.settings.calibration {
             CalibrationMode::Given => CalibrationStatus::Given,
@@ -419,9 +427,9 @@ impl Estimator {
         }
     }
 
-    /// The tick at `time` (s).
+    /// Evaluates the tick at `time` (s).
     pub fn update(&self, memory: &mut Memory, time: f64, line: &Line) {
-        // Samples that are not counted are taken at the ticks.
+        // Samples without numbers count as taken at the ticks.
         let line = if line.sample == 0 { Line { time, ..*line } } else { *line };
         let arrived = memory.running.map_or(line.readings[1] != Vector3::zeros(), |running| {
             line.sample == 0 || line.sample != running.last.sample
@@ -448,8 +456,8 @@ impl Estimator {
         self.show(memory, time, usable, rejected);
     }
 
-    /// Whether the sample was taken at a time at which it can have been taken; of the first one, whether its readings can be
-    /// believed, as there are no others.
+    /// Returns whether the time stamp of the sample is plausible. The first sample must also have
+    /// plausible readings, as there are no others to compare with.
     fn is_usable(&self, memory: &Memory, time: f64, line: &Line) -> bool {
         let oldest = memory.running.map_or(f64::NEG_INFINITY, |running| running.last.time);
         let taken = line.time <= time + tick_tolerance(time, self.settings.period)
@@ -459,7 +467,7 @@ impl Estimator {
         taken && (memory.running.is_some() || shown())
     }
 
-    /// What becomes of the readings of a sample that follows that of `before`.
+    /// Judges the readings of a sample that follows that of `before`.
     fn judge(&self, before: &Running, line: &Line) -> [Verdict; 3] {
         std::array::from_fn(|i| {
             let (gate, reading) = (&self.settings.gates[i], &line.readings[i]);
@@ -475,25 +483,26 @@ impl Estimator {
         })
     }
 
-    /// Whether readings of this sensor have been the same for too long.
+    /// Returns whether the readings of this sensor have been equal for too long.
     fn is_frozen(&self, running: &Running, sensor: usize) -> bool {
         let limit = self.settings.frozen_samples;
         limit > 0 && running.last.sample != 0 && running.equal[sensor] + 1 >= limit
     }
 
-    /// Angular rate (rad/s) with the bias that only the fusion knows, specific force and field, corrected.
+    /// Returns corrected angular rate (rad/s), specific force and field. The rate still contains
+    /// the bias that only the fusion knows.
     fn corrected(&self, memory: &Memory, filtered: &Nine) -> [Vector3<f64>; 3] {
         let [rate, force, _] = self.settings.corrections;
         let corrections = [rate, force, memory.calibration.correction];
         std::array::from_fn(|i| corrections[i].apply(&filtered.fixed_rows::<3>(3 * i).into()))
     }
 
-    /// Rotation from magnetic north to that of the angles.
+    /// Returns the rotation from magnetic north to the north of the angles.
     fn magnetic_to_north(&self) -> Rotation3<f64> {
         Rotation3::from_axis_angle(&Vector3::z_axis(), -self.settings.declination)
     }
 
-    /// From a sample alone; `None` if it shows no attitude.
+    /// Returns the state after the first sample; `None` if the sample shows no attitude.
     fn begin(&self, memory: &Memory, line: &Line) -> Option<Running> {
         let filtered = stacked(&line.readings);
         let [_, force, field] = self.corrected(memory, &filtered);
@@ -521,15 +530,16 @@ impl Estimator {
         })
     }
 
-    /// With the next sample. What lies between the samples is interpolated; in place of a reading that is not believed the last
-    /// one is held.
+    /// Returns the state after the next sample. Readings between the samples are interpolated; a
+    /// rejected reading is replaced by the last accepted one.
     fn take(&self, memory: &mut Memory, before: &Running, line: &Line) -> Running {
         let s = &self.settings;
         let verdicts = self.judge(before, line);
         let rejected = verdicts.map(|verdict| verdict == Verdict::Rejected);
         let left_out = rejected.contains(&true);
         if !before.confirmed && !left_out && verdicts.contains(&Verdict::Confirmed) {
-            // Two samples agree against the first one, from which all began.
+            // Two samples agree with each other but not with the first one, from which the estimate
+            // began.
             let again = self.begin(memory, line);
             return again.map_or(*before, |again| Running { start: before.start, ..again });
         }
@@ -576,7 +586,7 @@ impl Estimator {
         running
     }
 
-    /// Aligned by these readings, with the biases of before.
+    /// Returns the state aligned by these readings, with the previous biases.
     fn again(&self, memory: &Memory, running: &Running, filtered: Nine) -> Running {
         let [_, force, field] = self.corrected(memory, &filtered);
         let aligned = triad(&force, &field).map(|attitude| Fusion::new(&attitude, 1.0));
@@ -589,7 +599,7 @@ impl Estimator {
         }
     }
 
-    /// Collects a reading for the fit, and fits when it is time.
+    /// Collects a reading for the fit, and computes the fit when the time has come.
     fn calibrate(&self, memory: &mut Memory) {
         let Some(running) = memory.running else { return };
         if memory.calibration.status != CalibrationStatus::Collecting {
@@ -611,7 +621,7 @@ impl Estimator {
         memory.running = Some(self.again(memory, &running, running.filtered));
     }
 
-    /// What is shown at `time` (s).
+    /// Computes the estimate that is shown at `time` (s).
     fn show(&self, memory: &mut Memory, time: f64, arrived: bool, rejected: bool) {
         let Some(running) = memory.running else {
             memory.estimate.health = if rejected { Health::Rejected } else { Health::Waiting };

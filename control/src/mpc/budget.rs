@@ -1,12 +1,14 @@
-//! What an optimisation may take: time, and iterations of all solvers together.
+//! Limits of one optimisation: computing time, and iterations of all solvers together.
 
 use super::optimiser::SolverSettings;
 use std::time::{Duration, Instant};
 
-/// The cone solver is begun only if this many times as long is left as has passed: it sets itself up for longer than one iteration takes.
+/// The cone solver is started only if the remaining time is at least this many times the elapsed
+/// time, because its setup takes longer than one iteration.
 const FOR_THE_CONE: u32 = 4;
 
-/// Iterations for which there must be time: the one that is begun, and about as much for the plan and the report after it.
+/// Number of iterations for which time must remain: the next one, and about as much for the plan
+/// and the report after it.
 const TO_END: u32 = 2;
 
 /// The budget of one optimisation of a controller, which may solve several problems.
@@ -14,18 +16,18 @@ const TO_END: u32 = 2;
 pub struct Budget {
     begin: Instant,
     deadline: Option<Instant>,
-    /// When the last iteration was begun.
+    /// Time at which the last iteration was started.
     last: Instant,
     iterations: u32,
     exhausted: bool,
 }
 
 impl Budget {
-    /// The budget of the settings from now on.
+    /// Starts the budget given by the settings now.
     pub fn begin(settings: &SolverSettings) -> Self {
         let SolverSettings { time_budget, iteration_budget, .. } = *settings;
         let begin = Instant::now();
-        // A budget that no clock can count to is no limit.
+        // A budget too long for the clock to represent is no limit.
         let deadline = Some(time_budget)
             .filter(|&budget| budget > 0.0)
             .and_then(|budget| begin.checked_add(Duration::try_from_secs_f64(budget).ok()?));
@@ -33,13 +35,14 @@ impl Budget {
         Self { begin, deadline, last: begin, iterations, exhausted: false }
     }
 
-    /// No limits.
+    /// Returns a budget without limits.
     pub fn unlimited() -> Self {
         let begin = Instant::now();
         Self { begin, deadline: None, last: begin, iterations: u32::MAX, exhausted: false }
     }
 
-    /// Takes one iteration, unless there is none left, or no time for another one like the last and for what follows it.
+    /// Takes one iteration. Returns `false` if none is left, or if the time is too short for
+    /// another one like the last and for the work that follows it.
     pub fn take(&mut self) -> bool {
         self.exhausted |= self.iterations == 0;
         if let Some(deadline) = self.deadline {
@@ -54,7 +57,8 @@ impl Budget {
         true
     }
 
-    /// Iterations and time for the cone solver, s; nothing if it is not to be begun.
+    /// Returns the iterations and the time (s) left for the cone solver, or `None` if it must not
+    /// be started.
     pub fn of_the_cone(&mut self) -> Option<(u32, f64)> {
         let left = match self.deadline {
             None => f64::INFINITY,
@@ -69,13 +73,14 @@ impl Budget {
         (!self.exhausted).then_some((self.iterations, left))
     }
 
-    /// Takes these iterations; what had to end with the last of them was ended by the budget.
+    /// Subtracts `iterations`. If none or no time is left, the budget counts as the reason that the
+    /// solver ended.
     pub fn spend(&mut self, iterations: u32) {
         self.iterations = self.iterations.saturating_sub(iterations);
         self.exhausted |= self.iterations == 0 || self.is_late();
     }
 
-    /// Whether more was wanted than there was.
+    /// Returns whether the optimisation needed more than the budget allowed.
     pub fn is_exhausted(&self) -> bool {
         self.exhausted
     }

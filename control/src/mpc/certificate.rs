@@ -1,29 +1,32 @@
-//! What shows a motion to be the optimum, evaluated apart from the solvers: they have no part in it but the multipliers.
+//! Proof that a motion is the optimum. It is evaluated independently of the solvers; only the
+//! multipliers come from them.
 
 use super::problem::{Balls, Constraints, Motion, Problem, Solution, Start, State, dot};
 use nalgebra::Vector3;
 
-/// Residuals of the conditions of Karush, Kuhn and Tucker for the problem with its constraints as they are, not as a solver sees them.
-/// All relative: to the largest ∂(½ cost)/∂v, to the bounds and to half the cost.
+/// Residuals of the conditions of Karush, Kuhn and Tucker, with the constraints as functions of the
+/// motion rather than as a solver approximates them. All are relative: to the largest ∂(½ cost)/∂v,
+/// to the bounds and to half the cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Certificate {
-    /// Largest ∂L/∂v.
+    /// Largest slope ∂L/∂v in any input.
     pub stationarity: f64,
     /// Largest excess of a ball, or error of the chain.
     pub feasibility: f64,
-    /// Σ |λ c|, and negative multipliers.
+    /// Complementarity Σ |λ c|, or the largest negative multiplier.
     pub complementarity: f64,
-    /// Cost of the motion.
+    /// Cost of the whole motion.
     pub cost: f64,
 }
 
 impl Certificate {
-    /// The largest of the three.
+    /// Returns the largest of the three residuals.
     pub fn residual(&self) -> f64 {
         self.stationarity.max(self.feasibility).max(self.complementarity)
     }
 
-    /// Of `solution`. If `checked`, intervals without multipliers are known to satisfy their constraints and are not looked at again.
+    /// Evaluates the certificate of `solution`. If `checked`, intervals without multipliers are
+    /// known to satisfy their constraints and are not evaluated again.
     pub fn of<const O: usize, C: Constraints<O>>(
         problem: &Problem<O, C>,
         solution: &Solution<O>,
@@ -41,7 +44,7 @@ impl Certificate {
             negative = negative.max(-multiplier);
         };
 
-        // p of the last stage.
+        // Costate p of the last stage.
         let end = &motion.states[n];
         let mut weight = 1.0;
         let weighted = problem.end.weighted(end);
@@ -55,7 +58,7 @@ impl Certificate {
         for k in (0..=n).rev() {
             let state = &motion.states[k];
             let input = motion.inputs.get(k).copied().unwrap_or_default();
-            // Without multipliers only the norms matter.
+            // A stage without multipliers contributes only its norms.
             let by_input = multipliers.input.get(k).copied().unwrap_or_default();
             let by_state = if k > 0 && state_balls { multipliers.state[k - 1] } else { 0.0 };
             let idle = by_input == 0.0 && by_state == 0.0;
@@ -109,7 +112,7 @@ fn add<const O: usize>(p: &mut State<O>, term: impl Fn(usize) -> Vector3<f64>) {
     }
 }
 
-/// Largest ‖E_{k+1} − (A E_k + B v_k + d_k)‖, relative to the largest ‖E‖.
+/// Returns the largest ‖E_{k+1} − (A E_k + B v_k + d_k)‖, relative to the largest ‖E‖.
 fn chain_error<const O: usize, C>(problem: &Problem<O, C>, motion: &Motion<O>) -> f64 {
     let square = |state: &State<O>| dot(state, state);
     let error = |k: usize| {

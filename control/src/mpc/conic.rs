@@ -1,8 +1,8 @@
-//! The problem with its balls linearised, as a second-order cone program for Clarabel: the judge of [`super::riccati`], and what
-//! takes over where that fails.
+//! The problem with its balls linearised, as a second-order cone program for Clarabel. It serves as
+//! a check of [`super::riccati`] and as a substitute where that method fails.
 //!
-//! Unknowns are the errors E_k, k = 0..=N, scaled; the inputs are eliminated, as the last derivative's error moves by
-//! h v_k = E_{k+1} − E_k − d_k.
+//! The unknowns are the scaled errors E_k, k = 0..=N. The inputs are eliminated, as the error of
+//! the last derivative changes by h v_k = E_{k+1} − E_k − d_k.
 
 use super::problem::{Balls, Cost, Frozen, Outcome, Problem, Solution, Start, of_axis};
 use crate::conic_program::{ConicProgram, Optimum, Triplets};
@@ -10,32 +10,33 @@ use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT, ZeroConeT};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// What does not change between samples.
+/// The parts of the problem that do not change between samples.
 #[derive(Clone, Debug)]
 pub struct Structure<const O: usize> {
-    /// A and B.
+    /// Chain of integrators with its matrices A and B.
     pub chain: super::Chain<O>,
-    /// Weights.
+    /// Weights of the quadratic cost.
     pub cost: Cost<O>,
-    /// Number of intervals.
+    /// Number of intervals of the horizon.
     pub horizon: usize,
-    /// Whether states have a ball of their own.
+    /// Whether the states have balls of their own.
     pub state_balls: bool,
-    /// Whether the last state has to be in the terminal ball.
+    /// Whether the last state must lie in the terminal ball.
     pub terminal: bool,
-    /// Normals of the set that the start is in; `None` if it is given.
+    /// Normals of the set of admissible initial states; `None` if the initial state is given.
     pub start: Option<[Vec<SVector<f64, O>>; 3]>,
-    /// Typical errors, by which the unknowns are scaled.
+    /// Typical sizes of the errors, by which the unknowns are scaled.
     pub scale: [f64; O],
-    /// Iteration limit.
+    /// Largest number of iterations of one solution.
     pub max_iterations: u32,
 }
 
-/// The program with its solver.
+/// The cone program together with its solver.
 pub struct ConicSolver<const O: usize> {
     structure: Structure<O>,
     program: ConicProgram,
-    /// Where each stage's ball coefficients stand in the matrix, and its rows in the right side.
+    /// Positions of each stage's ball coefficients in the matrix, and of its rows in the right
+    /// side.
     state_slots: Vec<Slots<O>>,
     input_slots: Vec<Slots<O>>,
     start_row: usize,
@@ -44,17 +45,18 @@ pub struct ConicSolver<const O: usize> {
 
 struct Slots<const O: usize> {
     row: usize,
-    /// Positions of the block on E_k of the stage the ball belongs to.
+    /// Positions of the block on E_k of the stage to which the ball belongs.
     here: [[[usize; 3]; O]; 3],
     /// Positions of the block on the last derivative of E_{k+1} (input balls).
     next: Option<[[usize; 3]; 3]>,
 }
 
 impl<const O: usize> ConicSolver<O> {
-    /// Sets the program up.
+    /// Sets up the program and its solver.
     ///
     /// # Errors
-    /// The solver's own message if it refuses the data, for example weights that are not positive semidefinite.
+    /// Returns the solver's own message if it refuses the data, for example weights that are not
+    /// positive semidefinite.
     pub fn new(structure: Structure<O>) -> Result<Self, String> {
         let Structure { chain, horizon: n, scale, .. } = &structure;
         let n = *n;
@@ -64,7 +66,7 @@ impl<const O: usize> ConicSolver<O> {
         let mut a = Triplets::default();
         let mut cones: Vec<SupportedConeT<f64>> = Vec::new();
         let mut row = 0;
-        // The chain below its last derivative, with v eliminated, divided by the scale.
+        // The chain below its last derivative with v eliminated, divided by the scale.
         for k in 0..n {
             for i in 0..top {
                 let by_input = chain.b[i] / chain.step;
@@ -92,7 +94,7 @@ impl<const O: usize> ConicSolver<O> {
                 cones.push(ZeroConeT(3 * O));
             }
             Some(normals) => {
-                // ±nᵀ(E_given − E_0) ≤ 1
+                // Faces of the initial set: ±nᵀ(E_given − E_0) ≤ 1.
                 for (axis, normals) in normals.iter().enumerate() {
                     for (normal, sign) in normals.iter().flat_map(|normal| [(normal, 1.0), (normal, -1.0)]) {
                         for i in 0..O {
@@ -119,7 +121,7 @@ impl<const O: usize> ConicSolver<O> {
         let mut state_slots: Vec<Slots<O>> = (1..=stages).map(|k| ball(&mut a, k, false)).collect();
         let mut input_slots: Vec<Slots<O>> = (0..n).map(|k| ball(&mut a, k, true)).collect();
         let terminal_row = structure.terminal.then(|| {
-            // ‖Lᵀ E_N‖ ≤ ε with G = L Lᵀ, divided by the scale.
+            // Terminal ball ‖Lᵀ E_N‖ ≤ ε with G = L Lᵀ, divided by the scale.
             for axis in 0..3 {
                 let root = square_root(&of_axis(&structure.cost.end, axis));
                 for i in 0..O {
@@ -145,7 +147,7 @@ impl<const O: usize> ConicSolver<O> {
             }
         }
         let mut right_side = vec![0.0; row];
-        // A strictly feasible placeholder, so that the solver's setup sees finite data.
+        // Strictly feasible placeholders give the solver finite data for its setup.
         for slots in state_slots.iter().chain(&input_slots) {
             right_side[slots.row] = 1.0;
         }
@@ -154,7 +156,8 @@ impl<const O: usize> ConicSolver<O> {
         Ok(Self { structure, program, state_slots, input_slots, start_row, terminal_row })
     }
 
-    /// The optimum of `problem`, replacing the motion in `solution` if it is found; within so many iterations and so long (s).
+    /// Solves `problem` within the given number of iterations and time (s). The motion in
+    /// `solution` is replaced if the optimum is found.
     pub fn solve(
         &mut self,
         problem: &Problem<O, Frozen<O>>,
@@ -179,7 +182,8 @@ impl<const O: usize> ConicSolver<O> {
             motion.inputs[k] = moved / chain.step;
         }
         motion.roll_out(chain, problem.affine);
-        // The dual of ‖y‖ ≤ 1 is the multiplier of ½(‖y‖² − 1), for the whole cost.
+        // The dual of ‖y‖ ≤ 1 is the multiplier of ½(‖y‖² − 1) for the whole cost; the factor ½
+        // converts it to half the cost.
         multipliers.clear();
         for (multiplier, slots) in multipliers.state.iter_mut().zip(&self.state_slots) {
             *multiplier = 0.5 * duals[slots.row];
@@ -216,7 +220,7 @@ impl<const O: usize> ConicSolver<O> {
         self.program.linear_cost.fill(0.0);
         for (k, d) in problem.affine.iter().enumerate() {
             for axis in 0..3 {
-                // V/h² (E_{k+1} − E_k − d)² of the last derivative
+                // Part V/h² (E_{k+1} − E_k − d)² of the last derivative.
                 let slope = 2.0 * cost.input[axis] / (h * h) * d[top][axis] * scale[top];
                 self.program.linear_cost[3 * (O * k + top) + axis] += slope;
                 self.program.linear_cost[3 * (O * (k + 1) + top) + axis] -= slope;
@@ -285,9 +289,9 @@ fn write_ball<const O: usize>(
     program.right_side[slots.row] = 1.0;
 }
 
-/// Lᵀ with G = L Lᵀ; zero where G is zero.
+/// Returns Lᵀ with G = L Lᵀ; it is zero where G is zero.
 fn square_root<const O: usize>(g: &SMatrix<f64, O, O>) -> SMatrix<f64, O, O> {
-    // nalgebra's Cholesky asks for a dimension that is known to be one.
+    // nalgebra's Cholesky needs a dimension that is known at this point.
     let mut l = SMatrix::<f64, O, O>::zeros();
     for i in 0..O {
         for j in 0..=i {
@@ -304,7 +308,7 @@ fn square_root<const O: usize>(g: &SMatrix<f64, O, O>) -> SMatrix<f64, O, O> {
     l.transpose()
 }
 
-/// ½ xᵀP x with the cost Σ EᵀW E + V/h² (ΔE)² + E_NᵀG E_N, upper triangle, scaled.
+/// Returns P of ½ xᵀP x for the cost Σ EᵀW E + V/h² (ΔE)² + E_NᵀG E_N: upper triangle, scaled.
 fn cost_matrix<const O: usize>(structure: &Structure<O>) -> CscMatrix<f64> {
     let Structure { chain, cost, horizon: n, scale, .. } = structure;
     let (top, h2) = (O - 1, chain.step * chain.step);

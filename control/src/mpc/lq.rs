@@ -1,54 +1,56 @@
-//! The problem without balls: finite-horizon linear-quadratic optimum. Gains and weights depend on the cost alone and are computed
-//! once; what the affine terms do costs one sweep per sample.
+//! Finite-horizon linear-quadratic optimum: the problem without balls. Gains and weights depend on
+//! the cost alone and are computed once; the affine terms cost one sweep per sample.
 
 use super::problem::{Chain, Cost, Motion, PerAxis, State, apply, dot, of_axis, per_axis, zero_state};
 use nalgebra::{SMatrix, SVector, Vector3};
 
-/// The recursion from the end, v = K E − M⁻¹Bᵀ(P⁺d + p⁺).
+/// One stage of the backward recursion, v = K E − M⁻¹Bᵀ(P⁺d + p⁺).
 #[derive(Clone, Copy, Debug)]
 struct Gain<const O: usize> {
-    /// K.
+    /// Feedback gain K of the stage.
     feedback: State<O>,
-    /// M⁻¹Bᵀ.
+    /// Feedforward matrix M⁻¹Bᵀ of the stage.
     feedforward: State<O>,
-    /// (A + B K)ᵀ.
+    /// Transposed closed-loop matrix (A + B K)ᵀ.
     closed_loop_transposed: PerAxis<O>,
-    /// P of the next stage.
+    /// Weight P of the next stage.
     next_weight: PerAxis<O>,
 }
 
-/// The recursion from the start: the cost of getting from E_0 to E_k is (E_k − Ē)ᵀ Π⁻¹ (E_k − Ē) + const, as for a Kalman filter with v
-/// as process noise of variance V⁻¹ and the stage cost as a measurement of E = 0 with information W.
+/// One stage of the forward recursion. The cost of getting from E_0 to E_k is (E_k − Ē)ᵀ Π⁻¹
+/// (E_k − Ē) + const, as for a Kalman filter with v as process noise of variance V⁻¹ and the stage
+/// cost as a measurement of E = 0 with information W.
 #[derive(Clone, Copy, Debug)]
 struct Arrival<const O: usize> {
-    /// Ē⁺ = discount·Ē once the stage's own cost is counted.
+    /// Factor in Ē⁺ = discount·Ē, which includes the stage's own cost.
     discount: PerAxis<O>,
-    /// E_k = Ē_k⁺ + smoother·(E_{k+1} − Ē_{k+1}).
+    /// Gain of the smoother, E_k = Ē_k⁺ + smoother·(E_{k+1} − Ē_{k+1}).
     smoother: PerAxis<O>,
-    /// Π⁻¹ of the next stage.
+    /// Arrival weight Π⁻¹ of the next stage.
     next_weight: PerAxis<O>,
 }
 
-/// The optimum without balls, or with the terminal ball alone; and parts of the horizon to stand for the whole of it.
+/// The optimum without balls, or with the terminal ball alone. It also solves for a part of the
+/// horizon so that the part agrees with the optimum of the whole.
 #[derive(Clone, Debug)]
 pub struct Unconstrained<const O: usize> {
     chain: Chain<O>,
     end: PerAxis<O>,
     gains: Vec<Gain<O>>,
     arrivals: Vec<Arrival<O>>,
-    /// p of each stage's cost-to-go EᵀP E + 2 pᵀE + const.
+    /// Slope p of each stage's cost-to-go EᵀP E + 2 pᵀE + const.
     slopes: Vec<State<O>>,
-    /// Ē of each stage.
+    /// Mean Ē of each stage's arrival cost.
     means: Vec<State<O>>,
 }
 
-/// A per-axis computation on ordinary matrices, for what is done once.
+/// Computes a matrix for each axis with ordinary matrices; used only at construction.
 fn each_axis<const O: usize>(f: impl Fn(usize) -> SMatrix<f64, O, O>) -> PerAxis<O> {
     per_axis(&[f(0), f(1), f(2)])
 }
 
 impl<const O: usize> Unconstrained<O> {
-    /// For `horizon` intervals.
+    /// Computes gains and arrival weights for `horizon` intervals.
     pub fn new(horizon: usize, chain: &Chain<O>, cost: &Cost<O>) -> Self {
         let (a, b) = (chain.a, chain.b);
         let information =
@@ -68,7 +70,7 @@ impl<const O: usize> Unconstrained<O> {
                 let feedback = -(b.transpose() * next * a) / curvature;
                 information(axis) + a.transpose() * next * (a + b * feedback)
             });
-            // P is symmetric but for rounding.
+            // P is symmetric up to rounding; the sum with its transpose removes the error.
             weight = each_axis(|axis| {
                 let full: SMatrix<f64, O, O> = of_axis(&weight, axis);
                 (full + full.transpose()) * 0.5
@@ -94,7 +96,7 @@ impl<const O: usize> Unconstrained<O> {
         let mut spread = zeros;
         let mut arrivals = Vec::with_capacity(horizon);
         for _ in 0..horizon {
-            // (Π⁻¹ + W)⁻¹ Π⁻¹, written so that it also holds for a singular Π.
+            // (Π⁻¹ + W)⁻¹ Π⁻¹, in a form that also holds for a singular Π.
             let discount = each_axis(|axis| {
                 (SMatrix::identity() + of_axis(&spread, axis) * information(axis))
                     .try_inverse()
@@ -105,7 +107,7 @@ impl<const O: usize> Unconstrained<O> {
                 let next = a * counted(axis) * a.transpose() + b * b.transpose() / cost.input[axis];
                 (next + next.transpose()) * 0.5
             });
-            // The first Π that is not zero has rank one, but then the state before is known anyway.
+            // The first nonzero Π has rank one, but then the state before it is known anyway.
             let smoother = each_axis(|axis| {
                 of_axis(&next, axis)
                     .try_inverse()
@@ -126,12 +128,12 @@ impl<const O: usize> Unconstrained<O> {
         }
     }
 
-    /// K of the first stage, negative: v = K E without affine terms.
+    /// Returns K of the first stage, negative: v = K E without affine terms.
     pub fn feedback(&self) -> State<O> {
         self.gains.first().map_or_else(zero_state, |gain| gain.feedback)
     }
 
-    /// The optimum from `start` into `motion`.
+    /// Writes the optimum from `start` into `motion`.
     pub fn solve(&mut self, start: &State<O>, affine: &[State<O>], motion: &mut Motion<O>) {
         for (k, gain) in self.gains.iter().enumerate().rev() {
             let costate = costate(gain, &self.slopes[k + 1], &affine[k]);
@@ -141,7 +143,8 @@ impl<const O: usize> Unconstrained<O> {
         self.follow(0, affine, motion);
     }
 
-    /// The optimum from stage `first` of `motion` on, for the affine terms of the last [`Self::solve`].
+    /// Continues `motion` with the optimum from stage `first` on, for the affine terms of the last
+    /// [`Self::solve`].
     pub fn follow(&self, first: usize, affine: &[State<O>], motion: &mut Motion<O>) {
         for (k, gain) in self.gains.iter().enumerate().skip(first) {
             let state = motion.states[k];
@@ -150,7 +153,8 @@ impl<const O: usize> Unconstrained<O> {
         }
     }
 
-    /// The input of the optimum at `state` of stage `k`, and the state that it leads to, for the affine terms of the last [`Self::solve`].
+    /// Returns the optimal input at `state` of stage `k` and the next state, for the affine terms
+    /// of the last [`Self::solve`].
     pub fn go_on(&self, k: usize, state: &State<O>, affine: &[State<O>]) -> (Vector3<f64>, State<O>) {
         self.advance(&self.gains[k], &self.slopes[k + 1], state, &affine[k])
     }
@@ -172,7 +176,8 @@ impl<const O: usize> Unconstrained<O> {
         (v, std::array::from_fn(|i| next[i] + affine[i]))
     }
 
-    /// Leads stages `first` to `last` of `motion` along `plan` from the state that it has at `first`, with the gains of the optimum.
+    /// Lets stages `first` to `last` of `motion` follow `plan` with the gains of the optimum,
+    /// starting from the state of `motion` at `first`.
     pub fn track(
         &self,
         first: usize,
@@ -192,13 +197,14 @@ impl<const O: usize> Unconstrained<O> {
         }
     }
 
-    /// P and p of the cost of going on from stage `k`, for the affine terms of the last [`Self::solve`].
+    /// Returns P and p of the cost-to-go from stage `k`, for the affine terms of the last
+    /// [`Self::solve`].
     pub fn to_go(&self, k: usize) -> (&PerAxis<O>, State<O>) {
         let weight = if k == self.gains.len() { &self.end } else { &self.gains[k - 1].next_weight };
         (weight, self.slopes[k])
     }
 
-    /// Computes the costs of arriving at each stage from `start`.
+    /// Computes the arrival cost of each stage from `start`.
     pub fn arrive(&mut self, start: &State<O>, affine: &[State<O>]) {
         self.means[0] = *start;
         for (k, Arrival { discount, .. }) in self.arrivals.iter().enumerate() {
@@ -207,13 +213,14 @@ impl<const O: usize> Unconstrained<O> {
         }
     }
 
-    /// Π⁻¹ and Ē at stage `k`, which must be at least `O`, as fewer steps do not reach every E; after [`Self::arrive`].
+    /// Returns Π⁻¹ and Ē at stage `k`, after [`Self::arrive`]. `k` must be at least `O`, as fewer
+    /// steps do not reach every E.
     pub fn arrival(&self, k: usize) -> (&PerAxis<O>, State<O>) {
         (&self.arrivals[k - 1].next_weight, self.means[k])
     }
 
-    /// The optimum from the start of [`Self::arrive`] to the state that `motion` has at stage `k`, exact in the chain: what follows is
-    /// rolled out anew.
+    /// Computes the optimum from the start of [`Self::arrive`] to the state of `motion` at stage
+    /// `k`. The inputs are those that lead the last derivative exactly through the states.
     pub fn trace_back(&self, k: usize, affine: &[State<O>], motion: &mut Motion<O>) {
         for (j, Arrival { discount, smoother, .. }) in self.arrivals[..k].iter().enumerate().rev() {
             let (counted, after) = (apply(discount, &self.means[j]), motion.states[j + 1]);
@@ -227,11 +234,12 @@ impl<const O: usize> Unconstrained<O> {
         }
     }
 
-    /// The optimum from `start` with ‖E_N‖_G = `radius` into `motion`; its multiplier for half the cost. For a start whose
-    /// optimum without balls ends outside; nothing if none is found.
+    /// Writes the optimum from `start` with ‖E_N‖_G = `radius` into `motion` and returns its
+    /// multiplier for half the cost. It applies to a start whose optimum without balls ends
+    /// outside; the result is `None` if no solution is found.
     ///
-    /// The end minimises (E − Ē)ᵀΠ⁻¹(E − Ē) + EᵀG E, so that (Π⁻¹ + (1 + λ)G) E = Π⁻¹Ē, and 1/‖E‖_G is nearly linear in λ: a
-    /// secant finds it in a few steps.
+    /// The end minimises (E − Ē)ᵀΠ⁻¹(E − Ē) + EᵀG E, so that (Π⁻¹ + (1 + λ)G) E = Π⁻¹Ē. As 1/‖E‖_G
+    /// is nearly linear in λ, a secant method finds λ in a few steps.
     pub fn solve_onto_terminal_ball(
         &mut self,
         start: &State<O>,
@@ -278,13 +286,13 @@ impl<const O: usize> Unconstrained<O> {
     }
 }
 
-/// P⁺d + p⁺.
+/// Returns the costate P⁺d + p⁺ behind a stage.
 fn costate<const O: usize>(gain: &Gain<O>, next_slope: &State<O>, d: &State<O>) -> State<O> {
     let moved = apply(&gain.next_weight, d);
     std::array::from_fn(|i| next_slope[i] + moved[i])
 }
 
-/// Limits of the search for λ.
+/// Limits of the secant search for λ.
 const SECANT_STEPS: usize = 30;
 const SECANT_TOLERANCE: f64 = 1e-12;
 
@@ -312,7 +320,7 @@ mod tests {
         std::array::from_fn(|i| Vector3::new(0.1, -0.2, 0.05) / (1.0 + i as f64))
     }
 
-    /// With a jump.
+    /// Affine terms with a jump at stage 13.
     fn affine<const O: usize>() -> Vec<State<O>> {
         let d = |k: usize| if k == 13 { 0.08 } else { 1e-3 * k as f64 };
         (0..N)
@@ -327,7 +335,8 @@ mod tests {
         (lq, motion)
     }
 
-    /// The slope of the cost in every input, by differences of the cost of the motion that the inputs lead to. A quadratic has no error.
+    /// Slope of the cost in every input, by differences of the cost of the resulting motion. They
+    /// are exact for a quadratic.
     fn slopes<const O: usize>(motion: &Motion<O>, terminal: f64) -> DVector<f64> {
         let (chain, affine) = (chain(), affine());
         let mut cost = cost::<O>();
@@ -347,7 +356,7 @@ mod tests {
         still.inputs.fill(Vector3::zeros());
         let largest = slopes(&still, 0.0).amax();
         assert!(slopes(&motion, 0.0).amax() < 1e-11 * largest);
-        // Newton's step from anywhere leads there: the normal equations.
+        // Newton's step from any point leads to the optimum: these are the normal equations.
         let slope = slopes(&still, 0.0);
         let columns: Vec<_> = (0..3 * N)
             .map(|i| {
@@ -372,7 +381,8 @@ mod tests {
         let (mut lq, motion) = optimum::<O>();
         lq.arrive(&start(), &affine());
         for k in [O, O + 1, 7, 13, 14, N] {
-            // The stationary point of arrival cost and cost-to-go lies on the optimal motion, and both ways lead back to it.
+            // The stationary point of arrival cost plus cost-to-go lies on the optimal motion, and
+            // both directions lead back to that motion.
             let ((weight, mean), (to_go, slope)) = (lq.arrival(k), lq.to_go(k));
             for axis in 0..3 {
                 let (weight, to_go): (SMatrix<f64, O, O>, _) = (of_axis(weight, axis), of_axis(to_go, axis));
@@ -386,7 +396,7 @@ mod tests {
             lq.follow(k, &affine(), &mut again);
             assert!(again.distance(&motion) < 1e-10, "stage {k}: {}", again.distance(&motion));
         }
-        // Tracking the optimum from elsewhere is the optimum from there.
+        // Tracking the optimum from another start gives the optimum from that start.
         let elsewhere: State<O> = std::array::from_fn(|i| start::<O>()[i] * 1.5);
         let (mut tracked, mut optimum) = (motion.clone(), motion.clone());
         tracked.states[0] = elsewhere;

@@ -1,8 +1,8 @@
-//! Model predictive control of chains of integrators within balls: one problem ([`problem`]), two solvers ([`riccati`], [`cone`]), the
-//! ways around them ([`optimiser`]), and what shows an optimum to be one ([`certificate`]). Equations and figures are in
-//! docs/solver.md.
+//! Model predictive control of chains of integrators within balls. The problem is in [`problem`],
+//! the two solvers in [`riccati`] and [`conic`], the cheaper ways to the optimum in [`optimiser`],
+//! and the proof of optimality in [`certificate`]. Equations and figures are in docs/solver.md.
 
-// Loops over axes and blocks are written with their indices, as the equations are.
+// Loops over axes and blocks are written with indices, as in the equations.
 #![allow(clippy::needless_range_loop)]
 
 pub mod budget;

@@ -1,4 +1,5 @@
-//! The ways to the optimum, cheapest first. Each is checked against the constraints as they are, so that none loses anything.
+//! The ways to the optimum, cheapest first. The result of each is checked against the constraints
+//! as functions of the motion, so that no way loses accuracy.
 
 use super::budget::Budget;
 use super::certificate::Certificate;
@@ -14,47 +15,48 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Which solver is asked first where the exits do not lead to the optimum.
+/// The solver that is tried first if the exits do not lead to the optimum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Method {
-    /// The interior point method on the Riccati recursion; the cone solver where it fails.
+    /// The interior point method on the Riccati recursion, with the cone solver where it fails.
     #[default]
     Riccati,
-    /// The cone solver.
+    /// The cone solver alone, without the Riccati method.
     Cone,
 }
 
-/// What the Riccati method is given; the cone solver is always given linearised balls.
+/// The form of the balls for the Riccati method; the cone solver always receives linearised balls.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Nonlinearity {
-    /// The balls as functions of the motion.
+    /// The balls are functions of the motion.
     #[default]
     Exact,
-    /// The balls linearised about the previous plan.
+    /// The balls are linearised about the previous plan.
     Frozen,
 }
 
-/// How an optimisation is solved.
+/// Settings that choose and limit the solvers of an optimisation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolverSettings {
-    /// The first solver.
+    /// Solver that is tried first.
     pub method: Method,
-    /// What it is given.
+    /// Form of the balls that it receives.
     pub nonlinearity: Nonlinearity,
-    /// Iteration limit of each solver in each pass.
+    /// Largest number of iterations of each solver in each pass.
     pub max_iterations: u32,
-    /// Whether the exits are tried first.
+    /// Whether the exits, cheaper ways to the optimum, are tried first.
     pub exits: bool,
-    /// Wall-clock time after which no further iteration or solver is begun, s; 0 for none. Runs with one do not repeat.
+    /// Wall-clock time after which no further iteration or solver is started, s; 0 for no limit.
+    /// Runs with a time budget are not reproducible.
     pub time_budget: f64,
-    /// Iterations of all solvers together after which none is begun any more; 0 for no limit.
+    /// Iterations of all solvers together after which no further one is started; 0 for no limit.
     pub iteration_budget: u32,
 }
 
 impl SolverSettings {
-    /// The default, with so many iterations at most.
+    /// Returns the default settings with the given limit on iterations.
     pub fn new(max_iterations: u32) -> Self {
         Self {
             method: Method::default(),
@@ -67,96 +69,102 @@ impl SolverSettings {
     }
 }
 
-/// The constraints of a controller. Their bounds may depend on the motion, and are then those about a motion that was given before.
+/// The constraints of a controller. If their bounds depend on the motion, they are evaluated about
+/// a motion that was given before.
 pub trait Bounded<const O: usize>: Constraints<O> {
-    /// Whether the bounds of [`Constraints::balls`] are from now on those about the motion that is evaluated, rather than those of the last
-    /// [`Self::tighten`], which those of [`Constraints::squares`] stay. Their own derivatives are left out. Nothing to do for bounds that do
-    /// not depend on the motion.
+    /// Selects whether the bounds of [`Constraints::balls`] are those about the evaluated motion
+    /// (without their own derivatives) or those of the last [`Self::tighten`]. The bounds of
+    /// [`Constraints::squares`] always stay those of the last call. Bounds that do not depend on
+    /// the motion need no implementation.
     fn follow(&mut self, _follow: bool) {}
 
-    /// Sets the bounds of the intervals `of` about `motion`: of the state at the end of each, and of its input.
+    /// Sets the bounds of the intervals `of` about `motion`: for the state at the end of each
+    /// interval, and for its input.
     fn tighten(&mut self, motion: &Motion<O>, of: Range<usize>);
 
-    /// The intervals that `motion` violates, from the first to the last; those in `skip` and the terminal ball are not looked at. Sets the
-    /// bounds of the others about `motion`; those between the first and the last violated one may stay as they were.
+    /// Returns the range from the first to the last interval that `motion` violates. The intervals
+    /// in `skip` and the terminal ball are not checked. The bounds of the other intervals are set
+    /// about `motion`; those between the first and the last violated interval may stay unchanged.
     fn violated(&mut self, motion: &Motion<O>, skip: Range<usize>) -> Option<Range<usize>>;
 
-    /// Whether `motion` violates one of the intervals `of` with the bounds about itself. The bounds stay as they are. Nothing to do for bounds that
-    /// do not depend on the motion.
+    /// Returns whether `motion` violates one of the intervals `of` with the bounds about itself.
+    /// The bounds stay unchanged. Bounds that do not depend on the motion need no implementation.
     fn unsettled(&mut self, _motion: &Motion<O>, _of: Range<usize>) -> bool {
         false
     }
 
-    /// Whether the bounds of intervals for which [`Self::tighten`] was not called are those that would be set. So it is where they do not depend on
-    /// the motion, and where they follow the iterates.
+    /// Returns whether intervals without a call of [`Self::tighten`] already have the bounds that
+    /// it would set. This holds if the bounds do not depend on the motion, or if they follow the
+    /// iterates.
     fn is_set_beyond(&self) -> bool {
         true
     }
 
-    /// Whether nothing can keep the constraints from this start on. Nothing is said by `false`.
+    /// Returns whether no motion from this start can satisfy the constraints. `false` leaves the
+    /// question open.
     fn out_of_reach(&self, _start: &State<O>) -> bool {
         false
     }
 
-    /// ε of the terminal ball.
+    /// Returns the radius ε of the terminal ball, if there is one.
     fn terminal_radius(&self) -> Option<f64>;
 }
 
-/// How an optimisation ended.
+/// Result of an optimisation apart from its motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Report {
-    /// Which way led to the optimum; [`Status::Fallback`] if none did.
+    /// The way that led to the optimum; [`Status::Fallback`] if none did.
     pub status: Status,
-    /// Iterations, over all passes and solvers.
+    /// Number of iterations over all passes and solvers.
     pub iterations: u32,
-    /// What shows it to be the optimum.
+    /// Residuals that prove the optimum.
     pub certificate: Certificate,
-    /// Whether it is known to keep the bounds about itself.
+    /// Whether the motion is known to satisfy the bounds about itself.
     pub settled: bool,
 }
 
-/// What the structure of a controller's problem is.
+/// Structure of a controller's optimisation problem.
 #[derive(Clone, Debug)]
 pub struct Layout<const O: usize> {
-    /// A and B.
+    /// Chain of integrators with its matrices A and B.
     pub chain: Chain<O>,
-    /// Weights.
+    /// Weights of the quadratic cost.
     pub cost: Cost<O>,
-    /// Number of intervals.
+    /// Number of intervals of the horizon.
     pub horizon: usize,
-    /// Whether states have a ball of their own.
+    /// Whether the states have balls of their own.
     pub state_balls: bool,
-    /// Whether there is a terminal ball.
+    /// Whether the last state must lie in a terminal ball.
     pub terminal: bool,
-    /// Normals of the set that the start is in; `None` if it is given.
+    /// Normals of the set of admissible initial states; `None` if the initial state is given.
     pub start: Option<[Vec<SVector<f64, O>>; 3]>,
-    /// Typical errors and their derivatives.
+    /// Typical sizes of the errors and their derivatives.
     pub scale: [f64; O],
-    /// The first optimisation has converged when no error moves by more than this between passes.
+    /// Largest change of any error between passes at which the first optimisation has converged.
     pub standstill: f64,
 }
 
-/// What an optimisation is about.
+/// The data of one optimisation.
 struct Sample<'a, const O: usize> {
     start: &'a State<O>,
     affine: &'a [State<O>],
 }
 
-/// How far the search for the optimum has come.
+/// Progress of the search for the optimum.
 #[derive(Default)]
 struct Search {
-    /// What has to be looked at, if that is not the whole horizon.
+    /// Window of the horizon to solve for, if it is not the whole horizon.
     window: Option<Range<usize>>,
-    /// Whether the multipliers are those of a similar problem.
+    /// Whether the multipliers come from a similar problem.
     warm: bool,
     iterations: u32,
-    /// Whether the last solver came to the conclusion that nothing keeps the balls.
+    /// Whether the last solver concluded that no motion satisfies the balls.
     hopeless: bool,
-    /// Whether the optimum keeps the bounds about itself.
+    /// Whether the optimum satisfies the bounds about itself.
     settled: bool,
 }
 
-/// All solvers of one controller, with their scratch.
+/// All solvers of one controller with their scratch memory.
 pub struct Optimiser<const O: usize> {
     layout: Layout<O>,
     settings: SolverSettings,
@@ -169,16 +177,16 @@ pub struct Optimiser<const O: usize> {
     solution: Solution<O>,
 }
 
-/// Passes of the first optimisation at most.
+/// Largest number of passes of the first optimisation.
 const FIRST_PASSES: usize = 20;
-/// Relative slack when the terminal ball is checked, for rounding.
+/// Relative tolerance in the check of the terminal ball, for rounding.
 const CHECK_SLACK: f64 = 1e-9;
 
 impl<const O: usize> Optimiser<O> {
-    /// Sets the solvers up.
+    /// Sets up all solvers for the given structure.
     ///
     /// # Errors
-    /// The cone solver's message if it refuses the data.
+    /// Returns the cone solver's message if it refuses the data.
     pub fn new(layout: Layout<O>, settings: SolverSettings) -> Result<Self, String> {
         let Layout { chain, cost, horizon, start, .. } = &layout;
         let cone = ConicSolver::new(Structure {
@@ -205,34 +213,37 @@ impl<const O: usize> Optimiser<O> {
         })
     }
 
-    /// The optimum, or in a fallback whatever was there.
+    /// Returns the optimum, or in a fallback the motion left by the last solver.
     pub fn motion(&self) -> &Motion<O> {
         &self.solution.motion
     }
 
-    /// K of the first stage of the optimum without constraints, negative.
+    /// Returns K of the first stage of the optimum without constraints, negative.
     pub fn feedback(&self) -> State<O> {
         self.unconstrained.feedback()
     }
 
-    /// Multipliers of the ball on the state at each interval's end and of that on its input.
+    /// Returns for each interval the multipliers of the state ball at its end and of the ball on
+    /// its input.
     pub fn multipliers(&self) -> impl Iterator<Item = [f64; 2]> {
         let Multipliers { state, input, .. } = &self.solution.multipliers;
         state.iter().zip(input).map(|(&state, &input)| [state, input])
     }
 
-    /// An optimisation of the controller begins, and with it the budget of all calls of [`Self::optimise`] until the next one.
+    /// Starts the budget of an optimisation of the controller. It covers all calls of
+    /// [`Self::optimise`] until the next `begin`.
     pub fn begin(&mut self) {
         self.budget = Budget::begin(&self.settings);
     }
 
-    /// Whether the budget ended what was begun.
+    /// Returns whether the budget ended the present optimisation.
     pub fn is_exhausted(&self) -> bool {
         self.budget.is_exhausted()
     }
 
-    /// One optimisation from `start`. `previous` holds the motion planned before from now on, with its multipliers; without one, the bounds and the linearised
-    /// balls are set about the solution again until that stands still.
+    /// Solves one optimisation from `start`. `previous` holds the earlier plan from the present
+    /// time on, with its multipliers. Without it, the bounds and the linearised balls are set about
+    /// each solution again until the solution stops changing.
     pub fn optimise<B: Bounded<O>>(
         &mut self,
         bounded: &mut B,
@@ -270,7 +281,8 @@ impl<const O: usize> Optimiser<O> {
         match previous {
             Some((previous, active)) => {
                 self.about.clone_from(previous);
-                // Where the terminal ball is active, each sample has one stage more to reach it, and the plans differ too much.
+                // Where the terminal ball is active, each sample has one more stage to reach it,
+                // and successive plans differ too much for a warm start.
                 if self.settings.method == Method::Riccati && self.layout.start.is_none() && outside.is_none()
                 {
                     self.begin_at(start, affine, active, &mut search);
@@ -300,8 +312,10 @@ impl<const O: usize> Optimiser<O> {
         Report { settled: search.settled, ..self.report(bounded, &sample, status, search.iterations) }
     }
 
-    /// The optimum with the bounds about itself: those about the previous plan, or those that `follow` the iterates of the Riccati method, are set anew
-    /// about the optimum until it satisfies its own. One pass is enough for bounds that do not depend on the motion.
+    /// Finds an optimum that satisfies the bounds about itself. The first bounds are those about
+    /// the previous plan, or follow the iterates of the Riccati method (`follow`). They are then
+    /// set about the optimum until it satisfies its own bounds. One pass suffices for bounds that
+    /// do not depend on the motion.
     fn settle<B: Bounded<O>>(
         &mut self,
         bounded: &mut B,
@@ -316,14 +330,14 @@ impl<const O: usize> Optimiser<O> {
             bounded.follow(follow);
             status = solve(self, bounded, sample, search);
             bounded.follow(false);
-            // Linearised balls would have to be linearised anew as well.
+            // Linearised balls would have to be linearised again as well.
             if status == Status::Fallback || self.settings.nonlinearity == Nonlinearity::Frozen {
                 break;
             }
             if follow {
                 bounded.tighten(&self.solution.motion, 0..self.layout.horizon);
             }
-            // The intervals outside a window have been looked at.
+            // The intervals outside a window have already been checked.
             let solved = search.window.clone().unwrap_or(0..self.layout.horizon);
             search.settled = !bounded.unsettled(&self.solution.motion, solved);
             if search.settled {
@@ -332,7 +346,8 @@ impl<const O: usize> Optimiser<O> {
             if pass == 0 {
                 self.about.clone_from(&self.solution.motion);
             } else {
-                // Where the bounds change by more than the motion does, whole steps swing to and fro between two motions.
+                // Where the bounds change more than the motion, whole steps would alternate between
+                // two motions.
                 self.about.halve_the_way_to(&self.solution.motion);
             }
             search.warm = true;
@@ -340,8 +355,9 @@ impl<const O: usize> Optimiser<O> {
         status
     }
 
-    /// Takes the previous plan and its multipliers as first guess where they are active in what is to be solved. A window then takes in what was active
-    /// just beyond its end, as it would have to grow otherwise.
+    /// Takes the previous plan and its multipliers as first guess if some of them are active in the
+    /// range to be solved. A window is extended by the active stages just beyond its end, as it
+    /// would otherwise have to grow.
     fn begin_at(&mut self, start: &State<O>, affine: &[State<O>], active: &[[f64; 2]], search: &mut Search) {
         let n = self.layout.horizon;
         let mut range = search.window.clone().unwrap_or(0..n);
@@ -357,7 +373,7 @@ impl<const O: usize> Optimiser<O> {
         if let Some(window) = &mut search.window {
             window.end = range.end;
         }
-        // The motion must satisfy the chain over all that is to be solved.
+        // The motion must satisfy the chain over the whole range to be solved.
         if !self.layout.is_worth_a_window(&range) {
             search.window = None;
             range = 0..n;
@@ -372,7 +388,7 @@ impl<const O: usize> Optimiser<O> {
         search.warm = true;
     }
 
-    /// The first optimisation by the Riccati method, with bounds that follow its iterates.
+    /// Runs the first optimisation by the Riccati method, with bounds that follow its iterates.
     fn settled_by_riccati<B: Bounded<O>>(
         &mut self,
         bounded: &mut B,
@@ -390,7 +406,8 @@ impl<const O: usize> Optimiser<O> {
         self.settle(bounded, sample, search, true, by_riccati) == Status::Constrained
     }
 
-    /// The optimum with the bounds about `about`, by the Riccati method if it is wanted.
+    /// Finds the optimum with the bounds about `about` by the Riccati method, if the settings
+    /// select it.
     fn by_riccati<B: Bounded<O>>(
         &mut self,
         bounded: &mut B,
@@ -404,12 +421,12 @@ impl<const O: usize> Optimiser<O> {
             || !search.hopeless && self.over_whole_horizon(bounded, sample, search)
     }
 
-    /// The same by the solvers in turn.
+    /// Finds the optimum with the bounds about `about`, trying the solvers in turn.
     fn solve<B: Bounded<O>>(&mut self, bounded: &mut B, sample: &Sample<O>, search: &mut Search) -> Status {
         if self.by_riccati(bounded, sample, search) {
             return Status::Constrained;
         }
-        // Where nothing keeps the balls, it finds nothing either.
+        // The cone solver would not find a motion within the balls either.
         if search.hopeless {
             return Status::Fallback;
         }
@@ -452,7 +469,7 @@ impl<const O: usize> Optimiser<O> {
         };
         search.iterations += outcome.iterations();
         if !outcome.solved() && search.warm && !self.is_exhausted() {
-            // The guess has led astray.
+            // The first guess was misleading.
             search.warm = false;
             return self.over_whole_horizon(bounded, sample, search);
         }
@@ -460,9 +477,9 @@ impl<const O: usize> Optimiser<O> {
         outcome.solved()
     }
 
-    /// Solves only for a window of the horizon that holds what is violated, with the cost of arriving there and the cost of going
-    /// on. If the rest then satisfies its constraints, this is the optimum of the whole, as it is that of a relaxation; else the window
-    /// grows.
+    /// Solves only for a window of the horizon around the violated intervals, with arrival cost and
+    /// cost-to-go in place of the rest. If the rest then satisfies its constraints, the result is
+    /// the optimum of a relaxation and therefore of the whole problem. Otherwise the window grows.
     fn in_windows<B: Bounded<O>>(
         &mut self,
         bounded: &mut B,
@@ -508,13 +525,14 @@ impl<const O: usize> Optimiser<O> {
             };
             search.iterations += outcome.iterations();
             if !outcome.solved() {
-                // What nothing keeps within the window, nothing keeps within the horizon, unless a wrong guess has led astray.
+                // If no motion satisfies the balls within the window, none does over the horizon,
+                // unless the first guess was misleading.
                 search.hopeless = outcome.hopeless() && !search.warm;
                 search.warm = false;
                 return false;
             }
             window.end = window.start + riccati.horizon();
-            // A window that has grown to the end has done so without the terminal ball.
+            // A window that grew to the end was solved without the terminal ball.
             let unheld = bounded.terminal_radius().filter(|_| radius.is_none());
             let motion = &mut solution.motion;
             unconstrained.trace_back(window.start, affine, motion);
@@ -543,7 +561,7 @@ impl<const O: usize> Optimiser<O> {
         self.solution.motion.halve_the_way_to(plan);
     }
 
-    /// The report of a plan that is followed instead of an optimum.
+    /// Returns the report of a plan that is followed instead of an optimum.
     pub fn fall_back<B: Bounded<O>>(
         &mut self,
         bounded: &B,
@@ -566,7 +584,8 @@ impl<const O: usize> Optimiser<O> {
         iterations: u32,
     ) -> Report {
         let exact = self.layout.problem(sample, self.layout.end(bounded.terminal_radius()), bounded);
-        // By `Bounded::violated`; the other solvers give every ball a multiplier.
+        // [`Bounded::violated`] has checked these intervals; the other solvers give every ball a
+        // multiplier.
         let checked = !matches!(status, Status::Fallback | Status::Kept);
         let certificate = Certificate::of(&exact, &self.solution, checked);
         Report { status, iterations, certificate, settled: false }
@@ -574,7 +593,7 @@ impl<const O: usize> Optimiser<O> {
 }
 
 impl<const O: usize> Layout<O> {
-    /// The problem of the whole horizon.
+    /// Returns the problem of the whole horizon.
     fn problem<'a, C>(
         &'a self,
         sample: &Sample<'a, O>,
@@ -588,18 +607,19 @@ impl<const O: usize> Layout<O> {
         Problem { chain: &self.chain, cost: &self.cost, start, affine: sample.affine, constraints, end }
     }
 
-    /// The end of the whole horizon.
+    /// Returns the cost and the ball at the end of the whole horizon.
     fn end(&self, radius: Option<f64>) -> End<'_, O> {
         End { weight: &self.cost.end, slope: zero_state(), radius }
     }
 
-    /// `radius` if the motion ends outside the terminal ball.
+    /// Returns `radius` if the motion ends outside the terminal ball.
     fn ends_outside(&self, motion: &Motion<O>, radius: Option<f64>) -> Option<f64> {
         let square = self.cost.end_square(&motion.states[self.horizon]);
         radius.filter(|radius| square > radius * radius * (1.0 + CHECK_SLACK))
     }
 
-    /// The violated intervals with a margin, and the last interval if the terminal ball is to be in it.
+    /// Returns the violated intervals with a margin; with `terminal`, the range extends to the last
+    /// interval.
     fn window(&self, violated: Option<Range<usize>>, terminal: bool) -> Option<Range<usize>> {
         let n = self.horizon;
         let violated = match (violated, terminal) {
@@ -610,24 +630,25 @@ impl<const O: usize> Layout<O> {
         Some(self.widen(&violated, MARGIN + violated.len() / 2))
     }
 
-    /// Whether to solve for these intervals alone pays: at most three quarters of the horizon.
+    /// Returns whether it pays to solve for these intervals alone, which may be at most three
+    /// quarters of the horizon.
     fn is_worth_a_window(&self, range: &Range<usize>) -> bool {
         4 * range.len() <= 3 * self.horizon
     }
 
-    /// These intervals and so many before and after.
+    /// Extends the range by `margin` intervals before and after.
     fn widen(&self, range: &Range<usize>, margin: usize) -> Range<usize> {
         let start = range.start.saturating_sub(margin);
-        // Fewer steps than the order do not reach every state.
+        // Fewer steps than the order cannot reach every state.
         (if start < O { 0 } else { start })..(range.end + margin).min(self.horizon)
     }
 }
 
-/// Intervals before and after those that are violated, which a window takes in.
+/// Smallest number of intervals that a window adds before and after the violated ones.
 const MARGIN: usize = 3;
-/// A multiplier counts from this share of the largest on.
+/// A multiplier counts as active above this share of the largest one.
 const ACTIVE: f64 = 1e-3;
-/// Passes until an optimum satisfies the bounds about itself.
+/// Largest number of passes until an optimum satisfies the bounds about itself.
 const SETTLING_PASSES: usize = 8;
-/// Windows tried before the whole horizon.
+/// Largest number of windows tried before the whole horizon.
 const WINDOWS: usize = 4;

@@ -1,11 +1,12 @@
-//! The structured problem: chains of integrators, quadratic cost, ball constraints.
+//! The structured problem: chains of integrators, quadratic cost and ball constraints.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// The tracking error of one stage: the three axes' errors, then those of their derivatives up to the order − 1.
+/// The tracking error of one stage: the errors of the three axes, then those of their derivatives
+/// up to order O − 1.
 pub type State<const O: usize> = [Vector3<f64>; O];
 
-/// The error of nothing.
+/// Returns the state without any error.
 pub fn zero_state<const O: usize>() -> State<O> {
     [Vector3::zeros(); O]
 }
@@ -13,18 +14,18 @@ pub fn zero_state<const O: usize>() -> State<O> {
 /// Three chains of `O` integrators with a held input, sampled exactly: E⁺ = A E + B v + d.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chain<const O: usize> {
-    /// A: what the j-th derivative adds to the i-th, h^(j−i)/(j−i)!.
+    /// Matrix A: the j-th derivative contributes to the i-th with h^(j−i)/(j−i)!.
     pub a: SMatrix<f64, O, O>,
-    /// B: what the input adds to the i-th derivative, h^(O−i)/(O−i)!.
+    /// Vector B: the input contributes to the i-th derivative with h^(O−i)/(O−i)!.
     pub b: SVector<f64, O>,
-    /// h, s.
+    /// Sampling interval h, s.
     pub step: f64,
 }
 
 impl<const O: usize> Chain<O> {
-    /// Sampled every `step` s.
+    /// Returns the chains sampled every `step` s.
     pub fn new(step: f64) -> Self {
-        // h^n / n!
+        // Factor h^n / n! of the exact sampling.
         let power = |n: usize| (1..=n).map(|i| step / i as f64).product::<f64>();
         Self {
             a: SMatrix::from_fn(|i, j| if j < i { 0.0 } else { power(j - i) }),
@@ -33,7 +34,7 @@ impl<const O: usize> Chain<O> {
         }
     }
 
-    /// A E + B v.
+    /// Returns the next state A E + B v, without d.
     pub fn advance(&self, state: &State<O>, input: &Vector3<f64>) -> State<O> {
         std::array::from_fn(|i| {
             let sum = input * self.b[i] + state[i];
@@ -41,63 +42,64 @@ impl<const O: usize> Chain<O> {
         })
     }
 
-    /// Aᵀ p.
+    /// Returns the costate Aᵀ p of the stage before.
     pub fn adjoint(&self, costate: &State<O>) -> State<O> {
         std::array::from_fn(|i| (0..i).fold(costate[i], |sum, j| sum + costate[j] * self.a[(j, i)]))
     }
 
-    /// Bᵀ p.
+    /// Returns Bᵀ p, the slope of the future cost in the input.
     pub fn input_adjoint(&self, costate: &State<O>) -> Vector3<f64> {
         (0..O).fold(Vector3::zeros(), |sum, i| sum + costate[i] * self.b[i])
     }
 }
 
-/// Σ_{k<N} (E_kᵀ W E_k + v_kᵀ V v_k) + E_Nᵀ G E_N. W and V hold the step, where the cost is a sampled integral.
+/// The cost Σ_{k<N} (E_kᵀ W E_k + v_kᵀ V v_k) + E_Nᵀ G E_N. Where it is a sampled integral, W and V
+/// include the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost<const O: usize> {
-    /// W, diagonal.
+    /// Diagonal of the state weight W.
     pub state: State<O>,
-    /// V, diagonal.
+    /// Diagonal of the input weight V.
     pub input: Vector3<f64>,
-    /// G.
+    /// Weight G of the last state.
     pub end: PerAxis<O>,
 }
 
-/// A matrix that keeps the axes apart: the block (i, j) is diagonal.
+/// A matrix without coupling of the axes: each block (i, j) is diagonal.
 pub type PerAxis<const O: usize> = [[Vector3<f64>; O]; O];
 
-/// M E.
+/// Returns the product M E of a matrix and a state.
 pub(super) fn apply<const O: usize>(m: &PerAxis<O>, state: &State<O>) -> State<O> {
     m.map(|row| row.iter().zip(state).fold(Vector3::zeros(), |sum, (m, e)| sum + m.component_mul(e)))
 }
 
-/// The blocks from a matrix for each axis.
+/// Combines the matrices of the three axes into blocks.
 pub fn per_axis<const O: usize>(axes: &[SMatrix<f64, O, O>; 3]) -> PerAxis<O> {
     std::array::from_fn(|i| std::array::from_fn(|j| Vector3::from_fn(|axis, _| axes[axis][(i, j)])))
 }
 
-/// The matrix of one axis.
+/// Returns the matrix of one axis.
 pub(super) fn of_axis<const O: usize>(m: &PerAxis<O>, axis: usize) -> SMatrix<f64, O, O> {
     SMatrix::from_fn(|i, j| m[i][j][axis])
 }
 
 impl<const O: usize> Cost<O> {
-    /// G E.
+    /// Returns the product G E at the end.
     pub fn end_slope(&self, state: &State<O>) -> State<O> {
         apply(&self.end, state)
     }
 
-    /// EᵀG E.
+    /// Returns the square EᵀG E of the terminal norm.
     pub fn end_square(&self, state: &State<O>) -> f64 {
         dot(state, &self.end_slope(state))
     }
 
-    /// W E.
+    /// Returns the product W E at a stage.
     pub fn slope(&self, state: &State<O>) -> State<O> {
         std::array::from_fn(|i| self.state[i].component_mul(&state[i]))
     }
 
-    /// The cost of a motion.
+    /// Returns the cost of a motion.
     pub fn of(&self, motion: &Motion<O>) -> f64 {
         let state = |e: &State<O>| dot(e, &self.slope(e));
         let input = |v: &Vector3<f64>| v.component_mul(v).dot(&self.input);
@@ -108,19 +110,19 @@ impl<const O: usize> Cost<O> {
     }
 }
 
-/// Sum of the products of the components.
+/// Returns the scalar product of two states over all components.
 pub(super) fn dot<const O: usize>(a: &State<O>, b: &State<O>) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 
-/// A ball ‖y(E, v)‖ ≤ 1 at a point: y and its derivatives, all divided by the bound.
+/// A ball ‖y(E, v)‖ ≤ 1 at a point, with y and its derivatives, all divided by the bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball<const O: usize> {
-    /// y.
+    /// Value of y at the point.
     pub value: Vector3<f64>,
-    /// ∂y/∂E.
+    /// Derivative of y by the state, ∂y/∂E.
     pub by_state: [Matrix3<f64>; O],
-    /// ∂y/∂v.
+    /// Derivative of y by the input, ∂y/∂v.
     pub by_input: Matrix3<f64>,
 }
 
@@ -131,47 +133,49 @@ impl<const O: usize> Default for Ball<O> {
 }
 
 impl<const O: usize> Ball<O> {
-    /// y once state and input have changed, if it is linear.
+    /// Returns y at a changed state and input; exact if y is linear.
     fn at(&self, state: &State<O>, input: &Vector3<f64>) -> Vector3<f64> {
         self.value + self.change(state, input)
     }
 
-    /// ∂y of a change of state and input.
+    /// Returns the linear change of y for a change of state and input.
     pub fn change(&self, state: &State<O>, input: &Vector3<f64>) -> Vector3<f64> {
         self.by_state.iter().zip(state).fold(self.by_input * input, |sum, (by, e)| sum + by * e)
     }
 }
 
-/// The balls that the state and the input of one stage are in.
+/// The balls that constrain the state and the input of one stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Balls<const O: usize> {
-    /// On the state alone, for k = 1..=N. Without one: zero.
+    /// Ball on the state alone, for k = 1..=N; zero if there is none.
     pub state: Ball<O>,
-    /// On state and input, for k = 0..N.
+    /// Ball on state and input, for k = 0..N.
     pub input: Ball<O>,
 }
 
-/// The constraints of a problem.
+/// The ball constraints of a problem, one state ball and one input ball for each stage.
 pub trait Constraints<const O: usize> {
-    /// Whether the balls' sizes are those about the motion that is evaluated, with their own derivatives left out.
+    /// Returns whether the sizes of the balls follow the evaluated motion. The derivatives of the
+    /// sizes are left out.
     fn follows(&self) -> bool {
         false
     }
 
-    /// Whether states have a ball of their own.
+    /// Returns whether the states have balls of their own.
     fn has_state_balls(&self) -> bool;
 
-    /// The balls of stage `k` at (E_k, v_k), with derivatives. That on E_0 and that on v_N are not looked at.
+    /// Returns the balls of stage `k` at (E_k, v_k) with their derivatives. The balls on E_0 and on
+    /// v_N are not used.
     fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> Balls<O>;
 
-    /// ‖y‖² of both alone.
+    /// Returns only the two values ‖y‖², of the state ball and of the input ball.
     fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> (f64, f64) {
         let Balls { state, input } = self.balls(k, state, input);
         (state.value.norm_squared(), input.value.norm_squared())
     }
 }
 
-/// The constraints from stage `first` on.
+/// A view of constraints that starts at stage `first`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct From<'a, C> {
     pub constraints: &'a C,
@@ -196,16 +200,16 @@ impl<const O: usize, C: Constraints<O>> Constraints<O> for From<'_, C> {
     }
 }
 
-/// Constraints linearised about a motion: ‖c + J_E E_k + J_v v_k‖ ≤ 1.
+/// Constraints that are linearised about a motion: ‖c + J_E E_k + J_v v_k‖ ≤ 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frozen<const O: usize> {
-    /// Value at E = 0 and v = 0 and derivatives, for k = 0..=N.
+    /// Values at E = 0 and v = 0 with derivatives, for k = 0..=N.
     balls: Vec<Balls<O>>,
     state_balls: bool,
 }
 
 impl<const O: usize> Frozen<O> {
-    /// With room for `horizon` intervals.
+    /// Allocates linearised constraints for `horizon` intervals.
     pub fn new(horizon: usize) -> Self {
         Self { balls: vec![Balls::default(); horizon + 1], state_balls: true }
     }
@@ -245,68 +249,70 @@ impl<const O: usize> Constraints<O> for Frozen<O> {
     }
 }
 
-/// Where the motion starts.
+/// Condition on the first state of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start<'a, const O: usize> {
-    /// E_0 is given.
+    /// The first state E_0 is given.
     Fixed(State<O>),
-    /// E_0 may be chosen with |nᵀ(E_given − E_0)| ≤ 1 for each of an axis's normals n.
+    /// The first state E_0 is free within |nᵀ(E_given − E_0)| ≤ 1 for each normal n of each axis.
     Within(State<O>, &'a [Vec<SVector<f64, O>>; 3]),
-    /// E_0 is free at the cost (E_0 − Ē)ᵀ Π⁻¹ (E_0 − Ē) of arriving there: Π⁻¹ and Ē.
+    /// The first state E_0 is free at the arrival cost (E_0 − Ē)ᵀ Π⁻¹ (E_0 − Ē), given by Π⁻¹ and
+    /// Ē.
     Arrival(&'a PerAxis<O>, State<O>),
 }
 
-/// What the last state costs: EᵀP E + 2 pᵀE, and the ball it has to be in.
+/// Cost EᵀP E + 2 pᵀE of the last state, and the ball in which it must lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct End<'a, const O: usize> {
-    /// P.
+    /// Weight P of the last state.
     pub weight: &'a PerAxis<O>,
-    /// p.
+    /// Linear part p of the cost.
     pub slope: State<O>,
-    /// ε of the terminal ball ‖E_N‖_G ≤ ε, if there is one; then P is G.
+    /// Radius ε of the terminal ball ‖E_N‖_G ≤ ε, if there is one; P is then G.
     pub radius: Option<f64>,
 }
 
 impl<const O: usize> End<'_, O> {
-    /// P E.
+    /// Returns the product P E.
     pub(super) fn weighted(&self, state: &State<O>) -> State<O> {
         apply(self.weight, state)
     }
 }
 
-/// Minimise the cost of a motion E_{k+1} = A E_k + B v_k + d_k within the balls.
+/// The problem: minimise the cost of a motion E_{k+1} = A E_k + B v_k + d_k within the balls.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a, const O: usize, C> {
-    /// A and B.
+    /// Chain of integrators with its matrices A and B.
     pub chain: &'a Chain<O>,
-    /// Weights.
+    /// Weights of the quadratic cost.
     pub cost: &'a Cost<O>,
-    /// E_0.
+    /// Condition on the first state E_0.
     pub start: Start<'a, O>,
-    /// d_0 … d_{N−1}: what the reference does beyond the chain, its jumps included.
+    /// Affine terms d_0 … d_{N−1}: the part of the reference that the chain cannot reproduce,
+    /// including its jumps.
     pub affine: &'a [State<O>],
     /// Balls on states and inputs.
     pub constraints: &'a C,
-    /// What E_N costs.
+    /// Cost of the last state E_N, with its terminal ball.
     pub end: End<'a, O>,
 }
 
-/// A motion of the tracking error.
+/// A motion of the tracking error over the horizon.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion<const O: usize> {
-    /// E_0 … E_N.
+    /// States E_0 … E_N at the stages.
     pub states: Vec<State<O>>,
-    /// v_0 … v_{N−1}, held between them.
+    /// Inputs v_0 … v_{N−1}, each held over one interval.
     pub inputs: Vec<Vector3<f64>>,
 }
 
 impl<const O: usize> Motion<O> {
-    /// No error over `horizon` intervals.
+    /// Returns a motion without error over `horizon` intervals.
     pub fn new(horizon: usize) -> Self {
         Self { states: vec![zero_state(); horizon + 1], inputs: vec![Vector3::zeros(); horizon] }
     }
 
-    /// Half of the way to `other`.
+    /// Moves this motion half of the way to `other`.
     pub fn halve_the_way_to(&mut self, other: &Self) {
         let here = self.states.iter_mut().flatten().chain(&mut self.inputs);
         let there = other.states.iter().flatten().chain(&other.inputs);
@@ -315,13 +321,13 @@ impl<const O: usize> Motion<O> {
         }
     }
 
-    /// Largest difference of any component of any state.
+    /// Returns the largest difference of any component of any state.
     pub fn distance(&self, other: &Self) -> f64 {
         let states = self.states.iter().flatten().zip(other.states.iter().flatten());
         states.map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
     }
 
-    /// The motion that the inputs lead to from the first state.
+    /// Replaces the states by those that the inputs produce from the first state.
     pub fn roll_out(&mut self, chain: &Chain<O>, affine: &[State<O>]) {
         for (k, (v, d)) in self.inputs.iter().zip(affine).enumerate() {
             let next = chain.advance(&self.states[k], v);
@@ -330,23 +336,24 @@ impl<const O: usize> Motion<O> {
     }
 }
 
-/// Multipliers of the balls, written as ½(‖y‖² − 1) ≤ 0, and of the start's faces, for half the cost.
+/// Multipliers for half the cost, of the balls written as ½(‖y‖² − 1) ≤ 0 and of the faces of the
+/// initial set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Multipliers<const O: usize> {
-    /// Of the state balls of stages 1..=N, at position k − 1.
+    /// Multipliers of the state balls of stages 1..=N, at position k − 1.
     pub state: Vec<f64>,
-    /// Of the input balls.
+    /// Multipliers of the input balls.
     pub input: Vec<f64>,
-    /// Of the terminal ball.
+    /// Multiplier of the terminal ball.
     pub terminal: f64,
-    /// Σ λ n over the faces of the start's set, signed: their slope in E_0.
+    /// Signed sum Σ λ n over the faces of the initial set: their slope in E_0.
     pub start: State<O>,
-    /// Σ λ |c| of these faces.
+    /// Complementarity Σ λ |c| of these faces.
     pub start_gap: f64,
 }
 
 impl<const O: usize> Multipliers<O> {
-    /// Nothing is active.
+    /// Returns multipliers that are all zero.
     pub fn new(horizon: usize) -> Self {
         Self {
             state: vec![0.0; horizon],
@@ -357,7 +364,7 @@ impl<const O: usize> Multipliers<O> {
         }
     }
 
-    /// Makes nothing active.
+    /// Sets all multipliers to zero.
     pub fn clear(&mut self) {
         self.state.fill(0.0);
         self.input.fill(0.0);
@@ -367,47 +374,48 @@ impl<const O: usize> Multipliers<O> {
     }
 }
 
-/// A motion with the multipliers that show it to be the optimum.
+/// A motion with the multipliers that prove it to be the optimum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution<const O: usize> {
-    /// The motion.
+    /// Motion of the tracking error.
     pub motion: Motion<O>,
-    /// The multipliers.
+    /// Multipliers of the constraints for this motion.
     pub multipliers: Multipliers<O>,
 }
 
 impl<const O: usize> Solution<O> {
-    /// With room for `horizon` intervals.
+    /// Allocates a solution for `horizon` intervals.
     pub fn new(horizon: usize) -> Self {
         Self { motion: Motion::new(horizon), multipliers: Multipliers::new(horizon) }
     }
 }
 
-/// How a solver ended.
+/// The way in which a solver ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// With the optimum, after so many iterations.
+    /// The optimum was found after this number of iterations.
     Solved(u32),
-    /// Without.
+    /// No optimum was found after this number of iterations.
     Failed(u32),
-    /// Without, and far outside of the balls: nothing seems to keep them.
+    /// No optimum was found, and the last iterate was far outside the balls: probably no motion
+    /// satisfies them.
     Hopeless(u32),
 }
 
 impl Outcome {
-    /// Iterations done.
+    /// Returns the number of iterations done.
     pub fn iterations(self) -> u32 {
         match self {
             Self::Solved(iterations) | Self::Failed(iterations) | Self::Hopeless(iterations) => iterations,
         }
     }
 
-    /// Whether nothing seems to keep the balls.
+    /// Returns whether probably no motion satisfies the balls.
     pub fn hopeless(self) -> bool {
         matches!(self, Self::Hopeless(_))
     }
 
-    /// Whether the optimum was found.
+    /// Returns whether the optimum was found.
     pub fn solved(self) -> bool {
         matches!(self, Self::Solved(_))
     }

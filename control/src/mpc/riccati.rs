@@ -1,9 +1,11 @@
-//! Primal-dual interior point method on the Riccati recursion, docs/solver.md.
+//! Primal-dual interior point method on the Riccati recursion; see docs/solver.md.
 //!
-//! Balls are written c = ½(‖y‖² − 1) ≤ 0 with one slack s and one multiplier λ each. Every motion in between satisfies the chain of
-//! integrators exactly, so that Newton's method is left with three residuals: stationarity of the inputs, c + s, and sλ. The
-//! curvature of the balls is exact, that of y is left out (Gauss-Newton). Balls that the motion stays well inside of are left out: every
-//! iterate is looked at, and from where it comes near a ball, that is in the problem.
+//! Balls are written c = ½(‖y‖² − 1) ≤ 0 with one slack s and one multiplier λ each. Every iterate
+//! satisfies the chain of integrators exactly, so that Newton's method is left with three
+//! residuals: stationarity of the inputs, c + s, and sλ. The Hessian contains the curvature of
+//! ½‖y‖² exactly; the curvature of y itself is left out (Gauss-Newton). Balls are left out while
+//! the motion stays well inside them. Every iterate is checked, and a ball enters the problem as
+//! soon as an iterate comes near it.
 
 use super::budget::Budget;
 use super::lq::Unconstrained;
@@ -13,90 +15,99 @@ use super::problem::{
 use super::sweep::{Blocks, Gain, Quadratic, minimiser};
 use nalgebra::{Matrix3, SVector, Vector3};
 
-/// Relative residuals at which a motion is the optimum.
+/// Relative residuals below which a motion counts as the optimum.
 const STATIONARITY: f64 = 1e-6;
 const FEASIBILITY: f64 = 1e-9;
-/// The same where the bounds follow the motion: as their derivatives are left out, the residual then only shrinks by a factor from iteration to iteration.
+/// Feasibility tolerance for bounds that follow the motion. As their derivatives are left out, the
+/// residual then only shrinks by a constant factor per iteration.
 const FEASIBILITY_FOLLOWING: f64 = 1e-5;
 const GAP: f64 = 1e-9;
-/// Share of the way to the boundary that a step goes at most.
+/// Largest share of the way to the boundary that a step covers.
 const TO_BOUNDARY: f64 = 0.9999;
-/// A step shorter than this is tried again without second order, towards this share of the mean of sλ.
+/// A step shorter than `SHORT` is computed again without second-order terms, towards `RECENTRING`
+/// times the mean of sλ.
 const SHORT: f64 = 0.1;
 const RECENTRING: f64 = 0.5;
-/// A search has stalled when its steps were shorter than this so many times in a row.
+/// A search has stalled when `STALLED_STEPS` successive steps were shorter than `STALLED`.
 const STALLED: f64 = 1e-5;
 const STALLED_STEPS: u32 = 4;
-/// Or when its residual has not been halved in so many iterations; a residual so many times the least begins the count anew, as an iterate then has met
-/// what it had not looked at. With given bounds, which may be of any size, and with bounds that follow the motion.
+/// A search has also stalled when its residual has not been halved in the first number of
+/// iterations. The count restarts when the residual exceeds the least one by the second number,
+/// because the iterate has then met balls that were left out. `PATIENCE` is for given bounds, which
+/// may have any size, `PATIENCE_FOLLOWING` for bounds that follow the motion.
 const PATIENCE: (u32, f64) = (30, 1e3);
 const PATIENCE_FOLLOWING: (u32, f64) = (16, f64::INFINITY);
-/// A search goes round in a circle when its residual has not been halved in so many iterations; its steps are then so much shorter.
+/// A search runs in a cycle when its residual has not been halved in `CIRCLING` iterations; its
+/// steps are then multiplied by `DAMPING`.
 const CIRCLING: u32 = 8;
 const DAMPING: f64 = 0.5;
-/// A guess has led it astray when the balls' residual is so many times the least so far, and beyond 1.
+/// A first guess is misleading when the residual of the balls exceeds the least one so far by this
+/// factor; least values below 1 count as 1.
 const ASTRAY: f64 = 1e3;
-/// Residual of the balls from which on a search that ended so is hopeless.
+/// A search that fails while the residual of the balls is above this value is hopeless.
 const FAR_FROM_FEASIBLE: f64 = 1e-3;
-/// ‖y‖² from which on a ball is near.
+/// A ball is near when ‖y‖² exceeds this value.
 const NEAR: f64 = 0.5;
-/// ‖y‖² from which on a stage beyond the end is taken in.
+/// A stage beyond the end is included when ‖y‖² exceeds this value.
 const NEARLY_OUTSIDE: f64 = 0.9;
-/// Stages beyond the end that are looked at.
+/// Number of stages beyond the end that are examined.
 const AHEAD: usize = 6;
-/// Smallest slack at the start, and Σ sλ over half the cost.
+/// Cold start: smallest slack, and Σ sλ relative to half the cost.
 const COLD: (f64, f64) = (0.03, 0.03);
-/// Smallest slack of a ball that an iterate comes near to.
+/// Smallest initial slack of a ball that an iterate comes near.
 const NEWLY: f64 = 0.3;
-/// The same where the multipliers of a similar problem are known.
+/// Warm start, with the multipliers of a similar problem: smallest slack, and Σ sλ relative to half
+/// the cost.
 const WARM: (f64, f64) = (3e-4, 1e-6);
-/// The same where the first guess violates a ball by far.
+/// First guess that violates a ball by far: smallest slack, and Σ sλ relative to half the cost.
 const FAR: (f64, f64) = (3.0, 10.0);
-/// c from which on that is so.
+/// A first guess violates a ball by far when c exceeds this value.
 const FAR_OUTSIDE: f64 = 1.5;
 
-/// One inequality c ≤ 0 with its slack and multiplier.
+/// One inequality c ≤ 0 with its slack and its multiplier.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pair {
-    /// Whether it is in the problem.
+    /// Whether the inequality is included in the problem.
     watched: bool,
-    /// c at the iterate.
+    /// Value of c at the iterate.
     c: f64,
-    /// s > 0.
+    /// Slack of the inequality, s > 0.
     slack: f64,
-    /// λ > 0.
+    /// Multiplier of the inequality, λ > 0.
     multiplier: f64,
-    /// c + s, with the curvature that the predictor met.
+    /// Residual c + s, corrected by the curvature along the predictor.
     infeasibility: f64,
-    /// What sλ shall become, less the predictor's Δs Δλ.
+    /// Target of sλ, less the predictor's Δs Δλ.
     target: f64,
-    /// ∇cᵀΔz of the last direction.
+    /// First-order change ∇cᵀΔz along the last direction.
     change: f64,
-    /// ½‖JΔz‖² of it.
+    /// Second-order change ½‖JΔz‖² along the last direction.
     curvature: f64,
     d_slack: f64,
     d_multiplier: f64,
 }
 
 impl Pair {
-    /// A slack as large as there is room, at least `smallest`, with sλ = `mean` or a known multiplier if that is larger.
+    /// Includes the inequality. The slack is −c but at least `smallest`; sλ is `mean`, unless the
+    /// `known` multiplier is larger.
     fn begin(&mut self, smallest: f64, mean: f64, known: f64) {
         self.watched = true;
         self.slack = (-self.c).max(smallest);
         self.multiplier = (mean / self.slack).max(known);
     }
 
-    /// c of a ball.
+    /// Evaluates c of a ball at y.
     fn evaluate(&mut self, y: &Vector3<f64>) {
         self.c = 0.5 * (y.norm_squared() - 1.0);
     }
 
-    /// λ/s.
+    /// Returns the scaling λ/s of the inequality.
     fn scaling(&self) -> f64 {
         self.multiplier / self.slack
     }
 
-    /// The multiplier in the direction's right side, once Δs and Δλ are eliminated.
+    /// Returns the multiplier on the right side of the Newton system after Δs and Δλ are
+    /// eliminated.
     fn effective(&self) -> f64 {
         (self.target + self.multiplier * self.infeasibility) / self.slack
     }
@@ -106,14 +117,15 @@ impl Pair {
         self.target = 0.0;
     }
 
-    /// The direction to sλ = `centre`, with this share of the second order that the predictor met: the products of its changes, and the
-    /// ball's curvature along it.
+    /// Prepares the direction to sλ = `centre`. The pair gives the shares of the predictor's
+    /// second-order terms to include: the products Δs Δλ, and the ball's curvature along the
+    /// predictor.
     fn correct(&mut self, centre: f64, (products, curvature): (f64, f64)) {
         self.infeasibility = self.c + self.slack + curvature * self.curvature;
         self.target = centre - products * self.d_slack * self.d_multiplier;
     }
 
-    /// Δs and Δλ of a direction in which c changes by `change`.
+    /// Computes Δs and Δλ for a direction along which c changes by `change`.
     fn set_direction(&mut self, change: f64, curvature: f64) {
         self.change = change;
         self.curvature = curvature;
@@ -121,14 +133,14 @@ impl Pair {
         self.d_multiplier = (self.target - self.multiplier * self.d_slack) / self.slack - self.multiplier;
     }
 
-    /// The longest step that keeps s and λ positive.
+    /// Returns the longest step that keeps s and λ positive.
     fn longest(&self) -> f64 {
         let until = |value: f64, change: f64| if change < 0.0 { -value / change } else { f64::INFINITY };
         until(self.slack, self.d_slack).min(until(self.multiplier, self.d_multiplier))
     }
 }
 
-/// One stage of the horizon.
+/// One stage of the horizon: the iterate, its balls and the direction.
 #[derive(Clone, Copy, Debug)]
 struct Stage<const O: usize> {
     state: State<O>,
@@ -143,14 +155,14 @@ struct Stage<const O: usize> {
     d_input: Vector3<f64>,
 }
 
-/// ∇c of a stage's balls: of that on the state, then of that on state and input.
+/// Gradients ∇c of a stage's balls: first of the state ball, then of the input ball.
 #[derive(Clone, Copy, Debug)]
 struct Slopes<const O: usize> {
     state: State<O>,
     input: (State<O>, Vector3<f64>),
 }
 
-/// A face ±nᵀ(E_given − E_0) ≤ 1 of the set that the start is in.
+/// A face ±nᵀ(E_given − E_0) ≤ 1 of the set of admissible initial states.
 #[derive(Clone, Copy, Debug)]
 struct Face<const O: usize> {
     axis: usize,
@@ -158,36 +170,36 @@ struct Face<const O: usize> {
     pair: Pair,
 }
 
-/// What follows the last stage: the optimum without balls.
+/// The optimum without balls that continues the motion after the last stage.
 pub struct Rest<'a, const O: usize> {
-    /// Of the whole horizon, solved.
+    /// Solved optimum without balls over the whole horizon.
     pub unconstrained: &'a Unconstrained<O>,
-    /// d of the whole horizon.
+    /// Affine terms d of the whole horizon.
     pub affine: &'a [State<O>],
 }
 
-/// The solver: its iterate and scratch. Nothing is carried from one problem to the next.
+/// The solver with its iterate and scratch memory. Nothing is carried from one problem to the next.
 pub struct Riccati<const O: usize> {
     stages: Vec<Stage<O>>,
     terminal: Pair,
     faces: Vec<Face<O>>,
-    /// P of the first stage and its p.
+    /// Weight P and slope p of the first stage.
     first: (Blocks<O>, State<O>),
-    /// Intervals of the problem at hand.
+    /// Number of intervals of the present problem.
     horizon: usize,
     max_iterations: u32,
 }
 
-/// How far the iterate is from the optimum.
+/// Distance of the iterate from the optimum.
 #[derive(Clone, Copy, Debug)]
 struct Residuals {
     stationarity: f64,
     feasibility: f64,
-    /// Σ sλ.
+    /// Sum Σ sλ over all included inequalities.
     gap: f64,
-    /// Half the cost.
+    /// Half the cost of the iterate.
     cost: f64,
-    /// Number of inequalities, at least 1.
+    /// Number of included inequalities, at least 1.
     count: f64,
 }
 
@@ -196,14 +208,14 @@ impl Residuals {
         self.stationarity <= STATIONARITY && self.feasibility <= feasibility && self.gap <= GAP * self.cost
     }
 
-    /// μ.
+    /// Returns the mean μ of sλ.
     fn mean(&self) -> f64 {
         self.gap / self.count
     }
 }
 
 impl<const O: usize> Riccati<O> {
-    /// For `horizon` intervals and at most `faces` normals of the start's set.
+    /// Allocates a solver for `horizon` intervals and at most `faces` normals of the initial set.
     pub fn new(horizon: usize, faces: usize, max_iterations: u32) -> Self {
         let stage = Stage {
             state: zero_state(),
@@ -227,8 +239,9 @@ impl<const O: usize> Riccati<O> {
         }
     }
 
-    /// The optimum of `problem`, which takes the stages from `first` on of `solution`. Their motion is the first guess, which must satisfy
-    /// the chain, and is replaced if the optimum is found. With a `rest`, stages that the iterates come near to violating beyond the end are taken in.
+    /// Solves `problem`, which covers the stages of `solution` from `first` on. Their motion is the
+    /// first guess, which must satisfy the chain; it is replaced if the optimum is found. With a
+    /// `rest`, stages beyond the end that an iterate nearly violates are included in the problem.
     pub fn solve<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
@@ -266,16 +279,18 @@ impl<const O: usize> Riccati<O> {
                 return gives_up;
             }
             let affine = self.predictor(problem);
-            // Mehrotra's rule; not below what converges, or the scaling grows without bound while the motion still moves.
+            // Mehrotra's rule, with a lower bound: smaller targets are below the tolerance, and the
+            // scaling would grow without bound while the motion still changes.
             let least = 0.1 * GAP * residuals.cost / residuals.gap;
             let ratio = self.mean_after(problem, affine, residuals.count) / residuals.mean();
             let centring = ratio.powi(3).max(least).min(1.0);
-            // The step goes about so far along the predictor; where it does not follow it at all, its second order only disturbs.
+            // The step follows the predictor about this far; where it does not follow it at all,
+            // the second-order terms only disturb.
             let second_order = (1.0 - centring * centring, affine * (1.0 - centring));
             let centre = centring * residuals.mean();
             let mut alpha = self.corrector(problem, centre, second_order);
             if alpha < SHORT {
-                // The second order misleads.
+                // The second-order terms are misleading.
                 alpha = self.corrector(problem, RECENTRING * residuals.mean(), (0.0, 0.0));
             }
             short_steps = if alpha < STALLED { short_steps + 1 } else { 0 };
@@ -304,12 +319,12 @@ impl<const O: usize> Riccati<O> {
         Outcome::Failed(self.max_iterations)
     }
 
-    /// Intervals of the last problem.
+    /// Returns the number of intervals of the last problem.
     pub fn horizon(&self) -> usize {
         self.horizon
     }
 
-    /// Takes the next stages in if one of them is nearly outside of a ball.
+    /// Extends the problem by the next stages if one of them is nearly outside a ball.
     #[inline(never)]
     fn extend<'a, C: Constraints<O>>(
         &mut self,
@@ -337,7 +352,7 @@ impl<const O: usize> Riccati<O> {
                 return;
             }
             self.horizon = until;
-            // Nothing of another problem may move the input after the last state.
+            // The input after the last state must not keep values of an earlier problem.
             let after = &mut self.stages[until];
             (after.input, after.d_input) = (Vector3::zeros(), Vector3::zeros());
             let (weight, slope) = rest.unconstrained.to_go(first + until);
@@ -345,7 +360,7 @@ impl<const O: usize> Riccati<O> {
         }
     }
 
-    /// The first iterate.
+    /// Sets the first iterate from the guess in `solution`.
     fn begin<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
@@ -361,7 +376,7 @@ impl<const O: usize> Riccati<O> {
         for (stage, input) in self.stages[..self.horizon].iter_mut().zip(&motion.inputs[first..]) {
             stage.input = *input;
         }
-        // Bounds on the last state may look at the input that follows.
+        // The bounds on the last state may depend on the input that follows it.
         let last = &mut self.stages[self.horizon];
         last.input = motion.inputs.get(first + self.horizon).copied().unwrap_or_default();
         last.d_input = Vector3::zeros();
@@ -397,7 +412,8 @@ impl<const O: usize> Riccati<O> {
         }
     }
 
-    /// Takes the balls in that the iterate has come near; `known` gives their multipliers, that on the state first.
+    /// Includes the balls that the iterate has come near. `known` gives the multipliers of a stage,
+    /// state ball first.
     fn watch<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
@@ -407,7 +423,7 @@ impl<const O: usize> Riccati<O> {
     ) {
         let end = self.end();
         let state_balls = problem.constraints.has_state_balls();
-        // What is no number must not go unnoticed.
+        // A value that is not a number must not go unnoticed.
         let near = |square: f64| square.is_nan() || square > NEAR;
         for (k, stage) in self.stages[..=end].iter_mut().enumerate() {
             let (has_state, has_input) = (k > 0 && state_balls, k < end);
@@ -430,7 +446,7 @@ impl<const O: usize> Riccati<O> {
         }
     }
 
-    /// c and its slopes at the iterate.
+    /// Evaluates c and its slopes at the iterate.
     fn evaluate<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) {
         let end = self.end();
         for (k, stage) in self.stages[..=end].iter_mut().enumerate() {
@@ -464,12 +480,13 @@ impl<const O: usize> Riccati<O> {
         }
     }
 
-    /// What is left of the conditions of optimality at the iterate, with the costates p of the motion.
+    /// Computes the residuals of the optimality conditions at the iterate, with the costates p of
+    /// the motion.
     fn residuals<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> Residuals {
         let (mut feasibility, mut gap, mut count) = (0.0_f64, 0.0, 0.0_f64);
         self.each_pair(problem, |pair| {
             let own = (pair.c + pair.slack).abs();
-            // What is no number stays to be seen.
+            // A value that is not a number must stay visible.
             feasibility = if own.is_nan() || own > feasibility { own } else { feasibility };
             gap += pair.slack * pair.multiplier;
             count += 1.0;
@@ -495,7 +512,7 @@ impl<const O: usize> Riccati<O> {
         }
     }
 
-    /// Half the cost of the iterate without what is linear in its end.
+    /// Returns half the cost of the iterate, without the term that is linear in its end.
     fn cost<C: Constraints<O>>(&self, problem: &Problem<O, C>) -> f64 {
         let stages = self.stages[..self.horizon].iter();
         let inner: f64 = stages
@@ -508,13 +525,14 @@ impl<const O: usize> Riccati<O> {
         0.5 * (inner + dot(end, &problem.end.weighted(end)))
     }
 
-    /// Position of the last stage.
+    /// Returns the index of the last stage.
     fn end(&self) -> usize {
         self.horizon
     }
 
-    /// ∇L from the end to the start: calls `visit` with the slope in each input, its own part and that of what follows; leaves that in
-    /// E_0.
+    /// Computes ∇L from the end to the start. `visit` receives two parts of the slope in each
+    /// input: the stage's own, and the part of all later stages. The slope in E_0 remains in
+    /// `first`.
     fn adjoint<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
@@ -531,7 +549,7 @@ impl<const O: usize> Riccati<O> {
         self.first.1 = add(&p, &self.start_slope(problem, &multiplier));
     }
 
-    /// ∂L/∂E_N.
+    /// Returns the slope ∂L/∂E_N at the last stage.
     fn end_slope<C: Constraints<O>>(
         &self,
         problem: &Problem<O, C>,
@@ -551,7 +569,7 @@ impl<const O: usize> Riccati<O> {
         slope
     }
 
-    /// What the start adds to ∂L/∂E_0.
+    /// Returns the part of ∂L/∂E_0 that comes from the conditions on the start.
     fn start_slope<C>(&self, problem: &Problem<O, C>, multiplier: &impl Fn(&Pair) -> f64) -> State<O> {
         let mut slope = zero_state();
         if let Start::Arrival(weight, mean) = &problem.start {
@@ -565,7 +583,7 @@ impl<const O: usize> Riccati<O> {
         slope
     }
 
-    /// The backward recursion for P and the gains.
+    /// Runs the backward recursion for P and the gains.
     fn factor<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> Option<()> {
         let last = self.end();
         let mut p = self.end_weight(problem);
@@ -599,7 +617,7 @@ impl<const O: usize> Riccati<O> {
         Some(())
     }
 
-    /// P_N.
+    /// Returns the weight P_N of the last stage.
     fn end_weight<C: Constraints<O>>(&self, problem: &Problem<O, C>) -> Blocks<O> {
         let stage = &self.stages[self.end()];
         let mut quadratic = Quadratic::diagonal(&zero_state(), &Vector3::zeros());
@@ -627,14 +645,15 @@ impl<const O: usize> Riccati<O> {
         quadratic.q
     }
 
-    /// The direction to sλ = 0; returns the longest step along it.
+    /// Computes the direction to sλ = 0 and returns the longest step along it.
     fn predictor<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> f64 {
         self.each_pair(problem, Pair::aim);
         self.direction(problem);
         self.longest(problem).min(1.0)
     }
 
-    /// The direction to sλ = σμ with what the predictor learnt of second order; returns the step along it.
+    /// Computes the direction to sλ = σμ with the second-order terms from the predictor, and
+    /// returns the step along it.
     fn corrector<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
@@ -652,7 +671,7 @@ impl<const O: usize> Riccati<O> {
         longest
     }
 
-    /// Mean of sλ after a step.
+    /// Returns the mean of sλ after a step `alpha`.
     fn mean_after<C: Constraints<O>>(&mut self, problem: &Problem<O, C>, alpha: f64, count: f64) -> f64 {
         let mut gap = 0.0;
         self.each_pair(problem, |pair| {
@@ -661,7 +680,8 @@ impl<const O: usize> Riccati<O> {
         gap / count
     }
 
-    /// Newton's direction by the factors at hand: feedforward backwards, then the motion forwards.
+    /// Computes Newton's direction with the present factors: the feedforward backwards, then the
+    /// motion forwards.
     fn direction<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) {
         let last = self.end();
         let mut p = self.end_slope(problem, &Pair::effective);
@@ -743,12 +763,12 @@ impl<const O: usize> Riccati<O> {
 }
 
 impl<const O: usize> Stage<O> {
-    /// Whether any of its balls is.
+    /// Returns whether any ball of the stage is included in the problem.
     fn watched(&self) -> bool {
         self.state_pair.watched || self.input_pair.watched
     }
 
-    /// Balls, c and its slopes at the iterate.
+    /// Evaluates the balls, c and its slopes at the iterate.
     fn evaluate(&mut self, constraints: &impl Constraints<O>, k: usize) {
         self.balls = constraints.balls(k, &self.state, &self.input);
         let Balls { state, input } = &self.balls;
@@ -760,7 +780,7 @@ impl<const O: usize> Stage<O> {
         self.input_pair.evaluate(&input.value);
     }
 
-    /// ∂/∂E and ∂/∂v of the stage's cost and of its balls by their multipliers.
+    /// Returns ∂/∂E and ∂/∂v of the stage's cost and of its balls, weighted by their multipliers.
     fn slope<C: Constraints<O>>(
         &self,
         problem: &Problem<O, C>,

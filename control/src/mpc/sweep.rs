@@ -3,10 +3,11 @@
 use super::problem::{Ball, Chain, State, zero_state};
 use nalgebra::{Matrix3, Vector3};
 
-/// A symmetric matrix on a state, in 3×3 blocks; those above the diagonal count.
+/// A symmetric matrix on a state, in 3×3 blocks. Only the blocks on and above the diagonal are
+/// used.
 pub(super) type Blocks<const O: usize> = [[Matrix3<f64>; O]; O];
 
-/// ½ EᵀQ E + EᵀSᵀv + ½ vᵀR v + qᵀE + rᵀv of one stage.
+/// Quadratic cost of one stage, ½ EᵀQ E + EᵀSᵀv + ½ vᵀR v + qᵀE + rᵀv.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Quadratic<const O: usize> {
     pub q: Blocks<O>,
@@ -15,7 +16,7 @@ pub(super) struct Quadratic<const O: usize> {
 }
 
 impl<const O: usize> Quadratic<O> {
-    /// Of diagonal weights.
+    /// Returns the quadratic with the given diagonal weights of state and input.
     pub(super) fn diagonal(state: &State<O>, input: &Vector3<f64>) -> Self {
         let mut q = [[Matrix3::zeros(); O]; O];
         for i in 0..O {
@@ -24,7 +25,8 @@ impl<const O: usize> Quadratic<O> {
         Self { q, s: [Matrix3::zeros(); O], r: Matrix3::from_diagonal(input) }
     }
 
-    /// Adds the ball's share: λ JᵀJ, the curvature of ½‖y‖², and (λ/s) ∇c ∇cᵀ with `slope` ∇c = Jᵀy.
+    /// Adds the part of a ball: λ JᵀJ, the curvature of ½‖y‖², and (λ/s) ∇c ∇cᵀ, where `slope` is
+    /// ∇c = Jᵀy.
     pub(super) fn add_ball(
         &mut self,
         ball: &Ball<O>,
@@ -41,7 +43,7 @@ impl<const O: usize> Quadratic<O> {
         self.r += by_input * ball.by_input + weighted * slope.1.transpose();
     }
 
-    /// The same of a ball that the input is not in.
+    /// Adds the part of a ball that does not depend on the input.
     pub(super) fn add_state_ball(&mut self, ball: &Ball<O>, slope: &State<O>, multiplier: f64, scaling: f64) {
         for i in 0..O {
             let by_state = ball.by_state[i].transpose() * multiplier;
@@ -53,7 +55,7 @@ impl<const O: usize> Quadratic<O> {
     }
 }
 
-/// What the recursion leaves at a stage: v = K E + k with K = −M⁻¹F, M = R + BᵀPB, F = S + BᵀPA.
+/// Result of the recursion at a stage: v = K E + k with K = −M⁻¹F, M = R + BᵀPB, F = S + BᵀPA.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gain<const O: usize> {
     pub k: [Matrix3<f64>; O],
@@ -67,9 +69,10 @@ impl<const O: usize> Default for Gain<O> {
 }
 
 impl<const O: usize> Gain<O> {
-    /// The gain of a stage with the given cost, and P ← Q + AᵀPA − FᵀM⁻¹F; nothing if M is not positive definite.
+    /// Computes the gain of a stage with the given cost, and P ← Q + AᵀPA − FᵀM⁻¹F. Returns `None`
+    /// if M is not positive definite.
     pub(super) fn factor(stage: &Quadratic<O>, chain: &Chain<O>, p: &mut Blocks<O>) -> Option<Self> {
-        // P B and P A, where P is symmetric and A has ones on its diagonal.
+        // The products P B and P A use that P is symmetric and that A has ones on its diagonal.
         let block = |i: usize, j: usize| if i <= j { p[i][j] } else { p[j][i].transpose() };
         let pb: [Matrix3<f64>; O] =
             std::array::from_fn(|i| (0..O).fold(Matrix3::zeros(), |sum, j| sum + block(i, j) * chain.b[j]));
@@ -91,18 +94,18 @@ impl<const O: usize> Gain<O> {
         Some(Self { k, m })
     }
 
-    /// k = −M⁻¹r, and Kᵀr.
+    /// Returns the feedforward k = −M⁻¹r, and Kᵀr.
     pub(super) fn feedforward(&self, r: &Vector3<f64>) -> (Vector3<f64>, State<O>) {
         (-self.m.solve(r), self.k.map(|k| k.tr_mul(r)))
     }
 
-    /// K E + k.
+    /// Returns the input K E + k.
     pub(super) fn input(&self, state: &State<O>, feedforward: &Vector3<f64>) -> Vector3<f64> {
         self.k.iter().zip(state).fold(*feedforward, |sum, (k, e)| sum + k * e)
     }
 }
 
-/// −P⁻¹p by block elimination; nothing if P is not positive definite.
+/// Returns −P⁻¹p by block elimination, or `None` if P is not positive definite.
 pub(super) fn minimiser<const O: usize>(p: &Blocks<O>, slope: &State<O>) -> Option<State<O>> {
     let (mut p, mut rest) = (*p, *slope);
     let mut pivots = [Ldl::default(); O];
@@ -126,7 +129,7 @@ pub(super) fn minimiser<const O: usize>(p: &Blocks<O>, slope: &State<O>) -> Opti
     Some(solution)
 }
 
-/// L D Lᵀ of a symmetric positive definite 3×3 matrix; D inverted.
+/// Factors L D Lᵀ of a symmetric positive definite 3×3 matrix, with the inverse of D.
 #[derive(Clone, Copy, Debug, Default)]
 struct Ldl {
     l21: f64,

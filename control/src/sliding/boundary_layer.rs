@@ -1,22 +1,23 @@
-//! Reaching laws that are continuous within a boundary layer: Wu 2015, (34), and the finite-time one of Jia et al., (7).
+//! Reaching laws that are continuous within a boundary layer: (34) of Wu 2015, and the finite-time
+//! law (7) of Jia et al.
 
 use crate::error::DesignError;
 use crate::sliding::Reaching;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// sat(s) of Wu 2015, (35): s/h within the layer |s| ≤ h, sgn(s) outside.
+/// Returns sat(s) of Wu 2015, (35): s/h within the layer |s| ≤ h, sgn(s) outside.
 pub fn saturated(s: f64, h: f64) -> f64 {
     (s / h).clamp(-1.0, 1.0)
 }
 
-/// ṡ = −η sat(s), Wu 2015, (34) and (35).
+/// The reaching law ṡ = −η sat(s) of Wu 2015, (34) and (35).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoundaryLayer {
-    /// η, diagonal, rad/s².
+    /// Diagonal of the gain η, rad/s².
     pub eta: [f64; 3],
-    /// h, thickness of the layer, rad/s.
+    /// Thickness h of the layer, rad/s.
     pub h: [f64; 3],
 }
 
@@ -42,16 +43,16 @@ impl Reaching for BoundaryLayer {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FiniteTimeLayer {
-    /// ρ per axis.
+    /// Gain ρ per axis.
     pub rho: [f64; 3],
-    /// ε, thickness of the layer, per axis.
+    /// Thickness ε of the layer per axis.
     pub epsilon: [f64; 3],
-    /// b, between 0 and 1, per axis.
+    /// Exponent b per axis, between 0 and 1.
     pub b: [f64; 3],
 }
 
 impl FiniteTimeLayer {
-    /// ρ f SAT of each component of s.
+    /// Returns ρ f SAT of each component of s.
     pub fn value(&self, s: &Vector3<f64>) -> Vector3<f64> {
         Vector3::from_fn(|i, _| {
             let (factor, x, b) = self.scaled(i, s[i]);
@@ -59,7 +60,7 @@ impl FiniteTimeLayer {
         })
     }
 
-    /// Its derivative by s; inside the layer at |s| = ε.
+    /// Returns the derivative of the value by s; inside the layer it is the one at |s| = ε.
     pub fn slope(&self, s: &Vector3<f64>) -> Vector3<f64> {
         Vector3::from_fn(|i, _| {
             let (factor, x, b) = self.scaled(i, s[i]);
@@ -69,12 +70,12 @@ impl FiniteTimeLayer {
         })
     }
 
-    /// The largest slope of an axis, at the edge of the layer, 1/s.
+    /// Returns the largest slope of any axis, which occurs at the edge of the layer, 1/s.
     pub(crate) fn steepest(&self) -> f64 {
         self.slope(&Vector3::from(self.epsilon)).max()
     }
 
-    /// ρ 2^(−(b+1)/2), s/ε and b of one axis.
+    /// Returns ρ 2^(−(b+1)/2), s/ε and b of one axis.
     fn scaled(&self, i: usize, s: f64) -> (f64, f64, f64) {
         let b = self.b[i];
         (self.rho[i] * (-(b + 1.0) / 2.0).exp2(), s / self.epsilon[i], b)
@@ -112,7 +113,7 @@ mod tests {
 
     #[test]
     fn oracle_outside_the_layer_the_reaching_time_is_finite() {
-        // ds/dt = −k s^b reaches ε from s₀ after (s₀^(1−b) − ε^(1−b))/(k (1−b)).
+        // The solution of ds/dt = −k s^b reaches ε from s₀ after (s₀^(1−b) − ε^(1−b))/(k (1−b)).
         let (mut s, step) = (Vector3::repeat(0.3), 1e-5);
         let (rho, epsilon, b) = (0.8, 0.02_f64, 0.5);
         let k = rho * 2f64.powf(-0.75) / epsilon.powf(b);

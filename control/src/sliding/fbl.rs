@@ -1,4 +1,4 @@
-//! Feedback linearisation (FBL), Wu 2015, (61): the comparison without sliding mode.
+//! Feedback linearisation (FBL) of Wu 2015, (61): the comparison without sliding mode.
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
@@ -12,17 +12,17 @@ use vehicle::dynamics::RigidBody;
 /// Settings of the controller. Units SI, angles rad.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FblSettings {
-    /// The vehicle as the controller believes it to be.
+    /// Model of the vehicle that the controller uses.
     pub body: RigidBody,
     /// Time between ticks, s.
     pub period: f64,
-    /// k_p, 1/s².
+    /// Proportional gain k_p, 1/s².
     pub kp: f64,
-    /// k_d, 1/s.
+    /// Derivative gain k_d, 1/s.
     pub kd: f64,
 }
 
-/// M = K⁻¹ (v − B) with v = Θ̈_r − k_p e − k_d ė, (15) and (61).
+/// The law M = K⁻¹ (v − B) with v = Θ̈_r − k_p e − k_d ė, (15) and (61).
 ///
 /// ```
 /// use control::closed_loop::fly;
@@ -40,10 +40,11 @@ pub struct Fbl {
 }
 
 impl Fbl {
-    /// Checks the settings.
+    /// Checks the settings of the law.
     ///
     /// # Errors
-    /// Names the setting at fault; refuses gains that the sampling makes unstable.
+    /// Returns an error that names the setting at fault, or the gains that the sampling makes
+    /// unstable.
     pub fn new(settings: FblSettings) -> Result<Self, DesignError> {
         let FblSettings { period, kp, kd, .. } = settings;
         for (name, value) in [("period.feedback", period), ("gain.p", kp), ("gain.d", kd)] {

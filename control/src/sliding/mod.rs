@@ -1,9 +1,9 @@
-//! Time-varying sliding-mode control (TVSMC) of Wu et al. (2015): BTVSMC (62), BTVSMC/DO (36) and SOTVSMC/DO (45), and the
-//! feedback linearisation (61) they are compared with.
+//! Time-varying sliding-mode control (TVSMC) of Wu et al. (2015): BTVSMC (62), BTVSMC/DO (36) and
+//! SOTVSMC/DO (45), and the feedback linearisation (61) with which they are compared.
 //!
-//! All of them linearise Θ̈ = K M + B + Δv by M = K⁻¹ (v − B), (15), with K = R I⁻¹ and B = Ṙ ω − R I⁻¹ (ω × I ω), and choose
-//! v. The printed Δv leaves out a derivative and has R I⁻¹ where R belongs, (12); it is estimated as a whole, so nothing here
-//! depends on that.
+//! All of them linearise Θ̈ = K M + B + Δv by M = K⁻¹ (v − B), (15), with K = R I⁻¹ and B = Ṙ ω − R
+//! I⁻¹ (ω × I ω), and choose v. The printed Δv lacks a derivative and has R I⁻¹ where R belongs,
+//! (12). This does not matter here, because Δv is estimated as a whole.
 
 mod boundary_layer;
 mod fbl;
@@ -28,42 +28,43 @@ use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
 use vehicle::reference::Reference;
 
-/// How the sliding variable is driven to zero.
+/// A reaching law, which drives the sliding variable to zero.
 pub trait Reaching: Copy {
-    /// What the law integrates.
+    /// The integral state of the law.
     type Memory: Copy + Default + Serialize + DeserializeOwned + Send;
 
-    /// Refuses, by name, what cannot work at this period (s).
+    /// Checks that the law works at this period (s).
     ///
     /// # Errors
-    /// Names the setting at fault.
+    /// Returns an error that names the setting at fault.
     fn check(&self, period: f64) -> Result<(), DesignError>;
 
-    /// ṡ at s (rad/s), rad/s².
+    /// Returns ṡ at s (rad/s), rad/s².
     fn sliding_rate(&self, memory: &Self::Memory, s: &Vector3<f64>) -> Vector3<f64>;
 
-    /// Integrates over `period` (s), in which s (rad/s) is held.
+    /// Advances the integral over `period` (s), in which s (rad/s) is held.
     fn advance(&self, memory: &mut Self::Memory, s: &Vector3<f64>, period: f64);
 }
 
-/// BTVSMC and BTVSMC/DO, (62) and (36).
+/// The laws BTVSMC and BTVSMC/DO, (62) and (36).
 pub type Btvsmc = Tvsmc<BoundaryLayer>;
-/// SOTVSMC/DO, (45).
+/// The law SOTVSMC/DO, (45).
 pub type SotvsmcDo = Tvsmc<SecondOrder>;
 
-/// A moment that was commanded, and what is needed to tell how far the actuators fell short of it.
+/// A commanded moment, with the data that tell how far the actuators fell short of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Commanded {
-    /// M, N m.
+    /// Commanded moment M, N m.
     pub moment: Vector3<f64>,
-    /// Θ at that tick, rad.
+    /// Angles Θ at that tick, rad.
     pub angles: Vector3<f64>,
-    /// K M − (v − B): what a limit on M cost, rad/s².
+    /// Loss K M − (v − B) by the limit on M, rad/s².
     pub cut: Vector3<f64>,
 }
 
 impl Commanded {
-    /// The moment behind `v` (rad/s²), scaled into ‖M‖ ≤ `limit` (N m).
+    /// Returns the moment `wanted` (N m) scaled into ‖M‖ ≤ `limit` (N m), with the loss by the
+    /// scaling.
     pub(crate) fn new(body: &RigidBody, measured: &Measurement, wanted: Vector3<f64>, limit: f64) -> Self {
         let excess = wanted.norm() / limit;
         let moment = if excess > 1.0 { wanted / excess } else { wanted };
@@ -71,40 +72,40 @@ impl Commanded {
         Self { moment, angles, cut: gain(body, &angles, moment - wanted) }
     }
 
-    /// v_achieved − v = K (M_achieved − M_wanted), rad/s², with the moment that was measured at the next tick, or with the
-    /// commanded one.
+    /// Returns v_achieved − v = K (M_achieved − M_wanted), rad/s², with the moment that was
+    /// measured at the next tick, or with the commanded one.
     pub(crate) fn shortfall(&self, body: &RigidBody, achieved: Option<Vector3<f64>>) -> Vector3<f64> {
         self.cut + achieved.map_or_else(Vector3::zeros, |m| gain(body, &self.angles, m - self.moment))
     }
 }
 
-/// K M = R I⁻¹ M, rad/s².
+/// Returns the angular acceleration K M = R I⁻¹ M, rad/s².
 fn gain(body: &RigidBody, angles: &Vector3<f64>, moment: Vector3<f64>) -> Vector3<f64> {
     kinematics::r(angles) * (body.inverse * moment)
 }
 
-/// What a time-varying sliding mode carries from tick to tick.
+/// The state that a time-varying sliding mode carries from tick to tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory<Integral> {
-    /// Whether there was a tick.
+    /// Whether there has been a tick.
     pub started: bool,
-    /// The surface in force.
+    /// Anchor of the surface in force.
     pub anchor: Anchor,
-    /// s at the last tick, rad/s.
+    /// Sliding variable s at the last tick, rad/s.
     pub sliding: Vector3<f64>,
-    /// v − b at the last tick, rad/s².
+    /// Drive v − b at the last tick, rad/s².
     pub drive: Vector3<f64>,
-    /// The moment of the last tick.
+    /// Commanded moment of the last tick.
     pub commanded: Commanded,
-    /// Whether the actuators fell short in the interval before the last tick.
+    /// Whether the actuators saturated in the interval before the last tick.
     pub saturated: bool,
     /// State of the reaching law.
     pub integral: Integral,
-    /// State of the observer; rests at zero without one.
+    /// State of the observer; it stays zero without one.
     pub estimate: Estimate,
 }
 
-/// v = b − z₁ + ṡ, (27), with one of the reaching laws; without observer z₁ = 0.
+/// The law v = b − z₁ + ṡ, (27), with one of the reaching laws; without observer z₁ = 0.
 ///
 /// ```
 /// use control::closed_loop::fly;
@@ -127,10 +128,10 @@ pub struct Tvsmc<R> {
 }
 
 impl<R: Reaching> Tvsmc<R> {
-    /// Checks the settings.
+    /// Checks the settings of the law.
     ///
     /// # Errors
-    /// Names the setting at fault.
+    /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings<R>) -> Result<Self, DesignError> {
         let Settings { period, surface, reaching, observer, threshold, .. } = &settings;
         all_positive("period.feedback", &[*period])?;
@@ -141,12 +142,14 @@ impl<R: Reaching> Tvsmc<R> {
         Ok(Self { settings })
     }
 
-    /// Brings observer and reaching law from the last tick to this one, given what the actuators achieved since.
+    /// Advances observer and reaching law from the last tick to this one, with the moment that the
+    /// actuators achieved since then.
     fn integrate(&self, memory: &mut Memory<R::Memory>, achieved: Option<Vector3<f64>>) {
         let Settings { body, period, reaching, observer, threshold, .. } = &self.settings;
         let shortfall = memory.commanded.shortfall(body, achieved);
         if let Some(observer) = observer {
-            // The observer must know the v that acted: else it takes the shortfall for a disturbance.
+            // The observer must know the v that acted; otherwise it would treat the shortfall as a
+            // disturbance.
             let drive = memory.drive + shortfall;
             memory.estimate = observer.advance(&memory.estimate, &memory.sliding, &drive, *period);
         }
@@ -162,8 +165,8 @@ impl<R: Reaching> Controller for Tvsmc<R> {
         self.settings.period
     }
 
-    /// The moment at a tick does not depend on the moment achieved before it: that acts from the next tick on. So there is no
-    /// algebraic loop with actuators that answer at once.
+    /// The moment at a tick does not depend on the moment achieved before it, which has effect from
+    /// the next tick on. This avoids an algebraic loop with actuators that respond at once.
     fn update(
         &mut self,
         memory: &mut Self::Memory,
@@ -181,7 +184,7 @@ impl<R: Reaching> Controller for Tvsmc<R> {
         }
         if !memory.started || re_anchor {
             if memory.started {
-                // s jumps to zero, and its estimate by as much.
+                // The sliding variable s jumps to zero, and its estimate by the same amount.
                 memory.estimate.sliding -= surface.sliding(&memory.anchor, time, &error);
             }
             memory.anchor = surface.anchor(time, &error);
@@ -190,7 +193,7 @@ impl<R: Reaching> Controller for Tvsmc<R> {
         }
         let s = surface.sliding(&memory.anchor, time, &error);
         let b = surface.equivalent(&memory.anchor, time, &error, &reference.accelerations);
-        // Wu 2015, (27), and (15)
+        // Wu 2015, (27) and (15).
         let v = b - memory.estimate.disturbance + reaching.sliding_rate(&memory.integral, &s);
         let wanted = linearise::moment(body, &measured.angles, &angle_rates, &v);
         memory.sliding = s;
@@ -200,7 +203,7 @@ impl<R: Reaching> Controller for Tvsmc<R> {
     }
 }
 
-/// e = Θ − Θ_r and ė, and Θ̇ (rad/s).
+/// Returns e = Θ − Θ_r (rad) and ė (rad/s), and Θ̇ (rad/s).
 pub(crate) fn tracking_error(measured: &Measurement, reference: &Reference) -> (TrackingError, Vector3<f64>) {
     let angle_rates = kinematics::r(&measured.angles) * measured.rates;
     let error =
@@ -208,17 +211,17 @@ pub(crate) fn tracking_error(measured: &Measurement, reference: &Reference) -> (
     (error, angle_rates)
 }
 
-/// sgn(x), 0 at 0.
+/// Returns sgn(x), which is 0 at 0.
 fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }
 
-/// sig^a(x) = |x|^a sgn(x).
+/// Returns sig^a(x) = |x|^a sgn(x).
 fn power(x: f64, a: f64) -> f64 {
     x.abs().powf(a) * sign(x)
 }
 
-/// Refuses a value that is not positive and finite.
+/// Returns an error for a value that is not positive and finite.
 pub(crate) fn all_positive(name: &str, values: &[f64]) -> Result<(), DesignError> {
     match values.iter().find(|value| !(**value > 0.0 && value.is_finite())) {
         Some(&value) => Err(DesignError::Setting { name: name.into(), value }),
@@ -226,7 +229,8 @@ pub(crate) fn all_positive(name: &str, values: &[f64]) -> Result<(), DesignError
     }
 }
 
-/// Refuses a rate of decay (1/s) that ticks of `period` (s) turn into growth: 1 − rate·period must exceed −1.
+/// Returns an error for a rate of decay (1/s) that becomes growth with ticks of `period` (s):
+/// 1 − rate·period must exceed −1.
 pub(crate) fn sampled_decay(name: &'static str, rate: f64, period: f64) -> Result<(), DesignError> {
     let high = 2.0 / period;
     if rate < high { Ok(()) } else { Err(DesignError::OutOfRange { name, value: rate, low: 0.0, high }) }

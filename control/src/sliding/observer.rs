@@ -1,4 +1,5 @@
-//! The disturbance observer of Wu 2015, (24): a robust exact differentiator of second order on the sliding variable.
+//! The disturbance observer of Wu 2015, (24): a robust exact differentiator of second order on the
+//! sliding variable.
 
 use crate::error::DesignError;
 use nalgebra::Vector3;
@@ -8,32 +9,33 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Observer {
-    /// λ₀, λ₁, λ₂; γ₁, γ₂, γ₃ in Table 1.
+    /// Gains λ₀, λ₁, λ₂, which are γ₁, γ₂, γ₃ in Table 1.
     pub lambda: [f64; 3],
-    /// L, diagonal: bounds on the second derivative of the lumped uncertainty, rad/s⁴.
+    /// Diagonal of L: bounds on the second derivative of the lumped uncertainty, rad/s⁴.
     pub l: [f64; 3],
 }
 
-/// State of the observer.
+/// State of the observer: its three estimates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// z₀ of s, rad/s.
+    /// Estimate z₀ of s, rad/s.
     pub sliding: Vector3<f64>,
-    /// z₁ of the lumped uncertainty Δv, rad/s².
+    /// Estimate z₁ of the lumped uncertainty Δv, rad/s².
     pub disturbance: Vector3<f64>,
-    /// z₂ of its derivative, rad/s³.
+    /// Estimate z₂ of the derivative of Δv, rad/s³.
     pub disturbance_rate: Vector3<f64>,
 }
 
 impl Observer {
-    /// Refuses gains that are not positive.
+    /// Returns an error for gains that are not positive.
     pub(super) fn check(&self) -> Result<(), DesignError> {
         super::all_positive("observer.lambda", &self.lambda)?;
         super::all_positive("observer.L", &self.l)
     }
 
-    /// The state after `period` (s) in which ṡ = `drive` + Δv, `drive` = v − b, from `sliding` = s at its beginning (24), by
-    /// Euler's rule. What `drive` is shows in z₀ first, one step later in z₁.
+    /// Returns the state (24) after `period` (s) by Euler's rule, with ṡ = `drive` + Δv,
+    /// `drive` = v − b, and s = `sliding` at the beginning. A change of `drive` affects z₀ first,
+    /// and z₁ one step later.
     #[must_use]
     pub fn advance(
         &self,

@@ -5,25 +5,26 @@ use crate::sliding::Reaching;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// ṡ = −k₁ sig^((m−1)/m)(s) − k₂ s + τ, τ̇ = −k₃ sig^((m−2)/m)(s) − k₄ s, with sig^a(s) = |s|^a sgn(s). Printed with + k₃ and
-/// a second sgn, which diverges.
+/// The reaching law ṡ = −k₁ sig^((m−1)/m)(s) − k₂ s + τ, τ̇ = −k₃ sig^((m−2)/m)(s) − k₄ s, with
+/// sig^a(s) = |s|^a sgn(s). It is printed with + k₃ and a second sgn, which diverges.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SecondOrder {
-    /// k₁ per axis.
+    /// Gain k₁ per axis.
     pub k1: [f64; 3],
-    /// k₂ per axis, 1/s.
+    /// Gain k₂ per axis, 1/s.
     pub k2: [f64; 3],
-    /// k₃ per axis.
+    /// Gain k₃ per axis.
     pub k3: [f64; 3],
-    /// k₄ per axis, 1/s².
+    /// Gain k₄ per axis, 1/s².
     pub k4: [f64; 3],
-    /// m > 2.
+    /// Parameter m of the exponents, m > 2.
     pub m: f64,
 }
 
 impl SecondOrder {
-    /// Left-hand side of condition (46) for one axis (from 0); the proof of stability needs it positive.
+    /// Returns the left-hand side of condition (46) for one axis (from 0). The proof of stability
+    /// requires it to be positive.
     pub fn condition_46(&self, axis: usize) -> f64 {
         let Self { k1, k2, k3, k4, m } = self;
         let (k1, k2, k3, k4) = (k1[axis], k2[axis], k3[axis], k4[axis]);
@@ -32,7 +33,7 @@ impl SecondOrder {
 }
 
 impl Reaching for SecondOrder {
-    /// τ, rad/s².
+    /// The integral state τ, rad/s².
     type Memory = Vector3<f64>;
 
     fn check(&self, period: f64) -> Result<(), DesignError> {
@@ -72,7 +73,7 @@ mod tests {
 
     const LAW: SecondOrder = SecondOrder { k1: [0.1; 3], k2: [0.2; 3], k3: [0.1; 3], k4: [0.1; 3], m: 3.0 };
 
-    /// |s| after 60 s of ds/dt = `rate`, from 0.1 rad/s.
+    /// Returns |s| after 60 s of ds/dt = `rate`, from 0.1 rad/s.
     fn left(law: &SecondOrder, rate: impl Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>) -> f64 {
         let (period, mut s, mut tau) = (0.001, Vector3::repeat(0.1), Vector3::zeros());
         for _ in 0..60_000 {
@@ -102,7 +103,7 @@ mod tests {
     fn published_sign_of_k3_does_not_converge() {
         let right = left(&LAW, |tau, s| LAW.sliding_rate(tau, s));
         assert!(right < 1e-4, "{right}");
-        // Printed: + k₃, and sgn twice, which makes the powers of |s| even.
+        // The printed form has + k₃ and a second sgn, which makes the powers of |s| even functions.
         let period = 0.001;
         for twice in [false, true] {
             let power = |s: f64, a: f64| if twice { s.abs().powf(a) } else { crate::sliding::power(s, a) };

@@ -1,4 +1,4 @@
-//! Settings of the sliding-mode controllers, and the published ones from `data/tvsmc-2015.toml`.
+//! Settings of the sliding-mode controllers, with the published ones from `data/tvsmc-2015.toml`.
 
 use crate::sliding::{BoundaryLayer, FblSettings, Observer, SecondOrder, Surface};
 use serde::{Deserialize, Serialize};
@@ -9,22 +9,22 @@ use vehicle::scenario::Scenario;
 /// Settings of a time-varying sliding mode. Units SI, angles rad.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings<R> {
-    /// The vehicle as the controller believes it to be.
+    /// Model of the vehicle that the controller uses.
     pub body: RigidBody,
     /// Time between ticks, s.
     pub period: f64,
     /// Limit on ‖M‖ into which the command is scaled, N m; infinite for none.
     pub limit_moment: f64,
-    /// The surface.
+    /// Gains of the sliding surface.
     pub surface: Surface,
-    /// The reaching law.
+    /// Reaching law with its gains.
     pub reaching: R,
-    /// The disturbance observer, if there is one.
+    /// Disturbance observer, if there is one.
     pub observer: Option<Observer>,
-    /// Whether the surface is laid anew through the state, and the reaching law's integral cleared, while the actuators
-    /// saturate.
+    /// Whether, while the actuators saturate, the surface is placed again through the state and the
+    /// reaching law's integral is cleared.
     pub anti_windup: bool,
-    /// ‖v_achieved − v‖ from which on they do, rad/s².
+    /// Value of ‖v_achieved − v‖ above which the actuators count as saturated, rad/s².
     pub threshold: f64,
 }
 
@@ -66,7 +66,7 @@ fn body() -> RigidBody {
 }
 
 impl FblSettings {
-    /// Wu 2015, section 6, with its vehicle at the nominal inertia.
+    /// Returns the settings of Wu 2015, section 6, with its vehicle at the nominal inertia.
     pub fn published() -> Self {
         let &File { period, feedback_linearisation: FeedbackLinearisation { kp, kd }, .. } = embedded();
         Self { body: body(), period, kp, kd }
@@ -89,13 +89,13 @@ impl<R> Settings<R> {
 }
 
 impl Settings<BoundaryLayer> {
-    /// BTVSMC of Wu 2015, Table 1.
+    /// Returns the settings of BTVSMC in Wu 2015, Table 1.
     pub fn btvsmc() -> Self {
         let file = embedded();
         Self::published(file, file.boundary_layer, None)
     }
 
-    /// BTVSMC/DO of Wu 2015, Table 1.
+    /// Returns the settings of BTVSMC/DO in Wu 2015, Table 1.
     pub fn btvsmc_do() -> Self {
         let file = embedded();
         Self::published(file, file.boundary_layer, Some(file.observer))
@@ -103,7 +103,7 @@ impl Settings<BoundaryLayer> {
 }
 
 impl Settings<SecondOrder> {
-    /// SOTVSMC/DO of Wu 2015, Table 1.
+    /// Returns the settings of SOTVSMC/DO in Wu 2015, Table 1.
     pub fn sotvsmc_do() -> Self {
         let file = embedded();
         Self::published(file, file.second_order, Some(file.observer))

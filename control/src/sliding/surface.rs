@@ -4,52 +4,53 @@ use crate::error::DesignError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// Gains of s = ė + c e + a exp(−λ(t − t₀)).
+/// Gains of the surface s = ė + c e + a exp(−λ(t − t₀)).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Surface {
-    /// c, diagonal, 1/s.
+    /// Diagonal of the gain c, 1/s.
     pub c: [f64; 3],
-    /// λ, 1/s.
+    /// Rate λ of the decay, 1/s.
     pub lambda: f64,
 }
 
-/// Tracking error e = Θ − Θ_r (rad) and ė (rad/s).
+/// Tracking error e = Θ − Θ_r (rad) and its derivative ė (rad/s).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrackingError {
-    /// e, rad.
+    /// Angle error e, rad.
     pub angles: Vector3<f64>,
-    /// ė, rad/s.
+    /// Rate error ė, rad/s.
     pub rates: Vector3<f64>,
 }
 
-/// Where the surface was laid through the state.
+/// Time and offset at which the surface was placed through the state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Anchor {
-    /// t₀, s.
+    /// Time t₀ of the placement, s.
     pub time: f64,
-    /// a, rad/s.
+    /// Offset a of the surface at t₀, rad/s.
     pub a: Vector3<f64>,
 }
 
 impl Surface {
-    /// Refuses gains that are not positive.
+    /// Returns an error for gains that are not positive.
     pub(super) fn check(&self) -> Result<(), DesignError> {
         super::all_positive("surface.c", &self.c)?;
         super::all_positive("surface.lambda", &[self.lambda])
     }
 
-    /// a = −ė − c e at `time` (s), (18): the state is then on the surface.
+    /// Returns the surface through the state at `time` (s): a = −ė − c e, (18).
     pub fn anchor(&self, time: f64, error: &TrackingError) -> Anchor {
         Anchor { time, a: -error.rates - self.c().component_mul(&error.angles) }
     }
 
-    /// s at `time`, (17), rad/s.
+    /// Returns the sliding variable s at `time`, (17), rad/s.
     pub fn sliding(&self, anchor: &Anchor, time: f64, error: &TrackingError) -> Vector3<f64> {
         error.rates + self.c().component_mul(&error.angles) + anchor.a * self.decay(anchor, time)
     }
 
-    /// b = Θ̈_r − c ė + λ a exp(−λ(t − t₀)), (22): v = b keeps s constant without uncertainty; rad/s².
+    /// Returns b = Θ̈_r − c ė + λ a exp(−λ(t − t₀)), (22), rad/s². Without uncertainty, v = b keeps
+    /// s constant.
     pub fn equivalent(
         &self,
         anchor: &Anchor,
@@ -76,7 +77,7 @@ mod tests {
 
     #[test]
     fn published_error_on_the_surface_is_21() {
-        // c = λ: e = (1 + c t) exp(−c t) e(0), from rest.
+        // For c = λ, e = (1 + c t) exp(−c t) e(0) from rest.
         let surface = Surface { c: [2.0; 3], lambda: 2.0 };
         let start = Vector3::new(0.1, -0.2, 0.3);
         let anchor = surface.anchor(0.0, &TrackingError { angles: start, rates: Vector3::zeros() });
@@ -88,7 +89,7 @@ mod tests {
                 rates: start * (-4.0 * t * decay),
             };
             assert!(surface.sliding(&anchor, t, &error).norm() < 1e-15, "t = {t}");
-            // ë along (21) is what b asks for.
+            // The second derivative ë along (21) equals b.
             let second = start * ((8.0 * t - 4.0) * decay);
             assert!((surface.equivalent(&anchor, t, &error, &Vector3::zeros()) - second).norm() < 1e-14);
         }

@@ -1,4 +1,4 @@
-//! Balls with the same bounds at all stages, for problems of the solvers alone.
+//! Balls with the same bounds at all stages, for problems that test the solvers alone.
 #![allow(unreachable_pub)]
 
 use control::linearise::{InverseKinematics, Linear};
@@ -6,13 +6,14 @@ use control::mpc::{Ball, Balls, Constraints, State};
 use nalgebra::{Matrix3, Vector3};
 use vehicle::dynamics::RigidBody;
 
-/// Bounds on body rates and moment (the limits themselves), or on x_ω and u (the printed sets), about the origin.
+/// Bounds about the origin: on body rates and moment (the limits themselves), or on x_ω and u (the
+/// printed sets).
 pub struct Sets {
-    /// The vehicle.
+    /// Rigid body of the vehicle.
     pub body: RigidBody,
-    /// Whether on x_ω and u.
+    /// Whether the bounds are those on x_ω and u.
     pub printed: bool,
-    /// Of rates and input.
+    /// Bounds on rates and input.
     pub bounds: (f64, f64),
 }
 

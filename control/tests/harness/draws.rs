@@ -1,4 +1,5 @@
-//! Random optimisations, for the search for the one that takes longest and for the tests of those that were found.
+//! Random optimisations, for the search for the slowest one and for the tests of those that were
+//! found.
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
 use super::Optimising;
@@ -10,14 +11,15 @@ use vehicle::kinematics;
 use vehicle::reference::Profile;
 use vehicle::scenario::Scenario;
 
-/// Errors of the angles and rates at most, deg and deg/s.
+/// Largest errors of the angles and rates, deg and deg/s.
 const ERRORS: (f64, f64) = (15.0, 4.5);
-/// Numbers of size 1 that make a case.
+/// Count of the numbers of size 1 that define a case.
 pub const UNKNOWNS: usize = 22;
 
-/// What to optimise: a reference, a start, and a second state to which the vehicle is kicked one optimisation later.
+/// A case to optimise: a reference, a start, and a second state to which the vehicle is kicked one
+/// optimisation later.
 pub struct Case {
-    /// The time that the reference has at the start, s.
+    /// Time of the reference at the start, s.
     time: f64,
     reference: Profile,
     /// Errors of the angles, rad, and x_ω, rad/s: at the start, and after the kick.
@@ -29,7 +31,7 @@ fn degrees(values: [f64; 3]) -> Vector3<f64> {
 }
 
 impl Case {
-    /// The case that these numbers stand for, with errors of so many times the usual size.
+    /// Returns the case that these numbers define, with errors scaled by `size`.
     pub fn of(x: &[f64], size: f64) -> Self {
         let at = |i: usize| x[i].clamp(-1.0, 1.0);
         let three = |i: usize| Vector3::new(at(i), at(i + 1), at(i + 2));
@@ -42,27 +44,29 @@ impl Case {
             }
             _ => Profile::step(mean, mean + three(5).component_mul(&degrees([5.0, 3.0, 16.0])), 25.0),
         };
-        // In the ball.
+        // The vector is limited to the ball of this length.
         let vector =
             |i: usize, length: f64| three(i) * (size * length.to_radians() / three(i).norm().max(1.0));
         let states = [10, 16].map(|i| (vector(i, ERRORS.0), vector(i + 3, ERRORS.1)));
         Self { time: 25.0 + 25.0 * at(0), reference, states }
     }
 
-    /// A flight of Chai 2022 that begins at `time`, s, with these errors of the angles, deg, and x_ω, deg/s, at both instants.
+    /// Returns a flight of Chai 2022 that begins at `time`, s, with these errors of the angles,
+    /// deg, and x_ω, deg/s, at both instants.
     pub fn of_the_paper(time: f64, angles: [f64; 3], rates: [f64; 3]) -> Self {
         let state = (degrees(angles), degrees(rates));
         Self { time, reference: Scenario::crmpc2022().reference, states: [state; 2] }
     }
 
-    /// The case of this seed.
+    /// Returns the case of this seed.
     pub fn random(seed: u64, size: f64) -> Self {
         let random = &mut Random::new(seed);
         let x: Vec<f64> = (0..UNKNOWNS).map(|_| random.between(-1.0, 1.0)).collect();
         Self::of(&x, size)
     }
 
-    /// The reports of three optimisations, the first one (cold), the one after the kick and the one that follows, each with the shortest of its times.
+    /// Returns the reports of three optimisations, each with its shortest time: the first one
+    /// (cold), the one after the kick, and the one that follows.
     pub fn optimise<C: Optimising>(&self, law: &mut C, repetitions: usize) -> [Report; 3] {
         let (period, ratio) = (law.period(), law.ratio());
         let mut memory = law.memory();
@@ -91,7 +95,7 @@ impl Case {
             for tick in tick + 1..tick + ratio {
                 law.update(&mut memory, tick, tick as f64 * period, &measured(state), &reference);
             }
-            // About so far does it come until the next one.
+            // This is about the motion until the next optimisation.
             state.0 += state.1 * (ratio as f64 * period);
             Report { time: best, ..C::report(&memory) }
         })

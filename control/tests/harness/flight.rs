@@ -1,5 +1,6 @@
-//! Flights of CRMPC under the robust set that test its guarantee: bounded disturbances of any course, delayed moments, erroneous
-//! measurements or an estimator in the loop, any start and any reference.
+//! Flights of CRMPC under the robust set that test its guarantee, with bounded disturbances of any
+//! course, delayed moments, measurement errors or an estimator in the loop, any start and any
+//! reference.
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
 use super::{CHECK, platform};
@@ -20,12 +21,12 @@ use vehicle::scenario::Scenario;
 use vehicle::sensors::Sensors;
 use vehicle::transport::Transport;
 
-/// Attitude errors above this count as a lost attitude, rad.
+/// Attitude errors above this value count as a lost attitude, rad.
 const LOST: f64 = 30.0 * std::f64::consts::PI / 180.0;
-/// Relative slack for rounding when limits are checked.
+/// Relative tolerance for rounding when limits are checked.
 const SLACK: f64 = 1e-9;
 
-/// Random numbers, the same for the same seed.
+/// Random numbers that repeat for the same seed.
 #[derive(Clone, Debug)]
 pub struct Random {
     seed: u64,
@@ -33,60 +34,62 @@ pub struct Random {
 }
 
 impl Random {
-    /// The sequence of this seed.
+    /// Returns the sequence of this seed.
     pub fn new(seed: u64) -> Self {
         Self { seed, drawn: 0 }
     }
 
-    /// Uniform in [low, high).
+    /// Draws a number uniformly from [low, high).
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         self.drawn += 1;
         let [value] = uniform(self.seed, self.drawn);
         low + (high - low) * 0.5 * (value + 1.0)
     }
 
-    /// A whole number below `count`.
+    /// Draws a whole number below `count`.
     pub fn below(&mut self, count: usize) -> usize {
         (self.between(0.0, count as f64) as usize).min(count - 1)
     }
 
-    /// Each component uniform in [−1, 1).
+    /// Draws each component uniformly from [−1, 1).
     pub fn vector(&mut self) -> Vector3<f64> {
         Vector3::from_fn(|_, _| self.between(-1.0, 1.0))
     }
 
-    /// A corner of the box [−1, 1]³.
+    /// Draws a corner of the box [−1, 1]³.
     pub fn corner(&mut self) -> Vector3<f64> {
         signs(&self.vector())
     }
 
-    /// A vector of this length in any direction.
+    /// Draws a vector of this length in any direction.
     pub fn direction(&mut self, length: f64) -> Vector3<f64> {
         self.vector().try_normalize(1e-6).unwrap_or_else(Vector3::x) * length
     }
 }
 
-/// A course of a vector in the box [−1, 1]³ over time: of the disturbance or of the errors, each over its bound.
+/// A course of a vector in the box [−1, 1]³ over time, for the disturbance or the errors relative
+/// to their bounds.
 #[derive(Clone, Debug)]
 pub enum Course {
-    /// Constant.
+    /// The vector is constant over time.
     Constant(Vector3<f64>),
-    /// Drawn anew each time it is asked for.
+    /// The vector is drawn again at each request.
     White,
-    /// Its sign changes every half period (s).
+    /// The vector changes its sign every half period (s).
     Square(f64, Vector3<f64>),
-    /// A new corner of the box after random times of up to this long (s).
+    /// The vector moves to a new corner of the box after random times of at most this length (s).
     Switching(f64),
-    /// The corner along x_ω, times this sign.
+    /// The vector is the corner along x_ω, times this sign.
     AlongRate(f64),
-    /// The corner along the acceleration that the acting moment makes, times this sign.
+    /// The vector is the corner along the acceleration by the acting moment, times this sign.
     AlongMoment(f64),
-    /// Values one after the other, each until its time (s); the last one stays.
+    /// The vector takes these values one after the other, each until its time (s); the last one
+    /// stays.
     Segments(Vec<(f64, Vector3<f64>)>),
 }
 
 impl Course {
-    /// Any but segments.
+    /// Draws any course except segments.
     pub fn random(random: &mut Random) -> Self {
         let sign = if random.below(2) == 0 { 1.0 } else { -1.0 };
         let period = 10.0_f64.powf(random.between(-1.1, 1.4));
@@ -103,7 +106,7 @@ impl Course {
     }
 }
 
-/// A course in progress.
+/// A course in progress over time.
 #[derive(Clone, Debug)]
 struct Progress {
     course: Course,
@@ -117,7 +120,7 @@ impl Progress {
         Self { course: course.clone(), random: Random::new(seed), now: Vector3::zeros(), until: 0.0 }
     }
 
-    /// The value at `time` (s), which must not decrease.
+    /// Returns the value at `time` (s), which must not decrease.
     fn at(&mut self, time: f64, vehicle: &Vehicle) -> Vector3<f64> {
         let r = kinematics::r(&vehicle.angles());
         match &self.course {
@@ -148,84 +151,88 @@ fn signs(vector: &Vector3<f64>) -> Vector3<f64> {
     vector.map(|component| if component < 0.0 { -1.0 } else { 1.0 })
 }
 
-/// What the controller sees of the motion.
+/// The source of the controller's measurements.
 #[derive(Clone, Debug)]
 pub enum Sight {
-    /// The true state.
+    /// The controller receives the true state.
     Exact,
-    /// Angles and x_ω with errors that follow this course within the bounds of the settings.
+    /// The angles and x_ω have errors that follow this course within the bounds of the settings.
     Errors(Course),
-    /// What the estimator makes of the typical MEMS sensors with noise of this seed.
+    /// The estimator evaluates the typical MEMS sensors with noise of this seed.
     Estimator(u64),
 }
 
-/// A flight to do.
+/// Definition of a flight.
 #[derive(Clone, Debug)]
 pub struct Flight {
-    /// Settings of the controller: with the delay, the errors and the disturbance bound that are in force.
+    /// Settings of the controller, with the delay, the errors and the disturbance bound that are in
+    /// force.
     pub settings: Settings,
-    /// Vehicle's inertia over the one the controller knows.
+    /// Ratio of the vehicle's inertia to the one that the controller uses.
     pub inertia_scale: f64,
-    /// Θ at the start, rad.
+    /// Angles Θ at the start, rad.
     pub angles: Vector3<f64>,
-    /// ω at the start, rad/s.
+    /// Body rates ω at the start, rad/s.
     pub rates: Vector3<f64>,
-    /// The reference.
+    /// Reference of the flight.
     pub reference: Profile,
     /// Time of the reference at the start, s.
     pub reference_start: f64,
-    /// Δ over its bound.
+    /// Course of Δ relative to its bound.
     pub disturbance: Course,
-    /// Time over which Δ is held, s: a whole multiple of [`CHECK`].
+    /// Time over which Δ is held, s; a whole multiple of [`CHECK`].
     pub hold: f64,
-    /// What the controller sees.
+    /// Source of the controller's measurements.
     pub sight: Sight,
-    /// How old that is, s: a part of the delay of the settings.
+    /// Age of the measurements, s, which is a part of the delay of the settings.
     pub age: f64,
-    /// Seed of whatever is drawn on the way.
+    /// Seed of all random numbers of the flight.
     pub seed: u64,
-    /// s.
+    /// Duration of the flight, s.
     pub duration: f64,
 }
 
-/// What a flight shows. Limits are those of the settings.
+/// Results of a flight, relative to the limits of the settings.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shown {
-    /// Largest ‖ω‖ over its limit within the periods that began under guarantee, looked at every [`CHECK`].
+    /// Largest ‖ω‖ relative to its limit in the periods that began under guarantee, checked every
+    /// [`CHECK`].
     pub rate: f64,
-    /// When it was that large, s.
+    /// Time of this largest ‖ω‖, s.
     pub rate_time: f64,
-    /// Largest ‖m‖ over its limit that was commanded under guarantee.
+    /// Largest ‖m‖ relative to its limit that was commanded under guarantee.
     pub moment: f64,
-    /// Largest ‖ω‖ over its limit at all.
+    /// Largest ‖ω‖ relative to its limit over the whole flight.
     pub rate_at_all: f64,
-    /// Whether one of both exceeded its limit under guarantee.
+    /// Whether one of the two exceeded its limit under guarantee.
     pub broken: bool,
-    /// When the guarantee ended, s.
+    /// Time at which the guarantee ended, s.
     pub withdrawn: Option<f64>,
-    /// Whether the errors of angles and rates kept to their bounds, as the guarantee assumes.
+    /// Whether the errors of angles and rates stayed within their bounds, as the guarantee assumes.
     pub assumed: bool,
     /// Whether the attitude was lost.
     pub lost: bool,
-    /// Optimisations without an optimum.
+    /// Number of optimisations without an optimum.
     pub fallbacks: u32,
     /// Share of the ticks under guarantee.
     pub in_force: f64,
     /// Root mean square over the ticks of ‖Θ − Θ_r‖, deg.
     pub ems_deg: f64,
-    /// Largest error of an angle (rad) and of a component of x_ω (rad/s) that the controller saw.
+    /// Largest error of an angle (rad) and of a component of x_ω (rad/s) in the controller's
+    /// measurements.
     pub errors: (f64, f64),
 }
 
 impl Shown {
-    /// Whether the guarantee failed.
+    /// Returns whether the guarantee failed.
     pub fn defective(&self) -> bool {
         self.assumed && (self.broken || self.withdrawn.is_some()) || self.lost
     }
 }
 
 impl Flight {
-    /// From the start of Chai 2022 along its reference, without disturbance or errors.
+    /// Returns the flight from the start of Chai 2022 along its reference, without disturbance or
+    /// errors.
     pub fn new(settings: &Settings) -> Self {
         let scenario = Scenario::crmpc2022();
         Self {
@@ -244,7 +251,8 @@ impl Flight {
         }
     }
 
-    /// Any disturbance, inertia, start and reference, and errors of any course if the settings have any.
+    /// Draws disturbance, inertia, start and reference, and the course of the errors if the
+    /// settings have any.
     pub fn random(settings: &Settings, seed: u64) -> Self {
         let random = &mut Random::new(seed);
         let mut flight = Self::new(settings);
@@ -281,18 +289,19 @@ impl Flight {
 
     fn random_sine(random: &mut Random) -> Profile {
         let mean = degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([5.0, 2.0, 20.0]));
-        // A sideslip that moves costs many optimisations.
+        // A moving sideslip needs many optimisations.
         let sideslip = if random.below(12) == 0 { 3.0 } else { 0.0 };
         let amplitude = random.vector().component_mul(&degrees([3.0, sideslip, 6.0]));
         Profile::sine(mean, amplitude, random.between(0.1, 0.8), random.between(0.0, 6.3))
     }
 
-    /// Flies it.
+    /// Runs the flight and returns its results.
     pub fn fly(&self) -> Shown {
         self.fly_seen(|_, _, _, _| {})
     }
 
-    /// Flies it; `observe` sees memory, tick, measurement and reference after each update.
+    /// Runs the flight; `observe` receives memory, tick, measurement and reference after each
+    /// update.
     pub fn fly_seen(&self, mut observe: impl FnMut(&Memory, u64, &Measurement, &Reference)) -> Shown {
         let s = &self.settings;
         let law = Crmpc::new(*s).unwrap();
@@ -357,7 +366,7 @@ fn degrees(values: [f64; 3]) -> Vector3<f64> {
     Vector3::from(values).map(f64::to_radians)
 }
 
-/// The plant with a disturbance that is given to it from step to step.
+/// The plant with a disturbance that is set from step to step.
 struct Vehicle {
     body: RigidBody,
     state: State,
@@ -391,7 +400,7 @@ impl Vehicle {
         }
     }
 
-    /// The moment that acts, N m.
+    /// Returns the acting moment, N m.
     fn moment(&self, time: f64) -> Vector3<f64> {
         self.transport.as_ref().map_or(self.commanded, |transport| transport.moment(time))
     }
@@ -410,14 +419,15 @@ impl Vehicle {
     }
 }
 
-/// What makes measurements of the motion.
+/// The source of the measurements of the motion.
 struct Eyes {
     errors: Option<Progress>,
     /// Bounds on the errors of angles (rad) and rates (rad/s).
     bounds: (f64, f64),
     estimation: Option<(Sensors, Estimator, estimation::Memory)>,
     largest: (f64, f64),
-    /// Angles and rates at the checks since the instant that a measurement of now tells of; empty if that is now.
+    /// Angles and rates at the checks since the instant to which a present measurement refers;
+    /// empty if that is the present.
     past: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
@@ -458,7 +468,7 @@ impl Eyes {
         eyes
     }
 
-    /// Angles and rates that a measurement of now tells of.
+    /// Returns the angles and rates to which a present measurement refers.
     fn past(&self, vehicle: &Vehicle) -> (Vector3<f64>, Vector3<f64>) {
         self.past.first().copied().unwrap_or_else(|| (vehicle.angles(), vehicle.rates()))
     }
@@ -479,7 +489,7 @@ impl Eyes {
         }
     }
 
-    /// What the controller sees at a tick.
+    /// Returns the controller's measurement at a tick.
     fn look(&mut self, time: f64, vehicle: &Vehicle) -> Measurement {
         let (angles, rates) = self.past(vehicle);
         let angle_rates = kinematics::r(&angles) * rates;
@@ -509,7 +519,7 @@ impl Eyes {
         measured
     }
 
-    /// Whether the errors have kept to the bounds of the settings.
+    /// Returns whether the errors have stayed within the bounds of the settings.
     fn within_bounds(&self) -> bool {
         let (angle, rate) = self.bounds;
         let within = |value: f64, bound: f64| value <= bound * (1.0 + SLACK) + 1e-12;
@@ -517,23 +527,23 @@ impl Eyes {
     }
 }
 
-/// What became of some settings.
+/// Result of trying some settings.
 #[derive(Clone, Debug)]
 pub enum Tried {
-    /// Accepted, and flown.
+    /// The settings were accepted and flown.
     Flown(Shown),
-    /// Refused for want of a guarantee. The message names so many bounds, of which these are not accepted.
+    /// The settings were refused because no guarantee can be given.
     Refused {
-        /// Number of bounds named.
+        /// Number of bounds that the message names.
         bounds: usize,
-        /// What is said of the settings with the bound.
+        /// Messages about the settings with a named bound that are not accepted either.
         not_accepted: Vec<String>,
     },
-    /// Refused for another reason.
+    /// The settings were refused for another reason.
     Invalid(String),
 }
 
-/// Settings with anything that a user may set drawn at random.
+/// Draws every setting that a user may set.
 pub fn random_settings(seed: u64) -> Settings {
     let random = &mut Random::new(seed);
     let half = |random: &mut Random, high: f64| {
@@ -551,7 +561,7 @@ pub fn random_settings(seed: u64) -> Settings {
         inertia_error: random.between(0.0, 0.1),
         horizon: 20 + random.below(81),
         period_feedback,
-        // At most 0.3 s, so that the terminal law is stable.
+        // The period is at most 0.3 s, so that the terminal law is stable.
         period_optimisation: period_feedback * (1 + random.below((0.3 / period_feedback) as usize)) as f64,
         limit_rate: published.limit_rate * random.between(0.5, 2.0),
         limit_moment: published.limit_moment * random.between(0.5, 3.0),
@@ -560,7 +570,8 @@ pub fn random_settings(seed: u64) -> Settings {
     }
 }
 
-/// Flies the settings for 15 s if the design accepts them, or else tries each bound that its refusal names.
+/// Flies the settings for 15 s if the design accepts them, and otherwise tries each bound that its
+/// refusal names.
 pub fn tried(settings: &Settings, seed: u64) -> Tried {
     let Err(error) = Crmpc::new(*settings) else {
         return Tried::Flown(Flight { duration: 15.0, ..Flight::random(settings, seed) }.fly());
@@ -568,7 +579,7 @@ pub fn tried(settings: &Settings, seed: u64) -> Tried {
     let DesignError::NoGuarantee { disturbance, errors, delay, .. } = error else {
         return Tried::Invalid(error.to_string());
     };
-    // As the message prints them.
+    // The bounds are rounded as the message prints them.
     let down = |value: f64| (value * 1e4).floor() / 1e4;
     let down_angle = |value: f64| down(value.to_degrees()).to_radians();
     let with = [

@@ -1,4 +1,5 @@
-//! A closed loop of the scenario of Chai 2022 in one process, for tests, the campaign example and the benchmark.
+//! A closed loop of the scenario of Chai 2022 in one process, for tests, the campaign example and
+//! the benchmark.
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
 pub mod draws;
@@ -15,12 +16,12 @@ use nalgebra::Vector3;
 use vehicle::disturbance::{Disturbance, Kind};
 use vehicle::scenario::Scenario;
 
-/// Settings of Chai 2022 with these sets.
+/// Returns the settings of Chai 2022 with these sets.
 pub fn settings(constraints: Constraints) -> Settings {
     Settings::new(constraints)
 }
 
-/// The regulator of the comparison, with the weights of CRMPC.
+/// Returns the regulator of the comparison, with the weights of CRMPC.
 pub fn lqr() -> Lqr {
     let Settings { body, p, q, period_feedback: period, .. } = settings(Constraints::Robust);
     Lqr::new(LqrSettings { body, p, q, period }).unwrap()
@@ -28,14 +29,14 @@ pub fn lqr() -> Lqr {
 
 /// A controller that optimises at some of its ticks.
 pub trait Optimising: Controller {
-    /// What the last optimisation reported.
+    /// Returns the report of the last optimisation.
     fn report(memory: &Self::Memory) -> Report;
-    /// Ticks per optimisation.
+    /// Returns the number of ticks per optimisation.
     fn ratio(&self) -> u64;
 }
 
 impl Optimising for Crmpc {
-    /// What the last optimisation reported.
+    /// Returns the report of the last optimisation.
     fn report(memory: &Memory) -> Report {
         memory.report
     }
@@ -45,7 +46,7 @@ impl Optimising for Crmpc {
 }
 
 impl Optimising for Dlmpc {
-    /// What the last optimisation reported.
+    /// Returns the report of the last optimisation.
     fn report(memory: &dlmpc::Memory) -> Report {
         memory.report
     }
@@ -54,36 +55,39 @@ impl Optimising for Dlmpc {
     }
 }
 
-/// The disturbance of the scenario with another kind.
+/// Returns the disturbance of the scenario with another kind.
 pub fn disturbance(kind: Kind) -> Disturbance {
     Disturbance { kind, ..Scenario::crmpc2022().disturbance }
 }
 
-/// What one run shows.
+/// Figures of merit of one run.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// Root mean square over the ticks of ‖Θ − Θ_r‖, deg: the EMS of the paper. Infinite, as all, where the attitude was lost.
+    /// Root mean square over the ticks of ‖Θ − Θ_r‖, deg: the EMS of the paper. All figures are
+    /// infinite if the attitude was lost.
     pub ems_deg: f64,
-    /// Root mean square over the ticks of ‖m‖ over its limit: the CMS of the paper.
+    /// Root mean square over the ticks of ‖m‖ relative to its limit: the CMS of the paper.
     pub cms: f64,
-    /// Largest ‖ω‖ over its limit, looked at every [`CHECK`].
+    /// Largest ‖ω‖ relative to its limit, checked every [`CHECK`].
     pub rate: f64,
-    /// Largest ‖m‖ over its limit.
+    /// Largest ‖m‖ relative to its limit.
     pub moment: f64,
 }
 
-/// What a run of CRMPC shows of itself besides.
+/// Additional results of a run of CRMPC.
 #[derive(Clone, Debug)]
 pub struct Kept {
-    /// Samples at which no optimum was found.
+    /// Number of samples at which no optimum was found.
     pub fallbacks: u32,
     /// Share of the ticks at which the guarantee was in force.
     pub in_force: f64,
-    /// Whether ‖ω‖ was beyond its limit at a tick at which, or before which, the guarantee was in force.
+    /// Whether ‖ω‖ exceeded its limit at a tick at which, or before which, the guarantee was in
+    /// force.
     pub broken: bool,
 }
 
-/// The loop over the whole scenario (50 s); `observe` sees memory, tick and measurement after each update.
+/// Simulates the loop over the whole scenario (50 s); `observe` receives memory, tick and
+/// measurement after each update.
 pub fn simulate<C: Controller>(
     controller: &mut C,
     memory: &mut C::Memory,
@@ -106,7 +110,7 @@ pub fn simulate<C: Controller>(
     }
 }
 
-/// One CRMPC run from the start with a new controller.
+/// Runs CRMPC once from the start with a new controller.
 pub fn run(settings: &Settings, inertia_scale: f64, disturbance: Disturbance) -> (Outcome, Kept) {
     let mut memory = Memory::default();
     let mut controller = Crmpc::new(*settings).unwrap();
@@ -124,21 +128,21 @@ pub fn run(settings: &Settings, inertia_scale: f64, disturbance: Disturbance) ->
     (outcome, Kept { fallbacks: memory.report.fallbacks, in_force, broken })
 }
 
-/// A run to do: a name for messages, the vehicle's inertia and the disturbance.
+/// Definition of a run: a name for messages, the vehicle's inertia and the disturbance.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// For messages.
+    /// Name of the case for messages.
     pub name: String,
-    /// Vehicle's inertia over the one the controller knows.
+    /// Ratio of the vehicle's inertia to the one that the controller uses.
     pub inertia_scale: f64,
-    /// The disturbance.
+    /// Disturbance of the run.
     pub disturbance: Disturbance,
 }
 
-/// Both inertia errors of the paper's 5 %.
+/// Both inertia errors of 5 % that the paper names.
 pub const INERTIA_SCALES: [f64; 2] = [0.95, 1.05];
 
-/// Cases with both inertia errors.
+/// Returns the cases with both inertia errors.
 pub fn cases(disturbances: impl IntoIterator<Item = (String, Disturbance)>) -> Vec<Case> {
     let both = |(name, disturbance): (String, Disturbance)| {
         INERTIA_SCALES.map(|inertia_scale| Case {
@@ -150,7 +154,7 @@ pub fn cases(disturbances: impl IntoIterator<Item = (String, Disturbance)>) -> V
     disturbances.into_iter().flat_map(both).collect()
 }
 
-/// White noise with these seeds.
+/// Returns the cases of white noise with these seeds.
 pub fn white(seeds: std::ops::RangeInclusive<u64>, period: f64) -> Vec<Case> {
     cases(seeds.map(|seed| {
         let disturbance = Disturbance { seed, period, ..disturbance(Kind::White) };
@@ -158,7 +162,7 @@ pub fn white(seeds: std::ops::RangeInclusive<u64>, period: f64) -> Vec<Case> {
     }))
 }
 
-/// Δ at each corner of its box.
+/// Returns the cases with Δ at each corner of its box.
 pub fn constant() -> Vec<Case> {
     let signs = |i: u32| [0, 1, 2].map(|bit| if i >> bit & 1 == 0 { 1.0 } else { -1.0 });
     cases((0..8).map(|i| {
@@ -168,7 +172,8 @@ pub fn constant() -> Vec<Case> {
     }))
 }
 
-/// Square waves between opposite corners of the box, for each of these periods.
+/// Returns the cases with square waves between opposite corners of the box, for each of these
+/// periods.
 pub fn square(periods: &[f64]) -> Vec<Case> {
     let directions = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
     let all = periods.iter().flat_map(|&period| directions.map(|(y, z)| (period, Vector3::new(1.0, y, z))));
@@ -178,7 +183,7 @@ pub fn square(periods: &[f64]) -> Vec<Case> {
     }))
 }
 
-/// Disturbances that look at the motion, choosing anew every `period`.
+/// Returns the cases of disturbances that depend on the motion and are chosen again every `period`.
 pub fn adversaries(period: f64) -> Vec<Case> {
     let kinds = [Kind::AlongRate, Kind::AgainstMoment];
     cases(
@@ -186,7 +191,7 @@ pub fn adversaries(period: f64) -> Vec<Case> {
     )
 }
 
-/// Results of `work` on all items, in their order, computed on all processors.
+/// Applies `work` to all items on all processors and returns the results in the order of the items.
 pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from).min(items.len().max(1));
     let chunk = items.len().div_ceil(threads).max(1);
@@ -199,7 +204,7 @@ pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync)
     })
 }
 
-/// Measurements that no controller may remember once the tick is evaluated again.
+/// Measurements that no controller may remember after the tick is evaluated again.
 pub fn garbage() -> [Measurement; 4] {
     let measured = |angles, rates| Measurement { angles, rates, ..Measurement::default() };
     let all = Vector3::repeat;

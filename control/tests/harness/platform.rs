@@ -1,4 +1,5 @@
-//! What the sensors of a platform show that rests, follows the scenario of Chai 2022, or turns for calibration.
+//! Readings of the sensors of a platform that rests, follows the scenario of Chai 2022, or turns
+//! for calibration.
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
 use control::Measurement;
@@ -18,19 +19,19 @@ use vehicle::triad::Triad;
 /// Time between samples and ticks, s.
 pub const PERIOD: f64 = 0.01;
 
-/// Length of the flight that the MEMS set is calibrated on, s.
+/// Length of the flight with which the MEMS set is calibrated, s.
 pub const CALIBRATION_DURATION: f64 = 120.0;
-/// Its seed.
+/// Seed of the calibration flight.
 pub const CALIBRATION_SEED: u64 = 100;
 
-/// Where the platform is at a tick.
+/// True motion of the platform at a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
-    /// s.
+    /// Time of the tick, s.
     pub time: f64,
-    /// Θ, rad.
+    /// Angles Θ of the platform, rad.
     pub angles: Vector3<f64>,
-    /// ω of the model, rad/s.
+    /// Body rates ω of the model, rad/s.
     pub rates: Vector3<f64>,
 }
 
@@ -38,13 +39,13 @@ fn times(duration: f64) -> impl Iterator<Item = f64> {
     (0..(duration / PERIOD).round() as u32).map(|k| f64::from(k) * PERIOD)
 }
 
-/// At the scenario's initial attitude.
+/// Returns the motion at rest in the scenario's initial attitude.
 pub fn rest(duration: f64) -> Vec<Truth> {
     let angles = Scenario::crmpc2022().initial_angles;
     times(duration).map(|time| Truth { time, angles, rates: Vector3::zeros() }).collect()
 }
 
-/// Under CRMPC, which sees the truth, with the noise of this seed.
+/// Returns the motion under CRMPC with exact measurements and the noise of this seed.
 pub fn scenario(seed: u64) -> Vec<Truth> {
     let scenario = Scenario::crmpc2022();
     let mut config = scenario.config(PERIOD);
@@ -71,7 +72,7 @@ pub fn scenario(seed: u64) -> Vec<Truth> {
         .collect()
 }
 
-/// On the calibration sequence.
+/// Returns the motion of the calibration sequence.
 pub fn calibration(duration: f64) -> Vec<Truth> {
     let start = Scenario::crmpc2022().initial_angles;
     let sequence = SensorData::embedded().calibration;
@@ -82,7 +83,7 @@ pub fn calibration(duration: f64) -> Vec<Truth> {
     times(duration).map(at).collect()
 }
 
-/// What sensors without errors feel there.
+/// Returns the readings of sensors without errors in this motion.
 pub fn felt(truth: &Truth) -> Readings {
     let pose = Pose {
         kinematics: Kinematics::Printed,
@@ -94,7 +95,7 @@ pub fn felt(truth: &Truth) -> Readings {
     pose.felt(&SensorData::embedded().surroundings)
 }
 
-/// What the line shows at each tick.
+/// Returns the output of the line at each tick.
 pub fn lines(motion: &[Truth], config: &Config) -> Vec<estimation::Line> {
     let mut sensors = Sensors::new(config, 0.0).unwrap();
     let show = |truth: &Truth| {
@@ -105,17 +106,17 @@ pub fn lines(motion: &[Truth], config: &Config) -> Vec<estimation::Line> {
     motion.iter().map(show).collect()
 }
 
-/// Sensors on the line of the data file.
+/// Returns sensors on the line of the data file.
 pub fn config(triads: &[Triad; 3], seed: u64) -> Config {
     Config { triads: *triads, line: SensorData::embedded().line, seed }
 }
 
-/// The typical MEMS set.
+/// Returns the typical MEMS set.
 pub fn mems(seed: u64) -> Config {
     config(&SensorData::embedded().mems, seed)
 }
 
-/// Estimates at each tick.
+/// Returns the estimates at each tick.
 pub fn estimates(settings: &Settings, lines: &[estimation::Line]) -> Vec<Estimate> {
     let estimator = Estimator::new(*settings).unwrap();
     let mut memory = estimator.memory();
@@ -126,7 +127,8 @@ pub fn estimates(settings: &Settings, lines: &[estimation::Line]) -> Vec<Estimat
     (0..).zip(lines).map(&mut update).collect()
 }
 
-/// The correction that takes the readings back to what was felt: least squares of y = A x + b.
+/// Returns the correction that recovers the true values from the readings: least squares of y = A
+/// x + b.
 fn regression(felt: &[Vector3<f64>], readings: &[Vector3<f64>]) -> Correction {
     let mut normal = Matrix4::zeros();
     let mut right = SMatrix::<f64, 4, 3>::zeros();
@@ -140,8 +142,8 @@ fn regression(felt: &[Vector3<f64>], readings: &[Vector3<f64>]) -> Correction {
     Correction { matrix: matrix.try_inverse().unwrap(), bias: solution.column(3).into() }
 }
 
-/// Calibration of all sensors from one flight of the sequence: gyroscope and accelerometer against the platform's own angles, the
-/// magnetometer by the estimator's ellipsoid.
+/// Calibrates all sensors from one flight of the sequence: gyroscope and accelerometer against the
+/// platform's own angles, the magnetometer by the estimator's ellipsoid.
 pub fn calibrated(config: &Config, duration: f64) -> Settings {
     let motion = calibration(duration + 2.0 * PERIOD);
     let lines = lines(&motion, config);
@@ -168,14 +170,14 @@ pub fn calibrated(config: &Config, duration: f64) -> Settings {
     Settings { corrections: [gyroscope, accelerometer, memory.calibration.correction], ..Settings::default() }
 }
 
-/// Root mean square of each component (deg or deg/s) from `from` (s) on.
+/// Returns the root mean square of each component (deg or deg/s) from `from` (s) on.
 pub fn rms(from: f64, errors: impl Iterator<Item = (f64, Vector3<f64>)>) -> Vector3<f64> {
     let later: Vec<_> = errors.filter(|(time, _)| *time >= from).map(|(_, error)| error).collect();
     let sum: Vector3<f64> = later.iter().map(|error| error.component_mul(error)).sum();
     (sum / later.len() as f64).map(|mean| mean.sqrt().to_degrees())
 }
 
-/// Of angles and rates.
+/// Returns the root mean square errors of angles and rates.
 pub fn errors(motion: &[Truth], estimates: &[Estimate], from: f64) -> [Vector3<f64>; 2] {
     let pairs = || motion.iter().zip(estimates);
     [

@@ -1,4 +1,4 @@
-//! The numbers that the guarantee rests on, for the machine check of them.
+//! The numbers on which the guarantee rests, for its machine check.
 
 use super::super::design::Settings;
 use super::{
@@ -7,7 +7,8 @@ use super::{
 };
 use std::f64::consts::SQRT_2;
 
-/// Every bound that the proof uses, as this crate computes it. Their meaning stands beside the lines that compute them.
+/// Every bound that the proof uses, as this crate computes it. The lines that compute the bounds
+/// explain them.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
@@ -20,7 +21,7 @@ pub struct Lemmas {
     pub turn_by_angles: f64,
     pub drift_mixed: f64,
     pub drift_by_angles_twice: f64,
-    /// Of ∂(ω × I ω)/∂ω, and of I⁻¹ times that.
+    /// Bounds of ∂(ω × I ω)/∂ω, and of I⁻¹ times that derivative.
     pub gyroscopic: (f64, f64),
     pub largest: f64,
     pub smallest: f64,
@@ -31,7 +32,7 @@ pub struct Lemmas {
     pub jerk: f64,
     pub mismatch: f64,
     pub varying: f64,
-    /// With the share of `varying`.
+    /// Size of the swing, including the part of `varying`.
     pub swing: f64,
     pub bearing: f64,
     pub norm: f64,
@@ -42,7 +43,7 @@ pub struct Lemmas {
 }
 
 impl Lemmas {
-    /// Those of `s`.
+    /// Computes the bounds for the settings `s`.
     pub fn new(s: &Settings) -> Self {
         let dynamics = Dynamics::new(s);
         let parts = Parts::new(s, &dynamics);
@@ -80,13 +81,13 @@ impl Lemmas {
         }
     }
 
-    /// ‖∂m/∂(α, β)‖, ‖∂m/∂x_ω‖ and ‖m‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a.
+    /// Returns bounds on ‖∂m/∂(α, β)‖, ‖∂m/∂x_ω‖ and ‖m‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a.
     pub fn moment(&self, x: f64, a: f64) -> [f64; 3] {
         let (by_angles, by_rates) = self.dynamics.slopes(x, a);
         [by_angles, by_rates, self.dynamics.nominal_moment(x, a)]
     }
 
-    /// ‖d²m/dt²‖ and ‖d²ω/dt²‖ of a nominal motion with a held.
+    /// Returns bounds on ‖d²m/dt²‖ and ‖d²ω/dt²‖ of a nominal motion with a held.
     pub fn curvatures(&self, x: f64, a: f64) -> [f64; 2] {
         [self.dynamics.moment_curvature(x, a), Dynamics::rate_curvature(x, a)]
     }
