@@ -248,7 +248,7 @@ pub struct Merit {
 /// Defines when an attitude is lost and whether that ends the run.
 #[derive(Clone, Copy, Debug, Default)]
 struct Loss {
-    /// Largest ‖Θ − Θ_r‖ that can be lived with, rad.
+    /// Largest ‖Θ − Θ_r‖ that does not count as a loss of attitude, rad.
     beyond: Option<f64>,
     ends_run: bool,
     /// First time at which the bound was exceeded, s.
