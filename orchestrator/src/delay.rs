@@ -1,9 +1,10 @@
 //! Effective delay of each feedback loop, derived from the connections, the coupling and the
 //! dependencies that the FMUs declare for their outputs.
-//!
-//! An output that depends on its unit's inputs at the same instant is *direct*. Where such an output is read before its
-//! unit's inputs are set (always with Jacobi; with Gauss–Seidel if the unit comes later in the order), the reader gets the
-//! value of the point before: one of its steps of delay. An output that depends on states alone is never late. A loop in
+//! An output that depends on its unit's inputs at the same instant is *direct*. If such an output
+//! is read before its unit's inputs are set (always with Jacobi coupling; with Gauss–Seidel if the
+//! unit comes later in the order), the reader gets the value of the previous communication point,
+//! which delays it by one of its steps. An output that depends on states alone is never late. A
+//! loop in which every output is direct is algebraic: no order of calls solves it.
 //! which every output is direct is algebraic: no order of calls solves it.
 
 use crate::clock;

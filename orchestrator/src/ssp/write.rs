@@ -1,4 +1,4 @@
-//! From an experiment to an archive.
+//! Writes an experiment to an SSP archive.
 
 use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
 use crate::description::{Kind, Variable};
