@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 /// A unit that never says the same twice is collected up to so many warnings.
 const MOST: usize = 100;
 
-/// A warning, in a unit's words.
+/// A warning of a unit, in its own words.
 struct Warning {
     text: String,
     first: f64,
@@ -34,7 +34,7 @@ pub fn collect() -> Collection {
     Collection(())
 }
 
-/// Time goes on, s.
+/// Sets the current simulated time, s.
 pub fn at(time: f64) {
     HEARD.with_borrow_mut(|heard| {
         if let Some(heard) = heard {
@@ -43,7 +43,7 @@ pub fn at(time: f64) {
     });
 }
 
-/// A unit warns.
+/// Records or prints a warning of a unit.
 pub fn warn(text: &str) {
     let is_collected = HEARD.with_borrow_mut(|heard| {
         let Some(Heard { now, warnings }) = heard else { return false };
@@ -82,7 +82,7 @@ impl Warning {
 }
 
 impl Drop for Collection {
-    /// Tells what was collected.
+    /// Prints the warnings that were collected.
     fn drop(&mut self) {
         let heard = HEARD.with_borrow_mut(Option::take);
         for warning in heard.iter().flat_map(|heard| &heard.warnings) {

@@ -25,7 +25,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use view::State;
 
-/// Time from picture to picture.
+/// Time between two pictures of the view.
 const BETWEEN_PICTURES: Duration = Duration::from_millis(66);
 
 /// The values that the master copies for the view.

@@ -17,7 +17,7 @@ const ANGLES: [&str; 3] = ["alpha", "beta", "sigma"];
 const RATES: [&str; 3] = ["p", "q", "r"];
 const AXES: [&str; 3] = ["x", "y", "z"];
 const COLORS: [Color; 3] = [Color::LightBlue, Color::LightGreen, Color::LightRed];
-/// The course that is kept; when it is full, every second point goes.
+/// Largest number of points of a curve; when it is reached, every second point is dropped.
 const POINTS: usize = 2000;
 
 /// Curves of three axes, as pairs of time and value.

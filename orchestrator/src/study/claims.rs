@@ -129,7 +129,7 @@ fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
     let right = results.quantity(&check.right)?;
     let by = check.by.as_ref().map(|by| results.study.values.number(by)).transpose()?;
     let numbers = |side: &[Option<f64>]| Numbers(side.iter().copied().flatten().collect());
-    // Without a number on either side there is nothing to compare.
+    // If one side has no number at all, there is nothing to compare.
     let is_empty = numbers(&left).0.is_empty() || numbers(&right).0.is_empty();
     let pairs = if is_empty { 0 } else { left.len().max(right.len()) };
     let at = |side: &[Option<f64>], k: usize| side[k % side.len()];

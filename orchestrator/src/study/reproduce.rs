@@ -314,7 +314,7 @@ fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// The file of a finished part.
+/// Content of the file of a finished part.
 #[derive(Serialize, Deserialize)]
 struct Kept {
     key: String,
