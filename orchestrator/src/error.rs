@@ -26,7 +26,7 @@ pub enum Error {
     /// An FMU has faults, which have already been reported.
     #[error("{}: {count} {}", path.display(), if *count == 1 { "fault" } else { "faults" })]
     Faults {
-        /// The archive.
+        /// Path of the archive.
         path: PathBuf,
         /// Number of faults that were found.
         count: usize,
@@ -36,7 +36,7 @@ pub enum Error {
     Unit {
         /// Name of the component in the experiment.
         component: String,
-        /// Communication point, s.
+        /// Simulated time of the communication point, s.
         time: f64,
         /// The call that failed, with the unit's own message.
         failure: UnitFailure,
@@ -59,7 +59,7 @@ pub enum Error {
     Deadline {
         /// Name of the component whose values were late.
         component: String,
-        /// Communication point, s.
+        /// Simulated time of the communication point, s.
         time: f64,
         /// Time from the deadline until the values were ready, ms.
         late_ms: f64,

@@ -1,4 +1,5 @@
-//! What units warn of during a run: each warning is told once, at the end, with its first time and how often it came.
+//! Warnings of units during a run: each is printed once, at the end, with its first time and the
+//! number of times it came.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -61,7 +62,7 @@ pub fn warn(text: &str) {
     }
 }
 
-/// What is wrong with a file is told once, however many threads open it and however often.
+/// Prints a warning about a file once, however many threads open the file and however often.
 pub fn warn_once(text: String) {
     static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);

@@ -69,7 +69,7 @@ impl Files {
 pub struct Options {
     /// Folder for the results; `out/<experiment>` if it is not given.
     pub out: Option<PathBuf>,
-    /// Show no progress.
+    /// Whether the progress display is suppressed.
     pub quiet: bool,
     /// Settings of a run that is paced by the wall clock; `None` runs as fast as possible.
     pub real_time: Option<realtime::Settings>,

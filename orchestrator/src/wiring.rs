@@ -135,7 +135,7 @@ fn port(component: usize, position: usize, variable: &Variable) -> Option<Port> 
     Some(Port { component, variable: position, reference: variable.reference, carrier })
 }
 
-/// Resolves the connections.
+/// Resolves the connections of an experiment.
 ///
 /// # Errors
 /// Names that do not exist, wrong causalities, types or units that do not match, inputs connected twice, and inputs that

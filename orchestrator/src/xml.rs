@@ -51,7 +51,7 @@ pub struct Element {
 const DEPTH: usize = 100;
 
 impl Element {
-    /// Reads a document.
+    /// Reads an XML document from its text.
     ///
     /// # Errors
     /// One line: what is wrong with the text.
@@ -114,7 +114,7 @@ impl Element {
         Ok(Self { name: start.local_name().as_ref().to_string(), line, attributes, children: Vec::new() })
     }
 
-    /// What it is called in messages: its kind, its name if it has one, and where it stands.
+    /// Title of the element in messages: its kind, its name if it has one, and its line.
     pub fn title(&self) -> String {
         let own = self.attribute("name").map(|name| format!(" \"{}\"", shortened(name)));
         format!("the element {}{} in line {}", self.name, own.unwrap_or_default(), self.line)

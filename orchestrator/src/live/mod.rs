@@ -33,7 +33,7 @@ const BETWEEN_PICTURES: Duration = Duration::from_millis(66);
 pub struct Snapshot {
     /// Simulated time of the communication point, s; `None` before the first.
     pub time: Option<f64>,
-    /// The probed values.
+    /// The probed values at this communication point.
     pub values: Vec<f64>,
     /// State of the pacing, if the run is paced.
     pub tally: Option<Tally>,

@@ -15,7 +15,7 @@ const COLORS: [Color; 6] = [
     Color(23, 190, 207),
 ];
 
-/// Draws the figure.
+/// Draws the figure and writes it to a file.
 ///
 /// # Errors
 /// If the file cannot be written.

@@ -21,7 +21,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// The file's name.
+    /// Name of the file in the folder of results.
     pub fn file(self) -> &'static str {
         match self {
             Self::Csv => "results.csv",
@@ -30,7 +30,7 @@ impl Format {
     }
 }
 
-/// A recorded variable.
+/// A variable that is recorded, with its type and unit.
 #[derive(Clone, Debug)]
 pub struct Column {
     /// Full name of the variable, `component.variable`.

@@ -133,8 +133,8 @@ impl Own {
 /// (the smallest step). The order of the components is the one without delay, where there is one.
 ///
 /// # Errors
-/// What is wrong with the archive, or beyond this program: other components than FMUs for co-simulation, mappings of parameters,
-/// signal dictionaries.
+/// If the archive is faulty, or needs what this program does not support: components other than
+/// FMUs for co-simulation, mappings of parameters, or signal dictionaries.
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let folder = archive::unpack(path)?;
     let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };

@@ -104,7 +104,7 @@ pub fn check(study: &Study) -> Result<(), String> {
     Ok(())
 }
 
-/// Judges a claim.
+/// Judges a claim by its checks.
 ///
 /// # Errors
 /// If a check refers to a missing item, or a run has no such quantity.

@@ -60,7 +60,7 @@ pub struct Report {
     pub parts: (usize, usize),
     /// Runs of an experiment among all parts.
     pub runs: usize,
-    /// Elapsed time, s.
+    /// Elapsed time of the reproduction, s.
     pub elapsed: f64,
     /// Remarks on runs whose parameter has no effect or that lose the attitude.
     pub notes: Vec<String>,
