@@ -1,4 +1,4 @@
-//! Simulation time on integer ticks.
+//! Simulation time, counted in integer ticks.
 
 /// Communication points `start + k · step`, never accumulated; the last one is `stop` itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ impl Clock {
         Ok(Self { start, step, stop, ticks: ticks as u64 })
     }
 
-    /// Number of steps.
+    /// Number of steps from start to stop.
     pub fn ticks(&self) -> u64 {
         self.ticks
     }
@@ -51,17 +51,17 @@ impl Clock {
         if tick == self.ticks { self.stop } else { self.start + tick as f64 * self.step }
     }
 
-    /// Length of one step, s.
+    /// Length of one communication step, s.
     pub fn step(&self) -> f64 {
         self.step
     }
 
-    /// Start time, s.
+    /// Start time of the simulation, s.
     pub fn start(&self) -> f64 {
         self.start
     }
 
-    /// Stop time, s.
+    /// Stop time of the simulation, s.
     pub fn stop(&self) -> f64 {
         self.stop
     }

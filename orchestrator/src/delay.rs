@@ -1,8 +1,10 @@
-//! Effective delay of each feedback loop, from the wiring, the coupling and what the FMUs declare of their outputs.
-//!
-//! An output that depends on its unit's inputs at the same instant is *direct*. Where such an output is read before its
-//! unit's inputs are set (always with Jacobi; with Gauss–Seidel if the unit comes later in the order), the reader gets the
-//! value of the point before: one of its steps of delay. An output that depends on states alone is never late. A loop in
+//! Effective delay of each feedback loop, derived from the connections, the coupling and the
+//! dependencies that the FMUs declare for their outputs.
+//! An output that depends on its unit's inputs at the same instant is *direct*. If such an output
+//! is read before its unit's inputs are set (always with Jacobi coupling; with Gauss–Seidel if the
+//! unit comes later in the order), the reader gets the value of the previous communication point,
+//! which delays it by one of its steps. An output that depends on states alone is never late. A
+//! loop in which every output is direct is algebraic: no order of calls solves it.
 //! which every output is direct is algebraic: no order of calls solves it.
 
 use crate::clock;
@@ -12,25 +14,26 @@ use crate::settings::{Setting, SettingValue};
 use crate::wiring::{Part, Wire};
 use std::collections::BTreeSet;
 
-/// A feedback loop through components.
+/// A feedback loop through components, with its delay.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FeedbackLoop {
-    /// Indices of the components, each feeding the next, the last the first.
+    /// Indices of the components. Each feeds the next one, and the last feeds the first.
     pub components: Vec<usize>,
-    /// Delay beyond what the units themselves have, in ticks.
+    /// Delay in addition to the units' own, in ticks.
     pub ticks: u64,
-    /// Components on the way that do not declare what their outputs depend on, so that the worst was assumed.
+    /// Components of the loop that do not declare their outputs' dependencies, so that the worst
+    /// case was assumed.
     pub undeclared: Vec<usize>,
 }
 
 /// How an output depends on an input of its unit.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Passage {
-    /// Through states only.
+    /// The output depends on the input through states only.
     Delayed,
-    /// At the same instant.
+    /// The output depends on the input at the same instant.
     Direct,
-    /// The FMU does not say.
+    /// The FMU does not declare the dependency.
     Undeclared,
 }
 
@@ -42,7 +45,8 @@ fn passage(parts: &[Part], component: usize, input: usize, output: usize) -> Pas
     }
 }
 
-/// All feedback loops, each once. `parts` are in the experiment's order, `every` their periods in ticks.
+/// Finds all feedback loops, each once. `parts` are in the experiment's order, `every` are their
+/// periods in ticks.
 pub fn feedback_loops(
     parts: &[Part],
     every: &[u32],
@@ -52,7 +56,7 @@ pub fn feedback_loops(
     let mut loops = Vec::new();
     for first in 0..parts.len() {
         let mut path = vec![first];
-        // A loop is found from its smallest index only.
+        // Each loop is found only from its component with the smallest index.
         extend(&mut path, wires, &mut |components| {
             loops.push(measure(components, parts, every, wires, coupling));
         });
@@ -108,8 +112,9 @@ fn measure(
     FeedbackLoop { components: components.to_vec(), ticks, undeclared }
 }
 
-/// An order of the components in which Gauss–Seidel coupling has no delay, as far as there is one: a component whose outputs
-/// depend on its inputs at the same instant comes before those that read them. Else they stay in the order of `parts`.
+/// An order of the components in which Gauss–Seidel coupling has no delay, as far as there is one:
+/// a component whose outputs depend on its inputs at the same instant comes before those that read
+/// them. Otherwise the order of `parts` is kept.
 pub fn order(parts: &[Part], wires: &[Wire]) -> Vec<usize> {
     let is_direct = |wire: &Wire| {
         let component = wire.from.component;
@@ -133,9 +138,11 @@ pub fn order(parts: &[Part], wires: &[Wire]) -> Vec<usize> {
     order
 }
 
-/// A loop of outputs that all are declared to depend on each other at the same instant, by the names of its inputs.
+/// Finds an algebraic loop, in which every output is declared to depend on the one before at the
+/// same instant. Returns the names of the loop's inputs.
 pub fn algebraic_loop(parts: &[Part], wires: &[Wire]) -> Option<Vec<String>> {
-    // Nodes are wires; one wire leads to another if it ends at an input on which the other's output depends.
+    // The nodes of this graph are wires. One wire leads to another if it ends at an input on which
+    // the other's output depends.
     let leads_to = |a: &Wire, b: &Wire| {
         a.to.component == b.from.component
             && passage(parts, a.to.component, a.to.variable, b.from.variable) == Passage::Direct
@@ -154,7 +161,7 @@ pub fn algebraic_loop(parts: &[Part], wires: &[Wire]) -> Option<Vec<String>> {
     None
 }
 
-/// Depth-first search for a cycle; a wire once left is on none.
+/// Searches for a cycle depth first; a wire that the search has left is on no cycle.
 fn follow(
     path: &mut Vec<usize>,
     done: &mut [bool],
@@ -181,13 +188,14 @@ fn follow(
     None
 }
 
-/// The parameter by which a component says which delay of its loop its law counts on, s.
+/// Parameter by which a component states the loop delay that its law is designed for, s.
 const COUNTED_ON: &str = "delay";
-/// The parameter by which a component says how much later than commanded its actuators act, s.
+/// Parameter by which a component states how much later than commanded its actuators act, s.
 const TRANSPORT: &str = "actuation.delay";
 
-/// One warning for each component whose law counts on another delay than its feedback loop has. The loop's delay is its ticks
-/// times `step` (s), and the transport delays of the other components on it. Of several loops the one with the longest delay counts.
+/// Returns one warning for each component whose law is designed for another delay than its feedback
+/// loop has. The loop's delay is its ticks times `step` (s), plus the transport delays of the other
+/// components on it. If there are several loops, the one with the longest delay counts.
 pub fn warnings(parts: &[Part], settings: &[Vec<Setting>], loops: &[FeedbackLoop], step: f64) -> Vec<String> {
     let mut warnings = Vec::new();
     for (component, part) in parts.iter().enumerate() {
@@ -218,7 +226,8 @@ pub fn warnings(parts: &[Part], settings: &[Vec<Setting>], loops: &[FeedbackLoop
     warnings
 }
 
-/// Value of a real parameter in s, from the experiment or else its start value; `None` if there is no such parameter.
+/// Value of a real parameter in s, from the experiment or otherwise its start value; `None` if
+/// there is no such parameter.
 fn duration(name: &str, part: Part, settings: &[Setting]) -> Option<f64> {
     let (_, variable) = part.description.find(name)?;
     let is_duration = matches!(&variable.kind, Kind::Real { unit: Some(unit), .. } if unit == "s");
@@ -238,7 +247,8 @@ mod tests {
     use crate::experiment::Scaling;
     use crate::wiring::{Carrier, Port};
 
-    /// Variable 0 is an input; outputs 1, 2, … depend on it directly, not at all, or by no declaration.
+    /// Variable 0 is an input; outputs 1, 2, … depend on it directly, not at all, or without a
+    /// declaration.
     fn unit(outputs: &[Option<bool>]) -> ModelDescription {
         let variable = |(position, causality): (usize, &str)| Variable {
             name: format!("v{position}"),
@@ -287,13 +297,14 @@ mod tests {
         assert_eq!(ticks(&against, &[1, 1], &wires, Coupling::GaussSeidel), [1]);
         assert_eq!(ticks(&in_order, &[1, 1], &wires, Coupling::Jacobi), [1]);
         assert_eq!(ticks(&against, &[1, 1], &wires, Coupling::Jacobi), [1]);
-        // What is read too early is read again only at the reader's next point.
+        // A value that is read too early is read again only at the reader's next communication
+        // point.
         assert_eq!(ticks(&against, &[5, 1], &wires, Coupling::GaussSeidel), [5]);
     }
 
     #[test]
     fn oracle_three_in_a_ring_and_a_loop_within() {
-        // 0 -> 1 -> 2 -> 0, and 1 -> 0; only 2 has a state.
+        // The loops are 0 -> 1 -> 2 -> 0 and 1 -> 0; only component 2 has a state.
         let units = [unit(&[Some(true)]), unit(&[Some(true), Some(false)]), unit(&[Some(false)])];
         let wires = [wire((0, 1), 1), wire((1, 1), 2), wire((2, 1), 0), wire((1, 2), 0)];
         assert_eq!(ticks(&units, &[1; 3], &wires[..3], Coupling::GaussSeidel), [0]);
@@ -302,7 +313,7 @@ mod tests {
         assert!(ticks(&units, &[1; 3], &wires[..2], Coupling::Jacobi).is_empty());
     }
 
-    /// Adds a real parameter in s.
+    /// Adds a real parameter in s to the unit's description.
     fn with_duration(mut unit: ModelDescription, name: &str, unit_name: &str) -> ModelDescription {
         let kind = Kind::Real { unit: Some(unit_name.into()), display_unit: None, min: Some(0.0), max: None };
         let start = Some("0".to_string());
@@ -355,7 +366,7 @@ mod tests {
 
     #[test]
     fn the_longest_loop_counts_and_what_is_on_no_loop_does_not() {
-        // 0 -> 1 -> 0 with one tick in between, 0 -> 2 -> 0 with none; 3 is on no loop.
+        // The loop 0 -> 1 -> 0 has a delay of one tick, 0 -> 2 -> 0 has none, and 3 is on no loop.
         let law = with_duration(unit(&[Some(true)]), "delay", "s");
         let (direct, state) = (unit(&[Some(true)]), unit(&[Some(false)]));
         let units = [law.clone(), direct, state, law];

@@ -1,123 +1,125 @@
-//! `modelDescription.xml` as the orchestrator needs it: variables, units, enumerations, and which output depends on which
-//! input. (The reader in `fmi-rs` drops unit definitions and all types but the first.)
+//! The parts of `modelDescription.xml` that the orchestrator needs: variables, units, enumerations,
+//! and the dependencies of outputs on inputs. (The reader in `fmi-rs` drops unit definitions and
+//! all types but the first.)
 
 use crate::quantity::UnitDefinition;
 use crate::xml::Element;
 use std::collections::BTreeMap;
 
-/// What an FMU says of itself.
+/// The model description of an FMU.
 #[derive(Clone, Debug, Default)]
 pub struct ModelDescription {
-    /// `fmiVersion`.
+    /// FMI version, from the attribute `fmiVersion`.
     pub fmi_version: String,
-    /// `modelName`.
+    /// Name of the model, from the attribute `modelName`.
     pub model_name: String,
-    /// `guid`.
+    /// Identifier of the build, from the attribute `guid`.
     pub guid: String,
-    /// `description`.
+    /// Description of the model, from the attribute `description`.
     pub description: String,
-    /// `version` of the model.
+    /// Version of the model, from the attribute `version`.
     pub version: String,
-    /// `generationTool`.
+    /// Tool that exported the FMU, from the attribute `generationTool`.
     pub generation_tool: String,
-    /// Co-simulation capabilities, if offered.
+    /// Co-simulation capabilities, if the FMU offers co-simulation.
     pub co_simulation: Option<Interface>,
-    /// Model exchange capabilities, if offered.
+    /// Model exchange capabilities, if the FMU offers model exchange.
     pub model_exchange: Option<Interface>,
-    /// The experiment it proposes.
+    /// Simulation settings that the FMU proposes.
     pub default_experiment: DefaultExperiment,
-    /// Unit definitions.
+    /// Unit definitions of the FMU.
     pub units: Vec<UnitDefinition>,
-    /// All variables, in the file's order.
+    /// All variables, in the order of the file.
     pub variables: Vec<Variable>,
-    /// For each output that declares them: the variables it depends on at the same instant. Positions in `variables`.
+    /// Positions, in `variables`, of the variables that each output depends on at the same instant;
+    /// only for outputs that declare them.
     pub dependencies: BTreeMap<usize, Vec<usize>>,
-    /// Whether there is a `ModelStructure`, which FMI demands.
+    /// Whether the file has a `ModelStructure`, which FMI requires.
     pub has_structure: bool,
 }
 
 /// An interface's model identifier and its capability flags.
 #[derive(Clone, Debug, Default)]
 pub struct Interface {
-    /// Name of the library in the archive, without ending.
+    /// Name of the library in the archive, without file extension.
     pub model_identifier: String,
-    /// The attributes that are set to `true`, and those with a number, as `name` or `name=value`.
+    /// Attributes that are set to `true`, as `name`, and those with a number, as `name=value`.
     pub capabilities: Vec<String>,
 }
 
 impl Interface {
-    /// Whether a flag is set.
+    /// Whether a capability flag is set.
     pub fn has(&self, capability: &str) -> bool {
         self.capabilities.iter().any(|name| name == capability)
     }
 }
 
-/// Simulation settings the FMU proposes.
+/// Simulation settings that the FMU proposes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DefaultExperiment {
-    /// Start time, s.
+    /// Start time of the simulation, s.
     pub start: Option<f64>,
-    /// Stop time, s.
+    /// Stop time of the simulation, s.
     pub stop: Option<f64>,
-    /// Step, s.
+    /// Length of the communication step, s.
     pub step: Option<f64>,
-    /// Relative tolerance.
+    /// Relative tolerance of the integration.
     pub tolerance: Option<f64>,
 }
 
-/// A scalar variable.
+/// A scalar variable of an FMU.
 #[derive(Clone, Debug)]
 pub struct Variable {
-    /// Name.
+    /// Name of the variable.
     pub name: String,
-    /// Handle for the get and set calls of its type.
+    /// Value reference, which identifies the variable in the get and set calls of its type.
     pub reference: u32,
-    /// What it is.
+    /// Description of the variable's meaning.
     pub description: String,
-    /// `parameter`, `input`, `output`, `local`, ….
+    /// Causality: `parameter`, `input`, `output`, `local`, ….
     pub causality: String,
-    /// `fixed`, `discrete`, `continuous`, ….
+    /// Variability: `fixed`, `discrete`, `continuous`, ….
     pub variability: String,
-    /// Type and what belongs to it.
+    /// Type of the variable, with its attributes.
     pub kind: Kind,
-    /// Start value as written.
+    /// Start value as the file writes it.
     pub start: Option<String>,
 }
 
-/// Type of a variable.
+/// Type of a variable, with the attributes of that type.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
-    /// A 64-bit float.
+    /// A real number, held as a 64-bit float.
     Real {
-        /// Unit name.
+        /// Name of the unit, if any.
         unit: Option<String>,
-        /// Unit it is shown in.
+        /// Unit in which the value is displayed.
         display_unit: Option<String>,
-        /// Smallest allowed value, in the unit.
+        /// Smallest allowed value, in the variable's unit.
         min: Option<f64>,
-        /// Largest allowed value, in the unit.
+        /// Largest allowed value, in the variable's unit.
         max: Option<f64>,
     },
-    /// A 32-bit integer.
+    /// An integer number of 32 bits.
     Integer {
-        /// Smallest allowed value.
+        /// Smallest allowed value, if any.
         min: Option<i32>,
-        /// Largest allowed value.
+        /// Largest allowed value, if any.
         max: Option<i32>,
     },
-    /// A truth value.
+    /// A truth value, true or false.
     Boolean,
-    /// One of named items.
+    /// A choice among named items.
     Enumeration {
-        /// Item names and their values.
+        /// Names of the items, with their values.
         items: Vec<(String, i32)>,
     },
-    /// Text.
+    /// A text of any length.
     String,
 }
 
 impl Kind {
-    /// The type's FMI name.
+    /// Name of the type in FMI.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Real { .. } => "Real",
@@ -130,15 +132,15 @@ impl Kind {
 }
 
 impl ModelDescription {
-    /// Reads the text of `modelDescription.xml`.
+    /// Parses the text of `modelDescription.xml`.
     ///
     /// # Errors
-    /// One line: what is wrong with the text, and where.
+    /// A line that says what is wrong with the text, and where.
     pub fn parse(text: &str) -> Result<Self, String> {
         read::description(&Element::parse(text)?)
     }
 
-    /// The variable of this name, with its position.
+    /// Finds the variable with this name and returns it with its position.
     pub fn find(&self, name: &str) -> Option<(usize, &Variable)> {
         self.variables.iter().enumerate().find(|(_, variable)| variable.name == name)
     }
@@ -149,14 +151,14 @@ impl ModelDescription {
     }
 }
 
-/// Makes a description of the file's elements.
+/// Builds a description from the elements of the file.
 mod read {
     use super::{DefaultExperiment, Interface, Kind, ModelDescription, Variable};
     use crate::quantity::UnitDefinition;
     use crate::xml::Element;
     use std::collections::BTreeMap;
 
-    /// The flags of an interface, in the order in which they are shown.
+    /// Flags of an interface, in the order in which they are shown.
     const FLAGS: [&str; 10] = [
         "needsExecutionTool",
         "canHandleVariableCommunicationStepSize",
@@ -169,7 +171,7 @@ mod read {
         "providesDirectionalDerivative",
         "completedIntegratorStepNotNeeded",
     ];
-    /// What the standard calls the exponents of a base unit.
+    /// Names that the standard gives to the exponents of a base unit.
     const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
     type Types<'a> = BTreeMap<&'a str, &'a Element>;
@@ -256,7 +258,7 @@ mod read {
         let own = ["Real", "Integer", "Boolean", "String", "Enumeration"];
         let own = own.iter().find_map(|kind| element.child(kind));
         let own = own.ok_or_else(|| format!("{} has no type", element.title()))?;
-        // An attribute of its own goes before that of its type.
+        // An attribute of the variable itself takes precedence over that of its declared type.
         let declared = own.attribute("declaredType").and_then(|name| types.get(name)?.child(&own.name));
         let text =
             |name: &str| own.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string);
@@ -304,12 +306,13 @@ mod read {
         })
     }
 
-    /// By the position of each output that declares them.
+    /// Positions of the inputs that each output depends on, by the position of the output; only for
+    /// outputs that declare them.
     fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<usize>>, String> {
         let unknowns = root.child("ModelStructure").into_iter().flat_map(|of| of.list("Outputs", "Unknown"));
         let mut dependencies = BTreeMap::new();
         for unknown in unknowns {
-            // An index counts from 1.
+            // Indices in the file count from 1.
             let position = |index: usize| {
                 let position = index.checked_sub(1).filter(|&position| position < variables);
                 position.ok_or_else(|| {
@@ -378,7 +381,7 @@ mod tests {
         assert_eq!((u.reference, &u.kind, u.start.as_deref()), (7, &real, Some("0.5")));
         let items = vec![("none".to_string(), 1), ("white".to_string(), 2)];
         assert_eq!(description.find("kind").unwrap().1.kind, Kind::Enumeration { items });
-        // Declared dependencies are kept apart from none being declared.
+        // A declaration of no dependencies is distinguished from a missing declaration.
         assert_eq!(description.dependencies, BTreeMap::from([(1, vec![0])]));
     }
 

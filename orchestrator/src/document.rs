@@ -24,7 +24,7 @@ use toml::de::{DeTable, DeValue, Deserializer};
 pub struct Source {
     /// Path of the file.
     pub path: PathBuf,
-    /// Its text.
+    /// Text of the file itself.
     pub text: String,
     /// The files that it extends with their texts, the one that has precedence first.
     bases: Vec<(PathBuf, String)>,
@@ -43,10 +43,10 @@ impl Source {
         Self::new(path, text)
     }
 
-    /// The same for a file whose text is known.
+    /// Reads a file whose text is known already, and all that it extends.
     ///
     /// # Errors
-    /// As [`Self::load`].
+    /// The errors are those of [`Self::load`].
     pub fn new(path: &Path, text: String) -> Result<Self, Error> {
         let mut files = Vec::new();
         collect(path, text, &mut Vec::new(), &mut files)?;
@@ -94,7 +94,7 @@ impl Source {
         Error::Experiment { at, message: message.into() }
     }
 
-    /// Reads the whole.
+    /// Reads the whole document as a `T`.
     ///
     /// # Errors
     /// If it is no TOML, or holds an unknown key.
@@ -235,7 +235,7 @@ fn collect(
     Ok(())
 }
 
-/// By which a file is known again, whatever way leads to it.
+/// Identifies a file independently of the path that leads to it.
 fn identity(path: &Path) -> PathBuf {
     fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
 }

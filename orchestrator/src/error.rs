@@ -4,7 +4,7 @@ use crate::clock::rounded;
 use crate::interrupt::Request;
 use std::path::PathBuf;
 
-/// What can go wrong, from reading an experiment to writing its results.
+/// All errors of this crate, from reading an experiment to writing its results.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The experiment or the command line asks for something that cannot be done.
@@ -12,23 +12,23 @@ pub enum Error {
     Experiment {
         /// File and line, `lqr.toml:12: `, or empty where there is none.
         at: String,
-        /// The culprit and the remedy.
+        /// Description of the problem and its remedy.
         message: String,
     },
     /// A file is not an FMU that this program can use.
     #[error("{}: {message}", path.display())]
     Fmu {
-        /// The archive.
+        /// Path of the archive.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Description of the problem with the archive.
         message: String,
     },
-    /// An FMU has faults, which have been told.
+    /// An FMU has faults, which have already been reported.
     #[error("{}: {count} {}", path.display(), if *count == 1 { "fault" } else { "faults" })]
     Faults {
-        /// The archive.
+        /// Path of the archive.
         path: PathBuf,
-        /// How many.
+        /// Number of faults that were found.
         count: usize,
     },
     /// A unit failed in a call.
@@ -36,9 +36,9 @@ pub enum Error {
     Unit {
         /// Name of the component in the experiment.
         component: String,
-        /// Communication point, s.
+        /// Simulated time of the communication point, s.
         time: f64,
-        /// The call and the unit's own words.
+        /// The call that failed, with the unit's own message.
         failure: UnitFailure,
     },
     /// A unit ended the simulation, which FMI lets it do.
@@ -48,7 +48,7 @@ pub enum Error {
         component: String,
         /// The last communication point, s.
         time: f64,
-        /// The unit's own words.
+        /// Message of the unit, in its own words.
         message: String,
     },
     /// A deadline was missed in a run that was to end then.
@@ -57,11 +57,11 @@ pub enum Error {
         rounded(*time)
     )]
     Deadline {
-        /// Whose values came late.
+        /// Name of the component whose values were late.
         component: String,
-        /// Communication point, s.
+        /// Simulated time of the communication point, s.
         time: f64,
-        /// From the deadline to the values, ms.
+        /// Time from the deadline until the values were ready, ms.
         late_ms: f64,
     },
     /// The attitude is further from its reference than the experiment allows.
@@ -71,51 +71,51 @@ pub enum Error {
         rounded(*beyond_deg)
     )]
     Lost {
-        /// The first communication point at which it was, s.
+        /// First communication point at which the attitude was lost, s.
         time: f64,
-        /// What is allowed, deg.
+        /// Largest allowed distance from the reference, deg.
         beyond_deg: f64,
     },
-    /// A run was to end before its stop time.
+    /// A run was asked to end before its stop time.
     #[error("ended by {request} before t = {} s", rounded(*time))]
     Interrupted {
         /// The first communication point that was not reached, s.
         time: f64,
-        /// Who asked.
+        /// The request that ended the run.
         request: Request,
     },
-    /// A study was to end before all its runs were there.
+    /// A study was asked to end before all of its runs were complete.
     #[error(
         "ended by {request}: {done} of {all} parts are finished and kept in {}; the same command goes on from there",
         out.display()
     )]
     Unfinished {
-        /// Parts that are kept.
+        /// Number of parts that are complete and kept.
         done: usize,
-        /// Parts there are.
+        /// Number of parts in the study.
         all: usize,
         /// Folder of the study's results.
         out: PathBuf,
-        /// Who asked.
+        /// The request that ended the study.
         request: Request,
     },
-    /// Work without results of its own was to end.
+    /// Work that has no results of its own was asked to end.
     #[error("ended by {0}")]
     Ended(Request),
     /// A run of a study failed.
     #[error("run {run}: {source}")]
     Run {
-        /// Its id.
+        /// Id of the run in the study.
         run: String,
-        /// What went wrong.
+        /// The error of that run.
         source: Box<Error>,
     },
     /// A file or folder could not be read or written.
     #[error("{}: {source}", path.display())]
     File {
-        /// The file.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// The system's reason.
+        /// Reason that the system gave.
         source: std::io::Error,
     },
     /// Standard output could not be written.
@@ -124,7 +124,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// A fault of the experiment that has no line of its own.
+    /// Creates an error of the experiment that refers to no line.
     pub fn experiment(message: impl Into<String>) -> Self {
         Self::Experiment { at: String::new(), message: message.into() }
     }
@@ -156,7 +156,7 @@ impl Error {
         }
     }
 
-    /// Whether the reader of standard output went away, which is no failure.
+    /// Whether standard output was closed by its reader, which is no failure.
     pub fn is_broken_pipe(&self) -> bool {
         matches!(self, Self::Output(source) if source.kind() == std::io::ErrorKind::BrokenPipe)
     }
@@ -165,16 +165,16 @@ impl Error {
 /// A call to a unit that did not succeed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnitFailure {
-    /// Whether the unit ended the simulation by it, which is no fault.
+    /// Whether the unit ended the simulation by this call, which is no fault.
     pub ends: bool,
     /// The call, for example `doStep`.
     pub call: &'static str,
-    /// What the unit said of it, or else its status.
+    /// Message of the unit, or its status if it gave none.
     pub message: String,
 }
 
 impl UnitFailure {
-    /// A fault in this call.
+    /// Creates a failure of this call that does not end the simulation.
     pub fn new(call: &'static str, message: impl Into<String>) -> Self {
         Self { ends: false, call, message: message.into() }
     }

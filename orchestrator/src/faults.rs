@@ -1,16 +1,17 @@
-//! What is wrong with a description that can be read all the same. Units run with most of it, but not everywhere, and not always as meant.
+//! Faults of a model description that do not keep it from being read. Units run with most of them,
+//! but not everywhere, and not always as intended.
 
 use crate::description::{Kind, ModelDescription, Variable};
 use crate::wiring::Carrier;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// `causality` of FMI 2.0, section 2.2.7.
+/// Values of `causality` that FMI 2.0, section 2.2.7, allows.
 pub const CAUSALITIES: [&str; 6] =
     ["parameter", "calculatedParameter", "input", "output", "local", "independent"];
-/// `variability` of the same section.
+/// Values of `variability` that the same section of FMI 2.0 allows.
 const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
 
-/// One line for each fault, in the order of the file.
+/// Finds the faults of a description: one line for each, in the order of the file.
 pub fn faults(description: &ModelDescription) -> Vec<String> {
     let mut faults = Vec::new();
     if description.co_simulation.is_none() && description.model_exchange.is_none() {
@@ -29,7 +30,8 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
         if !names.insert(name) {
             faults.push(format!("two variables are called \"{name}\""));
         }
-        // Other variables may share a reference as aliases; of two that are set, the later would win.
+        // Other variables may share a reference as aliases. Of two that are both set, the later one
+        // would overwrite the first.
         if matches!(variable.causality.as_str(), "input" | "parameter") {
             let handle = (variable.reference, Carrier::of(&variable.kind));
             if let Some(other) = handles.insert(handle, name) {
@@ -70,7 +72,7 @@ fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<Str
     }
 }
 
-/// What is wrong with a start value.
+/// Describes the fault of a start value, if it has one.
 fn start_fault(start: &str, kind: &Kind) -> Option<String> {
     let outside =
         |below: bool, above: bool| (below || above).then(|| "is outside its min and max".to_string());

@@ -6,23 +6,23 @@ pub use fmi_rs::fmi2::types::{
 };
 use std::ffi::{c_char, c_int, c_uint, c_void};
 
-/// fmi2CoSimulation.
+/// Kind of an instance for co-simulation, fmi2CoSimulation.
 pub const CO_SIMULATION: c_int = fmi2Type::CoSimulation as c_int;
-/// fmi2LastSuccessfulTime.
+/// Kind of the status fmi2LastSuccessfulTime.
 pub const LAST_SUCCESSFUL_TIME: c_int = fmi2StatusKind::LastSuccessfulTime as c_int;
-/// fmi2Terminated.
+/// Kind of the status fmi2Terminated.
 pub const TERMINATED: c_int = fmi2StatusKind::Terminated as c_int;
 
-/// The status that a call returned; its number if FMI 2.0 has none such.
+/// Converts the integer that a call returned into a status.
 ///
 /// # Errors
-/// The number.
+/// The integer itself, if FMI 2.0 defines no such status.
 #[inline]
 pub fn status(code: c_int) -> Result<Status, c_int> {
     Status::try_from(code).map_err(|()| code)
 }
 
-/// What a call returned, as text.
+/// Formats the status that a call returned.
 pub fn name_of(status: Result<Status, c_int>) -> String {
     match status {
         Ok(known) => format!("{known:?}"),
@@ -30,25 +30,25 @@ pub fn name_of(status: Result<Status, c_int>) -> String {
     }
 }
 
-/// fmi2Component.
+/// Pointer to an instance, fmi2Component.
 pub type Component = *mut c_void;
-/// The texts of C.
+/// Pointer to a C string that ends with a zero byte.
 pub type Text = *const c_char;
 /// The logger, once the `printf` arguments are in the message.
 pub type Logger = unsafe extern "C" fn(*mut c_void, Text, c_int, Text, Text);
 
-/// fmi2CallbackFunctions.
+/// The callback structure of FMI 2.0, fmi2CallbackFunctions.
 #[repr(C)]
 pub struct Callbacks {
-    /// Gets the unit's messages.
+    /// Receives the log messages of the unit.
     pub logger: Logger,
-    /// Gives zeroed memory: how many, of what size.
+    /// Allocates zeroed memory, given the number and the size of objects.
     pub allocate: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
-    /// Takes it back.
+    /// Frees memory that `allocate` returned.
     pub free: Option<unsafe extern "C" fn(*mut c_void)>,
-    /// For steps that are not waited for.
+    /// Reports the end of an asynchronous step.
     pub step_finished: Option<unsafe extern "C" fn(*mut c_void, c_int)>,
-    /// Passed to the callbacks as it is.
+    /// Pointer that is passed to the callbacks unchanged.
     pub environment: *mut c_void,
 }
 
@@ -57,7 +57,7 @@ pub type GetText = unsafe extern "C" fn() -> Text;
 /// fmi2Instantiate: name, type, GUID, resources, callbacks, visible, logging.
 pub type Instantiate =
     unsafe extern "C" fn(Text, c_int, Text, Text, *const Callbacks, c_int, c_int) -> Component;
-/// fmi2FreeInstance.
+/// Type of the function fmi2FreeInstance.
 pub type FreeInstance = unsafe extern "C" fn(Component);
 /// fmi2SetupExperiment: tolerance and start and stop time, each but the start with whether it is given.
 pub type SetupExperiment = unsafe extern "C" fn(Component, c_int, f64, f64, c_int, f64) -> c_int;

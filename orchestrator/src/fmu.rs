@@ -1,8 +1,10 @@
-//! Opens `.fmu` archives and makes co-simulation units of them. The only file of this crate with `unsafe`.
+//! Opens `.fmu` archives and instantiates co-simulation units from them. This is the only file of
+//! the crate with `unsafe`.
 //!
-//! The logger that expands `printf` arguments comes from `fmi-rs`. The calls go through libloading, because
-//! `fmi-rs` lets the callback structure go after fmi2Instantiate, while units of several exporters keep the pointer to it
-//! and crash when they log; the C types are in [`fmi`], because those of `fmi-rs` take a status for an enumeration.
+//! The logger that expands `printf` arguments comes from `fmi-rs`. The calls go through libloading,
+//! because `fmi-rs` frees the callback structure after fmi2Instantiate, while units of several
+//! exporters keep the pointer to it and crash when they log. The C types are in [`fmi`], because
+//! those of `fmi-rs` represent a status as an enumeration.
 
 #![allow(unsafe_code)]
 
@@ -28,22 +30,23 @@ use tempfile::TempDir;
 use url::Url;
 
 unsafe extern "C" {
-    /// Puts a C function in front of the logger that expands the `printf` arguments of a message. Part of `fmi-rs`.
+    /// Wraps the logger in a C function that expands the `printf` arguments of a message. It is
+    /// part of `fmi-rs`.
     fn add_logger_proxy(functions: *mut fmi::Callbacks);
-    /// The C library's, for units that want memory from their environment.
+    /// The C library's `calloc`, for units that request memory from their environment.
     fn calloc(count: usize, size: usize) -> *mut c_void;
-    /// Its counterpart.
+    /// The C library's `free`, which releases that memory.
     fn free(memory: *mut c_void);
 }
 
-/// An unpacked archive. Several units can be made of it.
+/// An unpacked archive, of which several units can be instantiated.
 pub struct Fmu {
-    /// Where the archive is.
+    /// Path of the archive.
     pub path: PathBuf,
-    /// What it says of itself.
+    /// The model description in the archive.
     pub description: ModelDescription,
     folder: Rc<TempDir>,
-    /// Whether the library for this platform was looked at.
+    /// Whether the library for this platform has been checked.
     is_sound: Cell<bool>,
 }
 
@@ -51,7 +54,7 @@ impl Fmu {
     /// Unpacks an archive and reads its description.
     ///
     /// # Errors
-    /// If the archive is unsafe or broken, or no FMI 2.0 FMU.
+    /// If the archive is unsafe or damaged, or is not an FMI 2.0 FMU.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
         let folder = archive::unpack(path)?;
@@ -68,13 +71,14 @@ impl Fmu {
         })
     }
 
-    /// The platforms there are binaries for, in FMI's names.
+    /// Platforms for which the archive has binaries, by FMI's names.
     pub fn platforms(&self) -> Vec<String> {
         let binaries = self.folder.path().join("binaries");
         names_in(&binaries).into_iter().filter(|name| binaries.join(name).is_dir()).collect()
     }
 
-    /// What is wrong with the archive, though it can be opened: one line for each fault of the description, and of the library for this platform.
+    /// Faults of the archive that do not keep it from being opened: one line for each fault of the
+    /// description and of the library for this platform.
     pub fn faults(&self) -> Vec<String> {
         let mut faults = faults::faults(&self.description);
         if self.description.co_simulation.is_some() {
@@ -86,10 +90,11 @@ impl Fmu {
         faults
     }
 
-    /// Loads the library.
+    /// Loads the shared library of the FMU.
     ///
     /// # Errors
-    /// One line: what is missing, or why it cannot be loaded. It names the entry of the archive.
+    /// A line that says what is missing or why the library cannot be loaded, and names the entry of
+    /// the archive.
     fn load(&self) -> Result<Functions, String> {
         let interface = self.description.co_simulation.as_ref().ok_or("offers no co-simulation")?;
         let platforms = self.platforms();
@@ -98,7 +103,8 @@ impl Fmu {
             return Err(format!("has no binary for {PLATFORM}, only for: {offered}"));
         }
         let identifier = &interface.model_identifier;
-        // It becomes part of a path. FMI 2.0, section 2.2.7, wants a C identifier, but units with a hyphen in it run everywhere else.
+        // The identifier becomes part of a path. FMI 2.0, section 2.2.7, requires a C identifier,
+        // but other programs accept units with a hyphen in it.
         if identifier.is_empty() || identifier.contains(['/', '\\', '.', ':', '\0']) {
             return Err(format!(
                 "the model identifier \"{}\" is refused: it must be the name of a file without folder and ending",
@@ -122,7 +128,8 @@ impl Fmu {
             let text = text.trim_start_matches("dlopen failed: ");
             match text.split_once(": cannot open shared object file") {
                 Some((missing, _)) => format!("{entry} needs {missing}, which is not on this system"),
-                // Nobody knows the temporary folder.
+                // The path of the temporary folder is removed, because it means nothing to a
+                // reader.
                 None => {
                     format!("{entry}: {}", text.replace(&format!("{}/", self.folder.path().display()), ""))
                 }
@@ -130,7 +137,7 @@ impl Fmu {
         })
     }
 
-    /// Loads the library and makes a co-simulation unit called `name`.
+    /// Loads the library and instantiates a co-simulation unit called `name`.
     ///
     /// # Errors
     /// If the FMU has no binary for this platform or offers no co-simulation, if the library cannot be loaded, or if the
@@ -154,7 +161,8 @@ impl Fmu {
             last: Mutex::default(),
             instantiates: AtomicBool::new(true),
         });
-        // Units that say they need no memory functions refuse to go without them all the same.
+        // Some units refuse to start without memory functions although they declare that they need
+        // none.
         let mut callbacks = fmi::Callbacks {
             logger: receive_message,
             allocate: Some(calloc),
@@ -162,11 +170,13 @@ impl Fmu {
             step_finished: None,
             environment: Rc::as_ptr(&log).cast_mut().cast(),
         };
-        // SAFETY: the structure is valid; the call only exchanges the logger in it for one that expands the arguments.
+        // SAFETY: `callbacks` is a valid, exclusively borrowed structure for the whole call, which
+        // only replaces the logger in it by one that expands the arguments.
         unsafe { add_logger_proxy(&raw mut callbacks) };
         let callbacks = Rc::new(callbacks);
 
-        // SAFETY: the function has the type FMI gives it; the texts outlive the call, callbacks and log the instance.
+        // SAFETY: FMI 2.0 gives the function this type; the texts outlive the call, and the unit
+        // keeps callbacks and log alive as long as the instance, as FMI demands.
         let component = unsafe {
             (functions.instantiate)(
                 name_text.as_ptr(),
@@ -188,7 +198,7 @@ impl Fmu {
     }
 }
 
-/// What is in a folder, sorted; nothing if there is no such folder.
+/// Names of the entries of a folder, sorted; empty if the folder does not exist.
 fn names_in(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<String> =
@@ -197,11 +207,12 @@ fn names_in(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Whether a library file is for this machine, and all there: a program that touches what is missing is killed.
+/// Checks that a library file is complete and made for this machine. Without the check, access to a
+/// missing part would kill the program.
 fn check_library(file: &Path) -> Result<(), String> {
     let bytes = std::fs::read(file).map_err(|error| format!("cannot be read: {error}"))?;
     let fault = |error: object::Error| format!("is no sound library: {error}");
-    // The loader chooses among those in one file.
+    // The file holds libraries for several architectures, among which the loader chooses.
     if matches!(FileKind::parse(&*bytes), Ok(FileKind::MachOFat32 | FileKind::MachOFat64)) {
         return Ok(());
     }
@@ -216,7 +227,7 @@ fn check_library(file: &Path) -> Result<(), String> {
     library.segments().try_for_each(|segment| segment.data().map(drop)).map_err(fault)
 }
 
-/// What libraries for this machine are.
+/// Format and architecture that a library needs to run on this machine.
 const HOST: (BinaryFormat, Architecture) = (
     if cfg!(windows) {
         BinaryFormat::Pe
@@ -234,13 +245,13 @@ const HOST: (BinaryFormat, Architecture) = (
     },
 );
 
-/// An error and what caused it, in one line.
+/// Returns an error and its causes as one line.
 fn with_causes(error: &dyn std::error::Error) -> String {
     let causes = std::iter::successors(Some(error), |error| error.source());
     causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
 }
 
-/// The functions this program calls, and the library they are in.
+/// The FMI functions that this program calls, and the library that holds them.
 struct Functions {
     instantiate: fmi::Instantiate,
     free_instance: fmi::FreeInstance,
@@ -258,16 +269,18 @@ struct Functions {
     do_step: fmi::DoStep,
     get_real_status: fmi::GetStatus<f64>,
     get_boolean_status: fmi::GetStatus<c_int>,
-    /// Not needed for anything, and missing in some units.
+    /// Optional, because nothing depends on it and some units lack it.
     get_version: Option<fmi::GetText>,
     _library: Library,
 }
 
 impl Functions {
     fn load(file: &Path) -> Result<Self, libloading::Error> {
-        // SAFETY: loading runs the library's own initializers. Whoever runs an FMU trusts its code.
+        // SAFETY: loading runs the library's own initializers, which are sound only if the library
+        // is. Whoever runs an FMU trusts its code.
         let library = unsafe { Library::new(file) }?;
-        // SAFETY: FMI 2.0 gives each function the type it is loaded as, and the library stays as long as the pointers.
+        // SAFETY: FMI 2.0 gives each function the type it is loaded as, and `_library` keeps the
+        // code loaded as long as the pointers exist.
         unsafe {
             Ok(Self {
                 instantiate: *library.get(b"fmi2Instantiate\0")?,
@@ -292,32 +305,34 @@ impl Functions {
         }
     }
 
-    /// What the library says of its version, if that is not that of the description.
+    /// A line about the version that the library reports, if it is missing or not FMI 2.0.
     fn version_fault(&self) -> Option<String> {
         let Some(get_version) = self.get_version else {
             return Some("its library has no fmi2GetVersion".into());
         };
-        // SAFETY: the function has this type, and FMI lets it be called at any time.
+        // SAFETY: FMI 2.0 gives the function this type and allows the call at any time.
         let version = text_of(unsafe { get_version() });
         let is_known = version == "2.0" || version.starts_with("2.0.");
         (!is_known).then(|| format!("its library says that it is of FMI \"{}\"", version.escape_default()))
     }
 }
 
-/// The text at `text`, which ends with a zero byte; an empty one if there is none.
+/// Copies the C string at `text`; a null pointer gives an empty string.
 fn text_of(text: fmi::Text) -> String {
     if text.is_null() {
         return String::new();
     }
-    // SAFETY: FMI passes texts that end with a zero byte.
+    // SAFETY: FMI passes strings that end with a zero byte and stay valid during the call; the null
+    // pointer was excluded above.
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
-/// Passes an FMU's log messages on to `tracing`, and keeps the last one that tells of trouble.
+/// Forwards an FMU's log messages to `tracing`, and keeps the last one that reports a problem.
 struct Log {
     component: String,
     last: Mutex<Option<String>>,
-    /// Whether trouble is told by an error that is to come anyway.
+    /// Whether the unit is being instantiated. Messages about problems are then part of the error
+    /// that follows.
     instantiates: AtomicBool,
 }
 
@@ -341,7 +356,7 @@ impl Log {
     }
 }
 
-/// The logger callback, behind the one that expands the arguments.
+/// The logger callback, called by the C function that expands the arguments.
 unsafe extern "C" fn receive_message(
     environment: *mut c_void,
     _instance: fmi::Text,
@@ -349,20 +364,21 @@ unsafe extern "C" fn receive_message(
     category: fmi::Text,
     message: fmi::Text,
 ) {
-    // SAFETY: the environment is the `Log` given with the callbacks, which lives as long as the instance.
+    // SAFETY: the environment is the `Log` passed with the callbacks, which lives as long as the
+    // instance.
     if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
         log.message(fmi::status(status), &text_of(category), &text_of(message));
     }
 }
 
-/// What must live as long as a unit's instance.
+/// The data that must live as long as a unit's instance.
 struct Instance {
     functions: Functions,
     _callbacks: Rc<fmi::Callbacks>,
     log: Rc<Log>,
 }
 
-/// A unit made of an FMU.
+/// A co-simulation unit that was instantiated from an FMU.
 pub struct FmuUnit {
     component: fmi::Component,
     instance: Rc<Instance>,
@@ -394,11 +410,13 @@ impl FmuUnit {
         UnitFailure::new(call, format!("{said} ({})", fmi::name_of(status)))
     }
 
-    /// Why a step was discarded: FMI 2.0, section 4.2.3, lets a unit end the simulation so.
+    /// Describes why a step was discarded. FMI 2.0, section 4.2.3, lets a unit end the simulation
+    /// in this way.
     fn discarded(&mut self, said: Option<String>) -> UnitFailure {
         let Functions { get_real_status, get_boolean_status, .. } = self.instance.functions;
         let (mut time, mut terminated) = (f64::NAN, fmi::FALSE);
-        // SAFETY: the instance is alive, and after fmi2Discard these calls are allowed.
+        // SAFETY: the instance is alive, both pointers are valid for the calls, and FMI allows
+        // these calls after fmi2Discard.
         let statuses = unsafe {
             [
                 get_real_status(self.component, fmi::LAST_SUCCESSFUL_TIME, &raw mut time),
@@ -424,16 +442,17 @@ impl FmuUnit {
 impl Drop for FmuUnit {
     fn drop(&mut self) {
         if self.fatal {
-            // No function of the FMU may be called any more, not even fmi2FreeInstance: leave everything as it is.
+            // After a fatal error no function of the FMU may be called, not even fmi2FreeInstance,
+            // so the instance is leaked.
             std::mem::forget(Rc::clone(&self.instance));
         } else {
-            // SAFETY: the instance is alive, and nobody uses it after this.
+            // SAFETY: the instance is alive, is freed only here, and is not used afterwards.
             unsafe { (self.instance.functions.free_instance)(self.component) };
         }
     }
 }
 
-/// A get or set call for arrays of references and values.
+/// Performs a get or set call for arrays of references and values.
 macro_rules! call_with_values {
     ($self:ident, $function:ident, $name:literal, $references:ident, $values:expr, $length:expr) => {{
         assert_eq!($references.len(), $length, "as many values as references");
@@ -483,7 +502,8 @@ impl CoSimulationUnit for FmuUnit {
     }
 
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
-        // SAFETY: the instance is alive.
+        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
+        // FMI gives it.
         let status = unsafe {
             (self.instance.functions.setup_experiment)(
                 self.component,
@@ -495,25 +515,29 @@ impl CoSimulationUnit for FmuUnit {
             )
         };
         self.check("setupExperiment", status)?;
-        // SAFETY: the instance is alive.
+        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
+        // FMI gives it.
         let status = unsafe { (self.instance.functions.enter_initialization_mode)(self.component) };
         self.check("enterInitializationMode", status)
     }
 
     fn exit_initialization(&mut self) -> Outcome {
-        // SAFETY: the instance is alive.
+        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
+        // FMI gives it.
         let status = unsafe { (self.instance.functions.exit_initialization_mode)(self.component) };
         self.check("exitInitializationMode", status)
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
-        // SAFETY: the instance is alive.
+        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
+        // FMI gives it.
         let status = unsafe { (self.instance.functions.do_step)(self.component, time, step, fmi::TRUE) };
         self.check("doStep", status)
     }
 
     fn terminate(&mut self) -> Outcome {
-        // SAFETY: the instance is alive.
+        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
+        // FMI gives it.
         let status = unsafe { (self.instance.functions.terminate)(self.component) };
         self.check("terminate", status)
     }

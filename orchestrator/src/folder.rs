@@ -4,7 +4,7 @@ use crate::error::Error;
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
-/// What a run may leave.
+/// Names of the files that a run may write.
 pub const RESULTS: [&str; 6] =
     ["results.csv", "results.parquet", "results.json", "metrics.json", "plot.svg", "realtime.svg"];
 

@@ -18,13 +18,13 @@ pub struct Signals {
 /// The first tick at which the guarantee was no longer in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Loss {
-    /// Its time, s.
+    /// Time of that tick, s.
     pub time: f64,
-    /// The status at it.
+    /// Status of the guarantee at that tick.
     pub status: Option<f64>,
 }
 
-/// What became of the guarantee up to a tick.
+/// Course of the guarantee up to a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Course {
     signals: Signals,
@@ -33,7 +33,7 @@ pub struct Course {
     ticks: u64,
     ticks_in_force: u64,
     status: Option<f64>,
-    /// When it was first lost.
+    /// Tick at which the guarantee was first lost, if it was.
     pub lost: Option<Loss>,
     /// Smallest margins of rate and moment while it was in force.
     pub margins: [Option<f64>; 2],
@@ -41,7 +41,7 @@ pub struct Course {
     pub broken: bool,
 }
 
-/// Limits are met up to rounding.
+/// Tolerance with which limits count as met, because of rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// Whether a vector is longer than its limit. One that is not a number is.
@@ -57,7 +57,7 @@ fn smaller(a: f64, b: f64) -> f64 {
 }
 
 impl Course {
-    /// Nothing seen yet; `None` if no component says anything of a guarantee.
+    /// Creates a course without samples; `None` if no component reports on a guarantee.
     pub fn new(places: Places, limits: Limits) -> Option<Self> {
         Some(Self {
             signals: places.guarantee?,
@@ -77,7 +77,7 @@ impl Course {
         (self.ticks > 0).then(|| self.ticks_in_force as f64 / self.ticks as f64)
     }
 
-    /// Whether it is in force by these values.
+    /// Whether these values say that the guarantee is in force.
     pub fn is_in_force(&self, values: &[f64]) -> bool {
         values[self.signals.in_force] != 0.0
     }
@@ -87,7 +87,7 @@ impl Course {
         self.signals.margins.map(|place| place.map(|place| values[place]))
     }
 
-    /// The present status.
+    /// Status of the guarantee at the last tick seen.
     pub fn status_now(&self) -> Option<f64> {
         self.status
     }
@@ -97,7 +97,7 @@ impl Course {
         self.lost.map_or(self.status, |loss| loss.status)
     }
 
-    /// Whether it can be told that a limit is exceeded.
+    /// Whether there are limits with which the guarantee can be checked.
     pub fn is_checked(&self) -> bool {
         let Places { rate, moment, .. } = self.places;
         rate.and(self.limits.rate).or(moment.and(self.limits.moment)).is_some()

@@ -1,4 +1,5 @@
-//! What units warn of during a run: each warning is told once, at the end, with its first time and how often it came.
+//! Warnings of units during a run: each is printed once, at the end, with its first time and the
+//! number of times it came.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -7,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 /// A unit that never says the same twice is collected up to so many warnings.
 const MOST: usize = 100;
 
-/// A warning, in a unit's words.
+/// A warning of a unit, in its own words.
 struct Warning {
     text: String,
     first: f64,
@@ -34,7 +35,7 @@ pub fn collect() -> Collection {
     Collection(())
 }
 
-/// Time goes on, s.
+/// Sets the current simulated time, s.
 pub fn at(time: f64) {
     HEARD.with_borrow_mut(|heard| {
         if let Some(heard) = heard {
@@ -43,7 +44,7 @@ pub fn at(time: f64) {
     });
 }
 
-/// A unit warns.
+/// Records or prints a warning of a unit.
 pub fn warn(text: &str) {
     let is_collected = HEARD.with_borrow_mut(|heard| {
         let Some(Heard { now, warnings }) = heard else { return false };
@@ -61,7 +62,7 @@ pub fn warn(text: &str) {
     }
 }
 
-/// What is wrong with a file is told once, however many threads open it and however often.
+/// Prints a warning about a file once, however many threads open the file and however often.
 pub fn warn_once(text: String) {
     static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
@@ -82,7 +83,7 @@ impl Warning {
 }
 
 impl Drop for Collection {
-    /// Tells what was collected.
+    /// Prints the warnings that were collected.
     fn drop(&mut self) {
         let heard = HEARD.with_borrow_mut(Option::take);
         for warning in heard.iter().flat_map(|heard| &heard.warnings) {

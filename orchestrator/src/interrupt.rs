@@ -7,14 +7,14 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// Shared by whoever asks and by whoever is to end: the master looks at every communication point.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
-    /// Number of the signal that came, or 0.
+    /// Number of the signal that arrived, or 0.
     signal: Arc<AtomicUsize>,
     /// Whether one has come, for the second one.
     again: Arc<AtomicBool>,
     quit: Arc<AtomicBool>,
 }
 
-/// Who asked.
+/// Origin of a request to end the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// The user, by a key of the live view.
@@ -24,7 +24,7 @@ pub enum Request {
 }
 
 impl Request {
-    /// Ctrl-C.
+    /// Request that Ctrl-C makes, which is the signal SIGINT.
     pub const INTERRUPT: Self = Self::Signal(signal_hook::consts::SIGINT);
 
     /// The exit code of a process that was ended so: 128 and the signal's number, as shells count.
@@ -62,7 +62,7 @@ impl Interrupt {
         Ok(())
     }
 
-    /// Asks.
+    /// Records a request to end the work.
     pub fn ask(&self, request: Request) {
         match request {
             Request::Quit => self.quit.store(true, Ordering::Relaxed),
@@ -72,7 +72,7 @@ impl Interrupt {
         }
     }
 
-    /// What was asked for, if anything was.
+    /// The request that was made, if any.
     pub fn asked(&self) -> Option<Request> {
         match self.signal.load(Ordering::Relaxed) {
             0 => self.quit.load(Ordering::Relaxed).then_some(Request::Quit),

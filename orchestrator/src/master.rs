@@ -1,8 +1,11 @@
-//! The master algorithm: passes values on at communication points and steps the units between them.
+//! The master algorithm, which transfers values at communication points and steps the units between
+//! them.
 //!
-//! At tick k every unit that has reached t_k gets its inputs, then everything is looked at, then time goes on. A unit that
-//! steps at every n-th tick is stepped when its interval *ends*: until then it stays at its last communication point, so
-//! that nothing of its future shows in its outputs. Of each unit the sequence of calls is set, get, doStep, as any master's.
+//! At tick k, every unit that has reached t_k receives its inputs; then the observers see the
+//! probed values, and then time advances. A unit that steps at every n-th tick is stepped when its
+//! interval *ends*: until then it stays at its last communication point, so that its outputs show
+//! nothing of its future. Each unit sees the calls set, get and doStep in this order, as with any
+//! master.
 
 use crate::clock::Clock;
 use crate::error::{Error, UnitFailure};
@@ -18,51 +21,55 @@ use crate::wiring::{Carrier, Port, Wire};
 use std::ops::Range;
 use std::rc::Rc;
 
-/// What the master steps, in the order in which inputs are set.
+/// A unit together with what the master must know to step it. Members are kept in the order in
+/// which their inputs are set.
 pub struct Member {
-    /// Name in the experiment.
+    /// Name of the component in the experiment.
     pub name: String,
-    /// Steps at every n-th tick.
+    /// Period of the unit: it steps at every n-th tick.
     pub every: u32,
-    /// The unit, instantiated and with its parameters set.
+    /// The unit itself, instantiated and with its parameters set.
     pub unit: Box<dyn CoSimulationUnit>,
 }
 
-/// What there is to see at a communication point, after all inputs were passed on.
+/// The values that an observer sees at a communication point, after all inputs were transferred.
 pub struct Sample<'a> {
-    /// Number of the communication point.
+    /// Number of the communication point, counted from 0.
     pub tick: u64,
-    /// Its time, s.
+    /// Simulated time of the communication point, s.
     pub time: f64,
-    /// Whether this is the stop.
+    /// Whether this communication point is the stop time.
     pub last: bool,
-    /// The probed values, in the order in which the probes were asked for. Integers and booleans as floats, exactly.
+    /// The probed values, in the order in which the probes were requested. Integers and booleans
+    /// are converted to floats without loss.
     pub values: &'a [f64],
 }
 
-/// Looks at every communication point: writes results, sums up, shows progress.
+/// An observer is called at every communication point, for example to record results, to accumulate
+/// the figures of merit, or to show progress.
 pub trait Observer {
-    /// Sees one communication point.
+    /// Processes the values of one communication point.
     ///
     /// # Errors
-    /// Ends the run.
+    /// An error that the observer returns ends the run.
     fn observe(&mut self, sample: &Sample) -> Result<(), Error>;
 }
 
-/// The units with their wiring, ready to run.
+/// The units with their connections, ready to run.
 pub struct Master {
     clock: Clock,
     coupling: Coupling,
     members: Vec<Member>,
     inputs: Vec<Inputs>,
     probe: Probe,
-    /// The time spent in each unit, if it is measured.
+    /// Accumulated computing time of each unit; empty unless it is measured.
     spent: Vec<Rc<Spent>>,
     pacer: Option<Pacer>,
     interrupt: Interrupt,
 }
 
-/// Values of one type on their way to one unit: one get per source, one set.
+/// All values of one type that one unit receives: they are read with one get call per source and
+/// written with one set call.
 struct Bundle<T> {
     references: Vec<u32>,
     values: Vec<T>,
@@ -92,12 +99,12 @@ impl<T: Copy + Default> Bundle<T> {
     }
 }
 
-/// All values on their way to one unit.
+/// All values that one unit receives, grouped by type.
 struct Inputs {
     real: Bundle<f64>,
     integer: Bundle<i32>,
     boolean: Bundle<i32>,
-    /// Places among the reals whose values change on the way.
+    /// Indices of the real inputs whose values are converted on the way, with their scaling.
     scaled: Vec<(usize, Scaling)>,
 }
 
@@ -118,7 +125,7 @@ impl Inputs {
         }
     }
 
-    /// Reads the sources. On failure says whose call it was.
+    /// Reads the sources of the inputs. An error carries the index of the member whose call failed.
     fn gather(&mut self, members: &mut [Member]) -> Result<(), (usize, UnitFailure)> {
         for (source, references, range) in &self.real.sources {
             let values = &mut self.real.values[range.clone()];
@@ -152,7 +159,7 @@ impl Inputs {
     }
 }
 
-/// Reads variables for the observers, with one call per unit and type.
+/// Reads the probed variables for the observers, with one call per unit and type.
 struct Probe {
     reads: Vec<Read>,
     values: Vec<f64>,
@@ -162,7 +169,7 @@ struct Read {
     component: usize,
     carrier: Carrier,
     references: Vec<u32>,
-    /// Where each value goes.
+    /// Index of each value among the probed values.
     places: Vec<usize>,
     reals: Vec<f64>,
     integers: Vec<i32>,
@@ -217,7 +224,8 @@ impl Probe {
 }
 
 impl Master {
-    /// A master for units in this order; indices in `wires` and `probes` are positions in `members`.
+    /// Creates a master for units in this order; indices in `wires` and `probes` are positions in
+    /// `members`.
     pub fn new(
         clock: Clock,
         coupling: Coupling,
@@ -230,12 +238,13 @@ impl Master {
         Self { clock, coupling, members, inputs, probe, spent: Vec::new(), pacer: None, interrupt }
     }
 
-    /// Who may end the run from outside; to be said before it is paced.
+    /// Sets the interrupt through which the run can be ended from outside. It must be set before
+    /// [`Self::pace`] is called.
     pub fn heed(&mut self, interrupt: &Interrupt) {
         self.interrupt = interrupt.clone();
     }
 
-    /// Runs in step with the timer from now on.
+    /// Paces the run from now on, so that it keeps in step with the timer.
     pub fn pace(&mut self, settings: Settings, timer: Rc<dyn Timer>) -> &Pacer {
         self.measure(&timer);
         let spent = self.members.iter().zip(&self.spent);
@@ -244,12 +253,12 @@ impl Master {
         self.pacer.insert(pacer)
     }
 
-    /// What kept the run in step, if anything did.
+    /// Takes out the pacer that kept the run in step; `None` if the run was not paced.
     pub fn take_pacer(&mut self) -> Option<Pacer> {
         self.pacer.take()
     }
 
-    /// From now on the time spent in each unit is measured.
+    /// Measures the computing time of each unit from now on.
     pub fn measure_time(&mut self) {
         let timer: Rc<dyn Timer> = Rc::new(Monotonic);
         self.measure(&timer);
@@ -265,23 +274,25 @@ impl Master {
             .unzip();
     }
 
-    /// Mean wall-clock time (s) spent in each unit per step, by name; empty if it is not measured.
+    /// Mean wall-clock time (s) that each unit took per step, by name; empty if it is not measured.
     pub fn step_seconds(&self) -> impl Iterator<Item = (&str, f64)> {
         let spent = self.members.iter().zip(&self.spent);
         spent.filter_map(|(member, spent)| Some((member.name.as_str(), spent.seconds_per_step()?)))
     }
 
-    /// Initializes all units: their inputs are passed on in initialization mode, in order.
+    /// Initializes all units; their inputs are transferred in initialization mode, in the members'
+    /// order.
     ///
     /// # Errors
-    /// What a unit said.
+    /// If a call of a unit fails.
     pub fn initialize(&mut self) -> Result<(), Error> {
         let start = self.clock.start();
         for index in 0..self.members.len() {
             let outcome = self.members[index].unit.enter_initialization(start, self.clock.stop());
             outcome.map_err(|failure| self.error(start, (index, failure)))?;
         }
-        // Whatever the coupling, the simulation starts from consistent values.
+        // Whatever the coupling, inputs are transferred one after the other here, so that the
+        // simulation starts from consistent values.
         for index in 0..self.members.len() {
             self.pass_on(index).map_err(|culprit| self.error(start, culprit))?;
         }
@@ -295,18 +306,18 @@ impl Master {
     /// Reads variables of a unit once, for example parameters after initialization.
     ///
     /// # Errors
-    /// What the unit said.
+    /// If a call of the unit fails.
     pub fn read(&mut self, ports: &[Port]) -> Result<Vec<f64>, Error> {
         let mut probe = Probe::new(ports);
         probe.read(&mut self.members).map_err(|culprit| self.error(self.clock.start(), culprit))?;
         Ok(probe.values)
     }
 
-    /// Runs from start to stop.
+    /// Runs from the start time to the stop time.
     ///
     /// # Errors
-    /// What a unit or an observer said; a missed deadline, if it is to end the run; a request to end it. Observers have
-    /// seen everything up to then.
+    /// If a unit or an observer fails, if a missed deadline is to end the run, or if the run was
+    /// asked to end. The observers have seen all communication points up to then.
     pub fn run(&mut self, observers: &mut [&mut dyn Observer]) -> Result<(), Error> {
         let outcome = self.pass_through(observers);
         if let Some(pacer) = &mut self.pacer {
@@ -336,11 +347,11 @@ impl Master {
         Ok(())
     }
 
-    /// Goes on to this tick, the one after the last, or from the initialized units to tick 0. What is probed there, in the order in which it
-    /// was asked for.
+    /// Advances to this tick, which must follow the last one; tick 0 follows initialization.
+    /// Returns the probed values at this tick, in the order in which the probes were requested.
     ///
     /// # Errors
-    /// What a unit said; that the run was ended from outside.
+    /// If a unit fails, or if the run was ended from outside.
     pub fn advance(&mut self, tick: u64) -> Result<&[f64], Error> {
         let time = self.clock.time(tick);
         heard::at(time);
@@ -369,7 +380,7 @@ impl Master {
         Ok(())
     }
 
-    /// Passes values on to the units that are at this tick.
+    /// Transfers values to the units whose communication point is this tick.
     fn propagate(&mut self, tick: u64) -> Result<(), (usize, UnitFailure)> {
         let due = |member: &Member| tick.is_multiple_of(u64::from(member.every));
         match self.coupling {
@@ -421,8 +432,9 @@ mod tests {
 
     type Journal = Rc<RefCell<Vec<String>>>;
 
-    /// Input 0, output 1. A `gain` answers at once: output = 2 · input. An `integrator` has output = state, which grows by
-    /// h · input.
+    /// Variable 0 is the input and variable 1 the output. A `gain` has direct feedthrough: output =
+    /// 2 · input. The output of an `integrator` is its state, which grows by h · input at each
+    /// step.
     struct Mock {
         name: &'static str,
         direct: bool,
@@ -510,7 +522,8 @@ mod tests {
         }
     }
 
-    /// Rows of time, gain's output, integrator's input and output; and what happened.
+    /// Returns the outcome of the run, rows of time, the gain's output and the integrator's input
+    /// and output, and the journal of calls.
     fn run(
         coupling: Coupling,
         order: [&'static str; 2],
@@ -546,7 +559,8 @@ mod tests {
     fn oracle_gauss_seidel_in_the_order_of_the_loop_has_no_delay() {
         let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 3.0], 1e9);
         outcome.unwrap();
-        // x⁺ = x + 2x, and at each row the moment in force belongs to the state of that row.
+        // The state follows x⁺ = x + 2x, and the moment recorded in each row belongs to the state
+        // of that row.
         let expected =
             [[0.0, 2.0, 2.0, 1.0], [1.0, 6.0, 6.0, 3.0], [2.0, 18.0, 18.0, 9.0], [3.0, 54.0, 54.0, 27.0]];
         assert_eq!(rows, expected);
@@ -556,7 +570,8 @@ mod tests {
     fn oracle_the_other_order_delays_by_one_step() {
         let (outcome, rows, _) = run(Coupling::GaussSeidel, ["integrator", "gain"], [1, 1], [1.0, 3.0], 1e9);
         outcome.unwrap();
-        // The integrator gets 2·x of the tick before. In initialization mode it got the gain's 0, at tick 0 its 2·x₀.
+        // The integrator receives 2·x of the tick before. In initialization mode it received the
+        // gain's 0, at tick 0 its 2·x₀.
         let expected =
             [[0.0, 2.0, 2.0, 1.0], [1.0, 6.0, 2.0, 3.0], [2.0, 10.0, 6.0, 5.0], [3.0, 22.0, 10.0, 11.0]];
         assert_eq!(rows, expected);
@@ -567,7 +582,7 @@ mod tests {
         for order in [["gain", "integrator"], ["integrator", "gain"]] {
             let (outcome, rows, _) = run(Coupling::Jacobi, order, [1, 1], [1.0, 3.0], 1e9);
             outcome.unwrap();
-            // After initialization the gain holds 2·x₀ in either order.
+            // After initialization the gain's output is 2·x₀ in either order.
             let expected =
                 [[0.0, 2.0, 2.0, 1.0], [1.0, 6.0, 2.0, 3.0], [2.0, 10.0, 6.0, 5.0], [3.0, 22.0, 10.0, 11.0]];
             assert_eq!(rows, expected, "{order:?}");
@@ -601,7 +616,7 @@ mod tests {
         let (outcome, rows, journal) =
             run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 2], [1.0, 5.0], 1e9);
         outcome.unwrap();
-        // The integrator is at 0, 2, 4 only; x⁺ = x + 2·2x there.
+        // The integrator has communication points at 0, 2 and 4 only, where x⁺ = x + 2·2x.
         let states: Vec<f64> = rows.iter().map(|row| row[3]).collect();
         assert_eq!(states, [1.0, 1.0, 5.0, 5.0, 25.0, 25.0]);
         let steps: Vec<&String> = journal.iter().filter(|line| line.starts_with("integrator step")).collect();
@@ -609,7 +624,7 @@ mod tests {
 
         let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [2, 1], [1.0, 4.0], 1e9);
         outcome.unwrap();
-        // The gain is sampled at 0, 2, 4 and held between.
+        // The gain is sampled at 0, 2 and 4, and its output is held between.
         let held: Vec<f64> = rows.iter().map(|row| row[1]).collect();
         assert_eq!(held, [2.0, 2.0, 10.0, 10.0, 50.0]);
     }
@@ -624,7 +639,8 @@ mod tests {
     }
 
     proptest::proptest! {
-        /// Units that all step at every n-th tick do what they do at every tick of a clock n times slower.
+        /// Units that all step at every n-th tick give the same results as at every tick of a clock
+        /// n times slower.
         #[test]
         fn oracle_equal_periods_are_a_slower_clock(n in 1u32..6, periods in 1u32..6, jacobi: bool, swap: bool) {
             let coupling = if jacobi { Coupling::Jacobi } else { Coupling::GaussSeidel };

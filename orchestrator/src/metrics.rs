@@ -1,4 +1,4 @@
-//! The paper's figures of merit, summed up while the run goes on.
+//! The paper's figures of merit, accumulated while the run goes on.
 
 use crate::error::Error;
 use crate::experiment::Roles;
@@ -10,15 +10,15 @@ use crate::wiring::{Part, Port, find};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Variables that observers look at, each read once.
+/// The variables that the observers need; each is read once per communication point.
 #[derive(Clone, Default)]
 pub struct Probes {
-    /// What the master is to read.
+    /// Ports of the variables that the master reads.
     pub ports: Vec<Port>,
 }
 
 impl Probes {
-    /// The place of a variable among a sample's values.
+    /// Index of a variable among a sample's values. The variable is added if it is not yet there.
     pub fn place(&mut self, port: Port) -> usize {
         self.ports.iter().position(|known| *known == port).unwrap_or_else(|| {
             self.ports.push(port);
@@ -27,31 +27,32 @@ impl Probes {
     }
 }
 
-/// Places of the variables that play a role in the figures of merit; what an experiment does not have is `None`.
+/// Indices, among a sample's values, of the variables that the figures of merit need. A variable
+/// that the experiment does not have is `None`.
 #[derive(Clone, Copy, Debug)]
 pub struct Places {
-    /// Attitude angles α, β, σ.
+    /// Attitude angles α, β and σ, rad.
     pub attitude: Option<[usize; 3]>,
-    /// Their reference.
+    /// Reference of the attitude angles, rad.
     pub reference: Option<[usize; 3]>,
-    /// Angular rate p, q, r.
+    /// Angular rates p, q and r, rad/s.
     pub rate: Option<[usize; 3]>,
-    /// Control moment.
+    /// Control moment about the three axes, N m.
     pub moment: Option<[usize; 3]>,
-    /// Duration of the solver's last solution.
+    /// Duration of the solver's last solution, s.
     pub solver_time: Option<usize>,
-    /// Number of solutions so far.
+    /// Number of solutions up to the sample.
     pub solver_solves: Option<usize>,
-    /// Number of fallbacks so far.
+    /// Number of fallbacks up to the sample.
     pub solver_fallbacks: Option<usize>,
-    /// What the controller says of its guarantee.
+    /// Variables with which the controller reports on its guarantee.
     pub guarantee: Option<guarantee::Signals>,
-    /// The means are of every so many communication points.
+    /// Period of the samples that enter the means: every n-th communication point.
     pub every: u64,
 }
 
 impl Default for Places {
-    /// Nothing, at every communication point.
+    /// No variables at all; the means are taken over every communication point.
     fn default() -> Self {
         Self {
             attitude: None,
@@ -67,19 +68,19 @@ impl Default for Places {
     }
 }
 
-/// Limits against which rate and moment are held.
+/// Limits that the angular rate and the moment are compared with.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Limits {
-    /// Bound of ‖ω‖, rad/s.
+    /// Upper bound of ‖ω‖, rad/s.
     pub rate: Option<f64>,
-    /// Bound of ‖m‖, N m.
+    /// Upper bound of ‖m‖, N m.
     pub moment: Option<f64>,
 }
 
-/// Where the solver's variables are, unless the experiment says otherwise.
+/// Default prefix of the solver's variables.
 pub(crate) const SOLVER: &str = "controller.solver";
 
-/// Where the controller says whether its guarantee is in force, unless the experiment says otherwise.
+/// Default prefix of the variables that say whether the controller's guarantee is in force.
 pub(crate) const GUARANTEE: &str = "controller.guarantee";
 
 const ANGLES: [&str; 3] = ["alpha", "beta", "sigma"];
@@ -89,7 +90,8 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// Finds the variables of the roles, and the ports of the two limits.
 ///
 /// # Errors
-/// If a role that the experiment states has no such variables. A default that fits nothing is left out.
+/// If a role that the experiment states names variables that do not exist. A default that matches
+/// no variable is left out.
 pub fn places(
     roles: &Roles,
     parts: &[Part],
@@ -158,71 +160,77 @@ fn unknown(role: &str, path: &str, parts: &[Part]) -> Error {
     Error::experiment(format!("[metrics] {role}: there is no variable \"{path}\"{hint}"))
 }
 
-/// The figures of merit, as `metrics.json` has them; `None` (null) where the experiment has no such quantity.
+/// The figures of merit as `metrics.json` holds them. A figure is `None` (null) if the experiment
+/// lacks the quantity.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
-    /// √(mean of ‖Θ − Θ_r‖²) over the communication points before each step, deg.
+    /// Attitude error √(mean of ‖Θ − Θ_r‖²) over the communication points before each step, deg.
     pub ems_deg: Option<f64>,
-    /// √(mean of ‖m/M̄‖²) over the same points.
+    /// Control effort √(mean of ‖m/M̄‖²) over the same points.
     pub cms: Option<f64>,
     /// Largest ‖ω‖ over all communication points, deg/s.
     pub max_rate_deg_s: Option<f64>,
-    /// Bound of ‖ω‖, deg/s.
+    /// Upper bound of ‖ω‖, deg/s.
     pub rate_limit_deg_s: Option<f64>,
     /// Largest ‖m‖/M̄ over all communication points.
     pub max_moment_ratio: Option<f64>,
-    /// M̄, N m.
+    /// Upper bound M̄ of the moment, N m.
     pub moment_limit: Option<f64>,
-    /// The larger of largest ‖ω‖ and largest ‖m‖, each over its bound.
+    /// The larger of two ratios: largest ‖ω‖ and largest ‖m‖, each divided by its bound.
     pub worst_limit_ratio: Option<f64>,
-    /// Mean duration of a solution, ms.
+    /// Mean duration of a solution of the solver, ms.
     pub solver_ms_mean: Option<f64>,
-    /// Duration that 99 % of the solutions do not exceed, ms.
+    /// 99th percentile of the durations of the solutions, ms.
     pub solver_ms_p99: Option<f64>,
     /// Longest duration of a solution, ms.
     pub solver_ms_max: Option<f64>,
-    /// Number of solutions.
+    /// Number of solutions of the solver.
     pub solves: Option<u64>,
-    /// How often the controller fell back.
+    /// Number of times that the controller fell back.
     pub fallbacks: Option<u64>,
     /// Share of the communication points at which the controller's guarantee was in force.
     pub guarantee_share: Option<f64>,
-    /// First time at which it was no longer in force, s; null if it was never lost.
+    /// First time at which the guarantee was no longer in force, s; null if it was never lost.
     pub guarantee_lost_at: Option<f64>,
-    /// Status when it was first lost; if it never was, the last one.
+    /// Status of the guarantee when it was first lost, or the last status if it never was.
     pub guarantee_status: Option<String>,
-    /// Smallest share of the rate's limit that was left beyond what is reserved, while it was in force.
+    /// Smallest share of the rate limit that was left beyond the reserve while the guarantee was in
+    /// force.
     pub guarantee_rate_margin_min: Option<f64>,
-    /// The same of the moment's limit.
+    /// Smallest share of the moment limit that was left beyond the reserve while the guarantee was
+    /// in force.
     pub guarantee_moment_margin_min: Option<f64>,
-    /// Whether a limit was exceeded while it was in force, which is a defect.
+    /// Whether a limit was exceeded while the guarantee was in force, which is a defect.
     pub guarantee_broken: Option<bool>,
-    /// Simulated time over elapsed time.
+    /// Simulated time divided by elapsed time.
     pub real_time_factor: Option<f64>,
-    /// Elapsed time, s.
+    /// Elapsed wall-clock time, s.
     pub wall_s: f64,
-    /// Largest delay of a feedback loop beyond what the units have themselves, s; null without a loop.
+    /// Largest delay of a feedback loop in addition to the units' own, s; null if there is no loop.
     pub loop_delay_s: Option<f64>,
-    /// Number of communication points that were reached.
+    /// Number of communication points that the run reached.
     pub samples: u64,
-    /// Whether the run got to its stop time. A lost attitude ends a run, but not the runs of a study.
+    /// Whether the run reached its stop time. A lost attitude ends a single run, but not the runs
+    /// of a study.
     pub completed: bool,
-    /// First time at which the attitude was lost, s; null if it never was, or if the experiment does not say what that is.
+    /// First time at which the attitude was lost, s; null if it never was, or if the experiment
+    /// does not define when it is lost.
     #[serde(default)]
     pub lost_at: Option<f64>,
-    /// Mean time spent in each component per step of its own, µs, where it was measured.
+    /// Mean computing time of each component per step of its own, µs, if it was measured.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub step_us: BTreeMap<String, f64>,
-    /// How the run kept up with the wall clock, if it was paced.
+    /// Timing of the run against the wall clock, if it was paced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub real_time: Option<RealTime>,
 }
 
-/// Sums up the figures of merit.
+/// Accumulates the figures of merit.
 pub struct Merit {
     places: Places,
     limits: Limits,
-    /// Squares summed over the points before each step: angle error, moment; and the number of points.
+    /// Sums of squares over the points before each step: attitude error, then moment. `steps` is
+    /// the number of these points.
     sums: [f64; 2],
     steps: u64,
     largest: [f64; 2],
@@ -230,20 +238,20 @@ pub struct Merit {
     solver_seconds: Vec<f64>,
     fallbacks: Option<f64>,
     guarantee: Option<Course>,
-    /// Names of the guarantee's statuses.
+    /// Names of the guarantee's statuses, with their values.
     statuses: Vec<(String, i32)>,
     samples: u64,
     completed: bool,
     loss: Loss,
 }
 
-/// When an attitude is lost, and what becomes of the run then.
+/// Defines when an attitude is lost and whether that ends the run.
 #[derive(Clone, Copy, Debug, Default)]
 struct Loss {
-    /// Largest ‖Θ − Θ_r‖ that can be lived with, rad.
+    /// Largest ‖Θ − Θ_r‖ that does not count as a loss of attitude, rad.
     beyond: Option<f64>,
     ends_run: bool,
-    /// When it was exceeded first, s.
+    /// First time at which the bound was exceeded, s.
     at: Option<f64>,
 }
 
@@ -253,9 +261,10 @@ pub(crate) fn norm_squared(values: &[f64], places: [usize; 3]) -> f64 {
 }
 
 impl Merit {
-    /// An empty sum. `points` is how many communication points there will be at most.
+    /// Creates an accumulator without samples. `points` is the largest possible number of
+    /// communication points.
     pub fn new(places: Places, limits: Limits, points: u64) -> Self {
-        // Room for a usual run; a longer one takes more as it goes.
+        // This is enough room for a usual run; a longer run allocates more.
         let capacity = if places.solver_time.is_some() { points.min(1 << 16) as usize } else { 0 };
         Self {
             places,
@@ -274,14 +283,14 @@ impl Merit {
         }
     }
 
-    /// The attitude counts as lost where it is further from its reference than this, deg.
+    /// Sets the distance from the reference beyond which the attitude counts as lost, deg.
     #[must_use]
     pub fn with_loss(mut self, beyond_deg: Option<f64>) -> Self {
         self.loss.beyond = beyond_deg.map(f64::to_radians);
         self
     }
 
-    /// A lost attitude ends the run.
+    /// Makes a lost attitude end the run.
     #[must_use]
     pub fn ending_when_lost(mut self) -> Self {
         self.loss.ends_run = true;
@@ -299,14 +308,15 @@ impl Merit {
         &self.solver_seconds
     }
 
-    /// The figures of merit of what was seen. `wall` is the elapsed, `simulated` the simulated time, both s.
+    /// Figures of merit of the samples seen so far. `wall` is the elapsed and `simulated` the
+    /// simulated time, both s.
     pub fn metrics(&self, wall: f64, simulated: f64, loop_delay: Option<f64>) -> Metrics {
         let Places { attitude, reference, rate, moment, .. } = self.places;
         let root_mean = |sum: f64| (self.steps > 0).then(|| (sum / self.steps as f64).sqrt());
         let mut times = self.solver_seconds.clone();
         times.sort_by(f64::total_cmp);
         let milliseconds = |seconds: Option<&f64>| seconds.map(|seconds| seconds * 1e3);
-        // Nearest rank.
+        // The percentile is taken by nearest rank.
         let p99 = (times.len() * 99).div_ceil(100).checked_sub(1).and_then(|rank| times.get(rank));
         let mean = times.iter().sum::<f64>() / times.len() as f64;
         let max_rate = rate.map(|_| self.largest[0].sqrt());
@@ -348,7 +358,7 @@ impl Merit {
     }
 }
 
-/// The larger value. Unlike `f64::max` it does not hide a value that is not a number.
+/// Returns the larger value. Unlike `f64::max` it does not hide a value that is not a number.
 pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }
@@ -385,7 +395,7 @@ impl Observer for Merit {
         }
         self.samples += 1;
         self.completed |= last;
-        // What is not a number is lost, too.
+        // An attitude that is not a number counts as lost, too.
         if let Some(beyond) = self.loss.beyond
             && self.loss.at.is_none()
             && (angle.is_nan() || angle > beyond * beyond)
@@ -432,11 +442,13 @@ mod tests {
         feed(
             &mut merit,
             &[
-                // Error (3, 4, 0) rad: square 25. Moment (6, 8, 0): square 100.
+                // The error is (3, 4, 0) rad, with square 25, and the moment (6, 8, 0), with square
+                // 100.
                 [3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 6.0, 8.0, 0.0, 0.001, 1.0, 0.0],
-                // Error (0, 0, 1): square 1. No new solution: its time is not counted twice.
+                // The error is (0, 0, 1), with square 1. There is no new solution, so its time is
+                // not counted twice.
                 [1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.03, 0.04, 0.0, 0.0, 0.0, 0.001, 1.0, 1.0],
-                // The stop: counts for the largest values and the solver, not for the means.
+                // The stop counts for the largest values and the solver, but not for the means.
                 [9.0, 9.0, 9.0, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 12.0, 0.0, 0.0, 0.003, 2.0, 1.0],
             ],
         );
@@ -542,7 +554,8 @@ mod tests {
         assert_eq!(metrics.guarantee_broken, Some(true));
     }
 
-    /// Places in a component `law` and a component `controller` with these variables.
+    /// Places in a component `law` and a component `controller`, both of which have these
+    /// variables.
     fn places_with(names: &[&str], roles: &Roles) -> Result<Places, Error> {
         let variables = names.iter().enumerate().map(|(reference, name)| Variable {
             name: (*name).into(),

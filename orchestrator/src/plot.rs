@@ -11,7 +11,7 @@ const POINTS: u64 = 5000;
 
 const COLORS: [Color; 3] = [Color(31, 119, 180), Color(44, 160, 44), Color(214, 39, 40)];
 
-/// Collects the curves.
+/// Collects the curves of a run's figure.
 pub struct Curves {
     places: Places,
     limits: Limits,

@@ -76,7 +76,7 @@ pub struct Parts {
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
 impl Parts {
-    /// Of `all` parts `done` are there already.
+    /// Creates a display for `all` parts, of which `done` are complete already.
     pub fn new(title: &str, all: u64, done: u64, quiet: bool) -> Self {
         let quiet = quiet || done == all;
         if !stderr().is_terminal() && !quiet {
@@ -89,7 +89,7 @@ impl Parts {
         Self { bar, quiet, all, last_line: Mutex::new(Instant::now()) }
     }
 
-    /// One more part is finished.
+    /// Counts one more part as finished.
     pub fn finished(&self, what: &str) {
         self.bar.inc(1);
         self.bar.set_message(what.to_string());
@@ -100,7 +100,7 @@ impl Parts {
         }
     }
 
-    /// All is done.
+    /// Ends the display when all work is done.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }

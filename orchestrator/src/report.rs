@@ -1,4 +1,4 @@
-//! What a run says for itself on standard output.
+//! Prints the outcome of a run to standard output.
 
 use crate::clock;
 use crate::experiment::Coupling;
@@ -11,7 +11,7 @@ use std::path::Path;
 /// Prints the summary of a run.
 ///
 /// # Errors
-/// If it cannot be written.
+/// If the text cannot be written.
 pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
     let Report { clock, metrics, .. } = report;
     let coupling = match report.coupling {
@@ -105,10 +105,10 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
     line("results", format!("{}: {}", report.out.display(), report.files.join(", ")))
 }
 
-/// Says what an archive holds, and what the standard has no place for.
+/// Prints what a packed archive holds, and which settings the standard cannot store.
 ///
 /// # Errors
-/// If it cannot be written.
+/// If the text cannot be written.
 pub fn packed(plan: &Plan, archive: &Path, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "{}: {}", archive.display(), plan.order.join(", "))?;
     let step = plan.experiment.simulation.step;
@@ -118,10 +118,10 @@ pub fn packed(plan: &Plan, archive: &Path, out: &mut impl Write) -> io::Result<(
     )
 }
 
-/// Prints what a reproduction came to.
+/// Prints the outcome of a reproduction.
 ///
 /// # Errors
-/// If it cannot be written.
+/// If the text cannot be written.
 pub fn reproduction(report: &reproduce::Report, out: &mut impl Write) -> io::Result<()> {
     let (run, kept) = report.parts;
     writeln!(out, "{}", report.title)?;
@@ -142,14 +142,14 @@ pub fn reproduction(report: &reproduce::Report, out: &mut impl Write) -> io::Res
     writeln!(out, "  beside it: {}", report.files[1..].join("; "))
 }
 
-/// How a value stands against its limit.
+/// Formats the ratio of a value to its limit.
 fn against(ratio: f64, limit: &str) -> String {
-    // What is not a number is not within a limit. Limits are met up to rounding.
+    // A value that is not a number is not within a limit. A limit counts as met up to rounding.
     let verdict = if ratio <= 1.0 + 1e-9 { "within" } else { "EXCEEDS" };
     format!("   {verdict} its limit {limit}: {:.1} %", ratio * 100.0)
 }
 
-/// What became of the controller's guarantee, if it gives one.
+/// Describes how the controller's guarantee fared, if the controller gives one.
 fn guarantee(metrics: &Metrics) -> Option<String> {
     let share = metrics.guarantee_share?;
     let status = metrics.guarantee_status.as_ref().map_or(String::new(), |status| format!(" ({status})"));
@@ -168,7 +168,7 @@ fn guarantee(metrics: &Metrics) -> Option<String> {
     Some(course + if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" })
 }
 
-/// Margins of rate and moment as a part of a sentence.
+/// Formats the margins of rate and moment as part of a sentence.
 pub(crate) fn margins(margins: [Option<f64>; 2]) -> String {
     let known =
         margins.into_iter().zip(["rate", "moment"]).filter_map(|(margin, name)| Some((margin?, name)));

@@ -53,7 +53,7 @@ pub struct Files {
 }
 
 impl Files {
-    /// Refuses what would be without effect.
+    /// Rejects options that would have no effect.
     fn check(self) -> Result<(), Error> {
         if self.labels && self.format != Format::Csv {
             let problem =
@@ -64,68 +64,71 @@ impl Files {
     }
 }
 
-/// Where results go, and how much is said.
+/// Options of a run: where its results go, how it is paced, and what is shown.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Folder for the results; `out/<experiment>` if there is none.
+    /// Folder for the results; `out/<experiment>` if it is not given.
     pub out: Option<PathBuf>,
-    /// Show no progress.
+    /// Whether the progress display is suppressed.
     pub quiet: bool,
-    /// Run in step with the wall clock.
+    /// Settings of a run that is paced by the wall clock; `None` runs as fast as possible.
     pub real_time: Option<realtime::Settings>,
-    /// Show the run on the terminal while it goes on.
+    /// Whether the run is shown on the terminal while it goes on.
     pub live: bool,
-    /// Which files there are to be.
+    /// Choice of the files that the run writes.
     pub files: Files,
-    /// Replace the results of an earlier run.
+    /// Whether the results of an earlier run may be replaced.
     pub force: bool,
-    /// Who may end the run.
+    /// Interrupt through which the run can be ended from outside.
     pub interrupt: Interrupt,
 }
 
-/// What a run leaves behind.
+/// The outcome of a run: its figures of merit and where its results are.
 #[derive(Debug)]
 pub struct Report {
     /// Title of the experiment.
     pub title: String,
-    /// Start, stop and step.
+    /// Start time, stop time and communication step of the run.
     pub clock: Clock,
-    /// Coupling at communication points.
+    /// Coupling of the components at communication points.
     pub coupling: Coupling,
-    /// Components in their order.
+    /// Names of the components, in the order in which their inputs are set.
     pub order: Vec<String>,
-    /// The figures of merit.
+    /// Figures of merit of the run.
     pub metrics: Metrics,
     /// Feedback loops with their delays; components are indices into `order`.
     pub loops: Vec<FeedbackLoop>,
-    /// Folder of the results.
+    /// Folder that holds the results.
     pub out: PathBuf,
-    /// The files in it.
+    /// Names of the files that were written to the folder.
     pub files: Vec<&'static str>,
-    /// Why the run ended before its stop time, if it did: it was asked to, or a deadline was missed.
+    /// Reason why the run ended before its stop time, for example a request or a missed deadline;
+    /// `None` if it did not.
     pub ended: Option<Error>,
 }
 
-/// Archives that are open, by path. Plans that share them unpack each only once.
+/// The FMUs that have been opened, by path. Plans that share this map unpack each archive only
+/// once.
 pub type Opened = BTreeMap<PathBuf, Rc<Fmu>>;
 
-/// An experiment with all names resolved: nothing of it can be wrong any more, except in the units themselves.
+/// An experiment whose names are all resolved and checked: only the units themselves can still
+/// fail.
 pub struct Plan {
-    /// The experiment.
+    /// The experiment that the plan was made from.
     pub experiment: Experiment,
-    /// Start, stop and step.
+    /// Start time, stop time and communication step.
     pub clock: Clock,
-    /// Components in their order.
+    /// Names of the components, in the order in which their inputs are set.
     pub order: Vec<String>,
-    /// Their FMUs.
+    /// FMU of each component, in the same order.
     pub fmus: Vec<Rc<Fmu>>,
-    /// Their settings.
+    /// Settings of each component, in the same order.
     pub settings: Vec<Vec<Setting>>,
-    /// The connections.
+    /// Connections between outputs and inputs.
     pub wires: Vec<Wire>,
-    /// The recorded variables.
+    /// Variables to be recorded, one per column.
     pub columns: Vec<Column>,
-    /// Feedback loops.
+    /// Feedback loops with their delays, in ticks.
     pub loops: Vec<FeedbackLoop>,
     probes: Probes,
     pub(crate) places: Places,
@@ -133,18 +136,18 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Resolves an experiment.
+    /// Resolves the names of an experiment and checks it.
     ///
     /// # Errors
-    /// Everything that is wrong with the experiment or with an FMU's archive.
+    /// If anything is wrong with the experiment or with the archive of an FMU.
     pub fn new(experiment: Experiment, fmu_dirs: &[PathBuf]) -> Result<Self, Error> {
         Self::with(experiment, fmu_dirs, &mut Opened::default())
     }
 
-    /// Resolves an experiment; archives that are in `opened` are not opened again.
+    /// Resolves an experiment; archives that are already in `opened` are not opened again.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// The errors are those of [`Self::new`].
     pub fn with(experiment: Experiment, fmu_dirs: &[PathBuf], opened: &mut Opened) -> Result<Self, Error> {
         let simulation = &experiment.simulation;
         let clock = Clock::new(simulation.start, simulation.stop, simulation.step)
@@ -191,16 +194,16 @@ impl Plan {
         Ok(Self { experiment, clock, order, fmus, settings, wires, columns, loops, probes, places, limits })
     }
 
-    /// The components' names and descriptions.
+    /// Names and model descriptions of the components.
     pub fn parts(&self) -> Vec<Part<'_>> {
         parts(&self.order, &self.fmus)
     }
 
-    /// Runs the experiment and writes its results. If a unit fails or the run is ended, what was seen until then is written
-    /// all the same.
+    /// Runs the experiment and writes its results. If a unit fails or the run is ended early, the
+    /// results up to then are written as well.
     ///
     /// # Errors
-    /// What a unit said; files that cannot be written.
+    /// If a unit fails, or if a file cannot be written.
     pub fn run(&self, options: &Options) -> Result<Report, Error> {
         if options.live {
             live::check_terminal()?;
@@ -226,7 +229,7 @@ impl Plan {
             return Err(Error::Interrupted { time: self.clock.start(), request });
         }
         let folder = Folder::take(&out)?;
-        // Another process may have been faster.
+        // Another process may have written to the folder in the meantime.
         Folder::check(&out, options.force)?;
         folder.clear()?;
         let mut recorder =
@@ -245,14 +248,15 @@ impl Plan {
             Live::start(Scene { limits, ..scene }, probes.ports.len(), tally, options.interrupt.clone())
         });
         let mut live = live.transpose()?;
-        // After the threads that draw, which are not to have it.
+        // Requested after the drawing threads have started, because later threads would inherit the
+        // scheduling.
         let scheduling = Scheduling::request(options.real_time.and_then(|settings| settings.priority));
 
         let begin = Instant::now();
         let mut observers: Vec<&mut dyn Observer> = vec![&mut curves, &mut progress];
         observers.extend(recorder.as_mut().map(|recorder| recorder as &mut dyn Observer));
         observers.extend(live.as_mut().map(|live| live as &mut dyn Observer));
-        // The last one, as it may end the run.
+        // The figures of merit come last, because their observer may end the run.
         observers.push(&mut merit);
         let outcome = master.run(&mut observers);
         let wall = begin.elapsed().as_secs_f64();
@@ -310,7 +314,7 @@ impl Plan {
         })
     }
 
-    /// What is doubtful though it can be run.
+    /// Warns of settings that are doubtful although the experiment can be run.
     fn warn(&self, interrupt: &Interrupt) -> Result<(), Error> {
         for warning in delay::warnings(&self.parts(), &self.settings, &self.loops, self.clock.step()) {
             tracing::warn!("{warning}");
@@ -321,7 +325,7 @@ impl Plan {
         Ok(())
     }
 
-    /// The file of the recorded variables.
+    /// Creates the recorder, which writes the file of the recorded variables.
     fn recorder(&self, out: &Path, files: Files) -> Result<Recorder, Error> {
         let column = |column: &Column| {
             let place = self.place(column.port)?;
@@ -338,18 +342,18 @@ impl Plan {
         Recorder::create(&path, files.format, &columns, self.experiment.record.every, files.labels)
     }
 
-    /// The units, initialized, and the limits that the experiment states.
+    /// Returns the initialized units, and the limits that the experiment states.
     ///
     /// # Errors
-    /// What a unit said.
+    /// If a unit cannot be instantiated or initialized.
     pub fn initialized(&self) -> Result<(Master, Limits), Error> {
         self.initialized_with(&self.probes)
     }
 
-    /// The units, initialized with `settings` instead of their own.
+    /// Returns the units initialized with `settings` in place of the plan's own settings.
     ///
     /// # Errors
-    /// What a unit said.
+    /// If a unit cannot be instantiated or initialized.
     pub fn ready(&self, settings: &[Vec<Setting>], interrupt: &Interrupt) -> Result<Master, Error> {
         let mut master = self.master(&self.probes, settings)?;
         master.heed(interrupt);
@@ -368,12 +372,13 @@ impl Plan {
         Ok((master, limits))
     }
 
-    /// Where a recorded variable stands among a sample's values.
+    /// Index of a recorded variable among a sample's values.
     pub fn place(&self, port: Port) -> Option<usize> {
         self.probes.ports.iter().position(|known| *known == port)
     }
 
-    /// Items of the enumeration that stands at this place among a sample's values; none if it is of another type.
+    /// Items of the enumeration at this index among a sample's values; empty if the variable has
+    /// another type.
     fn items(&self, place: usize) -> Vec<(String, i32)> {
         let port = self.probes.ports[place];
         match &self.fmus[port.component].description.variables[port.variable].kind {
@@ -382,7 +387,7 @@ impl Plan {
         }
     }
 
-    /// An empty sum of the figures of merit.
+    /// Creates an observer for the figures of merit that has seen no sample yet.
     pub fn merit(&self, limits: Limits) -> Merit {
         let statuses =
             self.places.guarantee.and_then(|signals| signals.status).map(|place| self.items(place));
@@ -411,10 +416,10 @@ impl Plan {
         Ok(Master::new(self.clock, coupling, members, &self.wires, &probes.ports))
     }
 
-    /// All parameters as the units have them after initialization, except texts.
+    /// Reads the values of all parameters after initialization, except those of type String.
     ///
     /// # Errors
-    /// What a unit said.
+    /// If a unit cannot be read.
     pub fn parameters(&self, master: &mut Master) -> Result<sidecar::Parameters, Error> {
         let parts = self.parts();
         let mut all = sidecar::Parameters::new();
@@ -431,7 +436,7 @@ impl Plan {
     }
 }
 
-/// Opens an archive, and says if something is wrong with its description.
+/// Opens an archive, and warns if its description has a fault.
 fn open(path: &Path) -> Result<Fmu, Error> {
     let fmu = Fmu::open(path)?;
     let faults = faults::faults(&fmu.description);
@@ -445,7 +450,7 @@ fn open(path: &Path) -> Result<Fmu, Error> {
     Ok(fmu)
 }
 
-/// What must not go unsaid where there is no summary.
+/// Warns of missed deadlines and refused priorities if no summary is printed.
 fn warn(real_time: &realtime::report::RealTime, quiet: bool) {
     if !quiet {
         return;
@@ -458,7 +463,7 @@ fn warn(real_time: &realtime::report::RealTime, quiet: bool) {
     }
 }
 
-/// What to write for a parameter whose component is missing or wrong.
+/// Explains which component was meant if a parameter is given without one, or with a wrong one.
 fn whereabouts(target: &str, parts: &[Part]) -> String {
     let of = |part: &Part| {
         let known = part.description.names("parameter").chain(part.description.names("input"));
@@ -485,14 +490,15 @@ fn parts<'a>(order: &'a [String], fmus: &'a [Rc<Fmu>]) -> Vec<Part<'a>> {
     order.iter().zip(fmus).map(|(name, fmu)| Part { name, description: &fmu.description }).collect()
 }
 
-/// Beyond so many steps the times of two steps are one: units take instants that are closer than 1e-9 of their size for the same.
+/// Largest number of steps. Beyond it the times of two steps coincide, because units treat instants
+/// as equal if they differ by less than 1e-9 of their size.
 const MOST_STEPS: u64 = 1_000_000_000;
-/// A number in `results.csv`, bytes, about.
+/// Approximate size of a number in `results.csv`, bytes.
 const NUMBER: f64 = 20.0;
-/// A step of two small units takes no less, s.
+/// Lower bound of the computing time of a step of two small units, s.
 const QUICK: f64 = 1e-5;
 
-/// Refuses what no machine can run, and warns of results that fill a disk.
+/// Rejects experiments that no machine can run, and warns of results that fill a disk.
 fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<(), Error> {
     let steps = clock.ticks();
     let rows = steps as f64 / f64::from(experiment.record.every);
@@ -514,7 +520,7 @@ fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<
     Ok(())
 }
 
-/// Some FMUs can be used by one component only.
+/// Checks that an FMU that can be instantiated only once per process is used by one component only.
 fn check_single_instances(experiment: &Experiment, order: &[String], fmus: &[Rc<Fmu>]) -> Result<(), Error> {
     for (index, fmu) in fmus.iter().enumerate() {
         let only_once = fmu
@@ -557,7 +563,7 @@ fn periods(experiment: &Experiment, order: &[String]) -> Vec<u32> {
     order.iter().map(|name| experiment.components[name].every).collect()
 }
 
-/// The components in the order in which their inputs are set.
+/// Names of the components, in the order in which their inputs are set.
 fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
     let refuse = |message: String| Err(experiment.source.error(&(0..0), message));
     let names: Vec<&str> = experiment.components.keys().map(String::as_str).collect();
@@ -590,12 +596,13 @@ fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
             names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
         ));
     }
-    // What is not named comes last, by name.
+    // Components that the order does not name come last, sorted by name.
     let others = names.iter().filter(|name| !order.iter().any(|other| other == *name));
     Ok(order.iter().cloned().chain(others.map(ToString::to_string)).collect())
 }
 
-/// The archive of a component: beside the experiment, in the folders given, where units are found from any folder.
+/// Finds the archive of a component: beside the experiment, in the given folders, or where units
+/// are found from any folder.
 fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result<PathBuf, Error> {
     let written = &experiment.components[name].fmu;
     let mut folders: Vec<PathBuf> = experiment.source.folders().map(Path::to_path_buf).collect();

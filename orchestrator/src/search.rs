@@ -34,7 +34,7 @@ fn there(folders: Vec<PathBuf>) -> Vec<PathBuf> {
     folders.into_iter().filter(|folder| folder.is_dir()).filter(is_new).map(straight).collect()
 }
 
-/// Folders with experiments and studies.
+/// Returns the folders that hold experiments and studies.
 pub fn experiments() -> Vec<PathBuf> {
     let mut folders = vec![PathBuf::from(EXPERIMENTS)];
     folders.extend(by_variable());
@@ -42,7 +42,7 @@ pub fn experiments() -> Vec<PathBuf> {
     there(folders)
 }
 
-/// Folders with units.
+/// Returns the folders that hold units.
 pub fn units() -> Vec<PathBuf> {
     let mut folders = vec![PathBuf::from("target/fmu")];
     folders.extend(by_variable());
@@ -80,7 +80,7 @@ pub fn is_experiment(text: &str) -> bool {
     sets("title") && !sets("paper") && (has_components || sets("extends"))
 }
 
-/// Experiments below a folder.
+/// Finds the experiments below a folder.
 fn experiments_below(folder: &Path) -> Vec<PathBuf> {
     let mut found = files(folder, "toml");
     found.retain(|path| fs::read_to_string(path).is_ok_and(|text| is_experiment(&text)));

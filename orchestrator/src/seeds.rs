@@ -16,7 +16,7 @@ pub fn is_seed(name: &str) -> bool {
 /// different seeds are compared tick by tick until they differ, which is soon where the seed is of any effect.
 ///
 /// # Errors
-/// That the comparison was ended from outside.
+/// If the comparison was ended from outside.
 pub fn without_effect(plan: &Plan, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
     let mut idle = Vec::new();
     for (component, settings) in plan.settings.iter().enumerate() {

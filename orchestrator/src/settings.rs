@@ -9,29 +9,29 @@ use crate::unit::{CoSimulationUnit, Outcome};
 use crate::wiring::{Part, Wire};
 use toml::Value;
 
-/// A variable to be set before initialization.
+/// A variable that is set before initialization.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Name of the variable.
     pub name: String,
-    /// Value reference.
+    /// Value reference of the variable.
     pub reference: u32,
-    /// Value, in the variable's own unit.
+    /// Value in the variable's own unit.
     pub value: SettingValue,
 }
 
-/// A value with its type.
+/// A value together with its type.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SettingValue {
-    /// Real.
+    /// A value of type Real.
     Real(f64),
-    /// Integer.
+    /// A value of type Integer.
     Integer(i32),
-    /// Value of an enumeration's item, with its name.
+    /// An item of an enumeration, as its name and value.
     Item(String, i32),
-    /// Boolean.
+    /// A value of type Boolean.
     Boolean(bool),
-    /// Text.
+    /// A value of type String.
     Text(String),
 }
 
@@ -159,7 +159,7 @@ fn value(written: &Value, variable: &Variable, part: Part) -> Result<SettingValu
 /// Sets the values, all reals in one call and so on.
 ///
 /// # Errors
-/// What the unit said.
+/// If the unit reports a failure.
 pub fn apply(settings: &[Setting], unit: &mut dyn CoSimulationUnit) -> Outcome {
     let mut reals = (Vec::new(), Vec::new());
     let mut integers = (Vec::new(), Vec::new());

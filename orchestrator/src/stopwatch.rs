@@ -6,7 +6,7 @@ use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Duration;
 
-/// What was spent in a unit's calls so far.
+/// Computing time spent in a unit's calls so far.
 #[derive(Debug, Default)]
 pub struct Spent {
     time: Cell<Duration>,
@@ -15,30 +15,30 @@ pub struct Spent {
 }
 
 impl Spent {
-    /// The time.
+    /// Total time spent in the unit's calls.
     pub fn time(&self) -> Duration {
         self.time.get()
     }
 
-    /// A call that began and ended then, on the timer.
+    /// Adds a call that began and ended at these instants on the timer.
     pub(crate) fn add(&self, begin: Duration, end: Duration) {
         self.time.set(self.time.get() + end.saturating_sub(begin));
         self.ended.set(end);
     }
 
-    /// When the last call ended, on the timer.
+    /// Instant on the timer at which the last call ended.
     pub fn ended(&self) -> Duration {
         self.ended.get()
     }
 
-    /// Mean time per step, s; nothing before the first.
+    /// Mean time per step, s; `None` before the first step.
     pub fn seconds_per_step(&self) -> Option<f64> {
         let steps = self.steps.get();
         (steps > 0).then(|| self.time.get().as_secs_f64() / f64::from(steps))
     }
 }
 
-/// The unit.
+/// A unit whose calls are timed.
 pub struct Stopwatch {
     unit: Box<dyn CoSimulationUnit>,
     timer: Rc<dyn Timer>,
@@ -46,7 +46,7 @@ pub struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// A unit that is timed from now on, and where to see the time.
+    /// Wraps a unit so that it is timed from now on. Also returns the shared record of the time.
     pub fn new(unit: Box<dyn CoSimulationUnit>, timer: Rc<dyn Timer>) -> (Self, Rc<Spent>) {
         let spent = Rc::new(Spent::default());
         (Self { unit, timer, spent: Rc::clone(&spent) }, spent)

@@ -1,4 +1,5 @@
-//! What the master needs of a co-simulation unit, whether it is an FMU or a mock in a test.
+//! The interface between the master and a co-simulation unit, which may be an FMU or a mock in a
+//! test.
 
 use crate::error::UnitFailure;
 
@@ -11,56 +12,56 @@ pub trait CoSimulationUnit {
     /// Reads real variables.
     ///
     /// # Errors
-    /// As every call here: what the unit said.
+    /// If the unit reports a failure, as for every call of this trait.
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome;
     /// Reads integer and enumeration variables.
     ///
     /// # Errors
-    /// What the unit said.
+    /// If the unit reports a failure.
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome;
     /// Reads boolean variables.
     ///
     /// # Errors
-    /// What the unit said.
+    /// If the unit reports a failure.
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome;
     /// Sets real variables.
     ///
     /// # Errors
-    /// What the unit said.
+    /// If the unit reports a failure.
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome;
     /// Sets integer and enumeration variables.
     ///
     /// # Errors
-    /// What the unit said.
+    /// If the unit reports a failure.
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome;
     /// Sets boolean variables.
     ///
     /// # Errors
-    /// What the unit said.
+    /// If the unit reports a failure.
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome;
     /// Sets a text variable.
     ///
     /// # Errors
-    /// What the unit said.
+    /// If the unit reports a failure.
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome;
     /// Announces the experiment (times in s) and enters initialization mode.
     ///
     /// # Errors
-    /// What the unit said.
+    /// If the unit reports a failure.
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome;
     /// Leaves initialization mode: the unit can be stepped.
     ///
     /// # Errors
-    /// What the unit said.
+    /// If the unit reports a failure.
     fn exit_initialization(&mut self) -> Outcome;
     /// Steps from communication point `time` by `step` (both s).
     ///
     /// # Errors
-    /// What the unit said.
+    /// If the unit reports a failure.
     fn do_step(&mut self, time: f64, step: f64) -> Outcome;
     /// Ends the simulation.
     ///
     /// # Errors
-    /// What the unit said.
+    /// If the unit reports a failure.
     fn terminate(&mut self) -> Outcome;
 }

@@ -14,25 +14,25 @@ use toml::Spanned;
 /// A component's name and its FMU's description. Everywhere, a component's position here is its index.
 #[derive(Clone, Copy)]
 pub struct Part<'a> {
-    /// Name in the experiment.
+    /// Name of the component in the experiment.
     pub name: &'a str,
-    /// The FMU's description.
+    /// Model description of the component's FMU.
     pub description: &'a ModelDescription,
 }
 
-/// How a value travels.
+/// Type in which a value is transferred.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Carrier {
-    /// As `f64`.
+    /// A real number as `f64`.
     Real,
-    /// As `i32`: integers and enumerations.
+    /// An integer or an enumeration's value as `i32`.
     Integer,
-    /// As `i32`, 0 or 1.
+    /// A truth value as `i32`, 0 or 1.
     Boolean,
 }
 
 impl Carrier {
-    /// That of a type; nothing for texts, which do not travel.
+    /// Carrier of a type; `None` for texts, which are not transferred.
     pub fn of(kind: &Kind) -> Option<Self> {
         match kind {
             Kind::Real { .. } => Some(Self::Real),
@@ -50,29 +50,29 @@ pub struct Port {
     pub component: usize,
     /// Position in the description's variables.
     pub variable: usize,
-    /// Value reference.
+    /// Value reference of the variable.
     pub reference: u32,
-    /// How its value travels.
+    /// Type in which its value is transferred.
     pub carrier: Carrier,
 }
 
 /// A connection of one output with one input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wire {
-    /// The output.
+    /// Output that the connection starts from.
     pub from: Port,
-    /// The input.
+    /// Input that the connection ends at.
     pub to: Port,
-    /// What becomes of real values on the way.
+    /// Conversion of real values on the way.
     pub scaling: Scaling,
 }
 
 /// A variable in the results.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
-    /// `component.variable`.
+    /// Full name of the variable, `component.variable`.
     pub name: String,
-    /// The variable.
+    /// The variable that is recorded.
     pub port: Port,
 }
 
@@ -135,7 +135,7 @@ fn port(component: usize, position: usize, variable: &Variable) -> Option<Port> 
     Some(Port { component, variable: position, reference: variable.reference, carrier })
 }
 
-/// Resolves the connections.
+/// Resolves the connections of an experiment.
 ///
 /// # Errors
 /// Names that do not exist, wrong causalities, types or units that do not match, inputs connected twice, and inputs that

@@ -34,16 +34,16 @@ fn declared_encoding(bytes: &[u8]) -> Option<String> {
     quoted[1..].split_once(quote).map(|(label, _)| label.to_string())
 }
 
-/// An element with what is in it, but for text.
+/// An XML element with its attributes and child elements, but without text.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Element {
-    /// Name without prefix.
+    /// Name of the element without namespace prefix.
     pub name: String,
-    /// Where it begins, counted from 1.
+    /// Line where the element begins, counted from 1.
     pub line: usize,
-    /// Attributes, by name with prefix.
+    /// Attributes of the element, by name with prefix.
     attributes: BTreeMap<String, String>,
-    /// Elements in it.
+    /// Elements that are nested directly in this one.
     pub children: Vec<Element>,
 }
 
@@ -51,7 +51,7 @@ pub struct Element {
 const DEPTH: usize = 100;
 
 impl Element {
-    /// Reads a document.
+    /// Reads an XML document from its text.
     ///
     /// # Errors
     /// One line: what is wrong with the text.
@@ -114,13 +114,13 @@ impl Element {
         Ok(Self { name: start.local_name().as_ref().to_string(), line, attributes, children: Vec::new() })
     }
 
-    /// What it is called in messages: its kind, its name if it has one, and where it stands.
+    /// Title of the element in messages: its kind, its name if it has one, and its line.
     pub fn title(&self) -> String {
         let own = self.attribute("name").map(|name| format!(" \"{}\"", shortened(name)));
         format!("the element {}{} in line {}", self.name, own.unwrap_or_default(), self.line)
     }
 
-    /// The attribute of this name.
+    /// Value of the attribute with this name, if present.
     pub fn attribute(&self, name: &str) -> Option<&str> {
         self.attributes.get(name).map(String::as_str)
     }
@@ -136,7 +136,7 @@ impl Element {
     /// The attribute of this name as a number, if it is there.
     ///
     /// # Errors
-    /// If it is no number.
+    /// If the value of the attribute is not a number.
     pub fn number(&self, name: &str) -> Result<Option<f64>, String> {
         self.parsed(name, "a number")
     }
@@ -144,7 +144,7 @@ impl Element {
     /// The attribute of this name as a truth value, if it is there.
     ///
     /// # Errors
-    /// If it is none.
+    /// If the value of the attribute is not a truth value.
     pub fn truth(&self, name: &str) -> Result<Option<bool>, String> {
         match self.attribute(name).map(str::trim) {
             None => Ok(None),
@@ -157,7 +157,7 @@ impl Element {
     /// The attribute of this name as a `T`, which messages call `kind`, if it is there.
     ///
     /// # Errors
-    /// If it is none.
+    /// If the value of the attribute is not a `T`.
     pub fn parsed<T: FromStr>(&self, name: &str, kind: &str) -> Result<Option<T>, String> {
         let parse = |text: &str| text.trim().parse().map_err(|_| self.refusal(name, kind));
         self.attribute(name).map(parse).transpose()

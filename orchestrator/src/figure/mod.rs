@@ -13,9 +13,9 @@ use serde::Deserialize;
 pub struct Color(pub u8, pub u8, pub u8);
 
 impl Color {
-    /// Of references, norms and the like.
+    /// Colour of references, norms and the like.
     pub const GREY: Self = Self(110, 110, 110);
-    /// Of limits.
+    /// Colour of limits, a dark red.
     pub const LIMIT: Self = Self(200, 0, 0);
 }
 
@@ -38,32 +38,32 @@ impl std::fmt::Display for Color {
     }
 }
 
-/// Where the legend stands.
+/// Position of a figure's legend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Legend {
-    /// One for all panels, above them.
+    /// One legend for all panels, above them.
     Above,
-    /// One for each panel, to its right.
+    /// One legend for each panel, to its right.
     Beside,
 }
 
-/// Panels in rows.
+/// A figure, whose panels are arranged in rows.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// One line above everything.
+    /// Heading above the whole figure, one line.
     pub title: String,
-    /// Panels side by side.
+    /// Number of panels side by side.
     pub columns: usize,
-    /// Where the legend stands.
+    /// Position of the legend.
     pub legend: Legend,
-    /// The panels, row by row.
+    /// Panels of the figure, row by row.
     pub panels: Vec<Panel>,
 }
 
-/// One pair of axes.
+/// One pair of axes with its curves.
 #[derive(Clone, Debug)]
 pub struct Panel {
-    /// A heading, or nothing.
+    /// Heading of the panel, possibly empty.
     pub title: String,
     /// Label of the horizontal axis.
     pub x_label: String,
@@ -71,9 +71,9 @@ pub struct Panel {
     pub y_label: String,
     /// Whether the horizontal axis is logarithmic.
     pub log_x: bool,
-    /// The part of the horizontal axis to show at first.
+    /// Range of the horizontal axis that is shown at first.
     pub x_range: Option<[f64; 2]>,
-    /// What is drawn, the first lowest.
+    /// Curves of the panel; the first one is drawn lowest.
     pub curves: Vec<Curve>,
 }
 
@@ -82,20 +82,20 @@ pub struct Panel {
 pub struct Curve {
     /// Name in the legend. Curves of one name are shown and hidden together.
     pub name: String,
-    /// Its colour.
+    /// Colour in which it is drawn.
     pub color: Color,
-    /// How it is drawn.
+    /// Shape in which the points are drawn.
     pub shape: Shape,
-    /// Along the horizontal axis.
+    /// Coordinates along the horizontal axis.
     pub x: Vec<f64>,
-    /// Along the vertical axis.
+    /// Coordinates along the vertical axis.
     pub y: Vec<f64>,
 }
 
 /// How points are drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// A line.
+    /// A line through the points.
     Line,
     /// A thin, pale line.
     Pale,
@@ -105,9 +105,9 @@ pub enum Shape {
     Band(Vec<f64>),
     /// Columns: the value at x holds up to the next x.
     Steps,
-    /// Dots.
+    /// A dot at each point.
     Dots,
-    /// Large crosses.
+    /// A large cross at each point.
     Crosses,
     /// A dashed line across the panel at the first y.
     Horizontal,
@@ -139,7 +139,7 @@ impl Panel {
         Some(values.fold((first, first), |(low, high), value| (low.min(value), high.max(value))))
     }
 
-    /// The same with a margin, for drawing.
+    /// Range of values along one axis with a margin, for drawing.
     pub fn range(&self, along_x: bool) -> (f64, f64) {
         if along_x && let Some([low, high]) = self.x_range {
             return (low, high);

@@ -25,19 +25,19 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use view::State;
 
-/// Time from picture to picture.
+/// Time between two pictures of the view.
 const BETWEEN_PICTURES: Duration = Duration::from_millis(66);
 
-/// What the master leaves for the view.
+/// The values that the master copies for the view.
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
-    /// Communication point, s; nothing before the first.
+    /// Simulated time of the communication point, s; `None` before the first.
     pub time: Option<f64>,
-    /// The probed values.
+    /// The probed values at this communication point.
     pub values: Vec<f64>,
-    /// How the pacing is doing, if the run is paced.
+    /// State of the pacing, if the run is paced.
     pub tally: Option<Tally>,
-    /// What became of the controller's guarantee, if it gives one.
+    /// Course of the controller's guarantee, if it gives one.
     pub guarantee: Option<Course>,
 }
 
@@ -51,7 +51,7 @@ pub struct Live {
     thread: Option<JoinHandle<io::Result<()>>>,
 }
 
-/// Whether there is a terminal to draw on.
+/// Checks that there is a terminal to draw on.
 ///
 /// # Errors
 /// If there is none.
@@ -156,7 +156,7 @@ fn show(
     Ok(())
 }
 
-/// What a key asks for. In the view Ctrl-C is a key, not a signal.
+/// Translates a key into a request. In the view Ctrl-C is a key, not a signal.
 fn request(key: KeyEvent) -> Option<Request> {
     if key.kind != KeyEventKind::Press {
         return None;

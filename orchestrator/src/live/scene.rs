@@ -1,4 +1,4 @@
-//! What there is to show of an experiment: follows from the names of its variables.
+//! The contents of the view, derived from the names of an experiment's variables.
 
 use crate::description::Kind;
 use crate::metrics::{self, Limits, Places, Probes};
@@ -10,36 +10,36 @@ use crate::wiring;
 pub struct Scene {
     /// Title of the experiment.
     pub title: String,
-    /// Start and stop, s.
+    /// Start and stop time of the run, s.
     pub span: [f64; 2],
-    /// Factor of real time that was asked for.
+    /// Requested real-time factor, if the run is paced.
     pub factor: Option<f64>,
-    /// Components in their order.
+    /// Names of the components, in their order.
     pub components: Vec<String>,
-    /// Variables with a role.
+    /// Places of the variables that have a role in the figures of merit.
     pub places: Places,
-    /// Limits of rate and moment.
+    /// Limits of angular rate and moment.
     pub limits: Limits,
-    /// State of the solver.
+    /// Variable with the state of the solver.
     pub status: Option<Shown>,
-    /// Its number of iterations.
+    /// Place of the solver's number of iterations.
     pub iterations: Option<usize>,
-    /// Status of the controller's guarantee.
+    /// Variable with the status of the controller's guarantee.
     pub guarantee: Option<Shown>,
-    /// The recorded variables.
+    /// The variables that are recorded.
     pub recorded: Vec<Shown>,
 }
 
-/// A variable as it is shown.
+/// A variable that the view shows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shown {
-    /// `component.variable`.
+    /// Full name of the variable, `component.variable`.
     pub name: String,
-    /// Where it stands among the probed values.
+    /// Index of the variable among the probed values.
     pub place: usize,
-    /// Unit, or nothing.
+    /// Unit of the variable, or an empty text.
     pub unit: String,
-    /// Items of an enumeration.
+    /// Items of an enumeration with their values.
     pub items: Vec<(String, i32)>,
 }
 
@@ -56,12 +56,12 @@ impl Shown {
         Some(Self { name: path.into(), place, unit, items })
     }
 
-    /// The value with its unit, or the name of its item.
+    /// Formats the variable's current value with its unit, or as the name of its item.
     pub fn text(&self, values: &[f64]) -> String {
         self.text_of(values.get(self.place).copied().unwrap_or(f64::NAN))
     }
 
-    /// The same for any value of the variable.
+    /// Formats any value of the variable with its unit, or as the name of its item.
     pub fn text_of(&self, value: f64) -> String {
         match self.items.iter().find(|(_, item)| f64::from(*item) == value) {
             Some((name, _)) => name.clone(),

@@ -1,4 +1,4 @@
-//! How the view looks.
+//! Layout and drawing of the live view.
 
 use super::Snapshot;
 use super::scene::Scene;
@@ -17,13 +17,13 @@ const ANGLES: [&str; 3] = ["alpha", "beta", "sigma"];
 const RATES: [&str; 3] = ["p", "q", "r"];
 const AXES: [&str; 3] = ["x", "y", "z"];
 const COLORS: [Color; 3] = [Color::LightBlue, Color::LightGreen, Color::LightRed];
-/// The course that is kept; when it is full, every second point goes.
+/// Largest number of points of a curve; when it is reached, every second point is dropped.
 const POINTS: usize = 2000;
 
-/// Of three axes.
+/// Curves of three axes, as pairs of time and value.
 type Courses = [Vec<(f64, f64)>; 3];
 
-/// What was seen so far.
+/// Everything that the view has seen of the run so far.
 #[derive(Debug, Default)]
 pub struct State {
     scene: Scene,
@@ -39,12 +39,12 @@ pub struct State {
 }
 
 impl State {
-    /// Nothing seen yet.
+    /// Creates a state that has seen no snapshot yet.
     pub fn new(scene: Scene) -> Self {
         Self { scene, ..Self::default() }
     }
 
-    /// Takes a snapshot.
+    /// Adds a snapshot to the state.
     pub fn see(&mut self, snapshot: &Snapshot) {
         let began = *self.began.get_or_insert_with(Instant::now);
         self.see_after(snapshot, began.elapsed());
@@ -83,7 +83,7 @@ impl State {
     }
 }
 
-/// Draws everything.
+/// Draws the whole view into a frame.
 pub fn draw(frame: &mut Frame, state: &State) {
     let numbers = numbers(state);
     let bars = bars(state);

@@ -1,33 +1,35 @@
-//! How durations are distributed.
+//! Distributions of durations, with their quantiles and histograms.
 
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// Longest duration that is told from longer ones: an hour.
+/// Upper end of the range of durations that are told apart: an hour.
 const LONGEST: Duration = Duration::from_secs(3600);
-/// Columns of the histogram that is written: the first ends here, each further one is so many times as wide.
+/// Width of the first column of the written histogram; each further column ends at a constant
+/// multiple of the one before.
 const FIRST: Duration = Duration::from_micros(1);
 const WIDER: f64 = std::f64::consts::SQRT_2;
 
-/// Counts durations, to three digits, without allocating.
+/// Counts durations to three digits, without allocating memory.
 #[derive(Clone, Debug)]
 pub struct Distribution(Histogram<u32>);
 
-/// What is said of a distribution, all in ms.
+/// Summary of a distribution; all durations are in ms.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
-    /// Number of durations.
+    /// Number of durations that were recorded.
     pub count: u64,
-    /// Shortest.
+    /// Shortest of the durations, ms.
     pub min: f64,
-    /// Median.
+    /// Median of the durations, ms.
     pub median: f64,
-    /// 99 % are not longer.
+    /// 99th percentile of the durations, ms.
     pub p99: f64,
-    /// Longest.
+    /// Longest of the durations, ms.
     pub max: f64,
-    /// Upper ends of columns, the first starting at 0, with the number of durations in them.
+    /// Upper ends of the histogram's columns, ms, with the number of durations in each. The first
+    /// column starts at 0.
     pub histogram: Vec<(f64, u64)>,
 }
 
@@ -39,12 +41,12 @@ impl Default for Distribution {
 }
 
 impl Distribution {
-    /// One more.
+    /// Adds one duration to the distribution.
     pub fn record(&mut self, duration: Duration) {
         self.0.saturating_record(duration.as_nanos().min(LONGEST.as_nanos()) as u64);
     }
 
-    /// Number, quantiles and histogram.
+    /// Summarizes the distribution by its number of durations, quantiles and histogram.
     pub fn summary(&self) -> Summary {
         if self.0.is_empty() {
             return Summary::default();

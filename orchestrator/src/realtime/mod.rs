@@ -1,9 +1,11 @@
-//! A run in step with the wall clock.
+//! Runs that keep in step with the wall clock.
 //!
-//! Communication point t is due at t₀ + (t − start) / factor on the monotonic clock: absolute instants, so that no error adds
-//! up. The master waits for each ([`timer`]), then steps the units and passes values on. What a component computes at a
-//! communication point of its own must be there before its next one; what comes later is a *missed deadline*. The
-//! [`pacer`] counts them, does what was asked for, and measures; [`report`] says what came of it.
+//! Communication point t is due at t₀ + (t − start) / factor on the monotonic clock: these instants
+//! are absolute, so that errors do not accumulate. The master waits for each instant ([`timer`]),
+//! then steps the units and transfers values. The values that a component computes at one of its
+//! communication points must be ready before its next one; if they are not, a *deadline is missed*.
+//! The [`pacer`] counts missed deadlines, takes the requested action, and measures times;
+//! [`report`] summarizes them.
 
 pub mod distribution;
 pub mod pacer;
@@ -15,24 +17,24 @@ pub mod timer;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 
-/// How a run is paced.
+/// Settings of a run that is paced by the wall clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Simulated time over elapsed time.
+    /// Simulated time divided by elapsed time, as requested.
     pub factor: Factor,
-    /// What is done about a missed deadline.
+    /// Action taken when a deadline is missed.
     pub on_miss: OnMiss,
-    /// Real-time priority, 1 to 99, if it is asked for.
+    /// Real-time priority, 1 to 99, if one is requested.
     pub priority: Option<u8>,
 }
 
-/// A finite, positive factor.
+/// A real-time factor, which is finite and positive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Factor(f64);
 
 impl Factor {
-    /// The number.
+    /// Returns the factor as a number.
     pub fn get(self) -> f64 {
         self.0
     }

@@ -1,4 +1,4 @@
-//! Keeps a run in step with a timer, and watches the deadlines.
+//! The pacer keeps a run in step with a timer and checks the deadlines.
 
 use super::distribution::Distribution;
 use super::report::{Component, Lag, Late, RealTime, Series};
@@ -13,56 +13,58 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Duration;
 
-/// A wait is cut into pieces of this length, to see whether the run is to end.
+/// Longest uninterrupted part of a wait. After each part the pacer checks whether the run is to
+/// end.
 const PIECE: Duration = Duration::from_millis(100);
 
-/// A missed deadline.
+/// A deadline that a component missed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Miss {
-    /// Index of the component whose values came late.
+    /// Index of the component whose values were late.
     pub component: usize,
-    /// Communication point they belong to, s.
+    /// Simulated time of the communication point that the values belong to, s.
     pub time: f64,
-    /// From the deadline to the values.
+    /// Time from the deadline until the values were ready.
     pub late: Duration,
-    /// How late the communication point began: by the wake-up, or by what was before it.
+    /// Delay with which the communication point began, because of the wake-up or of earlier work.
     pub lag: Duration,
-    /// The longest step since the run last waited: what to blame, if it is not the component itself.
+    /// Longest step since the run last waited: the likely cause of the miss, if it is not the
+    /// component itself.
     pub longest: Step,
 }
 
-/// A step of a component.
+/// One step of a component, with its duration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Step {
-    /// Index of the component.
+    /// Index of the component that was stepped.
     pub component: usize,
-    /// Communication point at its end, s.
+    /// Simulated time of the communication point at its end, s.
     pub time: f64,
-    /// Time spent in the unit.
+    /// Computing time spent in the unit.
     pub duration: Duration,
 }
 
-/// What there is to tell while the run goes on.
+/// State of the pacing while the run goes on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tally {
-    /// Deadlines so far.
+    /// Number of deadlines checked so far.
     pub deadlines: u64,
-    /// Missed ones.
+    /// Number of deadlines missed so far.
     pub misses: u64,
-    /// The last miss.
+    /// The most recent missed deadline, if any.
     pub last: Option<Miss>,
-    /// How long after its instant the present communication point began.
+    /// Delay with which the current communication point began.
     pub lag: Duration,
     /// Sum of all shifts of the time base.
     pub slipped: Duration,
 }
 
-/// A component as the pacer sees it.
+/// A component with its timing, as the pacer needs it.
 struct Task {
     name: String,
     every: u64,
     spent: Rc<Spent>,
-    /// What of `spent` is counted already.
+    /// Computing time of this component that earlier communication points have already counted.
     counted: Duration,
     steps: Distribution,
     responses: Distribution,
@@ -71,23 +73,24 @@ struct Task {
     series: Series,
 }
 
-/// The pacer.
+/// Keeps a run in step with a timer, and records how well it did.
 pub struct Pacer {
     settings: Settings,
     clock: Clock,
     timer: Rc<dyn Timer>,
     interrupt: Interrupt,
     tasks: Vec<Task>,
-    /// When the start of the simulation is on the timer. A slip moves it.
+    /// Instant of the simulation's start on the timer. A slip moves it.
     base: Duration,
     began: Duration,
     elapsed: Duration,
-    /// When the work of the present tick began, and what was spent in the units until then.
+    /// Instant at which the work of the current tick began. `tick_spent` is the computing time of
+    /// all units up to then.
     tick_began: Duration,
     tick_spent: Duration,
-    /// Wake-up jitter of the present tick, if there was a wait.
+    /// Wake-up jitter of the current tick, if there was a wait.
     woken: Option<Duration>,
-    /// Whether a deadline was missed since the present tick began.
+    /// Whether a deadline was missed since the current tick began.
     missed: bool,
     longest: Step,
     first: Option<Miss>,
@@ -96,14 +99,15 @@ pub struct Pacer {
     largest_lag: Duration,
     slips: u64,
     tally: Rc<Cell<Tally>>,
-    /// What the orchestrator itself needs at a communication point.
+    /// Time that the orchestrator itself takes at a communication point.
     own: Distribution,
     wake_ups: Distribution,
     wake_up_series: Series,
 }
 
 impl Pacer {
-    /// For components with their name, their number of ticks from step to step, and what is spent in them.
+    /// Creates a pacer for components, each given by its name, its period in ticks, and its
+    /// accumulated computing time.
     pub fn new(
         settings: Settings,
         clock: Clock,
@@ -148,12 +152,12 @@ impl Pacer {
         }
     }
 
-    /// Where to see how the run is doing.
+    /// Shared state of the pacing, which can be read while the run goes on.
     pub fn tally(&self) -> Rc<Cell<Tally>> {
         Rc::clone(&self.tally)
     }
 
-    /// Waits for a communication point, unless it is past. Returns early if the run is to end.
+    /// Waits for a communication point, unless it has passed. Returns early if the run is to end.
     pub fn wait(&mut self, tick: u64) {
         let now = self.timer.now();
         if tick == 0 {
@@ -196,10 +200,11 @@ impl Pacer {
         }
     }
 
-    /// Counts what the components did at a communication point, and looks at their deadlines.
+    /// Records the components' computing times at a communication point, and checks their
+    /// deadlines.
     ///
     /// # Errors
-    /// If one was missed, and that is to end the run.
+    /// If a deadline was missed and the settings say that this ends the run.
     pub fn check(&mut self, tick: u64) -> Result<(), Error> {
         let time = self.clock.time(tick);
         if let Some(woken) = self.woken {
@@ -256,14 +261,15 @@ impl Pacer {
         });
     }
 
-    /// The run is over.
+    /// Records the end of the run.
     pub fn finish(&mut self) {
         let now = self.timer.now();
         self.count_own(now);
         self.elapsed = now.saturating_sub(self.began);
     }
 
-    /// When a communication point is on the timer. Beyond the stop the ticks go on.
+    /// Instant of a communication point on the timer. Ticks continue beyond the stop time, because
+    /// deadlines may lie there.
     fn release(&self, tick: u64) -> Duration {
         let simulated = if tick <= self.clock.ticks() {
             self.clock.time(tick) - self.clock.start()
@@ -303,7 +309,8 @@ impl Pacer {
         }
     }
 
-    /// What came of it; and the course of the wake-up jitter and of each component's step time.
+    /// Returns the timing report of the run, the time series of the wake-up jitter, and the time
+    /// series of each component's step time.
     pub fn report(self) -> (RealTime, Series, Vec<(String, Series)>) {
         let (first_miss, worst_miss) = (self.first.map(|m| self.late(m)), self.worst.map(|m| self.late(m)));
         let tally = self.tally.get();
@@ -346,7 +353,7 @@ impl Pacer {
     }
 }
 
-/// A time without what multiplication adds in its last digits.
+/// Rounds a time, to remove digits that stem from the multiplication of tick and step.
 fn shown(time: f64) -> f64 {
     (time * 1e9).round() / 1e9
 }
@@ -359,8 +366,9 @@ mod tests {
 
     const MS: Duration = Duration::from_millis(1);
 
-    /// Paces components with these periods (ticks) through 10 ticks of 1 s at factor 100, so of 10 ms. `work` says how long
-    /// (ms) a component computes at a tick. Returns what came of it and when each tick began, ms.
+    /// Paces components with these periods (ticks) through 10 ticks of 1 s at factor 100, that is,
+    /// of 10 ms. `work` gives the time (ms) that a component computes at a tick. Returns the report
+    /// and the instant at which each tick began, ms.
     fn paced(
         on_miss: OnMiss,
         every: &[u32],
@@ -368,7 +376,7 @@ mod tests {
         work: impl Fn(usize, u64) -> u32,
     ) -> (Result<(), Error>, RealTime, Vec<u128>) {
         let timer = Rc::new(Fake { jitter, ..Fake::default() });
-        // The timer's origin is not that of the run.
+        // The origin of the timer differs from the start of the run.
         timer.pass(12345 * MS);
         let clock = Clock::new(5.0, 15.0, 1.0).unwrap();
         let settings = Settings { factor: "100".parse().unwrap(), on_miss, priority: None };
@@ -390,7 +398,7 @@ mod tests {
                 }
             }
             outcome = pacer.check(tick);
-            // The observers.
+            // The observers take this time.
             timer.pass(MS);
             if outcome.is_err() {
                 break;
@@ -415,7 +423,7 @@ mod tests {
         assert_eq!(plant.step_ms.count, 11);
         near(plant.period_ms, 10.0);
         near(plant.step_ms.median, 4.0);
-        // The controller's 4 ms come before the plant's.
+        // The controller computes for 4 ms before the plant does.
         near(plant.response_ms.max, 8.0);
         near(report.orchestrator_ms.median, 1.0);
         near(report.elapsed_s, 0.109);
@@ -432,7 +440,7 @@ mod tests {
         near(controller.max, 2.0);
     }
 
-    /// 25 ms of work at tick 3, else 1 ms.
+    /// A component computes for 25 ms at tick 3 and for 1 ms otherwise.
     fn one_long_step(_: usize, tick: u64) -> u32 {
         if tick == 3 { 25 } else { 1 }
     }
@@ -441,9 +449,11 @@ mod tests {
     fn oracle_catching_up_returns_to_the_original_time_base() {
         let (outcome, report, begins) = paced(OnMiss::CatchUp, &[1], Duration::ZERO, one_long_step);
         outcome.unwrap();
-        // Done at 55 and with 1 ms of observers at 56, then 58 and 60: then there is time to wait.
+        // Tick 3 is computed at 55 ms and observed at 56; the next two ticks end at 58 and 60,
+        // after which there is time to wait.
         assert_eq!(begins, [0, 10, 20, 30, 56, 58, 60, 70, 80, 90, 100]);
-        // Values of tick 3 came at 55 instead of 40, those of tick 4 at 57 instead of 50; those of tick 5 at 59 are in time.
+        // The values of tick 3 came at 55 instead of 40 and those of tick 4 at 57 instead of 50;
+        // those of tick 5, at 59, are in time.
         assert_eq!((report.misses, report.lag.late_starts), (2, 2));
         let [first, worst] = [report.first_miss.as_ref().unwrap(), report.worst_miss.as_ref().unwrap()];
         assert_eq!((first, first.component.as_str(), first.time), (worst, "controller", 8.0));
@@ -480,18 +490,19 @@ mod tests {
 
     #[test]
     fn oracle_a_slow_component_has_the_time_to_its_own_next_tick_and_is_blamed_for_what_others_miss() {
-        // The plant steps every 5 ticks of 10 ms and takes 25 ms: in time. The controller steps at every tick, before it.
+        // The plant steps every 5 ticks of 10 ms and takes 25 ms, which is in time. The controller
+        // steps at every tick, before it.
         let work = |index: usize, tick: u64| if index == 1 && tick == 5 { 25 } else { 1 };
         let (_, report, begins) = paced(OnMiss::CatchUp, &[1, 5], Duration::ZERO, work);
         assert_eq!(begins[5..9], [50, 77, 79, 81]);
         let [controller, plant] = ["controller", "plant"].map(|name| &report.components[name]);
         near(plant.period_ms, 50.0);
         assert_eq!((plant.misses, controller.misses, report.deadlines), (0, 1, 14));
-        // Its values of tick 6, due at 70, came at 78.
+        // The controller's values of tick 6, due at 70, came at 78.
         let miss = report.first_miss.unwrap();
         assert_eq!((miss.component.as_str(), miss.time), ("controller", 11.0));
         near(miss.late_ms, 8.0);
-        // It began at 77.
+        // The communication point began at 77 ms.
         near(miss.lag_ms, 17.0);
         assert_eq!((miss.longest.as_str(), miss.longest_time), ("plant", 10.0));
         near(miss.longest_ms, 25.0);

@@ -1,11 +1,11 @@
-//! One figure of a paced run: step times and wake-up jitter, along the run and as distributions.
+//! A figure of a paced run, with step times and wake-up jitter as time series and as distributions.
 
 use super::report::{RealTime, Series};
 use crate::error::Error;
 use crate::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use std::path::Path;
 
-/// One after the other for the components.
+/// Colours of the components, assigned in their order.
 const COLORS: [Color; 6] = [
     Color(31, 119, 180),
     Color(255, 127, 14),
@@ -15,7 +15,7 @@ const COLORS: [Color; 6] = [
     Color(23, 190, 207),
 ];
 
-/// Draws the figure.
+/// Draws the figure and writes it to a file.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -38,7 +38,7 @@ pub fn draw(
         name: name.into(),
         color,
         shape: Shape::Steps,
-        // The value at an x holds up to the next.
+        // The value at an x holds up to the next x.
         x: histogram
             .first()
             .map(|(end, _)| end / 2.0)

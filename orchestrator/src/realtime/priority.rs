@@ -1,33 +1,35 @@
-//! Real-time scheduling, where the system allows.
+//! Real-time scheduling, on systems that allow it.
 
 use serde::{Deserialize, Serialize};
 
-/// What came of asking for a priority.
+/// Outcome of the request for a real-time priority.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Priority {
-    /// Nobody asked.
+    /// No priority was requested.
     #[default]
     Usual,
-    /// `SCHED_FIFO` with this priority; and why memory could not be locked, if it could not.
+    /// The thread runs under `SCHED_FIFO` with this priority. If memory could not be locked,
+    /// `unlocked` says why.
     Fifo {
-        /// 1 to 99.
+        /// Priority of the thread, 1 to 99.
         priority: u8,
-        /// Reason.
+        /// Reason why memory could not be locked, if so.
         unlocked: Option<String>,
     },
-    /// The system refused, or has no such thing: usual scheduling.
+    /// The system refused the request or has no such scheduling; usual scheduling applies.
     Refused(String),
 }
 
-/// The scheduling of this thread, until it is dropped.
+/// The scheduling of this thread, which lasts until this value is dropped.
 pub struct Scheduling {
-    /// What came of it.
+    /// Outcome of the request for the priority.
     pub priority: Priority,
 }
 
 impl Scheduling {
-    /// Asks for `SCHED_FIFO` with the priority, and for memory that stays where it is. Threads started later inherit it.
+    /// Requests `SCHED_FIFO` with the priority, and memory that is locked into RAM. Threads started
+    /// later inherit it.
     pub fn request(priority: Option<u8>) -> Self {
         Self { priority: priority.map_or(Priority::Usual, system::request) }
     }

@@ -1,4 +1,4 @@
-//! What came of a paced run.
+//! Timing report of a run that was paced by the wall clock.
 
 use super::distribution::Summary;
 use super::priority::Priority;
@@ -8,100 +8,103 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::time::Duration;
 
-/// The numbers, as `metrics.json` has them under `real_time`.
+/// The timing figures that `metrics.json` holds under `real_time`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RealTime {
-    /// Simulated time over elapsed time, as asked for.
+    /// Simulated time divided by elapsed time, as requested.
     pub factor: Factor,
-    /// What was to be done about a miss.
+    /// Action requested for a missed deadline.
     pub on_miss: OnMiss,
     /// Scheduling of the run's thread.
     pub priority: Priority,
-    /// From the first communication point to the end of the last, s.
+    /// Time from the first communication point to the end of the last, s.
     pub elapsed_s: f64,
-    /// Deadlines that were looked at.
+    /// Number of deadlines that were checked.
     pub deadlines: u64,
-    /// Those that were missed.
+    /// Number of deadlines that were missed.
     pub misses: u64,
-    /// The first of them.
+    /// The first deadline that was missed.
     pub first_miss: Option<Late>,
-    /// The one with the longest delay.
+    /// The missed deadline with the longest delay.
     pub worst_miss: Option<Late>,
-    /// How far the run fell behind.
+    /// Delay of the run against the wall clock.
     pub lag: Lag,
-    /// By component.
+    /// Timing of each component, by its name.
     pub components: BTreeMap<String, Component>,
-    /// Wake-up jitter: delay of each wake-up, at all communication points with a wait.
+    /// Wake-up jitter: delay of each wake-up, over all communication points with a wait.
     pub wake_up_ms: Summary,
-    /// What the orchestrator itself needed at a communication point: passing on values, recording.
+    /// Time that the orchestrator itself took at a communication point to transfer and record
+    /// values.
     pub orchestrator_ms: Summary,
 }
 
-/// A missed deadline.
+/// A missed deadline, with the step that may have caused it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Late {
-    /// Whose values came late.
+    /// Name of the component whose values were late.
     pub component: String,
-    /// Communication point they belong to, s.
+    /// Simulated time of the communication point that the values belong to, s.
     pub time: f64,
-    /// From the deadline to the values, ms.
+    /// Time from the deadline until the values were ready, ms.
     pub late_ms: f64,
-    /// How late the communication point began, by the wake-up or by what was before it, ms.
+    /// Delay with which the communication point began, because of the wake-up or of earlier work,
+    /// ms.
     pub lag_ms: f64,
-    /// The component with the longest step since the run last waited.
+    /// Name of the component with the longest step since the run last waited.
     pub longest: String,
-    /// The communication point at the end of that step, s.
+    /// Simulated time of the communication point at the end of that step, s.
     pub longest_time: f64,
-    /// Its duration, ms.
+    /// Duration of that step, ms.
     pub longest_ms: f64,
 }
 
-/// How far a run fell behind, and what was done about it.
+/// Delay of a run against the wall clock, and the shifts of its time base.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Lag {
-    /// Communication points that began late as what was before them took too long.
+    /// Number of communication points that began late because earlier work took too long.
     pub late_starts: u64,
-    /// Largest delay of a communication point's beginning, ms; wake-up jitter included.
+    /// Largest delay with which a communication point began, ms, including wake-up jitter.
     pub largest_ms: f64,
-    /// That of the last one, ms.
+    /// Delay with which the last communication point began, ms.
     pub at_end_ms: f64,
-    /// How often the time base was shifted.
+    /// Number of shifts of the time base.
     pub slips: u64,
-    /// By how much in all, ms.
+    /// Sum of all shifts of the time base, ms.
     pub slipped_ms: f64,
 }
 
-/// A component's times.
+/// Timing figures of one component.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Component {
-    /// From a communication point of its own to the next, ms on the wall clock.
+    /// Time between two communication points of the component on the wall clock, ms.
     pub period_ms: f64,
-    /// Missed deadlines.
+    /// Number of deadlines that the component missed.
     pub misses: u64,
-    /// Time spent in all calls of the unit, per step.
+    /// Computing time of the unit per step, over all of its calls.
     pub step_ms: Summary,
-    /// From the instant of the communication point to the component's values; to be shorter than the period.
+    /// Time from the instant of the communication point until the component's values are ready. It
+    /// must be shorter than the period.
     pub response_ms: Summary,
-    /// Wake-up jitter at its own communication points.
+    /// Wake-up jitter at the component's own communication points.
     pub wake_up_ms: Summary,
 }
 
-/// A figure shows at most about so many points of a course.
+/// Approximate upper bound of the number of points of a time series in a figure.
 const POINTS: u64 = 5000;
 
-/// The course of a duration, the largest of each stretch.
+/// Time series of a duration; each point is the largest value of a stretch of communication points.
 #[derive(Clone, Debug, Default)]
 pub struct Series {
     stride: u64,
     count: u64,
-    /// Communication points, s.
+    /// Simulated times of the communication points, s.
     pub time: Vec<f64>,
-    /// Durations, ms.
+    /// Durations at these times, ms.
     pub milliseconds: Vec<f64>,
 }
 
 impl Series {
-    /// Room for so many durations.
+    /// Creates an empty series with room for this number of durations.
     pub fn new(expected: u64) -> Self {
         let stride = expected.div_ceil(POINTS).max(1);
         let capacity = (expected / stride + 2) as usize;
@@ -109,7 +112,7 @@ impl Series {
         Self { stride, count: 0, time, milliseconds }
     }
 
-    /// One more.
+    /// Adds the duration of one communication point.
     pub fn add(&mut self, time: f64, duration: Duration) {
         let milliseconds = duration.as_secs_f64() * 1e3;
         if self.count.is_multiple_of(self.stride) {
@@ -125,10 +128,10 @@ impl Series {
 }
 
 impl RealTime {
-    /// Prints it, below the summary of the run.
+    /// Prints the timing report, below the summary of the run.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the text cannot be written.
     pub fn print(&self, order: &[String], out: &mut impl Write) -> io::Result<()> {
         let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
         line(
@@ -217,7 +220,7 @@ impl RealTime {
         Ok(())
     }
 
-    /// What was done about the misses, if there were any.
+    /// Describes the action taken on missed deadlines; `None` if there were none.
     pub fn done_about_it(&self) -> Option<String> {
         let Lag { late_starts, largest_ms, at_end_ms, slips, slipped_ms } = self.lag;
         (self.misses > 0).then(|| match self.on_miss {
@@ -260,7 +263,7 @@ impl std::fmt::Display for Late {
     }
 }
 
-/// Milliseconds, to the microsecond or to four digits.
+/// Formats milliseconds with three digits after the point, or with one from 100 ms on.
 fn plain(milliseconds: f64) -> String {
     match milliseconds {
         ms if ms < 100.0 => format!("{ms:.3}"),

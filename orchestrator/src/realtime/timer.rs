@@ -1,13 +1,14 @@
-//! A monotonic clock that can be waited on.
+//! A monotonic clock, and a way to wait for an instant on it.
 
 use std::time::Duration;
 
-/// A clock and a way to sleep until it shows an instant; instants are counted from an origin of its own.
+/// A clock and a way to sleep until it reaches an instant. Instants are counted from the clock's
+/// own origin.
 pub trait Timer {
-    /// The instant it is now.
+    /// The current instant on the clock.
     fn now(&self) -> Duration;
 
-    /// Returns not before the instant, and as soon after as the system can.
+    /// Sleeps until the instant: never returns before it, and as soon after it as the system can.
     fn sleep_until(&self, instant: Duration);
 }
 
@@ -23,18 +24,18 @@ mod system {
 
     impl Timer for Monotonic {
         fn now(&self) -> Duration {
-            // The clock starts when the system does: it is never negative.
+            // The clock starts with the system, so that its time is never negative.
             Duration::try_from(rustix::time::clock_gettime(ClockId::Monotonic)).unwrap_or_default()
         }
 
         fn sleep_until(&self, instant: Duration) {
             let Ok(until) = Timespec::try_from(instant) else { return };
-            // A signal ends the sleep early.
+            // The loop is needed because a signal ends the sleep early.
             while clock_nanosleep_absolute(ClockId::Monotonic, &until) == Err(rustix::io::Errno::INTR) {}
         }
     }
 
-    /// Asks the system not to delay this thread's wake-ups in order to join them with others'.
+    /// Asks the system not to delay this thread's wake-ups in order to combine them with others.
     pub fn wake_up_sharply() {
         if let Err(error) = set_current_timer_slack(NonZeroU64::new(1)) {
             tracing::debug!("the timer slack stays as it is: {error}");
@@ -62,7 +63,7 @@ mod system {
         }
     }
 
-    /// Nothing to ask for on this system.
+    /// Does nothing, because this system has no such setting.
     pub fn wake_up_sharply() {}
 }
 
@@ -73,7 +74,7 @@ pub(crate) mod fake {
     use super::{Duration, Timer};
     use std::cell::Cell;
 
-    /// Shows what it is told to, and wakes up late by `jitter`.
+    /// Shows the time that the test sets, and wakes up late by `jitter`.
     #[derive(Debug, Default)]
     pub(crate) struct Fake {
         pub(crate) now: Cell<Duration>,
@@ -109,7 +110,7 @@ mod tests {
             timer.sleep_until(instant);
             assert!(timer.now() >= instant);
         }
-        // One that is past.
+        // An instant in the past is accepted.
         timer.sleep_until(Duration::ZERO);
     }
 }

@@ -1,4 +1,4 @@
-//! results.parquet.
+//! Writes the recorded variables to `results.parquet`.
 
 use super::Column;
 use crate::error::Error;
@@ -46,13 +46,13 @@ impl Values {
     fn push(&mut self, value: f64) {
         match self {
             Self::Real(values) => values.push(value),
-            // It came from an i32.
+            // The conversion is exact, because the value came from an `i32`.
             Self::Integer(values) => values.push(value as i32),
             Self::Boolean(values) => values.push(value != 0.0),
         }
     }
 
-    /// Writes and forgets them.
+    /// Writes the values to the file and clears them.
     fn write(&mut self, writer: &mut ColumnWriter) -> Result<usize, ParquetError> {
         match (self, writer) {
             (Self::Real(values), ColumnWriter::DoubleColumnWriter(writer)) => {
@@ -75,11 +75,11 @@ impl Values {
     }
 }
 
-/// A Parquet file in the making. Without [`Self::finish`] it cannot be read.
+/// A Parquet file that is being written. Without [`Self::finish`] it cannot be read.
 pub(super) struct Columnar {
     path: PathBuf,
     writer: SerializedFileWriter<File>,
-    /// Of the time, then of each column.
+    /// Values of the time, then those of each column.
     values: Vec<Values>,
     places: Vec<usize>,
     rows: usize,
@@ -116,7 +116,7 @@ impl Columnar {
         if self.rows == GROUP { self.write() } else { Ok(()) }
     }
 
-    /// Writes the rows that are held.
+    /// Writes the rows that are held in memory.
     fn write(&mut self) -> Result<(), Error> {
         self.rows = 0;
         let mut write = || {

@@ -21,7 +21,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// The file's name.
+    /// Name of the file in the folder of results.
     pub fn file(self) -> &'static str {
         match self {
             Self::Csv => "results.csv",
@@ -30,18 +30,18 @@ impl Format {
     }
 }
 
-/// A recorded variable.
+/// A variable that is recorded, with its type and unit.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// `component.variable`.
+    /// Full name of the variable, `component.variable`.
     pub name: String,
-    /// Where it stands among a sample's values.
+    /// Index of the variable among a sample's values.
     pub place: usize,
-    /// Its type.
+    /// Type in which the values are transferred.
     pub carrier: Carrier,
-    /// Its unit, if it has one.
+    /// Unit of the variable, if it has one.
     pub unit: Option<String>,
-    /// Items of an enumeration; none for other types.
+    /// Items of an enumeration; empty for other types.
     pub items: Vec<(String, i32)>,
 }
 
@@ -50,7 +50,7 @@ enum Table {
     Columnar(Box<Columnar>),
 }
 
-/// A file of results in the making.
+/// A results file that is being written.
 pub struct Recorder {
     table: Table,
     every: u64,
@@ -75,7 +75,7 @@ impl Recorder {
         Ok(Self { table, every: u64::from(every) })
     }
 
-    /// Writes what is still in memory.
+    /// Writes the rows that are still in memory.
     ///
     /// # Errors
     /// If the file cannot be written.

@@ -1,4 +1,4 @@
-//! results.csv.
+//! Writes the recorded variables to `results.csv`.
 
 use super::Column;
 use crate::error::Error;
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// Bytes that are held in memory and written at once.
 const HELD: usize = 1 << 16;
 
-/// A CSV file in the making.
+/// A CSV file that is being written.
 pub(super) struct Text {
     path: PathBuf,
     file: File,
@@ -19,7 +19,7 @@ pub(super) struct Text {
     columns: Vec<Shown>,
 }
 
-/// How a column's values are told.
+/// Format in which a column's values are written.
 struct Shown {
     place: usize,
     carrier: Carrier,
@@ -57,7 +57,7 @@ impl Text {
             let value = values[*place];
             let text = match carrier {
                 Carrier::Real => real.format(value),
-                // It came from an i32.
+                // The conversion is exact, because the value came from an `i32`.
                 Carrier::Integer | Carrier::Boolean => {
                     let item = items.iter().find(|(_, item)| *item == value as i32);
                     item.map_or_else(|| integer.format(value as i32), |(name, _)| name)

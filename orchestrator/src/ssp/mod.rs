@@ -13,5 +13,5 @@ const STRUCTURE: &str = "SystemStructure.ssd";
 const OWN: &str = "orchestrator";
 /// The type of a widely read annotation that holds the step.
 const OPEN_MODELICA: &str = "org.openmodelica";
-/// What a component is, and what it is if it says nothing.
+/// Type of a component that is an FMU, which is also the type of a component that states none.
 const FMU: &str = "application/x-fmu-sharedlibrary";

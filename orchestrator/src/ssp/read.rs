@@ -1,4 +1,4 @@
-//! From an archive to an experiment.
+//! Reads an SSP archive as an experiment.
 
 use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
 use crate::archive;
@@ -20,13 +20,13 @@ use std::rc::Rc;
 use tempfile::TempDir;
 use toml::{Spanned, Value};
 
-/// An archive as an experiment.
+/// An experiment that was read from an archive.
 pub struct Loaded {
     /// The experiment; components of subsystems are called `subsystem/component`.
     pub experiment: Experiment,
-    /// Its FMUs.
+    /// The opened FMUs of the archive.
     pub opened: Opened,
-    /// Where they lie.
+    /// The unpacked entries of the archive.
     pub entries: Entries,
 }
 
@@ -56,7 +56,7 @@ fn of_entry(error: Error, archive: &Path, folder: &Path) -> Error {
     }
 }
 
-/// What an archive of this program says of its run.
+/// Run settings that this program stored in the archive.
 struct Own {
     title: String,
     description: String,
@@ -133,8 +133,8 @@ impl Own {
 /// (the smallest step). The order of the components is the one without delay, where there is one.
 ///
 /// # Errors
-/// What is wrong with the archive, or beyond this program: other components than FMUs for co-simulation, mappings of parameters,
-/// signal dictionaries.
+/// If the archive is faulty, or needs what this program does not support: components other than
+/// FMUs for co-simulation, mappings of parameters, or signal dictionaries.
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let folder = archive::unpack(path)?;
     let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
@@ -231,7 +231,7 @@ fn parts<'a>(components: &'a [Found], opened: &'a Opened, folder: &Path) -> Vec<
 /// A component of the system or of one of its subsystems.
 struct Found {
     name: String,
-    /// Its FMU in the archive.
+    /// Path of the component's FMU in the archive.
     source: String,
     parameters: BTreeMap<String, Value>,
 }
@@ -267,7 +267,7 @@ struct Structure {
     connections: Vec<Connection>,
 }
 
-/// What is collected while the systems are walked through.
+/// Collects components, connections and values while the systems are traversed.
 #[derive(Default)]
 struct Walk {
     components: Vec<Found>,

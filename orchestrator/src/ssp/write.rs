@@ -1,4 +1,4 @@
-//! From an experiment to an archive.
+//! Writes an experiment to an SSP archive.
 
 use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
 use crate::description::{Kind, Variable};
@@ -25,7 +25,7 @@ const NAMESPACES: [(&str, &str); 3] = [
 
 type Xml = Writer<Vec<u8>>;
 
-/// What is written.
+/// The experiment that is written to an archive.
 struct Source<'a> {
     plan: &'a Plan,
     /// Whether outputs that are enumerations have connectors.
@@ -141,7 +141,8 @@ fn open_modelica(xml: &mut Xml, plan: &Source) -> io::Result<()> {
     })
 }
 
-/// What makes the same run of an archive: step, coupling, order, periods, what is recorded and what the figures of merit are of.
+/// Writes the settings that an archive needs to repeat the same run: step, coupling, order,
+/// periods, recorded variables and roles of the figures of merit.
 fn own(xml: &mut Xml, plan: &Source) -> io::Result<()> {
     let experiment = &plan.experiment;
     let coupling = match experiment.simulation.coupling {

@@ -5,22 +5,22 @@ use super::values::Quantity;
 use super::{Check, Claim, Relation, Study};
 use serde::Serialize;
 
-/// What becomes of a claim.
+/// Verdict on a claim of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Every check holds for every member.
     Holds,
-    /// Some do.
+    /// Some checks hold for some members.
     HoldsPartly,
-    /// None does.
+    /// No check holds for any member.
     DoesNotHold,
     /// There is no run that could tell.
     NotJudged,
 }
 
 impl Verdict {
-    /// In words.
+    /// The verdict in words, for a reader.
     pub fn text(self) -> &'static str {
         match self {
             Self::Holds => "holds",
@@ -40,16 +40,16 @@ impl Verdict {
     }
 }
 
-/// Outcome of a check.
+/// Outcome of one check of a claim.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checked {
-    /// Left numbers.
+    /// Numbers on the left side of the relation.
     pub left: Numbers,
-    /// Right numbers.
+    /// Numbers on the right side of the relation.
     pub right: Numbers,
     /// (left − right)/right for each pair.
     pub difference: Numbers,
-    /// What the paper's margin asks for, as a fraction.
+    /// Margin that the paper claims, as a fraction.
     pub by: Option<f64>,
     /// Pairs of members that were compared. Where one of the two has no number, the relation does not hold.
     pub pairs: usize,
@@ -64,19 +64,19 @@ impl Checked {
     }
 }
 
-/// Outcome of a claim.
+/// Outcome of a claim with all of its checks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judged {
-    /// Over all checks.
+    /// Verdict over all checks of the claim.
     pub verdict: Verdict,
-    /// Each check.
+    /// Outcome of each check of the claim.
     pub checks: Vec<Checked>,
 }
 
-/// Refuses checks that name what is not there, or compare runs that cannot be paired.
+/// Rejects checks that refer to missing items, or compare runs that cannot be paired.
 ///
 /// # Errors
-/// Says what is wrong.
+/// An error that describes the first faulty check.
 pub fn check(study: &Study) -> Result<(), String> {
     for check in study.claims.iter().flat_map(|claim| &claim.checks) {
         let members = |place: usize| study.runs[place].vary.as_ref().map_or(1, |vary| vary.count);
@@ -104,10 +104,10 @@ pub fn check(study: &Study) -> Result<(), String> {
     Ok(())
 }
 
-/// Judges a claim.
+/// Judges a claim by its checks.
 ///
 /// # Errors
-/// If a check names what is not there, or a run has no such quantity.
+/// If a check refers to a missing item, or a run has no such quantity.
 pub fn judge(claim: &Claim, results: &Results) -> Result<Judged, String> {
     let checks = claim.checks.iter().map(|check| compare(check, results)).collect::<Result<Vec<_>, _>>()?;
     let any_left_open = checks.iter().any(|check| check.verdict() == Verdict::NotJudged);
@@ -129,7 +129,7 @@ fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
     let right = results.quantity(&check.right)?;
     let by = check.by.as_ref().map(|by| results.study.values.number(by)).transpose()?;
     let numbers = |side: &[Option<f64>]| Numbers(side.iter().copied().flatten().collect());
-    // Without a number on either side there is nothing to compare.
+    // If one side has no number at all, there is nothing to compare.
     let is_empty = numbers(&left).0.is_empty() || numbers(&right).0.is_empty();
     let pairs = if is_empty { 0 } else { left.len().max(right.len()) };
     let at = |side: &[Option<f64>], k: usize| side[k % side.len()];

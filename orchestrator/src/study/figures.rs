@@ -10,7 +10,7 @@ use toml::Spanned;
 /// Columns of a histogram per decade.
 const COLUMNS_PER_DECADE: f64 = 12.0;
 
-/// Makes a figure.
+/// Makes a figure from the results of a study.
 ///
 /// # Errors
 /// If it names what is not there.
@@ -119,7 +119,7 @@ fn through(across: &Across, line: &Through, results: &Results) -> Result<Curve, 
     Ok(Curve { name: line.label.clone(), color: line.color, shape, x, y })
 }
 
-/// What a panel draws of a run: signal, name, colour.
+/// The curves that a panel draws of a run: signal, name and colour of each.
 fn drawn<'a>(panel: &'a Panel, run: &'a Run) -> Vec<(&'a Signal, String, Color)> {
     let own = panel.signal.iter().map(|signal| (signal, run.label.clone(), run.color));
     own.chain(panel.signals.iter().map(|curve| (&curve.of, curve.label.clone(), curve.color))).collect()

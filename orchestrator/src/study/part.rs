@@ -16,44 +16,44 @@ use std::ops::Range;
 use std::path::PathBuf;
 use toml::Value;
 
-/// What a part is to do: members `range` of the run, counted from 0.
+/// A part of a study's work: the members `range` of a run, counted from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Part {
     /// Position of the run in the study.
     pub run: usize,
-    /// Which of its values.
+    /// Members of the run that belong to this part.
     pub range: Range<u32>,
 }
 
-/// What is kept of a part.
+/// Results that are kept of a part.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
-    /// One for each value of the parameter.
+    /// Results of each member, one for each value of the parameter.
     pub members: Vec<Member>,
-    /// Signals of the run's first member, if this is the part with it.
+    /// Signals of the run's first member, if it belongs to this part.
     pub series: Option<Series>,
-    /// Parameters of all components in the first member, likewise.
+    /// Parameters of all components in the first member, if it belongs to this part.
     #[serde(default)]
     pub parameters: Parameters,
     /// Smallest and largest value of each signal over the members, at each communication point.
     pub spread: BTreeMap<Signal, Spread>,
 }
 
-/// What is kept of one run.
+/// Results that are kept of one member of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Member {
     /// Value of the parameter, if one is varied.
     pub value: Option<i32>,
-    /// The figures of merit.
+    /// Figures of merit of the member.
     pub metrics: Metrics,
-    /// Signals against bounds, by id.
+    /// Comparisons of signals with bounds, by id.
     pub within: BTreeMap<String, Inside>,
-    /// The study's own numbers, by id; null where there is none.
+    /// Measures that the study defines, by id; null if a measure has no value.
     pub measures: BTreeMap<String, Option<f64>>,
 }
 
 impl Member {
-    /// Whether this run came to the same as another one, but for the times it took.
+    /// Whether this member had the same results as another one, apart from computing times.
     pub fn moves_as(&self, other: &Self) -> bool {
         let timeless = |metrics: &Metrics| Metrics {
             solver_ms_mean: None,
@@ -68,27 +68,27 @@ impl Member {
     }
 }
 
-/// How signals stood to a bound.
+/// Comparison of signals with a bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Inside {
-    /// Samples in which all signals were within the bound.
+    /// Number of samples in which all signals were within the bound.
     pub inside: u64,
-    /// All samples.
+    /// Number of all samples that were compared.
     pub samples: u64,
     /// Largest magnitude of any signal.
     pub largest: f64,
-    /// The same as a multiple of the bound.
+    /// Largest magnitude as a multiple of the bound.
     pub ratio: f64,
 }
 
-/// Signals over time.
+/// Time series of signals.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Series {
-    /// Communication points, s.
+    /// Simulated times of the communication points, s.
     pub time: Vec<f64>,
-    /// Values at these, in the unit they are shown in.
+    /// Values at these times, in the unit in which they are shown.
     pub signals: BTreeMap<Signal, Vec<f64>>,
-    /// That unit.
+    /// Unit in which each signal is shown.
     pub units: BTreeMap<Signal, String>,
     /// Duration of each of the solver's solutions, ms.
     pub solver_ms: Vec<f64>,
@@ -97,26 +97,26 @@ pub struct Series {
 /// Smallest and largest value at each communication point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// The smallest.
+    /// Smallest value at each communication point.
     pub low: Vec<f64>,
-    /// The largest.
+    /// Largest value at each communication point.
     pub high: Vec<f64>,
 }
 
-/// Bounds are met up to rounding.
+/// Tolerance with which bounds count as met, because of rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// The signals that a study wants of a run: as time series, and as bands.
 #[derive(Clone, Debug, Default)]
 pub struct Wanted {
-    /// Drawn as they are.
+    /// Signals that are drawn as lines.
     pub series: BTreeSet<Signal>,
-    /// Drawn as bands.
+    /// Signals that are drawn as bands.
     pub spread: BTreeSet<Signal>,
 }
 
 impl Wanted {
-    /// What the study's figures draw of a run.
+    /// Collects the signals of a run that the study's figures draw.
     pub fn of(study: &Study, run: &Run) -> Self {
         let mut wanted = Self::default();
         for figure in &study.figures {
@@ -141,9 +141,9 @@ impl Wanted {
 pub struct Preparation<'a> {
     study: &'a Study,
     run: &'a Run,
-    /// What the figures draw of it.
+    /// Signals of the run that the figures draw.
     pub wanted: Wanted,
-    /// Read once, so that all members are of the same text.
+    /// The experiment, read once so that all members use the same text.
     experiment: Experiment,
     fmu_dirs: &'a [PathBuf],
 }
@@ -198,7 +198,7 @@ impl<'a> Preparation<'a> {
     /// Checks that everything is there that will be asked for.
     ///
     /// # Errors
-    /// Names what is not.
+    /// An error that names the missing item.
     pub fn check(&self, opened: &mut Opened) -> Result<(), Error> {
         let plan = self
             .plan(0, opened)
@@ -212,7 +212,7 @@ impl<'a> Preparation<'a> {
     /// Runs the members with these numbers.
     ///
     /// # Errors
-    /// What a unit said; that it was asked to end.
+    /// If a unit fails, or if the run was asked to end.
     pub fn execute(
         &self,
         range: Range<u32>,
@@ -242,7 +242,7 @@ impl<'a> Preparation<'a> {
                 outcome.parameters = plan.parameters(&mut master)?;
             }
             let mut merit = plan.merit(limits);
-            // Of a run that shares the machine the times mean nothing.
+            // Computing times mean nothing if the run shares the machine.
             if self.run.timed && number == 0 {
                 master.measure_time();
             }
@@ -283,7 +283,7 @@ fn widen(spread: &mut BTreeMap<Signal, Spread>, signal: &Signal, values: &[f64])
 }
 
 impl Spread {
-    /// Makes room for more values.
+    /// Extends the band so that it also covers these values.
     pub fn widen(&mut self, low: &[f64], high: &[f64]) {
         for (own, value) in self.low.iter_mut().zip(low) {
             *own = own.min(*value);
@@ -303,7 +303,7 @@ impl Inside {
     }
 }
 
-/// Holds signals against a bound.
+/// Compares signals with a bound.
 struct Bounded<'a> {
     id: &'a str,
     signals: Vec<Resolved>,
@@ -323,7 +323,7 @@ impl Observer for Bounded<'_> {
 /// A series holds about this many points at most.
 const POINTS: u64 = 4000;
 
-/// Collects signals, at every so many communication points.
+/// Records signals at every n-th communication point.
 struct Watch {
     stride: u64,
     resolved: Vec<(Signal, Resolved)>,

@@ -26,54 +26,54 @@ use std::time::Instant;
 
 /// Members of a run that make up one part.
 const MEMBERS_PER_PART: u32 = 25;
-/// To be raised when what a part leaves is no longer what it was.
+/// Version of the files of parts, which must be raised when their content changes.
 const FORMAT: u32 = 5;
 
-/// How a study is reproduced.
+/// Options for the reproduction of a study.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// Folder for the results; `out/<folder of the study>` if there is none.
     pub out: Option<PathBuf>,
     /// Further folders with FMUs.
     pub fmu_dirs: Vec<PathBuf>,
-    /// Threads; one for each core if 0.
+    /// Number of threads; 0 means one for each core.
     pub jobs: usize,
-    /// Run everything again.
+    /// Whether parts that are complete already are run again.
     pub fresh: bool,
-    /// Show no progress.
+    /// Whether the progress display is suppressed.
     pub quiet: bool,
-    /// Who may end it.
+    /// Interrupt through which the work can be ended from outside.
     pub interrupt: Interrupt,
 }
 
-/// A claim, in our words, and what becomes of it.
+/// A claim, in our words, with its verdict.
 pub type Judgement = (String, claims::Verdict);
 
-/// What was done.
+/// Outcome of the reproduction of a study.
 #[derive(Debug)]
 pub struct Report {
     /// Title of the study.
     pub title: String,
-    /// The page.
+    /// Path of the report page.
     pub page: PathBuf,
-    /// Parts that were run, and parts that were there already.
+    /// Number of parts that were run, and number of parts that were complete already.
     pub parts: (usize, usize),
     /// Runs of an experiment among all parts.
     pub runs: usize,
-    /// Elapsed time, s.
+    /// Elapsed time of the reproduction, s.
     pub elapsed: f64,
-    /// Runs that deserve a word: whose parameter changes nothing, or that lose the attitude.
+    /// Remarks on runs whose parameter has no effect or that lose the attitude.
     pub notes: Vec<String>,
     /// Each claim with its verdict.
     pub verdicts: Vec<Judgement>,
-    /// All files, relative to the folder.
+    /// Names of all files, relative to the folder.
     pub files: Vec<String>,
 }
 
 /// The study of this name: a file, a folder with a `study.toml`, or such a folder below `orchestrator/experiments`.
 ///
 /// # Errors
-/// If there is none.
+/// If there is no study with this name.
 pub fn find(name: &Path) -> Result<PathBuf, Error> {
     let roots = search::experiments();
     let mut candidates = vec![name.to_path_buf(), name.join("study.toml")];
@@ -314,7 +314,7 @@ fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// The file of a finished part.
+/// Content of the file of a finished part.
 #[derive(Serialize, Deserialize)]
 struct Kept {
     key: String,
@@ -339,7 +339,7 @@ impl Kept {
     }
 }
 
-/// What a part left earlier, if it is still good.
+/// Reads the outcome that a part left earlier, if it is still valid.
 fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
     let text = fs::read(path).ok()?;
     let kept = serde_json::from_slice::<Kept>(&text).ok().filter(Kept::is_whole);
@@ -350,7 +350,7 @@ fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
     (kept.key == key && kept.members == part.range).then_some(kept.outcome)
 }
 
-/// Writes a file such that it is there wholly or not at all.
+/// Writes a file completely or not at all.
 fn write_whole(path: &Path, content: &[u8]) -> Result<(), Error> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).map_err(Error::file(folder))?;
@@ -394,7 +394,8 @@ impl Work<'_> {
                             Ok(outcome) => {
                                 lock(&done).insert((part.run, part.range.start), outcome);
                             }
-                            // Asked to end: what the other threads finish is kept.
+                            // The work was asked to end; parts that the other threads finish are
+                            // kept.
                             Err(Error::Interrupted { .. }) => lock(&queue).clear(),
                             Err(error) => {
                                 lock(&queue).clear();

@@ -1,4 +1,4 @@
-//! What came of a study's runs, and how it is referred to: `run.metric`.
+//! Results of a study's runs, and the references `run.metric` to them.
 
 use super::part::{Member, Outcome, Series, Spread};
 use super::signal::Signal;
@@ -9,14 +9,14 @@ use crate::names;
 use crate::sidecar::Parameters;
 use std::collections::BTreeMap;
 
-/// All that is kept of one run of the study.
+/// All results that are kept of one run of the study.
 #[derive(Clone, Debug, Default)]
 pub struct RunResult {
-    /// One for each value of its parameter, in that order.
+    /// Results of the members, one for each value of the parameter, in that order.
     pub members: Vec<Member>,
     /// Signals of the first member.
     pub series: Series,
-    /// Parameters of its components.
+    /// Parameters of the components in the first member.
     pub parameters: Parameters,
     /// Bands over all members.
     pub spread: BTreeMap<Signal, Spread>,
@@ -52,9 +52,9 @@ pub enum Metric {
     Parameter(String, String),
     /// Share of samples within a bound: `within.ID.share`.
     Share(String),
-    /// Largest magnitude, `within.ID.largest`.
+    /// Largest magnitude of a signal: `within.ID.largest`.
     Largest(String),
-    /// The same as a multiple of the bound, `within.ID.ratio`.
+    /// Largest magnitude as a multiple of the bound: `within.ID.ratio`.
     Ratio(String),
     /// A number that the study defines: `measure.ID`.
     Measure(String),
@@ -123,7 +123,7 @@ impl Metric {
                 let value = all.get(name)?;
                 value.as_f64().or_else(|| value.as_bool().map(|yes| f64::from(u8::from(yes))))
             }
-            // Of the run, not of its members.
+            // Parameters belong to the run, not to its members.
             Self::Parameter(..) => None,
             Self::StepTime(component) => member.metrics.step_us.get(component).copied(),
             Self::Share(id) => within(id).map(|w| w.inside as f64 / w.samples as f64),
@@ -144,12 +144,12 @@ impl Numbers {
         self.0.iter().sum::<f64>() / self.0.len() as f64
     }
 
-    /// The smallest and the largest.
+    /// The smallest and the largest of the numbers.
     pub fn extent(&self) -> (f64, f64) {
         self.0.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
     }
 
-    /// Whether there are several that differ.
+    /// Whether there are several numbers that differ.
     pub fn vary(&self) -> bool {
         self.0.iter().any(|value| *value != self.0[0])
     }
@@ -157,16 +157,16 @@ impl Numbers {
 
 /// The results of all runs, in the order of the study.
 pub struct Results<'a> {
-    /// What was asked.
+    /// The study that was run.
     pub study: &'a Study,
-    /// What came of it.
+    /// Results of each run of the study.
     pub runs: Vec<RunResult>,
 }
 
 /// Finds the run and the metric that `run.metric` refers to.
 ///
 /// # Errors
-/// Says what is not there.
+/// An error that names the missing run or metric.
 pub fn resolve(study: &Study, reference: &str) -> Result<(usize, Metric), String> {
     let (id, metric) = names::split(reference).ok_or_else(|| format!("\"{reference}\" is no run.metric"))?;
     let place = study.runs.iter().position(|run| run.id.get_ref() == id).ok_or_else(|| {
@@ -188,7 +188,7 @@ pub fn is_reference(study: &Study, quantity: &Quantity) -> bool {
 }
 
 impl Results<'_> {
-    /// What came of the run with this id.
+    /// Results of the run with this id.
     pub fn run(&self, id: &str) -> Option<&RunResult> {
         self.study.runs.iter().position(|run| run.id.get_ref() == id).map(|place| &self.runs[place])
     }
@@ -227,7 +227,7 @@ impl Results<'_> {
     /// The number of each member that a reference stands for, or the one of a value.
     ///
     /// # Errors
-    /// If it names nothing that there is.
+    /// If the quantity refers to something that does not exist.
     pub fn quantity(&self, quantity: &Quantity) -> Result<Vec<Option<f64>>, String> {
         match quantity {
             Quantity::Named(name) if is_reference(self.study, quantity) => self.of_members(name),
