@@ -79,9 +79,10 @@ pub(crate) trait Scalar: PartialEq + Sized {
     fn same(&self, other: &Self) -> bool {
         self == other
     }
-    /// Whether the value can be given to the importer; infinite numbers and NaN cannot.
-    fn is_presentable(&self) -> bool {
-        true
+    /// Says why the value cannot be given to the importer as that of a variable of this kind, or
+    /// `None` if it can.
+    fn unpresentable(&self, _kind: &Kind) -> Option<&'static str> {
+        None
     }
     /// Says why the value is not allowed for a variable of this kind, or `None` if it is.
     fn problem(&self, _kind: &Kind) -> Option<String> {
@@ -103,8 +104,8 @@ impl Scalar for f64 {
         // Zero and −0 are equal, but results computed from them can differ.
         self.to_bits() == other.to_bits()
     }
-    fn is_presentable(&self) -> bool {
-        self.is_finite()
+    fn unpresentable(&self, _kind: &Kind) -> Option<&'static str> {
+        (!self.is_finite()).then_some("is not a finite number; an input or a parameter is too large")
     }
     fn problem(&self, kind: &Kind) -> Option<String> {
         if !self.is_finite() {
@@ -125,6 +126,11 @@ impl Scalar for i32 {
     }
     fn put(self, unit: &mut dyn Unit, reference: usize) {
         unit.set_integer(reference, self);
+    }
+    fn unpresentable(&self, kind: &Kind) -> Option<&'static str> {
+        // Only a value that `Enumeration::number` does not find has no number.
+        (matches!(kind, Kind::Enumeration { .. }) && *self < 1)
+            .then_some("holds a value that its enumeration does not list")
     }
     fn problem(&self, kind: &Kind) -> Option<String> {
         match kind {
@@ -367,27 +373,28 @@ impl Instance {
             self.refresh()?;
         }
         for (i, &reference) in references.iter().enumerate() {
+            let variable = self.description.variables.get(reference as usize);
             let shown = T::look(self.unit.as_mut(), reference as usize, |value| {
-                let presentable = value.is_presentable();
-                if presentable {
+                let problem = variable.and_then(|variable| value.unpresentable(&variable.kind));
+                if problem.is_none() {
                     sink(i, value);
                 }
-                presentable
+                problem
             });
             match shown {
-                Some(true) => (),
-                Some(false) => return Err(self.overflow(reference)),
+                Some(None) => (),
+                Some(Some(problem)) => return Err(self.not_presentable(reference, problem)),
                 None => return Err(self.misfit::<T>(reference)),
             }
         }
         Ok(())
     }
 
-    /// Reports a calculated value that is not finite. In model exchange it is only discarded, as it
-    /// may come from an integrator's trial state.
-    fn overflow(&self, reference: u32) -> Failure {
+    /// Reports a calculated value that cannot be given out. In model exchange it is only discarded,
+    /// as it may come from an integrator's trial state.
+    fn not_presentable(&self, reference: u32, problem: &str) -> Failure {
         let name = self.variable(reference).map_or("", |variable| &variable.name);
-        let text = format!("'{name}' is not a finite number; an input or a parameter is too large");
+        let text = format!("'{name}' {problem}");
         match self.interface {
             Interface::ModelExchange => Failure::Discard(text),
             Interface::CoSimulation => Failure::Error(text),

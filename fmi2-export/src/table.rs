@@ -38,8 +38,8 @@ pub struct Enumeration<T: 'static> {
 }
 
 impl<T: PartialEq> Enumeration<T> {
-    /// Returns the item number of `value`, or 0 if it is not listed; importers and the check of
-    /// descriptions refuse 0.
+    /// Returns the item number of `value`, or 0 if it is not listed: the check of descriptions
+    /// refuses 0 as a start value, and the shell does not give it out.
     pub(crate) fn number(&self, value: &T) -> i32 {
         (1..).zip(self.items).find(|(_, item)| item.0 == *value).map_or(0, |(number, _)| number)
     }

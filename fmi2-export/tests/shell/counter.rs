@@ -2,10 +2,20 @@
 //! panic can start.
 
 use fmi2_export::table::{discrete_output, input, parameter};
-use fmi2_export::{Context, Description, Failure, Inputs, Model, Table};
+use fmi2_export::{Context, Description, Enumeration, Failure, Inputs, Model, Table};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+
+/// Whether the count is even. The enumeration below leaves one out, as a unit's author might.
+#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
+enum Parity {
+    Even,
+    Odd,
+}
+
+static PARITIES: Enumeration<Parity> =
+    Enumeration { name: "Parity", description: "Parity of the count", items: &[(Parity::Even, "even", "")] };
 
 /// Model that counts its steps.
 #[derive(Serialize, Deserialize)]
@@ -15,6 +25,7 @@ pub(crate) struct Counter {
     count: f64,
     seen: f64,
     resources: String,
+    parity: Parity,
 }
 
 impl Counter {
@@ -37,12 +48,20 @@ impl Model for Counter {
                 .string(parameter("defect", "Where to panic"), |m: &mut Self| &mut m.defect)
                 .real(input("increment", "What a step adds").real(), |m| &mut m.increment)
                 .real(discrete_output("count", "Sum of the increments").real(), |m| &mut m.seen)
-                .string(discrete_output("resources", "The resource folder"), |m| &mut m.resources),
+                .string(discrete_output("resources", "The resource folder"), |m| &mut m.resources)
+                .enumeration(discrete_output("parity", PARITIES.description), &PARITIES, |m| &mut m.parity),
         }
     }
 
     fn new() -> Self {
-        Self { defect: String::new(), increment: 1.0, count: 0.0, seen: 0.0, resources: String::new() }
+        Self {
+            defect: String::new(),
+            increment: 1.0,
+            count: 0.0,
+            seen: 0.0,
+            resources: String::new(),
+            parity: Parity::Even,
+        }
     }
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
@@ -59,6 +78,7 @@ impl Model for Counter {
     fn calculate(&mut self, _time: f64) -> Result<(), Failure> {
         self.meet("calculate");
         self.seen = self.count;
+        self.parity = if self.count % 2.0 == 0.0 { Parity::Even } else { Parity::Odd };
         Ok(())
     }
 

@@ -140,3 +140,16 @@ fn negative_zero_is_another_value_than_zero() {
     assert_eq!(instance.set_real(U, -0.0), Status::Ok);
     assert!(instance.real(U).is_sign_negative());
 }
+
+#[test]
+fn a_value_that_an_enumeration_does_not_list_is_an_error() {
+    const PARITY: u32 = 4;
+    let counter = Instance::of("Counter", CO_SIMULATION);
+    counter.initialize();
+    assert_eq!(counter.integer(PARITY), 1);
+    assert_eq!(counter.step(0.0, 0.1), Status::Ok);
+    let mut value = -7;
+    let status = c!(fmi2GetInteger(counter.component, &PARITY, 1, &mut value));
+    assert_eq!((status, value), (Status::Error, -7));
+    counter.said(&["'parity' holds a value that its enumeration does not list"]);
+}
