@@ -1,9 +1,9 @@
 //! Which of a unit's variables are shown, and all that is known of them as JSON.
 
-use crate::description::{Interface, Kind, ModelDescription, Variable};
 use crate::error::Error;
-use crate::fmu::Fmu;
-use crate::names;
+use fmu_import::description::{Interface, Kind, ModelDescription, Variable};
+use fmu_import::fmu::Fmu;
+use fmu_import::names;
 use serde_json::{Value, json};
 use std::io::{self, Write};
 

@@ -1,5 +1,7 @@
 //! Simulation time, counted in integer ticks.
 
+use fmu_import::quantity::rounded;
+
 /// Communication points `start + k · step`, never accumulated; the last one is `stop` itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
@@ -65,13 +67,6 @@ impl Clock {
     pub fn stop(&self) -> f64 {
         self.stop
     }
-}
-
-/// A time (s) for a text, without what rounding left in its last digits.
-pub(crate) fn rounded(time: f64) -> f64 {
-    // Of a large time fewer digits after the point are known.
-    let digits = if time.abs() < 1e5 { 1e9 } else { 1e4 };
-    (time * digits).round() / digits
 }
 
 #[cfg(test)]

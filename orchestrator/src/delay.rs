@@ -7,11 +7,11 @@
 //! loop in which every output is direct is algebraic: no order of calls solves it.
 //! which every output is direct is algebraic: no order of calls solves it.
 
-use crate::clock;
-use crate::description::Kind;
 use crate::experiment::Coupling;
 use crate::settings::{Setting, SettingValue};
 use crate::wiring::{Part, Wire};
+use fmu_import::description::Kind;
+use fmu_import::quantity::rounded;
 use std::collections::BTreeSet;
 
 /// A feedback loop through components, with its delay.
@@ -217,7 +217,7 @@ pub fn warnings(parts: &[Part], settings: &[Vec<Setting>], loops: &[FeedbackLoop
             .chain(longest.components.first())
             .map(|&index| parts[index].name)
             .collect();
-        let (name, delay) = (part.name, clock::rounded(delay));
+        let (name, delay) = (part.name, rounded(delay));
         warnings.push(format!(
             "{name}.{COUNTED_ON} = {counted_on} s, but the loop {} has a delay of {delay} s: set {name}.{COUNTED_ON} = {delay}",
             names.join(" -> ")
@@ -243,9 +243,10 @@ fn duration(name: &str, part: Part, settings: &[Setting]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::{ModelDescription, Variable};
-    use crate::experiment::Scaling;
-    use crate::wiring::{Carrier, Port};
+    use crate::wiring::Port;
+    use fmu_import::description::Carrier;
+    use fmu_import::description::{ModelDescription, Variable};
+    use fmu_import::quantity::Scaling;
 
     /// Variable 0 is an input; outputs 1, 2, … depend on it directly, not at all, or without a
     /// declaration.

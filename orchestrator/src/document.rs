@@ -9,7 +9,7 @@
 //! that is extended in several ways counts once, where it is named first.
 
 use crate::error::Error;
-use crate::names;
+use fmu_import::names;
 use serde::de::DeserializeOwned;
 use std::ops::Range;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,9 @@
 //! The crate's one error type. A message names the culprit and what to do about it.
 
-use crate::clock::rounded;
 use crate::interrupt::Request;
+use fmu_import::error::Error as Import;
+use fmu_import::quantity::rounded;
+use fmu_import::unit::UnitFailure;
 use std::path::PathBuf;
 
 /// All errors of this crate, from reading an experiment to writing its results.
@@ -15,14 +17,9 @@ pub enum Error {
         /// Description of the problem and its remedy.
         message: String,
     },
-    /// A file is not an FMU that this program can use.
-    #[error("{}: {message}", path.display())]
-    Fmu {
-        /// Path of the archive.
-        path: PathBuf,
-        /// Description of the problem with the archive.
-        message: String,
-    },
+    /// An archive cannot be used.
+    #[error(transparent)]
+    Import(#[from] fmu_import::error::Error),
     /// An FMU has faults, which have already been reported.
     #[error("{}: {count} {}", path.display(), if *count == 1 { "fault" } else { "faults" })]
     Faults {
@@ -139,7 +136,7 @@ impl Error {
     /// 3 for an attitude that was lost, 130 or 143 for one that a signal ended.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Experiment { .. } | Self::Fmu { .. } => 2,
+            Self::Experiment { .. } | Self::Import(Import::Fmu { .. }) => 2,
             // A case that ends early has no result to compare.
             Self::Run { source, .. } if matches!(**source, Self::EndedByUnit { .. }) => 1,
             Self::Run { source, .. } => source.exit_code(),
@@ -151,6 +148,7 @@ impl Error {
             Self::Faults { .. }
             | Self::Unit { .. }
             | Self::Deadline { .. }
+            | Self::Import(Import::File { .. })
             | Self::File { .. }
             | Self::Output(_) => 1,
         }
@@ -159,23 +157,5 @@ impl Error {
     /// Whether standard output was closed by its reader, which is no failure.
     pub fn is_broken_pipe(&self) -> bool {
         matches!(self, Self::Output(source) if source.kind() == std::io::ErrorKind::BrokenPipe)
-    }
-}
-
-/// A call to a unit that did not succeed.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct UnitFailure {
-    /// Whether the unit ended the simulation by this call, which is no fault.
-    pub ends: bool,
-    /// The call, for example `doStep`.
-    pub call: &'static str,
-    /// Message of the unit, or its status if it gave none.
-    pub message: String,
-}
-
-impl UnitFailure {
-    /// Creates a failure of this call that does not end the simulation.
-    pub fn new(call: &'static str, message: impl Into<String>) -> Self {
-        Self { ends: false, call, message: message.into() }
     }
 }

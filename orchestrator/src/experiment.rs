@@ -4,8 +4,9 @@
 
 use crate::document::Source;
 use crate::error::Error;
-use crate::names;
 use crate::watch::OnInvalid;
+use fmu_import::names;
+use fmu_import::quantity::Scaling;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -119,35 +120,6 @@ pub struct Connection {
     /// Applied to the values after that; no key of an experiment file.
     #[serde(skip)]
     pub scaling: Scaling,
-}
-
-/// value ↦ factor · value + offset
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scaling {
-    /// The factor.
-    pub factor: f64,
-    /// The offset.
-    pub offset: f64,
-}
-
-impl Default for Scaling {
-    /// Leaves every value as it is.
-    fn default() -> Self {
-        Self { factor: 1.0, offset: 0.0 }
-    }
-}
-
-impl Scaling {
-    /// The scaled value.
-    pub fn of(self, value: f64) -> f64 {
-        self.factor * value + self.offset
-    }
-
-    /// This one, and then `next`.
-    #[must_use]
-    pub fn then(self, next: Self) -> Self {
-        Self { factor: next.factor * self.factor, offset: next.of(self.offset) }
-    }
 }
 
 /// What goes into the results.

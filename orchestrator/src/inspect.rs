@@ -1,10 +1,10 @@
 //! Prints what an FMU says of itself.
 
 use crate::catalogue::{self, Filter};
-use crate::description::{Interface, Kind, ModelDescription, Variable};
 use crate::error::Error;
-use crate::faults::CAUSALITIES;
-use crate::fmu::Fmu;
+use fmu_import::description::{Interface, Kind, ModelDescription, Variable};
+use fmu_import::faults::CAUSALITIES;
+use fmu_import::fmu::Fmu;
 use std::io::{self, Write};
 use std::path::Path;
 

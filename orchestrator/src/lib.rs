@@ -8,31 +8,23 @@
 //!
 //! A [`study`] runs many experiments, draws [`figure`]s of them, and holds them against what a paper prints.
 
-pub mod archive;
 pub mod catalogue;
 pub mod clock;
 pub mod delay;
-pub mod description;
 pub mod document;
 pub mod error;
 pub mod experiment;
-pub mod faults;
 pub mod figure;
-pub mod fmi;
-pub mod fmu;
 pub mod folder;
 pub mod guarantee;
-pub mod heard;
 pub mod inspect;
 pub mod interrupt;
 pub mod list;
 pub mod live;
 pub mod master;
 pub mod metrics;
-pub mod names;
 pub mod plot;
 pub mod progress;
-pub mod quantity;
 pub mod realtime;
 pub mod recorder;
 pub mod report;
@@ -45,7 +37,5 @@ pub mod sidecar;
 pub mod ssp;
 pub mod stopwatch;
 pub mod study;
-pub mod unit;
 pub mod watch;
 pub mod wiring;
-pub mod xml;

@@ -2,9 +2,9 @@
 
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::fmu::Fmu;
 use crate::search::{self, files};
 use crate::study::Study;
+use fmu_import::fmu::Fmu;
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};

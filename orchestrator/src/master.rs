@@ -8,16 +8,19 @@
 //! master.
 
 use crate::clock::Clock;
-use crate::error::{Error, UnitFailure};
-use crate::experiment::{Coupling, Scaling};
-use crate::heard;
+use crate::error::Error;
+use crate::experiment::Coupling;
 use crate::interrupt::Interrupt;
 use crate::realtime::Settings;
 use crate::realtime::pacer::Pacer;
 use crate::realtime::timer::{Monotonic, Timer};
 use crate::stopwatch::{Spent, Stopwatch};
-use crate::unit::{CoSimulationUnit, Outcome};
-use crate::wiring::{Carrier, Port, Wire};
+use crate::wiring::{Port, Wire};
+use fmu_import::description::Carrier;
+use fmu_import::quantity::Scaling;
+use fmu_import::unit::UnitFailure;
+use fmu_import::unit::{CoSimulationUnit, Outcome};
+use fmu_import::warnings;
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -354,7 +357,7 @@ impl Master {
     /// If a unit fails, or if the run was ended from outside.
     pub fn advance(&mut self, tick: u64) -> Result<&[f64], Error> {
         let time = self.clock.time(tick);
-        heard::at(time);
+        warnings::at(time);
         if let Some(request) = self.interrupt.asked() {
             return Err(Error::Interrupted { time, request });
         }

@@ -4,9 +4,9 @@ use crate::error::Error;
 use crate::experiment::Roles;
 use crate::guarantee::{self, Course};
 use crate::master::{Observer, Sample};
-use crate::names;
 use crate::realtime::report::RealTime;
 use crate::wiring::{Part, Port, find};
+use fmu_import::names;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -412,7 +412,7 @@ impl Observer for Merit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::{Kind, ModelDescription, Variable};
+    use fmu_import::description::{Kind, ModelDescription, Variable};
 
     fn merit() -> Merit {
         let places = Places {

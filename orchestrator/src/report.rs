@@ -1,10 +1,10 @@
 //! Prints the outcome of a run to standard output.
 
-use crate::clock;
 use crate::experiment::Coupling;
 use crate::metrics::Metrics;
 use crate::run::{Plan, Report};
 use crate::study::reproduce;
+use fmu_import::quantity::rounded;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -22,8 +22,8 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,
         "  {} s to {} s in {} steps of {} s, {coupling}: {}",
-        clock::rounded(clock.start()),
-        clock::rounded(clock.stop()),
+        rounded(clock.start()),
+        rounded(clock.stop()),
         clock.ticks(),
         clock.step(),
         report.order.join(", ")
@@ -74,7 +74,7 @@ pub fn summary(report: &Report, out: &mut impl Write) -> io::Result<()> {
         let steps = match feedback.ticks {
             0 => "none".to_string(),
             1 => format!("{} s, 1 step", clock.step()),
-            n => format!("{} s, {n} steps", clock::rounded(n as f64 * clock.step())),
+            n => format!("{} s, {n} steps", rounded(n as f64 * clock.step())),
         };
         let reason = match (feedback.ticks, report.coupling) {
             (0, _) => "",
@@ -154,7 +154,7 @@ fn guarantee(metrics: &Metrics) -> Option<String> {
     let share = metrics.guarantee_share?;
     let status = metrics.guarantee_status.as_ref().map_or(String::new(), |status| format!(" ({status})"));
     let margins = margins([metrics.guarantee_rate_margin_min, metrics.guarantee_moment_margin_min]);
-    let course = match metrics.guarantee_lost_at.map(clock::rounded) {
+    let course = match metrics.guarantee_lost_at.map(rounded) {
         _ if share == 0.0 => format!("never in force{status}"),
         Some(time) => {
             format!("in force at {:.1} % of the ticks, lost at t = {time} s{status}", share * 100.0)

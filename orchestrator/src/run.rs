@@ -2,19 +2,14 @@
 
 use crate::clock::Clock;
 use crate::delay::{self, FeedbackLoop};
-use crate::description::{Kind, ModelDescription};
 use crate::error::Error;
 use crate::experiment::{Coupling, Experiment};
-use crate::faults;
-use crate::fmu::Fmu;
 use crate::folder::Folder;
-use crate::heard;
 use crate::interrupt::Interrupt;
 use crate::live::scene::Scene;
 use crate::live::{self, Live};
 use crate::master::{Master, Member, Observer};
 use crate::metrics::{self, Limits, Merit, Metrics, Places, Probes};
-use crate::names;
 use crate::plot::Curves;
 use crate::progress::Progress;
 use crate::realtime;
@@ -25,9 +20,14 @@ use crate::search;
 use crate::seeds;
 use crate::settings::{self, Setting};
 use crate::sidecar;
-use crate::unit::CoSimulationUnit;
 use crate::watch::Watched;
 use crate::wiring::{self, Column, Part, Port, Wire};
+use fmu_import::description::{Kind, ModelDescription};
+use fmu_import::faults;
+use fmu_import::fmu::Fmu;
+use fmu_import::names;
+use fmu_import::unit::CoSimulationUnit;
+use fmu_import::warnings;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -216,8 +216,8 @@ impl Plan {
 
         Folder::check(&out, options.force)?;
 
-        let warnings = heard::collect();
-        heard::at(self.clock.start());
+        let warnings = warnings::collect();
+        warnings::at(self.clock.start());
         let mut probes = self.probes.clone();
         let factor = options.real_time.map(|settings| settings.factor.get());
         let scene = options.live.then(|| Scene::new(self, self.places, factor, &mut probes));
@@ -445,7 +445,7 @@ fn open(path: &Path) -> Result<Fmu, Error> {
             1 => String::new(),
             count => format!(" ({} more: orchestrator inspect --check)", count - 1),
         };
-        heard::warn_once(format!("{}: {first}{more}", path.display()));
+        warnings::warn_once(format!("{}: {first}{more}", path.display()));
     }
     Ok(fmu)
 }

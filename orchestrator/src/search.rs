@@ -1,7 +1,7 @@
 //! Where experiments, studies and units are found from any folder: here, by an environment variable, and beside this program.
 
 use crate::error::Error;
-use crate::names;
+use fmu_import::names;
 use std::collections::BTreeSet;
 use std::env;
 use std::fs;

@@ -1,10 +1,10 @@
 //! Seeds of random numbers: which parameters they are, and whether one is of any effect.
 
 use crate::error::Error;
-use crate::heard;
 use crate::interrupt::Interrupt;
 use crate::run::Plan;
 use crate::settings::{Setting, SettingValue};
+use fmu_import::warnings;
 use tracing::subscriber::{NoSubscriber, with_default};
 
 /// Whether a parameter is a seed: by its name, which FMI leaves as the only sign.
@@ -30,7 +30,7 @@ pub fn without_effect(plan: &Plan, interrupt: &Interrupt) -> Result<Vec<String>,
             other[component][index].value = SettingValue::Integer(if seed > 0 { seed - 1 } else { seed + 1 });
             // What the units say comes again in the run itself.
             let same = with_default(NoSubscriber::default(), || {
-                let _warnings = heard::collect();
+                let _warnings = warnings::collect();
                 are_same(plan, &other, interrupt)
             });
             match same {

@@ -1,12 +1,12 @@
 //! Parameter values of an experiment, as the FMU's variables want them.
 
-use crate::description::{Kind, Variable};
 use crate::error::Error;
 use crate::experiment::Experiment;
-use crate::names;
-use crate::quantity;
-use crate::unit::{CoSimulationUnit, Outcome};
 use crate::wiring::{Part, Wire};
+use fmu_import::description::{Kind, Variable};
+use fmu_import::names;
+use fmu_import::quantity;
+use fmu_import::unit::{CoSimulationUnit, Outcome};
 use toml::Value;
 
 /// A variable that is set before initialization.

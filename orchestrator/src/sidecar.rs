@@ -1,10 +1,10 @@
 //! `results.json`: everything that is needed to know, years later, what `results.csv` came from.
 
-use crate::description::Kind;
 use crate::error::Error;
 use crate::realtime;
 use crate::run::Plan;
 use crate::seeds::is_seed;
+use fmu_import::description::Kind;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;

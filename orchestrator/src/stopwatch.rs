@@ -1,7 +1,7 @@
 //! A unit whose calls are timed. All of them count, as a unit may do the work of a step when its outputs are asked for.
 
 use crate::realtime::timer::Timer;
-use crate::unit::{CoSimulationUnit, Outcome};
+use fmu_import::unit::{CoSimulationUnit, Outcome};
 use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Duration;

@@ -1,12 +1,12 @@
 //! Watches what a unit gives: a value that is no number, no item of its enumeration, or neither true nor false would spread through the loop and
 //! pass for a result.
 
-use crate::description::{Kind, Variable};
-use crate::error::UnitFailure;
-use crate::fmu::Fmu;
-use crate::heard;
-use crate::unit::{CoSimulationUnit, Outcome};
-use crate::wiring::Carrier;
+use fmu_import::description::Carrier;
+use fmu_import::description::{Kind, Variable};
+use fmu_import::fmu::Fmu;
+use fmu_import::unit::UnitFailure;
+use fmu_import::unit::{CoSimulationUnit, Outcome};
+use fmu_import::warnings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
@@ -81,7 +81,7 @@ impl Watched {
             let remedy = "--on-invalid warn lets the run go on";
             return Err(UnitFailure::new(call, format!("{variable} is {value}, {what}; {remedy}")));
         }
-        heard::warn(&format!("{}: {variable} is {what}", self.name));
+        warnings::warn(&format!("{}: {variable} is {what}", self.name));
         Ok(())
     }
 }

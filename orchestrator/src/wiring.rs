@@ -1,12 +1,13 @@
 //! Resolves the names of an experiment, once, into value references: connections and recorded variables. What does not
 //! fit is refused with its place in the file and the nearest right name.
 
-use crate::description::{Kind, ModelDescription, Variable};
 use crate::document::Source;
 use crate::error::Error;
-use crate::experiment::{Experiment, Scaling};
-use crate::names;
-use crate::quantity;
+use crate::experiment::Experiment;
+use fmu_import::description::{Carrier, Kind, ModelDescription, Variable};
+use fmu_import::names;
+use fmu_import::quantity;
+use fmu_import::quantity::Scaling;
 use std::collections::BTreeSet;
 use std::ops::Range;
 use toml::Spanned;
@@ -18,29 +19,6 @@ pub struct Part<'a> {
     pub name: &'a str,
     /// Model description of the component's FMU.
     pub description: &'a ModelDescription,
-}
-
-/// Type in which a value is transferred.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Carrier {
-    /// A real number as `f64`.
-    Real,
-    /// An integer or an enumeration's value as `i32`.
-    Integer,
-    /// A truth value as `i32`, 0 or 1.
-    Boolean,
-}
-
-impl Carrier {
-    /// Carrier of a type; `None` for texts, which are not transferred.
-    pub fn of(kind: &Kind) -> Option<Self> {
-        match kind {
-            Kind::Real { .. } => Some(Self::Real),
-            Kind::Integer { .. } | Kind::Enumeration { .. } => Some(Self::Integer),
-            Kind::Boolean => Some(Self::Boolean),
-            Kind::String => None,
-        }
-    }
 }
 
 /// A variable of a component.

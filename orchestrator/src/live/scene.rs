@@ -1,9 +1,9 @@
 //! The contents of the view, derived from the names of an experiment's variables.
 
-use crate::description::Kind;
 use crate::metrics::{self, Limits, Places, Probes};
 use crate::run::Plan;
 use crate::wiring;
+use fmu_import::description::Kind;
 
 /// Everything that does not change while the run goes on.
 #[derive(Clone, Debug, Default)]

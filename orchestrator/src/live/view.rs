@@ -2,9 +2,9 @@
 
 use super::Snapshot;
 use super::scene::Scene;
-use crate::clock;
 use crate::realtime::pacer::Tally;
 use crate::report;
+use fmu_import::quantity::rounded;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
@@ -273,7 +273,7 @@ fn guarantee(state: &State) -> Option<Line<'static>> {
     };
     let lost = course.lost.map_or(String::new(), |loss| {
         let reason = loss.status.map_or(String::new(), status);
-        format!("; lost at t = {} s{reason}", clock::rounded(loss.time))
+        format!("; lost at t = {} s{reason}", rounded(loss.time))
     });
     let broken = if course.broken { "; DEFECT: a limit was EXCEEDED in force" } else { "" };
     let text = Span::raw(now + &lost + broken);

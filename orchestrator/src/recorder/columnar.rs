@@ -2,7 +2,7 @@
 
 use super::Column;
 use crate::error::Error;
-use crate::wiring::Carrier;
+use fmu_import::description::Carrier;
 use parquet::basic::{Repetition, Type as Physical};
 use parquet::column::writer::ColumnWriter;
 use parquet::errors::ParquetError;

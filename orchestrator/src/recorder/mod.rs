@@ -5,8 +5,8 @@ mod text;
 
 use crate::error::Error;
 use crate::master::{Observer, Sample};
-use crate::wiring::Carrier;
 use columnar::Columnar;
+use fmu_import::description::Carrier;
 use std::path::Path;
 use text::Text;
 

@@ -2,7 +2,7 @@
 
 use super::Column;
 use crate::error::Error;
-use crate::wiring::Carrier;
+use fmu_import::description::Carrier;
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,18 +1,18 @@
 //! Reads an SSP archive as an experiment.
 
 use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
-use crate::archive;
 use crate::delay;
 use crate::document::Source;
 use crate::error::Error;
-use crate::experiment::{
-    Component, Connection, Coupling, Experiment, Overrides, Record, Roles, Scaling, Simulation,
-};
-use crate::fmu::Fmu;
+use crate::experiment::{Component, Connection, Coupling, Experiment, Overrides, Record, Roles, Simulation};
 use crate::run::Opened;
 use crate::watch::OnInvalid;
 use crate::wiring::{self, Part};
-use crate::xml::{self, Element};
+use fmu_import::archive;
+use fmu_import::error::Error as Import;
+use fmu_import::fmu::Fmu;
+use fmu_import::quantity::Scaling;
+use fmu_import::xml::{self, Element};
 use percent_encoding::percent_decode_str;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -46,12 +46,13 @@ impl Entries {
 /// An FMU in an archive is called by the names of both, not by where it was unpacked.
 fn of_entry(error: Error, archive: &Path, folder: &Path) -> Error {
     match error {
-        Error::Fmu { path, message } => match path.strip_prefix(folder) {
-            Ok(entry) => {
-                Error::Fmu { message: format!("{}: {message}", entry.display()), path: archive.to_path_buf() }
-            }
-            Err(_) => Error::Fmu { path, message },
-        },
+        Error::Import(Import::Fmu { path, message }) => {
+            let (path, message) = match path.strip_prefix(folder) {
+                Ok(entry) => (archive.to_path_buf(), format!("{}: {message}", entry.display())),
+                Err(_) => (path, message),
+            };
+            Import::Fmu { path, message }.into()
+        }
         error => error,
     }
 }
@@ -137,7 +138,7 @@ impl Own {
 /// FMUs for co-simulation, mappings of parameters, or signal dictionaries.
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let folder = archive::unpack(path)?;
-    let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
+    let refuse = |message: String| Error::from(Import::Fmu { path: path.to_path_buf(), message });
     let bytes = std::fs::read(folder.path().join(STRUCTURE))
         .map_err(|error| refuse(format!("is no SSP archive, {STRUCTURE} cannot be read: {error}")))?;
     let in_structure = |message: String| refuse(format!("{STRUCTURE}: {message}"));
@@ -149,7 +150,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     for component in &structure.components {
         let fmu = structure.folder.join(&component.source);
         if !opened.contains_key(&fmu) {
-            let unit = Fmu::open(&fmu).map_err(|error| of_entry(error, path, folder.path()))?;
+            let unit = Fmu::open(&fmu).map_err(|error| of_entry(error.into(), path, folder.path()))?;
             opened.insert(fmu.clone(), Rc::new(unit));
         }
     }

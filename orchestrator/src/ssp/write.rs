@@ -1,12 +1,13 @@
 //! Writes an experiment to an SSP archive.
 
 use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
-use crate::description::{Kind, Variable};
 use crate::error::Error;
-use crate::experiment::{Coupling, Scaling};
+use crate::experiment::Coupling;
 use crate::interrupt::Interrupt;
 use crate::run::Plan;
 use crate::settings::SettingValue;
+use fmu_import::description::{Kind, Variable};
+use fmu_import::quantity::Scaling;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 use std::collections::BTreeMap;

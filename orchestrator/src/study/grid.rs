@@ -4,7 +4,7 @@ use super::{Run, Study};
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::figure::Color;
-use crate::names;
+use fmu_import::names;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;

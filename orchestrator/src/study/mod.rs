@@ -19,7 +19,7 @@ use crate::document::Source;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::figure::Color;
-use crate::names;
+use fmu_import::names;
 use grid::Grid;
 use measure::Measure;
 use schemars::JsonSchema;

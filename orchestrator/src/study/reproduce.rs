@@ -7,7 +7,6 @@
 use super::part::{Outcome, Part, Preparation};
 use super::results::{Results, RunResult, resolve};
 use super::{Study, claims, figures, page};
-use crate::clock::rounded;
 use crate::error::Error;
 use crate::figure::{png, svg};
 use crate::folder::Folder;
@@ -15,6 +14,7 @@ use crate::interrupt::Interrupt;
 use crate::progress::Parts;
 use crate::run::Opened;
 use crate::search;
+use fmu_import::quantity::rounded;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -85,7 +85,7 @@ pub fn find(name: &Path) -> Result<PathBuf, Error> {
             .filter(|entry| entry.path().join("study.toml").is_file())
             .map(|entry| entry.file_name().to_string_lossy().into_owned())
             .collect();
-        let hint = crate::names::hint(&name.to_string_lossy(), there.iter().map(String::as_str));
+        let hint = fmu_import::names::hint(&name.to_string_lossy(), there.iter().map(String::as_str));
         Error::experiment(format!(
             "there is no study \"{}\", neither as a file nor as a folder with a study.toml, here or among the experiments{hint}",
             name.display()

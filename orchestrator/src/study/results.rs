@@ -5,8 +5,8 @@ use super::signal::Signal;
 use super::values::Quantity;
 use super::{Run, Study};
 use crate::metrics::Metrics;
-use crate::names;
 use crate::sidecar::Parameters;
+use fmu_import::names;
 use std::collections::BTreeMap;
 
 /// All results that are kept of one run of the study.

@@ -6,9 +6,9 @@
 //! norm(plant.rate.p, plant.rate.q, plant.rate.r)
 //! ```
 
-use crate::description::Kind;
 use crate::run::Plan;
 use crate::wiring::{Port, find};
+use fmu_import::description::Kind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;

@@ -18,7 +18,7 @@
 //! or list. A template may use others; a row's values hold in all that is used and listed inside.
 
 use crate::document::{overlay, texts};
-use crate::names;
+use fmu_import::names;
 use std::borrow::Cow;
 use std::ops::Range;
 use toml::Spanned;

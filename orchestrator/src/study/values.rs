@@ -11,7 +11,7 @@
 
 use crate::document::Source;
 use crate::error::Error;
-use crate::names;
+use fmu_import::names;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -1,7 +1,23 @@
 //! The interface between the master and a co-simulation unit, which may be an FMU or a mock in a
 //! test.
 
-use crate::error::UnitFailure;
+/// A call to a unit that did not succeed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnitFailure {
+    /// Whether the unit ended the simulation by this call, which is no fault.
+    pub ends: bool,
+    /// The call, for example `doStep`.
+    pub call: &'static str,
+    /// Message of the unit, or its status if it gave none.
+    pub message: String,
+}
+
+impl UnitFailure {
+    /// Creates a failure of this call that does not end the simulation.
+    pub fn new(call: &'static str, message: impl Into<String>) -> Self {
+        Self { ends: false, call, message: message.into() }
+    }
+}
 
 /// Outcome of a call to a unit.
 pub type Outcome = Result<(), UnitFailure>;

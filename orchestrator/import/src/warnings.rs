@@ -74,7 +74,7 @@ pub fn warn_once(text: String) {
 
 impl Warning {
     fn told(&self) -> String {
-        let time = crate::clock::rounded(self.first);
+        let time = crate::quantity::rounded(self.first);
         match self.count {
             1 => format!("{} (at t = {time} s)", self.text),
             count => format!("{} (first at t = {time} s, {count} times)", self.text),

@@ -1,6 +1,5 @@
 //! Physical units by an FMU's own definitions: conversion of `"2 deg/s2"`, and whether two variables may be connected.
 
-use crate::experiment::Scaling;
 use crate::names;
 
 /// A unit: `base = factor · value + offset` in SI base units, and what it can be shown in.
@@ -104,6 +103,42 @@ pub fn conversion(
         _ if from == to => unchanged,
         _ => Err(format!("{from} against {to}")),
     }
+}
+
+/// value ↦ factor · value + offset
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scaling {
+    /// The factor.
+    pub factor: f64,
+    /// The offset.
+    pub offset: f64,
+}
+
+impl Default for Scaling {
+    /// Leaves every value as it is.
+    fn default() -> Self {
+        Self { factor: 1.0, offset: 0.0 }
+    }
+}
+
+impl Scaling {
+    /// The scaled value.
+    pub fn of(self, value: f64) -> f64 {
+        self.factor * value + self.offset
+    }
+
+    /// This one, and then `next`.
+    #[must_use]
+    pub fn then(self, next: Self) -> Self {
+        Self { factor: next.factor * self.factor, offset: next.of(self.offset) }
+    }
+}
+
+/// A number for a text, without what rounding left in its last digits.
+pub fn rounded(time: f64) -> f64 {
+    // Of a large time fewer digits after the point are known.
+    let digits = if time.abs() < 1e5 { 1e9 } else { 1e4 };
+    (time * digits).round() / digits
 }
 
 #[cfg(test)]

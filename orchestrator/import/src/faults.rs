@@ -1,8 +1,7 @@
 //! Faults of a model description that do not keep it from being read. Units run with most of them,
 //! but not everywhere, and not always as intended.
 
-use crate::description::{Kind, ModelDescription, Variable};
-use crate::wiring::Carrier;
+use crate::description::{Carrier, Kind, ModelDescription, Variable};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Values of `causality` that FMI 2.0, section 2.2.7, allows.

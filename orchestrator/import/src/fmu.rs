@@ -10,11 +10,11 @@
 
 use crate::archive;
 use crate::description::ModelDescription;
-use crate::error::{Error, UnitFailure};
+use crate::error::Error;
 use crate::faults;
 use crate::fmi::{self, Status};
-use crate::heard;
-use crate::unit::{CoSimulationUnit, Outcome};
+use crate::unit::{CoSimulationUnit, Outcome, UnitFailure};
+use crate::warnings;
 use crate::xml;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
 use fmi_rs::fmi2::PLATFORM;
@@ -146,7 +146,7 @@ impl Fmu {
         let refuse = |message: String| Error::Fmu { path: self.path.clone(), message };
         let functions = self.load().map_err(refuse)?;
         if let Some(fault) = functions.version_fault() {
-            heard::warn_once(format!("{}: {fault}", self.path.display()));
+            warnings::warn_once(format!("{}: {fault}", self.path.display()));
         }
 
         let text =
@@ -345,7 +345,7 @@ impl Log {
         let (component, message) = (&self.component, message.trim_end().replace('\n', " "));
         match status {
             Ok(Status::Ok | Status::Pending) => tracing::info!("{component}: [{category}] {message}"),
-            Ok(Status::Warning) => heard::warn(&format!("{component}: [{category}] {message}")),
+            Ok(Status::Warning) => warnings::warn(&format!("{component}: [{category}] {message}")),
             Ok(Status::Discard | Status::Error | Status::Fatal) | Err(_) => {
                 if !self.instantiates.load(Ordering::Relaxed) {
                     tracing::error!("{component}: [{category}] {message}");

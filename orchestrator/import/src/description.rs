@@ -336,6 +336,29 @@ mod read {
     }
 }
 
+/// Type in which a value is transferred.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Carrier {
+    /// A real number as `f64`.
+    Real,
+    /// An integer or an enumeration's value as `i32`.
+    Integer,
+    /// A truth value as `i32`, 0 or 1.
+    Boolean,
+}
+
+impl Carrier {
+    /// Carrier of a type; `None` for texts, which are not transferred.
+    pub fn of(kind: &Kind) -> Option<Self> {
+        match kind {
+            Kind::Real { .. } => Some(Self::Real),
+            Kind::Integer { .. } | Kind::Enumeration { .. } => Some(Self::Integer),
+            Kind::Boolean => Some(Self::Boolean),
+            Kind::String => None,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

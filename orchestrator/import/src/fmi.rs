@@ -1,29 +1,29 @@
 //! The types of FMI 2.0's C interface as the master meets them. What a unit gives back is taken as the integer that C passes: a unit may return
 //! anything, and a Rust enumeration must not hold what it has no item for.
 
-pub use fmi_rs::fmi2::types::{
+pub(crate) use fmi_rs::fmi2::types::{
     fmi2False as FALSE, fmi2Status as Status, fmi2StatusKind, fmi2True as TRUE, fmi2Type,
 };
 use std::ffi::{c_char, c_int, c_uint, c_void};
 
 /// Kind of an instance for co-simulation, fmi2CoSimulation.
-pub const CO_SIMULATION: c_int = fmi2Type::CoSimulation as c_int;
+pub(crate) const CO_SIMULATION: c_int = fmi2Type::CoSimulation as c_int;
 /// Kind of the status fmi2LastSuccessfulTime.
-pub const LAST_SUCCESSFUL_TIME: c_int = fmi2StatusKind::LastSuccessfulTime as c_int;
+pub(crate) const LAST_SUCCESSFUL_TIME: c_int = fmi2StatusKind::LastSuccessfulTime as c_int;
 /// Kind of the status fmi2Terminated.
-pub const TERMINATED: c_int = fmi2StatusKind::Terminated as c_int;
+pub(crate) const TERMINATED: c_int = fmi2StatusKind::Terminated as c_int;
 
 /// Converts the integer that a call returned into a status.
 ///
 /// # Errors
 /// The integer itself, if FMI 2.0 defines no such status.
 #[inline]
-pub fn status(code: c_int) -> Result<Status, c_int> {
+pub(crate) fn status(code: c_int) -> Result<Status, c_int> {
     Status::try_from(code).map_err(|()| code)
 }
 
 /// Formats the status that a call returned.
-pub fn name_of(status: Result<Status, c_int>) -> String {
+pub(crate) fn name_of(status: Result<Status, c_int>) -> String {
     match status {
         Ok(known) => format!("{known:?}"),
         Err(code) => format!("status {code}, which FMI 2.0 does not have"),
@@ -31,15 +31,15 @@ pub fn name_of(status: Result<Status, c_int>) -> String {
 }
 
 /// Pointer to an instance, fmi2Component.
-pub type Component = *mut c_void;
+pub(crate) type Component = *mut c_void;
 /// Pointer to a C string that ends with a zero byte.
-pub type Text = *const c_char;
+pub(crate) type Text = *const c_char;
 /// The logger, once the `printf` arguments are in the message.
-pub type Logger = unsafe extern "C" fn(*mut c_void, Text, c_int, Text, Text);
+pub(crate) type Logger = unsafe extern "C" fn(*mut c_void, Text, c_int, Text, Text);
 
 /// The callback structure of FMI 2.0, fmi2CallbackFunctions.
 #[repr(C)]
-pub struct Callbacks {
+pub(crate) struct Callbacks {
     /// Receives the log messages of the unit.
     pub logger: Logger,
     /// Allocates zeroed memory, given the number and the size of objects.
@@ -53,24 +53,24 @@ pub struct Callbacks {
 }
 
 /// fmi2GetVersion and fmi2GetTypesPlatform.
-pub type GetText = unsafe extern "C" fn() -> Text;
+pub(crate) type GetText = unsafe extern "C" fn() -> Text;
 /// fmi2Instantiate: name, type, GUID, resources, callbacks, visible, logging.
-pub type Instantiate =
+pub(crate) type Instantiate =
     unsafe extern "C" fn(Text, c_int, Text, Text, *const Callbacks, c_int, c_int) -> Component;
 /// Type of the function fmi2FreeInstance.
-pub type FreeInstance = unsafe extern "C" fn(Component);
+pub(crate) type FreeInstance = unsafe extern "C" fn(Component);
 /// fmi2SetupExperiment: tolerance and start and stop time, each but the start with whether it is given.
-pub type SetupExperiment = unsafe extern "C" fn(Component, c_int, f64, f64, c_int, f64) -> c_int;
+pub(crate) type SetupExperiment = unsafe extern "C" fn(Component, c_int, f64, f64, c_int, f64) -> c_int;
 /// fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2Terminate.
-pub type Plain = unsafe extern "C" fn(Component) -> c_int;
+pub(crate) type Plain = unsafe extern "C" fn(Component) -> c_int;
 /// fmi2GetReal, fmi2GetInteger, fmi2GetBoolean: value references, how many, values.
-pub type Get<T> = unsafe extern "C" fn(Component, *const c_uint, usize, *mut T) -> c_int;
+pub(crate) type Get<T> = unsafe extern "C" fn(Component, *const c_uint, usize, *mut T) -> c_int;
 /// fmi2SetReal, fmi2SetInteger, fmi2SetBoolean, fmi2SetString.
-pub type Set<T> = unsafe extern "C" fn(Component, *const c_uint, usize, *const T) -> c_int;
+pub(crate) type Set<T> = unsafe extern "C" fn(Component, *const c_uint, usize, *const T) -> c_int;
 /// fmi2DoStep: time, step, whether the state before will not be set again.
-pub type DoStep = unsafe extern "C" fn(Component, f64, f64, c_int) -> c_int;
+pub(crate) type DoStep = unsafe extern "C" fn(Component, f64, f64, c_int) -> c_int;
 /// fmi2GetRealStatus, fmi2GetBooleanStatus: which, value.
-pub type GetStatus<T> = unsafe extern "C" fn(Component, c_int, *mut T) -> c_int;
+pub(crate) type GetStatus<T> = unsafe extern "C" fn(Component, c_int, *mut T) -> c_int;
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,32 @@
+//! Errors of opening an archive. A message names the culprit and what to do about it.
+
+use std::path::PathBuf;
+
+/// An archive that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file is not an FMU that this program can use.
+    #[error("{}: {message}", path.display())]
+    Fmu {
+        /// Path of the archive.
+        path: PathBuf,
+        /// Description of the problem with the archive.
+        message: String,
+    },
+    /// A file or folder could not be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Path of the file or folder.
+        path: PathBuf,
+        /// Reason that the system gave.
+        source: std::io::Error,
+    },
+}
+
+impl Error {
+    /// Adds the name of a file to a system error.
+    pub fn file(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::File { path, source }
+    }
+}
