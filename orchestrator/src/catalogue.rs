@@ -1,6 +1,6 @@
 //! Which of a unit's variables are shown, and all that is known of them as JSON.
 
-use crate::error::Error;
+use cosim::error::Error;
 use fmu_import::description::{Interface, Kind, ModelDescription, Variable};
 use fmu_import::fmu::Fmu;
 use fmu_import::names;
@@ -9,12 +9,12 @@ use std::io::{self, Write};
 
 /// Chooses variables.
 #[derive(Clone, Debug, Default, clap::Args)]
-pub struct Filter {
+pub(crate) struct Filter {
     /// Variables to show: a name, a pattern with *, or a part of a name. All, if it is left out.
-    pub pattern: Option<String>,
+    pub(crate) pattern: Option<String>,
     /// Variables of this causality only: parameter, calculatedParameter, input, output, local or independent.
     #[arg(long)]
-    pub causality: Option<String>,
+    pub(crate) causality: Option<String>,
 }
 
 impl Filter {
@@ -30,7 +30,7 @@ impl Filter {
     ///
     /// # Errors
     /// If that is nothing.
-    pub fn apply(&self, description: &mut ModelDescription) -> Result<(), Error> {
+    pub(crate) fn apply(&self, description: &mut ModelDescription) -> Result<(), Error> {
         if self.pattern.is_none() && self.causality.is_none() {
             return Ok(());
         }
@@ -52,7 +52,7 @@ impl Filter {
 ///
 /// # Errors
 /// If the text cannot be written.
-pub fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
+pub(crate) fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     let d = &fmu.description;
     let interface = |interface: &Option<Interface>| {
         interface

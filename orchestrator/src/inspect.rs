@@ -1,7 +1,7 @@
 //! Prints what an FMU says of itself.
 
 use crate::catalogue::{self, Filter};
-use crate::error::Error;
+use crate::failure::Failure;
 use fmu_import::description::{Interface, Kind, ModelDescription, Variable};
 use fmu_import::faults::CAUSALITIES;
 use fmu_import::fmu::Fmu;
@@ -12,7 +12,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// If it is no FMU, if the filter lets nothing through, or the text cannot be written.
-pub fn inspect(path: &Path, filter: &Filter, as_json: bool, out: &mut impl Write) -> Result<(), Error> {
+pub(crate) fn inspect(path: &Path, filter: &Filter, as_json: bool, out: &mut impl Write) -> Result<(), Failure> {
     let mut fmu = Fmu::open(path)?;
     filter.apply(&mut fmu.description)?;
     if as_json {
@@ -27,14 +27,14 @@ pub fn inspect(path: &Path, filter: &Filter, as_json: bool, out: &mut impl Write
 ///
 /// # Errors
 /// If there are faults, if it is no FMU at all, or if the text cannot be written.
-pub fn check(path: &Path, out: &mut impl Write) -> Result<(), Error> {
+pub(crate) fn check(path: &Path, out: &mut impl Write) -> Result<(), Failure> {
     let faults = Fmu::open(path)?.faults();
     for fault in &faults {
         writeln!(out, "{}: {fault}", path.display())?;
     }
     match faults.len() {
         0 => Ok(()),
-        count => Err(Error::Faults { path: path.to_path_buf(), count }),
+        count => Err(Failure::Faults { path: path.to_path_buf(), count }),
     }
 }
 

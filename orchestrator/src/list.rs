@@ -1,9 +1,10 @@
 //! Lists the experiments, studies and FMUs there are.
 
-use crate::error::Error;
-use crate::experiment::Experiment;
-use crate::search::{self, files};
-use crate::study::Study;
+use crate::failure::Failure;
+use cosim::error::Error;
+use cosim::experiment::Experiment;
+use cosim::search::{self, files};
+use cosim_report::study::Study;
 use fmu_import::fmu::Fmu;
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -15,11 +16,11 @@ use std::{fs, iter};
 ///
 /// # Errors
 /// If the folder is not there, or the text cannot be written.
-pub fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Error> {
+pub(crate) fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Failure> {
     if let Some(folder) = folder
         && !folder.is_dir()
     {
-        return Err(Error::experiment(format!("{} is not a folder", folder.display())));
+        return Err(Error::experiment(format!("{} is not a folder", folder.display())).into());
     }
     let here = folder.unwrap_or(Path::new("."));
     let find = |extension: &str, others: Vec<PathBuf>| {
@@ -65,7 +66,7 @@ pub fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Error> {
     print("FMUs", &rows, out)
 }
 
-fn print(what: &str, rows: &[(PathBuf, String)], out: &mut impl Write) -> Result<(), Error> {
+fn print(what: &str, rows: &[(PathBuf, String)], out: &mut impl Write) -> Result<(), Failure> {
     writeln!(out, "{what} ({})", rows.len())?;
     let width = rows.iter().map(|(path, _)| path.display().to_string().chars().count()).max().unwrap_or(0);
     for (path, text) in rows {

@@ -1,15 +1,27 @@
 //! The command line.
 
 use clap::{CommandFactory, Parser, Subcommand};
-use orchestrator::catalogue::Filter;
-use orchestrator::error::Error;
-use orchestrator::experiment::{Experiment, Overrides};
-use orchestrator::interrupt::{Interrupt, Request};
-use orchestrator::live::log::Messages;
-use orchestrator::realtime::{self, Factor, OnMiss};
-use orchestrator::run::{Files, Options, Plan};
-use orchestrator::study::{Study, reproduce};
-use orchestrator::{inspect, list, report, schema, search, ssp};
+mod catalogue;
+mod failure;
+mod inspect;
+mod list;
+mod live;
+mod run;
+mod schema;
+
+use catalogue::Filter;
+use cosim::check::check;
+use cosim::error::Error;
+use cosim::experiment::{Experiment, Overrides};
+use cosim::interrupt::{Interrupt, Request};
+use cosim::pacing::{self, Factor, OnMiss};
+use cosim::system::{Opened, System};
+use cosim::{search, ssp};
+use cosim_report::study::{Study, reproduce};
+use cosim_report::summary;
+use failure::Failure;
+use live::log::Messages;
+use run::{Files, Options};
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -169,7 +181,7 @@ fn main() -> ExitCode {
     let mut out = BufWriter::new(stdout());
     let interrupt = Interrupt::default();
     let outcome =
-        execute(arguments.command, &mut out, &interrupt).and_then(|()| out.flush().map_err(Error::from));
+        execute(arguments.command, &mut out, &interrupt).and_then(|()| out.flush().map_err(Failure::from));
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if error.is_broken_pipe() => {
@@ -185,7 +197,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Error> {
+fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
     if matches!(command, Command::Run { .. } | Command::Reproduce { .. } | Command::Pack { .. }) {
         interrupt.listen()?;
     }
@@ -204,17 +216,17 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             force,
         } => {
             let experiment = search::experiment(&experiment)?;
-            let (plan, entries) = if experiment.extension().is_some_and(|extension| extension == "ssp") {
+            let (mut system, entries) = if experiment.extension().is_some_and(|extension| extension == "ssp") {
                 let ssp::Loaded { experiment, mut opened, entries } = ssp::load(&experiment, &overrides)?;
-                let plan = Plan::with(experiment, &fmu_dir, &mut opened);
-                (plan.map_err(|error| entries.named(error))?, Some(entries))
+                let system = check(experiment, &fmu_dir, &mut opened);
+                (system.map_err(|error| entries.named(error))?, Some(entries))
             } else {
                 let mut experiment = Experiment::load(&experiment)?;
                 experiment.apply(&overrides)?;
-                (Plan::new(experiment, &fmu_dir)?, None)
+                (check(experiment, &fmu_dir, &mut Opened::default())?, None)
             };
-            let real_time = real_time.map(|factor| realtime::Settings { factor, on_miss, priority });
-            let outcome = plan.run(&Options {
+            let real_time = real_time.map(|factor| pacing::Settings { factor, on_miss, priority });
+            let options = Options {
                 out: folder,
                 quiet,
                 real_time,
@@ -222,13 +234,13 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 files,
                 force,
                 interrupt: interrupt.clone(),
-            });
-            let report = outcome.map_err(|error| match &entries {
-                Some(entries) => entries.named(error),
-                None => error,
+            };
+            let report = run::run(&mut system, &options).map_err(|error| match (error, &entries) {
+                (Failure::Single(error), Some(entries)) => entries.named(error).into(),
+                (error, _) => error,
             })?;
             if !quiet {
-                report::summary(&report, out)?;
+                summary::summary(&system, &report, out)?;
                 out.flush()?;
             }
             match report.ended {
@@ -240,7 +252,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                     }
                     Ok(())
                 }
-                Some(error) => Err(error),
+                Some(error) => Err(error.into()),
             }
         }
         Command::Reproduce { study, out: folder, fmu_dir, jobs, members, fresh, quiet } => {
@@ -250,7 +262,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 reproduce::Options { out: folder, fmu_dirs: fmu_dir, jobs, fresh, quiet, interrupt };
             let report = reproduce::reproduce(&study, &options)?;
             if !quiet {
-                report::reproduction(&report, out)?;
+                summary::reproduction(&report, out)?;
             }
             Ok(())
         }
@@ -258,7 +270,8 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             if !ssp {
                 return Err(Error::experiment(
                     "pack wants the form of the archive, of which there is one: --ssp",
-                ));
+                )
+                .into());
             }
             let path = search::experiment(&path)?;
             let mut experiment = Experiment::load(&path)?;
@@ -269,11 +282,12 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 let path = archive.display();
                 return Err(Error::experiment(format!(
                     "{path} is there already: --force replaces it, --out takes another name"
-                )));
+                ))
+                .into());
             }
-            let plan = Plan::new(experiment, &fmu_dir)?;
-            ssp::pack(&plan, !no_enumerations, &archive, interrupt)?;
-            report::packed(&plan, &archive, out).map_err(Error::from)
+            let system = check(experiment, &fmu_dir, &mut Opened::default())?;
+            ssp::pack(&system, !no_enumerations, &archive, interrupt)?;
+            Ok(packed(&system, &archive, out)?)
         }
         Command::Inspect { fmu, check: true, .. } => inspect::check(&fmu, out),
         Command::Inspect { fmu, filter, json, check: false } => inspect::inspect(&fmu, &filter, json, out),
@@ -288,7 +302,17 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
 }
 
 /// Prints an experiment with all that it extends.
-fn show(experiment: &Path, out: &mut impl Write) -> Result<(), Error> {
+fn show(experiment: &Path, out: &mut impl Write) -> Result<(), Failure> {
     let experiment = Experiment::load(&search::experiment(experiment)?)?;
     Ok(out.write_all(experiment.source.whole().as_bytes())?)
+}
+
+/// Prints what a packed archive holds, and which settings the standard cannot store.
+fn packed(system: &System, archive: &Path, out: &mut impl Write) -> std::io::Result<()> {
+    writeln!(out, "{}: {}", archive.display(), system.order.join(", "))?;
+    let step = system.experiment.simulation.step;
+    writeln!(
+        out,
+        "  the standard has no place for the step, {step} s: it stands in annotations, which not every tool reads"
+    )
 }

@@ -3,8 +3,8 @@
 //! What a file leaves out may come from one that it extends, or from a template. So a schema knows every key and its type but asks for
 //! none; what is missing is told when the file is read.
 
-use crate::experiment::Experiment;
-use crate::study::Study;
+use cosim::experiment::Experiment;
+use cosim_report::study::Study;
 use schemars::generate::SchemaSettings;
 use schemars::transform::{RecursiveTransform, Transform};
 use schemars::{JsonSchema, Schema};
@@ -12,25 +12,15 @@ use serde_json::{Map, Value, json};
 
 /// A kind of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// An experiment.
     Experiment,
     /// A study.
     Study,
 }
 
-/// What a parameter is set to, as a file has it: a number, a text or a truth value.
-#[derive(JsonSchema)]
-#[serde(untagged)]
-#[expect(dead_code, reason = "stands for TOML's own type in the schema")]
-pub(crate) enum Scalar {
-    Number(f64),
-    Text(String),
-    Truth(bool),
-}
-
 /// The schema of a kind of file.
-pub fn text(kind: Kind) -> String {
+pub(crate) fn text(kind: Kind) -> String {
     let mut schema = match kind {
         Kind::Experiment => schema_of::<Experiment>(json!({
             "extends": texts("Files that this one extends, relative to it; a later one has precedence over those before."),

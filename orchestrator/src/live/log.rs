@@ -7,7 +7,7 @@ static KEPT: Mutex<Option<Vec<u8>>> = Mutex::new(None);
 
 /// Standard error, or what is kept for it.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Messages;
+pub(crate) struct Messages;
 
 impl Write for Messages {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {

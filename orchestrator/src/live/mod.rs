@@ -3,15 +3,16 @@
 //! At every communication point the master leaves a copy of what it sees, if the copy is not just being read; it never waits
 //! for the view. [`scene`] is what there is to show, [`view`] how it looks, [`log`] where messages go meanwhile.
 
-pub mod log;
-pub mod scene;
-pub mod view;
+pub(crate) mod log;
+pub(crate) mod scene;
+pub(crate) mod view;
 
-use crate::error::Error;
-use crate::guarantee::Course;
-use crate::interrupt::{Interrupt, Request};
-use crate::master::{Observer, Sample};
-use crate::realtime::pacer::Tally;
+use crate::failure::Failure;
+use cosim::error::Error;
+use cosim::interrupt::{Interrupt, Request};
+use cosim::master::{Observer, Sample};
+use cosim::pacing::pacer::Tally;
+use cosim_report::guarantee::Course;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use scene::Scene;
@@ -30,19 +31,19 @@ const BETWEEN_PICTURES: Duration = Duration::from_millis(66);
 
 /// The values that the master copies for the view.
 #[derive(Clone, Debug, Default)]
-pub struct Snapshot {
+pub(crate) struct Snapshot {
     /// Simulated time of the communication point, s; `None` before the first.
-    pub time: Option<f64>,
+    pub(crate) time: Option<f64>,
     /// The probed values at this communication point.
-    pub values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// State of the pacing, if the run is paced.
-    pub tally: Option<Tally>,
+    pub(crate) tally: Option<Tally>,
     /// Course of the controller's guarantee, if it gives one.
-    pub guarantee: Option<Course>,
+    pub(crate) guarantee: Option<Course>,
 }
 
 /// The view, for as long as this lives. The terminal is as before when it is dropped, also by a panic.
-pub struct Live {
+pub(crate) struct Live {
     snapshot: Arc<Mutex<Snapshot>>,
     tally: Option<Rc<Cell<Tally>>>,
     /// Followed at every communication point, as the view does not see them all.
@@ -55,7 +56,7 @@ pub struct Live {
 ///
 /// # Errors
 /// If there is none.
-pub fn check_terminal() -> Result<(), Error> {
+pub(crate) fn check_terminal() -> Result<(), Error> {
     if stdout().is_terminal() {
         return Ok(());
     }
@@ -69,16 +70,15 @@ impl Live {
     ///
     /// # Errors
     /// If there is no terminal that can be drawn on.
-    pub fn start(
+    pub(crate) fn start(
         scene: Scene,
-        values: usize,
         tally: Option<Rc<Cell<Tally>>>,
         interrupt: Interrupt,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, Failure> {
         check_terminal()?;
-        let snapshot = Arc::new(Mutex::new(Snapshot { values: vec![0.0; values], ..Snapshot::default() }));
-        let guarantee = Course::new(scene.places, scene.limits);
-        let mut live = Self { snapshot, tally, guarantee, over: Arc::default(), thread: None };
+        let guarantee = scene.guarantee.clone().map(Course::new);
+        let mut live =
+            Self { snapshot: Arc::default(), tally, guarantee, over: Arc::default(), thread: None };
         log::hold();
         let terminal = ratatui::try_init()?;
         let (shared, over) = (Arc::clone(&live.snapshot), Arc::clone(&live.over));
@@ -100,9 +100,10 @@ impl Observer for Live {
         // The run does not wait for the view: what cannot be left now is left at the next communication point.
         if let Ok(mut snapshot) = self.snapshot.try_lock() {
             snapshot.time = Some(sample.time);
-            snapshot.values.copy_from_slice(sample.values);
+            snapshot.values.clear();
+            snapshot.values.extend_from_slice(sample.values);
             snapshot.tally = self.tally.as_ref().map(|tally| tally.get());
-            snapshot.guarantee = self.guarantee;
+            snapshot.guarantee.clone_from(&self.guarantee);
         }
         Ok(())
     }
@@ -171,8 +172,7 @@ fn request(key: KeyEvent) -> Option<Request> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::guarantee::Signals;
-    use crate::metrics::{Limits, Places};
+    use cosim_report::guarantee::Signals;
 
     #[test]
     fn q_and_control_c_end_the_run() {
@@ -187,12 +187,10 @@ mod tests {
     #[test]
     fn the_run_does_not_wait_while_the_view_reads() {
         let snapshot = Arc::new(Mutex::new(Snapshot { values: vec![0.0], ..Snapshot::default() }));
-        let signals = Signals { in_force: 0, status: None, margins: [None; 2] };
-        let places = Places { guarantee: Some(signals), ..Places::default() };
         let mut live = Live {
             snapshot: Arc::clone(&snapshot),
             tally: None,
-            guarantee: Course::new(places, Limits::default()),
+            guarantee: Some(Course::new(Signals::default())),
             over: Arc::default(),
             thread: None,
         };

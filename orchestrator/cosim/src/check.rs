@@ -1,0 +1,220 @@
+//! Checks an experiment in one pass: everything it names is looked up, and everything that cannot
+//! be run is refused. Only the units themselves can fail after that.
+
+use crate::clock::Clock;
+use crate::delay;
+use crate::error::Error;
+use crate::experiment::{Coupling, Experiment};
+use crate::search;
+use crate::settings;
+use crate::system::{Opened, System, parts, periods};
+use crate::wiring::{self, Part};
+use fmu_import::faults;
+use fmu_import::fmu::Fmu;
+use fmu_import::names;
+use fmu_import::warnings;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+/// Checks an experiment against what its archives say. Archives that are already in `opened` are
+/// not opened again.
+///
+/// # Errors
+/// If anything is wrong with the experiment or with the archive of an FMU.
+pub fn check(experiment: Experiment, fmu_dirs: &[PathBuf], opened: &mut Opened) -> Result<System, Error> {
+    let simulation = &experiment.simulation;
+    let clock = Clock::new(simulation.start, simulation.stop, simulation.step)
+        .map_err(|message| experiment.source.error(&(0..0), format!("[simulation] {message}")))?;
+    let order = order(&experiment)?;
+
+    let mut fmus = Vec::new();
+    for name in &order {
+        let path = find_fmu(&experiment, name, fmu_dirs)?;
+        let fmu = match opened.get(&path) {
+            Some(fmu) => Rc::clone(fmu),
+            None => Rc::new(open(&path)?),
+        };
+        opened.insert(path, Rc::clone(&fmu));
+        fmus.push(fmu);
+    }
+    let parts = parts(&order, &fmus);
+    if let Some(target) = experiment.unplaced.first() {
+        return Err(Error::experiment(format!("--set {target}: {}", whereabouts(target, &parts))));
+    }
+    check_single_instances(&experiment, &order, &fmus)?;
+
+    let wires = wiring::wires(&experiment, &parts)?;
+    let settings = (0..parts.len())
+        .map(|index| settings::resolve(&experiment, &parts, index, &wires))
+        .collect::<Result<Vec<_>, _>>()?;
+    let columns = wiring::columns(&experiment, &parts)?;
+    check_size(&experiment, &clock, columns.len())?;
+    if let Some(names) = delay::algebraic_loop(&parts, &wires) {
+        let message = format!(
+            "algebraic loop: each of these inputs depends on the next at the same instant: {}. \
+             Put a unit with a state or a delay between them",
+            names.join(" <- ")
+        );
+        return Err(experiment.source.error(&(0..0), message));
+    }
+    let every = periods(&experiment, &order);
+    let loops = delay::feedback_loops(&parts, &every, &wires, simulation.coupling);
+    let probes = columns.iter().map(|column| column.port).collect();
+    Ok(System { experiment, clock, order, fmus, settings, wires, columns, loops, probes })
+}
+
+/// Opens an archive, and warns if its description has a fault.
+fn open(path: &Path) -> Result<Fmu, Error> {
+    let fmu = Fmu::open(path)?;
+    let faults = faults::faults(&fmu.description);
+    if let Some(first) = faults.first() {
+        let more = match faults.len() {
+            1 => String::new(),
+            count => format!(" ({} more: orchestrator inspect --check)", count - 1),
+        };
+        warnings::warn_once(format!("{}: {first}{more}", path.display()));
+    }
+    Ok(fmu)
+}
+
+/// Explains which component was meant if a parameter is given without one, or with a wrong one.
+fn whereabouts(target: &str, parts: &[Part]) -> String {
+    let of = |part: &Part| {
+        let known = part.description.names("parameter").chain(part.description.names("input"));
+        known.map(|name| format!("{}.{name}", part.name)).collect::<Vec<_>>()
+    };
+    let all: Vec<String> = parts.iter().flat_map(of).collect();
+    let meant: Vec<&str> = all
+        .iter()
+        .filter(|name| names::split(name).is_some_and(|(_, rest)| rest == target))
+        .map(String::as_str)
+        .collect();
+    if !meant.is_empty() {
+        return format!("of which component? Write {}", meant.join(" or "));
+    }
+    let component = names::split(target).map_or(target, |(component, _)| component);
+    let hint = match names::nearest(target, all.iter().map(String::as_str)) {
+        Some(name) => format!("; did you mean \"{name}\"?"),
+        None => names::hint(component, parts.iter().map(|part| part.name)),
+    };
+    format!("there is no component \"{component}\"{hint}")
+}
+
+/// Largest number of steps. Beyond it the times of two steps coincide, because units treat instants
+/// as equal if they differ by less than 1e-9 of their size.
+const MOST_STEPS: u64 = 1_000_000_000;
+/// Approximate size of a number in `results.csv`, bytes.
+const NUMBER: f64 = 20.0;
+/// Lower bound of the computing time of a step of two small units, s.
+const QUICK: f64 = 1e-5;
+
+/// Rejects experiments that no machine can run, and warns of results that fill a disk.
+fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<(), Error> {
+    let steps = clock.ticks();
+    let rows = steps as f64 / f64::from(experiment.record.every);
+    let gigabytes = rows * (columns + 1) as f64 * NUMBER / 1e9;
+    if steps > MOST_STEPS {
+        let message = format!(
+            "[simulation] {steps} steps of {} s: there can be {MOST_STEPS} at most. results.csv would take about \
+             {gigabytes:.0} GB and the run {:.0} h or more: take a longer step or an earlier stop",
+            clock.step(),
+            steps as f64 * QUICK / 3600.0
+        );
+        return Err(experiment.source.error(&(0..0), message));
+    }
+    if gigabytes > 10.0 {
+        tracing::warn!(
+            "results.csv will take about {gigabytes:.0} GB: [record] every = n writes every n-th step only"
+        );
+    }
+    Ok(())
+}
+
+/// Checks that an FMU that can be instantiated only once per process is used by one component only.
+fn check_single_instances(experiment: &Experiment, order: &[String], fmus: &[Rc<Fmu>]) -> Result<(), Error> {
+    for (index, fmu) in fmus.iter().enumerate() {
+        let only_once = fmu
+            .description
+            .co_simulation
+            .as_ref()
+            .is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"));
+        if only_once && let Some(other) = fmus[..index].iter().position(|other| Rc::ptr_eq(other, fmu)) {
+            let message = format!(
+                "\"{}\" and \"{}\" both use {}, which can be instantiated only once per process",
+                order[other],
+                order[index],
+                fmu.path.display()
+            );
+            return Err(experiment.source.error(&(0..0), message));
+        }
+    }
+    Ok(())
+}
+
+/// Names of the components, in the order in which their inputs are set.
+fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
+    let refuse = |message: String| Err(experiment.source.error(&(0..0), message));
+    let names: Vec<&str> = experiment.components.keys().map(String::as_str).collect();
+    if let Some(name) = names.iter().find(|name| name.is_empty() || name.contains('.')) {
+        return refuse(format!("the component name \"{name}\" must not be empty or hold a dot"));
+    }
+    if let Some((name, _)) = experiment.components.iter().find(|(_, component)| component.every == 0) {
+        return refuse(format!("[components.{name}] every = 0: must be at least 1"));
+    }
+    if experiment.record.every == 0 {
+        return refuse("[record] every = 0: must be at least 1".into());
+    }
+    let order = &experiment.simulation.order;
+    for name in order {
+        if !names.contains(&name.as_str()) {
+            let hint = names::hint(name, names.iter().copied());
+            return refuse(format!("[simulation] order: there is no component \"{name}\"{hint}"));
+        }
+        if order.iter().filter(|other| *other == name).count() > 1 {
+            return refuse(format!("[simulation] order names \"{name}\" twice"));
+        }
+    }
+    if order.is_empty() && (names.len() == 1 || experiment.simulation.coupling == Coupling::Jacobi) {
+        return Ok(names.iter().map(ToString::to_string).collect());
+    }
+    if order.is_empty() {
+        return refuse(format!(
+            "[simulation] there is no order: name the components in the order in which they get their inputs, those \
+             first that answer at once, for example order = [{}]",
+            names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+        ));
+    }
+    // Components that the order does not name come last, sorted by name.
+    let others = names.iter().filter(|name| !order.iter().any(|other| other == *name));
+    Ok(order.iter().cloned().chain(others.map(ToString::to_string)).collect())
+}
+
+/// Finds the archive of a component: beside the experiment, in the given folders, or where units
+/// are found from any folder.
+fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result<PathBuf, Error> {
+    let written = &experiment.components[name].fmu;
+    let mut folders: Vec<PathBuf> = experiment.source.folders().map(Path::to_path_buf).collect();
+    folders.dedup();
+    folders.extend(fmu_dirs.iter().cloned());
+    folders.extend(search::units());
+    if let Some(path) =
+        folders.iter().map(|folder| folder.join(written.get_ref())).find(|path| path.is_file())
+    {
+        return Ok(path);
+    }
+    let there: Vec<String> = folders
+        .iter()
+        .flat_map(|folder| fs::read_dir(folder).into_iter().flatten().flatten())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|file| Path::new(file).extension().is_some_and(|extension| extension == "fmu"))
+        .collect();
+    let hint = names::hint(written.get_ref(), there.iter().map(String::as_str));
+    let searched: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
+    let message = format!(
+        "[components.{name}] there is no file \"{}\" in {}{hint}",
+        written.get_ref(),
+        searched.join(", ")
+    );
+    Err(experiment.source.error(&written.span(), message))
+}

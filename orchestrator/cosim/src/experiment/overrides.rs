@@ -1,0 +1,87 @@
+//! What the command line changes in an experiment.
+
+use super::{Coupling, Experiment};
+use crate::error::Error;
+use crate::watch::OnInvalid;
+use fmu_import::names;
+use std::collections::BTreeMap;
+use std::path::Path;
+use toml::{Spanned, Value};
+
+/// Settings that the command line may change.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Overrides {
+    /// Set a parameter: `plant.disturbance.seed=7`, `controller.constraints=paper`, `plant.disturbance.bound="1 deg/s2"`.
+    #[arg(long = "set", value_name = "COMPONENT.PARAMETER=VALUE")]
+    pub set: Vec<String>,
+    /// Exchange a component's unit: `controller=MyLaw.fmu`, a file or one that is found by its name. What the experiment sets,
+    /// records or leaves open of the former unit and the new one does not have is left out.
+    #[arg(long = "fmu", value_name = "COMPONENT=FMU")]
+    pub fmu: Vec<String>,
+    /// Stop time, s.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub stop: Option<f64>,
+    /// Communication step, s.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub step: Option<f64>,
+    /// Coupling at communication points.
+    #[arg(long, value_enum)]
+    pub coupling: Option<Coupling>,
+    /// What is done about a value that is no number or outside its type.
+    #[arg(long, value_enum)]
+    pub on_invalid: Option<OnInvalid>,
+}
+
+impl Experiment {
+    /// Applies what the command line says.
+    ///
+    /// # Errors
+    /// If an assignment is malformed.
+    pub fn apply(&mut self, overrides: &Overrides) -> Result<(), Error> {
+        self.simulation.stop = overrides.stop.unwrap_or(self.simulation.stop);
+        self.simulation.step = overrides.step.unwrap_or(self.simulation.step);
+        self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
+        self.simulation.on_invalid = overrides.on_invalid.unwrap_or(self.simulation.on_invalid);
+        for assignment in &overrides.fmu {
+            let refuse = |message: String| Error::experiment(format!("--fmu {assignment}: {message}"));
+            let (name, fmu) = assignment
+                .split_once('=')
+                .ok_or_else(|| refuse("wants component=file, for example controller=MyLaw.fmu".into()))?;
+            let hint = names::hint(name, self.components.keys().map(String::as_str));
+            let component = self
+                .components
+                .get_mut(name)
+                .ok_or_else(|| refuse(format!("there is no component \"{name}\"{hint}")))?;
+            // A file is meant as seen from here, not from the experiment.
+            let file = Path::new(fmu).is_file().then(|| std::path::absolute(fmu).ok()).flatten();
+            let file = file.map_or_else(|| fmu.to_string(), |file| file.to_string_lossy().into_owned());
+            (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
+        }
+        for assignment in &overrides.set {
+            let malformed = || {
+                Error::experiment(format!(
+                    "--set {assignment}: wants component.parameter=value, for example plant.disturbance.seed=7"
+                ))
+            };
+            let (target, value) = assignment.split_once('=').ok_or_else(malformed)?;
+            let target = target.trim();
+            if target.is_empty() {
+                return Err(malformed());
+            }
+            // What is no TOML value is text: an enumeration's item needs no quotes within quotes.
+            let value = value.trim();
+            let value = toml::from_str::<BTreeMap<String, Value>>(&format!("x = {value}"))
+                .ok()
+                .filter(|table| table.len() == 1)
+                .and_then(|mut table| table.remove("x"))
+                .unwrap_or_else(|| Value::String(value.to_string()));
+            if self.set(target, value).is_ok() {
+                self.assigned.insert(target.to_string());
+            } else {
+                // The units know what is meant.
+                self.unplaced.push(target.to_string());
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,130 @@
+//! `results.json`: everything that is needed to know, years later, what `results.csv` came from.
+
+use crate::error::Error;
+use crate::pacing;
+use crate::system::{Parameters, System};
+use crate::seeds::is_seed;
+use fmu_import::description::Kind;
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// The content of the file. `failure` is why the run ended early, if it did.
+pub fn metadata(
+    system: &System,
+    parameters: &Parameters,
+    real_time: Option<pacing::Settings>,
+    failure: Option<&Error>,
+) -> Value {
+    let experiment = &system.experiment;
+    let simulation = &experiment.simulation;
+    let seeds: BTreeMap<String, &Value> = parameters
+        .iter()
+        .flat_map(|(component, own)| own.iter().map(move |(name, value)| (component, name, value)))
+        .filter(|(_, name, _)| is_seed(name))
+        .map(|(component, name, value)| (format!("{component}.{name}"), value))
+        .collect();
+    let parts = system.parts();
+    let variable = |component: usize, variable: usize| {
+        let part = parts[component];
+        format!("{}.{}", part.name, part.description.variables[variable].name)
+    };
+    let connections: Vec<Value> = system
+        .wires
+        .iter()
+        .map(|w| {
+            json!({
+                "from": variable(w.from.component, w.from.variable),
+                "to": variable(w.to.component, w.to.variable),
+            })
+        })
+        .collect();
+    let columns: Vec<Value> = system
+        .columns
+        .iter()
+        .map(|column| {
+            let variable = &parts[column.port.component].description.variables[column.port.variable];
+            let unit = if let Kind::Real { unit, .. } = &variable.kind { unit.clone() } else { None };
+            let items = match &variable.kind {
+                Kind::Enumeration { items } => Some(
+                    items.iter().map(|(name, item)| (item.to_string(), name)).collect::<BTreeMap<_, _>>(),
+                ),
+                _ => None,
+            };
+            json!({
+                "name": column.name,
+                "type": variable.kind.name(),
+                "unit": unit,
+                "items": items,
+                "description": variable.description,
+            })
+        })
+        .collect();
+    let loops: Vec<Value> = system
+        .loops
+        .iter()
+        .map(|l| {
+            let components: Vec<&String> = l.components.iter().map(|&index| &system.order[index]).collect();
+            json!({ "components": components, "delay_steps": l.ticks, "delay_s": l.ticks as f64 * system.clock.step() })
+        })
+        .collect();
+    let mut components = serde_json::Map::new();
+    for (index, name) in system.order.iter().enumerate() {
+        components.insert(name.clone(), component(system, index, name, parameters));
+    }
+    json!({
+        "title": experiment.title,
+        "status": status(failure),
+        "orchestrator": env!("CARGO_PKG_VERSION"),
+        "simulation": {
+            "start": simulation.start, "stop": simulation.stop, "step": simulation.step,
+            "steps": system.clock.ticks(), "coupling": simulation.coupling, "order": system.order,
+        },
+        "real_time": real_time.map(|s| json!({ "factor": s.factor, "on_miss": s.on_miss, "priority": s.priority })),
+        "components": components,
+        "seeds": seeds,
+        "connections": connections,
+        "feedback_loops": loops,
+        "columns": columns,
+        "experiment": {
+            "file": experiment.source.path.file_name().map(|name| name.to_string_lossy()),
+            "text": experiment.source.whole(),
+        },
+    })
+}
+
+fn status(failure: Option<&Error>) -> String {
+    match failure {
+        None => "completed".into(),
+        Some(error @ (Error::Interrupted { .. } | Error::EndedByUnit { .. } | Error::Lost { .. })) => {
+            error.to_string()
+        }
+        Some(error) => format!("failed: {error}"),
+    }
+}
+
+fn component(system: &System, index: usize, name: &str, parameters: &Parameters) -> Value {
+    let fmu = &system.fmus[index];
+    let set: BTreeMap<&str, Value> =
+        system.settings[index].iter().map(|s| (s.name.as_str(), s.value.to_json())).collect();
+    json!({
+        "fmu": fmu.path.file_name().map(|name| name.to_string_lossy()),
+        "sha256": std::fs::read(&fmu.path).ok().map(|bytes| hexadecimal(&Sha256::digest(bytes))),
+        "guid": fmu.description.guid,
+        "model": fmu.description.model_name,
+        "version": fmu.description.version,
+        "generation_tool": fmu.description.generation_tool,
+        "every": system.experiment.components[name].every,
+        "set": set,
+        "parameters": parameters.get(name),
+    })
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}

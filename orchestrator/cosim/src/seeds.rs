@@ -1,0 +1,65 @@
+//! Seeds of random numbers: which parameters they are, and whether one is of any effect.
+
+use crate::error::Error;
+use crate::interrupt::Interrupt;
+use crate::system::System;
+use crate::settings::{Setting, SettingValue};
+use fmu_import::warnings;
+use tracing::subscriber::{NoSubscriber, with_default};
+
+/// Whether a parameter is a seed: by its name, which FMI leaves as the only sign.
+pub fn is_seed(name: &str) -> bool {
+    name.rsplit('.').next() == Some("seed")
+}
+
+/// The seeds from the command line that change nothing, as that of a disturbance that is constant: `component.parameter`. Two runs with
+/// different seeds are compared tick by tick until they differ, which is soon where the seed is of any effect.
+///
+/// # Errors
+/// If the comparison was ended from outside.
+pub(crate) fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
+    let mut idle = Vec::new();
+    for (component, settings) in system.settings.iter().enumerate() {
+        for (index, setting) in settings.iter().enumerate() {
+            let path = format!("{}.{}", system.order[component], setting.name);
+            let SettingValue::Integer(seed) = setting.value else { continue };
+            if !is_seed(&path) || !system.experiment.assigned.contains(&path) {
+                continue;
+            }
+            let mut other = system.settings.clone();
+            other[component][index].value = SettingValue::Integer(if seed > 0 { seed - 1 } else { seed + 1 });
+            // What the units say comes again in the run itself.
+            let same = with_default(NoSubscriber::default(), || {
+                let _warnings = warnings::collect();
+                are_same(system, &other, interrupt)
+            });
+            match same {
+                Ok(true) => idle.push(path),
+                Err(error @ Error::Interrupted { .. }) => return Err(error),
+                // So does a failure.
+                Ok(false) | Err(_) => {}
+            }
+        }
+    }
+    Ok(idle)
+}
+
+/// Whether all that is looked at but computing times stays the same with `others` as settings.
+fn are_same(system: &System, others: &[Vec<Setting>], interrupt: &Interrupt) -> Result<bool, Error> {
+    let timings = system.timings();
+    let bits = |values: &[f64]| {
+        let mut bits: Vec<u64> = values.iter().map(|value| value.to_bits()).collect();
+        timings.iter().for_each(|place| bits[*place] = 0);
+        bits
+    };
+    let (mut one, mut other) = (system.start(interrupt)?, system.start_with(others, interrupt)?);
+    let mut compared = false;
+    for tick in 0..=system.clock.ticks() {
+        let (one, other) = (bits(one.advance(tick)?), bits(other.advance(tick)?));
+        compared |= !one.is_empty();
+        if one != other {
+            return Ok(false);
+        }
+    }
+    Ok(compared)
+}

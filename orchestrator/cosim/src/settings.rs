@@ -1,0 +1,194 @@
+//! Parameter values of an experiment, as the FMU's variables want them.
+
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::wiring::{Part, Wire};
+use fmu_import::description::{Kind, Variable};
+use fmu_import::names;
+use fmu_import::quantity;
+use fmu_import::unit::{CoSimulationUnit, Outcome};
+use toml::Value;
+
+/// A variable that is set before initialization.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Name of the variable.
+    pub name: String,
+    /// Value reference of the variable.
+    pub reference: u32,
+    /// Value in the variable's own unit.
+    pub value: SettingValue,
+}
+
+/// A value together with its type.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SettingValue {
+    /// A value of type Real.
+    Real(f64),
+    /// A value of type Integer.
+    Integer(i32),
+    /// An item of an enumeration, as its name and value.
+    Item(String, i32),
+    /// A value of type Boolean.
+    Boolean(bool),
+    /// A value of type String.
+    Text(String),
+}
+
+impl SettingValue {
+    /// The plain value; of an enumeration, the item's name.
+    pub fn to_json(&self) -> serde_json::Value {
+        match self {
+            Self::Real(value) => (*value).into(),
+            Self::Integer(value) => (*value).into(),
+            Self::Boolean(value) => (*value).into(),
+            Self::Item(text, _) | Self::Text(text) => text.as_str().into(),
+        }
+    }
+}
+
+/// Resolves a component's settings.
+///
+/// # Errors
+/// Names that do not exist or cannot be set, values of the wrong type, out of limits, or in an unfit unit.
+pub(crate) fn resolve(
+    experiment: &Experiment,
+    parts: &[Part],
+    index: usize,
+    wires: &[Wire],
+) -> Result<Vec<Setting>, Error> {
+    let part = parts[index];
+    let component = &experiment.components[part.name];
+    let mut settings = Vec::new();
+    for (name, written) in &component.parameters {
+        let span = written.span();
+        let path = format!("{}.{name}", part.name);
+        let is_assigned = experiment.assigned.contains(&path);
+        let refuse = |message: String| {
+            if is_assigned {
+                Error::experiment(format!("--set {path}: {message}"))
+            } else {
+                experiment.source.error(&span, format!("\"{path}\": {message}"))
+            }
+        };
+        if component.is_exchanged && !is_assigned && part.description.find(name).is_none() {
+            tracing::warn!("{path}: {} has no such parameter, it is left out", part.description.model_name);
+            continue;
+        }
+        let (position, variable) = part.description.find(name).ok_or_else(|| {
+            let known: Vec<&str> =
+                part.description.names("parameter").chain(part.description.names("input")).collect();
+            let hint = match names::nearest(name, known.iter().copied()) {
+                // As it has to be written there.
+                Some(near) if is_assigned => format!("; did you mean \"{}.{near}\"?", part.name),
+                _ => names::hint(name, known.iter().copied()),
+            };
+            refuse(format!("there is no such parameter{hint}"))
+        })?;
+        match variable.causality.as_str() {
+            "input" if wires.iter().any(|w| w.to.component == index && w.to.variable == position) => {
+                return Err(refuse(
+                    "is an input with a connection, so it cannot have a value of its own".into(),
+                ));
+            }
+            "parameter" | "input" => {}
+            other => {
+                return Err(refuse(format!(
+                    "is of causality {other}, only parameters and inputs can be set"
+                )));
+            }
+        }
+        let value = value(written.get_ref(), variable, part).map_err(refuse)?;
+        settings.push(Setting { name: name.clone(), reference: variable.reference, value });
+    }
+    Ok(settings)
+}
+
+fn value(written: &Value, variable: &Variable, part: Part) -> Result<SettingValue, String> {
+    let mismatch = |wanted: &str| Err(format!("wants {wanted}, not {written}"));
+    match (&variable.kind, written) {
+        (Kind::Real { unit, min, max, .. }, _) => {
+            let value = match written {
+                Value::Float(value) => *value,
+                Value::Integer(value) => *value as f64,
+                Value::String(text) => quantity::convert(text, unit.as_deref(), &part.description.units)?,
+                _ => return mismatch("a number, or text with a number and a unit"),
+            };
+            let unit = unit.as_deref().unwrap_or_default();
+            if min.is_some_and(|min| value < min) {
+                return Err(format!(
+                    "{value} {unit} is below its minimum {} {unit}",
+                    min.unwrap_or_default()
+                ));
+            }
+            if max.is_some_and(|max| value > max) {
+                return Err(format!(
+                    "{value} {unit} is above its maximum {} {unit}",
+                    max.unwrap_or_default()
+                ));
+            }
+            Ok(SettingValue::Real(value))
+        }
+        (Kind::Integer { min, max }, Value::Integer(written)) => {
+            let (low, high) = (min.unwrap_or(i32::MIN), max.unwrap_or(i32::MAX));
+            match i32::try_from(*written) {
+                Ok(value) if (low..=high).contains(&value) => Ok(SettingValue::Integer(value)),
+                _ => Err(format!("{written} is not between {low} and {high}")),
+            }
+        }
+        (Kind::Integer { .. }, _) => mismatch("an integer"),
+        (Kind::Boolean, Value::Boolean(value)) => Ok(SettingValue::Boolean(*value)),
+        (Kind::Boolean, _) => mismatch("true or false"),
+        (Kind::Enumeration { items }, Value::String(text)) => items
+            .iter()
+            .find(|(name, _)| name == text)
+            .map(|(name, value)| SettingValue::Item(name.clone(), *value))
+            .ok_or_else(|| {
+                let known: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
+                format!("has no item \"{text}\"{}", names::hint(text, known.iter().copied()))
+            }),
+        (Kind::Enumeration { items }, _) => {
+            let known: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
+            mismatch(&format!("the name of an item ({})", known.join(", ")))
+        }
+        (Kind::String, Value::String(text)) => Ok(SettingValue::Text(text.clone())),
+        (Kind::String, _) => mismatch("text"),
+    }
+}
+
+/// Sets the values, all reals in one call and so on.
+///
+/// # Errors
+/// If the unit reports a failure.
+pub(crate) fn apply(settings: &[Setting], unit: &mut dyn CoSimulationUnit) -> Outcome {
+    let mut reals = (Vec::new(), Vec::new());
+    let mut integers = (Vec::new(), Vec::new());
+    let mut booleans = (Vec::new(), Vec::new());
+    for Setting { reference, value, .. } in settings {
+        match value {
+            SettingValue::Real(value) => {
+                reals.0.push(*reference);
+                reals.1.push(*value);
+            }
+            SettingValue::Integer(value) | SettingValue::Item(_, value) => {
+                integers.0.push(*reference);
+                integers.1.push(*value);
+            }
+            SettingValue::Boolean(value) => {
+                booleans.0.push(*reference);
+                booleans.1.push(i32::from(*value));
+            }
+            SettingValue::Text(text) => unit.set_string(*reference, text)?,
+        }
+    }
+    if !reals.0.is_empty() {
+        unit.set_real(&reals.0, &reals.1)?;
+    }
+    if !integers.0.is_empty() {
+        unit.set_integer(&integers.0, &integers.1)?;
+    }
+    if !booleans.0.is_empty() {
+        unit.set_boolean(&booleans.0, &booleans.1)?;
+    }
+    Ok(())
+}

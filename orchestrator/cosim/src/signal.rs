@@ -1,0 +1,160 @@
+//! What is looked at in a run: a variable, the difference of two, or the norm of several, and any of
+//! them as a multiple of another variable.
+//!
+//! ```text
+//! plant.rate.p
+//! plant.attitude.alpha - controller.reference.alpha
+//! norm(plant.rate.p, plant.rate.q, plant.rate.r) / controller.limit.rate
+//! ```
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fmt;
+use std::iter;
+
+/// A signal as it is written.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
+#[serde(try_from = "String", into = "String")]
+#[schemars(with = "String")]
+pub struct Signal {
+    pub(crate) terms: Vec<Term<String>>,
+    pub(crate) norm: bool,
+    /// The variable that the whole is divided by.
+    pub(crate) over: Option<String>,
+}
+
+/// `component.variable`, with what is subtracted from it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Term<Variable> {
+    pub(crate) value: Variable,
+    pub(crate) minus: Option<Variable>,
+}
+
+impl TryFrom<String> for Signal {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let (whole, over) = match text.split_once(" / ") {
+            Some((whole, over)) => (whole.trim(), Some(over.trim().to_string())),
+            None => (text.trim(), None),
+        };
+        let inside = whole.strip_prefix("norm(").and_then(|rest| rest.strip_suffix(')'));
+        let term = |text: &str| match text.split_once(" - ") {
+            Some((from, minus)) => {
+                Term { value: from.trim().into(), minus: Some(minus.trim().into()) }
+            }
+            None => Term { value: text.trim().to_string(), minus: None },
+        };
+        let terms: Vec<_> = inside.unwrap_or(whole).split(',').map(term).collect();
+        let signal = Self { terms, norm: inside.is_some(), over };
+        let broken =
+            |path: &&str| !path.contains('.') || path.contains(|c: char| c.is_whitespace() || c == '(');
+        if let Some(path) = signal.all().find(broken) {
+            return Err(format!("\"{path}\" in \"{text}\" is no component.variable"));
+        }
+        if inside.is_none() && signal.terms.len() > 1 {
+            return Err(format!("\"{text}\": several variables stand in norm(…) only"));
+        }
+        Ok(signal)
+    }
+}
+
+impl From<Signal> for String {
+    fn from(signal: Signal) -> Self {
+        let term = |term: &Term<String>| match &term.minus {
+            Some(minus) => format!("{} - {minus}", term.value),
+            None => term.value.clone(),
+        };
+        let terms = signal.terms.iter().map(term).collect::<Vec<_>>().join(", ");
+        let whole = if signal.norm { format!("norm({terms})") } else { terms };
+        signal.over.iter().fold(whole, |whole, over| format!("{whole} / {over}"))
+    }
+}
+
+impl fmt::Display for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&String::from(self.clone()))
+    }
+}
+
+impl Signal {
+    fn all(&self) -> impl Iterator<Item = &str> {
+        let terms = self.terms.iter().flat_map(|term| iter::once(&term.value).chain(&term.minus));
+        terms.chain(&self.over).map(String::as_str)
+    }
+
+    /// The variables it is made of.
+    pub fn paths(&self) -> BTreeSet<&str> {
+        self.all().collect()
+    }
+}
+
+/// A signal with its variables found: places among a sample's values.
+#[derive(Clone, Debug)]
+pub struct Resolved {
+    pub(crate) terms: Vec<Term<usize>>,
+    pub(crate) norm: bool,
+    pub(crate) over: Option<usize>,
+    pub(crate) factor: f64,
+    /// The unit that [`Self::value`] is in.
+    pub unit: String,
+    /// Whether it is a single variable that is no real number.
+    pub is_integer: bool,
+}
+
+impl Resolved {
+    /// The variable at a place of a sample's values, as it is.
+    pub fn variable(place: usize) -> Self {
+        let terms = vec![Term { value: place, minus: None }];
+        Self { terms, norm: false, over: None, factor: 1.0, unit: String::new(), is_integer: false }
+    }
+
+    /// The signal in a sample, in its unit.
+    pub fn value(&self, values: &[f64]) -> f64 {
+        let term =
+            |term: &Term<usize>| values[term.value] - term.minus.map_or(0.0, |minus| values[minus]);
+        let value = if self.norm {
+            self.terms.iter().map(|t| term(t).powi(2)).sum::<f64>().sqrt()
+        } else {
+            self.terms.iter().map(term).sum()
+        };
+        self.factor * value / self.over.map_or(1.0, |over| values[over])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_reads_back_as_it_was_written() {
+        for text in ["a.b", "a.b - c.d", "norm(a.x, a.y - b.y)", "norm(a.x, a.y) / b.z"] {
+            assert_eq!(String::from(Signal::try_from(text.to_string()).unwrap()), text);
+        }
+    }
+
+    #[test]
+    fn what_is_no_signal_is_refused_by_name() {
+        for (text, culprit) in [("ab", "\"ab\""), ("a.b, c.d", "norm"), ("a.b - c", "\"c\""), ("", "\"\"")] {
+            let message = Signal::try_from(text.to_string()).unwrap_err();
+            assert!(message.contains(culprit), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn oracle_differences_and_norms_in_the_display_unit() {
+        let term = |value, minus| Term { value, minus };
+        let mut signal = Resolved {
+            terms: vec![term(0, Some(1)), term(2, None)],
+            norm: true,
+            over: None,
+            factor: 10.0,
+            unit: "mm".into(),
+            is_integer: false,
+        };
+        assert_eq!(signal.value(&[5.0, 2.0, 4.0]), 50.0);
+        signal.over = Some(1);
+        assert_eq!(signal.value(&[5.0, 2.0, 4.0]), 25.0);
+    }
+}

@@ -1,0 +1,378 @@
+//! Writes an experiment to an SSP archive.
+
+use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
+use crate::error::Error;
+use crate::experiment::Coupling;
+use crate::interrupt::Interrupt;
+use crate::system::System;
+use crate::settings::SettingValue;
+use fmu_import::description::{Kind, Variable};
+use fmu_import::quantity::Scaling;
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, Event};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{self, Cursor, Write};
+use std::ops::Deref;
+use std::path::{Path, PathBuf};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+const NAMESPACES: [(&str, &str); 3] = [
+    ("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription"),
+    ("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon"),
+    ("xmlns:ssv", "http://ssp-standard.org/SSP1/SystemStructureParameterValues"),
+];
+
+type Xml = Writer<Vec<u8>>;
+
+/// The experiment that is written to an archive.
+struct Source<'a> {
+    system: &'a System,
+    /// Whether outputs that are enumerations have connectors.
+    enumerations: bool,
+}
+
+impl Deref for Source<'_> {
+    type Target = System;
+
+    fn deref(&self) -> &System {
+        self.system
+    }
+}
+
+/// Writes an experiment as an archive. What the standard has no place for, the step above all, stands in annotations; a value that
+/// is the FMU's own is left out. Outputs that are enumerations are connectors if `enumerations` says so. The same experiment gives the same bytes.
+///
+/// # Errors
+/// If a file cannot be read or written, or if it is asked to end; then nothing is left behind.
+pub fn pack(system: &System, enumerations: bool, path: &Path, interrupt: &Interrupt) -> Result<(), Error> {
+    let goes_on = || interrupt.asked().map_or(Ok(()), |request| Err(Error::Ended(request)));
+    let mut entries: BTreeMap<String, Vec<u8>> = BTreeMap::new();
+    for fmu in &system.fmus {
+        entries.insert(resource(&fmu.path), fs::read(&fmu.path).map_err(Error::file(&fmu.path))?);
+    }
+    let structure = structure(&Source { system, enumerations }).map_err(Error::file(path))?;
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default());
+    // Made in memory: what cannot be written in the end needs no archive that is half one.
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let all = [(STRUCTURE, &structure)].into_iter().chain(entries.iter().map(|(n, c)| (n.as_str(), c)));
+    for (name, content) in all {
+        goes_on()?;
+        archive.start_file(name, options).map_err(|error| Error::file(path)(error.into()))?;
+        archive.write_all(content).map_err(Error::file(path))?;
+    }
+    let bytes = archive.finish().map_err(|error| Error::file(path)(error.into()))?.into_inner();
+    goes_on()?;
+    // Under another name first: nobody ever opens half an archive.
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(format!(".{}.part", std::process::id()));
+    let partial = PathBuf::from(partial);
+    fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path)).map_err(|error| {
+        // What is there of it is of no use, and may be what fills the disk.
+        let _ = fs::remove_file(&partial);
+        Error::file(path)(error)
+    })
+}
+
+fn resource(fmu: &Path) -> String {
+    format!("resources/{}", fmu.file_name().unwrap_or_default().to_string_lossy())
+}
+
+fn structure(system: &Source) -> io::Result<Vec<u8>> {
+    let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
+    xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
+    let mut attributes = NAMESPACES.map(|(name, value)| (name, value.to_string())).to_vec();
+    let stem = system.experiment.source.path.file_stem().unwrap_or_default();
+    attributes.push(("name", identifier(&stem.to_string_lossy())));
+    attributes.push(("version", "1.0".into()));
+    attributes.push(("description", system.experiment.title.clone()));
+    attributes.push(("generationTool", concat!("orchestrator ", env!("CARGO_PKG_VERSION")).into()));
+    element(&mut xml, "ssd:SystemStructureDescription", &attributes, |xml| {
+        element(xml, "ssd:System", &[("name", "system".into())], |xml| {
+            element(xml, "ssd:Elements", &[], |xml| {
+                (0..system.order.len()).try_for_each(|i| component(xml, system, i))
+            })?;
+            if !system.wires.is_empty() {
+                element(xml, "ssd:Connections", &[], |xml| connections(xml, system))?;
+            }
+            element(xml, "ssd:Annotations", &[], |xml| {
+                element(xml, "ssc:Annotation", &[("type", OPEN_MODELICA.into())], |xml| {
+                    open_modelica(xml, system)
+                })?;
+                element(xml, "ssc:Annotation", &[("type", OWN.into())], |xml| own(xml, system))
+            })
+        })?;
+        enumerations(xml, system)?;
+        units(xml, system)?;
+        let experiment = &system.experiment.simulation;
+        let time = [("startTime", real(experiment.start)), ("stopTime", real(experiment.stop))];
+        leaf(xml, "ssd:DefaultExperiment", &time)
+    })?;
+    let mut bytes = xml.into_inner();
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// A text as an identifier, which some tools want every name to be.
+fn identifier(text: &str) -> String {
+    let mut name: String =
+        text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();
+    if !name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
+        name.insert(0, '_');
+    }
+    name
+}
+
+/// The step as OMSimulator writes it, and others read it.
+fn open_modelica(xml: &mut Xml, system: &Source) -> io::Result<()> {
+    let schema = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd";
+    element(xml, "oms:Annotations", &[("xmlns:oms", schema.into())], |xml| {
+        element(xml, "oms:SimulationInformation", &[], |xml| {
+            let master = [
+                ("description", "oms-ma".into()),
+                ("stepSize", real(system.clock.step())),
+                ("absoluteTolerance", "0.0001".into()),
+                ("relativeTolerance", "0.0001".into()),
+            ];
+            leaf(xml, "oms:FixedStepMaster", &master)
+        })
+    })
+}
+
+/// Writes the settings that an archive needs to repeat the same run: step, coupling, order,
+/// periods, recorded variables and roles of the figures of merit.
+fn own(xml: &mut Xml, system: &Source) -> io::Result<()> {
+    let experiment = &system.experiment;
+    let coupling = match experiment.simulation.coupling {
+        Coupling::GaussSeidel => "gauss-seidel",
+        Coupling::Jacobi => "jacobi",
+    };
+    let attributes = [
+        ("xmlns:run", "urn:orchestrator:run:1".into()),
+        ("title", experiment.title.clone()),
+        ("description", experiment.description.trim().to_string()),
+        ("step", real(system.clock.step())),
+        ("coupling", coupling.into()),
+        ("recordEvery", experiment.record.every.to_string()),
+    ];
+    element(xml, "run:Experiment", &attributes, |xml| {
+        for name in &system.order {
+            let every = experiment.components[name].every.to_string();
+            leaf(xml, "run:Component", &[("name", name.clone()), ("every", every)])?;
+        }
+        for column in &system.columns {
+            leaf(xml, "run:Record", &[("variable", column.name.clone())])?;
+        }
+        let text = toml::to_string(&experiment.observe).map_err(io::Error::other)?;
+        leaf(xml, "run:Observe", &[("toml", text)])
+    })
+}
+
+fn component(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
+    let attributes = [
+        ("name", system.order[index].clone()),
+        ("type", FMU.into()),
+        ("source", resource(&system.fmus[index].path)),
+        ("implementation", "CoSimulation".into()),
+    ];
+    element(xml, "ssd:Component", &attributes, |xml| {
+        element(xml, "ssd:Connectors", &[], |xml| {
+            connectors(system, index).try_for_each(|variable| connector(xml, system, variable))
+        })?;
+        parameters(xml, system, index)
+    })
+}
+
+/// Inputs that are connected, and all outputs that a connector can have the type of.
+fn connectors<'a>(system: &'a Source, index: usize) -> impl Iterator<Item = &'a Variable> {
+    let variables = &system.fmus[index].description.variables;
+    let is_connected =
+        move |position| system.wires.iter().any(|w| w.to.component == index && w.to.variable == position);
+    variables.iter().enumerate().filter_map(move |(position, variable)| match variable.causality.as_str() {
+        "input" if is_connected(position) => Some(variable),
+        "output" => match variable.kind {
+            Kind::String => None,
+            Kind::Enumeration { .. } => system.enumerations.then_some(variable),
+            _ => Some(variable),
+        },
+        _ => None,
+    })
+}
+
+/// Enumerations of the connectors, each once, by the name it is given here: that of the first variable that is of it.
+fn kinds<'a>(system: &'a Source) -> Vec<(String, &'a [(String, i32)])> {
+    let mut kinds: Vec<(String, &'a [(String, i32)])> = Vec::new();
+    for (index, fmu) in system.fmus.iter().enumerate() {
+        for variable in connectors(system, index) {
+            if let Kind::Enumeration { items } = &variable.kind
+                && !kinds.iter().any(|(_, known)| *known == items.as_slice())
+            {
+                let name = identifier(&format!("{}_{}", fmu.description.model_name, variable.name));
+                kinds.push((name, items));
+            }
+        }
+    }
+    kinds
+}
+
+fn enumerations(xml: &mut Xml, system: &Source) -> io::Result<()> {
+    let kinds = kinds(system);
+    if kinds.is_empty() {
+        return Ok(());
+    }
+    element(xml, "ssd:Enumerations", &[], |xml| {
+        kinds.iter().try_for_each(|(name, items)| {
+            element(xml, "ssc:Enumeration", &[("name", name.clone())], |xml| {
+                items.iter().try_for_each(|(item, value)| {
+                    leaf(xml, "ssc:Item", &[("name", item.clone()), ("value", value.to_string())])
+                })
+            })
+        })
+    })
+}
+
+fn connector(xml: &mut Xml, system: &Source, variable: &Variable) -> io::Result<()> {
+    let attributes = [("name", variable.name.clone()), ("kind", variable.causality.clone())];
+    element(xml, "ssd:Connector", &attributes, |xml| {
+        let unit = match &variable.kind {
+            Kind::Real { unit: Some(unit), .. } => vec![("unit", unit.clone())],
+            Kind::Enumeration { items } => {
+                let kinds = kinds(system).into_iter();
+                let known = kinds.filter(|(_, known)| *known == items.as_slice());
+                known.map(|(name, _)| ("name", name)).collect()
+            }
+            _ => Vec::new(),
+        };
+        leaf(xml, &format!("ssc:{}", variable.kind.name()), &unit)
+    })
+}
+
+fn parameters(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
+    let description = &system.fmus[index].description;
+    let own = |name: &str| description.find(name).and_then(|(_, variable)| variable.start.as_deref());
+    let differs = |name: &str, value: &SettingValue| match value {
+        SettingValue::Real(value) => own(name).and_then(|start| start.parse().ok()) != Some(*value),
+        SettingValue::Integer(value) | SettingValue::Item(_, value) => {
+            own(name).and_then(|start| start.parse().ok()) != Some(*value)
+        }
+        SettingValue::Boolean(value) => own(name) != Some(if *value { "true" } else { "false" }),
+        SettingValue::Text(value) => own(name) != Some(value),
+    };
+    let set: Vec<_> = system.settings[index].iter().filter(|s| differs(&s.name, &s.value)).collect();
+    if set.is_empty() {
+        return Ok(());
+    }
+    element(xml, "ssd:ParameterBindings", &[], |xml| {
+        element(xml, "ssd:ParameterBinding", &[], |xml| {
+            element(xml, "ssd:ParameterValues", &[], |xml| {
+                let name = identifier(&format!("{}_values", system.order[index]));
+                element(xml, "ssv:ParameterSet", &[("version", "1.0".into()), ("name", name)], |xml| {
+                    element(xml, "ssv:Parameters", &[], |xml| {
+                        set.iter().try_for_each(|setting| {
+                            element(xml, "ssv:Parameter", &[("name", setting.name.clone())], |xml| {
+                                let (kind, value) = typed(&setting.value);
+                                leaf(xml, kind, &[("value", value)])
+                            })
+                        })
+                    })
+                })
+            })
+        })
+    })
+}
+
+fn typed(value: &SettingValue) -> (&'static str, String) {
+    match value {
+        SettingValue::Real(value) => ("ssv:Real", real(*value)),
+        SettingValue::Integer(value) => ("ssv:Integer", value.to_string()),
+        SettingValue::Item(name, _) => ("ssv:Enumeration", name.clone()),
+        SettingValue::Boolean(value) => ("ssv:Boolean", value.to_string()),
+        SettingValue::Text(text) => ("ssv:String", text.clone()),
+    }
+}
+
+fn connections(xml: &mut Xml, system: &Source) -> io::Result<()> {
+    let name =
+        |component: usize, variable: usize| system.fmus[component].description.variables[variable].name.clone();
+    system.wires.iter().try_for_each(|wire| {
+        let mut attributes = vec![
+            ("startElement", system.order[wire.from.component].clone()),
+            ("startConnector", name(wire.from.component, wire.from.variable)),
+            ("endElement", system.order[wire.to.component].clone()),
+            ("endConnector", name(wire.to.component, wire.to.variable)),
+        ];
+        if wire.scaling == Scaling::default() {
+            return leaf(xml, "ssd:Connection", &attributes);
+        }
+        // The conversion stands here, once and for all tools alike.
+        attributes.push(("suppressUnitConversion", "true".into()));
+        element(xml, "ssd:Connection", &attributes, |xml| {
+            let linear = [("factor", real(wire.scaling.factor)), ("offset", real(wire.scaling.offset))];
+            leaf(xml, "ssc:LinearTransformation", &linear)
+        })
+    })
+}
+
+/// The units that connectors have.
+fn units(xml: &mut Xml, system: &Source) -> io::Result<()> {
+    let mut units = BTreeMap::new();
+    for (index, fmu) in system.fmus.iter().enumerate() {
+        for variable in connectors(system, index) {
+            let Kind::Real { unit: Some(unit), .. } = &variable.kind else { continue };
+            if let Some(defined) = fmu.description.units.iter().find(|defined| defined.name == *unit) {
+                units.entry(unit.as_str()).or_insert(defined);
+            }
+        }
+    }
+    if units.is_empty() {
+        return Ok(());
+    }
+    element(xml, "ssd:Units", &[], |xml| {
+        units.values().try_for_each(|unit| {
+            element(xml, "ssc:Unit", &[("name", unit.name.clone())], |xml| {
+                let mut attributes = Vec::new();
+                for (base, exponent) in ["kg", "m", "s", "A", "K", "mol", "cd", "rad"]
+                    .into_iter()
+                    .zip(unit.exponents.unwrap_or_default())
+                {
+                    if exponent != 0 {
+                        attributes.push((base, exponent.to_string()));
+                    }
+                }
+                if unit.factor != 1.0 {
+                    attributes.push(("factor", real(unit.factor)));
+                }
+                if unit.offset != 0.0 {
+                    attributes.push(("offset", real(unit.offset)));
+                }
+                leaf(xml, "ssc:BaseUnit", &attributes)
+            })
+        })
+    })
+}
+
+/// The shortest text that reads back as the same number.
+fn real(value: f64) -> String {
+    format!("{value:?}")
+}
+
+/// An element with nothing in it.
+fn leaf(xml: &mut Xml, name: &str, attributes: &[(&str, String)]) -> io::Result<()> {
+    let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
+    xml.create_element(name).with_attributes(attributes).write_empty().map(drop)
+}
+
+/// An element with what `content` puts into it.
+fn element(
+    xml: &mut Xml,
+    name: &str,
+    attributes: &[(&str, String)],
+    content: impl FnOnce(&mut Xml) -> io::Result<()>,
+) -> io::Result<()> {
+    let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
+    let writer = xml.create_element(name).with_attributes(attributes);
+    writer.write_inner_content(content).map(drop)
+}

@@ -1,0 +1,108 @@
+//! A unit whose calls are timed. All of them count, as a unit may do the work of a step when its outputs are asked for.
+
+use crate::pacing::timer::Timer;
+use fmu_import::unit::{CoSimulationUnit, Outcome};
+use std::cell::Cell;
+use std::rc::Rc;
+use std::time::Duration;
+
+/// Computing time spent in a unit's calls so far.
+#[derive(Debug, Default)]
+pub struct Spent {
+    time: Cell<Duration>,
+    steps: Cell<u32>,
+    ended: Cell<Duration>,
+}
+
+impl Spent {
+    /// Total time spent in the unit's calls.
+    pub fn time(&self) -> Duration {
+        self.time.get()
+    }
+
+    /// Adds a call that began and ended at these instants on the timer.
+    pub(crate) fn add(&self, begin: Duration, end: Duration) {
+        self.time.set(self.time.get() + end.saturating_sub(begin));
+        self.ended.set(end);
+    }
+
+    /// Instant on the timer at which the last call ended.
+    pub fn ended(&self) -> Duration {
+        self.ended.get()
+    }
+
+    /// Mean time per step, s; `None` before the first step.
+    pub fn seconds_per_step(&self) -> Option<f64> {
+        let steps = self.steps.get();
+        (steps > 0).then(|| self.time.get().as_secs_f64() / f64::from(steps))
+    }
+}
+
+/// A unit whose calls are timed.
+pub(crate) struct Stopwatch {
+    unit: Box<dyn CoSimulationUnit>,
+    timer: Rc<dyn Timer>,
+    spent: Rc<Spent>,
+}
+
+impl Stopwatch {
+    /// Wraps a unit so that it is timed from now on. Also returns the shared record of the time.
+    pub(crate) fn new(unit: Box<dyn CoSimulationUnit>, timer: Rc<dyn Timer>) -> (Self, Rc<Spent>) {
+        let spent = Rc::new(Spent::default());
+        (Self { unit, timer, spent: Rc::clone(&spent) }, spent)
+    }
+
+    fn time(&mut self, call: impl FnOnce(&mut dyn CoSimulationUnit) -> Outcome) -> Outcome {
+        let begin = self.timer.now();
+        let outcome = call(self.unit.as_mut());
+        self.spent.add(begin, self.timer.now());
+        outcome
+    }
+}
+
+impl CoSimulationUnit for Stopwatch {
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
+        self.time(|unit| unit.get_real(references, values))
+    }
+
+    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
+        self.time(|unit| unit.get_integer(references, values))
+    }
+
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
+        self.time(|unit| unit.get_boolean(references, values))
+    }
+
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
+        self.time(|unit| unit.set_real(references, values))
+    }
+
+    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        self.time(|unit| unit.set_integer(references, values))
+    }
+
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        self.time(|unit| unit.set_boolean(references, values))
+    }
+
+    fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
+        self.time(|unit| unit.set_string(reference, value))
+    }
+
+    fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
+        self.unit.enter_initialization(start, stop)
+    }
+
+    fn exit_initialization(&mut self) -> Outcome {
+        self.unit.exit_initialization()
+    }
+
+    fn do_step(&mut self, time: f64, step: f64) -> Outcome {
+        self.spent.steps.set(self.spent.steps.get() + 1);
+        self.time(|unit| unit.do_step(time, step))
+    }
+
+    fn terminate(&mut self) -> Outcome {
+        self.unit.terminate()
+    }
+}

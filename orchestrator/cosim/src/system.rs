@@ -1,0 +1,321 @@
+//! An experiment that has been checked, ready to be run: observers say which signals they want to
+//! see, then the units are initialized and stepped.
+
+use crate::clock::Clock;
+use crate::delay::{self, FeedbackLoop};
+use crate::error::Error;
+use crate::experiment::Experiment;
+use crate::interrupt::Interrupt;
+use crate::master::{Master, Member, Observer};
+use crate::recorder::{self, Format, Recorder};
+use crate::seeds;
+use crate::settings::{self, Setting};
+use crate::signal::{Resolved, Signal, Term};
+use crate::watch::Watched;
+use crate::wiring::{self, Column, Part, Port, Wire};
+use fmu_import::description::{Kind, ModelDescription};
+use fmu_import::fmu::Fmu;
+use fmu_import::names;
+use fmu_import::unit::CoSimulationUnit;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+/// The FMUs that have been opened, by path. Systems that share this map unpack each archive only
+/// once.
+pub type Opened = BTreeMap<PathBuf, Rc<Fmu>>;
+
+/// Values of all parameters, by component and name.
+pub type Parameters = BTreeMap<String, BTreeMap<String, Value>>;
+
+/// The units of an experiment with their wiring; [`crate::check::check`] makes it.
+pub struct System {
+    /// The experiment that the system was made from.
+    pub experiment: Experiment,
+    /// Start time, stop time and communication step.
+    pub clock: Clock,
+    /// Names of the components, in the order in which their inputs are set.
+    pub order: Vec<String>,
+    /// FMU of each component, in the same order.
+    pub fmus: Vec<Rc<Fmu>>,
+    /// Feedback loops with their delays, in ticks.
+    pub loops: Vec<FeedbackLoop>,
+    /// Settings of each component, in the same order.
+    pub(crate) settings: Vec<Vec<Setting>>,
+    pub(crate) wires: Vec<Wire>,
+    pub(crate) columns: Vec<Column>,
+    /// Variables that the observers see, in the order of a sample's values.
+    pub(crate) probes: Vec<Port>,
+}
+
+/// A variable that is seen at every communication point.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Probed {
+    /// Full name of the variable, `component.variable`.
+    pub name: String,
+    /// Index of the variable among a sample's values.
+    pub place: usize,
+    /// Unit of the variable, or an empty text.
+    pub unit: String,
+    /// Items of an enumeration with their values.
+    pub items: Vec<(String, i32)>,
+}
+
+impl System {
+    /// Names and model descriptions of the components.
+    pub(crate) fn parts(&self) -> Vec<Part<'_>> {
+        parts(&self.order, &self.fmus)
+    }
+
+    fn find(&self, path: &str) -> Option<Port> {
+        wiring::find(path, &self.parts())
+    }
+
+    fn place(&mut self, port: Port) -> usize {
+        self.probes.iter().position(|known| *known == port).unwrap_or_else(|| {
+            self.probes.push(port);
+            self.probes.len() - 1
+        })
+    }
+
+    /// The largest delay of a feedback loop in addition to the units' own, s, if there is a loop.
+    pub fn loop_delay(&self) -> Option<f64> {
+        let ticks = self.loops.iter().map(|found| found.ticks).max()?;
+        Some(ticks as f64 * self.clock.step())
+    }
+
+    /// Full names of the recorded variables.
+    pub fn recorded(&self) -> Vec<String> {
+        self.columns.iter().map(|column| column.name.clone()).collect()
+    }
+
+    /// Whether there is a variable `component.variable` that is no text.
+    pub fn has(&self, path: &str) -> bool {
+        self.find(path).is_some()
+    }
+
+    /// Whether one of the variables belongs to a unit that the command line exchanged, so that it
+    /// may be missing.
+    pub fn is_exchanged<'a>(&self, paths: impl IntoIterator<Item = &'a str>) -> bool {
+        paths.into_iter().any(|path| {
+            let component = names::split(path).and_then(|(name, _)| self.experiment.components.get(name));
+            component.is_some_and(|component| component.is_exchanged)
+        })
+    }
+
+    /// Has a variable seen at every communication point.
+    ///
+    /// # Errors
+    /// If there is no such variable, or if it is a text.
+    pub fn probe(&mut self, path: &str) -> Result<Probed, String> {
+        let port = self.find(path).ok_or_else(|| {
+            let parts = self.parts();
+            let of = |part: &Part| {
+                let names = part.description.variables.iter().map(|v| format!("{}.{}", part.name, v.name));
+                names.collect::<Vec<_>>()
+            };
+            let known: Vec<String> = parts.iter().flat_map(of).collect();
+            let hint = names::hint(path, known.iter().map(String::as_str));
+            format!("there is no variable \"{path}\"{hint}")
+        })?;
+        let place = self.place(port);
+        let unit = match self.kind(port) {
+            Kind::Real { unit, .. } => unit.clone().unwrap_or_default(),
+            _ => String::new(),
+        };
+        Ok(Probed { name: path.into(), place, unit, items: self.items(port) })
+    }
+
+    /// Has a signal's variables seen at every communication point.
+    ///
+    /// # Errors
+    /// If a variable is not there, or if those that are added are not all in the same unit.
+    pub fn resolve(&mut self, signal: &Signal) -> Result<Resolved, String> {
+        let mut shown: Option<(f64, String)> = None;
+        let terms = signal.terms.iter().map(|term| {
+            let mut place = |path: &str| {
+                let probed = self.probe(path)?;
+                let own = self.display(self.probes[probed.place]);
+                match &shown {
+                    Some(other) if *other != own => {
+                        return Err(format!("\"{signal}\" mixes {} and {}", other.1, own.1));
+                    }
+                    _ => shown = Some(own),
+                }
+                Ok(probed.place)
+            };
+            Ok(Term { value: place(&term.value)?, minus: term.minus.as_deref().map(place).transpose()? })
+        });
+        let terms = terms.collect::<Result<Vec<_>, String>>()?;
+        let (mut factor, mut unit) = shown.unwrap_or((1.0, String::new()));
+        let over = signal.over.as_deref().map(|path| self.probe(path)).transpose()?.map(|own| own.place);
+        if let Some(over) = over {
+            let (own, name) = self.display(self.probes[over]);
+            if name != unit {
+                return Err(format!("\"{signal}\" divides {unit} by {name}"));
+            }
+            (factor, unit) = (factor / own, String::new());
+        }
+        let is_integer = matches!(terms[..], [Term { value, minus: None }]
+            if !matches!(self.kind(self.probes[value]), Kind::Real { .. }));
+        Ok(Resolved { terms, norm: signal.norm, over, factor, unit, is_integer })
+    }
+
+    /// Places of computing times, which differ from run to run, among a sample's values.
+    pub(crate) fn timings(&self) -> Vec<usize> {
+        let observe = &self.experiment.observe;
+        let timed = observe.metrics.values().filter(|measure| measure.timing);
+        timed
+            .filter_map(|measure| observe.list(measure.signals.get_ref()).ok())
+            .flatten()
+            .flat_map(Signal::paths)
+            .filter_map(|path| self.find(path))
+            .filter_map(|port| self.probes.iter().position(|known| *known == port))
+            .collect()
+    }
+
+    fn kind(&self, port: Port) -> &Kind {
+        &self.fmus[port.component].description.variables[port.variable].kind
+    }
+
+    fn items(&self, port: Port) -> Vec<(String, i32)> {
+        match self.kind(port) {
+            Kind::Enumeration { items } => items.clone(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Factor to the unit in which a variable wants to be shown, and that unit. Units with an
+    /// offset stay as they are.
+    fn display(&self, port: Port) -> (f64, String) {
+        let Kind::Real { unit: Some(unit), display_unit, .. } = self.kind(port) else {
+            return (1.0, String::new());
+        };
+        let units = &self.fmus[port.component].description.units;
+        units
+            .iter()
+            .find(|defined| defined.name == *unit)
+            .and_then(|defined| {
+                let wanted = display_unit.as_deref()?;
+                let (_, factor, _) = defined.displays.iter().find(|d| d.0 == wanted && d.2 == 0.0)?;
+                Some((*factor, wanted.to_string()))
+            })
+            .unwrap_or((1.0, unit.clone()))
+    }
+
+    /// What is doubtful about the experiment although it can be run.
+    ///
+    /// # Errors
+    /// If the run was asked to end.
+    pub fn doubts(&self, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
+        let mut doubts = delay::warnings(&self.parts(), &self.settings, &self.loops, self.clock.step());
+        for seed in seeds::without_effect(self, interrupt)? {
+            doubts.push(format!("--set {seed}: changes nothing, another seed comes to the same"));
+        }
+        Ok(doubts)
+    }
+
+    /// Runs the experiment from its start to its stop time.
+    ///
+    /// # Errors
+    /// If a unit or an observer fails, or if the run was asked to end. The observers have seen all
+    /// communication points up to then.
+    pub fn run(&self, observers: &mut [&mut dyn Observer], interrupt: &Interrupt) -> Result<(), Error> {
+        self.start(interrupt)?.run(observers)
+    }
+
+    /// Returns the initialized units.
+    ///
+    /// # Errors
+    /// If a unit cannot be instantiated or initialized.
+    pub fn start(&self, interrupt: &Interrupt) -> Result<Master, Error> {
+        self.start_with(&self.settings, interrupt)
+    }
+
+    /// Returns the units initialized with `settings` in place of the system's own.
+    pub(crate) fn start_with(
+        &self,
+        settings: &[Vec<Setting>],
+        interrupt: &Interrupt,
+    ) -> Result<Master, Error> {
+        let every = periods(&self.experiment, &self.order);
+        let mut members = Vec::new();
+        for (index, name) in self.order.iter().enumerate() {
+            let fmu = &self.fmus[index];
+            let unit: Box<dyn CoSimulationUnit> = Box::new(fmu.instantiate(name)?);
+            let on_invalid = self.experiment.simulation.on_invalid;
+            let mut unit = Watched::around(unit, name, fmu, on_invalid);
+            settings::apply(&settings[index], unit.as_mut()).map_err(|failure| Error::Unit {
+                component: name.clone(),
+                time: self.clock.start(),
+                failure,
+            })?;
+            members.push(Member { name: name.clone(), every: every[index], unit });
+        }
+        let coupling = self.experiment.simulation.coupling;
+        let mut master = Master::new(self.clock, coupling, members, &self.wires, &self.probes);
+        master.heed(interrupt);
+        master.initialize()?;
+        Ok(master)
+    }
+
+    /// Reads the values of all parameters after initialization, except those of type String.
+    ///
+    /// # Errors
+    /// If a unit cannot be read.
+    pub fn parameters(&self, master: &mut Master) -> Result<Parameters, Error> {
+        let parts = self.parts();
+        let mut all = Parameters::new();
+        for part in &parts {
+            let mut own = BTreeMap::new();
+            for name in part.description.names("parameter") {
+                let Some(port) = wiring::find(&format!("{}.{name}", part.name), &parts) else { continue };
+                let value = master.read(&[port])?[0];
+                own.insert(name.to_string(), plain_value(part.description, port, value));
+            }
+            all.insert(part.name.to_string(), own);
+        }
+        Ok(all)
+    }
+
+    /// Creates the recorder, which writes the file of the recorded variables into a folder.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn recorder(&self, folder: &Path, format: Format, labels: bool) -> Result<Recorder, Error> {
+        let column = |column: &Column| {
+            let port = column.port;
+            let unit = match self.kind(port) {
+                Kind::Real { unit, .. } => unit.clone(),
+                _ => None,
+            };
+            let (name, carrier) = (column.name.clone(), port.carrier);
+            let place = self.probes.iter().position(|known| *known == port)?;
+            Some(recorder::Column { name, place, carrier, unit, items: self.items(port) })
+        };
+        let columns: Vec<_> = self.columns.iter().filter_map(column).collect();
+        let path = folder.join(format.file());
+        Recorder::create(&path, format, &columns, self.experiment.record.every, labels)
+    }
+}
+
+pub(crate) fn parts<'a>(order: &'a [String], fmus: &'a [Rc<Fmu>]) -> Vec<Part<'a>> {
+    order.iter().zip(fmus).map(|(name, fmu)| Part { name, description: &fmu.description }).collect()
+}
+
+pub(crate) fn periods(experiment: &Experiment, order: &[String]) -> Vec<u32> {
+    order.iter().map(|name| experiment.components[name].every).collect()
+}
+
+fn plain_value(description: &ModelDescription, port: Port, value: f64) -> Value {
+    match &description.variables[port.variable].kind {
+        Kind::Boolean => (value != 0.0).into(),
+        Kind::Integer { .. } => (value as i64).into(),
+        Kind::Enumeration { items } => items
+            .iter()
+            .find(|(_, item)| f64::from(*item) == value)
+            .map_or_else(|| (value as i64).into(), |(name, _)| name.as_str().into()),
+        Kind::Real { .. } | Kind::String => value.into(),
+    }
+}

@@ -1,0 +1,157 @@
+//! Watches what a unit gives: a value that is no number, no item of its enumeration, or neither true nor false would spread through the loop and
+//! pass for a result.
+
+use fmu_import::description::Carrier;
+use fmu_import::description::{Kind, Variable};
+use fmu_import::fmu::Fmu;
+use fmu_import::unit::UnitFailure;
+use fmu_import::unit::{CoSimulationUnit, Outcome};
+use fmu_import::warnings;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::rc::Rc;
+
+/// What is done about an invalid value.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnInvalid {
+    /// It ends the run.
+    #[default]
+    Error,
+    /// It is told once for each variable.
+    Warn,
+    /// Nothing.
+    Allow,
+}
+
+/// A unit whose values are watched.
+pub(crate) struct Watched {
+    unit: Box<dyn CoSimulationUnit>,
+    name: String,
+    /// Knows the names of the variables.
+    fmu: Rc<Fmu>,
+    /// References of the enumerations, sorted, with the values of their items.
+    items: Vec<(u32, Vec<i32>)>,
+    warns: bool,
+}
+
+impl Watched {
+    /// Watches `unit`, which is called `name`. With [`OnInvalid::Allow`] it is given back as it is.
+    pub(crate) fn around(
+        unit: Box<dyn CoSimulationUnit>,
+        name: &str,
+        fmu: &Rc<Fmu>,
+        on_invalid: OnInvalid,
+    ) -> Box<dyn CoSimulationUnit> {
+        if on_invalid == OnInvalid::Allow {
+            return unit;
+        }
+        let of_items = |variable: &Variable| match &variable.kind {
+            Kind::Enumeration { items } => {
+                Some((variable.reference, items.iter().map(|(_, value)| *value).collect()))
+            }
+            _ => None,
+        };
+        let mut items: Vec<(u32, Vec<i32>)> = fmu.description.variables.iter().filter_map(of_items).collect();
+        items.sort();
+        Box::new(Self {
+            unit,
+            name: name.to_string(),
+            fmu: fmu.clone(),
+            items,
+            warns: on_invalid == OnInvalid::Warn,
+        })
+    }
+
+    #[cold]
+    fn invalid(
+        &self,
+        call: &'static str,
+        carrier: Carrier,
+        reference: u32,
+        value: &str,
+        what: &str,
+    ) -> Outcome {
+        let is_meant =
+            |known: &&Variable| (Carrier::of(&known.kind), known.reference) == (Some(carrier), reference);
+        let known = self.fmu.description.variables.iter().find(is_meant);
+        let variable =
+            known.map_or_else(|| format!("variable {reference}"), |known| format!("\"{}\"", known.name));
+        if !self.warns {
+            let remedy = "--on-invalid warn lets the run go on";
+            return Err(UnitFailure::new(call, format!("{variable} is {value}, {what}; {remedy}")));
+        }
+        warnings::warn(&format!("{}: {variable} is {what}", self.name));
+        Ok(())
+    }
+}
+
+impl CoSimulationUnit for Watched {
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
+        self.unit.get_real(references, values)?;
+        for (value, &reference) in values.iter().zip(references) {
+            if !value.is_finite() {
+                self.invalid("getReal", Carrier::Real, reference, &value.to_string(), "not finite")?;
+            }
+        }
+        Ok(())
+    }
+
+    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
+        self.unit.get_integer(references, values)?;
+        if self.items.is_empty() {
+            return Ok(());
+        }
+        for (value, &reference) in values.iter().zip(references) {
+            let place = self.items.binary_search_by_key(&reference, |(reference, _)| *reference);
+            if place.is_ok_and(|place| !self.items[place].1.contains(value)) {
+                let what = "no item of its enumeration";
+                self.invalid("getInteger", Carrier::Integer, reference, &value.to_string(), what)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
+        self.unit.get_boolean(references, values)?;
+        for (value, &reference) in values.iter().zip(references) {
+            if !matches!(value, 0 | 1) {
+                let what = "neither true nor false";
+                self.invalid("getBoolean", Carrier::Boolean, reference, &value.to_string(), what)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
+        self.unit.set_real(references, values)
+    }
+
+    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        self.unit.set_integer(references, values)
+    }
+
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        self.unit.set_boolean(references, values)
+    }
+
+    fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
+        self.unit.set_string(reference, value)
+    }
+
+    fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
+        self.unit.enter_initialization(start, stop)
+    }
+
+    fn exit_initialization(&mut self) -> Outcome {
+        self.unit.exit_initialization()
+    }
+
+    fn do_step(&mut self, time: f64, step: f64) -> Outcome {
+        self.unit.do_step(time, step)
+    }
+
+    fn terminate(&mut self) -> Outcome {
+        self.unit.terminate()
+    }
+}

@@ -1,0 +1,103 @@
+//! The folder of a run's results: taken by one process at a time, never with results of two runs side by side.
+
+use cosim::error::Error;
+use std::fs::{self, File, TryLockError};
+use std::path::{Path, PathBuf};
+
+/// Names of the files that a run may write.
+pub const RESULTS: [&str; 6] =
+    ["results.csv", "results.parquet", "results.json", "metrics.json", "plot.svg", "realtime.svg"];
+
+/// A folder that belongs to this process for as long as this lives.
+pub struct Folder {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl Folder {
+    /// Whether the results of a run may go there.
+    ///
+    /// # Errors
+    /// If it is no folder, or holds results that may not be replaced.
+    pub fn check(path: &Path, replaces: bool) -> Result<(), Error> {
+        if path.exists() && !path.is_dir() {
+            return Err(Error::experiment(format!(
+                "--out {} is a file: results go into a folder, name another one",
+                path.display()
+            )));
+        }
+        match RESULTS.into_iter().find(|name| path.join(name).exists()) {
+            Some(name) if !replaces => Err(Error::experiment(format!(
+                "{} holds results of an earlier run ({name}): --force replaces them, --out takes another folder",
+                path.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// Makes the folder and takes it. What it holds is left alone.
+    ///
+    /// # Errors
+    /// If another process has it, or it cannot be made.
+    pub fn take(path: &Path) -> Result<Self, Error> {
+        fs::create_dir_all(path).map_err(Error::file(path))?;
+        let lock = open(path).map_err(Error::file(path))?;
+        match lock.try_lock() {
+            // Where there are no locks, as on some network drives, it goes without.
+            Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { path: path.to_path_buf(), _lock: lock }),
+            Err(TryLockError::WouldBlock) => Err(Error::experiment(format!(
+                "another process is writing its results to {}: wait for it, or take another folder by --out",
+                path.display()
+            ))),
+        }
+    }
+
+    /// Removes the results of an earlier run.
+    ///
+    /// # Errors
+    /// If one cannot be removed.
+    pub fn clear(&self) -> Result<(), Error> {
+        for path in RESULTS.map(|name| self.path.join(name)) {
+            if path.exists() {
+                fs::remove_file(&path).map_err(Error::file(&path))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The folder itself carries the lock, so that nothing is left in it.
+#[cfg(unix)]
+fn open(path: &Path) -> std::io::Result<File> {
+    File::open(path)
+}
+
+#[cfg(not(unix))]
+fn open(path: &Path) -> std::io::Result<File> {
+    File::options().create(true).truncate(false).write(true).open(path.join(".lock"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_taken_once_and_given_back() {
+        let outer = tempfile::tempdir().unwrap();
+        let path = outer.path().join("out");
+        let refusal = |outcome: Result<(), Error>| outcome.unwrap_err().to_string();
+        let first = Folder::take(&path).unwrap();
+        let second = refusal(Folder::take(&path).map(drop));
+        assert!(second.contains("another process is writing its results to"), "{second}");
+        drop(first);
+        let folder = Folder::take(&path).unwrap();
+        fs::write(path.join("plot.svg"), "").unwrap();
+        fs::write(path.join("notes.txt"), "").unwrap();
+        assert!(refusal(Folder::check(&path, false)).contains("results of an earlier run (plot.svg)"));
+        Folder::check(&path, true).unwrap();
+        folder.clear().unwrap();
+        assert!(!path.join("plot.svg").exists() && path.join("notes.txt").exists());
+        Folder::check(&path, false).unwrap();
+        assert!(refusal(Folder::check(&path.join("notes.txt"), true)).contains("is a file"));
+    }
+}

@@ -1,0 +1,227 @@
+//! The guarantee that a unit gives that limits are kept: when it is in force, and whether it is
+//! kept.
+
+use crate::measure::larger;
+use cosim::error::Error;
+use cosim::experiment::Guarantee;
+use cosim::master::{Observer, Sample};
+use cosim::signal::Resolved;
+use cosim::system::{Probed, System};
+
+/// The variables in which a unit says whether its guarantee is in force.
+#[derive(Clone, Debug, Default)]
+pub struct Signals {
+    /// Place of the variable that says whether the limits are guaranteed to be kept.
+    pub in_force: usize,
+    /// Why it is in force or not, as an item of an enumeration.
+    pub status: Option<Probed>,
+    /// Names and places of the shares of the limits that are left beyond what is reserved.
+    pub margins: Vec<(String, usize)>,
+    /// Signals as multiples of their limits.
+    pub keeps: Vec<Resolved>,
+}
+
+/// The first tick at which the guarantee was no longer in force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Loss {
+    /// Time of that tick, s.
+    pub time: f64,
+    /// Status of the guarantee at that tick.
+    pub status: Option<f64>,
+}
+
+/// Course of the guarantee up to a tick.
+#[derive(Clone, Debug, Default)]
+pub struct Course {
+    /// What it is made of.
+    pub signals: Signals,
+    ticks: u64,
+    ticks_in_force: u64,
+    status: Option<f64>,
+    /// Tick at which the guarantee was first lost, if it was.
+    pub lost: Option<Loss>,
+    /// Smallest margins while it was in force.
+    pub margins: Vec<Option<f64>>,
+    /// Whether a limit was exceeded at a tick at which it was in force.
+    pub broken: bool,
+}
+
+/// Tolerance with which limits count as met, because of rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// The smaller value. Unlike `f64::min` it does not hide a value that is not a number.
+fn smaller(a: f64, b: f64) -> f64 {
+    if b < a || b.is_nan() { b } else { a }
+}
+
+impl Signals {
+    /// Finds the variables; `None` if they are optional and the units lack one that is needed.
+    ///
+    /// # Errors
+    /// If a variable is not there.
+    pub fn find(asked: &Guarantee, system: &mut System) -> Result<Option<Self>, String> {
+        let may_lack = asked.optional || system.is_exchanged([asked.in_force.as_str()]);
+        if may_lack && !system.has(&asked.in_force) {
+            return Ok(None);
+        }
+        let in_force = system.probe(&asked.in_force)?.place;
+        let is_left_out = |path: &str, system: &System| may_lack && !system.has(path);
+        let mut signals = Self { in_force, ..Self::default() };
+        if let Some(path) = asked.status.as_ref().filter(|path| !is_left_out(path, system)) {
+            signals.status = Some(system.probe(path)?);
+        }
+        for (name, path) in &asked.margins {
+            if !is_left_out(path, system) {
+                signals.margins.push((name.clone(), system.probe(path)?.place));
+            }
+        }
+        let observe = system.experiment.observe.clone();
+        let keeps = asked.keeps.as_ref().map_or(Ok(&[][..]), |name| observe.list(name))?;
+        for signal in keeps {
+            if signal.paths().into_iter().all(|path| !is_left_out(path, system)) {
+                signals.keeps.push(system.resolve(signal)?);
+            }
+        }
+        Ok(Some(signals))
+    }
+}
+
+impl Course {
+    /// Creates a course without samples.
+    pub fn new(signals: Signals) -> Self {
+        Self { margins: vec![None; signals.margins.len()], signals, ..Self::default() }
+    }
+
+    /// Share of the ticks at which it was in force; `None` before the first.
+    pub fn share(&self) -> Option<f64> {
+        (self.ticks > 0).then(|| self.ticks_in_force as f64 / self.ticks as f64)
+    }
+
+    /// Whether these values say that the guarantee is in force.
+    pub fn is_in_force(&self, values: &[f64]) -> bool {
+        values[self.signals.in_force] != 0.0
+    }
+
+    /// Margins by these values.
+    pub fn margins_at(&self, values: &[f64]) -> Vec<Option<f64>> {
+        self.signals.margins.iter().map(|(_, place)| Some(values[*place])).collect()
+    }
+
+    /// Status of the guarantee at the last tick seen.
+    pub fn status_now(&self) -> Option<f64> {
+        self.status
+    }
+
+    /// Status when it was first lost; if it never was, the present one.
+    pub fn status(&self) -> Option<f64> {
+        self.lost.map_or(self.status, |loss| loss.status)
+    }
+
+    /// A status by the name of its item.
+    pub fn name_of(&self, status: f64) -> String {
+        let mut items = self.signals.status.iter().flat_map(|status| &status.items);
+        let item = items.find(|(_, item)| f64::from(*item) == status);
+        item.map_or_else(|| status.to_string(), |(name, _)| name.clone())
+    }
+
+    /// Formats margins as part of a sentence.
+    pub fn told(&self, margins: &[Option<f64>]) -> String {
+        told(margins.iter().copied().zip(self.signals.margins.iter().map(|(name, _)| name.as_str())))
+    }
+}
+
+/// Formats margins with their names as part of a sentence.
+pub(crate) fn told<'a>(margins: impl Iterator<Item = (Option<f64>, &'a str)>) -> String {
+    let known = margins.filter_map(|(margin, name)| Some((margin?, name)));
+    let texts: Vec<String> =
+        known.map(|(margin, name)| format!("{:.1} % ({name})", margin * 100.0)).collect();
+    if texts.is_empty() { String::new() } else { format!(", margins {}", texts.join(", ")) }
+}
+
+impl Observer for Course {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        let values = sample.values;
+        self.ticks += 1;
+        self.status = self.signals.status.as_ref().map(|status| values[status.place]);
+        if self.is_in_force(values) {
+            self.ticks_in_force += 1;
+            for (smallest, (_, place)) in self.margins.iter_mut().zip(&self.signals.margins) {
+                *smallest = smallest.iter().copied().chain([values[*place]]).reduce(smaller);
+            }
+            // A value that is not a number is not within its limit.
+            let largest = self.signals.keeps.iter().map(|signal| signal.value(values)).fold(0.0, larger);
+            self.broken |= largest.is_nan() || largest > 1.0 + ROUNDING;
+        } else if self.ticks_in_force > 0 && self.lost.is_none() {
+            self.lost = Some(Loss { time: sample.time, status: self.status });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values: in force, status, margins of rate and moment, rate and moment as multiples of their
+    /// limits 0.1 and 10.
+    fn course(rows: &[[f64; 6]]) -> Course {
+        let keeps = |place| Resolved::variable(place);
+        let mut course = Course::new(Signals {
+            in_force: 0,
+            status: Some(Probed { place: 1, ..Probed::default() }),
+            margins: vec![("rate".into(), 2), ("moment".into(), 3)],
+            keeps: vec![keeps(4), keeps(5)],
+        });
+        for (tick, row) in rows.iter().enumerate() {
+            let [.., rate, moment] = *row;
+            let mut values = *row;
+            (values[4], values[5]) = (rate / 0.1, moment / 10.0);
+            let time = 0.5 * tick as f64;
+            let last = tick + 1 == rows.len();
+            course.observe(&Sample { tick: tick as u64, time, last, values: &values }).unwrap();
+        }
+        course
+    }
+
+    #[test]
+    fn oracle_share_loss_and_margins_by_hand() {
+        let course = course(&[
+            // Not in force yet: no loss, and its margins and limits do not count.
+            [0.0, 2.0, -1.0, -1.0, 9.0, 99.0],
+            [1.0, 1.0, 0.3, 0.1, 0.05, 5.0],
+            [1.0, 1.0, 0.2, 0.4, 0.1, 10.0],
+            [0.0, 5.0, -1.0, -1.0, 0.2, 5.0],
+            // A second loss is not the first.
+            [1.0, 1.0, 0.5, 0.5, 0.0, 0.0],
+            [0.0, 4.0, 0.0, 0.0, 0.0, 0.0],
+        ]);
+        assert_eq!(course.share(), Some(0.5));
+        assert_eq!(course.lost, Some(Loss { time: 1.5, status: Some(5.0) }));
+        assert_eq!(course.status(), Some(5.0));
+        assert_eq!(course.margins, [Some(0.2), Some(0.1)]);
+        assert!(!course.broken);
+    }
+
+    #[test]
+    fn a_limit_that_is_exceeded_in_force_is_a_defect() {
+        assert!(!course(&[[1.0, 1.0, 0.0, 0.0, 0.1 * (1.0 + 1e-12), 10.0]]).broken);
+        assert!(course(&[[1.0, 1.0, 0.0, 0.0, 0.1001, 0.0]]).broken);
+        assert!(course(&[[1.0, 1.0, 0.0, 0.0, 0.0, 10.01]]).broken);
+        assert!(course(&[[1.0, 1.0, 0.0, 0.0, f64::NAN, 0.0]]).broken);
+        assert!(!course(&[[0.0, 3.0, 0.0, 0.0, 0.2, 20.0]]).broken);
+    }
+
+    #[test]
+    fn what_was_never_in_force_was_not_lost_and_has_no_margins() {
+        let course = course(&[[0.0, 2.0, 0.1, 0.1, 0.0, 0.0], [0.0, 3.0, 0.1, 0.1, 0.0, 0.0]]);
+        assert_eq!((course.share(), course.lost, course.status()), (Some(0.0), None, Some(3.0)));
+        assert_eq!(course.margins, [None; 2]);
+    }
+
+    #[test]
+    fn a_margin_that_is_not_a_number_is_not_hidden() {
+        let course = course(&[[1.0, 1.0, 0.1, f64::NAN, 0.0, 0.0], [1.0, 1.0, 0.1, 0.1, 0.0, 0.0]]);
+        assert!(course.margins[1].is_some_and(f64::is_nan));
+    }
+
+}

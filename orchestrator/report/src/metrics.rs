@@ -1,0 +1,256 @@
+//! The metrics that an experiment asks for, taken while the run goes on, as `metrics.json` holds
+//! them.
+
+use crate::guarantee::{Course, Signals};
+use crate::measure::{self, Gauge};
+use cosim::error::Error;
+use cosim::experiment::{Guarantee, Observe};
+use cosim::master::{Observer, Sample};
+use cosim::pacing::report::RealTime;
+use cosim::signal::Resolved;
+use cosim::system::System;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Value of a metric.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// A count.
+    Count(u64),
+    /// A number.
+    Number(f64),
+    /// Yes or no.
+    Flag(bool),
+    /// A text, such as the item of an enumeration.
+    Text(String),
+}
+
+/// The metrics of a run. One is `None` (null) if the units lack what it is taken of.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Metrics {
+    /// The metrics that the experiment asks for, by name, with those of the guarantee.
+    #[serde(flatten)]
+    pub asked: BTreeMap<String, Option<Value>>,
+    /// Simulated time divided by elapsed time.
+    pub real_time_factor: Option<f64>,
+    /// Elapsed wall-clock time, s.
+    pub wall_s: f64,
+    /// Largest delay of a feedback loop in addition to the units' own, s; null if there is no loop.
+    pub loop_delay_s: Option<f64>,
+    /// Number of communication points that the run reached.
+    pub samples: u64,
+    /// Whether the run reached its stop time. A loss ends a single run, but not the runs of a study.
+    pub completed: bool,
+    /// First time at which the run was lost, s; null if it never was, or if the experiment does not
+    /// say when it is.
+    #[serde(default)]
+    pub lost_at: Option<f64>,
+    /// Mean computing time of each component per step of its own, µs, if it was measured.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub step_us: BTreeMap<String, f64>,
+    /// Timing of the run against the wall clock, if it was paced.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub real_time: Option<RealTime>,
+    /// Units of the metrics that have one.
+    #[serde(skip)]
+    pub units: BTreeMap<String, String>,
+}
+
+/// Metrics that every run has.
+const ALWAYS: [&str; 6] =
+    ["real_time_factor", "wall_s", "loop_delay_s", "samples", "completed", "lost_at"];
+
+impl Metrics {
+    /// Names of the metrics that runs of an experiment have.
+    pub fn names(observe: &Observe) -> Vec<String> {
+        let guarantee = observe.guarantee.iter().flat_map(of_guarantee);
+        ALWAYS.map(String::from).into_iter().chain(observe.metrics.keys().cloned()).chain(guarantee).collect()
+    }
+
+    /// A metric as a number, with 1 and 0 for yes and no; `None` if it has no value or is a text.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        let flag = |is: bool| Some(f64::from(u8::from(is)));
+        match name {
+            "real_time_factor" => self.real_time_factor,
+            "wall_s" => Some(self.wall_s),
+            "loop_delay_s" => self.loop_delay_s,
+            "samples" => Some(self.samples as f64),
+            "completed" => flag(self.completed),
+            "lost_at" => self.lost_at,
+            _ => match self.asked.get(name)?.as_ref()? {
+                Value::Count(count) => Some(*count as f64),
+                Value::Number(number) => Some(*number),
+                Value::Flag(is) => flag(*is),
+                Value::Text(_) => None,
+            },
+        }
+    }
+
+    /// A metric as a text.
+    pub fn text(&self, name: &str) -> Option<&str> {
+        match self.asked.get(name)?.as_ref()? {
+            Value::Text(text) => Some(text),
+            _ => None,
+        }
+    }
+}
+
+/// Names of the metrics of a guarantee.
+fn of_guarantee(asked: &Guarantee) -> Vec<String> {
+    let margins = asked.margins.keys().map(|name| margin(name));
+    let kept = asked.keeps.iter().map(|_| "broken".into());
+    let names = ["share", "lost_at", "status"].map(String::from).into_iter().chain(margins).chain(kept);
+    names.map(|name| format!("guarantee_{name}")).collect()
+}
+
+fn margin(name: &str) -> String {
+    format!("{name}_margin_min")
+}
+
+/// Takes the metrics of a run.
+pub struct Meters {
+    gauges: BTreeMap<String, Option<Gauge>>,
+    /// The experiment's guarantee, if it names one, and its course, if the units have it.
+    guarantee: (Option<Guarantee>, Option<Course>),
+    loss: Option<Loss>,
+    samples: u64,
+    completed: bool,
+}
+
+/// Bound beyond which a run is lost.
+struct Loss {
+    what: String,
+    signals: Vec<Resolved>,
+    beyond: f64,
+    ends_run: bool,
+    /// First time at which the bound was exceeded, s.
+    at: Option<f64>,
+}
+
+impl Meters {
+    /// Creates the meters that the experiment of a system asks for.
+    ///
+    /// # Errors
+    /// If the experiment names a variable that is not there.
+    pub fn new(system: &mut System) -> Result<Self, Error> {
+        let observe = system.experiment.observe.clone();
+        let mut gauges = BTreeMap::new();
+        for (name, measure) in &observe.metrics {
+            let fault = |problem| Error::experiment(format!("[observe.metrics.{name}] {problem}"));
+            gauges.insert(name.clone(), measure::asked(measure, &observe, system).map_err(fault)?);
+        }
+        let fault = |problem| Error::experiment(format!("[observe.guarantee] {problem}"));
+        let guarantee = observe.guarantee.clone();
+        let signals = guarantee.as_ref().map(|asked| Signals::find(asked, system)).transpose();
+        let course = signals.map_err(fault)?.flatten().map(Course::new);
+        let loss = observe.loss.as_ref().map(|loss| {
+            let fault = |problem| Error::experiment(format!("[observe.loss] {problem}"));
+            if loss.beyond.is_nan() || loss.beyond <= 0.0 {
+                return Err(fault(format!("beyond = {}: above 0", loss.beyond)));
+            }
+            let signals = observe.list(&loss.signals).map_err(fault)?;
+            let (what, beyond) = (loss.what.clone(), loss.beyond);
+            let paths = || signals.iter().flat_map(cosim::signal::Signal::paths);
+            if system.is_exchanged(paths()) && paths().any(|path| !system.has(path)) {
+                return Ok(None);
+            }
+            let signals = signals.iter().map(|signal| system.resolve(signal));
+            let signals = signals.collect::<Result<_, _>>().map_err(fault)?;
+            Ok(Some(Loss { what, signals, beyond, ends_run: false, at: None }))
+        });
+        let loss = loss.transpose()?.flatten();
+        Ok(Self { gauges, guarantee: (guarantee, course), loss, samples: 0, completed: false })
+    }
+
+    /// Makes a loss end the run.
+    #[must_use]
+    pub fn ending_when_lost(mut self) -> Self {
+        if let Some(loss) = &mut self.loss {
+            loss.ends_run = true;
+        }
+        self
+    }
+
+    /// The single values of the metrics that keep them, by name, in the order of time.
+    pub fn samples(&self) -> BTreeMap<String, Vec<f64>> {
+        let gauges = self.gauges.iter().filter_map(|(name, gauge)| Some((name, gauge.as_ref()?.samples())));
+        gauges.filter(|(_, samples)| !samples.is_empty()).map(|(name, s)| (name.clone(), s)).collect()
+    }
+
+    /// Number of communication points seen.
+    pub fn seen(&self) -> u64 {
+        self.samples
+    }
+
+    /// Metrics of the communication points seen so far; what the observer does not know is left
+    /// out.
+    pub fn metrics(&self) -> Metrics {
+        let value = |gauge: &Gauge| {
+            let value = gauge.value()?;
+            Some(if gauge.counts() && value >= 0.0 { Value::Count(value as u64) } else { Value::Number(value) })
+        };
+        let gauges = self.gauges.iter();
+        let mut asked: BTreeMap<_, _> =
+            gauges.map(|(name, gauge)| (name.clone(), gauge.as_ref().and_then(value))).collect();
+        if let (Some(guarantee), course) = &self.guarantee {
+            asked.extend(of_guarantee(guarantee).into_iter().map(|name| (name, None)));
+            if let Some(course) = course {
+                let mut set = |name: &str, value: Option<Value>| {
+                    asked.insert(format!("guarantee_{name}"), value);
+                };
+                set("share", course.share().map(Value::Number));
+                set("lost_at", course.lost.map(|loss| Value::Number(loss.time)));
+                set("status", course.status().map(|status| Value::Text(course.name_of(status))));
+                for ((name, _), least) in course.signals.margins.iter().zip(&course.margins) {
+                    set(&margin(name), least.map(Value::Number));
+                }
+                if !course.signals.keeps.is_empty() {
+                    set("broken", Some(Value::Flag(course.broken)));
+                }
+            }
+        }
+        let units = self.gauges.iter().filter_map(|(name, gauge)| Some((name, gauge.as_ref()?.unit())));
+        Metrics {
+            asked,
+            samples: self.samples,
+            completed: self.completed,
+            lost_at: self.loss.as_ref().and_then(|loss| loss.at),
+            units: units.map(|(name, unit)| (name.clone(), unit.to_string())).collect(),
+            ..Metrics::default()
+        }
+    }
+}
+
+impl Observer for Meters {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        for gauge in self.gauges.values_mut().flatten() {
+            gauge.observe(sample)?;
+        }
+        if let Some(course) = &mut self.guarantee.1 {
+            course.observe(sample)?;
+        }
+        self.samples += 1;
+        self.completed |= sample.last;
+        if let Some(loss) = self.loss.as_mut().filter(|loss| loss.at.is_none()) {
+            let squares = loss.signals.iter().map(|signal| signal.value(sample.values).powi(2));
+            let norm = squares.sum::<f64>().sqrt();
+            // A norm that is not a number counts as lost, too.
+            if norm.is_nan() || norm > loss.beyond {
+                loss.at = Some(sample.time);
+                if loss.ends_run {
+                    let unit = loss.signals.first().map_or("", |signal| &signal.unit);
+                    let reason = format!(
+                        "further than {} {unit} from its reference ([observe.loss])",
+                        loss.beyond
+                    );
+                    return Err(Error::Lost { what: loss.what.clone(), time: sample.time, reason });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

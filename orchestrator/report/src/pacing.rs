@@ -1,0 +1,85 @@
+//! A figure of a paced run, with step times and wake-up jitter as time series and as distributions.
+
+use cosim::pacing::report::{RealTime, Series};
+use cosim::error::Error;
+use crate::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
+use std::path::Path;
+
+/// Colours of the components, assigned in their order.
+const COLORS: [Color; 6] = [
+    Color(31, 119, 180),
+    Color(255, 127, 14),
+    Color(44, 160, 44),
+    Color(148, 103, 189),
+    Color(140, 86, 75),
+    Color(23, 190, 207),
+];
+
+/// Draws the figure and writes it to a file.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn draw(
+    path: &Path,
+    title: &str,
+    report: &RealTime,
+    wake_ups: Series,
+    steps: Vec<(String, Series)>,
+) -> Result<(), Error> {
+    let color = |index: usize| COLORS[index % COLORS.len()];
+    let line = |name: &str, color, series: Series| Curve {
+        name: name.into(),
+        color,
+        shape: Shape::Line,
+        x: series.time,
+        y: series.milliseconds,
+    };
+    let columns = |name: &str, color, histogram: &[(f64, u64)]| Curve {
+        name: name.into(),
+        color,
+        shape: Shape::Steps,
+        // The value at an x holds up to the next x.
+        x: histogram
+            .first()
+            .map(|(end, _)| end / 2.0)
+            .into_iter()
+            .chain(histogram.iter().map(|(end, _)| *end))
+            .collect(),
+        y: histogram.iter().map(|(_, count)| *count as f64).chain([0.0]).collect(),
+    };
+    let panel = |y_label: &str, x_label: &str, log_x, curves| Panel {
+        title: String::new(),
+        x_label: x_label.into(),
+        y_label: y_label.into(),
+        log_x,
+        x_range: None,
+        curves,
+    };
+    let names: Vec<String> = steps.iter().map(|(name, _)| name.clone()).collect();
+    let courses =
+        steps.into_iter().enumerate().map(|(index, (name, series))| line(&name, color(index), series));
+    let counts = names.iter().enumerate().filter_map(|(index, name)| {
+        report.components.get(name).map(|component| columns(name, color(index), &component.step_ms.histogram))
+    });
+    let mut panels = vec![
+        panel("step time, ms", "time, s", false, courses.collect()),
+        panel("number of steps", "duration, ms", true, counts.collect()),
+    ];
+    if report.wake_up_ms.count > 0 {
+        let counts = columns("wake-up", Color::GREY, &report.wake_up_ms.histogram);
+        panels.push(panel(
+            "wake-up jitter, ms",
+            "time, s",
+            false,
+            vec![line("wake-up", Color::GREY, wake_ups)],
+        ));
+        panels.push(panel("number of wake-ups", "duration, ms", true, vec![counts]));
+    }
+    let title = format!(
+        "{title}: factor {}, {} of {} deadlines missed",
+        report.factor.get(),
+        report.misses,
+        report.deadlines
+    );
+    svg::write(&Figure { title, columns: 2, legend: Legend::Above, panels }, path)
+}

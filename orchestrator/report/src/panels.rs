@@ -1,0 +1,90 @@
+//! The panels of an experiment with their signals found, for the figure of a run and for the live
+//! view.
+
+use cosim::error::Error;
+use cosim::experiment;
+use cosim::signal::{Resolved, Signal};
+use cosim::system::System;
+
+/// A panel with its signals found.
+#[derive(Clone, Debug, Default)]
+pub struct Panel {
+    /// Short name.
+    pub name: String,
+    /// Label of the vertical axis without the unit.
+    pub label: String,
+    /// Unit of all values.
+    pub unit: String,
+    factor: f64,
+    /// The curves.
+    pub curves: Vec<Curve>,
+    limit: Option<Resolved>,
+}
+
+/// A curve of a panel.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Name in the legend.
+    pub name: String,
+    of: Resolved,
+    reference: Option<Resolved>,
+}
+
+impl Panel {
+    /// Finds the signals of all panels of an experiment. What a unit lacks that the command line
+    /// exchanged is left out.
+    ///
+    /// # Errors
+    /// If a variable is not there.
+    pub fn all(system: &mut System) -> Result<Vec<Self>, Error> {
+        let panels = system.experiment.observe.panels.clone();
+        let found = panels.iter().map(|panel| {
+            let fault = |problem| {
+                Error::experiment(format!("[[observe.panels]] \"{}\": {problem}", panel.name))
+            };
+            Self::find(panel, system).map_err(fault)
+        });
+        let found = found.collect::<Result<Vec<_>, _>>()?;
+        Ok(found.into_iter().filter(|panel| !panel.curves.is_empty()).collect())
+    }
+
+    fn find(asked: &experiment::Panel, system: &mut System) -> Result<Self, String> {
+        let mut found = |signal: &Signal| {
+            if system.is_exchanged(signal.paths()) && signal.paths().iter().any(|path| !system.has(path)) {
+                return Ok(None);
+            }
+            system.resolve(signal).map(Some)
+        };
+        let mut curves = Vec::new();
+        for experiment::Curve { name, of, reference } in &asked.curves {
+            let reference = reference.as_ref().map(&mut found).transpose()?.flatten();
+            curves.extend(found(of)?.map(|of| Curve { name: name.clone(), of, reference }));
+        }
+        let limit = asked.limit.as_ref().map(&mut found).transpose()?.flatten();
+        let own = curves.first().map_or(String::new(), |curve| curve.of.unit.clone());
+        let (unit, factor) = asked.unit.as_ref().map_or((own, 1.0), |unit| (unit.name.clone(), unit.factor));
+        let label = if asked.label.is_empty() { &asked.name } else { &asked.label };
+        Ok(Self { name: asked.name.clone(), label: label.clone(), unit, factor, curves, limit })
+    }
+
+    /// Values of the curves in a sample.
+    pub fn values<'a>(&'a self, sample: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        self.curves.iter().map(|curve| self.factor * curve.of.value(sample))
+    }
+
+    /// Whether there is anything that the curves are to follow.
+    pub fn has_references(&self) -> bool {
+        self.curves.iter().any(|curve| curve.reference.is_some())
+    }
+
+    /// Values of what the curves are to follow in a sample; not a number where there is nothing.
+    pub fn references<'a>(&'a self, sample: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        let of = |signal: &Resolved| self.factor * signal.value(sample);
+        self.curves.iter().map(move |curve| curve.reference.as_ref().map_or(f64::NAN, of))
+    }
+
+    /// The limit of the norm of all curves in a sample, if there is one.
+    pub fn limit(&self, sample: &[f64]) -> Option<f64> {
+        self.limit.as_ref().map(|limit| self.factor * limit.value(sample))
+    }
+}

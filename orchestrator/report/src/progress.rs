@@ -1,0 +1,113 @@
+//! Shows how far a run has got: a bar on a terminal, nothing that moves otherwise.
+
+use cosim::error::Error;
+use cosim::master::{Observer, Sample};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::fmt::Arguments;
+use std::io::{IsTerminal, Write, stderr};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// A plain line. If standard error cannot be written, there is no one to tell.
+fn tell(line: Arguments) {
+    let _ = writeln!(stderr(), "{line}");
+}
+
+/// A hidden bar unless standard error is a terminal and something is to be shown.
+fn bar(length: u64, quiet: bool, template: &str) -> ProgressBar {
+    let shown = stderr().is_terminal() && !quiet;
+    let target = if shown { ProgressDrawTarget::stderr_with_hz(10) } else { ProgressDrawTarget::hidden() };
+    let bar = ProgressBar::with_draw_target(Some(length), target);
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    bar
+}
+
+/// A bar that is redrawn a few times a second.
+pub struct Progress {
+    bar: ProgressBar,
+    stride: u64,
+}
+
+impl Progress {
+    /// A bar for `ticks` steps, drawn to standard error if that is a terminal and `quiet` is not asked for; otherwise one
+    /// plain line. `apart` draws it by a thread of its own, so that the run never waits for the terminal.
+    pub fn new(title: &str, ticks: u64, quiet: bool, apart: bool) -> Self {
+        if !stderr().is_terminal() && !quiet {
+            tell(format_args!("running {title}: {ticks} steps"));
+        }
+        let bar = bar(ticks, quiet, "{msg} [{bar:40}] {percent} %, {eta} left");
+        bar.set_message(title.to_string());
+        if apart {
+            bar.enable_steady_tick(Duration::from_millis(100));
+        }
+        Self { bar, stride: (ticks / 200).max(1) }
+    }
+}
+
+impl Observer for Progress {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        if sample.tick.is_multiple_of(self.stride) {
+            self.bar.set_position(sample.tick);
+        }
+        if sample.last {
+            self.bar.finish_and_clear();
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// Progress of work in parts, shared by the threads that do it: a bar on a terminal, otherwise a line every few seconds.
+pub struct Parts {
+    bar: ProgressBar,
+    quiet: bool,
+    all: u64,
+    last_line: Mutex<Instant>,
+}
+
+/// Time between two lines where there is no terminal.
+const BETWEEN_LINES: Duration = Duration::from_secs(5);
+
+impl Parts {
+    /// Creates a display for `all` parts, of which `done` are complete already.
+    pub fn new(title: &str, all: u64, done: u64, quiet: bool) -> Self {
+        let quiet = quiet || done == all;
+        if !stderr().is_terminal() && !quiet {
+            tell(format_args!("{title}: {} of {all} parts to run", all - done));
+        }
+        let bar = bar(all, quiet, "[{bar:40}] {pos} of {len} parts, {eta} left, {msg}");
+        bar.set_position(done);
+        bar.reset_eta();
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self { bar, quiet, all, last_line: Mutex::new(Instant::now()) }
+    }
+
+    /// Counts one more part as finished.
+    pub fn finished(&self, what: &str) {
+        self.bar.inc(1);
+        self.bar.set_message(what.to_string());
+        let mut last = self.last_line.lock().unwrap_or_else(PoisonError::into_inner);
+        if !self.quiet && !stderr().is_terminal() && last.elapsed() >= BETWEEN_LINES {
+            tell(format_args!("{} of {} parts done", self.bar.position(), self.all));
+            *last = Instant::now();
+        }
+    }
+
+    /// Ends the display when all work is done.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Drop for Parts {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

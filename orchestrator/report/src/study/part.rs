@@ -1,0 +1,379 @@
+//! One part of the work of a study: a run for some values of its parameter, from the experiment to what is kept of it.
+
+use crate::measure::{Gauge, larger};
+use cosim::signal::{Resolved, Signal};
+use super::{Run, Study};
+use crate::error::Error;
+use cosim::check::check;
+use cosim::error::Error as Single;
+use cosim::experiment::Experiment;
+use cosim::interrupt::Interrupt;
+use cosim::master::{Observer, Sample};
+use crate::metrics::{Meters, Metrics};
+use cosim::system::{Opened, System};
+use cosim::system::Parameters;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::path::PathBuf;
+use toml::Value;
+
+/// A part of a study's work: the members `range` of a run, counted from 0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Position of the run in the study.
+    pub run: usize,
+    /// Members of the run that belong to this part.
+    pub range: Range<u32>,
+}
+
+/// Results that are kept of a part.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// Results of each member, one for each value of the parameter.
+    pub members: Vec<Member>,
+    /// Signals of the run's first member, if it belongs to this part.
+    pub series: Option<Series>,
+    /// Parameters of all components in the first member, if it belongs to this part.
+    #[serde(default)]
+    pub parameters: Parameters,
+    /// Smallest and largest value of each signal over the members, at each communication point.
+    pub spread: BTreeMap<Signal, Spread>,
+}
+
+/// Results that are kept of one member of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Member {
+    /// Value of the parameter, if one is varied.
+    pub value: Option<i32>,
+    /// Figures of merit of the member.
+    pub metrics: Metrics,
+    /// Comparisons of signals with bounds, by id.
+    pub within: BTreeMap<String, Inside>,
+    /// Measures that the study defines, by id; null if a measure has no value.
+    pub measures: BTreeMap<String, Option<f64>>,
+}
+
+impl Member {
+    /// Whether this member had the same results as another one, apart from the computing times that `timings` names.
+    pub fn moves_as(&self, other: &Self, timings: &[String]) -> bool {
+        let timeless = |metrics: &Metrics| {
+            let mut metrics = Metrics { step_us: BTreeMap::new(), ..metrics.clone() };
+            metrics.asked.retain(|name, _| !timings.contains(name));
+            metrics
+        };
+        timeless(&self.metrics) == timeless(&other.metrics)
+            && self.within == other.within
+            && self.measures == other.measures
+    }
+}
+
+/// Comparison of signals with a bound.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Inside {
+    /// Number of samples in which all signals were within the bound.
+    pub inside: u64,
+    /// Number of all samples that were compared.
+    pub samples: u64,
+    /// Largest magnitude of any signal.
+    pub largest: f64,
+    /// Largest magnitude as a multiple of the bound.
+    pub ratio: f64,
+}
+
+/// Time series of signals.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Series {
+    /// Simulated times of the communication points, s.
+    pub time: Vec<f64>,
+    /// Values at these times, in the unit in which they are shown.
+    pub signals: BTreeMap<Signal, Vec<f64>>,
+    /// Unit in which each signal is shown.
+    pub units: BTreeMap<Signal, String>,
+    /// Single values of the metrics that keep them, by name.
+    pub samples: BTreeMap<String, Vec<f64>>,
+}
+
+/// Smallest and largest value at each communication point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Smallest value at each communication point.
+    pub low: Vec<f64>,
+    /// Largest value at each communication point.
+    pub high: Vec<f64>,
+}
+
+/// Tolerance with which bounds count as met, because of rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// The signals that a study wants of a run: as time series, and as bands.
+#[derive(Clone, Debug, Default)]
+pub struct Wanted {
+    /// Signals that are drawn as lines.
+    pub series: BTreeSet<Signal>,
+    /// Signals that are drawn as bands.
+    pub spread: BTreeSet<Signal>,
+}
+
+impl Wanted {
+    /// Collects the signals of a run that the study's figures draw.
+    pub fn of(study: &Study, run: &Run) -> Self {
+        let mut wanted = Self::default();
+        for figure in &study.figures {
+            for panel in &figure.panels {
+                if !study.runs_of(figure, panel).any(|drawn| drawn.id == run.id) {
+                    continue;
+                }
+                let drawn = panel.signal.iter().chain(panel.signals.iter().map(|curve| &curve.of));
+                let drawn: Vec<Signal> = drawn.cloned().collect();
+                if panel.spread {
+                    wanted.spread.extend(drawn.iter().cloned());
+                }
+                wanted.series.extend(drawn);
+                wanted.series.extend(panel.reference.clone());
+            }
+        }
+        wanted
+    }
+}
+
+/// A run of a study, ready to be made for any value of its parameter.
+pub struct Preparation<'a> {
+    study: &'a Study,
+    run: &'a Run,
+    /// Signals of the run that the figures draw.
+    pub wanted: Wanted,
+    /// The experiment, read once so that all members use the same text.
+    experiment: Experiment,
+    fmu_dirs: &'a [PathBuf],
+}
+
+impl<'a> Preparation<'a> {
+    /// Collects what is wanted of a run, and reads its experiment.
+    ///
+    /// # Errors
+    /// If the experiment cannot be read, or has not what the run changes in it.
+    pub fn new(study: &'a Study, run: &'a Run, fmu_dirs: &'a [PathBuf]) -> Result<Self, Error> {
+        let wanted = Wanted::of(study, run);
+        let experiment = study
+            .experiment(run)
+            .map_err(|source| Error::Run { run: run.id.get_ref().clone(), source })?;
+        Ok(Self { study, run, wanted, experiment, fmu_dirs })
+    }
+
+    /// The experiment with all names resolved, for the member with this number.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the experiment, the FMUs, or the signals.
+    pub fn system(&self, member: u32, opened: &mut Opened) -> Result<System, Single> {
+        let mut experiment = self.experiment.clone();
+        if let Some(vary) = &self.run.vary {
+            let value = Value::Integer(i64::from(vary.first) + i64::from(member));
+            for parameter in vary.parameter.all() {
+                experiment.set(parameter, value.clone()).map_err(|message| self.fault(&message))?;
+            }
+        }
+        check(experiment, self.fmu_dirs, opened)
+    }
+
+    fn fault(&self, message: &str) -> Single {
+        let id = &self.run.id;
+        self.study.source.error(&id.span(), format!("[[run]] {}: {message}", id.get_ref()))
+    }
+
+    fn resolve(&self, signal: &Signal, system: &mut System) -> Result<Resolved, Single> {
+        system.resolve(signal).map_err(|message| self.fault(&message))
+    }
+
+    /// Checks that everything is there that will be asked for.
+    ///
+    /// # Errors
+    /// An error that names the missing item.
+    pub fn check(&self, opened: &mut Opened) -> Result<(), Error> {
+        let mut system = self.system(0, opened).map_err(|source| self.failed(source))?;
+        let bounded = self.study.bounds_of(self.run).flat_map(|(_, signals)| signals);
+        let measured = self.study.measures_of(self.run).flat_map(|(_, signals)| signals);
+        let mut all = self.wanted.series.iter().chain(bounded).chain(measured);
+        all.try_for_each(|signal| self.resolve(signal, &mut system).map(drop))?;
+        Meters::new(&mut system).map(drop).map_err(|source| self.failed(source))
+    }
+
+    fn failed(&self, source: Single) -> Error {
+        Error::Run { run: self.run.id.get_ref().clone(), source }
+    }
+
+    /// Runs the members with these numbers.
+    ///
+    /// # Errors
+    /// If a unit fails, or if the run was asked to end.
+    pub fn execute(
+        &self,
+        range: Range<u32>,
+        opened: &mut Opened,
+        interrupt: &Interrupt,
+    ) -> Result<Outcome, Single> {
+        let mut outcome = Outcome::default();
+        for number in range {
+            let mut system = self.system(number, opened)?;
+            let mut series = Watch::new(&self.wanted.series, self, &mut system)?;
+            let mut bounds = Vec::new();
+            for (within, signals) in self.study.bounds_of(self.run) {
+                let signals = signals.iter().map(|signal| self.resolve(signal, &mut system));
+                let signals = signals.collect::<Result<_, _>>()?;
+                let bound = self.study.number(&within.bound)?;
+                bounds.push(Bounded { id: &within.id, signals, bound, inside: Inside::default() });
+            }
+            let mut gauges = Vec::new();
+            for (measure, signals) in self.study.measures_of(self.run) {
+                let gauge = Gauge::new(measure, signals, &mut system);
+                gauges.push((measure.id.clone(), gauge.map_err(|message| self.fault(&message))?));
+            }
+            let mut meters = Meters::new(&mut system)?;
+            let mut master = system.start(interrupt)?;
+            if number == 0 {
+                outcome.parameters = system.parameters(&mut master)?;
+            }
+            // Computing times mean nothing if the run shares the machine.
+            if self.run.timed && number == 0 {
+                master.measure_time();
+            }
+            let mut observers: Vec<&mut dyn Observer> = vec![&mut meters, &mut series];
+            observers.extend(bounds.iter_mut().map(|bound| bound as &mut dyn Observer));
+            observers.extend(gauges.iter_mut().map(|(_, gauge)| gauge as &mut dyn Observer));
+            master.run(&mut observers)?;
+
+            let value = self.run.vary.as_ref().map(|vary| vary.first + number.cast_signed());
+            let step_us = master.step_seconds().map(|(name, seconds)| (name.into(), seconds * 1e6)).collect();
+            let metrics = Metrics { step_us, ..meters.metrics() };
+            let within = bounds.into_iter().map(|bound| (bound.id.to_string(), bound.inside)).collect();
+            let measures = gauges.into_iter().map(|(id, gauge)| (id, gauge.value())).collect();
+            outcome.members.push(Member { value, metrics, within, measures });
+            for (signal, values) in &series.signals {
+                if self.wanted.spread.contains(signal) {
+                    widen(&mut outcome.spread, signal, values);
+                }
+            }
+            if number == 0 {
+                outcome.series = Some(Series {
+                    time: series.time,
+                    signals: series.signals,
+                    units: series.resolved.iter().map(|(s, r)| (s.clone(), r.unit.clone())).collect(),
+                    samples: meters.samples(),
+                });
+            }
+        }
+        Ok(outcome)
+    }
+}
+
+fn widen(spread: &mut BTreeMap<Signal, Spread>, signal: &Signal, values: &[f64]) {
+    let own = spread
+        .entry(signal.clone())
+        .or_insert_with(|| Spread { low: values.to_vec(), high: values.to_vec() });
+    own.widen(values, values);
+}
+
+impl Spread {
+    /// Extends the band so that it also covers these values.
+    pub fn widen(&mut self, low: &[f64], high: &[f64]) {
+        for (own, value) in self.low.iter_mut().zip(low) {
+            *own = own.min(*value);
+        }
+        for (own, value) in self.high.iter_mut().zip(high) {
+            *own = own.max(*value);
+        }
+    }
+}
+
+impl Inside {
+    fn see(&mut self, magnitude: f64, bound: f64) {
+        self.samples += 1;
+        self.inside += u64::from(magnitude <= bound * (1.0 + ROUNDING));
+        self.largest = larger(self.largest, magnitude);
+        self.ratio = self.largest / bound;
+    }
+}
+
+/// Compares signals with a bound.
+struct Bounded<'a> {
+    id: &'a str,
+    signals: Vec<Resolved>,
+    bound: f64,
+    inside: Inside,
+}
+
+impl Observer for Bounded<'_> {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Single> {
+        let magnitudes = self.signals.iter().map(|signal| signal.value(sample.values).abs());
+        let largest = magnitudes.fold(0.0, larger);
+        self.inside.see(largest, self.bound);
+        Ok(())
+    }
+}
+
+/// A series holds about this many points at most.
+const POINTS: u64 = 4000;
+
+/// Records signals at every n-th communication point.
+struct Watch {
+    stride: u64,
+    resolved: Vec<(Signal, Resolved)>,
+    time: Vec<f64>,
+    signals: BTreeMap<Signal, Vec<f64>>,
+}
+
+impl Watch {
+    fn new(signals: &BTreeSet<Signal>, preparation: &Preparation, system: &mut System) -> Result<Self, Single> {
+        let resolved = signals
+            .iter()
+            .map(|signal| Ok((signal.clone(), preparation.resolve(signal, system)?)))
+            .collect::<Result<Vec<_>, Single>>()?;
+        let stride = system.clock.ticks().div_ceil(POINTS).max(1);
+        let room = (system.clock.ticks() / stride) as usize + 2;
+        let signals = signals.iter().map(|signal| (signal.clone(), Vec::with_capacity(room))).collect();
+        Ok(Self { stride, resolved, time: Vec::with_capacity(room), signals })
+    }
+}
+
+impl Observer for Watch {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Single> {
+        if !sample.tick.is_multiple_of(self.stride) && !sample.last {
+            return Ok(());
+        }
+        self.time.push(sample.time);
+        for ((_, resolved), values) in self.resolved.iter().zip(self.signals.values_mut()) {
+            values.push(resolved.value(sample.values));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oracle_shares_and_ratios_by_hand() {
+        let mut inside = Inside::default();
+        for magnitude in [0.5, 2.0, 3.0, 2.0] {
+            inside.see(magnitude, 2.0);
+        }
+        assert_eq!(inside, Inside { inside: 3, samples: 4, largest: 3.0, ratio: 1.5 });
+    }
+
+    #[test]
+    fn a_magnitude_that_is_not_a_number_is_outside_and_seen() {
+        let mut inside = Inside::default();
+        inside.see(f64::NAN, 2.0);
+        assert!(inside.inside == 0 && inside.largest.is_nan());
+    }
+
+    #[test]
+    fn a_band_holds_all_values() {
+        let mut spread = BTreeMap::new();
+        let signal = Signal::try_from("a.b".to_string()).unwrap();
+        widen(&mut spread, &signal, &[1.0, 5.0]);
+        widen(&mut spread, &signal, &[2.0, 3.0]);
+        assert_eq!(spread[&signal], Spread { low: vec![1.0, 3.0], high: vec![2.0, 5.0] });
+    }
+}

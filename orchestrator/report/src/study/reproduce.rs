@@ -1,0 +1,509 @@
+//! Runs a study on all cores, keeps what is finished, and writes the report.
+//!
+//! The work is cut into parts. What a finished part leaves is written to a file at once, together with a hash of all that
+//! it depends on; a part whose file is there, with the same hash, is not run again. So an interruption costs the parts that
+//! were being worked on, and nothing else.
+
+use super::part::{Outcome, Part, Preparation};
+use super::results::{Results, RunResult, resolve};
+use super::{Study, claims, figures, page};
+use crate::error::Error;
+use cosim::error::Error as Single;
+use crate::figure::{png, svg};
+use crate::folder::Folder;
+use cosim::interrupt::Interrupt;
+use crate::progress::Parts;
+use cosim::system::Opened;
+use cosim::search;
+use fmu_import::quantity::rounded;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use std::collections::{BTreeMap, VecDeque};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// Members of a run that make up one part.
+const MEMBERS_PER_PART: u32 = 25;
+/// Version of the files of parts, which must be raised when their content changes.
+const FORMAT: u32 = 5;
+
+/// Options for the reproduction of a study.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Folder for the results; `out/<folder of the study>` if there is none.
+    pub out: Option<PathBuf>,
+    /// Further folders with FMUs.
+    pub fmu_dirs: Vec<PathBuf>,
+    /// Number of threads; 0 means one for each core.
+    pub jobs: usize,
+    /// Whether parts that are complete already are run again.
+    pub fresh: bool,
+    /// Whether the progress display is suppressed.
+    pub quiet: bool,
+    /// Interrupt through which the work can be ended from outside.
+    pub interrupt: Interrupt,
+}
+
+/// A claim, in our words, with its verdict.
+pub type Judgement = (String, claims::Verdict);
+
+/// Outcome of the reproduction of a study.
+#[derive(Debug)]
+pub struct Report {
+    /// Title of the study.
+    pub title: String,
+    /// Path of the report page.
+    pub page: PathBuf,
+    /// Number of parts that were run, and number of parts that were complete already.
+    pub parts: (usize, usize),
+    /// Runs of an experiment among all parts.
+    pub runs: usize,
+    /// Elapsed time of the reproduction, s.
+    pub elapsed: f64,
+    /// Remarks on runs whose parameter has no effect or that lose the attitude.
+    pub notes: Vec<String>,
+    /// Each claim with its verdict.
+    pub verdicts: Vec<Judgement>,
+    /// Names of all files, relative to the folder.
+    pub files: Vec<String>,
+}
+
+/// The study of this name: a file, a folder with a `study.toml`, or such a folder below `orchestrator/experiments`.
+///
+/// # Errors
+/// If there is no study with this name.
+pub fn find(name: &Path) -> Result<PathBuf, Single> {
+    let roots = search::experiments();
+    let mut candidates = vec![name.to_path_buf(), name.join("study.toml")];
+    candidates.extend(roots.iter().flat_map(|root| [root.join(name), root.join(name).join("study.toml")]));
+    candidates.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {
+        let there: Vec<String> = roots
+            .iter()
+            .flat_map(|root| fs::read_dir(root).into_iter().flatten().flatten())
+            .filter(|entry| entry.path().join("study.toml").is_file())
+            .map(|entry| entry.file_name().to_string_lossy().into_owned())
+            .collect();
+        let hint = fmu_import::names::hint(&name.to_string_lossy(), there.iter().map(String::as_str));
+        Single::experiment(format!(
+            "there is no study \"{}\", neither as a file nor as a folder with a study.toml, here or among the experiments{hint}",
+            name.display()
+        ))
+    })
+}
+
+/// Runs what is not there yet of a study, and writes its report.
+///
+/// # Errors
+/// Everything that is wrong with the study, before anything is run; what a unit said; files that cannot be written. What is
+/// finished by then is kept.
+pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
+    let begin = Instant::now();
+    let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(name(study)));
+    let preparations = study
+        .runs
+        .iter()
+        .map(|run| Preparation::new(study, run, &options.fmu_dirs))
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut opened = Opened::default();
+    check(study, &preparations, &mut opened)?;
+    let keys = keys(study, &preparations, &mut opened)?;
+    if out.join("metrics.json").exists() || (out.exists() && !out.is_dir()) {
+        let message = format!("{} holds other results: take another folder by --out", out.display());
+        return Err(Single::experiment(message).into());
+    }
+    let _folder = Folder::take(&out)?;
+    let all = parts(study);
+    let file = |part: &Part| {
+        let id = study.runs[part.run].id.get_ref();
+        out.join("runs").join(id).join(format!("{:04}-{:04}.json", part.range.start, part.range.end))
+    };
+    let mut done: BTreeMap<(usize, u32), Outcome> = BTreeMap::new();
+    if !options.fresh {
+        for part in &all {
+            if let Some(outcome) = kept(&file(part), &keys[part.run], part) {
+                done.insert((part.run, part.range.start), outcome);
+            }
+        }
+    }
+    let missing: Vec<Part> =
+        all.iter().filter(|part| !done.contains_key(&(part.run, part.range.start))).cloned().collect();
+    let progress = Parts::new(&study.title, all.len() as u64, done.len() as u64, options.quiet);
+
+    if !missing.is_empty() {
+        // An earlier report is none of what comes now, should that be ended.
+        for path in [out.join("report.html"), out.join("results.json")] {
+            if path.exists() {
+                fs::remove_file(&path).map_err(Single::file(&path))?;
+            }
+        }
+    }
+
+    let interrupt = &options.interrupt;
+    let work =
+        Work { study, preparations: &preparations, keys: &keys, file: &file, progress: &progress, interrupt };
+    let is_timed = |part: &Part| study.runs[part.run].timed && part.range.start == 0;
+    let (timed, others): (Vec<Part>, Vec<Part>) = missing.iter().cloned().partition(is_timed);
+    let threads = match options.jobs {
+        0 => std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        jobs => jobs,
+    };
+    let computed = (timed.len() + others.len(), done.len());
+    // What is timed has the machine for itself.
+    for (parts, threads) in [(timed, 1), (others, threads)] {
+        done.extend(work.run(parts, threads)?);
+        if let Some(request) = interrupt.asked() {
+            progress.finish();
+            return Err(Error::Unfinished { done: done.len(), all: all.len(), out, request });
+        }
+    }
+    progress.finish();
+
+    let mut runs = vec![RunResult::default(); study.runs.len()];
+    for ((run, _), outcome) in done {
+        runs[run].push(outcome);
+    }
+    let results = Results { study, runs };
+    let (verdicts, files) = write(&results, &out)?;
+    Ok(Report {
+        title: study.title.clone(),
+        page: out.join("report.html"),
+        parts: computed,
+        runs: results.runs.iter().map(|run| run.members.len()).sum(),
+        elapsed: begin.elapsed().as_secs_f64(),
+        notes: notes(&results),
+        verdicts,
+        files,
+    })
+}
+
+/// Says which runs lose the attitude, and which vary a parameter without any effect, as the seed of a disturbance that is constant.
+fn notes(results: &Results) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (run, result) in results.study.runs.iter().zip(&results.runs) {
+        let (id, all) = (run.id.get_ref(), result.members.len());
+        let lost: Vec<f64> = result.members.iter().filter_map(|member| member.metrics.lost_at).collect();
+        if let Some(first) = lost.iter().copied().reduce(f64::min) {
+            let time = rounded(first);
+            notes.push(format!(
+                "{id}: the attitude is lost in {} of {all} runs, at t = {time} s or later",
+                lost.len()
+            ));
+        }
+        if let (Some(vary), Some((first, others))) = (&run.vary, result.members.split_first())
+            && !others.is_empty()
+            && others.iter().all(|other| other.moves_as(first, &run.timings))
+        {
+            let names = vary.parameter.all().join(" and ");
+            notes.push(format!("{id}: {names} changes nothing, all {all} runs are the same"));
+        }
+    }
+    notes
+}
+
+/// Name of a study: of its folder.
+fn name(study: &Study) -> String {
+    let path = &study.source.path;
+    let folder = path.parent().and_then(Path::file_name);
+    folder.or(path.file_stem()).map_or("study".into(), |name| name.to_string_lossy().into_owned())
+}
+
+/// Everything that can be checked before anything is run.
+fn check(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Result<(), Error> {
+    let fault = |message: String| study.source.error(&(0..0), message);
+    claims::check(study).map_err(fault)?;
+    for row in study.tables.iter().flat_map(|table| &table.rows) {
+        for name in [Some(&row.ours), row.beside.as_ref()].into_iter().flatten() {
+            resolve(study, name).map_err(fault)?;
+        }
+    }
+    for overview in &study.overviews {
+        for column in &overview.metrics {
+            // It is enough if one run has it; the others show nothing.
+            let mut tried = overview
+                .runs
+                .iter()
+                .map(|run| resolve(study, &format!("{}.{}", run.get_ref(), column.of)).map(drop))
+                .collect::<Vec<_>>();
+            if let Some(Err(message)) = tried.iter().all(Result::is_err).then(|| tried.pop()).flatten() {
+                return Err(fault(message).into());
+            }
+        }
+    }
+    for across in study.figures.iter().flat_map(|f| &f.panels).filter_map(|panel| panel.across.as_ref()) {
+        for run in across.lines.iter().flat_map(|line| &line.runs) {
+            for axis in [&across.x, &across.y] {
+                resolve(study, &format!("{}.{}", run.get_ref(), axis.of)).map_err(fault)?;
+            }
+        }
+    }
+    preparations.iter().try_for_each(|preparation| preparation.check(opened))
+}
+
+/// The parts of all runs, in order. Where a run is timed, its first member is a part of its own.
+fn parts(study: &Study) -> Vec<Part> {
+    let mut parts = Vec::new();
+    for (run, description) in study.runs.iter().enumerate() {
+        let count = description.vary.as_ref().map_or(1, |vary| vary.count);
+        let mut start = 0;
+        while start < count {
+            let length = if start == 0 && description.timed { 1 } else { MEMBERS_PER_PART };
+            let end = count.min(start + length);
+            parts.push(Part { run, range: start..end });
+            start = end;
+        }
+    }
+    parts
+}
+
+/// For each run, a hash of all that its parts depend on: the experiment, what the study changes in it and wants of it, the
+/// FMUs, and this program.
+fn keys(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Result<Vec<String>, Error> {
+    let digest =
+        |path: &Path| fs::read(path).map(|bytes| hex(&Sha256::digest(bytes))).map_err(Single::file(path));
+    let executable = std::env::current_exe().map_err(Single::file("the path of this program"))?;
+    let program = digest(&executable)?;
+    let mut archives: BTreeMap<PathBuf, String> = BTreeMap::new();
+    let mut keys = Vec::new();
+    for (run, preparation) in study.runs.iter().zip(preparations) {
+        let system = preparation.system(0, opened)?;
+        let mut fmus = BTreeMap::new();
+        for (name, fmu) in system.order.iter().zip(&system.fmus) {
+            if !archives.contains_key(&fmu.path) {
+                archives.insert(fmu.path.clone(), digest(&fmu.path)?);
+            }
+            fmus.insert(name, archives[&fmu.path].clone());
+        }
+        let within = study
+            .bounds_of(run)
+            .map(|(within, signals)| Ok(json!([within.id, signals, study.number(&within.bound)?])))
+            .collect::<Result<Vec<_>, Error>>()?;
+        let measures: Vec<Value> = study
+            .measures_of(run)
+            .map(|(measure, signals)| {
+                let kind = format!("{:?}", measure.kind);
+                json!([measure.id, kind, signals, measure.over, measure.band, measure.hold])
+            })
+            .collect();
+        let all = json!({
+            "format": FORMAT,
+            "program": program,
+            "experiment": system.experiment.source.whole(),
+            "set": run.set,
+            "unset": run.unset,
+            "vary": run.vary.as_ref().map(|vary| (&vary.parameter, vary.first)),
+            "within": within,
+            "measures": measures,
+            "series": preparation.wanted.series,
+            "spread": preparation.wanted.spread,
+            "timed": run.timed,
+            "fmus": fmus,
+        });
+        keys.push(hex(&Sha256::digest(all.to_string())));
+    }
+    Ok(keys)
+}
+
+fn hex(bytes: &[u8]) -> String {
+    use std::fmt::Write as _;
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// Content of the file of a finished part.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    key: String,
+    members: std::ops::Range<u32>,
+    /// Of all the rest, so that no number is taken over that has changed since.
+    digest: String,
+    outcome: Outcome,
+}
+
+impl Kept {
+    fn new(key: String, members: std::ops::Range<u32>, outcome: Outcome) -> serde_json::Result<Self> {
+        let digest = Self::digest(&key, &members, &outcome)?;
+        Ok(Self { key, members, digest, outcome })
+    }
+
+    fn digest(key: &str, members: &std::ops::Range<u32>, outcome: &Outcome) -> serde_json::Result<String> {
+        Ok(hex(&Sha256::digest(serde_json::to_vec(&(key, members, outcome))?)))
+    }
+
+    fn is_whole(&self) -> bool {
+        Self::digest(&self.key, &self.members, &self.outcome).is_ok_and(|digest| digest == self.digest)
+    }
+}
+
+/// Reads the outcome that a part left earlier, if it is still valid.
+fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
+    let text = fs::read(path).ok()?;
+    let kept = serde_json::from_slice::<Kept>(&text).ok().filter(Kept::is_whole);
+    let Some(kept) = kept else {
+        tracing::error!("{} is damaged: it is run again", path.display());
+        return None;
+    };
+    (kept.key == key && kept.members == part.range).then_some(kept.outcome)
+}
+
+/// Writes a file completely or not at all.
+fn write_whole(path: &Path, content: &[u8]) -> Result<(), Single> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(Single::file(folder))?;
+    }
+    let unfinished = path.with_extension("unfinished");
+    fs::write(&unfinished, content).map_err(Single::file(&unfinished))?;
+    fs::rename(&unfinished, path).map_err(Single::file(path))
+}
+
+/// Parts being worked on by several threads.
+struct Work<'a> {
+    study: &'a Study,
+    preparations: &'a [Preparation<'a>],
+    keys: &'a [String],
+    file: &'a (dyn Fn(&Part) -> PathBuf + Sync),
+    progress: &'a Parts,
+    interrupt: &'a Interrupt,
+}
+
+/// Outcomes by run and first member.
+type Done = BTreeMap<(usize, u32), Outcome>;
+
+/// A panic of another thread leaves a queue that is as good as before.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Work<'_> {
+    fn run(&self, parts: Vec<Part>, threads: usize) -> Result<Done, Error> {
+        let queue = Mutex::new(VecDeque::from(parts));
+        let done = Mutex::new(Done::new());
+        let failure: Mutex<Option<Error>> = Mutex::new(None);
+        std::thread::scope(|scope| {
+            for _ in 0..threads.max(1) {
+                scope.spawn(|| {
+                    // Units stay in the thread that opened their archive.
+                    let mut opened = Opened::default();
+                    loop {
+                        let Some(part) = lock(&queue).pop_front() else { break };
+                        match self.part(&part, &mut opened) {
+                            Ok(outcome) => {
+                                lock(&done).insert((part.run, part.range.start), outcome);
+                            }
+                            // The work was asked to end; parts that the other threads finish are
+                            // kept.
+                            Err(Error::Single(Single::Interrupted { .. })) => lock(&queue).clear(),
+                            Err(error) => {
+                                lock(&queue).clear();
+                                lock(&failure).get_or_insert(error);
+                            }
+                        }
+                    }
+                });
+            }
+        });
+        match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            Some(error) => Err(error),
+            None => Ok(done.into_inner().unwrap_or_else(PoisonError::into_inner)),
+        }
+    }
+
+    fn part(&self, part: &Part, opened: &mut Opened) -> Result<Outcome, Error> {
+        let run = &self.study.runs[part.run];
+        let outcome = self.preparations[part.run]
+            .execute(part.range.clone(), opened, self.interrupt)
+            .map_err(|error| match error {
+                Single::Interrupted { .. } => Error::Single(error),
+                source => Error::Run { run: run.id.get_ref().clone(), source },
+            })?;
+        let path = (self.file)(part);
+        let fault = |error: serde_json::Error| Single::file(&path)(error.into());
+        let kept = Kept::new(self.keys[part.run].clone(), part.range.clone(), outcome).map_err(fault)?;
+        let text = serde_json::to_vec(&kept).map_err(fault)?;
+        write_whole(&path, &text)?;
+        self.progress.finished(&run.label);
+        Ok(kept.outcome)
+    }
+}
+
+/// Writes figures, numbers and page. Returns the verdicts and the files.
+fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Vec<String>), Error> {
+    let study = results.study;
+    let fault = |message: String| study.source.error(&(0..0), message);
+    let mut files = vec!["report.html".to_string(), "results.json".to_string()];
+    let mut drawn = Vec::new();
+    for figure in &study.figures {
+        let picture = figures::figure(figure, results).map_err(fault)?;
+        let path = out.join("figures").join(format!("{}.svg", figure.id));
+        let text = svg::text(&picture).map_err(Single::file(&path))?;
+        write_whole(&path, text.as_bytes())?;
+        png::write(&text, &path.with_extension("png"))?;
+        files.push(format!("figures/{}.svg, .png", figure.id));
+        drawn.push(picture);
+    }
+    let judged = study
+        .claims
+        .iter()
+        .map(|claim| claims::judge(claim, results))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(fault)?;
+    write_whole(&out.join("results.json"), numbers(results, &judged).as_bytes())?;
+    let page = page::page(results, &judged, &drawn).map_err(fault)?;
+    write_whole(&out.join("report.html"), page.as_bytes())?;
+    let verdicts = study.claims.iter().zip(&judged).map(|(c, j)| (c.says.clone(), j.verdict)).collect();
+    Ok((verdicts, files))
+}
+
+/// All numbers, for other programs.
+fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
+    let study = results.study;
+    let runs: serde_json::Map<String, Value> = study
+        .runs
+        .iter()
+        .zip(&results.runs)
+        .map(|(run, result)| {
+            let own = json!({
+                "label": run.label,
+                "experiment": run.experiment,
+                "fmu": run.fmu,
+                "set": run.set,
+                "unset": run.unset,
+                "members": result.members,
+                "samples": result.series.samples,
+            });
+            (run.id.get_ref().clone(), own)
+        })
+        .collect();
+    let claims: Vec<Value> = study
+        .claims
+        .iter()
+        .zip(judged)
+        .map(|(claim, judged)| {
+            let checks: Vec<Value> = claim
+                .checks
+                .iter()
+                .zip(&judged.checks)
+                .map(|(check, checked)| {
+                    json!({
+                        "label": check.label,
+                        "left": checked.left.0,
+                        "right": checked.right.0,
+                        "difference": checked.difference.0,
+                        "held": checked.held,
+                        "of": checked.pairs,
+                    })
+                })
+                .collect();
+            json!({ "says": claim.says, "verdict": judged.verdict, "checks": checks })
+        })
+        .collect();
+    let all = json!({ "title": study.title, "values": study.values.0, "runs": runs, "claims": claims });
+    let mut text = serde_json::to_string_pretty(&all).unwrap_or_default();
+    text.push('\n');
+    text
+}

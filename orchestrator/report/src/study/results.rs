@@ -1,0 +1,235 @@
+//! Results of a study's runs, and the references `run.metric` to them.
+
+use super::part::{Member, Outcome, Series, Spread};
+use cosim::signal::Signal;
+use super::values::Quantity;
+use super::{Run, Study};
+use cosim::system::Parameters;
+use fmu_import::names;
+use std::collections::BTreeMap;
+
+/// All results that are kept of one run of the study.
+#[derive(Clone, Debug, Default)]
+pub struct RunResult {
+    /// Results of the members, one for each value of the parameter, in that order.
+    pub members: Vec<Member>,
+    /// Signals of the first member.
+    pub series: Series,
+    /// Parameters of the components in the first member.
+    pub parameters: Parameters,
+    /// Bands over all members.
+    pub spread: BTreeMap<Signal, Spread>,
+}
+
+impl RunResult {
+    /// Adds the next part.
+    pub fn push(&mut self, part: Outcome) {
+        self.members.extend(part.members);
+        if let Some(series) = part.series {
+            self.series = series;
+            self.parameters = part.parameters;
+        }
+        for (signal, spread) in part.spread {
+            match self.spread.get_mut(&signal) {
+                Some(own) => own.widen(&spread.low, &spread.high),
+                None => {
+                    self.spread.insert(signal, spread);
+                }
+            }
+        }
+    }
+}
+
+/// A number that every member of a run has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Metric {
+    /// A metric by its name in `metrics.json`, 1 or 0 for yes or no.
+    Merit {
+        /// Its name.
+        name: String,
+        /// Whether it is a computing time.
+        timing: bool,
+    },
+    /// Mean time spent in a component per step, µs: `step_us.COMPONENT`.
+    StepTime(String),
+    /// Parameters of a component, in SI units: `parameter.COMPONENT.NAME`; a final `*` stands for all that fit.
+    Parameter(String, String),
+    /// Share of samples within a bound: `within.ID.share`.
+    Share(String),
+    /// Largest magnitude of a signal: `within.ID.largest`.
+    Largest(String),
+    /// Largest magnitude as a multiple of the bound: `within.ID.ratio`.
+    Ratio(String),
+    /// A number that the study defines: `measure.ID`.
+    Measure(String),
+}
+
+impl Metric {
+    /// Reads the name of a metric of a run.
+    ///
+    /// # Errors
+    /// If there is no such metric.
+    pub fn parse(text: &str, run: &Run) -> Result<Self, String> {
+        if let Some((id, what)) = text.strip_prefix("within.").and_then(|rest| rest.rsplit_once('.')) {
+            let ids: Vec<&str> = run.within.iter().map(|within| within.get_ref().as_str()).collect();
+            if !ids.contains(&id) {
+                let hint = names::hint(id, ids.iter().copied());
+                return Err(format!("the run \"{}\" has no within \"{id}\"{hint}", run.id.get_ref()));
+            }
+            return match what {
+                "share" => Ok(Self::Share(id.into())),
+                "largest" => Ok(Self::Largest(id.into())),
+                "ratio" => Ok(Self::Ratio(id.into())),
+                _ => Err(format!("\"{text}\": within.{id} has share, largest, ratio")),
+            };
+        }
+        if let Some(id) = text.strip_prefix("measure.") {
+            let ids: Vec<&str> = run.measures.iter().map(|measure| measure.get_ref().as_str()).collect();
+            if ids.contains(&id) {
+                return Ok(Self::Measure(id.into()));
+            }
+            let hint = names::hint(id, ids.iter().copied());
+            return Err(format!("the run \"{}\" has no measure \"{id}\"{hint}", run.id.get_ref()));
+        }
+        if let Some((component, name)) = text.strip_prefix("parameter.").and_then(names::split) {
+            return Ok(Self::Parameter(component.into(), name.into()));
+        }
+        if let Some(component) = text.strip_prefix("step_us.") {
+            return if run.timed {
+                Ok(Self::StepTime(component.into()))
+            } else {
+                Err(format!("\"{text}\": the run \"{}\" is not timed", run.id.get_ref()))
+            };
+        }
+        let known: Vec<&str> = run.metrics.iter().map(String::as_str).collect();
+        if known.contains(&text) {
+            return Ok(Self::Merit { name: text.into(), timing: run.timings.iter().any(|own| own == text) });
+        }
+        Err(format!("there is no metric \"{text}\"{}", names::hint(text, known.iter().copied())))
+    }
+
+    /// Whether it is a duration, which differs from run to run and is measured with the first member only.
+    fn is_time(&self) -> bool {
+        match self {
+            Self::Merit { timing, .. } => *timing,
+            Self::StepTime(_) => true,
+            _ => false,
+        }
+    }
+
+    fn of(&self, member: &Member) -> Option<f64> {
+        let within = |id: &String| member.within.get(id);
+        match self {
+            Self::Merit { name, .. } => member.metrics.number(name),
+            // Parameters belong to the run, not to its members.
+            Self::Parameter(..) => None,
+            Self::StepTime(component) => member.metrics.step_us.get(component).copied(),
+            Self::Share(id) => within(id).map(|w| w.inside as f64 / w.samples as f64),
+            Self::Largest(id) => within(id).map(|w| w.largest),
+            Self::Ratio(id) => within(id).map(|w| w.ratio),
+            Self::Measure(id) => member.measures.get(id).copied().flatten(),
+        }
+    }
+}
+
+/// A number of each member of a run, or a single one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Numbers(pub Vec<f64>);
+
+impl Numbers {
+    /// Arithmetic mean; not a number if there is none.
+    pub fn mean(&self) -> f64 {
+        self.0.iter().sum::<f64>() / self.0.len() as f64
+    }
+
+    /// The smallest and the largest of the numbers.
+    pub fn extent(&self) -> (f64, f64) {
+        self.0.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+    }
+
+    /// Whether there are several numbers that differ.
+    pub fn vary(&self) -> bool {
+        self.0.iter().any(|value| *value != self.0[0])
+    }
+}
+
+/// The results of all runs, in the order of the study.
+pub struct Results<'a> {
+    /// The study that was run.
+    pub study: &'a Study,
+    /// Results of each run of the study.
+    pub runs: Vec<RunResult>,
+}
+
+/// Finds the run and the metric that `run.metric` refers to.
+///
+/// # Errors
+/// An error that names the missing run or metric.
+pub fn resolve(study: &Study, reference: &str) -> Result<(usize, Metric), String> {
+    let (id, metric) = names::split(reference).ok_or_else(|| format!("\"{reference}\" is no run.metric"))?;
+    let place = study.runs.iter().position(|run| run.id.get_ref() == id).ok_or_else(|| {
+        let hint = names::hint(id, study.runs.iter().map(|run| run.id.get_ref().as_str()));
+        format!("\"{reference}\": there is no run \"{id}\"{hint}")
+    })?;
+    Ok((place, Metric::parse(metric, &study.runs[place])?))
+}
+
+/// Whether a quantity refers to `run.metric` rather than to a value.
+pub fn is_reference(study: &Study, quantity: &Quantity) -> bool {
+    match quantity {
+        Quantity::Number(_) => false,
+        Quantity::Named(name) => {
+            study.values.find(name).is_none()
+                && names::split(name).is_some_and(|(id, _)| study.run(id).is_some())
+        }
+    }
+}
+
+impl Results<'_> {
+    /// Results of the run with this id.
+    pub fn run(&self, id: &str) -> Option<&RunResult> {
+        self.study.runs.iter().position(|run| run.id.get_ref() == id).map(|place| &self.runs[place])
+    }
+
+    /// The numbers that `run.metric` refers to; empty if the run has no such quantity.
+    ///
+    /// # Errors
+    /// If there is no such run or metric.
+    pub fn numbers(&self, reference: &str) -> Result<Numbers, String> {
+        Ok(Numbers(self.of_members(reference)?.into_iter().flatten().collect()))
+    }
+
+    /// The number of each member that `run.metric` refers to; none where a member has no such quantity, such as a settling
+    /// time where the motion did not settle.
+    ///
+    /// # Errors
+    /// If there is no such run or metric.
+    pub fn of_members(&self, reference: &str) -> Result<Vec<Option<f64>>, String> {
+        let (place, metric) = resolve(self.study, reference)?;
+        let RunResult { members, parameters, .. } = &self.runs[place];
+        if let Metric::Parameter(component, pattern) = &metric {
+            let own = parameters.get(component).into_iter().flatten();
+            let fitting = own.filter(|(name, _)| names::matches(pattern, name));
+            let numbers: Vec<_> = fitting.filter_map(|(_, value)| value.as_f64()).map(Some).collect();
+            let there = parameters.get(component).into_iter().flatten().map(|(name, _)| name.as_str());
+            return if numbers.is_empty() {
+                Err(format!("\"{reference}\": there is no such parameter{}", names::hint(pattern, there)))
+            } else {
+                Ok(numbers)
+            };
+        }
+        let counted = if metric.is_time() { &members[..members.len().min(1)] } else { members };
+        Ok(counted.iter().map(|member| metric.of(member)).collect())
+    }
+
+    /// The number of each member that a reference stands for, or the one of a value.
+    ///
+    /// # Errors
+    /// If the quantity refers to something that does not exist.
+    pub fn quantity(&self, quantity: &Quantity) -> Result<Vec<Option<f64>>, String> {
+        match quantity {
+            Quantity::Named(name) if is_reference(self.study, quantity) => self.of_members(name),
+            _ => self.study.values.number(quantity).map(|number| vec![Some(number)]),
+        }
+    }
+}

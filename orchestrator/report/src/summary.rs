@@ -1,0 +1,238 @@
+//! Prints the outcome of a run to standard output.
+
+use crate::guarantee::told;
+use crate::metrics::{Metrics, Value};
+use cosim::error::Error;
+use cosim::experiment::{Coupling, Observe};
+use cosim::system::System;
+use crate::study::reproduce;
+use fmu_import::quantity::rounded;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+/// What came of a run.
+#[derive(Debug)]
+pub struct Report {
+    /// Metrics of the run.
+    pub metrics: Metrics,
+    /// Folder that holds the results.
+    pub out: PathBuf,
+    /// Names of the files that were written to the folder.
+    pub files: Vec<&'static str>,
+    /// Reason why the run ended before its stop time, for example a request or a missed deadline;
+    /// `None` if it did not.
+    pub ended: Option<Error>,
+}
+
+/// Prints the summary of a run.
+///
+/// # Errors
+/// If the text cannot be written.
+pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Result<()> {
+    let (System { clock, experiment, order, loops, .. }, metrics) = (system, &report.metrics);
+    let coupling = match experiment.simulation.coupling {
+        Coupling::GaussSeidel => "Gauss-Seidel",
+        Coupling::Jacobi => "Jacobi",
+    };
+    writeln!(out, "{}", experiment.title)?;
+    writeln!(
+        out,
+        "  {} s to {} s in {} steps of {} s, {coupling}: {}",
+        rounded(clock.start()),
+        rounded(clock.stop()),
+        clock.ticks(),
+        clock.step(),
+        order.join(", ")
+    )?;
+    let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
+    for (label, text) in asked(&experiment.observe, metrics) {
+        line(&label, text)?;
+    }
+    if let Some(guarantee) = guarantee(metrics) {
+        line("guarantee", guarantee)?;
+    }
+    if loops.is_empty() {
+        line("loop delay", "no feedback loop".into())?;
+    }
+    for feedback in loops {
+        let names: Vec<&str> = feedback
+            .components
+            .iter()
+            .chain(feedback.components.first())
+            .map(|&index| order[index].as_str())
+            .collect();
+        let steps = match feedback.ticks {
+            0 => "none".to_string(),
+            1 => format!("{} s, 1 step", clock.step()),
+            n => format!("{} s, {n} steps", rounded(n as f64 * clock.step())),
+        };
+        let reason = match (feedback.ticks, experiment.simulation.coupling) {
+            (0, _) => "",
+            (_, Coupling::Jacobi) => ", from the Jacobi coupling",
+            (_, Coupling::GaussSeidel) => {
+                ", from the order: an output is read before its unit's inputs are set"
+            }
+        };
+        let undeclared: Vec<&str> =
+            feedback.undeclared.iter().map(|&index| order[index].as_str()).collect();
+        let assumed = if undeclared.is_empty() {
+            String::new()
+        } else {
+            format!(" (the worst case; not declared what outputs depend on: {})", undeclared.join(", "))
+        };
+        line("loop delay", format!("{steps} ({}){reason}{assumed}", names.join(" -> ")))?;
+    }
+    if let Some(factor) = metrics.real_time_factor {
+        line("real-time factor", format!("{factor:.1} ({:.3} s elapsed)", metrics.wall_s))?;
+    }
+    if let Some(ended) = &report.ended {
+        line("ended early", ended.to_string())?;
+    }
+    if let Some(real_time) = &metrics.real_time {
+        real_time.print(order, out)?;
+    }
+    let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
+    line("results", format!("{}: {}", report.out.display(), report.files.join(", ")))
+}
+
+/// Prints the outcome of a reproduction.
+///
+/// # Errors
+/// If the text cannot be written.
+pub fn reproduction(report: &reproduce::Report, out: &mut impl Write) -> io::Result<()> {
+    let (run, kept) = report.parts;
+    writeln!(out, "{}", report.title)?;
+    writeln!(
+        out,
+        "  {} runs in {} parts: {run} run now, {kept} kept from before; {:.1} s elapsed",
+        report.runs,
+        run + kept,
+        report.elapsed
+    )?;
+    for note in &report.notes {
+        writeln!(out, "  note: {note}")?;
+    }
+    for (claim, verdict) in &report.verdicts {
+        writeln!(out, "  {:<14} {claim}", verdict.text())?;
+    }
+    writeln!(out, "  report: {}", report.page.display())?;
+    writeln!(out, "  beside it: {}", report.files[1..].join("; "))
+}
+
+/// Formats the ratio of a value to its limit.
+fn against(ratio: f64, limit: &str) -> String {
+    // A value that is not a number is not within a limit. A limit counts as met up to rounding.
+    let verdict = if ratio <= 1.0 + 1e-9 { "within" } else { "EXCEEDS" };
+    format!("   {verdict} its limit {limit}: {:.1} %", ratio * 100.0)
+}
+
+/// Describes how the controller's guarantee fared, if the controller gives one.
+fn guarantee(metrics: &Metrics) -> Option<String> {
+    let number = |name: &str| metrics.number(&format!("guarantee_{name}"));
+    let share = number("share")?;
+    let status = metrics.text("guarantee_status").map_or(String::new(), |status| format!(" ({status})"));
+    let margins = metrics.asked.keys().filter_map(|name| {
+        let margin = name.strip_prefix("guarantee_")?.strip_suffix("_margin_min")?;
+        Some((metrics.number(name), margin))
+    });
+    let margins = told(margins);
+    let course = match number("lost_at").map(rounded) {
+        _ if share == 0.0 => format!("never in force{status}"),
+        Some(time) => {
+            format!("in force at {:.1} % of the ticks, lost at t = {time} s{status}", share * 100.0)
+        }
+        None if share < 1.0 => {
+            format!("in force at {:.1} % of the ticks, never lost{margins}", share * 100.0)
+        }
+        None => format!("in force throughout{margins}"),
+    };
+    let broken = number("broken") == Some(1.0);
+    Some(course + if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" })
+}
+
+/// The lines of the metrics that the experiment wants in the summary.
+fn asked(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
+    let mut lines: Vec<(String, String)> = Vec::new();
+    for name in &observe.summary {
+        let (Some(measure), Some(value)) = (observe.metrics.get(name), metrics.asked.get(name)) else { continue };
+        let unit = metrics.units.get(name).filter(|unit| !unit.is_empty());
+        let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+        let text = match value {
+            None => continue,
+            Some(Value::Count(count)) => count.to_string(),
+            Some(Value::Number(number)) => shown(*number),
+            Some(Value::Flag(is)) => is.to_string(),
+            Some(Value::Text(text)) => text.clone(),
+        };
+        let number = |name: &String| metrics.number(name);
+        let compared = match (number(name), measure.limit.as_ref().and_then(number)) {
+            (Some(value), Some(limit)) => against(value / limit, &format!("{}{unit}", shown(limit))),
+            _ => String::new(),
+        };
+        let part = if measure.part.is_empty() { String::new() } else { format!("{} ", measure.part) };
+        let text = format!("{part}{text}{unit}{compared}");
+        match lines.last_mut().filter(|(label, _)| *label == measure.label) {
+            Some((_, line)) => *line += &format!(", {text}"),
+            None => lines.push((measure.label.clone(), text)),
+        }
+    }
+    lines
+}
+
+/// Formats a number with four digits after the point, or with an exponent if it is large or small.
+fn shown(number: f64) -> String {
+    match number.abs() {
+        size if size >= 1e5 || size < 1e-3 && size > 0.0 => format!("{number:.4e}"),
+        _ => format!("{number:.4}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_is_met_up_to_rounding() {
+        assert_eq!(against(1.0000000000000004, "1 N m"), "   within its limit 1 N m: 100.0 %");
+        assert_eq!(against(1.001, "1 N m"), "   EXCEEDS its limit 1 N m: 100.1 %");
+        assert!(against(f64::NAN, "1 N m").contains("EXCEEDS"));
+    }
+
+    #[test]
+    fn a_guarantee_is_told_in_one_line() {
+        assert_eq!(guarantee(&Metrics::default()), None);
+        let mut metrics = Metrics {
+            guarantee_share: Some(1.0),
+            guarantee_status: Some("inForce".into()),
+            guarantee_rate_margin_min: Some(0.031),
+            guarantee_moment_margin_min: Some(0.012),
+            guarantee_broken: Some(false),
+            ..Metrics::default()
+        };
+        let told = |metrics: &Metrics| guarantee(metrics).unwrap();
+        assert_eq!(told(&metrics), "in force throughout, margins 3.1 % (rate), 1.2 % (moment)");
+        metrics.guarantee_broken = Some(true);
+        assert_eq!(
+            told(&metrics),
+            "in force throughout, margins 3.1 % (rate), 1.2 % (moment); \
+             DEFECT: a limit was EXCEEDED while it was in force"
+        );
+        metrics.guarantee_broken = None;
+        metrics.guarantee_share = Some(0.972);
+        assert_eq!(
+            told(&metrics),
+            "in force at 97.2 % of the ticks, never lost, margins 3.1 % (rate), 1.2 % (moment)"
+        );
+        (metrics.guarantee_lost_at, metrics.guarantee_status) =
+            (Some(310.0 * 0.04 + 1e-14), Some("exceeded".into()));
+        assert_eq!(told(&metrics), "in force at 97.2 % of the ticks, lost at t = 12.4 s (exceeded)");
+        let never = Metrics {
+            guarantee_share: Some(0.0),
+            guarantee_status: Some("refused".into()),
+            ..Metrics::default()
+        };
+        assert_eq!(told(&never), "never in force (refused)");
+        let bare = Metrics { guarantee_share: Some(1.0), ..Metrics::default() };
+        assert_eq!(told(&bare), "in force throughout");
+    }
+}

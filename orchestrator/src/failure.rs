@@ -1,0 +1,49 @@
+//! Why the program ends with an exit code other than 0.
+
+use cosim::error::Error as Single;
+use cosim_report::error::Error as Study;
+use std::io;
+use std::path::PathBuf;
+
+/// All errors of the program.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Failure {
+    /// A run failed, or could not be begun.
+    #[error(transparent)]
+    Single(#[from] Single),
+    /// A study failed, or could not be begun.
+    #[error(transparent)]
+    Study(#[from] Study),
+    /// An FMU cannot be used.
+    #[error(transparent)]
+    Import(#[from] fmu_import::error::Error),
+    /// An FMU has faults, which have already been reported.
+    #[error("{}: {count} {}", path.display(), if *count == 1 { "fault" } else { "faults" })]
+    Faults {
+        /// Path of the archive.
+        path: PathBuf,
+        /// Number of faults that were found.
+        count: usize,
+    },
+    /// Standard output could not be written.
+    #[error("standard output: {0}")]
+    Output(#[from] io::Error),
+}
+
+impl Failure {
+    /// The exit code: 1 for a run that failed, 2 for bad usage or a bad experiment, 3 for a run
+    /// that was lost, 130 or 143 for one that a signal ended.
+    pub(crate) fn exit_code(&self) -> u8 {
+        match self {
+            Self::Single(error) => error.exit_code(),
+            Self::Study(error) => error.exit_code(),
+            Self::Import(_) => 2,
+            Self::Faults { .. } | Self::Output(_) => 1,
+        }
+    }
+
+    /// Whether standard output was closed by its reader, which is no failure.
+    pub(crate) fn is_broken_pipe(&self) -> bool {
+        matches!(self, Self::Output(source) if source.kind() == io::ErrorKind::BrokenPipe)
+    }
+}
