@@ -12,7 +12,12 @@ use std::path::Path;
 ///
 /// # Errors
 /// If it is no FMU, if the filter lets nothing through, or the text cannot be written.
-pub(crate) fn inspect(path: &Path, filter: &Filter, as_json: bool, out: &mut impl Write) -> Result<(), Failure> {
+pub(crate) fn inspect(
+    path: &Path,
+    filter: &Filter,
+    as_json: bool,
+    out: &mut impl Write,
+) -> Result<(), Failure> {
     let mut fmu = Fmu::open(path)?;
     filter.apply(&mut fmu.description)?;
     if as_json {

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use cosim::error::Error;
 use cosim::experiment::Experiment;
 use cosim::search::{self, files};
-use cosim_report::study::Study;
+use cosim_report::study::definition::Study;
 use fmu_import::fmu::Fmu;
 use std::collections::BTreeSet;
 use std::io::Write;

@@ -17,7 +17,8 @@ use cosim::interrupt::{Interrupt, Request};
 use cosim::pacing::{self, Factor, OnMiss};
 use cosim::system::{Opened, System};
 use cosim::{search, ssp};
-use cosim_report::study::{Study, reproduce};
+use cosim_report::study::definition::Study;
+use cosim_report::study::reproduce;
 use cosim_report::summary;
 use failure::Failure;
 use live::log::Messages;
@@ -216,7 +217,8 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             force,
         } => {
             let experiment = search::experiment(&experiment)?;
-            let (mut system, entries) = if experiment.extension().is_some_and(|extension| extension == "ssp") {
+            let (mut system, entries) = if experiment.extension().is_some_and(|extension| extension == "ssp")
+            {
                 let ssp::Loaded { experiment, mut opened, entries } = ssp::load(&experiment, &overrides)?;
                 let system = check(experiment, &fmu_dir, &mut opened);
                 (system.map_err(|error| entries.named(error))?, Some(entries))
@@ -226,15 +228,8 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 (check(experiment, &fmu_dir, &mut Opened::default())?, None)
             };
             let real_time = real_time.map(|factor| pacing::Settings { factor, on_miss, priority });
-            let options = Options {
-                out: folder,
-                quiet,
-                real_time,
-                live,
-                files,
-                force,
-                interrupt: interrupt.clone(),
-            };
+            let options =
+                Options { out: folder, quiet, real_time, live, files, force, interrupt: interrupt.clone() };
             let report = run::run(&mut system, &options).map_err(|error| match (error, &entries) {
                 (Failure::Single(error), Some(entries)) => entries.named(error).into(),
                 (error, _) => error,

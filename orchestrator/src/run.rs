@@ -144,8 +144,7 @@ pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Fail
         recorder.finish()?;
         files.insert(0, format.file());
     }
-    let metadata =
-        metadata::metadata(system, &parameters, options.real_time, outcome.as_ref().err());
+    let metadata = metadata::metadata(system, &parameters, options.real_time, outcome.as_ref().err());
     write_json(&out.join("results.json"), &metadata)?;
     let reached = clock.step() * meters.seen().saturating_sub(1) as f64;
     let mut metrics = Metrics {
@@ -191,9 +190,7 @@ fn warn(real_time: &RealTime, quiet: bool) {
     if let Some(done) = real_time.done_about_it() {
         tracing::warn!("{} of {} deadlines missed; {done}", real_time.misses, real_time.deadlines);
     }
-    if let Priority::Refused(reason) | Priority::Fifo { unlocked: Some(reason), .. } =
-        &real_time.priority
-    {
+    if let Priority::Refused(reason) | Priority::Fifo { unlocked: Some(reason), .. } = &real_time.priority {
         tracing::warn!("--priority: {reason}");
     }
 }

@@ -4,7 +4,7 @@
 //! none; what is missing is told when the file is read.
 
 use cosim::experiment::Experiment;
-use cosim_report::study::Study;
+use cosim_report::study::definition::Study;
 use schemars::generate::SchemaSettings;
 use schemars::transform::{RecursiveTransform, Transform};
 use schemars::{JsonSchema, Schema};

@@ -61,7 +61,7 @@ pub fn check(experiment: Experiment, fmu_dirs: &[PathBuf], opened: &mut Opened) 
     let every = periods(&experiment, &order);
     let loops = delay::feedback_loops(&parts, &every, &wires, simulation.coupling);
     let probes = columns.iter().map(|column| column.port).collect();
-    Ok(System { experiment, clock, order, fmus, settings, wires, columns, loops, probes })
+    Ok(System { experiment, clock, order, fmus, loops, settings, wires, columns, probes })
 }
 
 /// Opens an archive, and warns if its description has a fault.

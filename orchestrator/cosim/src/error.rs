@@ -101,9 +101,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Experiment { .. } | Self::Import(Import::Fmu { .. }) => 2,
-            Self::Interrupted { request, .. } | Self::Ended(request) => {
-                request.exit_code()
-            }
+            Self::Interrupted { request, .. } | Self::Ended(request) => request.exit_code(),
             Self::EndedByUnit { .. } => 0,
             Self::Lost { .. } => 3,
             Self::Unit { .. }

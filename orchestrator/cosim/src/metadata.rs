@@ -2,8 +2,8 @@
 
 use crate::error::Error;
 use crate::pacing;
-use crate::system::{Parameters, System};
 use crate::seeds::is_seed;
+use crate::system::{Parameters, System};
 use fmu_import::description::Kind;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};

@@ -2,8 +2,8 @@
 
 use crate::error::Error;
 use crate::interrupt::Interrupt;
-use crate::system::System;
 use crate::settings::{Setting, SettingValue};
+use crate::system::System;
 use fmu_import::warnings;
 use tracing::subscriber::{NoSubscriber, with_default};
 
@@ -49,7 +49,9 @@ fn are_same(system: &System, others: &[Vec<Setting>], interrupt: &Interrupt) -> 
     let timings = system.timings();
     let bits = |values: &[f64]| {
         let mut bits: Vec<u64> = values.iter().map(|value| value.to_bits()).collect();
-        timings.iter().for_each(|place| bits[*place] = 0);
+        for place in &timings {
+            bits[*place] = 0;
+        }
         bits
     };
     let (mut one, mut other) = (system.start(interrupt)?, system.start_with(others, interrupt)?);

@@ -26,9 +26,11 @@ pub struct Signal {
 
 /// `component.variable`, with what is subtracted from it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Term<Variable> {
-    pub(crate) value: Variable,
-    pub(crate) minus: Option<Variable>,
+pub struct Term<Variable> {
+    /// The variable.
+    pub value: Variable,
+    /// What is subtracted from it.
+    pub minus: Option<Variable>,
 }
 
 impl TryFrom<String> for Signal {
@@ -41,9 +43,7 @@ impl TryFrom<String> for Signal {
         };
         let inside = whole.strip_prefix("norm(").and_then(|rest| rest.strip_suffix(')'));
         let term = |text: &str| match text.split_once(" - ") {
-            Some((from, minus)) => {
-                Term { value: from.trim().into(), minus: Some(minus.trim().into()) }
-            }
+            Some((from, minus)) => Term { value: from.trim().into(), minus: Some(minus.trim().into()) },
             None => Term { value: text.trim().to_string(), minus: None },
         };
         let terms: Vec<_> = inside.unwrap_or(whole).split(',').map(term).collect();
@@ -93,10 +93,14 @@ impl Signal {
 /// A signal with its variables found: places among a sample's values.
 #[derive(Clone, Debug)]
 pub struct Resolved {
-    pub(crate) terms: Vec<Term<usize>>,
-    pub(crate) norm: bool,
-    pub(crate) over: Option<usize>,
-    pub(crate) factor: f64,
+    /// The terms that are added, or whose norm is taken.
+    pub terms: Vec<Term<usize>>,
+    /// Whether the norm is taken.
+    pub norm: bool,
+    /// What the whole is divided by.
+    pub over: Option<usize>,
+    /// Factor from the unit of its variables to its own.
+    pub factor: f64,
     /// The unit that [`Self::value`] is in.
     pub unit: String,
     /// Whether it is a single variable that is no real number.
@@ -106,14 +110,22 @@ pub struct Resolved {
 impl Resolved {
     /// The variable at a place of a sample's values, as it is.
     pub fn variable(place: usize) -> Self {
-        let terms = vec![Term { value: place, minus: None }];
+        Self::of(Term { value: place, minus: None })
+    }
+
+    /// The difference of two variables at places of a sample's values.
+    pub fn difference(place: usize, minus: usize) -> Self {
+        Self::of(Term { value: place, minus: Some(minus) })
+    }
+
+    fn of(term: Term<usize>) -> Self {
+        let terms = vec![term];
         Self { terms, norm: false, over: None, factor: 1.0, unit: String::new(), is_integer: false }
     }
 
     /// The signal in a sample, in its unit.
     pub fn value(&self, values: &[f64]) -> f64 {
-        let term =
-            |term: &Term<usize>| values[term.value] - term.minus.map_or(0.0, |minus| values[minus]);
+        let term = |term: &Term<usize>| values[term.value] - term.minus.map_or(0.0, |minus| values[minus]);
         let value = if self.norm {
             self.terms.iter().map(|t| term(t).powi(2)).sum::<f64>().sqrt()
         } else {

@@ -8,6 +8,7 @@ pub mod error;
 pub mod faults;
 mod fmi;
 pub mod fmu;
+mod instance;
 pub mod names;
 pub mod quantity;
 pub mod unit;

@@ -173,9 +173,8 @@ mod tests {
             keeps: vec![keeps(4), keeps(5)],
         });
         for (tick, row) in rows.iter().enumerate() {
-            let [.., rate, moment] = *row;
             let mut values = *row;
-            (values[4], values[5]) = (rate / 0.1, moment / 10.0);
+            (values[4], values[5]) = (row[4] / 0.1, row[5] / 10.0);
             let time = 0.5 * tick as f64;
             let last = tick + 1 == rows.len();
             course.observe(&Sample { tick: tick as u64, time, last, values: &values }).unwrap();
@@ -223,5 +222,4 @@ mod tests {
         let course = course(&[[1.0, 1.0, 0.1, f64::NAN, 0.0, 0.0], [1.0, 1.0, 0.1, 0.1, 0.0, 0.0]]);
         assert!(course.margins[1].is_some_and(f64::is_nan));
     }
-
 }

@@ -55,7 +55,7 @@ impl Gauge {
         Ok(gauge)
     }
 
-    fn of(measure: &Measure, signals: Vec<Resolved>) -> Self {
+    pub(crate) fn of(measure: &Measure, signals: Vec<Resolved>) -> Self {
         Self {
             measure: measure.clone(),
             signals,
@@ -179,7 +179,11 @@ impl Observer for Gauge {
 ///
 /// # Errors
 /// If a list or a variable is not there.
-pub(crate) fn asked(measure: &Measure, observe: &Observe, system: &mut System) -> Result<Option<Gauge>, String> {
+pub(crate) fn asked(
+    measure: &Measure,
+    observe: &Observe,
+    system: &mut System,
+) -> Result<Option<Gauge>, String> {
     let signals = observe.list(measure.signals.get_ref())?;
     let paths = || signals.iter().flat_map(Signal::paths).chain(measure.each.as_deref());
     let missing = paths().any(|path| !system.has(path));
@@ -198,6 +202,11 @@ mod tests {
         held(kind, over, size, 0.0, rows)
     }
 
+    /// A measure as it is written.
+    fn measure(text: &str) -> Measure {
+        toml::from_str(&format!("signals = \"x\"\n{text}")).unwrap()
+    }
+
     fn held(
         kind: Kind,
         over: Option<[f64; 2]>,
@@ -207,8 +216,8 @@ mod tests {
     ) -> Option<f64> {
         let signals = Spanned::new(0..0, "x".to_string());
         let (band, bound) = if kind == Kind::Leaving { (None, size) } else { (size, None) };
-        let measure = Measure { id: "m".into(), kind, signals, over, band, hold, bound };
-        let mut gauge = Gauge::new(&measure, Vec::new());
+        let measure = Measure { kind, signals, over, band, hold, bound, ..measure("kind = \"rms\"") };
+        let mut gauge = Gauge::of(&measure, Vec::new());
         for (time, row) in rows.iter().enumerate() {
             gauge.see(time as f64, row);
         }
@@ -235,22 +244,53 @@ mod tests {
 
     #[test]
     fn a_measure_that_cannot_be_meant_is_refused() {
-        let measure = |kind, over, band| Measure {
-            id: "m".into(),
-            kind,
-            signals: Spanned::new(0..0, String::new()),
-            over,
-            band,
-            hold: 0.0,
-            bound: None,
-        };
-        assert!(measure(Kind::Rms, Some([2.0, 1.0]), None).fault().unwrap().contains("over"));
-        assert!(measure(Kind::Settling, None, None).fault().unwrap().contains("band"));
-        assert!(measure(Kind::Rms, None, Some(0.1)).fault().unwrap().contains("band"));
-        assert_eq!(measure(Kind::Settling, None, Some(0.1)).fault(), None);
-        assert!(measure(Kind::Leaving, None, None).fault().unwrap().contains("bound"));
-        let bounded = |kind| Measure { bound: Some(1.0), ..measure(kind, None, None) };
-        assert!(bounded(Kind::Largest).fault().unwrap().contains("bound"));
-        assert_eq!(bounded(Kind::Leaving).fault(), None);
+        let fault = |text: &str| measure(text).fault();
+        assert!(fault("kind = \"rms\"\nover = [2.0, 1.0]").unwrap().contains("over"));
+        assert!(fault("kind = \"settling\"").unwrap().contains("band"));
+        assert!(fault("kind = \"rms\"\nband = 0.1").unwrap().contains("band"));
+        assert!(fault("kind = \"rms\"\nevery = 0").unwrap().contains("every"));
+        assert_eq!(fault("kind = \"settling\"\nband = 0.1"), None);
+        assert!(fault("kind = \"leaving\"").unwrap().contains("bound"));
+        assert!(fault("kind = \"largest\"\nbound = 1.0").unwrap().contains("bound"));
+        assert_eq!(fault("kind = \"leaving\"\nbound = 1.0"), None);
+    }
+
+    /// What a measure of the first of two variables makes of rows of both.
+    fn taken(text: &str, rows: &[[f64; 2]]) -> Option<f64> {
+        let measure = measure(text);
+        let mut gauge = Gauge::of(&measure, vec![Resolved::variable(0)]);
+        gauge.each = measure.each.as_ref().map(|_| (1, 0.0));
+        for (tick, row) in rows.iter().enumerate() {
+            let (time, last) = (tick as f64, tick + 1 == rows.len());
+            gauge.observe(&Sample { tick: tick as u64, time, last, values: row }).unwrap();
+        }
+        gauge.value()
+    }
+
+    #[test]
+    fn oracle_which_points_are_taken_by_hand() {
+        let rows = [[3.0, 1.0], [100.0, 1.0], [4.0, 2.0], [50.0, 2.0]];
+        assert_eq!(taken("kind = \"rms\"\nevery = 2", &rows), Some(12.5_f64.sqrt()));
+        assert_eq!(taken("kind = \"mean\"\nsteps = true", &rows), Some(107.0 / 3.0));
+        // A count that has not grown is no new value.
+        let each = "each = \"a.count\"";
+        assert_eq!(taken(&format!("kind = \"mean\"\n{each}"), &rows), Some(3.5));
+        let unit = "unit = { name = \"ms\", factor = 1e3 }";
+        assert_eq!(taken(&format!("kind = \"p99\"\n{each}\n{unit}"), &rows), Some(4000.0));
+        assert_eq!(taken("kind = \"last\"", &rows), Some(50.0));
+        assert_eq!(taken("kind = \"largest\"", &rows), Some(100.0));
+        assert_eq!(taken("kind = \"p99\"", &[[0.0, 0.0]; 0]), None);
+    }
+
+    #[test]
+    fn oracle_the_99th_percentile_is_the_nearest_rank() {
+        let rows: Vec<[f64; 2]> = (1..=200).rev().map(|k| [f64::from(k), 0.0]).collect();
+        assert_eq!(taken("kind = \"p99\"", &rows), Some(198.0));
+    }
+
+    #[test]
+    fn a_value_that_is_not_a_number_is_not_hidden() {
+        let rows = [[1.0, 0.0], [f64::NAN, 0.0], [2.0, 0.0]];
+        assert!(taken("kind = \"largest\"", &rows).unwrap().is_nan());
     }
 }

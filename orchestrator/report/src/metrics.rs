@@ -58,8 +58,7 @@ pub struct Metrics {
 }
 
 /// Metrics that every run has.
-const ALWAYS: [&str; 6] =
-    ["real_time_factor", "wall_s", "loop_delay_s", "samples", "completed", "lost_at"];
+const ALWAYS: [&str; 6] = ["real_time_factor", "wall_s", "loop_delay_s", "samples", "completed", "lost_at"];
 
 impl Metrics {
     /// Names of the metrics that runs of an experiment have.
@@ -188,7 +187,11 @@ impl Meters {
     pub fn metrics(&self) -> Metrics {
         let value = |gauge: &Gauge| {
             let value = gauge.value()?;
-            Some(if gauge.counts() && value >= 0.0 { Value::Count(value as u64) } else { Value::Number(value) })
+            Some(if gauge.counts() && value >= 0.0 {
+                Value::Count(value as u64)
+            } else {
+                Value::Number(value)
+            })
         };
         let gauges = self.gauges.iter();
         let mut asked: BTreeMap<_, _> =
@@ -240,10 +243,8 @@ impl Observer for Meters {
                 loss.at = Some(sample.time);
                 if loss.ends_run {
                     let unit = loss.signals.first().map_or("", |signal| &signal.unit);
-                    let reason = format!(
-                        "further than {} {unit} from its reference ([observe.loss])",
-                        loss.beyond
-                    );
+                    let reason =
+                        format!("further than {} {unit} from its reference ([observe.loss])", loss.beyond);
                     return Err(Error::Lost { what: loss.what.clone(), time: sample.time, reason });
                 }
             }

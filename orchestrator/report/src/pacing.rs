@@ -1,8 +1,8 @@
 //! A figure of a paced run, with step times and wake-up jitter as time series and as distributions.
 
-use cosim::pacing::report::{RealTime, Series};
-use cosim::error::Error;
 use crate::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
+use cosim::error::Error;
+use cosim::pacing::report::{RealTime, Series};
 use std::path::Path;
 
 /// Colours of the components, assigned in their order.

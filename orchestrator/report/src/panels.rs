@@ -15,10 +15,12 @@ pub struct Panel {
     pub label: String,
     /// Unit of all values.
     pub unit: String,
-    factor: f64,
+    /// Factor from the unit of the signals to that unit.
+    pub factor: f64,
     /// The curves.
     pub curves: Vec<Curve>,
-    limit: Option<Resolved>,
+    /// The limit of the norm of all curves.
+    pub limit: Option<Resolved>,
 }
 
 /// A curve of a panel.
@@ -26,8 +28,10 @@ pub struct Panel {
 pub struct Curve {
     /// Name in the legend.
     pub name: String,
-    of: Resolved,
-    reference: Option<Resolved>,
+    /// What is drawn.
+    pub of: Resolved,
+    /// What it is to follow.
+    pub reference: Option<Resolved>,
 }
 
 impl Panel {
@@ -39,9 +43,8 @@ impl Panel {
     pub fn all(system: &mut System) -> Result<Vec<Self>, Error> {
         let panels = system.experiment.observe.panels.clone();
         let found = panels.iter().map(|panel| {
-            let fault = |problem| {
-                Error::experiment(format!("[[observe.panels]] \"{}\": {problem}", panel.name))
-            };
+            let fault =
+                |problem| Error::experiment(format!("[[observe.panels]] \"{}\": {problem}", panel.name));
             Self::find(panel, system).map_err(fault)
         });
         let found = found.collect::<Result<Vec<_>, _>>()?;
@@ -84,7 +87,7 @@ impl Panel {
     }
 
     /// The limit of the norm of all curves in a sample, if there is one.
-    pub fn limit(&self, sample: &[f64]) -> Option<f64> {
+    pub fn limit_in(&self, sample: &[f64]) -> Option<f64> {
         self.limit.as_ref().map(|limit| self.factor * limit.value(sample))
     }
 }

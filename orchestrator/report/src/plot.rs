@@ -105,7 +105,7 @@ impl Observer for Curves {
         }
         self.time.push(sample.time);
         for Track { panel, values, references, limit } in &mut self.panels {
-            *limit = panel.limit(sample.values);
+            *limit = panel.limit_in(sample.values);
             values.iter_mut().zip(panel.values(sample.values)).for_each(|(y, value)| y.push(value));
             let followed = panel.references(sample.values);
             references.iter_mut().zip(followed).for_each(|(y, value)| y.push(value));

@@ -2,10 +2,10 @@
 
 use crate::guarantee::told;
 use crate::metrics::{Metrics, Value};
+use crate::study::reproduce;
 use cosim::error::Error;
 use cosim::experiment::{Coupling, Observe};
 use cosim::system::System;
-use crate::study::reproduce;
 use fmu_import::quantity::rounded;
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -73,8 +73,7 @@ pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Re
                 ", from the order: an output is read before its unit's inputs are set"
             }
         };
-        let undeclared: Vec<&str> =
-            feedback.undeclared.iter().map(|&index| order[index].as_str()).collect();
+        let undeclared: Vec<&str> = feedback.undeclared.iter().map(|&index| order[index].as_str()).collect();
         let assumed = if undeclared.is_empty() {
             String::new()
         } else {
@@ -154,7 +153,9 @@ fn guarantee(metrics: &Metrics) -> Option<String> {
 fn asked(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
     let mut lines: Vec<(String, String)> = Vec::new();
     for name in &observe.summary {
-        let (Some(measure), Some(value)) = (observe.metrics.get(name), metrics.asked.get(name)) else { continue };
+        let (Some(measure), Some(value)) = (observe.metrics.get(name), metrics.asked.get(name)) else {
+            continue;
+        };
         let unit = metrics.units.get(name).filter(|unit| !unit.is_empty());
         let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
         let text = match value {
@@ -172,7 +173,7 @@ fn asked(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
         let part = if measure.part.is_empty() { String::new() } else { format!("{} ", measure.part) };
         let text = format!("{part}{text}{unit}{compared}");
         match lines.last_mut().filter(|(label, _)| *label == measure.label) {
-            Some((_, line)) => *line += &format!(", {text}"),
+            Some((_, line)) => line.extend([", ", &text]),
             None => lines.push((measure.label.clone(), text)),
         }
     }
@@ -182,7 +183,7 @@ fn asked(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
 /// Formats a number with four digits after the point, or with an exponent if it is large or small.
 fn shown(number: f64) -> String {
     match number.abs() {
-        size if size >= 1e5 || size < 1e-3 && size > 0.0 => format!("{number:.4e}"),
+        size if size >= 1e4 || size < 1e-3 && size > 0.0 => format!("{number:.4e}"),
         _ => format!("{number:.4}"),
     }
 }
@@ -201,38 +202,67 @@ mod tests {
     #[test]
     fn a_guarantee_is_told_in_one_line() {
         assert_eq!(guarantee(&Metrics::default()), None);
-        let mut metrics = Metrics {
-            guarantee_share: Some(1.0),
-            guarantee_status: Some("inForce".into()),
-            guarantee_rate_margin_min: Some(0.031),
-            guarantee_moment_margin_min: Some(0.012),
-            guarantee_broken: Some(false),
-            ..Metrics::default()
+        let metrics = |asked: &[(&str, Value)]| {
+            let asked = asked.iter().map(|(name, value)| (format!("guarantee_{name}"), Some(value.clone())));
+            Metrics { asked: asked.collect(), ..Metrics::default() }
         };
-        let told = |metrics: &Metrics| guarantee(metrics).unwrap();
-        assert_eq!(told(&metrics), "in force throughout, margins 3.1 % (rate), 1.2 % (moment)");
-        metrics.guarantee_broken = Some(true);
+        let (number, text) = (Value::Number, |text: &str| Value::Text(text.into()));
+        let margins = [("moment_margin_min", number(0.012)), ("rate_margin_min", number(0.031))];
+        let told = |asked: &[(&str, Value)]| guarantee(&metrics(&[asked, &margins].concat())).unwrap();
+        let throughout = [("share", number(1.0)), ("status", text("inForce"))];
+        assert_eq!(told(&throughout), "in force throughout, margins 1.2 % (moment), 3.1 % (rate)");
+        let broken = [("share", number(1.0)), ("broken", Value::Flag(true))];
         assert_eq!(
-            told(&metrics),
-            "in force throughout, margins 3.1 % (rate), 1.2 % (moment); \
+            told(&broken),
+            "in force throughout, margins 1.2 % (moment), 3.1 % (rate); \
              DEFECT: a limit was EXCEEDED while it was in force"
         );
-        metrics.guarantee_broken = None;
-        metrics.guarantee_share = Some(0.972);
+        let kept = [("share", number(0.972)), ("broken", Value::Flag(false))];
         assert_eq!(
-            told(&metrics),
-            "in force at 97.2 % of the ticks, never lost, margins 3.1 % (rate), 1.2 % (moment)"
+            told(&kept),
+            "in force at 97.2 % of the ticks, never lost, margins 1.2 % (moment), 3.1 % (rate)"
         );
-        (metrics.guarantee_lost_at, metrics.guarantee_status) =
-            (Some(310.0 * 0.04 + 1e-14), Some("exceeded".into()));
-        assert_eq!(told(&metrics), "in force at 97.2 % of the ticks, lost at t = 12.4 s (exceeded)");
-        let never = Metrics {
-            guarantee_share: Some(0.0),
-            guarantee_status: Some("refused".into()),
-            ..Metrics::default()
-        };
-        assert_eq!(told(&never), "never in force (refused)");
-        let bare = Metrics { guarantee_share: Some(1.0), ..Metrics::default() };
-        assert_eq!(told(&bare), "in force throughout");
+        let lost = [
+            ("share", number(0.972)),
+            ("lost_at", number(310.0 * 0.04 + 1e-14)),
+            ("status", text("exceeded")),
+        ];
+        assert_eq!(told(&lost), "in force at 97.2 % of the ticks, lost at t = 12.4 s (exceeded)");
+        let never = metrics(&[("share", number(0.0)), ("status", text("refused"))]);
+        assert_eq!(guarantee(&never).unwrap(), "never in force (refused)");
+        assert_eq!(guarantee(&metrics(&[("share", number(1.0))])).unwrap(), "in force throughout");
+    }
+
+    #[test]
+    fn metrics_of_one_heading_share_a_line_and_limits_are_told() {
+        let observe: Observe = toml::from_str(
+            r#"
+            summary = ["mean", "largest", "rate", "missing"]
+            [metrics]
+            mean = { label = "time", part = "mean", kind = "mean", signals = "x" }
+            largest = { label = "time", part = "max", kind = "largest", signals = "x" }
+            rate = { label = "largest rate", kind = "largest", signals = "y", limit = "limit" }
+            limit = { kind = "last", signals = "z" }
+            missing = { label = "count", kind = "last", signals = "z" }
+            "#,
+        )
+        .unwrap();
+        let values = [
+            ("mean", Some(0.0004)),
+            ("largest", Some(2.0)),
+            ("rate", Some(6.0)),
+            ("limit", Some(5.0)),
+            ("missing", None),
+        ];
+        let asked = values.map(|(name, value)| (name.to_string(), value.map(Value::Number)));
+        let units = ["mean", "largest"].map(|name| (name.to_string(), "ms".to_string()));
+        let metrics = Metrics { asked: asked.into(), units: units.into(), ..Metrics::default() };
+        assert_eq!(
+            super::asked(&observe, &metrics),
+            [
+                ("time".to_string(), "mean 4.0000e-4 ms, max 2.0000 ms".to_string()),
+                ("largest rate".into(), "6.0000   EXCEEDS its limit 5.0000: 120.0 %".into()),
+            ]
+        );
     }
 }

@@ -15,7 +15,7 @@ use cosim::pacing::pacer::Tally;
 use cosim_report::guarantee::Course;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
-use scene::Scene;
+use scene::{Scene, Snapshot};
 use std::cell::Cell;
 use std::io::{self, IsTerminal, stdout};
 use std::process;
@@ -28,19 +28,6 @@ use view::State;
 
 /// Time between two pictures of the view.
 const BETWEEN_PICTURES: Duration = Duration::from_millis(66);
-
-/// The values that the master copies for the view.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Snapshot {
-    /// Simulated time of the communication point, s; `None` before the first.
-    pub(crate) time: Option<f64>,
-    /// The probed values at this communication point.
-    pub(crate) values: Vec<f64>,
-    /// State of the pacing, if the run is paced.
-    pub(crate) tally: Option<Tally>,
-    /// Course of the controller's guarantee, if it gives one.
-    pub(crate) guarantee: Option<Course>,
-}
 
 /// The view, for as long as this lives. The terminal is as before when it is dropped, also by a panic.
 pub(crate) struct Live {

@@ -2,8 +2,9 @@
 
 use crate::failure::Failure;
 use cosim::error::Error;
+use cosim::pacing::pacer::Tally;
 use cosim::system::{Probed, System};
-use cosim_report::guarantee::Signals;
+use cosim_report::guarantee::{Course, Signals};
 use cosim_report::panels::Panel;
 
 /// Everything that does not change while the run goes on.
@@ -27,6 +28,19 @@ pub(crate) struct Scene {
     pub(crate) recorded: Vec<Probed>,
 }
 
+/// The values that the master copies for the view.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Snapshot {
+    /// Simulated time of the communication point, s; `None` before the first.
+    pub(crate) time: Option<f64>,
+    /// The probed values at this communication point.
+    pub(crate) values: Vec<f64>,
+    /// State of the pacing, if the run is paced.
+    pub(crate) tally: Option<Tally>,
+    /// Course of the controller's guarantee, if it gives one.
+    pub(crate) guarantee: Option<Course>,
+}
+
 /// Formats a variable's value with its unit, or as the name of its item.
 pub(crate) fn text(variable: &Probed, values: &[f64]) -> String {
     let value = values.get(variable.place).copied().unwrap_or(f64::NAN);
@@ -41,11 +55,7 @@ pub(crate) fn text(variable: &Probed, values: &[f64]) -> String {
 
 impl Scene {
     /// Finds what there is, and has it seen at every communication point.
-    pub(crate) fn new(
-        system: &mut System,
-        panels: Vec<Panel>,
-        factor: Option<f64>,
-    ) -> Result<Self, Failure> {
+    pub(crate) fn new(system: &mut System, panels: Vec<Panel>, factor: Option<f64>) -> Result<Self, Failure> {
         let observe = system.experiment.observe.clone();
         let mut found = |path: &String| system.has(path).then(|| system.probe(path).ok()).flatten();
         // A reading that a unit lacks is left out, as a metric is that is optional.

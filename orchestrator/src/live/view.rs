@@ -1,7 +1,6 @@
 //! Layout and drawing of the live view.
 
-use super::Snapshot;
-use super::scene::{self, Scene};
+use super::scene::{self, Scene, Snapshot};
 use cosim::pacing::pacer::Tally;
 use cosim::system::Probed;
 use cosim_report::panels::Panel;
@@ -28,13 +27,13 @@ const CHARTS: usize = 2;
 const POINTS: usize = 2000;
 
 /// A curve, as pairs of time and value.
-type Course = Vec<(f64, f64)>;
+type Points = Vec<(f64, f64)>;
 
 /// The courses of a chart.
 #[derive(Debug, Default)]
 struct Chart {
-    values: Vec<Course>,
-    references: Vec<Course>,
+    values: Vec<Points>,
+    references: Vec<Points>,
 }
 
 /// Everything that the view has seen of the run so far.
@@ -53,8 +52,8 @@ impl State {
     /// Creates a state that has seen no snapshot yet.
     pub(crate) fn new(scene: Scene) -> Self {
         let empty = |panel: &Panel| Chart {
-            values: vec![Course::new(); panel.curves.len()],
-            references: vec![Course::new(); panel.curves.len()],
+            values: vec![Points::new(); panel.curves.len()],
+            references: vec![Points::new(); panel.curves.len()],
         };
         let charts = scene.panels.iter().take(CHARTS).map(empty).collect();
         Self { scene, charts, ..Self::default() }
@@ -162,7 +161,7 @@ fn colors() -> impl Iterator<Item = Color> {
 
 fn chart(frame: &mut Frame, state: &State, title: Line, drawn: &Chart, area: Rect) {
     let pale = drawn.references.iter().map(|course| (course, Color::DarkGray));
-    let courses: Vec<(&Course, Color)> = pale.chain(drawn.values.iter().zip(colors())).collect();
+    let courses: Vec<(&Points, Color)> = pale.chain(drawn.values.iter().zip(colors())).collect();
     let datasets = courses.iter().map(|(course, color)| {
         Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line).style(*color).data(course)
     });
@@ -221,31 +220,32 @@ fn numbers(state: &State) -> Vec<Line<'static>> {
 fn bars(state: &State) -> Vec<LineGauge<'static>> {
     let values = state.values();
     let limited = state.scene.panels.iter().filter_map(|panel| {
-        let limit = panel.limit(values?)?;
+        let limit = panel.limit_in(values?)?;
         let norm = panel.values(values?).map(|x| x * x).sum::<f64>().sqrt();
         Some((panel, norm, limit))
     });
-    limited.map(|(panel, norm, limit)| {
-        let ratio = norm / limit;
-        let color = if ratio <= 0.9 {
-            Color::LightGreen
-        } else if ratio <= 1.0 {
-            Color::LightYellow
-        } else {
-            Color::LightRed
-        };
-        let label = format!(
-            "{:<10} {norm:>9.3} of {limit:.3} {:<5} {:>6.1} %",
-            panel.name,
-            panel.unit,
-            ratio * 100.0
-        );
-        // What is not a number is not within a limit.
-        let filled = if ratio.is_nan() { 1.0 } else { ratio.clamp(0.0, 1.0) };
-        let gauge = LineGauge::default().filled_symbol(line::THICK_HORIZONTAL).ratio(filled).label(label);
-        gauge.filled_style(color).unfilled_style(Color::DarkGray)
-    })
-    .collect()
+    limited
+        .map(|(panel, norm, limit)| {
+            let ratio = norm / limit;
+            let color = if ratio <= 0.9 {
+                Color::LightGreen
+            } else if ratio <= 1.0 {
+                Color::LightYellow
+            } else {
+                Color::LightRed
+            };
+            let label = format!(
+                "{:<10} {norm:>9.3} of {limit:.3} {:<5} {:>6.1} %",
+                panel.name,
+                panel.unit,
+                ratio * 100.0
+            );
+            // What is not a number is not within a limit.
+            let filled = if ratio.is_nan() { 1.0 } else { ratio.clamp(0.0, 1.0) };
+            let gauge = LineGauge::default().filled_symbol(line::THICK_HORIZONTAL).ratio(filled).label(label);
+            gauge.filled_style(color).unfilled_style(Color::DarkGray)
+        })
+        .collect()
 }
 
 /// The lines of variables that the experiment names.

@@ -1,6 +1,6 @@
 //! Writes the recorded variables to `results.parquet`.
 
-use super::Column;
+use super::column::Column;
 use crate::error::Error;
 use fmu_import::description::Carrier;
 use parquet::basic::{Repetition, Type as Physical};

@@ -2,6 +2,7 @@
 //! values, for any tool that reads them.
 
 mod read;
+mod structure;
 mod write;
 
 pub use read::{Entries, Loaded, load};

@@ -4,8 +4,8 @@ use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
 use crate::error::Error;
 use crate::experiment::Coupling;
 use crate::interrupt::Interrupt;
-use crate::system::System;
 use crate::settings::SettingValue;
+use crate::system::System;
 use fmu_import::description::{Kind, Variable};
 use fmu_import::quantity::Scaling;
 use quick_xml::Writer;
@@ -295,8 +295,9 @@ fn typed(value: &SettingValue) -> (&'static str, String) {
 }
 
 fn connections(xml: &mut Xml, system: &Source) -> io::Result<()> {
-    let name =
-        |component: usize, variable: usize| system.fmus[component].description.variables[variable].name.clone();
+    let name = |component: usize, variable: usize| {
+        system.fmus[component].description.variables[variable].name.clone()
+    };
     system.wires.iter().try_for_each(|wire| {
         let mut attributes = vec![
             ("startElement", system.order[wire.from.component].clone()),

@@ -1,8 +1,9 @@
 //! Whether a paper's claims hold in our runs.
 
+use super::comparisons::{Check, Claim, Relation};
+use super::definition::Study;
 use super::results::{Numbers, Results, is_reference, resolve};
 use super::values::Quantity;
-use super::{Check, Claim, Relation, Study};
 use serde::Serialize;
 
 /// Verdict on a claim of the paper.
@@ -176,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_claim_without_runs_is_not_judged() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/two-loop-smc/study.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments/two-loop-smc/study.toml");
         let study = Study::load(&path).unwrap();
         let runs = vec![RunResult::default(); study.runs.len()];
         let results = Results { study: &study, runs };
@@ -190,7 +191,7 @@ mod tests {
 
     #[test]
     fn a_member_without_the_number_does_not_hold_and_is_not_left_out() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/two-loop-smc/study.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments/two-loop-smc/study.toml");
         let study = Study::load(&path).unwrap();
         let check = study.claims.iter().flat_map(|claim| &claim.checks);
         let check = check.clone().find(|check| check.left == "direct.measure.settling-02").unwrap();

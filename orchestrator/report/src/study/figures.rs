@@ -1,10 +1,12 @@
 //! Makes figures of a study's results.
 
+use super::drawings::{Across, Axis, Figure, Panel, Through};
 use super::part::Series;
 use super::results::{Metric, Results, RunResult};
-use cosim::signal::Signal;
-use super::{Across, Axis, Figure, Panel, Run, Scaled, Through};
+use super::runs::Run;
 use crate::figure::{self, Color, Curve, Legend, Shape};
+use cosim::experiment::Scaled;
+use cosim::signal::Signal;
 use toml::Spanned;
 
 /// Columns of a histogram per decade.
@@ -14,7 +16,7 @@ const COLUMNS_PER_DECADE: f64 = 12.0;
 ///
 /// # Errors
 /// If it names what is not there.
-pub fn figure(figure: &Figure, results: &Results) -> Result<figure::Figure, String> {
+pub(super) fn figure(figure: &Figure, results: &Results) -> Result<figure::Figure, String> {
     let panels = figure.panels.iter().map(|p| panel(figure, p, results)).collect::<Result<_, _>>()?;
     Ok(figure::Figure { title: figure.title.clone(), columns: figure.columns, legend: Legend::Above, panels })
 }

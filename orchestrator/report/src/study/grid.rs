@@ -1,9 +1,10 @@
 //! Candidates on scenarios: a run for each pair, so that neither stands in the study more than once.
 
-use super::{Run, Study};
+use super::runs::Run;
+use crate::figure::Color;
+use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::Experiment;
-use crate::figure::Color;
 use fmu_import::names;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -14,7 +15,7 @@ use toml::{Spanned, Value};
 /// Every candidate on every scenario: the runs `SCENARIO-CANDIDATE`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Grid {
+pub(super) struct Grid {
     /// What is compared.
     #[serde(rename = "candidate")]
     candidates: Vec<Candidate>,
@@ -72,12 +73,12 @@ impl Grid {
     ///
     /// # Errors
     /// If an experiment cannot be read, or a candidate is not there.
-    pub fn runs(&self, study: &Study) -> Result<Vec<Run>, Error> {
+    pub(super) fn runs(&self, source: &Source) -> Result<Vec<Run>, Error> {
         let mut runs = Vec::new();
         for scenario in &self.scenarios {
-            let experiment = Experiment::load(&study.beside(&scenario.experiment))?;
+            let experiment = Experiment::load(&source.beside(&scenario.experiment))?;
             let ids = self.candidates.iter().map(|candidate| candidate.id.as_str());
-            study.known(scenario.set_for.keys(), "[[grid.candidate]]", ids)?;
+            source.known(scenario.set_for.keys(), "[[grid.candidate]]", ids)?;
             for candidate in &self.candidates {
                 let own = scenario.set_for.iter().find(|(id, _)| *id.get_ref() == candidate.id);
                 let own = own.into_iter().flat_map(|(_, set)| set.clone());
@@ -110,7 +111,10 @@ impl Grid {
 ///
 /// # Errors
 /// The name that fits none.
-pub fn expand(names: &[Spanned<String>], ids: &[&str]) -> Result<Vec<Spanned<String>>, Spanned<String>> {
+pub(super) fn expand(
+    names: &[Spanned<String>],
+    ids: &[&str],
+) -> Result<Vec<Spanned<String>>, Spanned<String>> {
     let mut all = Vec::new();
     for name in names {
         if !name.get_ref().contains('*') {

@@ -1,9 +1,10 @@
 //! The report as one HTML page that needs nothing but itself.
 
 use super::claims::{Checked, Judged, Verdict};
+use super::comparisons::{Check, Claim, Column, Overview, Relation, Row, Table};
 use super::results::{Numbers, Results};
+use super::texts::{percent, several, shown, signed};
 use super::values::{Quantity, ValueKind};
-use super::{Check, Claim, Column, Overview, Relation, Row, Table};
 use crate::figure::{self, interactive};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::fmt::Write as _;
@@ -15,7 +16,7 @@ const SCRIPT: &str = include_str!("page.js");
 ///
 /// # Errors
 /// If the study names what is not there.
-pub fn page(results: &Results, judged: &[Judged], drawn: &[figure::Figure]) -> Result<String, String> {
+pub(super) fn page(results: &Results, judged: &[Judged], drawn: &[figure::Figure]) -> Result<String, String> {
     let study = results.study;
     let runs: usize = results.runs.iter().map(|run| run.members.len()).sum();
     let claims = study.claims.iter().zip(judged).map(|(c, j)| claim(c, j)).collect::<Vec<_>>();
@@ -341,85 +342,9 @@ fn all_values(results: &Results) -> Markup {
     }
 }
 
-/// A number in as many digits as papers print.
-fn shown(value: f64) -> String {
-    let magnitude = value.abs();
-    if value == 0.0 {
-        "0".into()
-    } else if !value.is_finite() {
-        value.to_string()
-    } else if !(1e-3..1e5).contains(&magnitude) {
-        format!("{value:.3e}")
-    } else {
-        // Four places, as the paper's tables; more only to keep three significant digits.
-        let digits = (4 - magnitude.log10().floor() as i32).clamp(0, if magnitude < 0.1 { 6 } else { 4 });
-        let digits = if magnitude < 0.1 { digits - 2 } else { digits } as usize;
-        let text = format!("{value:.digits$}");
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
-    }
-}
-
-fn signed(value: f64) -> String {
-    let sign = if value < 0.0 { "−" } else { "+" };
-    format!("{sign}{}", shown(value.abs()))
-}
-
-fn several(numbers: &Numbers) -> String {
-    if numbers.0.is_empty() {
-        return "–".into();
-    }
-    let mean = shown(numbers.mean());
-    if !numbers.vary() {
-        return mean;
-    }
-    let (low, high) = numbers.extent();
-    // Wide tables break a line before the range, not within.
-    format!("{mean} [{},\u{a0}{}]", shown(low), shown(high))
-}
-
-/// Fractions as differences in per cent.
-fn percent(fractions: &Numbers) -> String {
-    let one = |fraction: f64| {
-        let percent = 100.0 * fraction;
-        let sign = if percent < 0.0 { "−" } else { "+" };
-        format!("{sign}{:.1}", percent.abs())
-    };
-    if fractions.vary() {
-        let (low, high) = fractions.extent();
-        format!("{} % [{}, {}]", one(fractions.mean()), one(low), one(high))
-    } else {
-        format!("{} %", one(fractions.mean()))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_are_shown_as_papers_print_them() {
-        for (value, text) in [
-            (1.6055, "1.6055"),
-            (0.3552, "0.3552"),
-            (116.8, "116.8"),
-            (12_345.6, "12346"),
-            (0.08511, "0.0851"),
-            (0.23413, "0.2341"),
-            (2e-5, "2.000e-5"),
-            (-0.0123, "-0.0123"),
-            (100.0, "100"),
-        ] {
-            assert_eq!(shown(value), text);
-        }
-    }
-
-    #[test]
-    fn several_numbers_show_their_mean_and_extent() {
-        assert_eq!(several(&Numbers(vec![1.0, 1.0])), "1");
-        assert_eq!(several(&Numbers(vec![1.0, 2.0])), "1.5 [1,\u{a0}2]");
-        assert_eq!(several(&Numbers(Vec::new())), "–");
-        assert_eq!(percent(&Numbers(vec![-0.342])), "−34.2 %");
-    }
 
     #[test]
     fn text_of_a_figure_cannot_end_the_script_element() {

@@ -1,17 +1,18 @@
 //! One part of the work of a study: a run for some values of its parameter, from the experiment to what is kept of it.
 
-use crate::measure::{Gauge, larger};
-use cosim::signal::{Resolved, Signal};
-use super::{Run, Study};
+use super::definition::Study;
+use super::runs::Run;
 use crate::error::Error;
+use crate::measure::{Gauge, larger};
+use crate::metrics::{Meters, Metrics};
 use cosim::check::check;
 use cosim::error::Error as Single;
 use cosim::experiment::Experiment;
 use cosim::interrupt::Interrupt;
 use cosim::master::{Observer, Sample};
-use crate::metrics::{Meters, Metrics};
-use cosim::system::{Opened, System};
+use cosim::signal::{Resolved, Signal};
 use cosim::system::Parameters;
+use cosim::system::{Opened, System};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -20,7 +21,7 @@ use toml::Value;
 
 /// A part of a study's work: the members `range` of a run, counted from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Part {
+pub(super) struct Part {
     /// Position of the run in the study.
     pub run: usize,
     /// Members of the run that belong to this part.
@@ -49,7 +50,7 @@ pub struct Member {
     /// Figures of merit of the member.
     pub metrics: Metrics,
     /// Comparisons of signals with bounds, by id.
-    pub within: BTreeMap<String, Inside>,
+    pub within: BTreeMap<String, Compared>,
     /// Measures that the study defines, by id; null if a measure has no value.
     pub measures: BTreeMap<String, Option<f64>>,
 }
@@ -70,7 +71,7 @@ impl Member {
 
 /// Comparison of signals with a bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Inside {
+pub struct Compared {
     /// Number of samples in which all signals were within the bound.
     pub inside: u64,
     /// Number of all samples that were compared.
@@ -108,7 +109,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// The signals that a study wants of a run: as time series, and as bands.
 #[derive(Clone, Debug, Default)]
-pub struct Wanted {
+pub(super) struct Wanted {
     /// Signals that are drawn as lines.
     pub series: BTreeSet<Signal>,
     /// Signals that are drawn as bands.
@@ -117,7 +118,7 @@ pub struct Wanted {
 
 impl Wanted {
     /// Collects the signals of a run that the study's figures draw.
-    pub fn of(study: &Study, run: &Run) -> Self {
+    pub(super) fn of(study: &Study, run: &Run) -> Self {
         let mut wanted = Self::default();
         for figure in &study.figures {
             for panel in &figure.panels {
@@ -138,7 +139,7 @@ impl Wanted {
 }
 
 /// A run of a study, ready to be made for any value of its parameter.
-pub struct Preparation<'a> {
+pub(super) struct Preparation<'a> {
     study: &'a Study,
     run: &'a Run,
     /// Signals of the run that the figures draw.
@@ -153,11 +154,10 @@ impl<'a> Preparation<'a> {
     ///
     /// # Errors
     /// If the experiment cannot be read, or has not what the run changes in it.
-    pub fn new(study: &'a Study, run: &'a Run, fmu_dirs: &'a [PathBuf]) -> Result<Self, Error> {
+    pub(super) fn new(study: &'a Study, run: &'a Run, fmu_dirs: &'a [PathBuf]) -> Result<Self, Error> {
         let wanted = Wanted::of(study, run);
-        let experiment = study
-            .experiment(run)
-            .map_err(|source| Error::Run { run: run.id.get_ref().clone(), source })?;
+        let experiment =
+            study.experiment(run).map_err(|source| Error::Run { run: run.id.get_ref().clone(), source })?;
         Ok(Self { study, run, wanted, experiment, fmu_dirs })
     }
 
@@ -165,7 +165,7 @@ impl<'a> Preparation<'a> {
     ///
     /// # Errors
     /// Everything that is wrong with the experiment, the FMUs, or the signals.
-    pub fn system(&self, member: u32, opened: &mut Opened) -> Result<System, Single> {
+    pub(super) fn system(&self, member: u32, opened: &mut Opened) -> Result<System, Single> {
         let mut experiment = self.experiment.clone();
         if let Some(vary) = &self.run.vary {
             let value = Value::Integer(i64::from(vary.first) + i64::from(member));
@@ -189,7 +189,7 @@ impl<'a> Preparation<'a> {
     ///
     /// # Errors
     /// An error that names the missing item.
-    pub fn check(&self, opened: &mut Opened) -> Result<(), Error> {
+    pub(super) fn check(&self, opened: &mut Opened) -> Result<(), Error> {
         let mut system = self.system(0, opened).map_err(|source| self.failed(source))?;
         let bounded = self.study.bounds_of(self.run).flat_map(|(_, signals)| signals);
         let measured = self.study.measures_of(self.run).flat_map(|(_, signals)| signals);
@@ -206,7 +206,7 @@ impl<'a> Preparation<'a> {
     ///
     /// # Errors
     /// If a unit fails, or if the run was asked to end.
-    pub fn execute(
+    pub(super) fn execute(
         &self,
         range: Range<u32>,
         opened: &mut Opened,
@@ -221,7 +221,7 @@ impl<'a> Preparation<'a> {
                 let signals = signals.iter().map(|signal| self.resolve(signal, &mut system));
                 let signals = signals.collect::<Result<_, _>>()?;
                 let bound = self.study.number(&within.bound)?;
-                bounds.push(Bounded { id: &within.id, signals, bound, inside: Inside::default() });
+                bounds.push(Bounded { id: &within.id, signals, bound, inside: Compared::default() });
             }
             let mut gauges = Vec::new();
             for (measure, signals) in self.study.measures_of(self.run) {
@@ -285,7 +285,7 @@ impl Spread {
     }
 }
 
-impl Inside {
+impl Compared {
     fn see(&mut self, magnitude: f64, bound: f64) {
         self.samples += 1;
         self.inside += u64::from(magnitude <= bound * (1.0 + ROUNDING));
@@ -299,7 +299,7 @@ struct Bounded<'a> {
     id: &'a str,
     signals: Vec<Resolved>,
     bound: f64,
-    inside: Inside,
+    inside: Compared,
 }
 
 impl Observer for Bounded<'_> {
@@ -323,7 +323,11 @@ struct Watch {
 }
 
 impl Watch {
-    fn new(signals: &BTreeSet<Signal>, preparation: &Preparation, system: &mut System) -> Result<Self, Single> {
+    fn new(
+        signals: &BTreeSet<Signal>,
+        preparation: &Preparation,
+        system: &mut System,
+    ) -> Result<Self, Single> {
         let resolved = signals
             .iter()
             .map(|signal| Ok((signal.clone(), preparation.resolve(signal, system)?)))
@@ -354,16 +358,16 @@ mod tests {
 
     #[test]
     fn oracle_shares_and_ratios_by_hand() {
-        let mut inside = Inside::default();
+        let mut inside = Compared::default();
         for magnitude in [0.5, 2.0, 3.0, 2.0] {
             inside.see(magnitude, 2.0);
         }
-        assert_eq!(inside, Inside { inside: 3, samples: 4, largest: 3.0, ratio: 1.5 });
+        assert_eq!(inside, Compared { inside: 3, samples: 4, largest: 3.0, ratio: 1.5 });
     }
 
     #[test]
     fn a_magnitude_that_is_not_a_number_is_outside_and_seen() {
-        let mut inside = Inside::default();
+        let mut inside = Compared::default();
         inside.see(f64::NAN, 2.0);
         assert!(inside.inside == 0 && inside.largest.is_nan());
     }

@@ -4,19 +4,20 @@
 //! it depends on; a part whose file is there, with the same hash, is not run again. So an interruption costs the parts that
 //! were being worked on, and nothing else.
 
+use super::claims;
+use super::definition::Study;
+use super::kept::{Kept, hex, kept, write_whole};
+use super::output::{Judgement, write};
 use super::part::{Outcome, Part, Preparation};
 use super::results::{Results, RunResult, resolve};
-use super::{Study, claims, figures, page};
 use crate::error::Error;
-use cosim::error::Error as Single;
-use crate::figure::{png, svg};
 use crate::folder::Folder;
-use cosim::interrupt::Interrupt;
 use crate::progress::Parts;
-use cosim::system::Opened;
+use cosim::error::Error as Single;
+use cosim::interrupt::Interrupt;
 use cosim::search;
+use cosim::system::Opened;
 use fmu_import::quantity::rounded;
-use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, VecDeque};
@@ -46,9 +47,6 @@ pub struct Options {
     /// Interrupt through which the work can be ended from outside.
     pub interrupt: Interrupt,
 }
-
-/// A claim, in our words, with its verdict.
-pub type Judgement = (String, claims::Verdict);
 
 /// Outcome of the reproduction of a study.
 #[derive(Debug)]
@@ -306,61 +304,6 @@ fn keys(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Res
     Ok(keys)
 }
 
-fn hex(bytes: &[u8]) -> String {
-    use std::fmt::Write as _;
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
-}
-
-/// Content of the file of a finished part.
-#[derive(Serialize, Deserialize)]
-struct Kept {
-    key: String,
-    members: std::ops::Range<u32>,
-    /// Of all the rest, so that no number is taken over that has changed since.
-    digest: String,
-    outcome: Outcome,
-}
-
-impl Kept {
-    fn new(key: String, members: std::ops::Range<u32>, outcome: Outcome) -> serde_json::Result<Self> {
-        let digest = Self::digest(&key, &members, &outcome)?;
-        Ok(Self { key, members, digest, outcome })
-    }
-
-    fn digest(key: &str, members: &std::ops::Range<u32>, outcome: &Outcome) -> serde_json::Result<String> {
-        Ok(hex(&Sha256::digest(serde_json::to_vec(&(key, members, outcome))?)))
-    }
-
-    fn is_whole(&self) -> bool {
-        Self::digest(&self.key, &self.members, &self.outcome).is_ok_and(|digest| digest == self.digest)
-    }
-}
-
-/// Reads the outcome that a part left earlier, if it is still valid.
-fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
-    let text = fs::read(path).ok()?;
-    let kept = serde_json::from_slice::<Kept>(&text).ok().filter(Kept::is_whole);
-    let Some(kept) = kept else {
-        tracing::error!("{} is damaged: it is run again", path.display());
-        return None;
-    };
-    (kept.key == key && kept.members == part.range).then_some(kept.outcome)
-}
-
-/// Writes a file completely or not at all.
-fn write_whole(path: &Path, content: &[u8]) -> Result<(), Single> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(Single::file(folder))?;
-    }
-    let unfinished = path.with_extension("unfinished");
-    fs::write(&unfinished, content).map_err(Single::file(&unfinished))?;
-    fs::rename(&unfinished, path).map_err(Single::file(path))
-}
-
 /// Parts being worked on by several threads.
 struct Work<'a> {
     study: &'a Study,
@@ -429,81 +372,4 @@ impl Work<'_> {
         self.progress.finished(&run.label);
         Ok(kept.outcome)
     }
-}
-
-/// Writes figures, numbers and page. Returns the verdicts and the files.
-fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Vec<String>), Error> {
-    let study = results.study;
-    let fault = |message: String| study.source.error(&(0..0), message);
-    let mut files = vec!["report.html".to_string(), "results.json".to_string()];
-    let mut drawn = Vec::new();
-    for figure in &study.figures {
-        let picture = figures::figure(figure, results).map_err(fault)?;
-        let path = out.join("figures").join(format!("{}.svg", figure.id));
-        let text = svg::text(&picture).map_err(Single::file(&path))?;
-        write_whole(&path, text.as_bytes())?;
-        png::write(&text, &path.with_extension("png"))?;
-        files.push(format!("figures/{}.svg, .png", figure.id));
-        drawn.push(picture);
-    }
-    let judged = study
-        .claims
-        .iter()
-        .map(|claim| claims::judge(claim, results))
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(fault)?;
-    write_whole(&out.join("results.json"), numbers(results, &judged).as_bytes())?;
-    let page = page::page(results, &judged, &drawn).map_err(fault)?;
-    write_whole(&out.join("report.html"), page.as_bytes())?;
-    let verdicts = study.claims.iter().zip(&judged).map(|(c, j)| (c.says.clone(), j.verdict)).collect();
-    Ok((verdicts, files))
-}
-
-/// All numbers, for other programs.
-fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
-    let study = results.study;
-    let runs: serde_json::Map<String, Value> = study
-        .runs
-        .iter()
-        .zip(&results.runs)
-        .map(|(run, result)| {
-            let own = json!({
-                "label": run.label,
-                "experiment": run.experiment,
-                "fmu": run.fmu,
-                "set": run.set,
-                "unset": run.unset,
-                "members": result.members,
-                "samples": result.series.samples,
-            });
-            (run.id.get_ref().clone(), own)
-        })
-        .collect();
-    let claims: Vec<Value> = study
-        .claims
-        .iter()
-        .zip(judged)
-        .map(|(claim, judged)| {
-            let checks: Vec<Value> = claim
-                .checks
-                .iter()
-                .zip(&judged.checks)
-                .map(|(check, checked)| {
-                    json!({
-                        "label": check.label,
-                        "left": checked.left.0,
-                        "right": checked.right.0,
-                        "difference": checked.difference.0,
-                        "held": checked.held,
-                        "of": checked.pairs,
-                    })
-                })
-                .collect();
-            json!({ "says": claim.says, "verdict": judged.verdict, "checks": checks })
-        })
-        .collect();
-    let all = json!({ "title": study.title, "values": study.values.0, "runs": runs, "claims": claims });
-    let mut text = serde_json::to_string_pretty(&all).unwrap_or_default();
-    text.push('\n');
-    text
 }

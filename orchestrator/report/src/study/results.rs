@@ -1,9 +1,10 @@
 //! Results of a study's runs, and the references `run.metric` to them.
 
+use super::definition::Study;
 use super::part::{Member, Outcome, Series, Spread};
-use cosim::signal::Signal;
+use super::runs::Run;
 use super::values::Quantity;
-use super::{Run, Study};
+use cosim::signal::Signal;
 use cosim::system::Parameters;
 use fmu_import::names;
 use std::collections::BTreeMap;
@@ -42,7 +43,7 @@ impl RunResult {
 
 /// A number that every member of a run has.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Metric {
+pub(super) enum Metric {
     /// A metric by its name in `metrics.json`, 1 or 0 for yes or no.
     Merit {
         /// Its name.
@@ -69,7 +70,7 @@ impl Metric {
     ///
     /// # Errors
     /// If there is no such metric.
-    pub fn parse(text: &str, run: &Run) -> Result<Self, String> {
+    pub(super) fn parse(text: &str, run: &Run) -> Result<Self, String> {
         if let Some((id, what)) = text.strip_prefix("within.").and_then(|rest| rest.rsplit_once('.')) {
             let ids: Vec<&str> = run.within.iter().map(|within| within.get_ref().as_str()).collect();
             if !ids.contains(&id) {
@@ -165,7 +166,7 @@ pub struct Results<'a> {
 ///
 /// # Errors
 /// An error that names the missing run or metric.
-pub fn resolve(study: &Study, reference: &str) -> Result<(usize, Metric), String> {
+pub(super) fn resolve(study: &Study, reference: &str) -> Result<(usize, Metric), String> {
     let (id, metric) = names::split(reference).ok_or_else(|| format!("\"{reference}\" is no run.metric"))?;
     let place = study.runs.iter().position(|run| run.id.get_ref() == id).ok_or_else(|| {
         let hint = names::hint(id, study.runs.iter().map(|run| run.id.get_ref().as_str()));
@@ -175,7 +176,7 @@ pub fn resolve(study: &Study, reference: &str) -> Result<(usize, Metric), String
 }
 
 /// Whether a quantity refers to `run.metric` rather than to a value.
-pub fn is_reference(study: &Study, quantity: &Quantity) -> bool {
+pub(super) fn is_reference(study: &Study, quantity: &Quantity) -> bool {
     match quantity {
         Quantity::Number(_) => false,
         Quantity::Named(name) => {

@@ -25,7 +25,7 @@ use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
 /// A place, and what is wrong there.
-pub type Fault = (Range<usize>, String);
+pub(super) type Fault = (Range<usize>, String);
 
 /// Templates may use each other so many deep; more must be a circle.
 const DEPTH: usize = 8;
@@ -34,7 +34,7 @@ const DEPTH: usize = 8;
 ///
 /// # Errors
 /// Names a template, a list or a value that is not there.
-pub fn expand(study: &mut DeTable) -> Result<(), Fault> {
+pub(super) fn expand(study: &mut DeTable) -> Result<(), Fault> {
     let mut shared = |key: &str| match study.remove(key).map(|value| (value.span(), value.into_inner())) {
         None => Ok(DeTable::new()),
         Some((_, DeValue::Table(table))) => Ok(table),
@@ -56,7 +56,7 @@ pub fn expand(study: &mut DeTable) -> Result<(), Fault> {
 ///
 /// # Errors
 /// What `change` says, with its place.
-pub fn rewrite(
+pub(super) fn rewrite(
     value: &mut Spanned<DeValue>,
     change: &impl Fn(&str) -> Result<Option<String>, String>,
 ) -> Result<(), Fault> {

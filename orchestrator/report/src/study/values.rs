@@ -33,7 +33,7 @@ pub enum ValueKind {
 /// A number with its origin.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub struct Value {
+pub struct Entry {
     /// By which it is referred to.
     pub id: String,
     /// The number.
@@ -50,7 +50,7 @@ pub struct Value {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    value: Vec<Value>,
+    value: Vec<Entry>,
 }
 
 /// A number as it is written, or the id of a value (or, where it says so, `run.metric`).
@@ -65,7 +65,12 @@ pub enum Quantity {
 
 /// All values of a study.
 #[derive(Clone, Debug, Default)]
-pub struct Values(pub Vec<Value>);
+pub struct Values(pub Vec<Entry>);
+
+/// The factor of what is shown in its own unit.
+pub(super) fn unscaled() -> f64 {
+    1.0
+}
 
 impl Values {
     /// Adds the values of a file.
@@ -85,7 +90,7 @@ impl Values {
     }
 
     /// The value of this id.
-    pub fn find(&self, id: &str) -> Option<&Value> {
+    pub fn find(&self, id: &str) -> Option<&Entry> {
         self.0.iter().find(|value| value.id == id)
     }
 

@@ -1,9 +1,9 @@
-use super::super::scene::Shown;
 use super::*;
-use crate::guarantee::{Course, Signals};
-use crate::master::{Observer, Sample};
-use crate::metrics::{Limits, Places};
-use crate::realtime::pacer::{Miss, Step};
+use cosim::master::{Observer, Sample};
+use cosim::pacing::pacer::{Miss, Step};
+use cosim::signal::Resolved;
+use cosim_report::guarantee::{Course, Signals};
+use cosim_report::panels::Curve;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::buffer::Cell;
@@ -17,34 +17,68 @@ fn picture(state: &State, width: u16, height: u16) -> Vec<String> {
     cells.map(|row| row.iter().map(Cell::symbol).collect::<String>().trim_end().to_string()).collect()
 }
 
+fn panel(
+    name: &str,
+    names: [&str; 3],
+    unit: &str,
+    factor: f64,
+    of: [usize; 3],
+    minus: Option<[usize; 3]>,
+) -> Panel {
+    let signal = |place: usize| Resolved { factor, ..Resolved::variable(place) };
+    let curve = |axis: usize| Curve {
+        name: names[axis].into(),
+        of: minus.filter(|_| name == "error").map_or(signal(of[axis]), |minus| Resolved {
+            factor,
+            ..Resolved::difference(of[axis], minus[axis])
+        }),
+        reference: minus.filter(|_| name == "attitude").map(|minus| signal(minus[axis])),
+    };
+    let curves = [0, 1, 2].map(curve).into();
+    Panel { name: name.into(), label: name.into(), unit: unit.into(), factor: 1.0, curves, limit: None }
+}
+
+fn probed(name: &str, place: usize, unit: &str, items: &[(&str, i32)]) -> Probed {
+    let items = items.iter().map(|(name, item)| ((*name).to_string(), *item)).collect();
+    Probed { name: name.into(), place, unit: unit.into(), items }
+}
+
 fn scene() -> Scene {
+    let angles = ["alpha", "beta", "sigma"];
+    let degrees = 1_f64.to_degrees();
+    let limited = |panel: Panel, place: usize, factor: f64| {
+        let limit = Some(Resolved { factor, ..Resolved::variable(place) });
+        Panel { limit, ..panel }
+    };
+    let rate = panel("rate", ["p", "q", "r"], "deg/s", degrees, [6, 7, 8], None);
+    let moment = panel("moment", ["x", "y", "z"], "kN m", 1e-3, [9, 10, 11], None);
     Scene {
         title: "CRMPC".into(),
         span: [0.0, 50.0],
         factor: Some(1.0),
         components: vec!["controller".into(), "plant".into()],
-        places: Places {
-            attitude: Some([0, 1, 2]),
-            reference: Some([3, 4, 5]),
-            rate: Some([6, 7, 8]),
-            moment: Some([9, 10, 11]),
-            solver_time: Some(12),
-            solver_solves: Some(13),
-            solver_fallbacks: Some(14),
-            ..Places::default()
-        },
-        limits: Limits { rate: Some(5_f64.to_radians()), moment: Some(1e5) },
-        status: Some(Shown { place: 15, items: vec![("optimal".into(), 1)], ..Shown::default() }),
-        iterations: Some(16),
+        panels: vec![
+            panel("attitude", angles, "deg", degrees, [0, 1, 2], Some([3, 4, 5])),
+            panel("error", angles, "deg", degrees, [0, 1, 2], Some([3, 4, 5])),
+            limited(rate, 17, degrees),
+            limited(moment, 18, 1e-3),
+        ],
+        readings: vec![(
+            "solver".into(),
+            vec![
+                probed("controller.solver.status", 15, "", &[("optimal", 1)]),
+                probed("controller.solver.time", 12, "s", &[]),
+                probed("controller.solver.iterations", 16, "", &[]),
+            ],
+        )],
         guarantee: None,
         recorded: Vec::new(),
     }
 }
 
 fn snapshot(time: f64) -> Snapshot {
-    let mut values: Vec<f64> =
-        [3.0, 1.0, 0.0, 2.0, 0.0, 0.0, 3.0, 4.0, 0.0].map(f64::to_radians).to_vec();
-    values.extend([0.0, 6e4, -8e4, 0.0019, 7.0, 0.0, 1.0, 11.0]);
+    let mut values: Vec<f64> = [3.0, 1.0, 0.0, 2.0, 0.0, 0.0, 3.0, 4.0, 0.0].map(f64::to_radians).to_vec();
+    values.extend([0.0, 6e4, -8e4, 0.0019, 7.0, 0.0, 1.0, 11.0, 5_f64.to_radians(), 1e5]);
     let miss = Miss {
         component: 1,
         time: 9.96,
@@ -77,15 +111,11 @@ fn a_picture_shows_angles_limits_solver_and_deadlines() {
     assert_eq!(picture[13..18], expected);
     // ‖(3, 4, 0)‖ of 5 and ‖(0, 60, -80)‖ of 100: both at their limits.
     assert!(picture[18].starts_with("rate           5.000 of 5.000 deg/s  100.0 % ━"), "{}", picture[18]);
-    assert!(
-        picture[19].starts_with("moment       100.000 of 100.000 kN m   100.0 % ━"),
-        "{}",
-        picture[19]
-    );
+    assert!(picture[19].starts_with("moment       100.000 of 100.000 kN m   100.0 % ━"), "{}", picture[19]);
     assert_eq!(
         picture[20..],
         [
-            "solver     optimal, 1.900 ms, 11 iterations, 7 solutions, 0 fallbacks",
+            "solver     optimal, time 0.0019 s, iterations 11",
             "deadlines  1 of 500 missed, this step began 0.060 ms late",
             "last miss  plant at t = 9.96 s by 2.500 ms; longest step: controller, 42.000 ms",
             "q: end the run, keep the results",
@@ -101,18 +131,20 @@ fn a_picture_shows_angles_limits_solver_and_deadlines() {
 
 #[test]
 fn the_guarantee_has_a_line_that_turns_red_when_it_is_lost() {
-    let items = [("inForce", 1), ("none", 2), ("exceeded", 5)].map(|(name, item)| (name.into(), item));
-    let signals = Signals { in_force: 0, status: Some(1), margins: [Some(2), Some(3)] };
-    let places = Places { guarantee: Some(signals), ..Places::default() };
-    let guarantee = Some(Shown { place: 1, items: items.to_vec(), ..Shown::default() });
-    let mut state = State::new(Scene { span: [0.0, 1.0], places, guarantee, ..Scene::default() });
-    let mut course = Course::new(places, Limits::default()).unwrap();
+    let signals = Signals {
+        in_force: 0,
+        status: Some(probed("s.status", 1, "", &[("inForce", 1), ("none", 2), ("exceeded", 5)])),
+        margins: vec![("moment".into(), 3), ("rate".into(), 2)],
+        keeps: Vec::new(),
+    };
+    let mut state = State::new(Scene { span: [0.0, 1.0], ..Scene::default() });
+    let mut course = Course::new(signals);
     let mut told = |time: f64, values: [f64; 4]| {
         course.observe(&Sample { tick: 0, time, last: false, values: &values }).unwrap();
         let snapshot = Snapshot {
             time: Some(time),
             values: values.to_vec(),
-            guarantee: Some(course),
+            guarantee: Some(course.clone()),
             ..Snapshot::default()
         };
         state.see_after(&snapshot, Duration::ZERO);
@@ -122,23 +154,17 @@ fn the_guarantee_has_a_line_that_turns_red_when_it_is_lost() {
         (line.to_string(), is_red)
     };
     assert_eq!(told(0.0, [0.0, 2.0, 0.0, 0.0]), ("guarantee  not in force (none)".into(), false));
-    let line = "guarantee  in force, margins 3.1 % (rate), 1.2 % (moment)";
+    let line = "guarantee  in force, margins 1.2 % (moment), 3.1 % (rate)";
     assert_eq!(told(0.04, [1.0, 1.0, 0.031, 0.012]), (line.into(), false));
     let line = "guarantee  not in force (exceeded); lost at t = 0.12 s (exceeded)";
     assert_eq!(told(3.0 * 0.04, [0.0, 5.0, 0.0, 0.0]), (line.into(), true));
-    let line = "guarantee  in force, margins 2.0 % (rate), 1.0 % (moment); lost at t = 0.12 s (exceeded)";
+    let line = "guarantee  in force, margins 1.0 % (moment), 2.0 % (rate); lost at t = 0.12 s (exceeded)";
     assert_eq!(told(0.16, [1.0, 1.0, 0.02, 0.01]), (line.into(), true));
 }
 
 #[test]
-fn without_variables_that_have_a_role_what_is_recorded_is_shown() {
-    let shown = |name: &str, place, unit: &str| Shown {
-        name: name.into(),
-        place,
-        unit: unit.into(),
-        items: Vec::new(),
-    };
-    let recorded = vec![shown("gain.output", 0, "m"), shown("plant.steps", 1, "")];
+fn without_panels_what_is_recorded_is_shown() {
+    let recorded = vec![probed("gain.output", 0, "m", &[]), probed("plant.steps", 1, "", &[])];
     let mut state =
         State::new(Scene { title: "loop".into(), span: [0.0, 3.0], recorded, ..Scene::default() });
     let before = picture(&state, 60, 10);
@@ -169,7 +195,7 @@ fn a_long_run_keeps_its_whole_course() {
     for tick in 0..10 * POINTS {
         state.see_after(&snapshot(tick as f64), Duration::ZERO);
     }
-    let course = &state.attitude[0];
+    let course = &state.charts[0].values[0];
     assert!(course.len() <= POINTS && course.len() >= POINTS / 2);
     assert_eq!(course[0].0, 0.0);
     assert!(course.windows(2).all(|pair| pair[0].0 < pair[1].0));

@@ -1,6 +1,4 @@
-//! A folder to run the program in, with a unit in C that `cc` compiles there. Each test program uses a part of it.
-
-#![allow(dead_code, unreachable_pub)]
+//! A folder to run the program in, with a unit in C that `cc` compiles there.
 
 use std::fs;
 use std::io::Write;
@@ -10,7 +8,7 @@ use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
 /// Two of the unit in a loop.
-pub const LOOP: &str = r#"
+pub(crate) const LOOP: &str = r#"
 title = "gain and integrator"
 [simulation]
 stop = 3.0
@@ -31,17 +29,17 @@ variables = ["gain.output.direct", "plant.output.integral", "plant.steps"]
 "#;
 
 /// How the unit in C is made.
-pub struct Recipe<'a> {
+pub(crate) struct Recipe<'a> {
     /// What the compiler is told besides, `-DENDS` for instance.
-    pub flags: &'a [&'a str],
+    pub(crate) flags: &'a [&'a str],
     /// What becomes of the text of its description.
-    pub description: &'a dyn Fn(String) -> String,
+    pub(crate) description: &'a dyn Fn(String) -> String,
     /// What becomes of its library.
-    pub library: &'a dyn Fn(Vec<u8>) -> Vec<u8>,
+    pub(crate) library: &'a dyn Fn(Vec<u8>) -> Vec<u8>,
     /// What comes before the name of an entry.
-    pub prefix: &'a str,
+    pub(crate) prefix: &'a str,
     /// Name of the library.
-    pub name: &'a str,
+    pub(crate) name: &'a str,
 }
 
 impl Default for Recipe<'_> {
@@ -51,21 +49,21 @@ impl Default for Recipe<'_> {
 }
 
 /// A folder with `Unit.fmu` and `loop.toml`.
-pub struct Bench {
+pub(crate) struct Bench {
     /// Vanishes with it.
-    pub folder: TempDir,
+    pub(crate) folder: TempDir,
 }
 
 impl Bench {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::with(LOOP)
     }
 
-    pub fn with(experiment: &str) -> Self {
+    pub(crate) fn with(experiment: &str) -> Self {
         Self::made(experiment, &Recipe::default())
     }
 
-    pub fn made(experiment: &str, recipe: &Recipe) -> Self {
+    pub(crate) fn made(experiment: &str, recipe: &Recipe) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/unit");
         let library = folder.path().join("unit.so");
@@ -92,36 +90,36 @@ impl Bench {
         Self { folder }
     }
 
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    pub fn command(&self, arguments: &[&str]) -> Command {
+    pub(crate) fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_orchestrator"));
         command.args(arguments).current_dir(self.folder.path()).env_remove("RUST_LOG");
         command
     }
 
-    pub fn call(&self, arguments: &[&str]) -> (i32, String, String) {
+    pub(crate) fn call(&self, arguments: &[&str]) -> (i32, String, String) {
         let Output { status, stdout, stderr } = self.command(arguments).output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         (status.code().expect("no signal"), text(stdout), text(stderr))
     }
 
     /// Runs the experiment, as often as one likes.
-    pub fn run(&self, arguments: &[&str]) -> (i32, String, String) {
+    pub(crate) fn run(&self, arguments: &[&str]) -> (i32, String, String) {
         self.call(&[&["run", "loop.toml", "--force"], arguments].concat())
     }
 
     /// Refusal of an experiment: exit code 2, and one line.
-    pub fn refusal(&self, arguments: &[&str]) -> String {
+    pub(crate) fn refusal(&self, arguments: &[&str]) -> String {
         let (code, _, errors) = self.run(arguments);
         assert_eq!(code, 2, "{errors}");
         assert_eq!(errors.lines().count(), 1, "{errors}");
         errors
     }
 
-    pub fn json(&self, name: &str) -> serde_json::Value {
+    pub(crate) fn json(&self, name: &str) -> serde_json::Value {
         serde_json::from_str(&fs::read_to_string(self.path(name)).unwrap()).unwrap()
     }
 }

@@ -1,8 +1,6 @@
 //! Units of other makers, imitated by a unit in C: what they do differently runs, and what is wrong with them is told.
 
-mod bench;
-
-use bench::{Bench, LOOP, Recipe};
+use crate::bench::{Bench, LOOP, Recipe};
 use std::fs;
 use std::process::Command;
 

@@ -1,0 +1,228 @@
+use super::*;
+use fmu_import::description::Carrier;
+use fmu_import::quantity::Scaling;
+use fmu_import::unit::{CoSimulationUnit, Outcome};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+type Journal = Rc<RefCell<Vec<String>>>;
+
+/// Variable 0 is the input and variable 1 the output. A `gain` has direct feedthrough: output =
+/// 2 · input. The output of an `integrator` is its state, which grows by h · input at each
+/// step.
+struct Mock {
+    name: &'static str,
+    direct: bool,
+    input: f64,
+    state: f64,
+    fails_after: f64,
+    journal: Journal,
+}
+
+impl Mock {
+    fn note(&self, what: &str) {
+        self.journal.borrow_mut().push(format!("{} {what}", self.name));
+    }
+}
+
+impl CoSimulationUnit for Mock {
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
+        for (reference, value) in references.iter().zip(values.iter_mut()) {
+            *value = match (reference, self.direct) {
+                (0, _) => self.input,
+                (_, true) => 2.0 * self.input,
+                (_, false) => self.state,
+            };
+        }
+        Ok(())
+    }
+    fn get_integer(&mut self, _: &[u32], _: &mut [i32]) -> Outcome {
+        unreachable!("no such variables")
+    }
+    fn get_boolean(&mut self, _: &[u32], _: &mut [i32]) -> Outcome {
+        unreachable!("no such variables")
+    }
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
+        assert_eq!(references, [0]);
+        self.input = values[0];
+        self.note(&format!("set {}", self.input));
+        Ok(())
+    }
+    fn set_integer(&mut self, _: &[u32], _: &[i32]) -> Outcome {
+        unreachable!("no such variables")
+    }
+    fn set_boolean(&mut self, _: &[u32], _: &[i32]) -> Outcome {
+        unreachable!("no such variables")
+    }
+    fn set_string(&mut self, _: u32, _: &str) -> Outcome {
+        unreachable!("no such variables")
+    }
+    fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
+        self.note(&format!("enter {start}..{stop}"));
+        Ok(())
+    }
+    fn exit_initialization(&mut self) -> Outcome {
+        self.note("exit");
+        Ok(())
+    }
+    fn do_step(&mut self, time: f64, step: f64) -> Outcome {
+        if time >= self.fails_after {
+            return Err(UnitFailure::new("doStep", "out of propellant"));
+        }
+        self.state += step * self.input;
+        self.note(&format!("step {time}+{step}"));
+        Ok(())
+    }
+    fn terminate(&mut self) -> Outcome {
+        self.note("terminate");
+        Ok(())
+    }
+}
+
+fn port(component: usize, reference: u32) -> Port {
+    Port { component, variable: reference as usize, reference, carrier: Carrier::Real }
+}
+
+fn wire(from: usize, to: usize) -> Wire {
+    Wire { from: port(from, 1), to: port(to, 0), scaling: Scaling::default() }
+}
+
+#[derive(Default)]
+struct Rows(Vec<Vec<f64>>);
+
+impl Observer for Rows {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        self.0.push([&[sample.time], sample.values].concat());
+        Ok(())
+    }
+}
+
+/// Returns the outcome of the run, rows of time, the gain's output and the integrator's input
+/// and output, and the journal of calls.
+fn run(
+    coupling: Coupling,
+    order: [&'static str; 2],
+    every: [u32; 2],
+    [step, stop]: [f64; 2],
+    fails_after: f64,
+) -> (Result<(), Error>, Vec<Vec<f64>>, Vec<String>) {
+    let journal = Journal::default();
+    let members = order
+        .iter()
+        .zip(every)
+        .map(|(&name, every)| {
+            let direct = name == "gain";
+            let state = if direct { 0.0 } else { 1.0 };
+            let mock = Mock { name, direct, input: 0.0, state, fails_after, journal: Rc::clone(&journal) };
+            Member { name: name.into(), every, unit: Box::new(mock) }
+        })
+        .collect();
+    let gain = order.iter().position(|name| *name == "gain").unwrap();
+    let integrator = 1 - gain;
+    let wires = [wire(integrator, gain), wire(gain, integrator)];
+    let probes = [port(gain, 1), port(integrator, 0), port(integrator, 1)];
+    let clock = Clock::new(0.0, stop, step).unwrap();
+    let mut master = Master::new(clock, coupling, members, &wires, &probes);
+    let mut rows = Rows::default();
+    let outcome = master.initialize().and_then(|()| master.run(&mut [&mut rows]));
+    let journal = journal.borrow().clone();
+    (outcome, rows.0, journal)
+}
+
+#[test]
+fn oracle_gauss_seidel_in_the_order_of_the_loop_has_no_delay() {
+    let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 3.0], 1e9);
+    outcome.unwrap();
+    // The state follows x⁺ = x + 2x, and the moment recorded in each row belongs to the state
+    // of that row.
+    let expected =
+        [[0.0, 2.0, 2.0, 1.0], [1.0, 6.0, 6.0, 3.0], [2.0, 18.0, 18.0, 9.0], [3.0, 54.0, 54.0, 27.0]];
+    assert_eq!(rows, expected);
+}
+
+#[test]
+fn oracle_the_other_order_delays_by_one_step() {
+    let (outcome, rows, _) = run(Coupling::GaussSeidel, ["integrator", "gain"], [1, 1], [1.0, 3.0], 1e9);
+    outcome.unwrap();
+    // The integrator receives 2·x of the tick before. In initialization mode it received the
+    // gain's 0, at tick 0 its 2·x₀.
+    let expected =
+        [[0.0, 2.0, 2.0, 1.0], [1.0, 6.0, 2.0, 3.0], [2.0, 10.0, 6.0, 5.0], [3.0, 22.0, 10.0, 11.0]];
+    assert_eq!(rows, expected);
+}
+
+#[test]
+fn oracle_jacobi_delays_by_one_step_in_either_order() {
+    for order in [["gain", "integrator"], ["integrator", "gain"]] {
+        let (outcome, rows, _) = run(Coupling::Jacobi, order, [1, 1], [1.0, 3.0], 1e9);
+        outcome.unwrap();
+        // After initialization the gain's output is 2·x₀ in either order.
+        let expected =
+            [[0.0, 2.0, 2.0, 1.0], [1.0, 6.0, 2.0, 3.0], [2.0, 10.0, 6.0, 5.0], [3.0, 22.0, 10.0, 11.0]];
+        assert_eq!(rows, expected, "{order:?}");
+    }
+}
+
+#[test]
+fn units_are_set_before_they_are_stepped() {
+    let (_, _, journal) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 1.0], 1e9);
+    let expected = [
+        "gain enter 0..1",
+        "integrator enter 0..1",
+        "gain set 1",
+        "integrator set 2",
+        "gain exit",
+        "integrator exit",
+        "gain set 1",
+        "integrator set 2",
+        "gain step 0+1",
+        "integrator step 0+1",
+        "gain set 3",
+        "integrator set 6",
+        "gain terminate",
+        "integrator terminate",
+    ];
+    assert_eq!(journal, expected);
+}
+
+#[test]
+fn oracle_a_slow_unit_holds_its_outputs_and_shows_nothing_early() {
+    let (outcome, rows, journal) =
+        run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 2], [1.0, 5.0], 1e9);
+    outcome.unwrap();
+    // The integrator has communication points at 0, 2 and 4 only, where x⁺ = x + 2·2x.
+    let states: Vec<f64> = rows.iter().map(|row| row[3]).collect();
+    assert_eq!(states, [1.0, 1.0, 5.0, 5.0, 25.0, 25.0]);
+    let steps: Vec<&String> = journal.iter().filter(|line| line.starts_with("integrator step")).collect();
+    assert_eq!(steps, ["integrator step 0+2", "integrator step 2+2"]);
+
+    let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [2, 1], [1.0, 4.0], 1e9);
+    outcome.unwrap();
+    // The gain is sampled at 0, 2 and 4, and its output is held between.
+    let held: Vec<f64> = rows.iter().map(|row| row[1]).collect();
+    assert_eq!(held, [2.0, 2.0, 10.0, 10.0, 50.0]);
+}
+
+#[test]
+fn a_failing_unit_is_named_with_time_and_words_and_the_rows_stay() {
+    let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 5.0], 2.0);
+    let error = outcome.unwrap_err();
+    assert_eq!(error.to_string(), "gain failed at t = 2 s in doStep: out of propellant");
+    assert_eq!(error.exit_code(), 1);
+    assert_eq!(rows.len(), 3);
+}
+
+proptest::proptest! {
+    /// Units that all step at every n-th tick give the same results as at every tick of a clock
+    /// n times slower.
+    #[test]
+    fn oracle_equal_periods_are_a_slower_clock(n in 1u32..6, periods in 1u32..6, jacobi: bool, swap: bool) {
+        let coupling = if jacobi { Coupling::Jacobi } else { Coupling::GaussSeidel };
+        let order = if swap { ["integrator", "gain"] } else { ["gain", "integrator"] };
+        let stop = f64::from(n * periods) * 0.25;
+        let (_, fine, _) = run(coupling, order, [n, n], [0.25, stop], 1e9);
+        let (_, coarse, _) = run(coupling, order, [1, 1], [0.25 * f64::from(n), stop], 1e9);
+        let sampled: Vec<Vec<f64>> = fine.into_iter().step_by(n as usize).collect();
+        proptest::prop_assert_eq!(sampled, coarse);
+    }
+}

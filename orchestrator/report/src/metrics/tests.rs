@@ -1,0 +1,144 @@
+use super::*;
+use cosim::experiment::Measure;
+
+/// Angles and their references (rad), moment as a multiple of its limit, time and number of the
+/// solver's solutions.
+fn meters() -> Meters {
+    let difference = |axis: usize| Resolved {
+        factor: 1_f64.to_degrees(),
+        unit: "deg".into(),
+        ..Resolved::difference(axis, axis + 3)
+    };
+    let gauge = |text: &str, signals: Vec<Resolved>| {
+        let measure: Measure = toml::from_str(&format!("signals = \"x\"\n{text}")).unwrap();
+        Some(Gauge::of(&measure, signals))
+    };
+    let errors = || vec![difference(0), difference(1), difference(2)];
+    let count = Resolved { is_integer: true, ..Resolved::variable(7) };
+    let gauges = [
+        ("cms", gauge("kind = \"rms\"\nsteps = true", vec![Resolved::variable(6)])),
+        ("ems_deg", gauge("kind = \"rms\"\nsteps = true", errors())),
+        ("fallbacks", None),
+        ("solves", gauge("kind = \"last\"", vec![count])),
+    ];
+    let loss = Loss {
+        what: "attitude".into(),
+        signals: errors(),
+        beyond: 5.5_f64.to_degrees(),
+        ends_run: false,
+        at: None,
+    };
+    Meters {
+        gauges: gauges.map(|(name, gauge)| (name.to_string(), gauge)).into(),
+        guarantee: (None, None),
+        loss: Some(loss),
+        samples: 0,
+        completed: false,
+    }
+}
+
+fn feed(meters: &mut Meters, rows: &[[f64; 8]]) {
+    for (tick, row) in rows.iter().enumerate() {
+        let (time, last) = (tick as f64, tick + 1 == rows.len());
+        meters.observe(&Sample { tick: tick as u64, time, last, values: row }).unwrap();
+    }
+}
+
+#[test]
+fn oracle_metrics_by_hand() {
+    let mut meters = meters();
+    feed(
+        &mut meters,
+        &[
+            // The error is (3, 4, 0) rad, with square 25.
+            [3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0],
+            // The error is (0, 0, 1), with square 1.
+            [1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0],
+            // The stop begins no step, and does not count for the means.
+            [2.0, 2.0, 2.0, 0.0, 0.0, 0.0, 1.2, 2.0],
+        ],
+    );
+    let metrics = meters.metrics();
+    let near = |name: &str, b: f64| {
+        let a = metrics.number(name);
+        assert!((a.unwrap() - b).abs() < 1e-12, "{name}: {a:?} {b}");
+    };
+    near("ems_deg", 13.0_f64.sqrt().to_degrees());
+    near("cms", 0.5_f64.sqrt());
+    assert_eq!(metrics.asked["solves"], Some(Value::Count(2)));
+    assert_eq!(metrics.units["ems_deg"], "deg");
+    assert!(metrics.completed && metrics.samples == 3 && metrics.lost_at.is_none());
+}
+
+#[test]
+fn a_run_is_lost_beyond_its_bound_or_where_the_signal_is_no_number() {
+    let row = |alpha: f64| {
+        let mut row = [0.0; 8];
+        row[0] = alpha;
+        row
+    };
+    let mut kept = meters();
+    feed(&mut kept, &[row(0.5), row(-5.4), row(5.5)]);
+    assert_eq!((kept.metrics().lost_at, kept.metrics().completed), (None, true));
+    for lost in [5.6, f64::NAN] {
+        let mut meters = meters();
+        feed(&mut meters, &[row(0.5), row(lost), row(20.0), row(0.0)]);
+        assert_eq!((meters.metrics().lost_at, meters.metrics().completed), (Some(1.0), true));
+    }
+    let mut ending = meters().ending_when_lost();
+    let sample = Sample { tick: 3, time: 0.1 + 0.2, last: false, values: &row(6.0) };
+    let error = ending.observe(&sample).unwrap_err();
+    assert_eq!(error.exit_code(), 3);
+    assert!(error.to_string().starts_with("attitude lost at t = 0.3 s: further than 315.1"), "{error}");
+}
+
+#[test]
+fn what_is_missing_is_null_and_what_is_kept_reads_back() {
+    let mut meters = meters();
+    feed(&mut meters, &[[0.0; 8]]);
+    let json = serde_json::to_value(meters.metrics()).unwrap();
+    for key in ["ems_deg", "cms", "fallbacks", "real_time_factor", "lost_at"] {
+        assert!(json.as_object().unwrap()[key].is_null(), "{key}");
+    }
+    let back: Metrics = serde_json::from_value(json).unwrap();
+    assert_eq!(back.asked, meters.metrics().asked);
+}
+
+#[test]
+fn the_guarantee_is_among_the_metrics() {
+    let status = cosim::system::Probed {
+        place: 1,
+        items: vec![("inForce".to_string(), 1), ("exceeded".to_string(), 5)],
+        ..Default::default()
+    };
+    let asked: Guarantee =
+        toml::from_str("in_force = \"a.b\"\nkeeps = \"x\"\nmargins = { moment = \"a.m\", rate = \"a.r\" }")
+            .unwrap();
+    let signals = Signals {
+        in_force: 0,
+        status: Some(status),
+        margins: vec![("moment".into(), 3), ("rate".into(), 2)],
+        keeps: vec![Resolved::variable(4)],
+    };
+    let mut meters = meters();
+    meters.guarantee = (Some(asked.clone()), None);
+    for name in ["share", "lost_at", "status", "rate_margin_min", "moment_margin_min", "broken"] {
+        assert_eq!(meters.metrics().asked[&format!("guarantee_{name}")], None, "{name}");
+    }
+    meters.guarantee.1 = Some(Course::new(signals));
+    let mut rows = [[0.0; 8]; 4];
+    rows[0][..5].copy_from_slice(&[1.0, 1.0, 0.25, 0.5, 1.1]);
+    rows[1][..5].copy_from_slice(&[1.0, 1.0, 0.5, 0.125, 0.1]);
+    rows[2][..5].copy_from_slice(&[0.0, 5.0, 0.0, 0.0, 0.1]);
+    rows[3][..5].copy_from_slice(&[0.0, 2.0, 0.0, 0.0, 0.1]);
+    feed(&mut meters, &rows);
+    let metrics = meters.metrics();
+    let numbers = ["share", "lost_at", "rate_margin_min", "moment_margin_min", "broken"];
+    let numbers = numbers.map(|name| metrics.number(&format!("guarantee_{name}")));
+    assert_eq!(numbers, [0.5, 2.0, 0.25, 0.125, 1.0].map(Some));
+    assert_eq!(metrics.text("guarantee_status"), Some("exceeded"));
+    assert!(
+        Metrics::names(&Observe { guarantee: Some(asked), ..Observe::default() })
+            .contains(&"guarantee_broken".to_string())
+    );
+}

@@ -1,0 +1,67 @@
+//! What a finished part of a study leaves in a file, so that it is not run again.
+
+use super::part::{Outcome, Part};
+use cosim::error::Error as Single;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::fs;
+use std::path::Path;
+
+pub(super) fn hex(bytes: &[u8]) -> String {
+    use std::fmt::Write as _;
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// Content of the file of a finished part.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Kept {
+    key: String,
+    members: std::ops::Range<u32>,
+    /// Of all the rest, so that no number is taken over that has changed since.
+    digest: String,
+    pub(super) outcome: Outcome,
+}
+
+impl Kept {
+    pub(super) fn new(
+        key: String,
+        members: std::ops::Range<u32>,
+        outcome: Outcome,
+    ) -> serde_json::Result<Self> {
+        let digest = Self::digest(&key, &members, &outcome)?;
+        Ok(Self { key, members, digest, outcome })
+    }
+
+    fn digest(key: &str, members: &std::ops::Range<u32>, outcome: &Outcome) -> serde_json::Result<String> {
+        Ok(hex(&Sha256::digest(serde_json::to_vec(&(key, members, outcome))?)))
+    }
+
+    fn is_whole(&self) -> bool {
+        Self::digest(&self.key, &self.members, &self.outcome).is_ok_and(|digest| digest == self.digest)
+    }
+}
+
+/// Reads the outcome that a part left earlier, if it is still valid.
+pub(super) fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
+    let text = fs::read(path).ok()?;
+    let kept = serde_json::from_slice::<Kept>(&text).ok().filter(Kept::is_whole);
+    let Some(kept) = kept else {
+        tracing::error!("{} is damaged: it is run again", path.display());
+        return None;
+    };
+    (kept.key == key && kept.members == part.range).then_some(kept.outcome)
+}
+
+/// Writes a file completely or not at all.
+pub(super) fn write_whole(path: &Path, content: &[u8]) -> Result<(), Single> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(Single::file(folder))?;
+    }
+    let unfinished = path.with_extension("unfinished");
+    fs::write(&unfinished, content).map_err(Single::file(&unfinished))?;
+    fs::rename(&unfinished, path).map_err(Single::file(path))
+}

@@ -1,0 +1,187 @@
+//! Reads a study and checks all that can be checked without running anything.
+
+use super::definition::Study;
+use super::runs::Run;
+use super::{grid, template};
+use crate::metrics::Metrics;
+use cosim::document::Source;
+use cosim::error::Error;
+use cosim::experiment::Experiment;
+use fmu_import::names;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// A text with the numbers of runs in the places that ask for them.
+fn counted(text: &str, runs: &[Run], members: Option<u32>) -> Result<Option<String>, String> {
+    let mut parts = text.split("{runs:");
+    let mut counted = parts.next().unwrap_or_default().to_string();
+    for part in parts {
+        let (id, rest) = part.split_once('}').ok_or("\"{runs:\" is not closed by a brace")?;
+        let run = runs.iter().find(|run| run.id.get_ref() == id).ok_or_else(|| {
+            let hint = names::hint(id, runs.iter().map(|run| run.id.get_ref().as_str()));
+            format!("\"{{runs:{id}}}\": there is no [[run]] \"{id}\"{hint}")
+        })?;
+        counted += &run.vary.as_ref().map_or(1, |vary| vary.limited(members)).to_string();
+        counted += rest;
+    }
+    Ok((counted != text).then_some(counted))
+}
+
+impl Study {
+    /// Reads a study and its files of values.
+    ///
+    /// # Errors
+    /// If a file cannot be read, is no TOML, or names what is not there.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        Self::load_with(path, None)
+    }
+
+    /// Reads a study with at most so many members of each run, and its files of values. `{runs:ID}` in its texts becomes the
+    /// number of runs that there are of ID.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with(path: &Path, members: Option<u32>) -> Result<Self, Error> {
+        let source = Source::load(path)?;
+        let fault = |(span, message): template::Fault| source.error(&span, message);
+        let mut study: Self = source.read_with(|mut table| {
+            template::expand(table.get_mut()).map_err(fault)?;
+            let Self { runs, .. } = source.take(table.clone())?;
+            let counted = |text: &str| counted(text, &runs, members);
+            let mut values = table.get_mut().iter_mut();
+            values.try_for_each(|(_, value)| template::rewrite(value, &counted)).map_err(fault)?;
+            source.take(table)
+        })?;
+        study.source = source;
+        for grid in std::mem::take(&mut study.grids) {
+            let runs = grid.runs(&study.source)?;
+            study.runs.extend(runs);
+        }
+        study.expand()?;
+        for file in &study.value_files {
+            study.values.load(&study.source.beside(file))?;
+        }
+        study.check()?;
+        for vary in study.runs.iter_mut().filter_map(|run| run.vary.as_mut()) {
+            vary.count = vary.limited(members);
+        }
+        study.learn_metrics();
+        Ok(study)
+    }
+
+    /// Notes which metrics the experiments ask for. One that cannot be read is told of when it is to
+    /// be run.
+    fn learn_metrics(&mut self) {
+        let mut known: BTreeMap<PathBuf, (Vec<String>, Vec<String>)> = BTreeMap::new();
+        for index in 0..self.runs.len() {
+            let path = self.source.beside(&self.runs[index].experiment);
+            let (metrics, timings) = known.entry(path).or_insert_with_key(|path| {
+                let observe = Experiment::load(path).map(|read| read.observe).unwrap_or_default();
+                let timed = observe.metrics.iter().filter(|(_, measure)| measure.timing);
+                let timed = timed.map(|(name, _)| name.clone()).collect();
+                (Metrics::names(&observe), timed)
+            });
+            (self.runs[index].metrics, self.runs[index].timings) = (metrics.clone(), timings.clone());
+        }
+    }
+
+    /// Puts the ids of runs in the place of patterns.
+    fn expand(&mut self) -> Result<(), Error> {
+        let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
+        let panels = self.figures.iter_mut().flat_map(|figure| {
+            let own = figure.panels.iter_mut().flat_map(|panel| {
+                let lines = panel.across.iter_mut().flat_map(|across| &mut across.lines);
+                lines.map(|line| &mut line.runs).chain(&mut panel.runs)
+            });
+            own.chain([&mut figure.runs])
+        });
+        for names in panels.chain(self.overviews.iter_mut().map(|overview| &mut overview.runs)) {
+            *names = grid::expand(names, &ids).map_err(|name| {
+                self.source.error(&name.span(), format!("no [[run]] fits \"{}\"", name.get_ref()))
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Everything that can be wrong without running anything.
+    fn check(&self) -> Result<(), Error> {
+        let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
+        for (place, run) in self.runs.iter().enumerate() {
+            let id = run.id.get_ref();
+            let fault = |message: &str| {
+                Err(self.source.error(&run.id.span(), format!("[[run]] id = \"{id}\": {message}")))
+            };
+            if id.is_empty() || !id.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
+                return fault("letters, digits and - only");
+            }
+            if ids[..place].contains(&id.as_str()) {
+                return fault("there is another run of that id");
+            }
+            if run.vary.as_ref().is_some_and(|vary| vary.count == 0) {
+                return fault("vary.count = 0: at least 1");
+            }
+            self.source.known(
+                &run.within,
+                "[[within]]",
+                self.within.iter().map(|within| within.id.as_str()),
+            )?;
+            self.source.known(
+                &run.measures,
+                "[[measure]]",
+                self.measures.iter().map(|measure| measure.id.as_str()),
+            )?;
+        }
+        for within in &self.within {
+            self.number(&within.bound)?;
+        }
+        for measure in &self.measures {
+            if let Some(fault) = measure.fault() {
+                let fault = format!("[[measure]] id = \"{}\": {fault}", measure.id);
+                return Err(self.source.error(&(0..0), fault));
+            }
+        }
+        let bounded = self.within.iter().map(|within| &within.signals);
+        for list in bounded.chain(self.measures.iter().map(|measure| &measure.signals)) {
+            self.source.known([list], "[signals]", self.signals.keys().map(String::as_str))?;
+        }
+        for figure in &self.figures {
+            self.source.known(&figure.runs, "[[run]]", ids.iter().copied())?;
+            for panel in &figure.panels {
+                let through =
+                    panel.across.iter().flat_map(|across| &across.lines).flat_map(|line| &line.runs);
+                let named = panel.runs.iter().flatten().chain(through);
+                self.source.known(named, "[[run]]", ids.iter().copied())?;
+                let drawn = [
+                    panel.signal.is_some(),
+                    !panel.signals.is_empty(),
+                    panel.histogram.is_some(),
+                    panel.scatter.is_some(),
+                    panel.across.is_some(),
+                ];
+                let count = drawn.iter().filter(|is| **is).count();
+                if count != 1 && (count > 1 || panel.points.is_empty()) {
+                    return Err(self.source.error(
+                        &(0..0),
+                        format!(
+                            "[[figure]] id = \"{}\", panel \"{}\": exactly one of signal, signals, histogram, scatter, across, or points alone",
+                            figure.id, panel.label
+                        ),
+                    ));
+                }
+                let lines = panel.bounds.iter().chain(&panel.marks).map(|line| &line.at);
+                let points = panel.points.iter().flat_map(|point| [&point.x, &point.y]);
+                for quantity in lines.chain(points) {
+                    self.number(quantity)?;
+                }
+            }
+        }
+        for overview in &self.overviews {
+            self.source.known(&overview.runs, "[[run]]", ids.iter().copied())?;
+        }
+        for quantity in self.tables.iter().flat_map(|table| &table.rows).filter_map(|row| row.paper.as_ref())
+        {
+            self.number(quantity)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,90 @@
+//! Writes what a study came to: figures, numbers and the page.
+
+use super::claims;
+use super::kept::write_whole;
+use super::results::Results;
+use super::{figures, page};
+use crate::figure::{png, svg};
+use cosim::error::Error;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// A claim, in our words, with its verdict.
+pub(super) type Judgement = (String, claims::Verdict);
+
+/// Writes figures, numbers and page. Returns the verdicts and the files.
+pub(super) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Vec<String>), Error> {
+    let study = results.study;
+    let fault = |message: String| study.source.error(&(0..0), message);
+    let mut files = vec!["report.html".to_string(), "results.json".to_string()];
+    let mut drawn = Vec::new();
+    for figure in &study.figures {
+        let picture = figures::figure(figure, results).map_err(fault)?;
+        let path = out.join("figures").join(format!("{}.svg", figure.id));
+        let text = svg::text(&picture).map_err(Error::file(&path))?;
+        write_whole(&path, text.as_bytes())?;
+        png::write(&text, &path.with_extension("png"))?;
+        files.push(format!("figures/{}.svg, .png", figure.id));
+        drawn.push(picture);
+    }
+    let judged = study
+        .claims
+        .iter()
+        .map(|claim| claims::judge(claim, results))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(fault)?;
+    write_whole(&out.join("results.json"), numbers(results, &judged).as_bytes())?;
+    let page = page::page(results, &judged, &drawn).map_err(fault)?;
+    write_whole(&out.join("report.html"), page.as_bytes())?;
+    let verdicts = study.claims.iter().zip(&judged).map(|(c, j)| (c.says.clone(), j.verdict)).collect();
+    Ok((verdicts, files))
+}
+
+/// All numbers, for other programs.
+fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
+    let study = results.study;
+    let runs: serde_json::Map<String, Value> = study
+        .runs
+        .iter()
+        .zip(&results.runs)
+        .map(|(run, result)| {
+            let own = json!({
+                "label": run.label,
+                "experiment": run.experiment,
+                "fmu": run.fmu,
+                "set": run.set,
+                "unset": run.unset,
+                "members": result.members,
+                "samples": result.series.samples,
+            });
+            (run.id.get_ref().clone(), own)
+        })
+        .collect();
+    let claims: Vec<Value> = study
+        .claims
+        .iter()
+        .zip(judged)
+        .map(|(claim, judged)| {
+            let checks: Vec<Value> = claim
+                .checks
+                .iter()
+                .zip(&judged.checks)
+                .map(|(check, checked)| {
+                    json!({
+                        "label": check.label,
+                        "left": checked.left.0,
+                        "right": checked.right.0,
+                        "difference": checked.difference.0,
+                        "held": checked.held,
+                        "of": checked.pairs,
+                    })
+                })
+                .collect();
+            json!({ "says": claim.says, "verdict": judged.verdict, "checks": checks })
+        })
+        .collect();
+    let all = json!({ "title": study.title, "values": study.values.0, "runs": runs, "claims": claims });
+    let mut text = serde_json::to_string_pretty(&all).unwrap_or_default();
+    text.push('\n');
+    text
+}

@@ -1,0 +1,284 @@
+//! Runs with the wall clock, runs that are ended, and what they leave behind.
+
+use crate::bench::Bench;
+use std::fs;
+use std::io::Write;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use zip::write::SimpleFileOptions;
+
+#[test]
+fn a_run_in_real_time_takes_its_time() {
+    let bench = Bench::new();
+    let begin = Instant::now();
+    let (code, summary, errors) = bench.run(&["--stop", "1", "--real-time"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(begin.elapsed() >= Duration::from_secs(1));
+    assert!(summary.contains("real time         factor 1: 0 of 4 deadlines missed"), "{summary}");
+    assert!(summary.contains("realtime.svg"), "{summary}");
+    let real_time = &bench.json("out/loop/metrics.json")["real_time"];
+    assert!(real_time["elapsed_s"].as_f64().unwrap() >= 1.0);
+    assert_eq!(real_time["components"]["plant"]["step_ms"]["count"], 2);
+    // The first communication point is not waited for.
+    assert_eq!(real_time["components"]["plant"]["wake_up_ms"]["count"], 1);
+    assert_eq!(bench.json("out/loop/results.json")["real_time"]["on_miss"], "catch-up");
+    assert!(fs::read_to_string(bench.path("out/loop/realtime.svg")).unwrap().contains("wake-up jitter, ms"));
+}
+
+/// No machine steps units in a nanosecond.
+const IMPOSSIBLE: &str = "1e9";
+
+#[test]
+fn every_missed_deadline_is_counted_and_what_was_done_is_said() {
+    let bench = Bench::new();
+    let (_, _, _) = bench.run(&["--out", "usual"]);
+    for (policy, said) in
+        [("catch-up", "went on at once, 3 times"), ("slip", "shifted the time base 3 times, by ")]
+    {
+        let (code, summary, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--on-miss", policy]);
+        assert_eq!(code, 0, "{errors}");
+        assert!(summary.contains(": 8 of 8 deadlines missed") && summary.contains(said), "{summary}");
+        assert!(
+            summary.contains("first miss        gain at t = 0 s, ") && summary.contains("worst miss"),
+            "{summary}"
+        );
+        // The results are those of a run without pacing.
+        let rows = |out: &str| fs::read(bench.path(out).join("results.csv")).unwrap();
+        assert_eq!(rows("out/loop"), rows("usual"));
+        let (_, _, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--on-miss", policy, "--quiet"]);
+        assert!(errors.contains("8 of 8 deadlines missed") && errors.contains(said), "{errors}");
+    }
+    let (code, summary, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--on-miss", "stop"]);
+    assert_eq!(code, 1);
+    assert!(errors.contains("error: gain missed its deadline at t = 0 s by "), "{errors}");
+    assert!(summary.contains("2 of 2 deadlines missed"), "{summary}");
+    assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(), 2);
+    assert_eq!(bench.json("out/loop/metrics.json")["completed"], false);
+    let status = bench.json("out/loop/results.json")["status"].as_str().unwrap().to_string();
+    assert!(status.starts_with("failed: gain missed its deadline"), "{status}");
+}
+
+#[test]
+fn a_slow_unit_is_named() {
+    let bench = Bench::new();
+    // 20 ms from tick to tick, and a step of the plant takes 50 ms.
+    let (code, summary, errors) = bench.run(&["--real-time", "50", "--set", "plant.pause=0.05"]);
+    assert_eq!(code, 0, "{errors}");
+    let worst = summary.lines().find(|line| line.contains("worst miss")).unwrap();
+    assert!(worst.contains("longest step since the last wait: plant, "), "{worst}");
+    let real_time = &bench.json("out/loop/metrics.json")["real_time"];
+    let plant = &real_time["components"]["plant"];
+    // The histogram has three digits.
+    assert!(plant["step_ms"]["max"].as_f64().unwrap() >= 49.9, "{plant}");
+    // The tick at the start needs no step.
+    assert!(plant["misses"].as_u64().unwrap() >= 3, "{plant}");
+    assert!(real_time["worst_miss"]["late_ms"].as_f64().unwrap() >= 29.9, "{real_time}");
+}
+
+#[test]
+fn factors_and_priorities_that_make_no_sense_are_refused() {
+    let bench = Bench::new();
+    for factor in ["0", "-1", "nan", "inf"] {
+        let (code, _, errors) = bench.run(&["--real-time", factor]);
+        assert_eq!(code, 2);
+        assert!(errors.contains("must be finite and above 0"), "{factor}: {errors}");
+    }
+    let (code, _, errors) = bench.call(&["run", "--real-time", "loop.toml"]);
+    assert_eq!(code, 2);
+    assert!(errors.contains("write the experiment before --real-time"), "{errors}");
+    for arguments in [&["--on-miss", "stop"][..], &["--priority"], &["--real-time", "--priority", "100"]] {
+        assert_eq!(bench.run(arguments).0, 2, "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_priority_is_had_or_refused_in_words() {
+    let bench = Bench::new();
+    let (code, summary, errors) = bench.run(&["--real-time", "1000", "--priority", "1"]);
+    assert_eq!(code, 0, "{errors}");
+    let line = summary.lines().find(|line| line.starts_with("  priority ")).unwrap();
+    assert!(line.contains("SCHED_FIFO 1") || line.contains("REFUSED, ran with usual scheduling: "), "{line}");
+}
+
+#[test]
+fn the_live_view_wants_a_terminal() {
+    let bench = Bench::new();
+    let message = bench.refusal(&["--live"]);
+    assert!(message.contains("--live draws on a terminal, and standard output is none"), "{message}");
+    assert!(!bench.path("out").exists());
+}
+
+/// Starts the program, sends it a signal once `awaited` is there, and gives back its exit code.
+#[cfg(unix)]
+fn signalled(bench: &Bench, arguments: &[&str], signal: &str, awaited: &str) -> Option<i32> {
+    let mut child = bench
+        .command(arguments)
+        .env("TMPDIR", bench.path("tmp"))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while !bench.path(awaited).exists() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let status = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    assert!(status.success());
+    child.wait().unwrap().code()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_any_run_and_keeps_its_results() {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("tmp")).unwrap();
+    // A step takes ten hours, or as long as the unit does.
+    let paced = ["run", "loop.toml", "--force", "--real-time", "2.7e-5"];
+    let usual = ["run", "loop.toml", "--force", "--stop", "1000", "--set", "plant.pause=0.02"];
+    for (arguments, signal, code) in
+        [(&paced[..], "-INT", 130), (&paced, "-TERM", 143), (&usual, "-INT", 130), (&usual, "-TERM", 143)]
+    {
+        fs::create_dir_all(bench.path("out/loop")).unwrap();
+        for old in ["metrics.json", "plot.svg", "realtime.svg"] {
+            fs::write(bench.path("out/loop").join(old), "of an earlier run").unwrap();
+        }
+        assert_eq!(signalled(&bench, arguments, signal, "out/loop/results.csv"), Some(code));
+        let status = bench.json("out/loop/results.json")["status"].as_str().unwrap().to_string();
+        assert!(status.starts_with("ended by a signal (SIG"), "{status}");
+        assert!(status.contains(") before t = "), "{status}");
+        assert_eq!(bench.json("out/loop/metrics.json")["completed"], false);
+        let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+        assert!(rows.starts_with("time,gain.output.direct") && rows.ends_with('\n'), "{rows}");
+        assert!(rows.lines().all(|row| row.split(',').count() == 4), "{rows}");
+        assert_eq!(bench.path("out/loop/realtime.svg").exists(), arguments == paced);
+        assert!(!bench.path("out/loop/plot.svg").exists());
+        assert_eq!(fs::read_dir(bench.path("tmp")).unwrap().count(), 0);
+        fs::remove_file(bench.path("out/loop/results.csv")).unwrap();
+    }
+}
+
+#[test]
+fn results_of_an_earlier_run_are_replaced_only_if_that_is_asked_for() {
+    let bench = Bench::new();
+    let run = |arguments: &[&str]| bench.call(&[&["run", "loop.toml", "--quiet"], arguments].concat());
+    assert_eq!(run(&[]), (0, String::new(), String::new()));
+    let before = fs::read(bench.path("out/loop/results.csv")).unwrap();
+    let (code, _, errors) = run(&["--stop", "1"]);
+    assert_eq!(code, 2);
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    assert!(errors.contains("out/loop holds results of an earlier run"), "{errors}");
+    assert_eq!(fs::read(bench.path("out/loop/results.csv")).unwrap(), before);
+    assert_eq!(run(&["--stop", "1", "--force"]).0, 0);
+    assert_ne!(fs::read(bench.path("out/loop/results.csv")).unwrap(), before);
+    let (code, _, errors) = run(&["--out", "loop.toml"]);
+    assert!(code == 2 && errors.contains("--out loop.toml is a file"), "{errors}");
+
+    let pack = |arguments: &[&str]| bench.call(&[&["pack", "loop.toml", "--ssp"], arguments].concat());
+    assert_eq!(pack(&[]).0, 0);
+    let (code, _, errors) = pack(&[]);
+    assert!(code == 2 && errors.contains("loop.ssp is there already: --force replaces it"), "{errors}");
+    assert_eq!(pack(&["--force"]).0, 0);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_archive_that_cannot_be_written_leaves_nothing_behind() {
+    let bench = Bench::new();
+    // Noise makes the archive larger than any file in it.
+    let archive = fs::File::options().read(true).write(true).open(bench.path("Unit.fmu")).unwrap();
+    let mut zip = zip::ZipWriter::new_append(archive).unwrap();
+    let mut noise = 1_u32;
+    for name in 0..10 {
+        zip.start_file(format!("resources/{name}"), SimpleFileOptions::default()).unwrap();
+        let bytes = (0..20_000).map(|_| {
+            noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (noise >> 24) as u8
+        });
+        zip.write_all(&bytes.collect::<Vec<_>>()).unwrap();
+    }
+    zip.finish().unwrap();
+    // Files may not grow beyond 100 blocks, of 512 or 1024 bytes, as if the disk were full.
+    let script = "trap '' XFSZ; ulimit -f 100; exec \"$0\" pack loop.toml --ssp";
+    let output = Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_orchestrator")])
+        .current_dir(bench.folder.path())
+        .output()
+        .unwrap();
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    let there = fs::read_dir(bench.folder.path()).unwrap().flatten().map(|entry| entry.file_name());
+    assert!(there.into_iter().all(|name| !name.to_string_lossy().contains("ssp")), "{errors}");
+}
+
+#[cfg(unix)]
+#[test]
+fn two_processes_do_not_share_a_folder() {
+    let bench = Bench::new();
+    let mut child = bench
+        .command(&["run", "loop.toml", "--out", "shared", "--real-time", "2.7e-5"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while !bench.path("shared/results.csv").exists() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let message = bench.refusal(&["--out", "shared"]);
+    assert!(message.contains("another process is writing its results to shared"), "{message}");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(bench.run(&["--out", "shared"]).0, 0);
+}
+
+#[test]
+fn steps_without_number_are_refused_with_what_they_would_take() {
+    let bench = Bench::new();
+    for (arguments, steps) in
+        [(["--step", "1e-9"], "3000000000 steps"), (["--stop", "1e12"], "1000000000000 steps")]
+    {
+        let message = bench.refusal(&arguments);
+        assert!(message.contains(steps) && message.contains(" GB and the run "), "{message}");
+        assert!(!bench.path("out").exists());
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn standard_error_that_cannot_be_written_ends_no_run() {
+    let bench = Bench::new();
+    let run = |arguments: &[&str]| {
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let mut command = bench.command(&[&["run", "loop.toml", "--force"], arguments].concat());
+        command.stdout(Stdio::null()).stderr(full).status().unwrap().code()
+    };
+    assert_eq!(run(&[]), Some(0));
+    // With a warning.
+    assert_eq!(run(&["--set", "gain.delay=0.5"]), Some(0));
+    assert_eq!(run(&["--set", "gain.gian=0.5"]), Some(2));
+    assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(), 5);
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_failure() {
+    let bench = Bench::new();
+    let mut child = bench
+        .command(&["inspect", "Unit.fmu"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(output.stderr.is_empty());
+}
+
+#[test]
+fn nothing_is_left_in_the_temporary_folder() {
+    let bench = Bench::new();
+    let temporary = bench.path("tmp with space");
+    fs::create_dir(&temporary).unwrap();
+    let status = bench.command(&["run", "loop.toml", "--quiet"]).env("TMPDIR", &temporary).status().unwrap();
+    assert!(status.success());
+    assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);
+}

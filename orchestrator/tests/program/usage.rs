@@ -1,0 +1,300 @@
+//! What the command line and the files are refused for, and what is found.
+
+use crate::bench::{Bench, LOOP};
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+use zip::write::SimpleFileOptions;
+
+/// Whether a line of the list shows this file with this title, among those of the project if the program was built there.
+fn lists(text: &str, file: &str, title: &str) -> bool {
+    text.lines().any(|line| line.contains(file) && line.ends_with(title))
+}
+
+fn refusal_of(from: &str, to: &str) -> String {
+    let changed = LOOP.replace(from, to);
+    assert_ne!(changed, LOOP, "{from}");
+    Bench::with(&changed).refusal(&[])
+}
+
+#[test]
+fn experiments_and_units_are_found_from_any_folder() {
+    let bench = Bench::new();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = bench.command(arguments);
+        let output = command
+            .current_dir(elsewhere.path())
+            .env("ORCHESTRATOR_PATH", bench.folder.path())
+            .output()
+            .unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let (code, text, _) = run(&["list"]);
+    assert!(code == Some(0) && lists(&text, "loop.toml", "gain and integrator"), "{text}");
+    for (name, out) in [("loop", "a"), ("loop.toml", "b")] {
+        let (code, _, errors) = run(&["run", name, "--quiet", "--out", out]);
+        assert_eq!(code, Some(0), "{errors}");
+        assert!(elsewhere.path().join(out).join("results.csv").exists());
+    }
+    let (code, _, errors) = run(&["run", "lop"]);
+    assert!(code == Some(2) && errors.contains("there is no experiment \"lop\""), "{errors}");
+    assert!(errors.contains("did you mean \"loop\"?"), "{errors}");
+    let (code, _, errors) = run(&["run", "some/Unit.fmu"]);
+    assert!(code == Some(2) && errors.contains("is a unit, and units are run by an experiment"), "{errors}");
+    fs::create_dir(bench.path("more")).unwrap();
+    fs::copy(bench.path("loop.toml"), bench.path("more/loop.toml")).unwrap();
+    let (code, _, errors) = run(&["run", "loop"]);
+    assert!(code == Some(2) && errors.contains("several experiments are called loop: "), "{errors}");
+}
+
+#[test]
+fn usage_that_is_nearly_right_is_told_what_it_lacks() {
+    let bench = Bench::new();
+    assert!(bench.refusal(&["--stop", "-1"]).contains("stop = -1 s must be at least one step of 1 s"));
+    let (code, _, errors) = bench.call(&["pack", "loop.toml"]);
+    assert!(code == 2 && errors.contains("--ssp"), "{errors}");
+    let (code, _, errors) = bench.call(&["reproduce", "loop", "--members", "0"]);
+    assert!(code == 2 && errors.contains("--members"), "{errors}");
+    // A unit without inputs that are left: all of none stay unconnected.
+    let lonely = LOOP.replace(
+        "[components.plant]",
+        "[components.other]\nfmu = \"Unit.fmu\"\nunconnected = [\"*\"]\n[components.plant]",
+    );
+    let bench = Bench::with(&lonely);
+    let (code, summary, errors) = bench.run(&[]);
+    assert_eq!(code, 0, "{errors}");
+    // What the order leaves out comes last.
+    assert!(summary.contains("gain, plant, other"), "{summary}");
+}
+
+#[test]
+fn a_unit_is_exchanged_from_the_command_line() {
+    let experiment =
+        LOOP.replace("[components.plant]", "[components.gain.parameters]\ngain = 3.0\n[components.plant]");
+    let bench = Bench::with(&experiment);
+    // Another unit, that lacks what is set of the first.
+    let mut old = zip::ZipArchive::new(fs::File::open(bench.path("Unit.fmu")).unwrap()).unwrap();
+    fs::create_dir(bench.path("mine")).unwrap();
+    let mut zip = zip::ZipWriter::new(fs::File::create(bench.path("mine/My.fmu")).unwrap());
+    for index in 0..old.len() {
+        let mut entry = old.by_index(index).unwrap();
+        let name = entry.name().unwrap().into_owned();
+        let mut content = Vec::new();
+        std::io::Read::read_to_end(&mut entry, &mut content).unwrap();
+        if name == "modelDescription.xml" {
+            let text = String::from_utf8(content).unwrap();
+            content = text.replace("name=\"gain\"", "name=\"amplification\"").into_bytes();
+        }
+        zip.start_file(name, SimpleFileOptions::default()).unwrap();
+        zip.write_all(&content).unwrap();
+    }
+    zip.finish().unwrap();
+    let (code, _, errors) =
+        bench.run(&["--quiet", "--fmu", "gain=mine/My.fmu", "--set", "gain.amplification=0.5"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(errors.contains("gain.gain: ") && errors.contains("it is left out"), "{errors}");
+    let sidecar = bench.json("out/loop/results.json");
+    assert_eq!(sidecar["components"]["gain"]["fmu"], "My.fmu");
+    assert_eq!(sidecar["components"]["gain"]["set"]["amplification"], 0.5);
+    for (assignment, told) in [
+        ("gian=mine/My.fmu", "did you mean \"gain\""),
+        ("mine/My.fmu", "wants component=file"),
+        ("gain=mine/Me.fmu", "there is no file \"mine/Me.fmu\""),
+        ("gain=Unti.fmu", "did you mean \"Unit.fmu\""),
+    ] {
+        let message = bench.refusal(&["--fmu", assignment]);
+        assert!(message.contains(told), "{message}");
+    }
+}
+
+#[test]
+fn inspect_filters_and_speaks_json() {
+    let bench = Bench::new();
+    let (code, text, _) = bench.call(&["inspect", "Unit.fmu", "guarantee.*", "--json"]);
+    assert_eq!(code, 0);
+    let all: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let names: Vec<&str> =
+        all["variables"].as_array().unwrap().iter().map(|v| v["name"].as_str().unwrap()).collect();
+    assert_eq!(
+        names,
+        ["guarantee.inForce", "guarantee.status", "guarantee.rateMargin", "guarantee.momentMargin"]
+    );
+    assert_eq!(all["guid"], "{u-1}");
+    let (_, text, _) = bench.call(&["inspect", "Unit.fmu", "seed"]);
+    assert!(text.contains("noise.seed") && !text.contains("output.direct"), "{text}");
+    let (_, text, _) = bench.call(&["inspect", "Unit.fmu", "--causality", "input"]);
+    assert!(text.contains("input (1)") && !text.contains("parameter ("), "{text}");
+    let (code, _, errors) = bench.call(&["inspect", "Unit.fmu", "sed"]);
+    assert!(code == 2 && errors.contains("has no variable that fits \"sed\""), "{errors}");
+}
+
+#[test]
+fn shells_complete_commands() {
+    for shell in ["bash", "zsh", "fish"] {
+        let (code, text, _) = Bench::new().call(&["completions", shell]);
+        assert!(code == 0 && text.contains("reproduce") && text.contains("on-miss"), "{shell}");
+    }
+}
+
+#[test]
+fn bad_usage_exits_with_2() {
+    let bench = Bench::new();
+    for arguments in [&["run"][..], &["jump"], &[], &["run", "loop.toml", "--stop", "soon"]] {
+        assert_eq!(bench.call(arguments).0, 2, "{arguments:?}");
+    }
+    assert_eq!(bench.call(&["--help"]).0, 0);
+    assert_eq!(bench.call(&["run", "missing.toml"]).0, 2);
+    assert_eq!(bench.call(&["inspect", "missing.fmu"]).0, 2);
+    assert_eq!(bench.call(&["inspect", "loop.toml"]).0, 2);
+    assert_eq!(bench.call(&["list", "missing"]).0, 2);
+}
+
+#[test]
+fn wrong_names_are_refused_with_place_and_remedy() {
+    let message = refusal_of("plant.output.integral\"\nto", "plant.output.integrall\"\nto");
+    assert!(
+        message.contains("loop.toml:12: ") && message.contains("did you mean \"output.integral\""),
+        "{message}"
+    );
+    let message = refusal_of("to = \"gain.input\"", "to = \"gian.input\"");
+    assert!(message.contains("loop.toml:13: ") && message.contains("did you mean \"gain\""), "{message}");
+    let message = refusal_of("\"plant.steps\"", "\"plant.step\"");
+    assert!(message.contains("loop.toml:18: ") && message.contains("did you mean \"steps\""), "{message}");
+    let message = refusal_of("Unit.fmu\"\n[components.plant]", "Unti.fmu\"\n[components.plant]");
+    assert!(message.contains("loop.toml:8: ") && message.contains("did you mean \"Unit.fmu\""), "{message}");
+    let message = refusal_of("[\"gain\", \"plant\"]", "[\"gain\", \"palnt\"]");
+    assert!(message.contains("did you mean \"plant\""), "{message}");
+    let message = refusal_of("[\"gain\", \"plant\"]", "[]");
+    assert!(
+        message.contains("there is no order") && message.contains("order = [\"gain\", \"plant\"]"),
+        "{message}"
+    );
+    let message = refusal_of("stop = 3.0", "stopp = 3.0");
+    assert!(message.contains("loop.toml:4: ") && message.contains("`stop`"), "{message}");
+}
+
+#[test]
+fn wrong_settings_are_refused() {
+    let bench = Bench::new();
+    for (setting, remedy) in [
+        ("gain.gian=1", "did you mean \"gain.gain\""),
+        ("noise.seed=1", "of which component? Write gain.noise.seed or plant.noise.seed"),
+        ("palnt.gain=1", "did you mean \"plant.gain\""),
+        ("gain.seed=1", "did you mean \"gain.noise.seed\""),
+        ("gain.kind=ruogh", "did you mean \"rough\""),
+        ("gain.kind=2", "the name of an item (calm, rough)"),
+        ("gain.gain=1 m/s", "measure different things"),
+        ("gain.gain=1 mmm", "did you mean \"mm\""),
+        ("gain.gain=2000", "above its maximum 1000"),
+        ("gain.fail.status=7", "not between 2 and 4"),
+        ("gain.flag=1", "wants true or false"),
+        ("gain.steps=1", "is of causality output"),
+        ("gain.input=1", "is an input with a connection"),
+    ] {
+        let message = bench.refusal(&["--set", setting]);
+        assert!(message.contains(remedy), "{setting}: {message}");
+        assert!(message.starts_with("error: --set ") && !message.contains("loop.toml"), "{message}");
+    }
+    assert!(bench.refusal(&["--stop", "2.5"]).contains("2 s or 3 s"));
+    let (code, _, errors) = bench.run(&["--set", "gain.text=hello", "--set", "gain.flag=true"]);
+    assert_eq!(code, 0, "{errors}");
+    assert_eq!(bench.json("out/loop/results.json")["components"]["gain"]["parameters"]["flag"], true);
+}
+
+#[test]
+fn wrong_wiring_is_refused() {
+    let message = refusal_of("plant.output.integral\"\nto", "plant.speed\"\nto");
+    assert!(message.contains("units") && message.contains("m/s against m"), "{message}");
+    let message = refusal_of("plant.output.integral\"\nto", "plant.steps\"\nto");
+    assert!(message.contains("Integer against Real"), "{message}");
+    let message = refusal_of("plant.output.integral\"\nto", "plant.gain\"\nto");
+    assert!(message.contains("is of causality parameter, not an output"), "{message}");
+    let message = refusal_of("to = \"plant.input\"", "to = \"plant.output.direct\"");
+    assert!(message.contains("is of causality output, not an input"), "{message}");
+    let message = refusal_of("to = \"plant.input\"", "to = \"gain.input\"");
+    assert!(message.contains("loop.toml:16: ") && message.contains("connected twice"), "{message}");
+    let message = refusal_of("plant.output.integral\"\nto", "plant.output.direct\"\nto");
+    assert!(message.contains("algebraic loop") && message.contains("gain.input"), "{message}");
+    let message = refusal_of(
+        "from = \"gain.output.direct\"\nto = \"plant.input\"",
+        "from = \"plant.*\"\nto = \"gain.none.*\"",
+    );
+    assert!(message.contains("there are: input"), "{message}");
+}
+
+#[test]
+fn inputs_without_connection_must_be_meant() {
+    let open = LOOP.replace("[[connections]]\nfrom = \"gain.output.direct\"\nto = \"plant.input\"\n", "");
+    let message = Bench::with(&open).refusal(&[]);
+    assert!(message.contains("inputs of \"plant\" are not connected: input"), "{message}");
+    // The line that the message proposes is the remedy.
+    let (_, line) = message.split_once("[components.plant]: ").unwrap();
+    let meant = open.replace("[components.plant]\n", &format!("[components.plant]\n{line}"));
+    assert_eq!(Bench::with(&meant).run(&[]).0, 0);
+    // A value will do as well.
+    let bench = Bench::with(&open);
+    assert_eq!(bench.run(&["--set", "plant.input=3"]).0, 0);
+    assert!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().contains("\n3.0,20.0,10.0,3\n"));
+    let message =
+        Bench::with(&LOOP.replace("[components.plant]\n", "[components.plant]\nunconnected = [\"input\"]\n"))
+            .refusal(&[]);
+    assert!(message.contains("is said to be unconnected, but is connected"), "{message}");
+}
+
+#[test]
+fn inspect_and_list_show_what_there_is() {
+    let bench = Bench::new();
+    let (code, text, _) = bench.call(&["inspect", "Unit.fmu"]);
+    assert_eq!(code, 0);
+    for part in
+        ["{u-1}", "linux64", "canHandleVariableCommunicationStepSize", "output.integral", "{calm, rough}"]
+    {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let (code, text, _) = bench.call(&["list"]);
+    assert_eq!(code, 0);
+    assert!(lists(&text, "loop.toml", "gain and integrator") && text.contains("Unit.fmu"), "{text}");
+}
+
+#[test]
+fn an_experiment_that_extends_another_is_all_of_them() {
+    let bench = Bench::new();
+    let (code, _, errors) = bench.call(&["run", "loop.toml", "--quiet"]);
+    assert_eq!(code, 0, "{errors}");
+    let results = |name: &str| fs::read_to_string(bench.path(&format!("out/{name}/results.csv"))).unwrap();
+    let own = "extends = \"../loop.toml\"\ntitle = \"longer\"\n[simulation]\nstop = 4.0\n";
+    fs::create_dir(bench.path("more")).unwrap();
+    fs::write(bench.path("more/longer.toml"), own).unwrap();
+    // The unit stands beside the file that is extended.
+    let (code, _, errors) = bench.call(&["run", "longer", "--quiet"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(results("longer").starts_with(&results("loop")) && results("longer") != results("loop"));
+    // What is kept of the run, what is shown and what is packed is the whole.
+    let kept = bench.json("out/longer/results.json");
+    let (code, shown, _) = bench.call(&["show", "longer"]);
+    assert!(code == 0 && kept["experiment"]["text"] == shown && !shown.contains("extends"), "{shown}");
+    fs::write(bench.path("whole.toml"), shown).unwrap();
+    let (code, _, errors) = bench.call(&["run", "whole.toml", "--quiet"]);
+    assert!(code == 0 && results("whole") == results("longer"), "{errors}");
+    let (code, _, errors) = bench.call(&["pack", "more/longer.toml", "--ssp", "--out", "longer.ssp"]);
+    assert_eq!(code, 0, "{errors}");
+    let (code, _, errors) = bench.call(&["run", "longer.ssp", "--quiet", "--out", "out/packed"]);
+    assert_eq!(code, 0, "{errors}");
+    // A fault is told with the file that has it; without a title a file is no experiment of its own.
+    fs::write(bench.path("loop.toml"), LOOP.replace("plant.steps", "plant.stepz")).unwrap();
+    let (code, _, errors) = bench.call(&["run", "more/longer.toml", "--force"]);
+    assert!(code == 2 && errors.contains("loop.toml:18: ") && errors.contains("\"steps\""), "{errors}");
+    fs::write(bench.path("loop.toml"), LOOP.replace("title = \"gain and integrator\"\n", "")).unwrap();
+    let (_, text, _) = bench.call(&["list"]);
+    assert!(lists(&text, "longer.toml", "longer") && !text.contains("./loop.toml"), "{text}");
+}
+
+#[test]
+fn all_experiments_of_the_project_can_be_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let (code, text, _) = Bench::new().call(&["list", folder.to_str().unwrap()]);
+    assert_eq!(code, 0);
+    assert!(text.contains("crmpc-robust.toml") && !text.contains("FAULT"), "{text}");
+}
