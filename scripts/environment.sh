@@ -79,16 +79,23 @@ library() {
     fail "the library of $1 is not in $2"
 }
 
-# Packs every FMU of the libraries in the folder $1 into the folder $2. Further arguments go to fmu-pack.
+# The crates whose libraries are packed as FMUs. Icons and generated descriptions of the units stand
+# in their folders.
+unit_crates=(fmu-plant fmu-controller)
+
+# Packs every FMU of the libraries in the folder $1 into the folder $2. Further arguments go to
+# fmu-pack, which runs in the folder of each crate: paths among them are relative to that folder.
 pack_fmus() {
     say "Packing the FMUs"
-    local plant controller licence licences=()
-    plant="$(library fmu_plant "$1")"
-    controller="$(library fmu_controller "$1")"
-    for licence in LICENSE-*; do
+    local crate library licence licences=()
+    for licence in "$root"/LICENSE-*; do
         if [[ -f $licence ]]; then licences+=(--license "$licence"); fi
     done
-    "$target/release/fmu-pack" "$plant" "$controller" --output "$2" --icons modelDescription/icons "${licences[@]+"${licences[@]}"}" "${@:3}"
+    for crate in "${unit_crates[@]}"; do
+        library="$(library "${crate//-/_}" "$1")"
+        (cd "$crate" && "$target/release/fmu-pack" "$library" --output "$2" --icons icons \
+            "${licences[@]+"${licences[@]}"}" "${@:3}")
+    done
 }
 
 # Builds the programs and the FMU libraries, and packs every FMU into $fmus. Arguments go to fmu-pack.
