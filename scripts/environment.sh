@@ -114,7 +114,7 @@ package_fmus() {
     say "Building the FMU libraries against glibc 2.17"
     local triple=x86_64-unknown-linux-gnu
     PATH="$target/zig/bin:$PATH" cargo zigbuild --release --locked --target "$triple.2.17" \
-        --package fmu-plant --package fmu-controller
-    cargo build --release --locked --package model-description
+        --package reentry-fmu-plant --package reentry-fmu-controller
+    cargo build --release --locked --package reentry-model-description
     pack_fmus "$target/$triple/release" "$packaged" "$@"
 }
