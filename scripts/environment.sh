@@ -98,11 +98,17 @@ pack_fmus() {
     done
 }
 
+# Builds in release the targets of the workspace that the arguments choose. With --workspace, every
+# choice has the same features of the dependencies, so that none of them is built twice.
+build_release() {
+    cargo build --release --locked --workspace "$@"
+}
+
 # Builds the programs and the FMU libraries, and packs every FMU into $fmus. Arguments go to fmu-pack.
 build_fmus() {
     need_rust
     say "Building in release"
-    cargo build --release --locked --workspace
+    build_release --lib --bin orchestrator --bin fmu-pack
     pack_fmus "$target/release" "$fmus" "$@"
 }
 
@@ -115,6 +121,6 @@ package_fmus() {
     local triple=x86_64-unknown-linux-gnu
     PATH="$target/zig/bin:$PATH" cargo zigbuild --release --locked --target "$triple.2.17" \
         --package reentry-fmu-plant --package reentry-fmu-controller
-    cargo build --release --locked --package reentry-model-description
+    build_release --bin fmu-pack
     pack_fmus "$target/$triple/release" "$packaged" "$@"
 }
