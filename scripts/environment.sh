@@ -79,23 +79,36 @@ library() {
     fail "the library of $1 is not in $2"
 }
 
-# Packs every FMU of the libraries in the folder $1 into the folder $2. Further arguments go to fmu-pack.
+# The crates whose libraries are packed as FMUs. Icons and generated descriptions of the units stand
+# in their folders.
+unit_crates=(fmu-plant fmu-controller)
+
+# Packs every FMU of the libraries in the folder $1 into the folder $2. Further arguments go to
+# fmu-pack, which runs in the folder of each crate: paths among them are relative to that folder.
 pack_fmus() {
     say "Packing the FMUs"
-    local plant controller licence licences=()
-    plant="$(library fmu_plant "$1")"
-    controller="$(library fmu_controller "$1")"
-    for licence in LICENSE-*; do
+    local crate library licence licences=()
+    for licence in "$root"/LICENSE-*; do
         if [[ -f $licence ]]; then licences+=(--license "$licence"); fi
     done
-    "$target/release/fmu-pack" "$plant" "$controller" --output "$2" --icons modelDescription/icons "${licences[@]+"${licences[@]}"}" "${@:3}"
+    for crate in "${unit_crates[@]}"; do
+        library="$(library "${crate//-/_}" "$1")"
+        (cd "$crate" && "$target/release/fmu-pack" "$library" --output "$2" --icons icons \
+            "${licences[@]+"${licences[@]}"}" "${@:3}")
+    done
+}
+
+# Builds in release the targets of the workspace that the arguments choose. With --workspace, every
+# choice has the same features of the dependencies, so that none of them is built twice.
+build_release() {
+    cargo build --release --locked --workspace "$@"
 }
 
 # Builds the programs and the FMU libraries, and packs every FMU into $fmus. Arguments go to fmu-pack.
 build_fmus() {
     need_rust
     say "Building in release"
-    cargo build --release --locked --workspace
+    build_release --lib --bin orchestrator --bin fmu-pack
     pack_fmus "$target/release" "$fmus" "$@"
 }
 
@@ -107,7 +120,7 @@ package_fmus() {
     say "Building the FMU libraries against glibc 2.17"
     local triple=x86_64-unknown-linux-gnu
     PATH="$target/zig/bin:$PATH" cargo zigbuild --release --locked --target "$triple.2.17" \
-        --package fmu-plant --package fmu-controller
-    cargo build --release --locked --package model-description
+        --package reentry-fmu-plant --package reentry-fmu-controller
+    build_release --bin fmu-pack
     pack_fmus "$target/$triple/release" "$packaged" "$@"
 }

@@ -16,6 +16,8 @@ import importers
 from fmi import Fmu
 
 ROOT = Path(__file__).resolve().parent.parent
+# The tests import what scripts/yardsticks and the examples run.
+sys.path += [str(ROOT / "scripts" / folder) for folder in ("oracles", "examples")]
 TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
 EXPERIMENTS = ROOT / "orchestrator" / "experiments" / "crmpc-2022"
 NAMES = [

@@ -87,7 +87,7 @@ def test_tests_quoted_elsewhere_on_the_page_exist(names):
 def variables() -> set[str]:
     """Returns the names of the variables of all FMUs."""
     found: set[str] = set()
-    for path in (ROOT / "modelDescription" / "generated").glob("*.xml"):
+    for path in ROOT.glob("fmu-*/generated/*.xml"):
         found.update(variable.get("name") for variable in ET.parse(path).iter("ScalarVariable"))
     return found
 

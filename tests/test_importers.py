@@ -357,9 +357,9 @@ SECONDS = 20
 
 @pytest.fixture(scope="module")
 def foreign(tool, tmp_path_factory):
-    """Builds tests/pd_controller.py as an FMU."""
+    """Builds scripts/examples/pd_controller.py as an FMU."""
     folder = tmp_path_factory.mktemp("pythonfmu")
-    command = [tool("pythonfmu"), "build", "-f", ROOT / "tests" / "pd_controller.py", "-d", folder]
+    command = [tool("pythonfmu"), "build", "-f", ROOT / "scripts" / "examples" / "pd_controller.py", "-d", folder]
     subprocess.run(command, check=True, capture_output=True, timeout=60)
     return folder / "PdController.fmu"
 

@@ -51,14 +51,14 @@ def verdict(results, words: str) -> str:
     return found["verdict"]
 
 
-# Limits of the effectors, computed by tests/reach.py.
+# Limits of the effectors, computed by scripts/oracles/reach.py.
 
 
 def test_regress_the_file_of_reaches_is_what_the_programmes_give(computed):
     values = {name: value for name, value, _, _ in reach.values()}
     assert values.keys() == computed.keys()
     for name, value in values.items():
-        assert computed[name] == pytest.approx(value, rel=1e-5), f"{name}: run tests/reach.py"
+        assert computed[name] == pytest.approx(value, rel=1e-5), f"{name}: run scripts/yardsticks"
 
 
 def test_oracle_reach_in_pitch_is_the_sum_of_what_each_effector_gives(computed):

@@ -18,7 +18,7 @@ BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", (ROOT / "docs" / "use-it.md").read
     reason="not every tool of the page is there for this platform or Python",
 )
 def test_the_steps_of_the_page(libpython, tmp_path):
-    for name in ("orchestrator", "scripts", "tests", "docs"):
+    for name in ("orchestrator", "scripts", "docs"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "target").symlink_to(TARGET)
     (tmp_path / "out").mkdir()

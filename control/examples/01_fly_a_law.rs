@@ -1,7 +1,7 @@
 //! Flies the linear-quadratic regulator through the scenario of Chai et al. (2022) and prints a line per second.
 //!
 //! ```text
-//! cargo run --release -p control --example 01_fly_a_law
+//! cargo run --release -p reentry-control --example 01_fly_a_law
 //! ```
 
 use control::closed_loop::fly;

@@ -1,7 +1,7 @@
 //! Asks the design of CRMPC whether its limits are guaranteed, for two settings, and flies the one for which they are.
 //!
 //! ```text
-//! cargo run --release -p control --example 02_the_guarantee
+//! cargo run --release -p reentry-control --example 02_the_guarantee
 //! ```
 
 use control::closed_loop::fly;

@@ -2,7 +2,7 @@
 //! of it, and once with the state predicted over the delay.
 //!
 //! ```text
-//! cargo run --release -p control --example 03_a_delay
+//! cargo run --release -p reentry-control --example 03_a_delay
 //! ```
 
 use control::crmpc::{Constraints, Settings};

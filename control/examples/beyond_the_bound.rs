@@ -2,7 +2,7 @@
 //! moment is also scaled into the limit:
 //!
 //! ```text
-//! cargo run --release -p control --example beyond_the_bound
+//! cargo run --release -p reentry-control --example beyond_the_bound
 //! ```
 //!
 //! The example prints a line for each size and family of disturbances, with the mean and largest

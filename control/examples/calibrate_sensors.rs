@@ -2,7 +2,8 @@
 //! prints the file `control/data/sensor-calibration.toml`:
 //!
 //! ```text
-//! cargo run --release -p control --example calibrate_sensors >control/data/sensor-calibration.toml
+//! cargo run --release -p reentry-control --example calibrate_sensors \
+//!     >control/data/sensor-calibration.toml
 //! ```
 
 #[path = "../tests/harness/mod.rs"]

@@ -2,7 +2,7 @@
 //! inertia errors of 5 %:
 //!
 //! ```text
-//! cargo run --release -p control --example campaign -- [SEEDS]
+//! cargo run --release -p reentry-control --example campaign -- [SEEDS]
 //! ```
 //!
 //! It prints one line for each controller and family of disturbances. The default is 200 seeds of

@@ -1,7 +1,7 @@
 //! Compares fusion filters of several crates on the same calibrated readings of the MEMS set:
 //!
 //! ```text
-//! cargo run --release -p control --example compare_fusion
+//! cargo run --release -p reentry-control --example compare_fusion
 //! ```
 //!
 //! It also prints the errors of the estimator with its defaults. The output contains attitude

@@ -2,7 +2,7 @@
 //! gains, delay and measurement errors:
 //!
 //! ```text
-//! cargo run --release -p control --example guarantee
+//! cargo run --release -p reentry-control --example guarantee
 //! ```
 //!
 //! The example prints the largest disturbance bound that is accepted, and the share of the moment

@@ -1,7 +1,7 @@
 //! This example tries random settings of CRMPC with the robust set:
 //!
 //! ```text
-//! cargo run --release -p control --example random_settings -- FIRST COUNT
+//! cargo run --release -p reentry-control --example random_settings -- FIRST COUNT
 //! ```
 //!
 //! It tries COUNT settings, with the seeds from FIRST on. Settings that the design accepts are

@@ -2,7 +2,7 @@
 //! (white noise, inertia + 5 %, 50 s). The outer layer stays as printed:
 //!
 //! ```text
-//! cargo run --release -p control --example tune_dlmpc -- [SEEDS]
+//! cargo run --release -p reentry-control --example tune_dlmpc -- [SEEDS]
 //! ```
 //!
 //! The search consists of a coarse grid over three seeds, then of steps from its best sets over

@@ -1,8 +1,9 @@
 //! Searches for flights in which the guarantee of the robust set fails, for each of several loops:
 //!
 //! ```text
-//! cargo run --release -p control --example worst_case -- random LOOP FIRST COUNT
-//! cargo run --release -p control --example worst_case -- search LOOP FIRST COUNT EVALUATIONS
+//! cargo run --release -p reentry-control --example worst_case -- ARGUMENTS
+//!     random LOOP FIRST COUNT
+//!     search LOOP FIRST COUNT EVALUATIONS
 //! ```
 //!
 //! `random` flies COUNT random flights with the seeds from FIRST on. `search` starts COUNT searches

@@ -1,10 +1,11 @@
 //! Searches for the slowest optimisation, of CRMPC with either set and of DLMPC's outer layer:
 //!
 //! ```text
-//! cargo run --release -p control --example worst_time -- random LAW FIRST COUNT [SIZE [BUDGET_MS]]
-//! cargo run --release -p control --example worst_time -- search LAW FIRST COUNT EVALUATIONS [SIZE]
-//! cargo run --release -p control --example worst_time -- list LAW FIRST COUNT
-//! cargo run --release -p control --example worst_time -- one LAW SEED [SIZE]
+//! cargo run --release -p reentry-control --example worst_time -- ARGUMENTS
+//!     random LAW FIRST COUNT [SIZE [BUDGET_MS]]
+//!     search LAW FIRST COUNT EVALUATIONS [SIZE]
+//!     list LAW FIRST COUNT
+//!     one LAW SEED [SIZE]
 //! ```
 //!
 //! A case is a reference, a start, and a second state to which the vehicle is kicked one

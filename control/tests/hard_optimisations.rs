@@ -39,7 +39,7 @@ fn listed(law: &str) -> Vec<(u64, [u32; 3])> {
 }
 
 /// The list was made by
-/// `cargo run --release -p control --example worst_time -- list LAW 200000 20000`.
+/// `cargo run --release -p reentry-control --example worst_time -- list LAW 200000 20000`.
 fn assert_takes_no_more<C: Optimising>(name: &str, law: &mut C) {
     let rows = listed(name);
     assert_eq!(rows.len(), 40);

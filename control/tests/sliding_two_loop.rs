@@ -70,7 +70,7 @@ fn direct(settings: &TwoLoopSettings) -> Outcome {
 fn regress_steps_settle_with_a_moment_within_the_actuators_reach_about_each_axis() {
     let outcome = direct(&TwoLoopSettings::ours());
     // The reach is that of surfaces and jets about one axis with the others balanced
-    // (tests/reach.py). The disturbance alone takes 1e5 N m of it.
+    // (scripts/oracles/reach.py). The disturbance alone takes 1e5 N m of it.
     let reach = Vector3::new(179.57e3, 302.24e3, 104.54e3);
     assert!((reach - outcome.moments).min() > 0.0, "{outcome:?}");
     assert!((outcome.settling - 4.39).abs() < 0.05 && (outcome.rest - 0.087).abs() < 0.005, "{outcome:?}");

@@ -1,7 +1,7 @@
 //! Checks the bounds of CRMPC's guarantee for given settings.
 //!
 //! ```text
-//! cargo run --release -p guarantee-check -- --k1 -3 --k2 -4 --delay 0.04
+//! cargo run --release -p reentry-guarantee-check -- --k1 -3 --k2 -4 --delay 0.04
 //! ```
 
 use clap::Parser;

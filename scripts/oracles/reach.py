@@ -1,6 +1,6 @@
 """Limits of what surfaces and jets can do in the scenario of Jia, Zhou and Zhou, two-loop SMC, by
-linear programmes from the effectors' data alone. `python tests/reach.py` writes
-orchestrator/experiments/two-loop-smc/computed.toml.
+linear programmes from the effectors' data alone. scripts/yardsticks writes
+orchestrator/experiments/two-loop-smc/computed.toml by it.
 
 Moments are in N m and deflections in deg, at the reference dynamic pressure.
 """
@@ -17,8 +17,11 @@ try:
 except ModuleNotFoundError:  # Python 3.10
     import tomli as tomllib
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 FILE = ROOT / "orchestrator" / "experiments" / "two-loop-smc" / "computed.toml"
+HEADER = """\
+# What surfaces and jets can do at all. Written by scripts/yardsticks:
+# change scripts/oracles/reach.py, not this file."""
 with (ROOT / "vehicle" / "data" / "effectors.toml").open("rb") as _file:
     _DATA = tomllib.load(_file)
 with (ROOT / "vehicle" / "data" / "two-loop-smc.toml").open("rb") as _file:
@@ -145,10 +148,11 @@ def values() -> list[tuple[str, float, str, str]]:
 
 def text() -> str:
     """Returns the text of the file."""
-    lines = ["# What surfaces and jets can do at all. Written by tests/reach.py: change that, not this file."]
+    lines = [HEADER]
     for name, value, unit, meaning in values():
         # HiGHS reaches its optimum to about 1e-9.
-        lines += ["", "[[value]]", f'id = "{name}"', f"value = {value:.6g}", f'unit = "{unit}"', 'kind = "computed"', f'source = "tests/reach.py: {meaning}"']
+        lines += ["", "[[value]]", f'id = "{name}"', f"value = {value:.6g}", f'unit = "{unit}"']
+        lines += ['kind = "computed"', f'source = "scripts/yardsticks: {meaning}"']
     return "\n".join(lines) + "\n"
 
 

@@ -1,7 +1,7 @@
 """Numbers against which the experiments of Chai 2022 are measured, computed from the paper's raw
 data alone.
 
-`python tests/yardsticks.py FILE` (scripts/yardsticks) writes them. Times are in s, angles in deg.
+scripts/yardsticks writes them by this program. Times are in s, angles in deg.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ STATED_BOUND = 2.0
 PRINTED_BOUND = 1.0
 HEADER = """\
 # Yardsticks for the results of Chai 2022, computed from the paper's raw data. Written by scripts/yardsticks: change
-# tests/yardsticks.py, not this file.
+# scripts/oracles/yardsticks.py, not this file.
 """
 
 
