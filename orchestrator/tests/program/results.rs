@@ -15,14 +15,14 @@ fn oracle_a_run_writes_its_results() {
                     0.0,0.5,1.0,0\n1.0,0.75,1.5,1\n2.0,1.125,2.25,2\n3.0,1.6875,3.375,3\n";
     assert_eq!(rows, expected);
 
-    let sidecar = bench.json("out/loop/results.json");
-    assert_eq!(sidecar["status"], "completed");
-    assert_eq!(sidecar["experiment"]["text"], LOOP);
-    assert_eq!(sidecar["components"]["gain"]["guid"], "{u-1}");
-    assert_eq!(sidecar["components"]["gain"]["set"]["gain"], 0.5);
-    assert_eq!(sidecar["components"]["gain"]["parameters"]["kind"], "rough");
-    assert_eq!(sidecar["components"]["plant"]["parameters"]["kind"], "calm");
-    assert_eq!(sidecar["seeds"]["plant.noise.seed"], 0);
+    let metadata = bench.json("out/loop/results.json");
+    assert_eq!(metadata["status"], "completed");
+    assert_eq!(metadata["experiment"]["text"], LOOP);
+    assert_eq!(metadata["components"]["gain"]["guid"], "{u-1}");
+    assert_eq!(metadata["components"]["gain"]["set"]["gain"], 0.5);
+    assert_eq!(metadata["components"]["gain"]["parameters"]["kind"], "rough");
+    assert_eq!(metadata["components"]["plant"]["parameters"]["kind"], "calm");
+    assert_eq!(metadata["seeds"]["plant.noise.seed"], 0);
     let metrics = bench.json("out/loop/metrics.json");
     for key in ["real_time_factor", "wall_s", "loop_delay_s", "samples", "completed", "lost_at"] {
         assert!(metrics.as_object().unwrap().contains_key(key), "{key}");

@@ -95,9 +95,9 @@ fn a_unit_is_exchanged_from_the_command_line() {
         bench.run(&["--quiet", "--fmu", "gain=mine/My.fmu", "--set", "gain.amplification=0.5"]);
     assert_eq!(code, 0, "{errors}");
     assert!(errors.contains("gain.gain: ") && errors.contains("it is left out"), "{errors}");
-    let sidecar = bench.json("out/loop/results.json");
-    assert_eq!(sidecar["components"]["gain"]["fmu"], "My.fmu");
-    assert_eq!(sidecar["components"]["gain"]["set"]["amplification"], 0.5);
+    let metadata = bench.json("out/loop/results.json");
+    assert_eq!(metadata["components"]["gain"]["fmu"], "My.fmu");
+    assert_eq!(metadata["components"]["gain"]["set"]["amplification"], 0.5);
     for (assignment, told) in [
         ("gian=mine/My.fmu", "did you mean \"gain\""),
         ("mine/My.fmu", "wants component=file"),
