@@ -149,7 +149,7 @@ def test_a_unit_that_fails_ends_the_run(orchestrate, tmp_path):
 
 
 def test_a_lost_attitude_ends_the_run(orchestrate, tmp_path):
-    path = changed(tmp_path, "lost_deg = 60.0", "lost_deg = 1.0", "lqr")
+    path = changed(tmp_path, "beyond = 60.0", "beyond = 1.0", "lqr")
     finished, out = orchestrate(path)
     assert finished.returncode == 3, finished.stderr
     found = re.search(r"attitude lost at t = (\S+) s: further than 1 deg", finished.stderr)

@@ -276,7 +276,7 @@ def test_a_claim_without_its_numbers_is_not_judged_and_a_seed_that_changes_nothi
     study = tmp_path / "study"
     study.mkdir()
     text = merged(EXPERIMENTS / "lqr.toml")
-    (study / "lqr.toml").write_text(text.replace("lost_deg = 60.0", "lost_deg = 2.0"))
+    (study / "lqr.toml").write_text(text.replace("beyond = 60.0", "beyond = 2.0"))
     (study / "study.toml").write_text(
         """title = "one run"
 paper = "none"
@@ -325,7 +325,7 @@ def test_a_changed_experiment_is_run_again(report, tmp_path):
     [
         ('experiment = "{id}.toml" }', 'experiment = "{id}q.toml" }', "run crmpc-paper"),
         ('runs = ["lqr", "dlmpc"', 'runs = ["lqq", "dlmpc"', 'did you mean "lqr"'),
-        ('signal = "estimator.attitude.{angle} ', 'signal = "estimator.attitude.{angle}a ', 'did you mean "attitude.alpha"'),
+        ('signal = "estimator.attitude.{angle} ', 'signal = "estimator.attitude.{angle}a ', 'did you mean "estimator.attitude.alpha"'),
         ('paper = "ems.dlmpc"', 'paper = "ems.dlmp"', 'did you mean "ems.dlmpc"'),
         ('ours = "dlmpc-est.cms"', 'ours = "dlmpc-est.cmss"', 'did you mean "cms"'),
         ('beside = "dlmpc.cms"', 'beside = "dlmpc.cmss"', 'did you mean "cms"'),

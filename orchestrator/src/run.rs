@@ -3,6 +3,7 @@
 
 use crate::failure::Failure;
 use crate::live::{self, Live, scene::Scene};
+use cosim::doubts::doubts;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim::master::Observer;
@@ -87,7 +88,7 @@ pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Fail
     options.files.check()?;
     let mut meters = Meters::new(system)?.ending_when_lost();
     let panels = Panel::all(system)?;
-    for doubt in system.doubts(&options.interrupt)? {
+    for doubt in doubts(system, &options.interrupt)? {
         tracing::warn!("{doubt}");
     }
     let (clock, title) = (system.clock, system.experiment.title.clone());

@@ -2,7 +2,6 @@
 
 use crate::error::Error;
 use crate::pacing;
-use crate::seeds::is_seed;
 use crate::system::{Parameters, System};
 use fmu_import::description::Kind;
 use serde_json::{Value, json};
@@ -92,6 +91,12 @@ pub fn metadata(
             "text": experiment.source.whole(),
         },
     })
+}
+
+/// Whether a parameter is the seed of random numbers: by its name, which FMI leaves as the only
+/// sign.
+pub(crate) fn is_seed(name: &str) -> bool {
+    name.rsplit('.').next() == Some("seed")
 }
 
 fn status(failure: Option<&Error>) -> String {

@@ -2,13 +2,12 @@
 //! see, then the units are initialized and stepped.
 
 use crate::clock::Clock;
-use crate::delay::{self, FeedbackLoop};
+use crate::delay::FeedbackLoop;
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::interrupt::Interrupt;
 use crate::master::{Master, Member, Observer};
 use crate::recorder::{self, Format, Recorder};
-use crate::seeds;
 use crate::settings::{self, Setting};
 use crate::signal::{Resolved, Signal, Term};
 use crate::watch::Watched;
@@ -202,18 +201,6 @@ impl System {
                 Some((*factor, wanted.to_string()))
             })
             .unwrap_or((1.0, unit.clone()))
-    }
-
-    /// What is doubtful about the experiment although it can be run.
-    ///
-    /// # Errors
-    /// If the run was asked to end.
-    pub fn doubts(&self, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
-        let mut doubts = delay::warnings(&self.parts(), &self.settings, &self.loops, self.clock.step());
-        for seed in seeds::without_effect(self, interrupt)? {
-            doubts.push(format!("--set {seed}: changes nothing, another seed comes to the same"));
-        }
-        Ok(doubts)
     }
 
     /// Runs the experiment from its start to its stop time.

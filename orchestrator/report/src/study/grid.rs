@@ -98,8 +98,7 @@ impl Grid {
                     timed: scenario.timed,
                     within: scenario.within.clone(),
                     measures: scenario.measures.clone(),
-                    metrics: Vec::new(),
-                    timings: Vec::new(),
+                    observe: experiment.observe.clone(),
                 });
             }
         }

@@ -3,10 +3,9 @@
 use super::definition::Study;
 use super::runs::Run;
 use super::{grid, template};
-use crate::metrics::Metrics;
 use cosim::document::Source;
 use cosim::error::Error;
-use cosim::experiment::Experiment;
+use cosim::experiment::{Experiment, Observe};
 use fmu_import::names;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -69,19 +68,15 @@ impl Study {
         Ok(study)
     }
 
-    /// Notes which metrics the experiments ask for. One that cannot be read is told of when it is to
-    /// be run.
+    /// Notes what the experiments ask for. One that cannot be read is told of when it is to be run.
     fn learn_metrics(&mut self) {
-        let mut known: BTreeMap<PathBuf, (Vec<String>, Vec<String>)> = BTreeMap::new();
-        for index in 0..self.runs.len() {
-            let path = self.source.beside(&self.runs[index].experiment);
-            let (metrics, timings) = known.entry(path).or_insert_with_key(|path| {
-                let observe = Experiment::load(path).map(|read| read.observe).unwrap_or_default();
-                let timed = observe.metrics.iter().filter(|(_, measure)| measure.timing);
-                let timed = timed.map(|(name, _)| name.clone()).collect();
-                (Metrics::names(&observe), timed)
+        let mut known: BTreeMap<PathBuf, Observe> = BTreeMap::new();
+        for run in &mut self.runs {
+            let path = self.source.beside(&run.experiment);
+            let asked = known.entry(path).or_insert_with_key(|path| {
+                Experiment::load(path).map(|read| read.observe).unwrap_or_default()
             });
-            (self.runs[index].metrics, self.runs[index].timings) = (metrics.clone(), timings.clone());
+            run.observe.clone_from(asked);
         }
     }
 

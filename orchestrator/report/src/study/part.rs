@@ -7,7 +7,7 @@ use crate::measure::{Gauge, larger};
 use crate::metrics::{Meters, Metrics};
 use cosim::check::check;
 use cosim::error::Error as Single;
-use cosim::experiment::Experiment;
+use cosim::experiment::{Experiment, Observe};
 use cosim::interrupt::Interrupt;
 use cosim::master::{Observer, Sample};
 use cosim::signal::{Resolved, Signal};
@@ -56,11 +56,11 @@ pub struct Member {
 }
 
 impl Member {
-    /// Whether this member had the same results as another one, apart from the computing times that `timings` names.
-    pub fn moves_as(&self, other: &Self, timings: &[String]) -> bool {
+    /// Whether this member had the same results as another one, apart from computing times.
+    pub fn moves_as(&self, other: &Self, asked: &Observe) -> bool {
         let timeless = |metrics: &Metrics| {
             let mut metrics = Metrics { step_us: BTreeMap::new(), ..metrics.clone() };
-            metrics.asked.retain(|name, _| !timings.contains(name));
+            metrics.asked.retain(|name, _| asked.metrics.get(name).is_none_or(|measure| !measure.timing));
             metrics
         };
         timeless(&self.metrics) == timeless(&other.metrics)

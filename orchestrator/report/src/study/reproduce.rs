@@ -185,14 +185,15 @@ fn notes(results: &Results) -> Vec<String> {
         let lost: Vec<f64> = result.members.iter().filter_map(|member| member.metrics.lost_at).collect();
         if let Some(first) = lost.iter().copied().reduce(f64::min) {
             let time = rounded(first);
+            let what = run.observe.loss.as_ref().map_or("run", |loss| &loss.what);
             notes.push(format!(
-                "{id}: the attitude is lost in {} of {all} runs, at t = {time} s or later",
+                "{id}: the {what} is lost in {} of {all} runs, at t = {time} s or later",
                 lost.len()
             ));
         }
         if let (Some(vary), Some((first, others))) = (&run.vary, result.members.split_first())
             && !others.is_empty()
-            && others.iter().all(|other| other.moves_as(first, &run.timings))
+            && others.iter().all(|other| other.moves_as(first, &run.observe))
         {
             let names = vary.parameter.all().join(" and ");
             notes.push(format!("{id}: {names} changes nothing, all {all} runs are the same"));

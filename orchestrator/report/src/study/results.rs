@@ -4,6 +4,7 @@ use super::definition::Study;
 use super::part::{Member, Outcome, Series, Spread};
 use super::runs::Run;
 use super::values::Quantity;
+use crate::metrics::Metrics;
 use cosim::signal::Signal;
 use cosim::system::Parameters;
 use fmu_import::names;
@@ -102,9 +103,13 @@ impl Metric {
                 Err(format!("\"{text}\": the run \"{}\" is not timed", run.id.get_ref()))
             };
         }
-        let known: Vec<&str> = run.metrics.iter().map(String::as_str).collect();
+        let names = Metrics::names(&run.observe);
+        let known: Vec<&str> = names.iter().map(String::as_str).collect();
         if known.contains(&text) {
-            return Ok(Self::Merit { name: text.into(), timing: run.timings.iter().any(|own| own == text) });
+            return Ok(Self::Merit {
+                name: text.into(),
+                timing: run.observe.metrics.get(text).is_some_and(|measure| measure.timing),
+            });
         }
         Err(format!("there is no metric \"{text}\"{}", names::hint(text, known.iter().copied())))
     }

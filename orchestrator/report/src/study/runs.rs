@@ -2,6 +2,7 @@
 
 use super::values::Quantity;
 use crate::figure::Color;
+use cosim::experiment::Observe;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -70,12 +71,9 @@ pub struct Run {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub measures: Vec<Spanned<String>>,
-    /// Names of the metrics that its experiment asks for; no key of a study file.
+    /// What its experiment asks for; no key of a study file.
     #[serde(skip)]
-    pub metrics: Vec<String>,
-    /// Those that are computing times; no key of a study file.
-    #[serde(skip)]
-    pub timings: Vec<String>,
+    pub observe: Observe,
 }
 
 /// Values `first`, `first` + 1, … of a parameter.

@@ -1,15 +1,25 @@
-//! Seeds of random numbers: which parameters they are, and whether one is of any effect.
+//! What is doubtful about an experiment although it can be run: a delay that a law counts on and the
+//! loop does not have, and a seed that changes nothing.
 
+use crate::delay;
 use crate::error::Error;
 use crate::interrupt::Interrupt;
+use crate::metadata::is_seed;
 use crate::settings::{Setting, SettingValue};
 use crate::system::System;
 use fmu_import::warnings;
 use tracing::subscriber::{NoSubscriber, with_default};
 
-/// Whether a parameter is a seed: by its name, which FMI leaves as the only sign.
-pub fn is_seed(name: &str) -> bool {
-    name.rsplit('.').next() == Some("seed")
+/// Finds what is doubtful about a system, one line for each.
+///
+/// # Errors
+/// If the run was asked to end.
+pub fn doubts(system: &System, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
+    let mut doubts = delay::warnings(&system.parts(), &system.settings, &system.loops, system.clock.step());
+    for seed in without_effect(system, interrupt)? {
+        doubts.push(format!("--set {seed}: changes nothing, another seed comes to the same"));
+    }
+    Ok(doubts)
 }
 
 /// The seeds from the command line that change nothing, as that of a disturbance that is constant: `component.parameter`. Two runs with
@@ -17,7 +27,7 @@ pub fn is_seed(name: &str) -> bool {
 ///
 /// # Errors
 /// If the comparison was ended from outside.
-pub(crate) fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
+fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
     let mut idle = Vec::new();
     for (component, settings) in system.settings.iter().enumerate() {
         for (index, setting) in settings.iter().enumerate() {
