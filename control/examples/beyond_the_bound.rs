@@ -30,10 +30,6 @@ struct Saturated(Lqr, f64);
 impl Controller for Saturated {
     type Memory = ();
 
-    fn period(&self) -> f64 {
-        self.0.period()
-    }
-
     fn memory(&self) {}
 
     fn update(

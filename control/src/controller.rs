@@ -56,9 +56,6 @@ pub trait Controller {
     /// The state of the controller that is carried from tick to tick.
     type Memory: Clone + Default + Serialize + DeserializeOwned + Send;
 
-    /// Returns the time between ticks, s.
-    fn period(&self) -> f64;
-
     /// Returns the memory for the first tick, with room for everything that later ticks store in
     /// it.
     fn memory(&self) -> Self::Memory {

@@ -155,14 +155,20 @@ pub struct Delayed<C> {
 }
 
 impl<C: Controller> Delayed<C> {
-    /// Puts a delay in front of `inner`. `body` is the model of the vehicle. `moment_limit` (N m,
-    /// infinite for none) is the limit into which commands are scaled behind the controller; the
-    /// prediction uses the scaled commands.
+    /// Puts a delay in front of `inner`, which is evaluated every `period` (s). `body` is the model
+    /// of the vehicle. `moment_limit` (N m, infinite for none) is the limit into which commands are
+    /// scaled behind the controller; the prediction uses the scaled commands.
     ///
     /// # Errors
     /// Returns the errors of [`Predictor::new`], and errors for a negative part of the latency and
     /// for a limit that is not positive.
-    pub fn new(inner: C, body: RigidBody, latency: Latency, moment_limit: f64) -> Result<Self, DesignError> {
+    pub fn new(
+        inner: C,
+        body: RigidBody,
+        period: f64,
+        latency: Latency,
+        moment_limit: f64,
+    ) -> Result<Self, DesignError> {
         if moment_limit.is_nan() || moment_limit <= 0.0 {
             return Err(DesignError::NotPositive { name: "limit.moment", value: moment_limit });
         }
@@ -174,7 +180,7 @@ impl<C: Controller> Delayed<C> {
         if !(0.0..=LONGEST).contains(&action) {
             return Err(DesignError::Delay { value: action, longest: LONGEST });
         }
-        let predictor = Predictor::new(body, latency.total(), inner.period())?;
+        let predictor = Predictor::new(body, latency.total(), period)?;
         Ok(Self { inner, predictor, latency, moment_limit })
     }
 
@@ -201,10 +207,6 @@ impl<C: Controller> Delayed<C> {
 
 impl<C: Controller> Controller for Delayed<C> {
     type Memory = Memory<C::Memory>;
-
-    fn period(&self) -> f64 {
-        self.inner.period()
-    }
 
     fn memory(&self) -> Self::Memory {
         Memory { inner: self.inner.memory(), under_way: vec![Vector3::zeros(); self.predictor.count] }

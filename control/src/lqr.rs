@@ -34,7 +34,7 @@ pub struct LqrSettings {
 /// // P and Q of the comparison are those of CRMPC.
 /// let Settings { body, p, q, period_feedback: period, .. } = Settings::new(Constraints::Robust);
 /// let mut law = Lqr::new(LqrSettings { body, p, q, period })?;
-/// let summary = fly(&mut law, &mut (), &Scenario::crmpc2022(), |_| ())?;
+/// let summary = fly(&mut law, &mut (), period, &Scenario::crmpc2022(), |_| ())?;
 /// assert!(summary.error_rms.to_degrees() < 3.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -87,10 +87,6 @@ impl Lqr {
 
 impl Controller for Lqr {
     type Memory = ();
-
-    fn period(&self) -> f64 {
-        self.settings.period
-    }
 
     fn update(
         &mut self,

@@ -272,10 +272,11 @@ pub struct TwoLoopMemory {
 /// use control::Controller;
 /// use vehicle::Scenario;
 ///
-/// let mut law = TwoLoopSmc::new(TwoLoopSettings::ours())?;
+/// let settings = TwoLoopSettings::ours();
+/// let mut law = TwoLoopSmc::new(settings)?;
 /// let mut memory = law.memory();
 /// let mut last = f64::INFINITY;
-/// fly(&mut law, &mut memory, &Scenario::two_loop(), |sample| {
+/// fly(&mut law, &mut memory, settings.period, &Scenario::two_loop(), |sample| {
 ///     last = (sample.measured.angles - sample.reference.angles).norm().to_degrees();
 /// })?;
 /// assert!(last < 0.1, "{last} deg");
@@ -325,10 +326,6 @@ impl TwoLoopSmc {
 
 impl Controller for TwoLoopSmc {
     type Memory = TwoLoopMemory;
-
-    fn period(&self) -> f64 {
-        self.settings.period
-    }
 
     /// As in [`crate::sliding::Tvsmc`], the moment achieved before a tick has effect from the next
     /// tick on.

@@ -8,7 +8,7 @@ use control::dlmpc::{Memory, Plan, Report, Settings, SlidingMode, Status};
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::schedule::Sampled;
 use control::{Controller, DesignError, Dlmpc, Measurement};
-use harness::{disturbance, in_parallel, simulate, white};
+use harness::{FEEDBACK, disturbance, in_parallel, simulate, white};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::ops::Range;
 use vehicle::disturbance::Kind;
@@ -40,7 +40,7 @@ struct Recorded {
 impl Recorded {
     fn update(&self, controller: &mut Dlmpc) -> (Memory, Vector3<f64>) {
         let mut memory = self.before.clone();
-        let time = self.tick as f64 * controller.period();
+        let time = self.tick as f64 * FEEDBACK;
         let moment = controller.update(&mut memory, self.tick, time, &self.measured, &reference());
         (memory, moment)
     }
@@ -223,10 +223,6 @@ struct Interrupted {
 impl Controller for Interrupted {
     type Memory = Memory;
 
-    fn period(&self) -> f64 {
-        self.working.period()
-    }
-
     fn update(
         &mut self,
         memory: &mut Memory,
@@ -406,8 +402,8 @@ fn another_evaluation_of_a_tick_leaves_no_trace() {
     let preview = Preview::Profile(&scenario.reference);
     let garbage = harness::garbage();
     let (mut disturbed_controller, mut calm_controller) = (dlmpc(), dlmpc());
-    let (mut disturbed, mut calm) =
-        (Sampled::new(0.0, Memory::default()), Sampled::new(0.0, Memory::default()));
+    let new = || Sampled::new(0.0, FEEDBACK, Memory::default());
+    let (mut disturbed, mut calm) = (new(), new());
     for Recorded { tick, measured, .. } in recorded().iter().take(300) {
         let wrong = &garbage[*tick as usize / 5 % garbage.len()];
         disturbed.evaluate(&mut disturbed_controller, wrong, &preview);
@@ -427,7 +423,7 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
     let scenario = Scenario::crmpc2022();
     let preview = Preview::Profile(&scenario.reference);
     let mut used = dlmpc();
-    let mut sampled = Sampled::new(0.0, Memory::default());
+    let mut sampled = Sampled::new(0.0, FEEDBACK, Memory::default());
     for (tick, Recorded { measured, .. }) in recorded.iter().enumerate().take(750) {
         // The saved state is taken within and at the beginning of an optimisation period, with the
         // tick evaluated or not.

@@ -19,7 +19,7 @@ struct Outcome {
 }
 
 /// Simulates the loop over the scenario. `actuate` turns a command into the achieved moment, which
-/// is measured if `fed`.
+/// is measured if `fed`. All controllers here have the published period.
 fn simulate<C: Controller>(
     controller: &mut C,
     scenario: &Scenario,
@@ -27,7 +27,7 @@ fn simulate<C: Controller>(
     mut actuate: impl FnMut(Vector3<f64>) -> Vector3<f64>,
     mut observe: impl FnMut(f64, &C::Memory),
 ) -> Outcome {
-    let period = controller.period();
+    let period = FblSettings::published().period;
     let mut plant = Plant::new(&scenario.config(period), 0.0).unwrap();
     let mut memory = controller.memory();
     let reference = |time: f64| scenario.reference.at(time);

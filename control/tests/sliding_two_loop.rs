@@ -32,7 +32,7 @@ fn run(
 ) -> Outcome {
     let scenario = Scenario::two_loop();
     let mut controller = TwoLoopSmc::new(*settings).unwrap();
-    let period = controller.period();
+    let period = settings.period;
     let mut memory = TwoLoopMemory::default();
     let mut plant = Plant::new(&scenario.config(period), 0.0).unwrap();
     let reference = |time: f64| scenario.reference.at(time);

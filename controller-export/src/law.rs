@@ -9,7 +9,7 @@ use fmi2_export::Table;
 use serde::{Serialize, de::DeserializeOwned};
 use vehicle::dynamics::RigidBody;
 
-/// Data of the vehicle that every controller receives.
+/// Data that every controller receives: its vehicle, limits and schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
     /// Rigid body of the vehicle that the controller uses.
@@ -20,6 +20,8 @@ pub struct Vehicle {
     pub limit_moment: f64,
     /// Whether the commanded moment is scaled into its limit.
     pub saturation: bool,
+    /// Time between two evaluations of the law, s.
+    pub period: f64,
     /// Time from the instant of a measurement until the resulting moment acts. The law receives the
     /// state predicted over this time.
     pub latency: Latency,
@@ -49,6 +51,10 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     const DOCUMENTATION: &'static str = "";
     /// Version of the unit in FMI.
     const VERSION: &'static str = env!("CARGO_PKG_VERSION");
+
+    /// Returns the start value of the time between two evaluations, s. A law whose period can be
+    /// set declares it by [`table::period`](crate::table::period).
+    fn period() -> f64;
 
     /// Adds the law's own variables to the table.
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {

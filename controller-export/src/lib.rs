@@ -28,12 +28,17 @@
 //!     const NAME: &'static str = "Soft";
 //!     const DESCRIPTION: &'static str = "Linear-quadratic regulator with one weight";
 //!
+//!     fn period() -> f64 {
+//!         0.04
+//!     }
+//!
 //!     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
 //!         table.real(parameter("weight", "Weight on the errors").real().min(0.0), |m| &mut m.law.weight)
 //!     }
 //!
 //!     fn settings(&self, vehicle: &Vehicle) -> LqrSettings {
-//!         LqrSettings { body: vehicle.body, p: [self.weight; 6], q: [10.0; 3], period: 0.04 }
+//!         let Vehicle { body, period, .. } = *vehicle;
+//!         LqrSettings { body, p: [self.weight; 6], q: [10.0; 3], period }
 //!     }
 //!
 //!     fn design(settings: LqrSettings) -> Result<Lqr, control::error::DesignError> {

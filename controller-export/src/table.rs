@@ -217,14 +217,10 @@ pub fn achieved_moment<L: Law>(table: Table<ControllerFmu<L>>) -> Table<Controll
     table.boolean(used, |m| &mut m.parameters.achieved_moment_used)
 }
 
-/// Adds the parameter period.feedback of a law with one rate.
-pub fn period<L: Law>(
-    table: Table<ControllerFmu<L>>,
-    nominal: f64,
-    field: impl Fn(&mut L) -> &mut f64 + Copy + Send + Sync + 'static,
-) -> Table<ControllerFmu<L>> {
-    let period = parameter("period.feedback", "Time between two evaluations of the law").real();
-    table.real(period.unit(unit::time()).min(1e-4).max(10.0).nominal(nominal), move |m| field(&mut m.law))
+/// Adds the parameter period.feedback, the time between two evaluations of what `text` says.
+pub fn period<L: Law>(table: Table<ControllerFmu<L>>, text: &str) -> Table<ControllerFmu<L>> {
+    let period = parameter("period.feedback", text).real().unit(unit::time());
+    table.real(period.min(1e-4).max(10.0).nominal(L::period()), |m| &mut m.parameters.period)
 }
 
 /// Adds the gains of the three angles, `name[1]` to `name[3]`, in the order of [`ANGLES`].

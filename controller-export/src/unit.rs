@@ -45,6 +45,8 @@ pub struct Parameters {
     pub limit_moment: f64,
     /// Whether the commanded moment is scaled into its limit.
     pub saturation: bool,
+    /// Time between two evaluations of the law, s; only laws that let it be set declare it.
+    pub period: f64,
     /// Delays over which the law predicts the state.
     pub latency: Latency,
     /// Whether the input `achieved_moment` is connected; only laws that use it declare this
@@ -81,9 +83,10 @@ pub struct Designed<L: Law> {
 
 impl<L: Law> ControllerUnit<L> {
     fn vehicle(&self) -> Result<Vehicle, Failure> {
-        let Parameters { inertia, limit_rate, limit_moment, saturation, latency, .. } = self.parameters;
+        let Parameters { inertia, limit_rate, limit_moment, saturation, period, latency, .. } =
+            self.parameters;
         let body = inertia.body(1.0).map_err(|error| Failure::Error(error.to_string()))?;
-        Ok(Vehicle { body, limit_rate, limit_moment, saturation, latency })
+        Ok(Vehicle { body, limit_rate, limit_moment, saturation, period, latency })
     }
 }
 
@@ -106,6 +109,7 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
                 limit_rate: scenario.limit_rate,
                 limit_moment: scenario.limit_moment,
                 saturation: false,
+                period: L::period(),
                 latency: Latency::default(),
                 achieved_moment_used: false,
             },
@@ -132,7 +136,10 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
     fn design(&self) -> Result<Designed<L>, Failure> {
         let vehicle = self.vehicle()?;
         let controller = L::design(self.law.settings(&vehicle))
-            .and_then(|law| Delayed::new(law, vehicle.body, vehicle.latency, vehicle.saturates_at()))
+            .and_then(|law| {
+                let limit = vehicle.saturates_at();
+                Delayed::new(law, vehicle.body, vehicle.period, vehicle.latency, limit)
+            })
             .map_err(|error| Failure::Error(error.to_string()))?;
         Ok(Designed { settings: self.law.settings(&vehicle), vehicle, controller })
     }
@@ -143,7 +150,7 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
     }
 
     fn period(device: &Designed<L>) -> f64 {
-        device.controller.period()
+        device.vehicle.period
     }
 
     fn memory(device: &Designed<L>) -> Self::Memory {
@@ -155,7 +162,7 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
         let controller = &mut device.controller;
         let achieved_moment = parameters.achieved_moment_used.then_some(input.achieved_moment);
         let measured = Measurement { achieved_moment, ..input.measured };
-        let now = ticks.next_time(controller.period());
+        let now = ticks.next_time();
         // An external reference is only known now; the law uses its present value for the time at
         // which its moment acts.
         let known = now + controller.acts_after();

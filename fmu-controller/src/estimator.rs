@@ -154,7 +154,7 @@ impl SampledUnit for EstimatorUnit {
         if !(line.time.is_finite() && line.readings.iter().flatten().all(|value| value.is_finite())) {
             return Err(Failure::Error("an input 'measured' is not a finite number".into()));
         }
-        let time = ticks.next_time(estimator.period());
+        let time = ticks.next_time();
         ticks.evaluate_with(line, |memory, _| estimator.update(memory, time, &line));
         let Estimate { angles, rates, gyroscope_bias, .. } = ticks.in_force().1.estimate;
         if [angles, rates, gyroscope_bias].iter().flatten().all(|value| value.is_finite()) {

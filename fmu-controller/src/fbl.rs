@@ -29,16 +29,20 @@ impl Law for FblLaw {
         "Feedback linearisation of the attitude, a comparison of Wu et al. (2015)";
     const DOCUMENTATION: &'static str = include_str!("fbl.html");
 
+    fn period() -> f64 {
+        FblSettings::published().period
+    }
+
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         let p = parameter("gain.p", "Gain on the error of the angles").real().min(0.0);
         let d = parameter("gain.d", "Gain on the error of their rates").real().min(0.0);
-        table::period(table, 0.01, |law| &mut law.settings.period)
+        table::period(table, "Time between two evaluations of the law")
             .real(p.unit(unit::gain_angle()), |m| &mut m.law.settings.kp)
             .real(d.unit(unit::gain_rate()), |m| &mut m.law.settings.kd)
     }
 
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
-        FblSettings { body: vehicle.body, ..self.settings }
+        FblSettings { body: vehicle.body, period: vehicle.period, ..self.settings }
     }
 
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {

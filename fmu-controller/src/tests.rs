@@ -129,8 +129,7 @@ fn moments_are_held_between_ticks() {
 }
 
 fn set_feedback(unit: &mut Crmpc, k: f64, period: f64) {
-    let settings = &mut unit.law.settings;
-    (settings.feedback, settings.period_feedback) = (Gain { k1: k, k2: k }, period);
+    (unit.law.settings.feedback, unit.parameters.period) = (Gain { k1: k, k2: k }, period);
 }
 
 #[test]

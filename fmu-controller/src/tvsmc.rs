@@ -53,8 +53,12 @@ impl<V: Variant> Law for TvsmcLaw<V> {
     const DESCRIPTION: &'static str = V::DESCRIPTION;
     const DOCUMENTATION: &'static str = include_str!("tvsmc.html");
 
+    fn period() -> f64 {
+        V::published().period
+    }
+
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-        let table = table::period(table, 0.01, |law| &mut law.settings.period);
+        let table = table::period(table, "Time between two evaluations of the law");
         let table = anti_windup(V::reaching(surface(table)));
         let table = if V::OBSERVER { observer(table) } else { table };
         outputs(table)
@@ -63,6 +67,7 @@ impl<V: Variant> Law for TvsmcLaw<V> {
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
         Settings {
             body: vehicle.body,
+            period: vehicle.period,
             limit_moment: vehicle.saturates_at(),
             observer: V::OBSERVER.then_some(self.observer),
             ..self.settings

@@ -61,8 +61,12 @@ impl Law for TwoLoopLaw {
     const DESCRIPTION: &'static str = "Two-loop sliding-mode attitude controller of Jia, Zhou and Zhou";
     const DOCUMENTATION: &'static str = include_str!("two_loop.html");
 
+    fn period() -> f64 {
+        TwoLoopSettings::ours().period
+    }
+
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-        let table = table::period(table, 0.01, |law| &mut law.settings.period);
+        let table = table::period(table, "Time between two evaluations of the law");
         let outer = ["outer", "outer loop"];
         let table = reaching(table, outer, ANGLES, &unit::angular_rate(), &unit::angle(), |law| {
             &mut law.settings.outer
@@ -74,7 +78,8 @@ impl Law for TwoLoopLaw {
     }
 
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
-        TwoLoopSettings { body: vehicle.body, limit_moment: vehicle.saturates_at(), ..self.settings }
+        let Vehicle { body, period, .. } = *vehicle;
+        TwoLoopSettings { body, period, limit_moment: vehicle.saturates_at(), ..self.settings }
     }
 
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {

@@ -125,9 +125,10 @@ impl Clone for Memory {
 /// use vehicle::Scenario;
 ///
 /// let scenario = Scenario { duration: 4.0, ..Scenario::crmpc2022() };
-/// let mut law = Crmpc::new(Settings::new(Constraints::Robust))?;
+/// let settings = Settings::new(Constraints::Robust);
+/// let mut law = Crmpc::new(settings)?;
 /// let mut memory = law.memory();
-/// fly(&mut law, &mut memory, &scenario, |sample| {
+/// fly(&mut law, &mut memory, settings.period_feedback, &scenario, |sample| {
 ///     assert_eq!(sample.memory.standing, Standing::InForce, "the limits are guaranteed from the first tick on");
 /// })?;
 /// assert_eq!(memory.report.fallbacks, 0);
@@ -522,10 +523,6 @@ impl Crmpc {
 
 impl Controller for Crmpc {
     type Memory = Memory;
-
-    fn period(&self) -> f64 {
-        self.settings.period_feedback
-    }
 
     fn memory(&self) -> Memory {
         Memory { plan: Plan::new(self.settings.horizon), ..Memory::default() }

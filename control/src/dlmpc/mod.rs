@@ -128,10 +128,11 @@ impl Clone for Memory {
 /// use control::Controller;
 /// use vehicle::Scenario;
 ///
-/// let mut law = Dlmpc::new(Settings::published())?;
+/// let settings = Settings::published();
+/// let mut law = Dlmpc::new(settings)?;
 /// let mut memory = law.memory();
 /// let scenario = Scenario { duration: 4.0, ..Scenario::crmpc2022() };
-/// fly(&mut law, &mut memory, &scenario, |_| ())?;
+/// fly(&mut law, &mut memory, settings.period_feedback, &scenario, |_| ())?;
 /// assert_eq!(memory.report.solves, 20, "the outer layer optimises five times a second");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -354,10 +355,6 @@ impl Dlmpc {
 
 impl Controller for Dlmpc {
     type Memory = Memory;
-
-    fn period(&self) -> f64 {
-        self.settings.period_feedback
-    }
 
     fn memory(&self) -> Memory {
         Memory { plan: Plan::new(self.settings.horizon), ..Memory::default() }

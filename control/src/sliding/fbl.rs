@@ -29,8 +29,9 @@ pub struct FblSettings {
 /// use control::sliding::{Fbl, FblSettings};
 /// use vehicle::Scenario;
 ///
-/// let mut law = Fbl::new(FblSettings::published())?;
-/// let summary = fly(&mut law, &mut (), &Scenario::tvsmc2015(), |_| ())?;
+/// let settings = FblSettings::published();
+/// let mut law = Fbl::new(settings)?;
+/// let summary = fly(&mut law, &mut (), settings.period, &Scenario::tvsmc2015(), |_| ())?;
 /// assert!(summary.error_rms.to_degrees() < 5.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -61,10 +62,6 @@ impl Fbl {
 
 impl Controller for Fbl {
     type Memory = ();
-
-    fn period(&self) -> f64 {
-        self.settings.period
-    }
 
     fn update(
         &mut self,

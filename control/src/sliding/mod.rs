@@ -113,10 +113,11 @@ pub struct Memory<Integral> {
 /// use control::Controller;
 /// use vehicle::Scenario;
 ///
-/// let mut law = SotvsmcDo::new(Settings::sotvsmc_do())?;
+/// let settings = Settings::sotvsmc_do();
+/// let mut law = SotvsmcDo::new(settings)?;
 /// let mut memory = law.memory();
 /// let mut last = f64::INFINITY;
-/// fly(&mut law, &mut memory, &Scenario::tvsmc2015(), |sample| {
+/// fly(&mut law, &mut memory, settings.period, &Scenario::tvsmc2015(), |sample| {
 ///     last = (sample.measured.angles - sample.reference.angles).norm().to_degrees();
 /// })?;
 /// assert!(last < 0.01, "the observer leaves no error at rest: {last} deg");
@@ -160,10 +161,6 @@ impl<R: Reaching> Tvsmc<R> {
 
 impl<R: Reaching> Controller for Tvsmc<R> {
     type Memory = Memory<R::Memory>;
-
-    fn period(&self) -> f64 {
-        self.settings.period
-    }
 
     /// The moment at a tick does not depend on the moment achieved before it, which has effect from
     /// the next tick on. This avoids an algebraic loop with actuators that respond at once.

@@ -306,7 +306,8 @@ impl Flight {
         let s = &self.settings;
         let law = Crmpc::new(*s).unwrap();
         let latency = Latency { measurement: self.age, action: s.delay - self.age };
-        let mut controller = Delayed::new(law, s.body, latency, s.limit_moment).unwrap();
+        let Settings { body, period_feedback, limit_moment, .. } = *s;
+        let mut controller = Delayed::new(law, body, period_feedback, latency, limit_moment).unwrap();
         let mut memory = controller.memory();
         let mut vehicle = Vehicle::new(self);
         let mut disturbance = Progress::new(&self.disturbance, self.seed);
