@@ -20,7 +20,8 @@ fn flown(known: f64) -> Result<(f64, f64), Box<dyn std::error::Error>> {
     let settings = Settings { delay: known, ..Settings::new(Constraints::Robust) };
     let latency = Latency::of_action(known);
     let Settings { body, period_feedback, .. } = settings;
-    let mut law = Delayed::new(Crmpc::new(settings)?, body, period_feedback, latency, f64::INFINITY)?;
+    let law = Crmpc::new(settings)?;
+    let mut law = Delayed::new(law, body, period_feedback, latency, f64::INFINITY)?;
     let mut memory = law.memory();
     let mut config = scenario.config(0.01);
     config.moment_delay = DELAY;

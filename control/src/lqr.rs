@@ -88,7 +88,7 @@ impl Lqr {
 impl Controller for Lqr {
     type Memory = ();
 
-    fn update(
+    fn command(
         &mut self,
         _memory: &mut (),
         _tick: u64,

@@ -150,7 +150,7 @@ mod tests {
 
     impl Controller for Sum {
         type Memory = f64;
-        fn update(
+        fn command(
             &mut self,
             memory: &mut f64,
             tick: u64,

@@ -61,8 +61,6 @@ pub struct TwoLoopSettings {
     pub body: RigidBody,
     /// Time between ticks, s.
     pub period: f64,
-    /// Limit on ‖M‖ into which the command is scaled, N m; infinite for none.
-    pub limit_moment: f64,
     /// Frequency of the critically damped filter of the command, rad/s; 0 for none.
     pub filter: f64,
     /// Outer loop, of the angles α, β, σ.
@@ -122,7 +120,6 @@ impl TwoLoopSettings {
             kinematics: OuterKinematics::Corrected,
             body,
             period: file.period,
-            limit_moment: f64::INFINITY,
             filter: file.command_filter.frequency,
             outer: file.outer,
             inner: file.inner,
@@ -329,7 +326,7 @@ impl Controller for TwoLoopSmc {
 
     /// As in [`crate::sliding::Tvsmc`], the moment achieved before a tick has effect from the next
     /// tick on.
-    fn update(
+    fn command(
         &mut self,
         memory: &mut TwoLoopMemory,
         _tick: u64,
@@ -384,9 +381,13 @@ impl Controller for TwoLoopSmc {
             outer_sliding: s_w,
             inner_sliding: s_n,
             rate_command: omega_c,
-            commanded: Commanded::new(body, measured, wanted, self.settings.limit_moment),
+            commanded: Commanded::new(measured, wanted),
             ..*memory
         };
-        memory.commanded.moment
+        wanted
+    }
+
+    fn limited(&mut self, memory: &mut TwoLoopMemory, applied: &Vector3<f64>) {
+        memory.commanded.limit(&self.settings.body, applied);
     }
 }

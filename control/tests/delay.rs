@@ -3,9 +3,9 @@
 
 mod harness;
 
-use control::controller::{Preview, ReferenceAt};
+use control::controller::{Preview, ReferenceAt, saturated};
 use control::crmpc::{Constraints, Settings};
-use control::delay::{Latency, Memory, Predictor, saturated};
+use control::delay::{Latency, Memory, Predictor};
 use control::lqr::LqrSettings;
 use control::schedule::Sampled;
 use control::{Controller, Crmpc, Delayed, DesignError, Lqr, Measurement};
@@ -270,7 +270,7 @@ struct Probe {
 impl Controller for Probe {
     type Memory = ();
 
-    fn update(
+    fn command(
         &mut self,
         (): &mut (),
         _: u64,

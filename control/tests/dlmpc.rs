@@ -223,7 +223,7 @@ struct Interrupted {
 impl Controller for Interrupted {
     type Memory = Memory;
 
-    fn update(
+    fn command(
         &mut self,
         memory: &mut Memory,
         tick: u64,
@@ -232,7 +232,7 @@ impl Controller for Interrupted {
         reference: control::controller::ReferenceAt,
     ) -> Vector3<f64> {
         let controller = if self.during.contains(&tick) { &mut self.failing } else { &mut self.working };
-        controller.update(memory, tick, time, measured, reference)
+        controller.command(memory, tick, time, measured, reference)
     }
 }
 

@@ -389,7 +389,7 @@ struct Interrupted {
 impl Controller for Interrupted {
     type Memory = Memory;
 
-    fn update(
+    fn command(
         &mut self,
         memory: &mut Memory,
         tick: u64,
@@ -398,7 +398,15 @@ impl Controller for Interrupted {
         reference: control::controller::ReferenceAt,
     ) -> Vector3<f64> {
         let controller = if self.during.contains(&tick) { &mut self.failing } else { &mut self.working };
-        controller.update(memory, tick, time, measured, reference)
+        controller.command(memory, tick, time, measured, reference)
+    }
+
+    fn limit(&self, memory: &Memory) -> f64 {
+        self.working.limit(memory)
+    }
+
+    fn limited(&mut self, memory: &mut Memory, applied: &Vector3<f64>) {
+        self.working.limited(memory, applied);
     }
 }
 

@@ -1,5 +1,6 @@
 //! The sliding-mode controllers of Wu et al. (2015) on the paper's scenario.
 
+use control::delay::{Delayed, Latency};
 use control::sliding::{BoundaryLayer, FblSettings, Observer, Settings, Surface, Tvsmc};
 use control::{Btvsmc, Controller, Fbl, Measurement, SotvsmcDo};
 use nalgebra::Vector3;
@@ -215,10 +216,12 @@ fn the_observer_must_know_what_was_achieved() {
 
 #[test]
 fn a_known_limit_needs_no_measured_moment() {
-    // The controller's own limit counts as a shortfall, with the same result as measured actuators.
+    // The limit on the command counts as a shortfall, with the same result as measured actuators.
     let scenario = Scenario::tvsmc2015();
     let limit_moment = 1.5e5;
-    let mut limited = Tvsmc::new(Settings { limit_moment, ..Settings::sotvsmc_do() }).unwrap();
+    let Settings { body, period, .. } = Settings::sotvsmc_do();
+    let latency = Latency::default();
+    let mut limited = Delayed::new(sotvsmc_do(), body, period, latency, limit_moment).unwrap();
     let known = simulate(&mut limited, &scenario, false, |moment| moment, |_, _| ());
     assert!(known.moment <= limit_moment * (1.0 + 1e-12));
     let within = |moment: Vector3<f64>| moment / (moment.norm() / limit_moment).max(1.0);

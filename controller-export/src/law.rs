@@ -28,9 +28,8 @@ pub struct Vehicle {
 }
 
 impl Vehicle {
-    /// Returns the limit into which a command is scaled, N m; infinite for none. It is for laws
-    /// that need their command after the scaling.
-    pub fn saturates_at(&self) -> f64 {
+    /// Returns the limit into which a command is scaled, N m; infinite for none.
+    pub(crate) fn saturates_at(&self) -> f64 {
         if self.saturation { self.limit_moment } else { f64::INFINITY }
     }
 }

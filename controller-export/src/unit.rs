@@ -179,12 +179,9 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
         L::warning(&before.inner, &after.inner)
     }
 
-    fn show(&mut self, time: f64, device: &Designed<L>, (moment, memory): (Vector3<f64>, &Self::Memory)) {
+    fn show(&mut self, time: f64, _device: &Designed<L>, (moment, memory): (Vector3<f64>, &Self::Memory)) {
         self.law.show(&memory.inner);
-        self.output = Output {
-            moment: device.controller.saturated(moment),
-            reference: self.source.preview(time, &self.input.reference).at(time),
-        };
+        self.output = Output { moment, reference: self.source.preview(time, &self.input.reference).at(time) };
     }
 
     fn fits(device: &Designed<L>, memory: &Self::Memory) -> bool {

@@ -198,7 +198,7 @@ fn the_achieved_moment_counts_only_if_it_is_used() {
 }
 
 #[test]
-fn sliding_modes_scale_into_the_limit_themselves() {
+fn sliding_modes_are_scaled_into_the_limit() {
     let mut unit: SotvsmcDo = ready(|unit: &mut SotvsmcDo| {
         unit.parameters.saturation = true;
         unit.parameters.limit_moment = 1e4;

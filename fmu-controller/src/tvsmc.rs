@@ -68,7 +68,6 @@ impl<V: Variant> Law for TvsmcLaw<V> {
         Settings {
             body: vehicle.body,
             period: vehicle.period,
-            limit_moment: vehicle.saturates_at(),
             observer: V::OBSERVER.then_some(self.observer),
             ..self.settings
         }

@@ -79,7 +79,7 @@ impl Law for TwoLoopLaw {
 
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
         let Vehicle { body, period, .. } = *vehicle;
-        TwoLoopSettings { body, period, limit_moment: vehicle.saturates_at(), ..self.settings }
+        TwoLoopSettings { body, period, ..self.settings }
     }
 
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {

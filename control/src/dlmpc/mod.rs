@@ -343,8 +343,9 @@ impl Dlmpc {
         let s = e + memory.integral * gamma;
         let acceleration = -(growth * gamma + s * q + signed_power(&s, rho) * p);
         let moment = rates.cross(&(body.inertia * rates)) + body.inertia * acceleration;
+        // The inner law limits its moment itself: the integral must not wind up while the moment
+        // is smaller than required, and the published runs depend on the rounding of this scaling.
         let share = within(moment.norm(), self.settings.limit_moment);
-        // The integral must not wind up while the moment is smaller than required.
         if share >= 1.0 {
             memory.integral += growth * self.settings.period_feedback;
         }
@@ -365,7 +366,7 @@ impl Controller for Dlmpc {
         angles.len() == n + 1 && commands.len() == n && multipliers.len() == n
     }
 
-    fn update(
+    fn command(
         &mut self,
         memory: &mut Memory,
         tick: u64,

@@ -63,7 +63,7 @@ impl Fbl {
 impl Controller for Fbl {
     type Memory = ();
 
-    fn update(
+    fn command(
         &mut self,
         _memory: &mut (),
         _tick: u64,

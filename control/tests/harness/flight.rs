@@ -306,14 +306,13 @@ impl Flight {
         let s = &self.settings;
         let law = Crmpc::new(*s).unwrap();
         let latency = Latency { measurement: self.age, action: s.delay - self.age };
-        let Settings { body, period_feedback, limit_moment, .. } = *s;
-        let mut controller = Delayed::new(law, body, period_feedback, latency, limit_moment).unwrap();
+        let Settings { body, period_feedback: period, limit_moment, .. } = *s;
+        let mut controller = Delayed::new(law, body, period, latency, limit_moment).unwrap();
         let mut memory = controller.memory();
         let mut vehicle = Vehicle::new(self);
         let mut disturbance = Progress::new(&self.disturbance, self.seed);
         let mut eyes = Eyes::new(self);
         let reference = |time: f64| self.reference.at(self.reference_start + time);
-        let period = s.period_feedback;
         let (ticks, checks) = ((self.duration / period).round() as u64, (period / CHECK).round() as u64);
         let holds = (self.hold / CHECK).round() as u64;
         let (mut shown, mut error, mut in_force, mut before) = (Shown::default(), 0.0, 0, false);

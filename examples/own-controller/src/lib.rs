@@ -25,7 +25,7 @@ impl Default for Pd {
 impl Controller for Pd {
     type Memory = ();
 
-    fn update(&mut self, (): &mut (), _: u64, t: f64, x: &Measurement, at: ReferenceAt) -> Vector3<f64> {
+    fn command(&mut self, (): &mut (), _: u64, t: f64, x: &Measurement, at: ReferenceAt) -> Vector3<f64> {
         let (rates, wanted) = (r(&x.angles) * x.rates, at(t));
         let (error, error_rate) = (x.angles - wanted.angles, rates - wanted.rates);
         let a = wanted.accelerations - error * self.gains.0 - error_rate * self.gains.1;
