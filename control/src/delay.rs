@@ -149,9 +149,9 @@ pub struct Delayed<C> {
 }
 
 impl<C: Controller> Delayed<C> {
-    /// Puts a delay and a limit around `inner`, which is evaluated every `period` (s). `body` is the model
-    /// of the vehicle. `moment_limit` (N m, infinite for none) is the limit into which commands are
-    /// scaled; law and prediction know the scaled commands.
+    /// Puts a delay and a limit around `inner`, which is evaluated every `period` (s). `body` is
+    /// the model of the vehicle. `moment_limit` (N m, infinite for none) is the limit into which
+    /// commands are scaled; law and prediction know the scaled commands.
     ///
     /// # Errors
     /// Returns the errors of [`Predictor::new`], and errors for a negative part of the latency and
@@ -164,11 +164,11 @@ impl<C: Controller> Delayed<C> {
         moment_limit: f64,
     ) -> Result<Self, DesignError> {
         if moment_limit.is_nan() || moment_limit <= 0.0 {
-            return Err(DesignError::NotPositive { name: "limit.moment", value: moment_limit });
+            return Err(DesignError::NotPositive { name: "limit_moment", value: moment_limit });
         }
         let Latency { measurement, action } = latency;
         if !(0.0..=LONGEST).contains(&measurement) {
-            let name = "measurement.age";
+            let name = "latency.measurement";
             return Err(DesignError::OutOfRange { name, value: measurement, low: 0.0, high: LONGEST });
         }
         if !(0.0..=LONGEST).contains(&action) {

@@ -136,27 +136,24 @@ impl TwoLoopSettings {
 
     fn check(&self) -> Result<(), DesignError> {
         let Self { period, filter, outer, inner, disturbance, threshold, .. } = self;
-        all_positive("period.feedback", &[*period])?;
-        all_positive("antiWindupThreshold", &[*threshold])?;
+        all_positive("period", &[*period])?;
+        all_positive("threshold", &[*threshold])?;
         if !(0.0..1.0 / period).contains(filter) {
             let high = 1.0 / period;
-            return Err(DesignError::OutOfRange {
-                name: "commandFilter.frequency",
-                value: *filter,
-                low: 0.0,
-                high,
-            });
+            return Err(DesignError::OutOfRange { name: "filter", value: *filter, low: 0.0, high });
         }
         if let Some(&value) = disturbance.iter().find(|value| !(0.0..f64::INFINITY).contains(*value)) {
             return Err(DesignError::OutOfRange {
-                name: "disturbanceMoment.bound",
+                name: "disturbance",
                 value,
                 low: 0.0,
                 high: f64::INFINITY,
             });
         }
-        outer.check(["outer.k", "outer.rho", "outer.epsilon", "outer.b"], *period)?;
-        inner.check(["inner.k", "inner.rho", "inner.epsilon", "inner.b"], *period)?;
+        let names = ["outer.k", "outer.layer.rho", "outer.layer.epsilon", "outer.layer.b"];
+        outer.check(names, *period)?;
+        let names = ["inner.k", "inner.layer.rho", "inner.layer.epsilon", "inner.layer.b"];
+        inner.check(names, *period)?;
         let acceleration = self.disturbance_acceleration();
         for (axis, (&rho, &needed)) in inner.layer.rho.iter().zip(&acceleration).enumerate() {
             if rho <= needed {

@@ -252,17 +252,17 @@ fn settings_that_cannot_work_are_refused_by_name() {
     let mut weak = ours;
     weak.inner.layer.rho[0] = 0.18;
     let text = refusal(weak);
-    assert!(text.contains("inner.rho[1] = 0.18") && text.contains("0.183"), "{text}");
+    assert!(text.contains("`inner.layer.rho`[1] = 0.18") && text.contains("0.183"), "{text}");
     let mut flat = ours;
     flat.outer.layer.b[1] = 1.0;
     let text = refusal(flat);
-    assert!(text.contains("outer.b = 1"), "{text}");
+    assert!(text.contains("`outer.layer.b` = 1"), "{text}");
     let text = refusal(TwoLoopSettings { period: 0.1, ..ours });
-    assert!(text.contains("inner.rho"), "{text}");
+    assert!(text.contains("inner.layer.rho"), "{text}");
     let text = refusal(TwoLoopSettings { filter: -1.0, ..ours });
-    assert!(text.contains("commandFilter.frequency"), "{text}");
+    assert!(text.contains("`filter`"), "{text}");
     let text = refusal(TwoLoopSettings { disturbance: [1e5, f64::NAN, 1e5], ..ours });
-    assert!(text.contains("disturbanceMoment.bound"), "{text}");
+    assert!(text.contains("`disturbance`"), "{text}");
 }
 
 #[test]

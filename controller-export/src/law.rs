@@ -6,6 +6,7 @@ use control::Controller;
 use control::delay::Latency;
 use control::error::DesignError;
 use fmi2_export::Table;
+use fmi2_export::fields::Fields;
 use serde::{Serialize, de::DeserializeOwned};
 use vehicle::dynamics::RigidBody;
 
@@ -48,6 +49,9 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     const DESCRIPTION: &'static str;
     /// Description of the computation, as an HTML fragment.
     const DOCUMENTATION: &'static str = "";
+    /// Names of the variables that hold fields of the settings, where they differ from the fields'
+    /// own and are not in [`table::FIELDS`](crate::table::FIELDS).
+    const FIELDS: &'static Fields = &[];
     /// Version of the unit in FMI.
     const VERSION: &'static str = env!("CARGO_PKG_VERSION");
 
@@ -66,7 +70,7 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// Builds the controller from its settings.
     ///
     /// # Errors
-    /// Returns an error that names the parameter at fault.
+    /// Returns an error that names the field of the settings at fault.
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError>;
 
     /// Copies the law's own outputs from the memory in force.

@@ -1,6 +1,7 @@
 //! Any unit that works at ticks of its own: its steps from tick to tick, and its restoration.
 
 use control::schedule::Sampled;
+use fmi2_export::fields::by_variable;
 use fmi2_export::{Context, Description, Failure, Inputs, Model, Restoration};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::ops::{Deref, DerefMut};
@@ -132,7 +133,7 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
         self.unit.load(context)?;
         let device = self.unit.design()?;
         vehicle::time::check_resolution(context.start_time, U::period(&device))
-            .map_err(|error| Failure::Error(error.to_string()))?;
+            .map_err(|error| Failure::Error(by_variable(&error, &[])))?;
         self.ticks = Some(Sampled::new(context.start_time, U::period(&device), U::memory(&device)));
         self.device = Some(device);
         Ok(())

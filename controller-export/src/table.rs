@@ -4,6 +4,7 @@ use crate::law::Law;
 use crate::reference::PROFILES;
 use crate::unit::ControllerFmu;
 use control::delay;
+use fmi2_export::fields::Fields;
 use fmi2_export::table::{Common, Description, Real, Table, discrete_output, input, output, parameter};
 use model_description::DefaultExperiment;
 use model_description::unit;
@@ -17,6 +18,19 @@ pub const ANGLES: [(&str, &str); 3] =
 pub const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
 /// Names and meanings of the components of a moment.
 pub const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
+
+/// Names of the variables that hold fields of a controller's settings, for messages.
+pub const FIELDS: &Fields = &[
+    ("limit_rate", "limit.rate"),
+    ("limit_moment", "limit.moment"),
+    ("latency.measurement", "measurement.age"),
+    ("period", "period.feedback"),
+    ("period_feedback", "period.feedback"),
+    ("period_optimisation", "period.optimisation"),
+    ("p", "weight.P"),
+    ("q", "weight.Q"),
+    ("threshold", "antiWindupThreshold"),
+];
 
 /// Names of the inputs on which the outputs of a tick depend.
 const MEASURED: [&str; 6] =

@@ -7,6 +7,7 @@ use crate::table;
 use control::controller::{Controller, Measurement};
 use control::delay::{Delayed, Latency};
 use control::schedule::ControllerInput;
+use fmi2_export::fields::by_variable;
 use fmi2_export::{Context, Description, Failure};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -82,10 +83,15 @@ pub struct Designed<L: Law> {
 }
 
 impl<L: Law> ControllerUnit<L> {
+    /// Returns the failure for refused settings.
+    fn refusal(error: &impl ToString) -> Failure {
+        Failure::Error(by_variable(error, &[table::FIELDS, L::FIELDS].concat()))
+    }
+
     fn vehicle(&self) -> Result<Vehicle, Failure> {
         let Parameters { inertia, limit_rate, limit_moment, saturation, period, latency, .. } =
             self.parameters;
-        let body = inertia.body(1.0).map_err(|error| Failure::Error(error.to_string()))?;
+        let body = inertia.body(1.0).map_err(|error| Self::refusal(&error))?;
         Ok(Vehicle { body, limit_rate, limit_moment, saturation, period, latency })
     }
 }
@@ -140,7 +146,7 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
                 let limit = vehicle.saturates_at();
                 Delayed::new(law, vehicle.body, vehicle.period, vehicle.latency, limit)
             })
-            .map_err(|error| Failure::Error(error.to_string()))?;
+            .map_err(|error| Self::refusal(&error))?;
         Ok(Designed { settings: self.law.settings(&vehicle), vehicle, controller })
     }
 

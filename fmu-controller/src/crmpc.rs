@@ -7,6 +7,7 @@ use control::error_dynamics::Gain;
 use control::report::Report;
 use controller_export::table::{self, ANGLES, sampled_output, shown, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
+use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use fmi2_export::{Enumeration, Table};
 use model_description::unit;
@@ -103,6 +104,15 @@ impl Law for CrmpcLaw {
     const DESCRIPTION: &'static str =
         "Centralised robust model predictive attitude controller of Chai et al. (2022)";
     const DOCUMENTATION: &'static str = include_str!("crmpc.html");
+    const FIELDS: &'static Fields = &[
+        ("observer.time_constant", "observer.timeConstant"),
+        ("inertia_error", "inertia.error"),
+        ("angle_error", "estimation.angleError"),
+        ("rate_error", "estimation.rateError"),
+        ("sideslip_domain", "guarantee.sideslip"),
+        ("disturbance_bound", "disturbance.bound"),
+        ("guarantee", "guarantee.policy"),
+    ];
 
     fn period() -> f64 {
         Settings::new(Constraints::Robust).period_feedback

@@ -7,6 +7,7 @@ use control::report::Report;
 use controller_export::table::{self, ANGLES, RATES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::Table;
+use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use model_description::unit;
 use nalgebra::Vector3;
@@ -42,6 +43,7 @@ impl Law for DlmpcLaw {
     const NAME: &'static str = "DLMPC";
     const DESCRIPTION: &'static str = "Double-layered model predictive and sliding-mode attitude controller, the comparison of Chai et al. (2022)";
     const DOCUMENTATION: &'static str = include_str!("dlmpc.html");
+    const FIELDS: &'static Fields = &[("sliding_mode", "slidingMode")];
 
     fn period() -> f64 {
         Settings::published().period_feedback

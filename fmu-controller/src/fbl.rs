@@ -4,6 +4,7 @@ use control::error::DesignError;
 use control::sliding::{Fbl, FblSettings};
 use controller_export::{ControllerFmu, Law, Vehicle, table};
 use fmi2_export::Table;
+use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use model_description::unit;
 use serde::{Deserialize, Serialize};
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// Parameters of the feedback linearisation.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FblLaw {
-    settings: FblSettings,
+    pub(crate) settings: FblSettings,
 }
 
 impl Default for FblLaw {
@@ -28,6 +29,7 @@ impl Law for FblLaw {
     const DESCRIPTION: &'static str =
         "Feedback linearisation of the attitude, a comparison of Wu et al. (2015)";
     const DOCUMENTATION: &'static str = include_str!("fbl.html");
+    const FIELDS: &'static Fields = &[("kp", "gain.p"), ("kd", "gain.d")];
 
     fn period() -> f64 {
         FblSettings::published().period

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LqrLaw {
     /// Settings of the regulator; the body in them is replaced by that of the vehicle.
-    settings: LqrSettings,
+    pub(crate) settings: LqrSettings,
 }
 
 impl Default for LqrLaw {

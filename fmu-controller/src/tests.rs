@@ -1,5 +1,7 @@
 //! Tests of the units through the trait that the FMI shell uses.
 
+mod messages;
+
 use crate::crmpc::CrmpcLaw;
 use crate::dlmpc::DlmpcLaw;
 use crate::tvsmc::{self, TvsmcLaw};

@@ -4,6 +4,7 @@ use control::error::DesignError;
 use control::two_loop::{Form, Loop, OuterKinematics, TwoLoopMemory, TwoLoopSettings, TwoLoopSmc};
 use controller_export::table::{self, ANGLES, RATES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
+use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use fmi2_export::{Enumeration, Table};
 use model_description::unit;
@@ -31,7 +32,7 @@ static KINEMATICS: Enumeration<OuterKinematics> = Enumeration {
 /// Parameters and outputs of the two-loop sliding mode.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TwoLoopLaw {
-    settings: TwoLoopSettings,
+    pub(crate) settings: TwoLoopSettings,
     outer_sliding: Vector3<f64>,
     inner_sliding: Vector3<f64>,
     rate_command: Vector3<f64>,
@@ -60,6 +61,12 @@ impl Law for TwoLoopLaw {
     const NAME: &'static str = "TwoLoopSMC";
     const DESCRIPTION: &'static str = "Two-loop sliding-mode attitude controller of Jia, Zhou and Zhou";
     const DOCUMENTATION: &'static str = include_str!("two_loop.html");
+    const FIELDS: &'static Fields = &[
+        ("filter", "commandFilter.frequency"),
+        ("disturbance", "disturbanceMoment.bound"),
+        ("outer.layer", "outer"),
+        ("inner.layer", "inner"),
+    ];
 
     fn period() -> f64 {
         TwoLoopSettings::ours().period

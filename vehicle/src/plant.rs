@@ -224,9 +224,9 @@ impl Plant {
     /// # Errors
     /// Names the value of the configuration that is out of range.
     pub fn new(config: &Config, start_time: f64) -> Result<Self, Error> {
-        let refuse = |name, problem: String| Err(Error::Parameter { name, problem });
+        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
         if !(config.inertia_scale > 0.0 && config.inertia_scale.is_finite()) {
-            return refuse("inertia.scale", format!("= {} must be positive", config.inertia_scale));
+            return refuse("inertia_scale", format!("= {} must be positive", config.inertia_scale));
         }
         let body = config.inertia.body(config.inertia_scale)?;
         if !config.initial.iter().all(|value| value.is_finite()) {
@@ -234,15 +234,15 @@ impl Plant {
         }
         if config.initial[1].abs() >= BETA_LIMIT {
             return refuse(
-                "initial.beta",
+                "initial[1]",
                 format!("= {} deg must lie within 90 deg", config.initial[1].to_degrees()),
             );
         }
         if !(config.step > 0.0 && config.step.is_finite()) {
-            return refuse("integrator.step", format!("= {} s must be positive", config.step));
+            return refuse("step", format!("= {} s must be positive", config.step));
         }
         if !config.earth_rate.is_finite() {
-            return refuse("trajectory.earthRate", "is not finite".into());
+            return refuse("earth_rate", "is not finite".into());
         }
         let transport = Transport::new(config.moment_delay)?;
         if config.actuators.is_some() && transport.is_some() {
@@ -250,7 +250,7 @@ impl Plant {
                 "= {} s delays an input moment, and there is none with actuators",
                 config.moment_delay
             );
-            return refuse("actuation.delay", problem);
+            return refuse("moment_delay", problem);
         }
         config.disturbance.check()?;
         let held = config.disturbance.intervals(start_time).map(|(_, length)| length);

@@ -53,8 +53,7 @@ impl Table {
         if self.curvatures.len() == self.times.len() && finite {
             return Ok(());
         }
-        let problem = "has other curvatures than points".into();
-        Err(Error::Parameter { name: "reference table", problem })
+        Err(Error::of("reference table", "has other curvatures than points"))
     }
 
     /// Reads a CSV file with the headings `time_s` and, in any order, `alpha_deg` or `alpha_rad`,
@@ -183,7 +182,7 @@ impl Table {
 }
 
 fn check(times: &[f64], angles: &[Vector3<f64>]) -> Result<(), Error> {
-    let refuse = |problem: String| Err(Error::Parameter { name: "reference table", problem });
+    let refuse = |problem: String| Err(Error::of("reference table", problem));
     if times.len() > MOST_POINTS {
         return refuse(too_many());
     }

@@ -48,13 +48,13 @@ impl Fbl {
     /// unstable.
     pub fn new(settings: FblSettings) -> Result<Self, DesignError> {
         let FblSettings { period, kp, kd, .. } = settings;
-        for (name, value) in [("period.feedback", period), ("gain.p", kp), ("gain.d", kd)] {
+        for (name, value) in [("period", period), ("kp", kp), ("kd", kd)] {
             all_positive(name, &[value])?;
         }
         let (k1, k2) = (-kp, -kd);
         let radius = SampledError::new(Gain { k1, k2 }, period).spectral_radius();
         if radius >= 1.0 {
-            return Err(DesignError::Unstable { k1, k2, period, radius });
+            return Err(DesignError::Unstable { name: "period", k1, k2, period, radius });
         }
         Ok(Self { settings })
     }

@@ -137,8 +137,8 @@ impl<R: Reaching> Tvsmc<R> {
     /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings<R>) -> Result<Self, DesignError> {
         let Settings { period, surface, reaching, observer, threshold, .. } = &settings;
-        all_positive("period.feedback", &[*period])?;
-        all_positive("antiWindupThreshold", &[*threshold])?;
+        all_positive("period", &[*period])?;
+        all_positive("threshold", &[*threshold])?;
         surface.check()?;
         reaching.check(*period)?;
         observer.as_ref().map_or(Ok(()), Observer::check)?;
