@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use vehicle::reference::{Profile, Reference};
+use vehicle::profile::Profile;
+use vehicle::reference::Reference;
 
 /// The measured state of the vehicle that a controller receives at a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -8,7 +8,8 @@ use nalgebra::{Matrix3, Vector3};
 use vehicle::kinematics;
 use vehicle::kinematics::Kinematics;
 use vehicle::plant::{self, Load, Plant};
-use vehicle::reference::{Profile, Reference};
+use vehicle::profile::Profile;
+use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
 
 /// Figures of merit of one run.

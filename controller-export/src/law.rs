@@ -1,14 +1,17 @@
-//! The part of a unit that a single controller adds: its own parameters, its design and its
-//! outputs.
+//! The part of a unit that a single controller adds, and the data of the unit around it.
 
-use crate::unit::ControllerFmu;
+use crate::reference::{self, Source};
+use crate::sampled::SampledFmu;
 use control::Controller;
+use control::controller::Measurement;
 use control::delay::Latency;
 use control::error::DesignError;
 use fmi2_export::Table;
 use fmi2_export::fields::Fields;
-use serde::{Serialize, de::DeserializeOwned};
-use vehicle::dynamics::RigidBody;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use vehicle::dynamics::{Inertia, RigidBody};
+use vehicle::reference::Reference;
 
 /// Data that every controller receives: its vehicle, limits and schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +36,66 @@ impl Vehicle {
     pub(crate) fn saturates_at(&self) -> f64 {
         if self.saturation { self.limit_moment } else { f64::INFINITY }
     }
+}
+
+/// A controller as an FMI unit, to be handed to [`fmi2_export::export_fmus!`].
+pub type ControllerFmu<L> = SampledFmu<ControllerUnit<L>>;
+
+/// Parameters, inputs and outputs of a controller's unit.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct ControllerUnit<L: Law> {
+    /// Parameters that every controller has.
+    pub parameters: Parameters,
+    /// Inputs that every controller has.
+    pub input: Input,
+    /// Outputs that every controller has.
+    pub output: Output,
+    /// Parameters and outputs of the law alone.
+    pub law: L,
+    pub(crate) source: Source,
+}
+
+/// Parameters that every controller has.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Parameters {
+    /// Parameters of the reference.
+    pub reference: reference::Parameters,
+    /// Inertia that the controller uses, kg m².
+    pub inertia: Inertia,
+    /// Limit on ‖ω‖, rad/s.
+    pub limit_rate: f64,
+    /// Limit on ‖m‖, N m.
+    pub limit_moment: f64,
+    /// Whether the commanded moment is scaled into its limit.
+    pub saturation: bool,
+    /// Time between two evaluations of the law, s; only laws that let it be set declare it.
+    pub period: f64,
+    /// Delays over which the law predicts the state.
+    pub latency: Latency,
+    /// Whether the input `achieved_moment` is connected; only laws that use it declare this
+    /// parameter.
+    pub achieved_moment_used: bool,
+}
+
+/// Inputs that every controller has.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Input {
+    /// Measured angles and rates.
+    pub measured: Measurement,
+    /// Moment that the actuators give, N m.
+    pub achieved_moment: Vector3<f64>,
+    /// Reference from outside the unit.
+    pub reference: Reference,
+}
+
+/// Outputs that every controller has.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Output {
+    /// Commanded moment of the controller, N m.
+    pub moment: Vector3<f64>,
+    /// Reference that is in force.
+    pub reference: Reference,
 }
 
 /// A control law with the variables that only it has. The value holds those variables; its default

@@ -32,9 +32,8 @@
 //!         0.04
 //!     }
 //!
-//!     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-//!         table.real(parameter("weight", "Weight on the errors").real().min(0.0), |m| &mut m.law.weight)
-//!     }
+//! fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+//! table.real(parameter("weight", "Weight on the errors").real().min(0.0), |m| &mut m.law.weight) }
 //!
 //!     fn settings(&self, vehicle: &Vehicle) -> LqrSettings {
 //!         let Vehicle { body, period, .. } = *vehicle;
@@ -53,8 +52,8 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`law`] | what a controller adds to the shared unit |
-//! | [`mod@unit`] | the unit that all controllers share |
+//! | [`law`] | what a controller adds to the shared unit, and the data of that unit |
+//! | `unit` | how that unit works at its ticks |
 //! | [`sampled`] | any unit that works at ticks: steps, saved states |
 //! | [`table`] | the variables that all controllers have, and declarations that laws share |
 //! | [`mod@reference`] | the source of the reference |
@@ -63,8 +62,7 @@ pub mod law;
 pub mod reference;
 pub mod sampled;
 pub mod table;
-pub mod unit;
+mod unit;
 
-pub use law::{Law, Vehicle};
+pub use law::{ControllerFmu, ControllerUnit, Law, Vehicle};
 pub use sampled::{SampledFmu, SampledUnit};
-pub use unit::ControllerFmu;

@@ -1,8 +1,7 @@
 //! The table of variables that every controller has; each law adds its own.
 
-use crate::law::Law;
+use crate::law::{ControllerFmu, Law};
 use crate::reference::PROFILES;
-use crate::unit::ControllerFmu;
 use control::delay;
 use fmi2_export::fields::Fields;
 use fmi2_export::table::{Common, Description, Real, Table, discrete_output, input, output, parameter};

@@ -1,8 +1,8 @@
-//! The unit that all controllers share: inputs, reference and limits.
+//! How the unit that all controllers share works at its ticks.
 
-use crate::law::{Law, Vehicle};
+use crate::law::{ControllerFmu, ControllerUnit, Input, Law, Output, Parameters, Vehicle};
 use crate::reference::{self, Source};
-use crate::sampled::{SampledFmu, SampledUnit, Ticks};
+use crate::sampled::{SampledUnit, Ticks};
 use crate::table;
 use control::controller::{Controller, Measurement};
 use control::delay::{Delayed, Latency};
@@ -10,70 +10,7 @@ use control::schedule::ControllerInput;
 use fmi2_export::fields::by_variable;
 use fmi2_export::{Context, Description, Failure};
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 use vehicle::Scenario;
-use vehicle::dynamics::Inertia;
-use vehicle::reference::Reference;
-
-/// A controller as an FMI unit, to be handed to [`fmi2_export::export_fmus!`].
-pub type ControllerFmu<L> = SampledFmu<ControllerUnit<L>>;
-
-/// Parameters, inputs and outputs of a controller's unit.
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub struct ControllerUnit<L: Law> {
-    /// Parameters that every controller has.
-    pub parameters: Parameters,
-    /// Inputs that every controller has.
-    pub input: Input,
-    /// Outputs that every controller has.
-    pub output: Output,
-    /// Parameters and outputs of the law alone.
-    pub law: L,
-    source: Source,
-}
-
-/// Parameters that every controller has.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Parameters {
-    /// Parameters of the reference.
-    pub reference: reference::Parameters,
-    /// Inertia that the controller uses, kg m².
-    pub inertia: Inertia,
-    /// Limit on ‖ω‖, rad/s.
-    pub limit_rate: f64,
-    /// Limit on ‖m‖, N m.
-    pub limit_moment: f64,
-    /// Whether the commanded moment is scaled into its limit.
-    pub saturation: bool,
-    /// Time between two evaluations of the law, s; only laws that let it be set declare it.
-    pub period: f64,
-    /// Delays over which the law predicts the state.
-    pub latency: Latency,
-    /// Whether the input `achieved_moment` is connected; only laws that use it declare this
-    /// parameter.
-    pub achieved_moment_used: bool,
-}
-
-/// Inputs that every controller has.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct Input {
-    /// Measured angles and rates.
-    pub measured: Measurement,
-    /// Moment that the actuators give, N m.
-    pub achieved_moment: Vector3<f64>,
-    /// Reference from outside the unit.
-    pub reference: Reference,
-}
-
-/// Outputs that every controller has.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct Output {
-    /// Commanded moment of the controller, N m.
-    pub moment: Vector3<f64>,
-    /// Reference that is in force.
-    pub reference: Reference,
-}
 
 /// A controller with the settings and the vehicle for which it was designed.
 pub struct Designed<L: Law> {

@@ -3,7 +3,7 @@
 
 use crate::error::Error;
 use crate::kinematics::Kinematics;
-use crate::plant::{BETA_LIMIT, State, state};
+use crate::motion::{BETA_LIMIT, State, state};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 

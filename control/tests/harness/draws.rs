@@ -8,7 +8,7 @@ use control::Measurement;
 use control::report::Report;
 use nalgebra::Vector3;
 use vehicle::kinematics;
-use vehicle::reference::Profile;
+use vehicle::profile::Profile;
 use vehicle::scenario::Scenario;
 
 /// Largest errors of the angles and rates, deg and deg/s.
