@@ -13,9 +13,9 @@ use control::crmpc::{self, Constraints};
 use control::dlmpc;
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::report::Status;
-use control::{Controller, Crmpc, Dlmpc, Measurement};
+use control::{Crmpc, Dlmpc, Measurement};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use harness::{Optimising, disturbance, settings, simulate};
+use harness::{FEEDBACK, Optimising, disturbance, settings, simulate};
 use std::hint::black_box;
 use vehicle::disturbance::Kind;
 use vehicle::scenario::Scenario;
@@ -48,7 +48,7 @@ fn update<C: Optimising>(
     scenario: &Scenario,
     memory: &mut C::Memory,
 ) {
-    let time = tick.number as f64 * controller.period();
+    let time = tick.number as f64 * FEEDBACK;
     let reference = |time| scenario.reference.at(time);
     black_box(controller.update(memory, tick.number, time, black_box(&tick.measured), &reference));
 }
@@ -136,9 +136,8 @@ fn optimisations(criterion: &mut Criterion) {
         let ticks = run(&mut controller);
         let ratio = controller.ratio();
         let mut group = criterion.benchmark_group(name);
-        let period = controller.period();
         let after = |time: f64, status: Status| {
-            let first = (time / period).round() as u64;
+            let first = (time / FEEDBACK).round() as u64;
             let mut optimised = ticks.iter().filter(|tick| tick.number >= first && tick.number % ratio == 0);
             optimised.find(|tick| tick.status == status)
         };

@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut law = Lqr::new(LqrSettings { body, p, q, period })?;
 
     println!("   time    error   ‖ω‖      ‖m‖");
-    let summary = fly(&mut law, &mut (), &scenario, |sample| {
+    let summary = fly(&mut law, &mut (), period, &scenario, |sample| {
         if sample.tick % 25 == 0 {
             let error = (sample.measured.angles - sample.reference.angles).norm().to_degrees();
             let rate = sample.measured.rates.norm().to_degrees();

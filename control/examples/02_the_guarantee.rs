@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut law = Crmpc::new(settings)?;
     let mut memory = law.memory();
     let (mut in_force, mut least) = (0, f64::INFINITY);
-    fly(&mut law, &mut memory, &scenario, |sample| {
+    fly(&mut law, &mut memory, settings.period_feedback, &scenario, |sample| {
         in_force += u32::from(sample.memory.standing == Standing::InForce);
         least = least.min(sample.memory.margins.moment);
     })?;

@@ -19,7 +19,9 @@ fn flown(known: f64) -> Result<(f64, f64), Box<dyn std::error::Error>> {
     let scenario = Scenario::crmpc2022();
     let settings = Settings { delay: known, ..Settings::new(Constraints::Robust) };
     let latency = Latency::of_action(known);
-    let mut law = Delayed::new(Crmpc::new(settings)?, settings.body, latency, f64::INFINITY)?;
+    let Settings { body, period_feedback, .. } = settings;
+    let law = Crmpc::new(settings)?;
+    let mut law = Delayed::new(law, body, period_feedback, latency, f64::INFINITY)?;
     let mut memory = law.memory();
     let mut config = scenario.config(0.01);
     config.moment_delay = DELAY;

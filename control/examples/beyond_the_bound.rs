@@ -12,41 +12,15 @@
 #[path = "../tests/harness/mod.rs"]
 mod harness;
 
-use control::controller::ReferenceAt;
+use control::Controller;
 use control::crmpc::{Constraints, Guarantee, Settings};
-use control::delay::saturated;
-use control::{Controller, Lqr, Measurement};
+use control::delay::{Delayed, Latency};
 use harness::{
-    Case, Kept, Outcome, adversaries, constant, in_parallel, lqr, run, settings, simulate, square,
+    Case, FEEDBACK, Kept, Outcome, adversaries, constant, in_parallel, lqr, run, settings, simulate, square,
 };
-use nalgebra::Vector3;
 
 /// Runs with an EMS above this count as lost, deg.
 const LOST: f64 = 20.0;
-
-/// An LQR whose moment is scaled into the limit.
-struct Saturated(Lqr, f64);
-
-impl Controller for Saturated {
-    type Memory = ();
-
-    fn period(&self) -> f64 {
-        self.0.period()
-    }
-
-    fn memory(&self) {}
-
-    fn update(
-        &mut self,
-        memory: &mut (),
-        tick: u64,
-        time: f64,
-        measured: &Measurement,
-        reference: ReferenceAt,
-    ) -> Vector3<f64> {
-        saturated(self.0.update(memory, tick, time, measured, reference), self.1)
-    }
-}
 
 fn main() {
     let published = settings(Constraints::Robust);
@@ -72,8 +46,11 @@ fn main() {
                 in_parallel(&cases, |case| run(settings, case.inertia_scale, larger(case)))
             };
             let regulated = in_parallel(&cases, |case| {
-                let mut law = Saturated(lqr(), published.limit_moment);
-                let outcome = simulate(&mut law, &mut (), case.inertia_scale, larger(case), |(), _, _| {});
+                let Settings { body, limit_moment, .. } = published;
+                let latency = Latency::default();
+                let mut law = Delayed::new(lqr(), body, FEEDBACK, latency, limit_moment).unwrap();
+                let mut memory = law.memory();
+                let outcome = simulate(&mut law, &mut memory, case.inertia_scale, larger(case), |_, _, _| {});
                 (outcome, Kept { fallbacks: 0, in_force: 0.0, broken: false })
             });
             let crmpc = [robust(&published), robust(&told)];

@@ -7,9 +7,10 @@
 //! use vehicle::Scenario;
 //!
 //! let scenario = Scenario { duration: 2.0, ..Scenario::crmpc2022() };
-//! let mut law = Crmpc::new(Settings::new(Constraints::Robust))?;
+//! let settings = Settings::new(Constraints::Robust);
+//! let mut law = Crmpc::new(settings)?;
 //! let mut memory = law.memory();
-//! let summary = fly(&mut law, &mut memory, &scenario, |sample| {
+//! let summary = fly(&mut law, &mut memory, settings.period_feedback, &scenario, |sample| {
 //!     println!("{:.2} s: {:.0} N m", sample.time, sample.moment.norm());
 //! })?;
 //! assert!(summary.largest_rate <= scenario.limit_rate && summary.largest_moment <= scenario.limit_moment);
@@ -57,8 +58,9 @@ pub struct Summary {
     pub largest_moment: f64,
 }
 
-/// Flies `scenario` with ideal measurement. Inertia, initial state, disturbance and reference are
-/// those of the scenario. `observe` is called at each tick after the controller's update.
+/// Flies `scenario` with ideal measurement and a tick every `period` (s). Inertia, initial state,
+/// disturbance and reference are those of the scenario. `observe` is called at each tick after the
+/// controller's update.
 ///
 /// # Errors
 /// Returns an error that names the value of the scenario at fault, or says when the attitude was
@@ -66,12 +68,12 @@ pub struct Summary {
 pub fn fly<C: Controller>(
     controller: &mut C,
     memory: &mut C::Memory,
+    period: f64,
     scenario: &Scenario,
     mut observe: impl FnMut(&Sample<C::Memory>),
 ) -> Result<Summary, Error> {
     let mut plant = Plant::new(&scenario.config(CHECK), 0.0)?;
     let reference = |time: f64| scenario.reference.at(time);
-    let period = controller.period();
     let ticks = (scenario.duration / period).round() as u64;
     let looks = (period / CHECK - 1e-9).ceil().max(1.0);
     let mut summary = Summary::default();

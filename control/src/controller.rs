@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use vehicle::reference::{Profile, Reference};
+use vehicle::profile::Profile;
+use vehicle::reference::Reference;
 
 /// The measured state of the vehicle that a controller receives at a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -49,15 +50,23 @@ impl Preview<'_> {
     }
 }
 
-/// A sampled attitude controller. `update` changes nothing that a later call could notice except
-/// `memory`. A tick can therefore be evaluated again with other inputs from the same memory, and a
-/// saved memory continues bit for bit.
+/// Scales a moment (N m) into ‖m‖ ≤ `limit` (N m, infinite for none); its direction is kept.
+pub fn saturated(moment: Vector3<f64>, limit: f64) -> Vector3<f64> {
+    let scaled = |moment: Vector3<f64>| {
+        let excess = moment.norm() / limit;
+        if excess > 1.0 { moment / excess } else { moment }
+    };
+    // The second scaling takes away what rounding leaves above the limit.
+    scaled(scaled(moment))
+}
+
+/// A sampled attitude controller: a law that commands a moment, and is told if a limit leaves less
+/// of it. `update` changes nothing that a later call could notice except `memory`. A tick can
+/// therefore be evaluated again with other inputs from the same memory, and a saved memory
+/// continues bit for bit.
 pub trait Controller {
     /// The state of the controller that is carried from tick to tick.
     type Memory: Clone + Default + Serialize + DeserializeOwned + Send;
-
-    /// Returns the time between ticks, s.
-    fn period(&self) -> f64;
 
     /// Returns the memory for the first tick, with room for everything that later ticks store in
     /// it.
@@ -70,9 +79,9 @@ pub trait Controller {
         true
     }
 
-    /// Evaluates the tick with number `tick` at `time` (s). Returns the moment to hold until the
-    /// next tick, N m.
-    fn update(
+    /// Evaluates the law at the tick with number `tick` and `time` (s). Returns the moment that it
+    /// commands before any limit, N m.
+    fn command(
         &mut self,
         memory: &mut Self::Memory,
         tick: u64,
@@ -80,4 +89,31 @@ pub trait Controller {
         measured: &Measurement,
         reference: ReferenceAt,
     ) -> Vector3<f64>;
+
+    /// Returns the limit on ‖m‖ that belongs to the command just given, N m; infinite for none.
+    fn limit(&self, _memory: &Self::Memory) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Tells the law that its last command exceeded the limit, and which moment (N m) is applied in
+    /// its place.
+    fn limited(&mut self, _memory: &mut Self::Memory, _applied: &Vector3<f64>) {}
+
+    /// Evaluates a tick, and returns the moment to hold until the next one, N m. Nowhere else is a
+    /// command limited.
+    fn update(
+        &mut self,
+        memory: &mut Self::Memory,
+        tick: u64,
+        time: f64,
+        measured: &Measurement,
+        reference: ReferenceAt,
+    ) -> Vector3<f64> {
+        let commanded = self.command(memory, tick, time, measured, reference);
+        let applied = saturated(commanded, self.limit(memory));
+        if applied != commanded {
+            self.limited(memory, &applied);
+        }
+        applied
+    }
 }

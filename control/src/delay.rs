@@ -57,12 +57,6 @@ pub fn ticks(delay: f64, period: f64) -> usize {
     (delay / period * (1.0 - TOLERANCE)).ceil() as usize
 }
 
-/// Scales a moment (N m) into ‖m‖ ≤ `limit` (N m, infinite for none); its direction is kept.
-pub fn saturated(moment: Vector3<f64>, limit: f64) -> Vector3<f64> {
-    let excess = moment.norm() / limit;
-    if excess > 1.0 { moment / excess } else { moment }
-}
-
 /// Computes the state after the delay from the measured state and the moments that act until then.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Predictor {
@@ -155,37 +149,38 @@ pub struct Delayed<C> {
 }
 
 impl<C: Controller> Delayed<C> {
-    /// Puts a delay in front of `inner`. `body` is the model of the vehicle. `moment_limit` (N m,
-    /// infinite for none) is the limit into which commands are scaled behind the controller; the
-    /// prediction uses the scaled commands.
+    /// Puts a delay and a limit around `inner`, which is evaluated every `period` (s). `body` is
+    /// the model of the vehicle. `moment_limit` (N m, infinite for none) is the limit into which
+    /// commands are scaled; law and prediction know the scaled commands.
     ///
     /// # Errors
     /// Returns the errors of [`Predictor::new`], and errors for a negative part of the latency and
     /// for a limit that is not positive.
-    pub fn new(inner: C, body: RigidBody, latency: Latency, moment_limit: f64) -> Result<Self, DesignError> {
+    pub fn new(
+        inner: C,
+        body: RigidBody,
+        period: f64,
+        latency: Latency,
+        moment_limit: f64,
+    ) -> Result<Self, DesignError> {
         if moment_limit.is_nan() || moment_limit <= 0.0 {
-            return Err(DesignError::NotPositive { name: "limit.moment", value: moment_limit });
+            return Err(DesignError::NotPositive { name: "limit_moment", value: moment_limit });
         }
         let Latency { measurement, action } = latency;
         if !(0.0..=LONGEST).contains(&measurement) {
-            let name = "measurement.age";
+            let name = "latency.measurement";
             return Err(DesignError::OutOfRange { name, value: measurement, low: 0.0, high: LONGEST });
         }
         if !(0.0..=LONGEST).contains(&action) {
             return Err(DesignError::Delay { value: action, longest: LONGEST });
         }
-        let predictor = Predictor::new(body, latency.total(), inner.period())?;
+        let predictor = Predictor::new(body, latency.total(), period)?;
         Ok(Self { inner, predictor, latency, moment_limit })
     }
 
     /// Returns the time from a tick until its command acts, s.
     pub fn acts_after(&self) -> f64 {
         self.latency.action
-    }
-
-    /// Returns a command (N m) after the scaling behind the controller.
-    pub fn saturated(&self, moment: Vector3<f64>) -> Vector3<f64> {
-        saturated(moment, self.moment_limit)
     }
 
     /// Returns the law behind the prediction.
@@ -202,10 +197,6 @@ impl<C: Controller> Delayed<C> {
 impl<C: Controller> Controller for Delayed<C> {
     type Memory = Memory<C::Memory>;
 
-    fn period(&self) -> f64 {
-        self.inner.period()
-    }
-
     fn memory(&self) -> Self::Memory {
         Memory { inner: self.inner.memory(), under_way: vec![Vector3::zeros(); self.predictor.count] }
     }
@@ -214,7 +205,7 @@ impl<C: Controller> Controller for Delayed<C> {
         memory.under_way.len() == self.predictor.count && self.inner.fits(&memory.inner)
     }
 
-    fn update(
+    fn command(
         &mut self,
         memory: &mut Self::Memory,
         tick: u64,
@@ -224,16 +215,27 @@ impl<C: Controller> Controller for Delayed<C> {
     ) -> Vector3<f64> {
         let Memory { inner, under_way } = memory;
         if self.predictor.count == 0 {
-            return self.inner.update(inner, tick, time, measured, reference);
+            return self.inner.command(inner, tick, time, measured, reference);
         }
         let predicted = self.predictor.predict(under_way, measured);
-        let moment = self.inner.update(inner, tick, time + self.latency.action, &predicted, reference);
+        let moment = self.inner.command(inner, tick, time + self.latency.action, &predicted, reference);
         // A default memory has no room yet.
         under_way.resize(self.predictor.count, Vector3::zeros());
         under_way.rotate_left(1);
         if let Some(newest) = under_way.last_mut() {
-            *newest = saturated(moment, self.moment_limit);
+            *newest = moment;
         }
         moment
+    }
+
+    fn limit(&self, memory: &Self::Memory) -> f64 {
+        self.moment_limit.min(self.inner.limit(&memory.inner))
+    }
+
+    fn limited(&mut self, memory: &mut Self::Memory, applied: &Vector3<f64>) {
+        if let Some(newest) = memory.under_way.last_mut() {
+            *newest = *applied;
+        }
+        self.inner.limited(&mut memory.inner, applied);
     }
 }

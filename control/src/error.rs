@@ -1,13 +1,16 @@
-//! Errors in the settings of a controller.
+//! Errors in the settings of a controller. Their texts name fields of the settings in backticks, so
+//! that a unit can say its own names of them.
 
-/// A setting that the design refuses. Names follow the parameters of the FMUs.
+/// A setting that the design refuses. Each `name` is the path of a field from the settings on.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DesignError {
     /// The feedback gain does not stabilise the sampled error dynamics.
     #[error(
-        "feedback gain K = [{k1}, {k2}] sampled every {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter period.feedback"
+        "feedback gain K = [{k1}, {k2}] sampled every {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter `{name}`"
     )]
     Unstable {
+        /// Name of the period.
+        name: &'static str,
         /// Gain on the angle, 1/s².
         k1: f64,
         /// Gain on the rate, 1/s.
@@ -20,7 +23,7 @@ pub enum DesignError {
     /// The terminal gain does not stabilise the nominal motion when it is held between two
     /// optimisations.
     #[error(
-        "terminal gain K~ = [{k1}, {k2}] held for {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter period.optimisation"
+        "terminal gain K~ = [{k1}, {k2}] held for {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter `period_optimisation`"
     )]
     UnstableTerminal {
         /// Gain on the angle, 1/s².
@@ -33,7 +36,7 @@ pub enum DesignError {
         radius: f64,
     },
     /// The limits leave too little room for a guarantee.
-    #[error("constraints = robust cannot be guaranteed: {}", no_guarantee(self))]
+    #[error("`constraints` = robust cannot be guaranteed: {}", no_guarantee(self))]
     NoGuarantee {
         /// Share of the moment limit that is left; negative if there is not enough.
         moment_left: f64,
@@ -43,8 +46,8 @@ pub enum DesignError {
         limit_moment: f64,
         /// Limit on the rate, rad/s.
         limit_rate: f64,
-        /// Largest accepted disturbance.bound with the other settings unchanged, rad/s²; `None` if
-        /// not even 0 is accepted.
+        /// Largest accepted `disturbance_bound` with the other settings unchanged, rad/s²; `None`
+        /// if not even 0 is accepted.
         disturbance: Option<f64>,
         /// Largest accepted errors of angles (rad) and rates (rad/s) in the given proportion.
         errors: Option<(f64, f64)>,
@@ -53,14 +56,14 @@ pub enum DesignError {
     },
     /// A gain violates Lemma 2 or 3 of Chai 2022.
     #[error(
-        "{name}.k1 and {name}.k2 need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)"
+        "`{name}.k1` and `{name}.k2` need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)"
     )]
     NotReal {
         /// Name of the gain.
         name: &'static str,
     },
     /// A quantity must be positive and finite.
-    #[error("{name} = {value} must be positive and finite")]
+    #[error("`{name}` = {value} must be positive and finite")]
     NotPositive {
         /// Name of the setting.
         name: &'static str,
@@ -68,9 +71,9 @@ pub enum DesignError {
         value: f64,
     },
     /// A weight must not be negative, and weights on the input must be positive.
-    #[error("weight.{name}[{index}] = {value} is not allowed: P must not be negative, Q must be positive")]
+    #[error("`{name}`[{index}] = {value} is not allowed: P must not be negative, Q must be positive")]
     Weight {
-        /// Name of the weight, P or Q.
+        /// Name of the weight, p or q.
         name: &'static str,
         /// Position on the diagonal, from 1.
         index: usize,
@@ -78,7 +81,7 @@ pub enum DesignError {
         value: f64,
     },
     /// A quantity is outside its range.
-    #[error("{name} = {value} must be at least {low} and below {high}")]
+    #[error("`{name}` = {value} must be at least {low} and below {high}")]
     OutOfRange {
         /// Name of the setting.
         name: &'static str,
@@ -90,7 +93,7 @@ pub enum DesignError {
         high: f64,
     },
     /// The delay that a prediction compensates for is out of its range.
-    #[error("delay = {value} s must lie between 0 and {longest} s")]
+    #[error("`delay` = {value} s must lie between 0 and {longest} s")]
     Delay {
         /// Value of the delay, s.
         value: f64,
@@ -99,7 +102,7 @@ pub enum DesignError {
     },
     /// The two periods do not fit together.
     #[error(
-        "period.optimisation = {optimisation} s must be a whole multiple of period.feedback = {feedback} s"
+        "`period_optimisation` = {optimisation} s must be a whole multiple of `period_feedback` = {feedback} s"
     )]
     Periods {
         /// Optimisation period, s.
@@ -109,7 +112,7 @@ pub enum DesignError {
     },
     /// The limits of a control surface are inconsistent.
     #[error(
-        "surface {index}: the limits limit.surfaceMin = {min} and limit.surfaceMax = {max} must be finite and hold zero, and limit.surfaceRate = {rate} must be finite and not negative"
+        "surface {index}: the limits `effectors.min` = {min} and `effectors.max` = {max} must be finite and hold zero, and `effectors.rate` = {rate} must be finite and not negative"
     )]
     Surface {
         /// Number of the surface, from 1.
@@ -122,7 +125,7 @@ pub enum DesignError {
         rate: f64,
     },
     /// The period of the allocation is not a multiple of the modulator's.
-    #[error("period = {period} s must be a whole multiple of pwpf.period = {pwpf} s")]
+    #[error("`period` = {period} s must be a whole multiple of `pwpf.period` = {pwpf} s")]
     Modulation {
         /// Period of the allocation, s.
         period: f64,
@@ -131,7 +134,7 @@ pub enum DesignError {
     },
     /// One of the paper's sets is empty after tightening.
     #[error(
-        "nothing is left of the paper's set: {name} = {value:.4}; lower disturbance.bound or the reference bounds, or raise the limits"
+        "nothing is left of the paper's set: {name} = {value:.4}; lower `disturbance_bound` or the reference bounds, or raise the limits"
     )]
     EmptySet {
         /// Symbol of the set's size.
@@ -140,7 +143,7 @@ pub enum DesignError {
         value: f64,
     },
     /// A gain, given by its name, must be positive and finite.
-    #[error("{name} must be positive and finite throughout, not {value}")]
+    #[error("`{name}` must be positive and finite throughout, not {value}")]
     Setting {
         /// Name of the setting.
         name: String,
@@ -148,13 +151,13 @@ pub enum DesignError {
         value: f64,
     },
     /// A matrix must have an inverse.
-    #[error("{name} must be finite and have an inverse")]
+    #[error("`{name}` must be finite and have an inverse")]
     Singular {
         /// Name of the matrix.
         name: String,
     },
     /// A quantity must exceed a bound.
-    #[error("{name} = {value} must be finite and above {bound}")]
+    #[error("`{name}` = {value} must be finite and above {bound}")]
     NotAbove {
         /// Name of the setting.
         name: &'static str,
@@ -175,7 +178,7 @@ pub enum DesignError {
     },
     /// The reaching law of Jia et al. is weaker than the disturbance.
     #[error(
-        "inner.rho[{index}] = {rho} must exceed |I⁻¹ M_d| = {needed:.4} rad/s²; raise it or lower disturbanceMoment.bound"
+        "`inner.layer.rho`[{index}] = {rho} must exceed |I⁻¹ M_d| = {needed:.4} rad/s²; raise it or lower `disturbance`"
     )]
     WeakReaching {
         /// Axis, from 1: roll, pitch, yaw.
@@ -206,8 +209,8 @@ fn no_guarantee(error: &DesignError) -> String {
     };
     let mut lacks = Vec::new();
     for (what, left, limit) in [
-        ("moment", *moment_left, format!("limit.moment = {limit_moment} N m")),
-        ("rate", *rate_left, format!("limit.rate = {:.4} deg/s", limit_rate.to_degrees())),
+        ("moment", *moment_left, format!("`limit_moment` = {limit_moment} N m")),
+        ("rate", *rate_left, format!("`limit_rate` = {:.4} deg/s", limit_rate.to_degrees())),
     ] {
         if left <= 0.0 {
             lacks.push(format!(
@@ -225,21 +228,21 @@ fn no_guarantee(error: &DesignError) -> String {
     }
     let mut accepted = Vec::new();
     match disturbance {
-        Some(bound) => accepted.push(format!("disturbance.bound = {:.4} deg/s2", down(bound.to_degrees()))),
-        None => accepted.push("no disturbance.bound".into()),
+        Some(bound) => accepted.push(format!("`disturbance_bound` = {:.4} deg/s2", down(bound.to_degrees()))),
+        None => accepted.push("no `disturbance_bound`".into()),
     }
     if let Some((angle, rate)) = errors {
         accepted.push(format!(
-            "estimation.angleError = {:.4} deg with estimation.rateError = {:.4} deg/s",
+            "`angle_error` = {:.4} deg with `rate_error` = {:.4} deg/s",
             down(angle.to_degrees()),
             down(rate.to_degrees())
         ));
     }
     if let Some(delay) = delay {
-        accepted.push(format!("delay = {:.4} s", down(*delay)));
+        accepted.push(format!("`delay` = {:.4} s", down(*delay)));
     }
     format!(
-        "{}; with all else as it is, what would be accepted is at most {}; guarantee.policy = bestEffort runs all the same, without guarantee",
+        "{}; with all else as it is, what would be accepted is at most {}; `guarantee` = bestEffort runs all the same, without guarantee",
         lacks.join(" and "),
         accepted.join(", or ")
     )

@@ -34,7 +34,7 @@ pub struct LqrSettings {
 /// // P and Q of the comparison are those of CRMPC.
 /// let Settings { body, p, q, period_feedback: period, .. } = Settings::new(Constraints::Robust);
 /// let mut law = Lqr::new(LqrSettings { body, p, q, period })?;
-/// let summary = fly(&mut law, &mut (), &Scenario::crmpc2022(), |_| ())?;
+/// let summary = fly(&mut law, &mut (), period, &Scenario::crmpc2022(), |_| ())?;
 /// assert!(summary.error_rms.to_degrees() < 3.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -59,11 +59,11 @@ impl Lqr {
     /// that the sampling makes unstable.
     pub fn new(settings: LqrSettings) -> Result<Self, DesignError> {
         if !(settings.period > 0.0 && settings.period.is_finite()) {
-            return Err(DesignError::NotPositive { name: "period.feedback", value: settings.period });
+            return Err(DesignError::NotPositive { name: "period", value: settings.period });
         }
         let weights =
-            settings.p.iter().enumerate().map(|(i, &value)| ("P", i, value, i >= 3 && value >= 0.0));
-        let weights = weights.chain(settings.q.iter().enumerate().map(|(i, &value)| ("Q", i, value, false)));
+            settings.p.iter().enumerate().map(|(i, &value)| ("p", i, value, i >= 3 && value >= 0.0));
+        let weights = weights.chain(settings.q.iter().enumerate().map(|(i, &value)| ("q", i, value, false)));
         for (name, i, value, zero_allowed) in weights {
             if !(value.is_finite() && (value > 0.0 || zero_allowed)) {
                 return Err(DesignError::Weight { name, index: i + 1, value });
@@ -73,7 +73,8 @@ impl Lqr {
         for Gain { k1, k2 } in gains {
             let radius = SampledError::new(Gain { k1, k2 }, settings.period).spectral_radius();
             if radius >= 1.0 {
-                return Err(DesignError::Unstable { k1, k2, period: settings.period, radius });
+                let (name, period) = ("period", settings.period);
+                return Err(DesignError::Unstable { name, k1, k2, period, radius });
             }
         }
         Ok(Self { settings, gains })
@@ -88,11 +89,7 @@ impl Lqr {
 impl Controller for Lqr {
     type Memory = ();
 
-    fn period(&self) -> f64 {
-        self.settings.period
-    }
-
-    fn update(
+    fn command(
         &mut self,
         _memory: &mut (),
         _tick: u64,

@@ -1,4 +1,5 @@
-//! The sampled side of a controller on integer ticks: t_k = t₀ + k·period, never accumulated.
+//! The sampled side of a controller on integer ticks: t_k = t₀ + k·period, never accumulated. The
+//! schedule is the only one who knows start and period at run time.
 
 use crate::controller::{Controller, Measurement, Preview};
 use nalgebra::Vector3;
@@ -9,12 +10,14 @@ use vehicle::time::{check_resolution, tick_time, tick_tolerance};
 /// Largest number of a tick; beyond it the time of a tick is not exact.
 const LAST_TICK: u64 = 1 << 53;
 
-/// Memory of a sampled unit and its position in time. At a tick the output is a function of the
-/// committed memory and of the present input. It may be evaluated any number of times, and is
-/// committed when time leaves the tick. Attitude controllers have the default input and output.
+/// Memory of a sampled unit, its period and its position in time. At a tick the output is a
+/// function of the committed memory and of the present input. It may be evaluated any number of
+/// times, and is committed when time leaves the tick. Attitude controllers have the default input
+/// and output.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sampled<Memory, Input = ControllerInput, Output = Vector3<f64>> {
     start: f64,
+    period: f64,
     /// Number of the first tick that is not committed.
     next: u64,
     committed: Memory,
@@ -40,29 +43,29 @@ where
     Output: Copy + Default,
 {
     /// Returns the state before tick 0, which is due at `start` (s), with the initial memory of a
-    /// controller.
-    pub fn new(start: f64, memory: Memory) -> Self {
-        Self { start, committed: memory.clone(), pending: memory, ..Self::default() }
+    /// controller. Further ticks follow every `period` (s).
+    pub fn new(start: f64, period: f64, memory: Memory) -> Self {
+        Self { start, period, committed: memory.clone(), pending: memory, ..Self::default() }
     }
 
     /// Returns the time of the first uncommitted tick, s.
-    pub fn next_time(&self, period: f64) -> f64 {
-        tick_time(self.next.cast_signed(), self.start, period)
+    pub fn next_time(&self) -> f64 {
+        tick_time(self.next.cast_signed(), self.start, self.period)
     }
 
     /// Returns whether a tick is due at `time` (s).
-    pub fn is_due(&self, time: f64, period: f64) -> bool {
-        self.next_time(period) <= time + tick_tolerance(time, period)
+    pub fn is_due(&self, time: f64) -> bool {
+        self.next_time() <= time + tick_tolerance(time, self.period)
     }
 
     /// Returns the time of the first uncommitted tick (s), if it comes before `time` (s).
-    pub fn next_before(&self, time: f64, period: f64) -> Option<f64> {
-        Some(self.next_time(period)).filter(|tick| *tick < time - tick_tolerance(time, period))
+    pub fn next_before(&self, time: f64) -> Option<f64> {
+        Some(self.next_time()).filter(|tick| *tick < time - tick_tolerance(time, self.period))
     }
 
-    /// Returns whether a unit can be in this state at `time` (s) in an experiment that began at
-    /// `start` (s). All earlier ticks must be committed and, unless a step has `failed` in the
-    /// middle, no later ones. `fits` checks each memory.
+    /// Returns whether a unit with this `period` (s) can be in this state at `time` (s) in an
+    /// experiment that began at `start` (s). All earlier ticks must be committed and, unless a step
+    /// has `failed` in the middle, no later ones. `fits` checks each memory.
     pub fn fits(
         &self,
         (start, time): (f64, f64),
@@ -70,11 +73,12 @@ where
         failed: bool,
         fits: impl Fn(&Memory) -> bool,
     ) -> bool {
-        let next = self.next_time(period);
+        let next = self.next_time();
         check_resolution(start, period).is_ok()
             && self.start.to_bits() == start.to_bits()
+            && self.period.to_bits() == period.to_bits()
             && self.next <= LAST_TICK
-            && self.next_before(time, period).is_none()
+            && self.next_before(time).is_none()
             && (failed || next <= time + period + tick_tolerance(time, period))
             && fits(&self.committed)
             && fits(&self.pending)
@@ -127,7 +131,7 @@ impl<Memory: Clone + Default> Sampled<Memory> {
         measured: &Measurement,
         preview: &Preview,
     ) {
-        let time = self.next_time(controller.period());
+        let time = self.next_time();
         let input = ControllerInput { measured: *measured, external: preview.external() };
         self.evaluate_with(input, |memory, tick| {
             controller.update(memory, tick, time, measured, &|time| preview.at(time))
@@ -146,10 +150,7 @@ mod tests {
 
     impl Controller for Sum {
         type Memory = f64;
-        fn period(&self) -> f64 {
-            0.04
-        }
-        fn update(
+        fn command(
             &mut self,
             memory: &mut f64,
             tick: u64,
@@ -172,7 +173,7 @@ mod tests {
 
     #[test]
     fn a_tick_is_a_function_of_committed_memory_and_present_inputs() {
-        let mut sampled = Sampled::new(0.0, 0.0);
+        let mut sampled = Sampled::new(0.0, 0.04, 0.0);
         evaluate(&mut sampled, 1.0);
         evaluate(&mut sampled, 5.0);
         assert_eq!(sampled.in_force().0.x, 5.0, "the first evaluation leaves no trace");
@@ -184,13 +185,11 @@ mod tests {
 
     #[test]
     fn ticks_are_due_at_integer_multiples_from_either_side_of_rounding() {
-        let mut sampled = Sampled::<f64>::new(0.1, 0.0);
+        let mut sampled = Sampled::<f64>::new(0.1, 0.04, 0.0);
         for k in 0..10_000_u32 {
             let time = 0.1 + f64::from(k) * 0.04;
-            assert!(sampled.is_due(time.next_down(), 0.04) && sampled.is_due(time, 0.04));
-            assert!(
-                !sampled.is_due(time - 0.01, 0.04) && sampled.next_before(time.next_up(), 0.04).is_none()
-            );
+            assert!(sampled.is_due(time.next_down()) && sampled.is_due(time));
+            assert!(!sampled.is_due(time - 0.01) && sampled.next_before(time.next_up()).is_none());
             evaluate(&mut sampled, 0.0);
             sampled.commit();
         }

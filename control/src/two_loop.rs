@@ -61,8 +61,6 @@ pub struct TwoLoopSettings {
     pub body: RigidBody,
     /// Time between ticks, s.
     pub period: f64,
-    /// Limit on ‖M‖ into which the command is scaled, N m; infinite for none.
-    pub limit_moment: f64,
     /// Frequency of the critically damped filter of the command, rad/s; 0 for none.
     pub filter: f64,
     /// Outer loop, of the angles α, β, σ.
@@ -122,7 +120,6 @@ impl TwoLoopSettings {
             kinematics: OuterKinematics::Corrected,
             body,
             period: file.period,
-            limit_moment: f64::INFINITY,
             filter: file.command_filter.frequency,
             outer: file.outer,
             inner: file.inner,
@@ -139,27 +136,24 @@ impl TwoLoopSettings {
 
     fn check(&self) -> Result<(), DesignError> {
         let Self { period, filter, outer, inner, disturbance, threshold, .. } = self;
-        all_positive("period.feedback", &[*period])?;
-        all_positive("antiWindupThreshold", &[*threshold])?;
+        all_positive("period", &[*period])?;
+        all_positive("threshold", &[*threshold])?;
         if !(0.0..1.0 / period).contains(filter) {
             let high = 1.0 / period;
-            return Err(DesignError::OutOfRange {
-                name: "commandFilter.frequency",
-                value: *filter,
-                low: 0.0,
-                high,
-            });
+            return Err(DesignError::OutOfRange { name: "filter", value: *filter, low: 0.0, high });
         }
         if let Some(&value) = disturbance.iter().find(|value| !(0.0..f64::INFINITY).contains(*value)) {
             return Err(DesignError::OutOfRange {
-                name: "disturbanceMoment.bound",
+                name: "disturbance",
                 value,
                 low: 0.0,
                 high: f64::INFINITY,
             });
         }
-        outer.check(["outer.k", "outer.rho", "outer.epsilon", "outer.b"], *period)?;
-        inner.check(["inner.k", "inner.rho", "inner.epsilon", "inner.b"], *period)?;
+        let names = ["outer.k", "outer.layer.rho", "outer.layer.epsilon", "outer.layer.b"];
+        outer.check(names, *period)?;
+        let names = ["inner.k", "inner.layer.rho", "inner.layer.epsilon", "inner.layer.b"];
+        inner.check(names, *period)?;
         let acceleration = self.disturbance_acceleration();
         for (axis, (&rho, &needed)) in inner.layer.rho.iter().zip(&acceleration).enumerate() {
             if rho <= needed {
@@ -272,10 +266,11 @@ pub struct TwoLoopMemory {
 /// use control::Controller;
 /// use vehicle::Scenario;
 ///
-/// let mut law = TwoLoopSmc::new(TwoLoopSettings::ours())?;
+/// let settings = TwoLoopSettings::ours();
+/// let mut law = TwoLoopSmc::new(settings)?;
 /// let mut memory = law.memory();
 /// let mut last = f64::INFINITY;
-/// fly(&mut law, &mut memory, &Scenario::two_loop(), |sample| {
+/// fly(&mut law, &mut memory, settings.period, &Scenario::two_loop(), |sample| {
 ///     last = (sample.measured.angles - sample.reference.angles).norm().to_degrees();
 /// })?;
 /// assert!(last < 0.1, "{last} deg");
@@ -326,13 +321,9 @@ impl TwoLoopSmc {
 impl Controller for TwoLoopSmc {
     type Memory = TwoLoopMemory;
 
-    fn period(&self) -> f64 {
-        self.settings.period
-    }
-
     /// As in [`crate::sliding::Tvsmc`], the moment achieved before a tick has effect from the next
     /// tick on.
-    fn update(
+    fn command(
         &mut self,
         memory: &mut TwoLoopMemory,
         _tick: u64,
@@ -387,9 +378,13 @@ impl Controller for TwoLoopSmc {
             outer_sliding: s_w,
             inner_sliding: s_n,
             rate_command: omega_c,
-            commanded: Commanded::new(body, measured, wanted, self.settings.limit_moment),
+            commanded: Commanded::new(measured, wanted),
             ..*memory
         };
-        memory.commanded.moment
+        wanted
+    }
+
+    fn limited(&mut self, memory: &mut TwoLoopMemory, applied: &Vector3<f64>) {
+        memory.commanded.limit(&self.settings.body, applied);
     }
 }

@@ -3,7 +3,6 @@
 
 mod harness;
 
-use control::Controller;
 use control::crmpc::{Constraints, InitialState, Settings, Status};
 use control::{Crmpc, crmpc::Memory};
 use harness::{Case, adversaries, constant, disturbance, in_parallel, settings, simulate, square, white};
@@ -229,11 +228,10 @@ fn a_run_repeats_bit_for_bit() {
 fn without_disturbance_nothing_is_constrained_once_the_jump_is_over() {
     let mut controller = Crmpc::new(settings(Constraints::Robust)).unwrap();
     let jump = Scenario::crmpc2022().reference.jumps().next().unwrap();
-    let period = controller.period();
     let mut constrained = Vec::new();
     simulate(&mut controller, &mut Memory::default(), 1.0, Disturbance::default(), |memory, tick, _| {
         if memory.report.status == Status::Constrained {
-            constrained.push(tick as f64 * period);
+            constrained.push(tick as f64 * harness::FEEDBACK);
         }
     });
     let within = |from: f64, to: f64| constrained.iter().filter(|&&time| from <= time && time < to).count();

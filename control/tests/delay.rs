@@ -3,13 +3,13 @@
 
 mod harness;
 
-use control::controller::{Preview, ReferenceAt};
+use control::controller::{Preview, ReferenceAt, saturated};
 use control::crmpc::{Constraints, Settings};
-use control::delay::{Latency, Memory, Predictor, saturated};
+use control::delay::{Latency, Memory, Predictor};
 use control::lqr::LqrSettings;
 use control::schedule::Sampled;
 use control::{Controller, Crmpc, Delayed, DesignError, Lqr, Measurement};
-use harness::{disturbance, garbage, lqr, settings};
+use harness::{FEEDBACK, disturbance, garbage, lqr, settings};
 use nalgebra::Vector3;
 use vehicle::Error;
 use vehicle::disturbance::{Disturbance, Kind};
@@ -20,7 +20,15 @@ use vehicle::scenario::Scenario;
 const DELAYS: [f64; 5] = [0.04, 0.1, 0.117, 0.12, 0.003];
 
 fn delayed<C: Controller>(inner: C, delay: f64) -> Delayed<C> {
-    Delayed::new(inner, settings(Constraints::Robust).body, Latency::of_action(delay), f64::INFINITY).unwrap()
+    limited(inner, FEEDBACK, delay, f64::INFINITY).unwrap()
+}
+
+fn limited<C>(inner: C, period: f64, delay: f64, limit: f64) -> Result<Delayed<C>, DesignError>
+where
+    C: Controller,
+{
+    let body = settings(Constraints::Robust).body;
+    Delayed::new(inner, body, period, Latency::of_action(delay), limit)
 }
 
 /// A plant on which commands act `delay` (s) after they are given.
@@ -73,15 +81,16 @@ impl Late {
     fn run<C: Controller>(
         &mut self,
         controller: &mut C,
+        period: f64,
         duration: f64,
         mut observe: impl FnMut(&C, &C::Memory, &Measurement),
     ) -> Result<Vec<f64>, Error> {
         let reference = Scenario::crmpc2022().reference;
         let mut memory = controller.memory();
-        let ticks = (duration / controller.period()).round() as u64;
+        let ticks = (duration / period).round() as u64;
         let mut errors = Vec::new();
         for tick in 0..ticks {
-            let time = tick as f64 * controller.period();
+            let time = tick as f64 * period;
             self.advance(time)?;
             let (angles, rates) = (self.plant.angles(), self.plant.rates());
             let measured = Measurement { angles, rates, ..Measurement::default() };
@@ -100,9 +109,9 @@ fn rms(values: &[f64]) -> f64 {
 }
 
 /// Returns the largest distance (rad, rad/s) of a predicted state from the actual one, over 10 s.
-fn largest_error<C: Controller>(mut late: Late, mut controller: Delayed<C>) -> f64 {
+fn largest_error<C: Controller>(mut late: Late, mut controller: Delayed<C>, period: f64) -> f64 {
     let mut predicted = Vec::new();
-    late.run(&mut controller, 10.0, |controller, memory, measured| {
+    late.run(&mut controller, period, 10.0, |controller, memory, measured| {
         let Measurement { angles, rates, .. } = controller.predictor().predict(&memory.under_way, measured);
         predicted.push(state(&angles, &rates));
     })
@@ -115,12 +124,13 @@ fn largest_error<C: Controller>(mut late: Late, mut controller: Delayed<C>) -> f
 #[test]
 fn oracle_with_the_right_model_the_predicted_state_is_the_one_that_comes() {
     for delay in DELAYS {
-        let error = largest_error(Late::undisturbed(delay), delayed(lqr(), delay));
+        let error = largest_error(Late::undisturbed(delay), delayed(lqr(), delay), FEEDBACK);
         assert!(error < 1e-9, "{delay} s: {error:e}");
         // With feedback every 0.01 s, up to 12 commands are under way.
         let Settings { body, p, q, .. } = settings(Constraints::Robust);
         let fast = Lqr::new(LqrSettings { body, p, q, period: 0.01 }).unwrap();
-        let error = largest_error(Late::undisturbed(delay), delayed(fast, delay));
+        let fast = limited(fast, 0.01, delay, f64::INFINITY).unwrap();
+        let error = largest_error(Late::undisturbed(delay), fast, 0.01);
         assert!(error < 1e-9, "{delay} s: {error:e}");
     }
 }
@@ -129,9 +139,8 @@ fn oracle_with_the_right_model_the_predicted_state_is_the_one_that_comes() {
 fn oracle_saturated_commands_are_predicted_as_they_act() {
     let limit = 5e4;
     let late = || Late { moment_limit: limit, ..Late::undisturbed(0.1) };
-    let body = settings(Constraints::Robust).body;
-    let knowing = largest_error(late(), Delayed::new(lqr(), body, Latency::of_action(0.1), limit).unwrap());
-    let unknowing = largest_error(late(), delayed(lqr(), 0.1));
+    let knowing = largest_error(late(), limited(lqr(), FEEDBACK, 0.1, limit).unwrap(), FEEDBACK);
+    let unknowing = largest_error(late(), delayed(lqr(), 0.1), FEEDBACK);
     assert!(knowing < 1e-9 && unknowing > 1e-3, "{knowing:e}, {unknowing:e}");
 }
 
@@ -147,7 +156,7 @@ fn oracle_the_loop_moves_as_one_without_delay_that_begins_later() {
     // At rest and without a moment the vehicle's state is constant until the first command acts.
     for delay in DELAYS {
         let mut late = Late::undisturbed(delay);
-        late.run(&mut delayed(lqr(), delay), 20.0, |_, _, _| {}).unwrap();
+        late.run(&mut delayed(lqr(), delay), FEEDBACK, 20.0, |_, _, _| {}).unwrap();
         let reference = Scenario::crmpc2022().reference;
         let mut plant = Late::undisturbed(0.0).plant;
         for (tick, reached) in late.reached.iter().enumerate() {
@@ -171,8 +180,8 @@ struct Merit {
 
 fn merit(q: f64, delay: f64, predicts: bool, scale: f64, kind: Kind) -> Result<Merit, Error> {
     let mut late = Late::new(delay, scale, disturbance(kind));
-    let errors =
-        late.run(&mut delayed(regulator(q), if predicts { delay } else { 0.0 }), 50.0, |_, _, _| {})?;
+    let mut controller = delayed(regulator(q), if predicts { delay } else { 0.0 });
+    let errors = late.run(&mut controller, FEEDBACK, 50.0, |_, _, _| {})?;
     let limit = Scenario::crmpc2022().limit_moment;
     let efforts: Vec<f64> = late.commands.iter().map(|(_, moment)| moment.norm() / limit).collect();
     Ok(Merit { ems_deg: rms(&errors), settled_deg: rms(&errors[250..625]), cms: rms(&efforts) })
@@ -236,7 +245,7 @@ fn a_tick_evaluated_again_gives_the_same_and_leaves_no_trace() {
         ..Measurement::default()
     };
     let mut controller = delayed(lqr(), 0.117);
-    let [mut once, mut often] = [0, 1].map(|_| Sampled::new(0.0, controller.memory()));
+    let [mut once, mut often] = [0, 1].map(|_| Sampled::new(0.0, FEEDBACK, controller.memory()));
     for k in 0..10 {
         once.evaluate(&mut controller, &at(k), &preview);
         for other in garbage() {
@@ -261,11 +270,7 @@ struct Probe {
 impl Controller for Probe {
     type Memory = ();
 
-    fn period(&self) -> f64 {
-        0.04
-    }
-
-    fn update(
+    fn command(
         &mut self,
         (): &mut (),
         _: u64,
@@ -301,7 +306,8 @@ fn the_law_is_told_the_time_at_which_its_moment_acts() {
 fn an_old_measurement_is_predicted_to_now_and_the_reference_is_that_of_now() {
     let latency = Latency { measurement: 0.08, action: 0.0 };
     let body = settings(Constraints::Robust).body;
-    let mut controller = Delayed::new(Probe::default(), body, latency, f64::INFINITY).unwrap();
+    let probe = Probe::default();
+    let mut controller = Delayed::new(probe, body, FEEDBACK, latency, f64::INFINITY).unwrap();
     let measured = Measurement { rates: Vector3::new(0.0, 0.1, 0.0), ..Measurement::default() };
     controller.update(&mut Memory::default(), 50, 2.0, &measured, &|_| Reference::default());
     let (time, told) = controller.inner().told.unwrap();
@@ -313,14 +319,15 @@ fn an_old_measurement_is_predicted_to_now_and_the_reference_is_that_of_now() {
 fn what_cannot_work_is_refused() {
     let body = settings(Constraints::Robust).body;
     for delay in [-0.01, 1.01, f64::NAN, f64::INFINITY] {
-        let refusal = Delayed::new(lqr(), body, Latency::of_action(delay), f64::INFINITY).map(|_| ());
+        let refusal = limited(lqr(), FEEDBACK, delay, f64::INFINITY).map(|_| ());
         assert!(matches!(refusal, Err(DesignError::Delay { longest: 1.0, .. })), "{delay}: {refusal:?}");
     }
-    let old =
-        Delayed::new(lqr(), body, Latency { measurement: -0.01, action: 0.1 }, f64::INFINITY).map(|_| ());
-    assert!(matches!(old, Err(DesignError::OutOfRange { name: "measurement.age", .. })), "{old:?}");
+    let latency = Latency { measurement: -0.01, action: 0.1 };
+    let old = Delayed::new(lqr(), body, FEEDBACK, latency, f64::INFINITY).map(|_| ());
+    let Err(DesignError::OutOfRange { name, .. }) = old else { panic!("{old:?}") };
+    assert_eq!(name, "latency.measurement");
     assert!(Predictor::new(body, 0.9, 1e-4).is_ok() && Predictor::new(body, 0.9, 1e-5).is_err());
     for limit in [0.0, -1.0, f64::NAN] {
-        assert!(Delayed::new(lqr(), body, Latency::of_action(0.1), limit).is_err(), "{limit}");
+        assert!(limited(lqr(), FEEDBACK, 0.1, limit).is_err(), "{limit}");
     }
 }

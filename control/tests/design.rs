@@ -208,7 +208,7 @@ fn oracle_marginal_gain_is_refused_with_its_spectral_radius() {
     // Here Φ = [0.8 0; −2 −1].
     let settings = Settings { feedback: gain(-10.0), period_feedback: 0.2, ..settings() };
     let error = Design::new(&settings).unwrap_err();
-    let DesignError::Unstable { k1, k2, period, radius } = error else { panic!("{error}") };
+    let DesignError::Unstable { k1, k2, period, radius, .. } = error else { panic!("{error}") };
     assert_eq!([k1, k2, period], [-10.0, -10.0, 0.2]);
     assert!((radius - 1.0).abs() < 1e-12);
     assert!(error.to_string().contains("spectral radius 1.000000"), "{error}");
@@ -404,7 +404,7 @@ fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
     let DesignError::NoGuarantee { moment_left, disturbance: Some(largest), .. } = error else {
         panic!("{error}")
     };
-    assert!(moment_left < 0.0 && error.to_string().contains("disturbance.bound"), "{error}");
+    assert!(moment_left < 0.0 && error.to_string().contains("`disturbance_bound`"), "{error}");
     Design::new(&Settings { disturbance_bound: largest, ..settings }).unwrap();
     Design::new(&Settings { disturbance_bound: 1.01 * largest, ..settings }).unwrap_err();
     let counted = Design::new(&Settings { guarantee: Guarantee::BestEffort, ..settings }).unwrap().counted;
@@ -415,8 +415,8 @@ fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
 fn errors_of_measurement_out_of_range_are_refused_by_name() {
     let base = settings();
     for (name, settings) in [
-        ("estimation.angleError", Settings { angle_error: -1e-3, ..base }),
-        ("estimation.rateError", Settings { rate_error: f64::NAN, ..base }),
+        ("`angle_error`", Settings { angle_error: -1e-3, ..base }),
+        ("`rate_error`", Settings { rate_error: f64::NAN, ..base }),
     ] {
         let text = Design::new(&settings).unwrap_err().to_string();
         assert!(text.contains(name), "{text}");

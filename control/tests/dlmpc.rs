@@ -8,7 +8,7 @@ use control::dlmpc::{Memory, Plan, Report, Settings, SlidingMode, Status};
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::schedule::Sampled;
 use control::{Controller, DesignError, Dlmpc, Measurement};
-use harness::{disturbance, in_parallel, simulate, white};
+use harness::{FEEDBACK, disturbance, in_parallel, simulate, white};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::ops::Range;
 use vehicle::disturbance::Kind;
@@ -40,7 +40,7 @@ struct Recorded {
 impl Recorded {
     fn update(&self, controller: &mut Dlmpc) -> (Memory, Vector3<f64>) {
         let mut memory = self.before.clone();
-        let time = self.tick as f64 * controller.period();
+        let time = self.tick as f64 * FEEDBACK;
         let moment = controller.update(&mut memory, self.tick, time, &self.measured, &reference());
         (memory, moment)
     }
@@ -223,11 +223,7 @@ struct Interrupted {
 impl Controller for Interrupted {
     type Memory = Memory;
 
-    fn period(&self) -> f64 {
-        self.working.period()
-    }
-
-    fn update(
+    fn command(
         &mut self,
         memory: &mut Memory,
         tick: u64,
@@ -236,7 +232,7 @@ impl Controller for Interrupted {
         reference: control::controller::ReferenceAt,
     ) -> Vector3<f64> {
         let controller = if self.during.contains(&tick) { &mut self.failing } else { &mut self.working };
-        controller.update(memory, tick, time, measured, reference)
+        controller.command(memory, tick, time, measured, reference)
     }
 }
 
@@ -406,8 +402,8 @@ fn another_evaluation_of_a_tick_leaves_no_trace() {
     let preview = Preview::Profile(&scenario.reference);
     let garbage = harness::garbage();
     let (mut disturbed_controller, mut calm_controller) = (dlmpc(), dlmpc());
-    let (mut disturbed, mut calm) =
-        (Sampled::new(0.0, Memory::default()), Sampled::new(0.0, Memory::default()));
+    let new = || Sampled::new(0.0, FEEDBACK, Memory::default());
+    let (mut disturbed, mut calm) = (new(), new());
     for Recorded { tick, measured, .. } in recorded().iter().take(300) {
         let wrong = &garbage[*tick as usize / 5 % garbage.len()];
         disturbed.evaluate(&mut disturbed_controller, wrong, &preview);
@@ -427,7 +423,7 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
     let scenario = Scenario::crmpc2022();
     let preview = Preview::Profile(&scenario.reference);
     let mut used = dlmpc();
-    let mut sampled = Sampled::new(0.0, Memory::default());
+    let mut sampled = Sampled::new(0.0, FEEDBACK, Memory::default());
     for (tick, Recorded { measured, .. }) in recorded.iter().enumerate().take(750) {
         // The saved state is taken within and at the beginning of an optimisation period, with the
         // tick evaluated or not.
@@ -471,16 +467,16 @@ fn settings_that_cannot_work_are_refused_by_name() {
     };
     let cases = [
         (Settings { horizon: 0, ..published }, "horizon"),
-        (Settings { limit_rate: f64::NAN, ..published }, "limit.rate"),
-        (Settings { limit_moment: 0.0, ..published }, "limit.moment"),
-        (Settings { period_feedback: 0.03, ..published }, "period.feedback"),
-        (Settings { q: [1.0, 0.0, 1.0], ..published }, "weight.Q[2]"),
-        (Settings { p: [1.0, 1.0, -1.0], ..published }, "weight.P[3]"),
-        (sliding(|gains| gains.q = 50.0), "slidingMode.q"),
-        (sliding(|gains| gains.p = -1.0), "slidingMode.p"),
-        (sliding(|gains| gains.gamma = f64::NAN), "slidingMode.gamma"),
-        (sliding(|gains| gains.rho = 0.0), "slidingMode.rho"),
-        (sliding(|gains| gains.rho = 1.0), "slidingMode.rho"),
+        (Settings { limit_rate: f64::NAN, ..published }, "limit_rate"),
+        (Settings { limit_moment: 0.0, ..published }, "limit_moment"),
+        (Settings { period_feedback: 0.03, ..published }, "period_feedback"),
+        (Settings { q: [1.0, 0.0, 1.0], ..published }, "`q`[2]"),
+        (Settings { p: [1.0, 1.0, -1.0], ..published }, "`p`[3]"),
+        (sliding(|gains| gains.q = 50.0), "sliding_mode.q"),
+        (sliding(|gains| gains.p = -1.0), "sliding_mode.p"),
+        (sliding(|gains| gains.gamma = f64::NAN), "sliding_mode.gamma"),
+        (sliding(|gains| gains.rho = 0.0), "sliding_mode.rho"),
+        (sliding(|gains| gains.rho = 1.0), "sliding_mode.rho"),
     ];
     for (settings, name) in cases {
         let refused: Option<DesignError> = Dlmpc::new(settings).err();

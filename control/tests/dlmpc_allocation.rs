@@ -50,7 +50,7 @@ fn ticks_without_the_cone_solver_allocate_nothing() {
     for (tick, measured) in (0..).zip(&truth) {
         let counted = COUNT.get();
         before.clone_from(&memory);
-        controller.update(&mut memory, tick, tick as f64 * controller.period(), measured, &reference);
+        controller.update(&mut memory, tick, tick as f64 * harness::FEEDBACK, measured, &reference);
         let allocated = COUNT.get() - counted;
         let optimised = tick % controller.ratio() == 0;
         if optimised && memory.report.status == Status::Constrained {

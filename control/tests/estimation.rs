@@ -256,13 +256,16 @@ fn settings_that_cannot_work_are_refused_by_name() {
     let nan = Correction { matrix: Matrix3::repeat(f64::NAN), ..Correction::default() };
     for (name, settings) in [
         ("period", Settings { period: 0.0, ..s }),
-        ("filter.cutoff", Settings { cutoff: 50.0, ..s }),
-        ("filter.cutoff", Settings { cutoff: f64::NAN, ..s }),
-        ("sensor.delay", Settings { sensor_delay: -0.1, ..s }),
-        ("lost.after", Settings { lost_after: 0.0, ..s }),
-        ("calibration.duration", Settings { calibration_duration: f64::INFINITY, ..s }),
-        ("gyroscope.matrix", Settings { corrections: [singular, s.corrections[1], s.corrections[2]], ..s }),
-        ("magnetometer.matrix", Settings { corrections: [s.corrections[0], s.corrections[1], nan], ..s }),
+        ("cutoff", Settings { cutoff: 50.0, ..s }),
+        ("cutoff", Settings { cutoff: f64::NAN, ..s }),
+        ("sensor_delay", Settings { sensor_delay: -0.1, ..s }),
+        ("lost_after", Settings { lost_after: 0.0, ..s }),
+        ("calibration_duration", Settings { calibration_duration: f64::INFINITY, ..s }),
+        (
+            "corrections[0].matrix",
+            Settings { corrections: [singular, s.corrections[1], s.corrections[2]], ..s },
+        ),
+        ("corrections[2].matrix", Settings { corrections: [s.corrections[0], s.corrections[1], nan], ..s }),
     ] {
         let text = Estimator::new(settings).unwrap_err().to_string();
         assert!(text.contains(name), "{name}: {text}");

@@ -8,7 +8,7 @@ use control::crmpc::{Constraints, InitialState, Memory, Plan, Report, Settings, 
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::schedule::Sampled;
 use control::{Controller, Crmpc, Measurement};
-use harness::{disturbance, settings, simulate};
+use harness::{FEEDBACK, disturbance, settings, simulate};
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
@@ -50,7 +50,7 @@ struct Recorded {
 impl Recorded {
     fn update(&self, controller: &mut Crmpc) -> (Memory, Vector3<f64>) {
         let mut memory = self.before.clone();
-        let time = self.tick as f64 * controller.period();
+        let time = self.tick as f64 * FEEDBACK;
         let moment = controller.update(&mut memory, self.tick, time, &self.measured, &reference());
         (memory, moment)
     }
@@ -151,7 +151,7 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
         let tick = sample.tick + 1;
         let angles = sample.measured.angles + Vector3::new(0.001, -0.002, 0.003);
         let rates = sample.measured.rates + Vector3::new(-0.002, 0.001, 0.0005);
-        let time = tick as f64 * controller.period();
+        let time = tick as f64 * FEEDBACK;
         let moment = controller.update(
             &mut memory,
             tick,
@@ -166,7 +166,7 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
         let expected = memory.plan.accelerations[0] + angle * feedback.k1 + rate * feedback.k2;
         // This is the state to which that acceleration leads by the middle of the period
         // (docs/guarantee.md).
-        let half = 0.5 * controller.period();
+        let half = 0.5 * FEEDBACK;
         let middle = angles + angle_rates * half + expected * (0.5 * half * half);
         if moment.norm() > (1.0 - 1e-12) * settings(Constraints::Robust).limit_moment {
             continue;
@@ -389,11 +389,7 @@ struct Interrupted {
 impl Controller for Interrupted {
     type Memory = Memory;
 
-    fn period(&self) -> f64 {
-        self.working.period()
-    }
-
-    fn update(
+    fn command(
         &mut self,
         memory: &mut Memory,
         tick: u64,
@@ -402,7 +398,15 @@ impl Controller for Interrupted {
         reference: control::controller::ReferenceAt,
     ) -> Vector3<f64> {
         let controller = if self.during.contains(&tick) { &mut self.failing } else { &mut self.working };
-        controller.update(memory, tick, time, measured, reference)
+        controller.command(memory, tick, time, measured, reference)
+    }
+
+    fn limit(&self, memory: &Memory) -> f64 {
+        self.working.limit(memory)
+    }
+
+    fn limited(&mut self, memory: &mut Memory, applied: &Vector3<f64>) {
+        self.working.limited(memory, applied);
     }
 }
 
@@ -473,8 +477,8 @@ fn another_evaluation_of_a_tick_leaves_no_trace() {
     );
     let (mut disturbed_controller, mut calm_controller) =
         (controller(Constraints::Robust), controller(Constraints::Robust));
-    let (mut disturbed, mut calm) =
-        (Sampled::new(0.0, Memory::default()), Sampled::new(0.0, Memory::default()));
+    let new = || Sampled::new(0.0, FEEDBACK, Memory::default());
+    let (mut disturbed, mut calm) = (new(), new());
     for (tick, measured) in truth.iter().enumerate().take(300) {
         let wrong = &garbage[tick / 5 % garbage.len()];
         disturbed.evaluate(&mut disturbed_controller, wrong, &preview);
@@ -502,7 +506,7 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
         let scenario = Scenario::crmpc2022();
         let preview = Preview::Profile(&scenario.reference);
         let mut used = controller(constraints);
-        let mut sampled = Sampled::new(0.0, Memory::default());
+        let mut sampled = Sampled::new(0.0, FEEDBACK, Memory::default());
         for (tick, measured) in truth.iter().enumerate().take(750) {
             // The saved state is taken within and at the beginning of an optimisation period, with
             // the tick evaluated or not.

@@ -1,5 +1,6 @@
 //! The sliding-mode controllers of Wu et al. (2015) on the paper's scenario.
 
+use control::delay::{Delayed, Latency};
 use control::sliding::{BoundaryLayer, FblSettings, Observer, Settings, Surface, Tvsmc};
 use control::{Btvsmc, Controller, Fbl, Measurement, SotvsmcDo};
 use nalgebra::Vector3;
@@ -19,7 +20,7 @@ struct Outcome {
 }
 
 /// Simulates the loop over the scenario. `actuate` turns a command into the achieved moment, which
-/// is measured if `fed`.
+/// is measured if `fed`. All controllers here have the published period.
 fn simulate<C: Controller>(
     controller: &mut C,
     scenario: &Scenario,
@@ -27,7 +28,7 @@ fn simulate<C: Controller>(
     mut actuate: impl FnMut(Vector3<f64>) -> Vector3<f64>,
     mut observe: impl FnMut(f64, &C::Memory),
 ) -> Outcome {
-    let period = controller.period();
+    let period = FblSettings::published().period;
     let mut plant = Plant::new(&scenario.config(period), 0.0).unwrap();
     let mut memory = controller.memory();
     let reference = |time: f64| scenario.reference.at(time);
@@ -215,10 +216,12 @@ fn the_observer_must_know_what_was_achieved() {
 
 #[test]
 fn a_known_limit_needs_no_measured_moment() {
-    // The controller's own limit counts as a shortfall, with the same result as measured actuators.
+    // The limit on the command counts as a shortfall, with the same result as measured actuators.
     let scenario = Scenario::tvsmc2015();
     let limit_moment = 1.5e5;
-    let mut limited = Tvsmc::new(Settings { limit_moment, ..Settings::sotvsmc_do() }).unwrap();
+    let Settings { body, period, .. } = Settings::sotvsmc_do();
+    let latency = Latency::default();
+    let mut limited = Delayed::new(sotvsmc_do(), body, period, latency, limit_moment).unwrap();
     let known = simulate(&mut limited, &scenario, false, |moment| moment, |_, _| ());
     assert!(known.moment <= limit_moment * (1.0 + 1e-12));
     let within = |moment: Vector3<f64>| moment / (moment.norm() / limit_moment).max(1.0);
@@ -250,16 +253,16 @@ fn settings_that_cannot_work_are_refused_by_name() {
     let refusal = |settings: Settings<BoundaryLayer>| Tvsmc::new(settings).unwrap_err().to_string();
     let good = Settings::btvsmc_do();
     let text = refusal(Settings { period: 0.0, ..good });
-    assert!(text.contains("period.feedback"), "{text}");
+    assert!(text.contains("`period`"), "{text}");
     let text = refusal(Settings { period: 0.5, ..good });
-    assert!(text.contains("boundaryLayer.h"), "{text}");
+    assert!(text.contains("reaching.h"), "{text}");
     let text = refusal(Settings { surface: Surface { lambda: -1.0, ..good.surface }, ..good });
     assert!(text.contains("surface.lambda") && text.contains("-1"), "{text}");
     let observer = good.observer.map(|observer| Observer { l: [0.005, f64::NAN, 0.01], ..observer });
     let text = refusal(Settings { observer, ..good });
-    assert!(text.contains("observer.L"), "{text}");
+    assert!(text.contains("observer.l`"), "{text}");
     let text = Fbl::new(FblSettings { kd: -3.0, ..FblSettings::published() }).unwrap_err().to_string();
-    assert!(text.contains("gain.d"), "{text}");
+    assert!(text.contains("`kd`"), "{text}");
     let text = Fbl::new(FblSettings { period: 1.0, ..FblSettings::published() }).unwrap_err().to_string();
     assert!(text.contains("spectral radius"), "{text}");
 }

@@ -1,5 +1,6 @@
 //! The two-loop sliding-mode controller on the scenario of Jia et al.
 
+use control::delay::{Delayed, Latency};
 use control::sliding::FiniteTimeLayer;
 use control::two_loop::{Form, Loop, OuterKinematics, TwoLoopMemory, TwoLoopSettings};
 use control::{Controller, Measurement, TwoLoopSmc};
@@ -7,7 +8,8 @@ use nalgebra::{Matrix3, Vector3};
 use vehicle::kinematics;
 use vehicle::kinematics::Kinematics;
 use vehicle::plant::{self, Load, Plant};
-use vehicle::reference::{Profile, Reference};
+use vehicle::profile::Profile;
+use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
 
 /// Figures of merit of one run.
@@ -27,13 +29,15 @@ struct Outcome {
 
 fn run(
     settings: &TwoLoopSettings,
+    limit: f64,
     fed: bool,
     mut actuate: impl FnMut(Vector3<f64>) -> Vector3<f64>,
 ) -> Outcome {
     let scenario = Scenario::two_loop();
-    let mut controller = TwoLoopSmc::new(*settings).unwrap();
-    let period = controller.period();
-    let mut memory = TwoLoopMemory::default();
+    let TwoLoopSettings { body, period, .. } = *settings;
+    let law = TwoLoopSmc::new(*settings).unwrap();
+    let mut controller = Delayed::new(law, body, period, Latency::default(), limit).unwrap();
+    let mut memory = controller.memory();
     let mut plant = Plant::new(&scenario.config(period), 0.0).unwrap();
     let reference = |time: f64| scenario.reference.at(time);
     let moments = Vector3::zeros();
@@ -55,15 +59,15 @@ fn run(
         outcome.moment = outcome.moment.max(moment.norm());
         outcome.moments = outcome.moments.sup(&moment.abs());
         let (outer, inner) = &mut outcome.integrals;
-        *outer = outer.max(memory.outer_integral.amax());
-        *inner = inner.max(memory.inner_integral.amax());
+        *outer = outer.max(memory.inner.outer_integral.amax());
+        *inner = inner.max(memory.inner.inner_integral.amax());
         plant.advance(time, (tick + 1) as f64 * period, moment).unwrap();
     }
     outcome
 }
 
 fn direct(settings: &TwoLoopSettings) -> Outcome {
-    run(settings, false, |moment| moment)
+    run(settings, f64::INFINITY, false, |moment| moment)
 }
 
 #[test]
@@ -90,19 +94,15 @@ fn regress_steps_without_filter_ask_for_millions_of_newton_metres() {
 
 #[test]
 fn regress_integrals_that_rest_in_saturation_do_not_wind_up() {
-    let limited = |anti_windup| TwoLoopSettings {
-        filter: 0.0,
-        limit_moment: 1.9e5,
-        anti_windup,
-        ..TwoLoopSettings::ours()
-    };
-    let (with, without) = (direct(&limited(true)), direct(&limited(false)));
+    let settings = |anti_windup| TwoLoopSettings { filter: 0.0, anti_windup, ..TwoLoopSettings::ours() };
+    let limited = |anti_windup| run(&settings(anti_windup), 1.9e5, false, |moment| moment);
+    let (with, without) = (limited(true), limited(false));
     assert!((with.settling - 9.22).abs() < 0.05 && with.rest < 0.1, "{with:?}");
     assert!(with.integrals.0 < 0.02 && with.integrals.1 < 0.003, "{with:?}");
     assert!(without.rest > 90.0, "the attitude is lost: {without:?}");
     // The same limit acts in actuators whose moment is measured.
-    let free = TwoLoopSettings { limit_moment: f64::INFINITY, ..limited(true) };
-    let measured = run(&free, true, |moment| moment / (moment.norm() / 1.9e5).max(1.0));
+    let measured =
+        run(&settings(true), f64::INFINITY, true, |moment| moment / (moment.norm() / 1.9e5).max(1.0));
     assert!((measured.settling - with.settling).abs() < 0.011 && measured.rest < 0.3, "{measured:?}");
 }
 
@@ -253,17 +253,17 @@ fn settings_that_cannot_work_are_refused_by_name() {
     let mut weak = ours;
     weak.inner.layer.rho[0] = 0.18;
     let text = refusal(weak);
-    assert!(text.contains("inner.rho[1] = 0.18") && text.contains("0.183"), "{text}");
+    assert!(text.contains("`inner.layer.rho`[1] = 0.18") && text.contains("0.183"), "{text}");
     let mut flat = ours;
     flat.outer.layer.b[1] = 1.0;
     let text = refusal(flat);
-    assert!(text.contains("outer.b = 1"), "{text}");
+    assert!(text.contains("`outer.layer.b` = 1"), "{text}");
     let text = refusal(TwoLoopSettings { period: 0.1, ..ours });
-    assert!(text.contains("inner.rho"), "{text}");
+    assert!(text.contains("inner.layer.rho"), "{text}");
     let text = refusal(TwoLoopSettings { filter: -1.0, ..ours });
-    assert!(text.contains("commandFilter.frequency"), "{text}");
+    assert!(text.contains("`filter`"), "{text}");
     let text = refusal(TwoLoopSettings { disturbance: [1e5, f64::NAN, 1e5], ..ours });
-    assert!(text.contains("disturbanceMoment.bound"), "{text}");
+    assert!(text.contains("`disturbance`"), "{text}");
 }
 
 #[test]

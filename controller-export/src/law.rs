@@ -1,15 +1,19 @@
-//! The part of a unit that a single controller adds: its own parameters, its design and its
-//! outputs.
+//! The part of a unit that a single controller adds, and the data of the unit around it.
 
-use crate::unit::ControllerFmu;
+use crate::reference::{self, Source};
+use crate::sampled::SampledFmu;
 use control::Controller;
+use control::controller::Measurement;
 use control::delay::Latency;
 use control::error::DesignError;
 use fmi2_export::Table;
-use serde::{Serialize, de::DeserializeOwned};
-use vehicle::dynamics::RigidBody;
+use fmi2_export::fields::Fields;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use vehicle::dynamics::{Inertia, RigidBody};
+use vehicle::reference::Reference;
 
-/// Data of the vehicle that every controller receives.
+/// Data that every controller receives: its vehicle, limits and schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
     /// Rigid body of the vehicle that the controller uses.
@@ -20,17 +24,78 @@ pub struct Vehicle {
     pub limit_moment: f64,
     /// Whether the commanded moment is scaled into its limit.
     pub saturation: bool,
+    /// Time between two evaluations of the law, s.
+    pub period: f64,
     /// Time from the instant of a measurement until the resulting moment acts. The law receives the
     /// state predicted over this time.
     pub latency: Latency,
 }
 
 impl Vehicle {
-    /// Returns the limit into which a command is scaled, N m; infinite for none. It is for laws
-    /// that need their command after the scaling.
-    pub fn saturates_at(&self) -> f64 {
+    /// Returns the limit into which a command is scaled, N m; infinite for none.
+    pub(crate) fn saturates_at(&self) -> f64 {
         if self.saturation { self.limit_moment } else { f64::INFINITY }
     }
+}
+
+/// A controller as an FMI unit, to be handed to [`fmi2_export::export_fmus!`].
+pub type ControllerFmu<L> = SampledFmu<ControllerUnit<L>>;
+
+/// Parameters, inputs and outputs of a controller's unit.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct ControllerUnit<L: Law> {
+    /// Parameters that every controller has.
+    pub parameters: Parameters,
+    /// Inputs that every controller has.
+    pub input: Input,
+    /// Outputs that every controller has.
+    pub output: Output,
+    /// Parameters and outputs of the law alone.
+    pub law: L,
+    pub(crate) source: Source,
+}
+
+/// Parameters that every controller has.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Parameters {
+    /// Parameters of the reference.
+    pub reference: reference::Parameters,
+    /// Inertia that the controller uses, kg m².
+    pub inertia: Inertia,
+    /// Limit on ‖ω‖, rad/s.
+    pub limit_rate: f64,
+    /// Limit on ‖m‖, N m.
+    pub limit_moment: f64,
+    /// Whether the commanded moment is scaled into its limit.
+    pub saturation: bool,
+    /// Time between two evaluations of the law, s; only laws that let it be set declare it.
+    pub period: f64,
+    /// Delays over which the law predicts the state.
+    pub latency: Latency,
+    /// Whether the input `achieved_moment` is connected; only laws that use it declare this
+    /// parameter.
+    pub achieved_moment_used: bool,
+}
+
+/// Inputs that every controller has.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Input {
+    /// Measured angles and rates.
+    pub measured: Measurement,
+    /// Moment that the actuators give, N m.
+    pub achieved_moment: Vector3<f64>,
+    /// Reference from outside the unit.
+    pub reference: Reference,
+}
+
+/// Outputs that every controller has.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Output {
+    /// Commanded moment of the controller, N m.
+    pub moment: Vector3<f64>,
+    /// Reference that is in force.
+    pub reference: Reference,
 }
 
 /// A control law with the variables that only it has. The value holds those variables; its default
@@ -47,8 +112,15 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     const DESCRIPTION: &'static str;
     /// Description of the computation, as an HTML fragment.
     const DOCUMENTATION: &'static str = "";
+    /// Names of the variables that hold fields of the settings, where they differ from the fields'
+    /// own and are not in [`table::FIELDS`](crate::table::FIELDS).
+    const FIELDS: &'static Fields = &[];
     /// Version of the unit in FMI.
     const VERSION: &'static str = env!("CARGO_PKG_VERSION");
+
+    /// Returns the start value of the time between two evaluations, s. A law whose period can be
+    /// set declares it by [`table::period`](crate::table::period).
+    fn period() -> f64;
 
     /// Adds the law's own variables to the table.
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
@@ -61,7 +133,7 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// Builds the controller from its settings.
     ///
     /// # Errors
-    /// Returns an error that names the parameter at fault.
+    /// Returns an error that names the field of the settings at fault.
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError>;
 
     /// Copies the law's own outputs from the memory in force.

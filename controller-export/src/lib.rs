@@ -28,12 +28,16 @@
 //!     const NAME: &'static str = "Soft";
 //!     const DESCRIPTION: &'static str = "Linear-quadratic regulator with one weight";
 //!
-//!     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-//!         table.real(parameter("weight", "Weight on the errors").real().min(0.0), |m| &mut m.law.weight)
+//!     fn period() -> f64 {
+//!         0.04
 //!     }
 //!
+//! fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+//! table.real(parameter("weight", "Weight on the errors").real().min(0.0), |m| &mut m.law.weight) }
+//!
 //!     fn settings(&self, vehicle: &Vehicle) -> LqrSettings {
-//!         LqrSettings { body: vehicle.body, p: [self.weight; 6], q: [10.0; 3], period: 0.04 }
+//!         let Vehicle { body, period, .. } = *vehicle;
+//!         LqrSettings { body, p: [self.weight; 6], q: [10.0; 3], period }
 //!     }
 //!
 //!     fn design(settings: LqrSettings) -> Result<Lqr, control::error::DesignError> {
@@ -48,8 +52,8 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`law`] | what a controller adds to the shared unit |
-//! | [`mod@unit`] | the unit that all controllers share |
+//! | [`law`] | what a controller adds to the shared unit, and the data of that unit |
+//! | `unit` | how that unit works at its ticks |
 //! | [`sampled`] | any unit that works at ticks: steps, saved states |
 //! | [`table`] | the variables that all controllers have, and declarations that laws share |
 //! | [`mod@reference`] | the source of the reference |
@@ -58,8 +62,7 @@ pub mod law;
 pub mod reference;
 pub mod sampled;
 pub mod table;
-pub mod unit;
+mod unit;
 
-pub use law::{Law, Vehicle};
+pub use law::{ControllerFmu, ControllerUnit, Law, Vehicle};
 pub use sampled::{SampledFmu, SampledUnit};
-pub use unit::ControllerFmu;

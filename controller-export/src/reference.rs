@@ -2,13 +2,15 @@
 //! external inputs.
 
 use control::controller::Preview;
+use fmi2_export::fields::by_variable;
 use fmi2_export::{Context, Enumeration, Failure};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use vehicle::Scenario;
-use vehicle::reference::{Profile, Reference};
-use vehicle::table::Table;
+use vehicle::profile::Profile;
+use vehicle::reference::Reference;
+use vehicle::table::LookupTable;
 
 /// Choice of the source of the reference attitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -115,7 +117,7 @@ impl Source {
 }
 
 /// Reads the table from the file name as given, or from the unit's resources.
-fn table(file: &str, context: &Context) -> Result<Table, Failure> {
+fn table(file: &str, context: &Context) -> Result<LookupTable, Failure> {
     if file.is_empty() {
         let text =
             "reference.profile is 'table' but reference.file is empty; set it to the path of a CSV file";
@@ -124,5 +126,6 @@ fn table(file: &str, context: &Context) -> Result<Table, Failure> {
     let path = Path::new(file);
     let inside = context.resources.map(|folder| folder.join(path)).filter(|inside| inside.is_file());
     let path = if path.is_file() { path.into() } else { inside.unwrap_or_else(|| path.into()) };
-    Table::from_csv_file(&path).map_err(|error| Failure::Error(format!("reference.file: {error}")))
+    let problem = |error| format!("reference.file: {}", by_variable(&error, &[]));
+    LookupTable::from_csv_file(&path).map_err(|error| Failure::Error(problem(error)))
 }

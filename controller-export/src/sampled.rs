@@ -1,6 +1,7 @@
 //! Any unit that works at ticks of its own: its steps from tick to tick, and its restoration.
 
 use control::schedule::Sampled;
+use fmi2_export::fields::by_variable;
 use fmi2_export::{Context, Description, Failure, Inputs, Model, Restoration};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::ops::{Deref, DerefMut};
@@ -47,7 +48,7 @@ pub trait SampledUnit: Serialize + DeserializeOwned + Send + Sized + 'static {
         false
     }
 
-    /// Returns the time between two ticks, s.
+    /// Returns the time between two ticks (s), with which the schedule is built.
     fn period(device: &Self::Device) -> f64;
 
     /// Returns the memory for the first tick.
@@ -132,15 +133,15 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
         self.unit.load(context)?;
         let device = self.unit.design()?;
         vehicle::time::check_resolution(context.start_time, U::period(&device))
-            .map_err(|error| Failure::Error(error.to_string()))?;
-        self.ticks = Some(Sampled::new(context.start_time, U::memory(&device)));
+            .map_err(|error| Failure::Error(by_variable(&error, &[])))?;
+        self.ticks = Some(Sampled::new(context.start_time, U::period(&device), U::memory(&device)));
         self.device = Some(device);
         Ok(())
     }
 
     fn calculate(&mut self, time: f64) -> Result<(), Failure> {
         let (unit, device, ticks) = self.parts()?;
-        if ticks.is_due(time, U::period(device)) {
+        if ticks.is_due(time) {
             unit.evaluate(device, ticks)?;
         }
         if let (Some(device), Some(ticks)) = (&self.device, &self.ticks) {
@@ -159,8 +160,8 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
         log: &mut dyn FnMut(&str),
     ) -> Result<(), Failure> {
         loop {
-            let (_, device, ticks) = self.parts()?;
-            let Some(tick) = ticks.next_before(to, U::period(device)) else { return Ok(()) };
+            let (_, _, ticks) = self.parts()?;
+            let Some(tick) = ticks.next_before(to) else { return Ok(()) };
             inputs.advance(self, tick.max(from));
             let (unit, device, ticks) = self.parts()?;
             unit.evaluate(device, ticks)?;

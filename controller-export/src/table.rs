@@ -1,9 +1,9 @@
 //! The table of variables that every controller has; each law adds its own.
 
-use crate::law::Law;
+use crate::law::{ControllerFmu, Law};
 use crate::reference::PROFILES;
-use crate::unit::ControllerFmu;
 use control::delay;
+use fmi2_export::fields::Fields;
 use fmi2_export::table::{Common, Description, Real, Table, discrete_output, input, output, parameter};
 use model_description::DefaultExperiment;
 use model_description::unit;
@@ -17,6 +17,19 @@ pub const ANGLES: [(&str, &str); 3] =
 pub const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
 /// Names and meanings of the components of a moment.
 pub const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
+
+/// Names of the variables that hold fields of a controller's settings, for messages.
+pub const FIELDS: &Fields = &[
+    ("limit_rate", "limit.rate"),
+    ("limit_moment", "limit.moment"),
+    ("latency.measurement", "measurement.age"),
+    ("period", "period.feedback"),
+    ("period_feedback", "period.feedback"),
+    ("period_optimisation", "period.optimisation"),
+    ("p", "weight.P"),
+    ("q", "weight.Q"),
+    ("threshold", "antiWindupThreshold"),
+];
 
 /// Names of the inputs on which the outputs of a tick depend.
 const MEASURED: [&str; 6] =
@@ -217,14 +230,10 @@ pub fn achieved_moment<L: Law>(table: Table<ControllerFmu<L>>) -> Table<Controll
     table.boolean(used, |m| &mut m.parameters.achieved_moment_used)
 }
 
-/// Adds the parameter period.feedback of a law with one rate.
-pub fn period<L: Law>(
-    table: Table<ControllerFmu<L>>,
-    nominal: f64,
-    field: impl Fn(&mut L) -> &mut f64 + Copy + Send + Sync + 'static,
-) -> Table<ControllerFmu<L>> {
-    let period = parameter("period.feedback", "Time between two evaluations of the law").real();
-    table.real(period.unit(unit::time()).min(1e-4).max(10.0).nominal(nominal), move |m| field(&mut m.law))
+/// Adds the parameter period.feedback, the time between two evaluations of what `text` says.
+pub fn period<L: Law>(table: Table<ControllerFmu<L>>, text: &str) -> Table<ControllerFmu<L>> {
+    let period = parameter("period.feedback", text).real().unit(unit::time());
+    table.real(period.min(1e-4).max(10.0).nominal(L::period()), |m| &mut m.parameters.period)
 }
 
 /// Adds the gains of the three angles, `name[1]` to `name[3]`, in the order of [`ANGLES`].

@@ -1,76 +1,16 @@
-//! The unit that all controllers share: inputs, reference and limits.
+//! How the unit that all controllers share works at its ticks.
 
-use crate::law::{Law, Vehicle};
+use crate::law::{ControllerFmu, ControllerUnit, Input, Law, Output, Parameters, Vehicle};
 use crate::reference::{self, Source};
-use crate::sampled::{SampledFmu, SampledUnit, Ticks};
+use crate::sampled::{SampledUnit, Ticks};
 use crate::table;
 use control::controller::{Controller, Measurement};
 use control::delay::{Delayed, Latency};
 use control::schedule::ControllerInput;
+use fmi2_export::fields::by_variable;
 use fmi2_export::{Context, Description, Failure};
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 use vehicle::Scenario;
-use vehicle::dynamics::Inertia;
-use vehicle::reference::Reference;
-
-/// A controller as an FMI unit, to be handed to [`fmi2_export::export_fmus!`].
-pub type ControllerFmu<L> = SampledFmu<ControllerUnit<L>>;
-
-/// Parameters, inputs and outputs of a controller's unit.
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub struct ControllerUnit<L: Law> {
-    /// Parameters that every controller has.
-    pub parameters: Parameters,
-    /// Inputs that every controller has.
-    pub input: Input,
-    /// Outputs that every controller has.
-    pub output: Output,
-    /// Parameters and outputs of the law alone.
-    pub law: L,
-    source: Source,
-}
-
-/// Parameters that every controller has.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Parameters {
-    /// Parameters of the reference.
-    pub reference: reference::Parameters,
-    /// Inertia that the controller uses, kg m².
-    pub inertia: Inertia,
-    /// Limit on ‖ω‖, rad/s.
-    pub limit_rate: f64,
-    /// Limit on ‖m‖, N m.
-    pub limit_moment: f64,
-    /// Whether the commanded moment is scaled into its limit.
-    pub saturation: bool,
-    /// Delays over which the law predicts the state.
-    pub latency: Latency,
-    /// Whether the input `achieved_moment` is connected; only laws that use it declare this
-    /// parameter.
-    pub achieved_moment_used: bool,
-}
-
-/// Inputs that every controller has.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct Input {
-    /// Measured angles and rates.
-    pub measured: Measurement,
-    /// Moment that the actuators give, N m.
-    pub achieved_moment: Vector3<f64>,
-    /// Reference from outside the unit.
-    pub reference: Reference,
-}
-
-/// Outputs that every controller has.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct Output {
-    /// Commanded moment of the controller, N m.
-    pub moment: Vector3<f64>,
-    /// Reference that is in force.
-    pub reference: Reference,
-}
 
 /// A controller with the settings and the vehicle for which it was designed.
 pub struct Designed<L: Law> {
@@ -80,10 +20,16 @@ pub struct Designed<L: Law> {
 }
 
 impl<L: Law> ControllerUnit<L> {
+    /// Returns the failure for refused settings.
+    fn refusal(error: &impl ToString) -> Failure {
+        Failure::Error(by_variable(error, &[table::FIELDS, L::FIELDS].concat()))
+    }
+
     fn vehicle(&self) -> Result<Vehicle, Failure> {
-        let Parameters { inertia, limit_rate, limit_moment, saturation, latency, .. } = self.parameters;
-        let body = inertia.body(1.0).map_err(|error| Failure::Error(error.to_string()))?;
-        Ok(Vehicle { body, limit_rate, limit_moment, saturation, latency })
+        let Parameters { inertia, limit_rate, limit_moment, saturation, period, latency, .. } =
+            self.parameters;
+        let body = inertia.body(1.0).map_err(|error| Self::refusal(&error))?;
+        Ok(Vehicle { body, limit_rate, limit_moment, saturation, period, latency })
     }
 }
 
@@ -106,6 +52,7 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
                 limit_rate: scenario.limit_rate,
                 limit_moment: scenario.limit_moment,
                 saturation: false,
+                period: L::period(),
                 latency: Latency::default(),
                 achieved_moment_used: false,
             },
@@ -132,8 +79,11 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
     fn design(&self) -> Result<Designed<L>, Failure> {
         let vehicle = self.vehicle()?;
         let controller = L::design(self.law.settings(&vehicle))
-            .and_then(|law| Delayed::new(law, vehicle.body, vehicle.latency, vehicle.saturates_at()))
-            .map_err(|error| Failure::Error(error.to_string()))?;
+            .and_then(|law| {
+                let limit = vehicle.saturates_at();
+                Delayed::new(law, vehicle.body, vehicle.period, vehicle.latency, limit)
+            })
+            .map_err(|error| Self::refusal(&error))?;
         Ok(Designed { settings: self.law.settings(&vehicle), vehicle, controller })
     }
 
@@ -143,7 +93,7 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
     }
 
     fn period(device: &Designed<L>) -> f64 {
-        device.controller.period()
+        device.vehicle.period
     }
 
     fn memory(device: &Designed<L>) -> Self::Memory {
@@ -155,7 +105,7 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
         let controller = &mut device.controller;
         let achieved_moment = parameters.achieved_moment_used.then_some(input.achieved_moment);
         let measured = Measurement { achieved_moment, ..input.measured };
-        let now = ticks.next_time(controller.period());
+        let now = ticks.next_time();
         // An external reference is only known now; the law uses its present value for the time at
         // which its moment acts.
         let known = now + controller.acts_after();
@@ -172,12 +122,9 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
         L::warning(&before.inner, &after.inner)
     }
 
-    fn show(&mut self, time: f64, device: &Designed<L>, (moment, memory): (Vector3<f64>, &Self::Memory)) {
+    fn show(&mut self, time: f64, _device: &Designed<L>, (moment, memory): (Vector3<f64>, &Self::Memory)) {
         self.law.show(&memory.inner);
-        self.output = Output {
-            moment: device.controller.saturated(moment),
-            reference: self.source.preview(time, &self.input.reference).at(time),
-        };
+        self.output = Output { moment, reference: self.source.preview(time, &self.input.reference).at(time) };
     }
 
     fn fits(device: &Designed<L>, memory: &Self::Memory) -> bool {

@@ -5,7 +5,7 @@ use crate::logger::{Category, Logger};
 use crate::model::{Context, EventInfo, Failure};
 use crate::saved;
 use crate::types::{Interface, Status};
-use crate::unit::{Export, Extrapolation, MAX_INPUT_DERIVATIVE_ORDER, Progress, Unit};
+use crate::unit::{Export, Extrapolation, FmuUnit, MAX_INPUT_DERIVATIVE_ORDER, Progress};
 use model_description::ModelDescription;
 use model_description::variable::{Causality, Kind, Variability, Variable};
 use std::any::Any;
@@ -35,7 +35,7 @@ pub(crate) fn error<T>(text: impl Into<String>) -> Result<T, Failure> {
 
 /// One instance of a unit with everything that the shell keeps for it.
 pub(crate) struct Instance {
-    unit: Box<dyn Unit>,
+    unit: Box<dyn FmuUnit>,
     description: Arc<ModelDescription>,
     /// Value references of each state and its derivative.
     states: Vec<(usize, usize)>,
@@ -72,9 +72,9 @@ pub(crate) trait Scalar: PartialEq + Sized {
     const TYPE: &'static str;
     /// Returns the result of `look` for the variable's value, or `None` if the variable has another
     /// type.
-    fn look<R>(unit: &mut dyn Unit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R>;
+    fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R>;
     /// Sets the variable, which must have this type.
-    fn put(self, unit: &mut dyn Unit, reference: usize);
+    fn put(self, unit: &mut dyn FmuUnit, reference: usize);
     /// Whether replacing this value by `other` would change nothing.
     fn same(&self, other: &Self) -> bool {
         self == other
@@ -92,10 +92,10 @@ pub(crate) trait Scalar: PartialEq + Sized {
 
 impl Scalar for f64 {
     const TYPE: &'static str = "Real";
-    fn look<R>(unit: &mut dyn Unit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+    fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
         unit.real(reference).map(|value| look(value))
     }
-    fn put(self, unit: &mut dyn Unit, reference: usize) {
+    fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
         if let Some(field) = unit.real(reference) {
             *field = self;
         }
@@ -121,10 +121,10 @@ impl Scalar for f64 {
 
 impl Scalar for i32 {
     const TYPE: &'static str = "Integer or Enumeration";
-    fn look<R>(unit: &mut dyn Unit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+    fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
         unit.integer(reference).map(|value| look(&value))
     }
-    fn put(self, unit: &mut dyn Unit, reference: usize) {
+    fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
         unit.set_integer(reference, self);
     }
     fn unpresentable(&self, kind: &Kind) -> Option<&'static str> {
@@ -146,10 +146,10 @@ impl Scalar for i32 {
 
 impl Scalar for bool {
     const TYPE: &'static str = "Boolean";
-    fn look<R>(unit: &mut dyn Unit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+    fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
         unit.boolean(reference).map(|value| look(value))
     }
-    fn put(self, unit: &mut dyn Unit, reference: usize) {
+    fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
         if let Some(field) = unit.boolean(reference) {
             *field = self;
         }
@@ -158,10 +158,10 @@ impl Scalar for bool {
 
 impl Scalar for String {
     const TYPE: &'static str = "String";
-    fn look<R>(unit: &mut dyn Unit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+    fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
         unit.string(reference).map(|value| look(value))
     }
-    fn put(self, unit: &mut dyn Unit, reference: usize) {
+    fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
         if let Some(field) = unit.string(reference) {
             *field = self;
         }

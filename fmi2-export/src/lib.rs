@@ -4,6 +4,7 @@
 //! | module | what it knows |
 //! |---|---|
 //! | [`model`], [`table`] | what a unit must offer |
+//! | [`fields`] | errors of fields, told as errors of variables |
 //! | `unit` | a model bound to its table, without its type |
 //! | `instance` | one instance: checks, laziness, saved states; no pointers |
 //! | `call` | the table of calls allowed in each state |
@@ -16,6 +17,7 @@
 
 mod call;
 mod export;
+pub mod fields;
 mod instance;
 #[doc(hidden)]
 pub mod interface;

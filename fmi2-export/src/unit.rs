@@ -95,7 +95,7 @@ impl Progress {
 }
 
 /// A model together with its table, seen without the model's type.
-pub(crate) trait Unit: Send {
+pub(crate) trait FmuUnit: Send {
     fn real(&mut self, reference: usize) -> Option<&mut f64>;
     /// Returns the value of an integer or enumeration variable.
     fn integer(&mut self, reference: usize) -> Option<i32>;
@@ -149,7 +149,7 @@ impl<M> Inputs<M> for Extrapolated<'_, M> {
     }
 }
 
-impl<M: Model> Unit for Bound<M> {
+impl<M: Model> FmuUnit for Bound<M> {
     fn real(&mut self, reference: usize) -> Option<&mut f64> {
         match &self.table.entries.get(reference)?.access {
             Access::Real(field) => Some(field(&mut self.model)),
@@ -263,7 +263,7 @@ impl<M: Model> Unit for Bound<M> {
 /// A unit that a library exports.
 pub struct Export {
     describe: fn() -> ModelDescription,
-    pub(crate) create: fn() -> Box<dyn Unit>,
+    pub(crate) create: fn() -> Box<dyn FmuUnit>,
     described: OnceLock<Described>,
 }
 
@@ -288,7 +288,7 @@ impl Export {
     }
 }
 
-fn create<M: Model>() -> Box<dyn Unit> {
+fn create<M: Model>() -> Box<dyn FmuUnit> {
     Box::new(Bound { model: M::new(), table: M::description().table })
 }
 

@@ -3,6 +3,7 @@
 use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Report, Settings, Status};
 use controller_export::sampled::{SampledFmu, SampledUnit, Ticks};
 use controller_export::table::AXES;
+use fmi2_export::fields::{Fields, by_variable};
 use fmi2_export::table::{Common, discrete_output, input, parameter};
 use fmi2_export::{Description, Enumeration, Failure, Table};
 use model_description::DefaultExperiment;
@@ -48,7 +49,7 @@ pub type ControlAllocator = SampledFmu<AllocatorUnit>;
 /// Parameters, inputs and outputs of the allocator's unit.
 #[derive(Serialize, Deserialize)]
 pub struct AllocatorUnit {
-    settings: Settings,
+    pub(crate) settings: Settings,
     command: Command,
     output: Output,
 }
@@ -116,7 +117,8 @@ impl SampledUnit for AllocatorUnit {
     }
 
     fn design(&self) -> Result<Allocator, Failure> {
-        Allocator::new(self.settings.clone()).map_err(|error| Failure::Error(error.to_string()))
+        let allocator = Allocator::new(self.settings.clone());
+        allocator.map_err(|error| Failure::Error(by_variable(&error, FIELDS)))
     }
 
     fn is_designed(&self, allocator: &Allocator) -> bool {
@@ -145,6 +147,22 @@ impl SampledUnit for AllocatorUnit {
         self.output = Output::from(memory);
     }
 }
+
+/// Names of the variables that hold fields of the settings, for messages.
+const FIELDS: &Fields = &[
+    ("effectors.reference_pressure", "dynamicPressure.reference"),
+    ("effectors.effectiveness", "effectiveness"),
+    ("effectors.min", "limit.surfaceMin"),
+    ("effectors.max", "limit.surfaceMax"),
+    ("effectors.rate", "limit.surfaceRate"),
+    ("weight_moment.x", "weight.moment[1]"),
+    ("weight_moment.y", "weight.moment[2]"),
+    ("weight_moment.z", "weight.moment[3]"),
+    ("weight_jet", "weight.jet"),
+    ("weight_surface", "weight.surface"),
+    ("threshold", "threshold.dynamicPressure"),
+    ("pwpf.time_constant", "pwpf.timeConstant"),
+];
 
 type Variables = Table<ControlAllocator>;
 

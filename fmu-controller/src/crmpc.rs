@@ -7,6 +7,7 @@ use control::error_dynamics::Gain;
 use control::report::Report;
 use controller_export::table::{self, ANGLES, sampled_output, shown, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
+use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use fmi2_export::{Enumeration, Table};
 use model_description::unit;
@@ -103,6 +104,19 @@ impl Law for CrmpcLaw {
     const DESCRIPTION: &'static str =
         "Centralised robust model predictive attitude controller of Chai et al. (2022)";
     const DOCUMENTATION: &'static str = include_str!("crmpc.html");
+    const FIELDS: &'static Fields = &[
+        ("observer.time_constant", "observer.timeConstant"),
+        ("inertia_error", "inertia.error"),
+        ("angle_error", "estimation.angleError"),
+        ("rate_error", "estimation.rateError"),
+        ("sideslip_domain", "guarantee.sideslip"),
+        ("disturbance_bound", "disturbance.bound"),
+        ("guarantee", "guarantee.policy"),
+    ];
+
+    fn period() -> f64 {
+        Settings::new(Constraints::Robust).period_feedback
+    }
 
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         outputs(guarantee(bounds(gains(schedule(table)))))
@@ -113,6 +127,7 @@ impl Law for CrmpcLaw {
             body: vehicle.body,
             limit_rate: vehicle.limit_rate,
             limit_moment: vehicle.limit_moment,
+            period_feedback: vehicle.period,
             delay: vehicle.latency.total(),
             ..self.settings
         }
@@ -163,17 +178,14 @@ fn schedule(table: Controller) -> Controller {
         "period.optimisation",
         "Time between two optimisations and prediction step; a whole multiple of period.feedback",
     );
-    let feedback = parameter("period.feedback", "Time between two evaluations of the feedback law");
     let table = table
         .enumeration(constraints, &CONSTRAINTS, |m| &mut m.law.settings.constraints)
         .enumeration(initial, &INITIAL_STATES, |m| &mut m.law.settings.initial_state)
         .integer(horizon, (Some(2), Some(1000)), |m| &mut m.law.settings.horizon)
         .real(optimisation.real().unit(unit::time()).min(1e-3).max(10.0).nominal(0.2), |m| {
             &mut m.law.settings.period_optimisation
-        })
-        .real(feedback.real().unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| {
-            &mut m.law.settings.period_feedback
         });
+    let table = table::period(table, "Time between two evaluations of the feedback law");
     solver::parameters(table, |law| &mut law.settings.solver)
 }
 

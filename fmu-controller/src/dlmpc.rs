@@ -4,9 +4,10 @@ use crate::solver;
 use control::dlmpc::{Dlmpc, Memory, Settings};
 use control::error::DesignError;
 use control::report::Report;
-use controller_export::table::{ANGLES, RATES, sampled_output, shown_vector, vector};
+use controller_export::table::{self, ANGLES, RATES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::Table;
+use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use model_description::unit;
 use nalgebra::Vector3;
@@ -42,6 +43,11 @@ impl Law for DlmpcLaw {
     const NAME: &'static str = "DLMPC";
     const DESCRIPTION: &'static str = "Double-layered model predictive and sliding-mode attitude controller, the comparison of Chai et al. (2022)";
     const DOCUMENTATION: &'static str = include_str!("dlmpc.html");
+    const FIELDS: &'static Fields = &[("sliding_mode", "slidingMode")];
+
+    fn period() -> f64 {
+        Settings::published().period_feedback
+    }
 
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         outputs(sliding_mode(weights(schedule(table))))
@@ -52,6 +58,7 @@ impl Law for DlmpcLaw {
             body: vehicle.body,
             limit_rate: vehicle.limit_rate,
             limit_moment: vehicle.limit_moment,
+            period_feedback: vehicle.period,
             ..self.settings
         }
     }
@@ -82,15 +89,12 @@ fn schedule(table: Controller) -> Controller {
         "period.optimisation",
         "Period of the outer layer and its prediction step; a whole multiple of period.feedback",
     );
-    let feedback = parameter("period.feedback", "Period of the inner layer");
     let table = table
         .integer(horizon, (Some(2), Some(1000)), |m| &mut m.law.settings.horizon)
         .real(optimisation.real().unit(unit::time()).min(1e-3).max(10.0).nominal(0.2), |m| {
             &mut m.law.settings.period_optimisation
-        })
-        .real(feedback.real().unit(unit::time()).min(1e-4).max(10.0).nominal(0.04), |m| {
-            &mut m.law.settings.period_feedback
         });
+    let table = table::period(table, "Period of the inner layer");
     solver::parameters(table, |law| &mut law.settings.solver)
 }
 

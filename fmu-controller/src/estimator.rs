@@ -6,6 +6,7 @@ use control::estimation::{
 };
 use controller_export::sampled::{SampledFmu, SampledUnit, Ticks};
 use controller_export::table::{ANGLES, AXES, RATES, vector};
+use fmi2_export::fields::{Fields, by_variable};
 use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input, parameter};
 use fmi2_export::{Description, Enumeration, Failure, Table};
 use model_description::DefaultExperiment;
@@ -80,10 +81,10 @@ pub type AttitudeEstimator = SampledFmu<EstimatorUnit>;
 /// Parameters, inputs and outputs of the estimator's unit.
 #[derive(Serialize, Deserialize)]
 pub struct EstimatorUnit {
-    settings: Settings,
+    pub(crate) settings: Settings,
     /// Sensor set as in the plant: 0, 1 for sensors without errors, [`MEMS_SENSORS`] for those with
     /// errors.
-    sensor_set: i32,
+    pub(crate) sensor_set: i32,
     line: Line,
     output: Output,
 }
@@ -138,7 +139,7 @@ impl SampledUnit for EstimatorUnit {
             settings.corrections = Default::default();
             settings.sensor_delay = 0.0;
         }
-        Estimator::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        Estimator::new(settings).map_err(|error| Failure::Error(by_variable(&error, FIELDS)))
     }
 
     fn period(estimator: &Estimator) -> f64 {
@@ -154,7 +155,7 @@ impl SampledUnit for EstimatorUnit {
         if !(line.time.is_finite() && line.readings.iter().flatten().all(|value| value.is_finite())) {
             return Err(Failure::Error("an input 'measured' is not a finite number".into()));
         }
-        let time = ticks.next_time(estimator.period());
+        let time = ticks.next_time();
         ticks.evaluate_with(line, |memory, _| estimator.update(memory, time, &line));
         let Estimate { angles, rates, gyroscope_bias, .. } = ticks.in_force().1.estimate;
         if [angles, rates, gyroscope_bias].iter().flatten().all(|value| value.is_finite()) {
@@ -207,6 +208,22 @@ fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
         None
     }
 }
+
+/// Names of the variables that hold fields of the settings, for messages.
+const FIELDS: &Fields = &[
+    ("lost_after", "lost.after"),
+    ("calibration_duration", "calibration.duration"),
+    ("cutoff", "filter.cutoff"),
+    ("gains", "fusion"),
+    ("sensor_delay", "sensor.delay"),
+    ("rest_duration", "rest.duration"),
+    ("gates[0]", "gyroscope"),
+    ("corrections[0]", "gyroscope"),
+    ("gates[1]", "accelerometer"),
+    ("corrections[1]", "accelerometer"),
+    ("gates[2]", "magnetometer"),
+    ("corrections[2]", "magnetometer"),
+];
 
 type Variables = Table<AttitudeEstimator>;
 

@@ -4,6 +4,7 @@ use control::error::DesignError;
 use control::sliding::{Fbl, FblSettings};
 use controller_export::{ControllerFmu, Law, Vehicle, table};
 use fmi2_export::Table;
+use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use model_description::unit;
 use serde::{Deserialize, Serialize};
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// Parameters of the feedback linearisation.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FblLaw {
-    settings: FblSettings,
+    pub(crate) settings: FblSettings,
 }
 
 impl Default for FblLaw {
@@ -28,17 +29,22 @@ impl Law for FblLaw {
     const DESCRIPTION: &'static str =
         "Feedback linearisation of the attitude, a comparison of Wu et al. (2015)";
     const DOCUMENTATION: &'static str = include_str!("fbl.html");
+    const FIELDS: &'static Fields = &[("kp", "gain.p"), ("kd", "gain.d")];
+
+    fn period() -> f64 {
+        FblSettings::published().period
+    }
 
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         let p = parameter("gain.p", "Gain on the error of the angles").real().min(0.0);
         let d = parameter("gain.d", "Gain on the error of their rates").real().min(0.0);
-        table::period(table, 0.01, |law| &mut law.settings.period)
+        table::period(table, "Time between two evaluations of the law")
             .real(p.unit(unit::gain_angle()), |m| &mut m.law.settings.kp)
             .real(d.unit(unit::gain_rate()), |m| &mut m.law.settings.kd)
     }
 
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
-        FblSettings { body: vehicle.body, ..self.settings }
+        FblSettings { body: vehicle.body, period: vehicle.period, ..self.settings }
     }
 
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {

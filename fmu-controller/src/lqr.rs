@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LqrLaw {
     /// Settings of the regulator; the body in them is replaced by that of the vehicle.
-    settings: LqrSettings,
+    pub(crate) settings: LqrSettings,
 }
 
 impl Default for LqrLaw {
@@ -30,13 +30,17 @@ impl Law for LqrLaw {
         "Linear-quadratic attitude regulator, the unconstrained comparison of Chai et al. (2022)";
     const DOCUMENTATION: &'static str = include_str!("lqr.html");
 
+    fn period() -> f64 {
+        Settings::new(Constraints::Robust).period_feedback
+    }
+
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-        let table = table::period(table, 0.04, |law| &mut law.settings.period);
+        let table = table::period(table, "Time between two evaluations of the law");
         table::weights(table, |law| &mut law.settings.p, |law| &mut law.settings.q)
     }
 
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
-        LqrSettings { body: vehicle.body, ..self.settings }
+        LqrSettings { body: vehicle.body, period: vehicle.period, ..self.settings }
     }
 
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {

@@ -1,5 +1,7 @@
 //! Tests of the units through the trait that the FMI shell uses.
 
+mod messages;
+
 use crate::crmpc::CrmpcLaw;
 use crate::dlmpc::DlmpcLaw;
 use crate::tvsmc::{self, TvsmcLaw};
@@ -129,8 +131,7 @@ fn moments_are_held_between_ticks() {
 }
 
 fn set_feedback(unit: &mut Crmpc, k: f64, period: f64) {
-    let settings = &mut unit.law.settings;
-    (settings.feedback, settings.period_feedback) = (Gain { k1: k, k2: k }, period);
+    (unit.law.settings.feedback, unit.parameters.period) = (Gain { k1: k, k2: k }, period);
 }
 
 #[test]
@@ -199,7 +200,7 @@ fn the_achieved_moment_counts_only_if_it_is_used() {
 }
 
 #[test]
-fn sliding_modes_scale_into_the_limit_themselves() {
+fn sliding_modes_are_scaled_into_the_limit() {
     let mut unit: SotvsmcDo = ready(|unit: &mut SotvsmcDo| {
         unit.parameters.saturation = true;
         unit.parameters.limit_moment = 1e4;

@@ -5,6 +5,7 @@ use control::sliding::{BoundaryLayer, Estimate, Memory, Observer, Reaching, Seco
 use controller_export::table::{self, ANGLES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::Table;
+use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use model_description::unit;
 use nalgebra::Vector3;
@@ -30,9 +31,9 @@ pub trait Variant: Sized + Send + Sync + 'static {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct TvsmcLaw<V: Variant> {
-    settings: Settings<V::Reaching>,
+    pub(crate) settings: Settings<V::Reaching>,
     /// Gains of the observer; used only if the variant has one.
-    observer: Observer,
+    pub(crate) observer: Observer,
     sliding: Vector3<f64>,
     estimate: Estimate,
 }
@@ -52,9 +53,18 @@ impl<V: Variant> Law for TvsmcLaw<V> {
     const NAME: &'static str = V::NAME;
     const DESCRIPTION: &'static str = V::DESCRIPTION;
     const DOCUMENTATION: &'static str = include_str!("tvsmc.html");
+    const FIELDS: &'static Fields = &[
+        ("reaching.h", "boundaryLayer.h"),
+        ("reaching.eta / reaching.h", "reaching.eta / boundaryLayer.h"),
+        ("observer.l", "observer.L"),
+    ];
+
+    fn period() -> f64 {
+        V::published().period
+    }
 
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-        let table = table::period(table, 0.01, |law| &mut law.settings.period);
+        let table = table::period(table, "Time between two evaluations of the law");
         let table = anti_windup(V::reaching(surface(table)));
         let table = if V::OBSERVER { observer(table) } else { table };
         outputs(table)
@@ -63,7 +73,7 @@ impl<V: Variant> Law for TvsmcLaw<V> {
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
         Settings {
             body: vehicle.body,
-            limit_moment: vehicle.saturates_at(),
+            period: vehicle.period,
             observer: V::OBSERVER.then_some(self.observer),
             ..self.settings
         }

@@ -4,6 +4,7 @@ use control::error::DesignError;
 use control::two_loop::{Form, Loop, OuterKinematics, TwoLoopMemory, TwoLoopSettings, TwoLoopSmc};
 use controller_export::table::{self, ANGLES, RATES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
+use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use fmi2_export::{Enumeration, Table};
 use model_description::unit;
@@ -31,7 +32,7 @@ static KINEMATICS: Enumeration<OuterKinematics> = Enumeration {
 /// Parameters and outputs of the two-loop sliding mode.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TwoLoopLaw {
-    settings: TwoLoopSettings,
+    pub(crate) settings: TwoLoopSettings,
     outer_sliding: Vector3<f64>,
     inner_sliding: Vector3<f64>,
     rate_command: Vector3<f64>,
@@ -60,9 +61,19 @@ impl Law for TwoLoopLaw {
     const NAME: &'static str = "TwoLoopSMC";
     const DESCRIPTION: &'static str = "Two-loop sliding-mode attitude controller of Jia, Zhou and Zhou";
     const DOCUMENTATION: &'static str = include_str!("two_loop.html");
+    const FIELDS: &'static Fields = &[
+        ("filter", "commandFilter.frequency"),
+        ("disturbance", "disturbanceMoment.bound"),
+        ("outer.layer", "outer"),
+        ("inner.layer", "inner"),
+    ];
+
+    fn period() -> f64 {
+        TwoLoopSettings::ours().period
+    }
 
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-        let table = table::period(table, 0.01, |law| &mut law.settings.period);
+        let table = table::period(table, "Time between two evaluations of the law");
         let outer = ["outer", "outer loop"];
         let table = reaching(table, outer, ANGLES, &unit::angular_rate(), &unit::angle(), |law| {
             &mut law.settings.outer
@@ -74,7 +85,8 @@ impl Law for TwoLoopLaw {
     }
 
     fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
-        TwoLoopSettings { body: vehicle.body, limit_moment: vehicle.saturates_at(), ..self.settings }
+        let Vehicle { body, period, .. } = *vehicle;
+        TwoLoopSettings { body, period, ..self.settings }
     }
 
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {

@@ -3,9 +3,11 @@
 
 mod parameters;
 mod plant;
+mod roles;
 mod table;
 #[cfg(test)]
 mod tests;
+mod unit;
 
 pub use plant::ReentryPlant;
 

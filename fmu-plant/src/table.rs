@@ -1,16 +1,16 @@
-//! Table of the unit's variables. Outputs and inputs have the first 69 positions, as [`Unknown`]
-//! and [`Known`] list them; parameters follow, then [`sensors`].
+//! Table of the unit's variables.
 
 mod sensors;
 
 use crate::parameters::{ACTUATIONS, KINDS, KINEMATICS};
-use crate::plant::ReentryPlant;
-use fmi2_export::table::{
-    Description, Real, Table, discrete_input, discrete_output, input, output, parameter,
-};
+use crate::plant::{MOTION, ReentryPlant};
+use crate::roles::{Known, Role, Unknown, Variables};
+use fmi2_export::fields::Fields;
+use fmi2_export::table::{Description, Real, discrete_input, discrete_output, input, output, parameter};
 use model_description::DefaultExperiment;
 use model_description::unit;
 use nalgebra::Vector3;
+use std::sync::LazyLock;
 use vehicle::Scenario;
 use vehicle::atmosphere;
 use vehicle::effectors::{Effectors, JETS, SURFACES};
@@ -23,74 +23,43 @@ const ANGLES: [(&str, &str); 3] =
 const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
 const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
 
-/// A calculated variable, identified by its position in the table. States and derivatives are
-/// counted in the order attitude, rates, deflections.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Unknown {
-    State(usize),
-    Derivative(usize),
-    AppliedMoment(usize),
-    Delta,
-    DisturbanceMoment(usize),
-    DynamicPressure,
-    Measured(usize),
-    /// Time of the sample, which depends on nothing.
-    MeasuredTime,
+/// Names of the variables that hold fields of the plant's configuration, for messages.
+pub(crate) const FIELDS: &Fields = &[
+    ("inertia_scale", "inertia.scale"),
+    ("initial[1]", "initial.beta"),
+    ("step", "integrator.step"),
+    ("earth_rate", "trajectory.earthRate"),
+    ("moment_delay", "actuation.delay"),
+    ("actuators.aerodynamics_scale", "aerodynamics.scale"),
+    ("disturbance.square_period", "disturbance.square.period"),
+    ("surroundings", "sensor"),
+    ("calibration.beta_amplitude", "calibration.beta.amplitude"),
+    ("sensors.line", "sensor"),
+    ("sensors.line.drop_probability", "sensor.drop.probability"),
+    ("sensors.triads[0]", "sensor.gyroscope"),
+    ("sensors.triads[1]", "sensor.accelerometer"),
+    ("sensors.triads[2]", "sensor.magnetometer"),
+];
+
+/// Returns the role of the variable at a position in the table.
+pub(crate) fn role(position: usize) -> Role {
+    static ROLES: LazyLock<Vec<Role>> = LazyLock::new(|| all().roles);
+    ROLES.get(position).copied().unwrap_or_default()
 }
 
-impl Unknown {
-    pub(crate) fn of(position: usize) -> Option<Self> {
-        Some(match position {
-            0..6 => Self::State(position),
-            6..12 => Self::Derivative(position - 6),
-            12..15 => Self::AppliedMoment(position - 12),
-            15..18 => Self::Delta,
-            18..21 => Self::DisturbanceMoment(position - 18),
-            27..35 => Self::State(position - 27 + 6),
-            35 => Self::DynamicPressure,
-            54..62 => Self::Derivative(position - 54 + 6),
-            sensors::FIRST..sensors::TIME => Self::Measured(position - sensors::FIRST),
-            sensors::TIME => Self::MeasuredTime,
-            _ => return None,
-        })
-    }
-}
-
-/// A state or an input, identified by its position in the table.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Known {
-    State(usize),
-    Moment(usize),
-    DisturbanceMoment(usize),
-    Surface(usize),
-    Jet(usize),
-    Trajectory(usize),
-}
-
-impl Known {
-    pub(crate) fn of(position: usize) -> Option<Self> {
-        Some(match position {
-            0..6 => Self::State(position),
-            21..24 => Self::Moment(position - 21),
-            24..27 => Self::DisturbanceMoment(position - 24),
-            27..=34 => Self::State(position - 27 + 6),
-            36..44 => Self::Surface(position - 36),
-            44..54 => Self::Jet(position - 44),
-            62..69 => Self::Trajectory(position - 62),
-            _ => return None,
-        })
-    }
+/// Returns all variables, in the order of the table.
+fn all() -> Plant {
+    let variables = trajectory(deflection_rates(commands(actuated(inputs(outputs(Plant::new()))))));
+    let table = disturbance(initial(inertia(variables)));
+    let step = parameter("integrator.step", "Longest step of the Runge-Kutta integration in co-simulation");
+    let table = table
+        .real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| &mut m.parameters.step);
+    delay(sensors::all(kinematics(actuation(table))))
 }
 
 /// Returns the description of the unit for FMI.
 pub(crate) fn description() -> Description<ReentryPlant> {
     let scenario = Scenario::crmpc2022();
-    let variables = trajectory(deflection_rates(commands(actuated(inputs(outputs(Table::new()))))));
-    let table = disturbance(initial(inertia(variables)));
-    let step = parameter("integrator.step", "Longest step of the Runge-Kutta integration in co-simulation");
-    let table = table
-        .real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| &mut m.parameters.step);
-    let table = delay(sensors::all(kinematics(actuation(table))));
     Description {
         name: "ReentryPlant",
         description: "Attitude motion of a re-entry vehicle under moments and bounded disturbances",
@@ -104,23 +73,30 @@ pub(crate) fn description() -> Description<ReentryPlant> {
             tolerance: 1e-8,
             step: scenario.disturbance.period,
         },
-        table,
+        table: all().table,
     }
 }
 
-type Plant = Table<ReentryPlant>;
+type Plant = Variables<ReentryPlant>;
 
-/// Adds the three components of a vector; `declare` gets the name and the meaning of each axis.
+/// Adds the three components of a vector; `declare` gets the name and the meaning of each axis, and
+/// `role` its number.
 fn vector(
     mut table: Plant,
     axes: [(&'static str, &'static str); 3],
     declare: impl Fn(&str, &str) -> Real,
+    role: impl Fn(usize) -> Role,
     field: impl Fn(&mut ReentryPlant) -> &mut Vector3<f64> + Copy + Send + Sync + 'static,
 ) -> Plant {
     for (i, (axis, meaning)) in axes.into_iter().enumerate() {
-        table = table.real(declare(axis, meaning), move |m| &mut field(m)[i]);
+        table = table.real(declare(axis, meaning), move |m| &mut field(m)[i]).role(role(i));
     }
     table
+}
+
+/// The role of a parameter.
+fn none(_: usize) -> Role {
+    Role::default()
 }
 
 fn outputs(table: Plant) -> Plant {
@@ -182,13 +158,27 @@ fn outputs(table: Plant) -> Plant {
             .unit(unit::moment())
             .nominal(1e4)
     };
-    let table = vector(table, ANGLES, angle, |m| &mut m.output.angles);
-    let table = vector(table, RATES, rate, |m| &mut m.output.rates);
-    let table = vector(table, ANGLES, angle_rate, |m| &mut m.output.angle_rates);
-    let table = vector(table, RATES, acceleration, |m| &mut m.output.angular_acceleration);
-    let table = vector(table, AXES, applied, |m| &mut m.output.applied_moment);
-    let table = vector(table, ANGLES, delta, |m| &mut m.output.delta);
-    vector(table, AXES, disturbing, |m| &mut m.output.disturbance_moment)
+    let table = vector(table, ANGLES, angle, Role::state, |m| &mut m.output.angles);
+    let table = vector(table, RATES, rate, |i| Role::state(3 + i), |m| &mut m.output.rates);
+    let table =
+        vector(table, ANGLES, angle_rate, |i| Unknown::Derivative(i).into(), |m| &mut m.output.angle_rates);
+    let table = vector(
+        table,
+        RATES,
+        acceleration,
+        |i| Unknown::Derivative(3 + i).into(),
+        |m| &mut m.output.angular_acceleration,
+    );
+    let table =
+        vector(table, AXES, applied, |i| Unknown::AppliedMoment(i).into(), |m| &mut m.output.applied_moment);
+    let table = vector(table, ANGLES, delta, |_| Unknown::Delta.into(), |m| &mut m.output.delta);
+    vector(
+        table,
+        AXES,
+        disturbing,
+        |i| Unknown::DisturbanceMoment(i).into(),
+        |m| &mut m.output.disturbance_moment,
+    )
 }
 
 fn inputs(table: Plant) -> Plant {
@@ -200,8 +190,8 @@ fn inputs(table: Plant) -> Plant {
         let common = input(&format!("disturbanceMoment.{axis}"), &format!("External {meaning} moment"));
         common.real().unit(unit::moment()).nominal(1e4)
     };
-    let table = vector(table, AXES, control, |m| &mut m.input.moment);
-    vector(table, AXES, external, |m| &mut m.input.disturbance_moment)
+    let table = vector(table, AXES, control, |i| Known::Moment(i).into(), |m| &mut m.input.moment);
+    vector(table, AXES, external, |i| Known::DisturbanceMoment(i).into(), |m| &mut m.input.disturbance_moment)
 }
 
 /// Adds the deflections of the surfaces and the flight condition.
@@ -209,10 +199,13 @@ fn actuated(mut table: Plant) -> Plant {
     for (i, name) in Effectors::published().names.iter().enumerate() {
         let common = output(&format!("deflection[{}]", i + 1), &format!("Deflection of the {name}"));
         let real = common.real().unit(unit::angle()).nominal(0.1);
-        table = table.real(real, move |m| &mut m.output.deflections[i]);
+        let role = Role::state(MOTION + i);
+        table = table.real(real, move |m| &mut m.output.deflections[i]).role(role);
     }
     let pressure = output("flight.dynamicPressure", "Dynamic pressure of the flight, with density.scale");
-    table.real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| &mut m.output.dynamic_pressure)
+    table
+        .real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| &mut m.output.dynamic_pressure)
+        .role(Unknown::DynamicPressure)
 }
 
 fn commands(mut table: Plant) -> Plant {
@@ -220,12 +213,12 @@ fn commands(mut table: Plant) -> Plant {
         let text = format!("Commanded deflection of the {name}, trailing edge down positive");
         let common = discrete_input(&format!("surface[{}]", i + 1), &text);
         let real = common.real().unit(unit::angle()).nominal(0.1);
-        table = table.real(real, move |m| &mut m.command.surfaces[i]);
+        table = table.real(real, move |m| &mut m.command.surfaces[i]).role(Known::Surface(i));
     }
     for j in 0..JETS {
         let text = format!("Command to jet {}: 0 off, 1 full thrust", j + 1);
         let real = discrete_input(&format!("jet[{}]", j + 1), &text).real().nominal(1.0);
-        table = table.real(real, move |m| &mut m.command.jets[j]);
+        table = table.real(real, move |m| &mut m.command.jets[j]).role(Known::Jet(j));
     }
     table
 }
@@ -237,7 +230,8 @@ fn deflection_rates(mut table: Plant) -> Plant {
         let common = output(&format!("deflectionRate[{}]", i + 1), &text)
             .depends_on([command.as_str(), deflection.as_str()]);
         let real = common.real().unit(unit::angular_rate()).nominal(0.1).derivative_of(&deflection);
-        table = table.real(real, move |m| &mut m.output.deflection_rates[i]);
+        let role = Unknown::Derivative(MOTION + i);
+        table = table.real(real, move |m| &mut m.output.deflection_rates[i]).role(role);
     }
     table
 }
@@ -261,14 +255,14 @@ const TRAJECTORY_INPUTS: [TrajectoryInput; 7] = [
 ];
 
 fn trajectory(mut table: Plant) -> Plant {
-    for (name, meaning, is_rate, field) in TRAJECTORY_INPUTS {
+    for (i, (name, meaning, is_rate, field)) in TRAJECTORY_INPUTS.into_iter().enumerate() {
         let real = input(name, meaning).real();
         let real = if is_rate {
             real.unit(unit::angular_rate()).nominal(1e-3)
         } else {
             real.unit(unit::angle()).nominal(0.1)
         };
-        table = table.real(real, move |m| field(&mut m.input.trajectory));
+        table = table.real(real, move |m| field(&mut m.input.trajectory)).role(Known::Trajectory(i));
     }
     table
 }
@@ -347,8 +341,8 @@ fn initial(table: Plant) -> Plant {
         let common = parameter(&format!("initial.{axis}"), &format!("Body {meaning} rate at the start"));
         common.real().unit(unit::angular_rate()).min(-10.0).max(10.0).nominal(0.05)
     };
-    let table = vector(table, ANGLES, angle, |m| &mut m.parameters.initial_angles);
-    vector(table, RATES, rate, |m| &mut m.parameters.initial_rates)
+    let table = vector(table, ANGLES, angle, none, |m| &mut m.parameters.initial_angles);
+    vector(table, RATES, rate, none, |m| &mut m.parameters.initial_rates)
 }
 
 fn disturbance(table: Plant) -> Plant {
@@ -382,9 +376,9 @@ fn disturbance(table: Plant) -> Plant {
         })
         .real(time(period).min(1e-4).nominal(0.04), |m| &mut m.parameters.period)
         .integer(seed, (Some(0), None), |m| &mut m.parameters.seed);
-    let table = vector(table, ANGLES, direction, |m| &mut m.parameters.direction)
+    let table = vector(table, ANGLES, direction, none, |m| &mut m.parameters.direction)
         .real(time(square).min(1e-3).nominal(10.0), |m| &mut m.parameters.square_period);
-    let table = vector(table, AXES, offset, |m| &mut m.parameters.sine_offset);
+    let table = vector(table, AXES, offset, none, |m| &mut m.parameters.sine_offset);
     let table = sine(sine(table, "first", 0), "second", 1);
     table.real(time(start), |m| &mut m.parameters.start).real(time(end), |m| &mut m.parameters.end)
 }
@@ -397,7 +391,7 @@ fn sine(table: Plant, which: &'static str, i: usize) -> Plant {
     };
     let frequency = parameter(&name("frequency"), &format!("Angular frequency of the {which} sinusoid"));
     let phase = parameter(&name("phase"), &format!("Phase of the {which} sinusoid at time 0"));
-    vector(table, AXES, amplitude, move |m| &mut m.parameters.waves[i].amplitude)
+    vector(table, AXES, amplitude, none, move |m| &mut m.parameters.waves[i].amplitude)
         .real(frequency.real().unit(unit::angular_rate()).min(0.0).nominal(1.0), move |m| {
             &mut m.parameters.waves[i].frequency
         })

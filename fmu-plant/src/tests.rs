@@ -4,7 +4,8 @@ mod sensors;
 
 use crate::parameters::{Actuation, KINDS};
 use crate::plant::{Output, ReentryPlant};
-use crate::table::{Known, Unknown};
+use crate::roles::{Known, Unknown};
+use crate::table::role;
 use fmi2_export::{Context, Failure, Inputs, Model, describe};
 use model_description::variable::{self, Causality, Variability};
 use nalgebra::Vector3;
@@ -77,7 +78,7 @@ fn positions_and_names_agree() {
         describe::<ReentryPlant>().variables.into_iter().map(|variable| variable.name).collect();
     for (position, name) in names.iter().enumerate() {
         let group = name.split(['.', '[']).next().unwrap();
-        let unknown = match Unknown::of(position) {
+        let unknown = match role(position).unknown {
             Some(Unknown::State(0..3)) => "attitude",
             Some(Unknown::State(3..6)) => "rate",
             Some(Unknown::State(_)) => "deflection",
@@ -88,7 +89,7 @@ fn positions_and_names_agree() {
             Some(Unknown::Delta | Unknown::DisturbanceMoment(_)) => "disturbance",
             Some(Unknown::DynamicPressure) => "flight",
             Some(Unknown::Measured(_) | Unknown::MeasuredTime) => "measured",
-            None => match Known::of(position) {
+            None => match role(position).known {
                 Some(Known::Moment(_)) => "moment",
                 Some(Known::DisturbanceMoment(_)) => "disturbanceMoment",
                 Some(Known::Surface(_)) => "surface",
@@ -128,9 +129,9 @@ fn positions_and_names_agree() {
             "measured.sample",
         ]
     );
-    assert_eq!(Unknown::of(MEASURED), Some(Unknown::Measured(0)));
-    assert_eq!(Unknown::of(MEASURED + 9), Some(Unknown::MeasuredTime));
-    assert_eq!(Unknown::of(MEASURED + 10), None, "an integer");
+    assert_eq!(role(MEASURED).unknown, Some(Unknown::Measured(0)));
+    assert_eq!(role(MEASURED + 9).unknown, Some(Unknown::MeasuredTime));
+    assert_eq!(role(MEASURED + 10).unknown, None, "an integer");
 }
 
 #[test]
@@ -258,12 +259,12 @@ fn under_a_delayed_moment() -> ReentryPlant {
 }
 
 fn known_positions() -> impl Iterator<Item = usize> {
-    (0..69).filter(|&position| Known::of(position).is_some())
+    (0..69).filter(|&position| role(position).known.is_some())
 }
 
 /// Adds a number to the state or input at a position in the table.
 fn nudge(unit: &mut ReentryPlant, known: usize, by: f64) {
-    match Known::of(known).unwrap() {
+    match role(known).known.unwrap() {
         Known::State(i) => {
             let mut states = [0.0; 14];
             unit.continuous_states(&mut states);
@@ -727,6 +728,65 @@ fn oracle_input_derivatives_are_integrated() {
     unit.step(0.0, 2.0, &Ramp(1e4), &mut |_| {}).unwrap();
     let exact = 1e4 * 2.0 * 2.0 / 2.0 / (1303212.0 * 1.05);
     assert!((outputs(&mut unit, 2.0).rates.y - exact).abs() < 1e-15);
+}
+
+#[test]
+fn refusals_name_variables() {
+    let changes: [fn(&mut ReentryPlant); 32] = [
+        |unit| unit.parameters.inertia.Ixx = 0.0,
+        |unit| unit.parameters.inertia.Ixz = 2e6,
+        |unit| unit.parameters.inertia.Iyy = 1e7,
+        |unit| unit.parameters.inertia_scale = 0.0,
+        |unit| unit.parameters.initial_angles.x = f64::NAN,
+        |unit| unit.parameters.initial_angles.y = 1.6,
+        |unit| unit.parameters.step = 0.0,
+        |unit| unit.parameters.earth_rate = f64::NAN,
+        |unit| unit.parameters.moment_delay = -1.0,
+        |unit| {
+            unit.parameters.actuation = Actuation::SurfacesAndJets;
+            unit.parameters.moment_delay = 0.1;
+        },
+        |unit| {
+            unit.parameters.actuation = Actuation::SurfacesAndJets;
+            unit.parameters.aerodynamics_scale = -1.0;
+        },
+        |unit| unit.parameters.flight.altitude = 1e5,
+        |unit| unit.parameters.flight.mach = -1.0,
+        |unit| unit.parameters.bound = -1.0,
+        |unit| unit.parameters.period = 0.0,
+        |unit| unit.parameters.square_period = 0.0,
+        |unit| unit.parameters.direction.x = 2.0,
+        |unit| unit.parameters.end = -1.0,
+        |unit| unit.parameters.waves[0].phase = f64::NAN,
+        |unit| unit.parameters.surroundings.gravity = -1.0,
+        |unit| unit.parameters.surroundings.field.x = f64::NAN,
+        |unit| {
+            unit.parameters.calibrates = true;
+            unit.parameters.sequence.beta_amplitude = 1.5;
+        },
+        |unit| {
+            unit.parameters.calibrates = true;
+            unit.parameters.sequence.alpha_rate = f64::NAN;
+        },
+        |unit| unit.parameters.line.period = 0.0,
+        |unit| unit.parameters.line.delay = 1e3,
+        |unit| unit.parameters.line.drop_probability = 2.0,
+        |unit| unit.parameters.triads[0].noise = -1.0,
+        |unit| unit.parameters.triads[1].bandwidth = -1.0,
+        |unit| unit.parameters.triads[2].range = -1.0,
+        |unit| unit.parameters.triads[2].resolution = -1.0,
+        |unit| unit.parameters.triads[0].matrix.fill(f64::NAN),
+        |unit| unit.parameters.triads[1].bias.fill(f64::NAN),
+    ];
+    let refusal = |set: &fn(&mut ReentryPlant)| {
+        let mut unit = ReentryPlant::new();
+        unit.parameters.sensor_set = 2;
+        set(&mut unit);
+        unit.initialize(&CONTEXT).unwrap_err().to_string()
+    };
+    let found: Vec<String> = changes.iter().map(refusal).collect();
+    let expected: Vec<&str> = include_str!("tests/messages.txt").lines().collect();
+    assert_eq!(found, expected);
 }
 
 #[test]

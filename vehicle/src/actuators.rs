@@ -92,7 +92,7 @@ impl Actuators {
         let scale = config.aerodynamics_scale;
         if !(scale >= 0.0 && scale.is_finite()) {
             let problem = format!("= {scale} must not be negative");
-            return Err(Error::Parameter { name: "aerodynamics.scale", problem });
+            return Err(Error::of("actuators.aerodynamics_scale", problem));
         }
         let Effectors { min, max, rate, jet_moments, .. } = config.effectors;
         Ok(Self {
@@ -365,6 +365,7 @@ mod tests {
         let effectors = Effectors::published();
         let config =
             Config { effectors, jet_mode: JetMode::OnOff, dynamic_pressure: 1e3, aerodynamics_scale: -1.0 };
-        assert!(Actuators::new(&config).unwrap_err().to_string().contains("aerodynamics.scale"));
+        let text = Actuators::new(&config).unwrap_err().to_string();
+        assert!(text.contains("`actuators.aerodynamics_scale`"));
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::error::Error;
 use crate::kinematics::Kinematics;
-use crate::plant::{BETA_LIMIT, State, state};
+use crate::motion::{BETA_LIMIT, State, state};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -26,21 +26,21 @@ impl Sequence {
     /// Refuses a sequence that reaches the singular sideslip angle from the `initial` angles (rad).
     ///
     /// # Errors
-    /// Names the value at fault as the units do.
+    /// Names the value at fault by its path in the configuration of the plant.
     pub fn check(&self, initial: &Vector3<f64>) -> Result<(), Error> {
         let values = [self.alpha_rate, self.sigma_rate, self.beta_amplitude, self.beta_frequency];
         if !values.iter().all(|value| value.is_finite()) {
-            let problem = "holds a value that is not finite".into();
-            return Err(Error::Parameter { name: "calibration", problem });
+            let problem = "holds a value that is not finite";
+            return Err(Error::of("calibration", problem));
         }
         let reach = initial.y.abs() + self.beta_amplitude.abs();
         if reach >= BETA_LIMIT {
             let problem = format!(
-                "= {} deg: with initial.beta beta comes to {} deg, it must stay within 90 deg",
+                "= {} deg: with `initial[1]` beta comes to {} deg, it must stay within 90 deg",
                 self.beta_amplitude.to_degrees(),
                 reach.to_degrees()
             );
-            return Err(Error::Parameter { name: "calibration.beta.amplitude", problem });
+            return Err(Error::of("calibration.beta_amplitude", problem));
         }
         Ok(())
     }

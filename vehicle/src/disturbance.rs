@@ -117,9 +117,9 @@ impl Disturbance {
     /// Refuses values that the definitions of the fields do not allow.
     ///
     /// # Errors
-    /// Names the value at fault as the units do.
+    /// Names the value at fault by its path in the configuration of the plant.
     pub fn check(&self) -> Result<(), Error> {
-        let refuse = |name, problem: String| Err(Error::Parameter { name, problem });
+        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
         if !(self.bound >= 0.0 && self.bound.is_finite()) {
             return refuse("disturbance.bound", format!("= {} rad/s2 must not be negative", self.bound));
         }
@@ -128,7 +128,7 @@ impl Disturbance {
         }
         if !(self.square_period > 0.0 && self.square_period.is_finite()) {
             return refuse(
-                "disturbance.square.period",
+                "disturbance.square_period",
                 format!("= {} s must be positive", self.square_period),
             );
         }
@@ -138,7 +138,7 @@ impl Disturbance {
         if !(self.start.is_finite() && self.end > self.start) {
             return refuse(
                 "disturbance.end",
-                format!("= {} s must come after disturbance.start = {} s", self.end, self.start),
+                format!("= {} s must come after `disturbance.start` = {} s", self.end, self.start),
             );
         }
         let sine = &self.sine;

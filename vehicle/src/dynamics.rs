@@ -33,7 +33,7 @@ impl Inertia {
     /// Names the moment or product of inertia that no body can have: I must be positive definite,
     /// and no principal moment may exceed the sum of the other two.
     pub fn body(&self, scale: f64) -> Result<RigidBody, Error> {
-        let refuse = |name, problem: String| Err(Error::Parameter { name, problem });
+        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
         for (name, value) in [("inertia.Ixx", self.Ixx), ("inertia.Iyy", self.Iyy), ("inertia.Izz", self.Izz)]
         {
             if !(value > 0.0 && value.is_finite()) {
@@ -52,7 +52,7 @@ impl Inertia {
         if 2.0 * principal.max() > principal.sum() {
             let problem =
                 "violate the triangle inequality: no principal moment may exceed the sum of the others";
-            return refuse("inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz", problem.into());
+            return refuse("inertia.Ixx`, `inertia.Iyy`, `inertia.Izz`, `inertia.Ixz", problem.into());
         }
         Ok(body)
     }

@@ -1,5 +1,7 @@
 //! Errors that this crate reports.
 
+use std::borrow::Cow;
+
 /// Reason why a vehicle, its data or a simulation cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -32,10 +34,11 @@ pub enum Error {
         problem: String,
     },
     /// A configuration value lies outside the range that the equations allow.
-    #[error("{name} {problem}")]
+    #[error("`{name}` {problem}")]
     Parameter {
-        /// Name of the value, as in the data files and units.
-        name: &'static str,
+        /// Path of the field that holds the value. Errors name fields in backticks, so that a unit
+        /// can say its own names of them.
+        name: Cow<'static, str>,
         /// Description of the fault in the value.
         problem: String,
     },
@@ -57,6 +60,13 @@ pub enum Error {
         /// Name of the quantity at fault.
         what: &'static str,
     },
+}
+
+impl Error {
+    /// Returns the error for a configuration value, with the path of its field.
+    pub(crate) fn of(name: impl Into<Cow<'static, str>>, problem: impl Into<String>) -> Self {
+        Self::Parameter { name: name.into(), problem: problem.into() }
+    }
 }
 
 fn place(line: Option<u64>, column: Option<&str>) -> String {

@@ -11,33 +11,13 @@ use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::error::Error;
 use crate::integrator::{equal_steps, rk4};
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
+pub use crate::motion::{BETA_LIMIT, State, angles, rates, state};
 use crate::platform::Surroundings;
 use crate::sensors::{self, Sensors};
 use crate::time::{check_resolution, tolerance};
 use crate::transport::Transport;
-use nalgebra::{Matrix3, Matrix6, Matrix6x3, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, Matrix6x3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
-
-/// State vector `[alpha, beta, sigma, p, q, r]` in rad and rad/s.
-pub type State = Vector6<f64>;
-
-/// Largest |β| (rad) at which the attitude angles are used, because R is singular at π/2.
-pub const BETA_LIMIT: f64 = std::f64::consts::FRAC_PI_2 - 1e-6;
-
-/// Returns the attitude angles Θ of a state, rad.
-pub fn angles(state: &State) -> Vector3<f64> {
-    state.fixed_rows::<3>(0).into()
-}
-
-/// Returns the body rates ω of a state, rad/s.
-pub fn rates(state: &State) -> Vector3<f64> {
-    state.fixed_rows::<3>(3).into()
-}
-
-/// Returns the state with the given angles (rad) and rates (rad/s).
-pub fn state(angles: &Vector3<f64>, rates: &Vector3<f64>) -> State {
-    Vector6::new(angles.x, angles.y, angles.z, rates.x, rates.y, rates.z)
-}
 
 /// Loads at one instant, which the right side needs besides the state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -224,9 +204,9 @@ impl Plant {
     /// # Errors
     /// Names the value of the configuration that is out of range.
     pub fn new(config: &Config, start_time: f64) -> Result<Self, Error> {
-        let refuse = |name, problem: String| Err(Error::Parameter { name, problem });
+        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
         if !(config.inertia_scale > 0.0 && config.inertia_scale.is_finite()) {
-            return refuse("inertia.scale", format!("= {} must be positive", config.inertia_scale));
+            return refuse("inertia_scale", format!("= {} must be positive", config.inertia_scale));
         }
         let body = config.inertia.body(config.inertia_scale)?;
         if !config.initial.iter().all(|value| value.is_finite()) {
@@ -234,15 +214,15 @@ impl Plant {
         }
         if config.initial[1].abs() >= BETA_LIMIT {
             return refuse(
-                "initial.beta",
+                "initial[1]",
                 format!("= {} deg must lie within 90 deg", config.initial[1].to_degrees()),
             );
         }
         if !(config.step > 0.0 && config.step.is_finite()) {
-            return refuse("integrator.step", format!("= {} s must be positive", config.step));
+            return refuse("step", format!("= {} s must be positive", config.step));
         }
         if !config.earth_rate.is_finite() {
-            return refuse("trajectory.earthRate", "is not finite".into());
+            return refuse("earth_rate", "is not finite".into());
         }
         let transport = Transport::new(config.moment_delay)?;
         if config.actuators.is_some() && transport.is_some() {
@@ -250,7 +230,7 @@ impl Plant {
                 "= {} s delays an input moment, and there is none with actuators",
                 config.moment_delay
             );
-            return refuse("actuation.delay", problem);
+            return refuse("moment_delay", problem);
         }
         config.disturbance.check()?;
         let held = config.disturbance.intervals(start_time).map(|(_, length)| length);

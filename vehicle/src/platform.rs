@@ -26,14 +26,14 @@ impl Surroundings {
     /// Refuses values that are not finite, and gravity that points up.
     ///
     /// # Errors
-    /// Names the value at fault as the units do.
+    /// Names the value at fault by its path in the configuration of the plant.
     pub fn check(&self) -> Result<(), Error> {
-        let refuse = |name, problem: String| Err(Error::Parameter { name, problem });
+        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
         if !(self.gravity >= 0.0 && self.gravity.is_finite()) {
-            return refuse("sensor.gravity", format!("= {} m/s2 must not be negative", self.gravity));
+            return refuse("surroundings.gravity", format!("= {} m/s2 must not be negative", self.gravity));
         }
         if !self.field.iter().all(|value| value.is_finite()) {
-            return refuse("sensor.field", "holds a value that is not finite".into());
+            return refuse("surroundings.field", "holds a value that is not finite".into());
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::kinematics::Kinematics;
 use crate::plant::{self, Config};
 use crate::platform::Surroundings;
-use crate::reference::{Course, Profile, Segment, Wave};
+use crate::profile::{Course, Profile, Segment, Wave};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;

@@ -9,39 +9,12 @@ use crate::error::Error;
 use crate::noise::{normal_pair, uniform};
 use crate::platform::Readings;
 use crate::time::{check_resolution, tick, tick_time, tick_tolerance};
-use crate::triad::{Memory, Names, Triad, Window};
+use crate::triad::{Memory, Triad, Window};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// Largest number of samples that may be on their way at a time.
 pub const IN_FLIGHT: usize = 1000;
-
-const NAMES: [Names; 3] = [
-    Names {
-        matrix: "sensor.gyroscope.matrix",
-        bias: "sensor.gyroscope.bias",
-        noise: "sensor.gyroscope.noise",
-        bandwidth: "sensor.gyroscope.bandwidth",
-        range: "sensor.gyroscope.range",
-        resolution: "sensor.gyroscope.resolution",
-    },
-    Names {
-        matrix: "sensor.accelerometer.matrix",
-        bias: "sensor.accelerometer.bias",
-        noise: "sensor.accelerometer.noise",
-        bandwidth: "sensor.accelerometer.bandwidth",
-        range: "sensor.accelerometer.range",
-        resolution: "sensor.accelerometer.resolution",
-    },
-    Names {
-        matrix: "sensor.magnetometer.matrix",
-        bias: "sensor.magnetometer.bias",
-        noise: "sensor.magnetometer.noise",
-        bandwidth: "sensor.magnetometer.bandwidth",
-        range: "sensor.magnetometer.range",
-        resolution: "sensor.magnetometer.resolution",
-    },
-];
 
 /// Configuration of the three sensors and their line.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -112,20 +85,22 @@ pub struct Sensors {
 
 impl Config {
     fn check(&self) -> Result<(), Error> {
-        let refuse = |name, problem: String| Err(Error::Parameter { name, problem });
+        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
         let Line { period, delay, drop_probability, .. } = self.line;
         if !(period > 0.0 && period.is_finite()) {
-            return refuse("sensor.period", format!("= {period} s must be positive"));
+            return refuse("sensors.line.period", format!("= {period} s must be positive"));
         }
         if !(delay >= 0.0 && delay / period <= IN_FLIGHT as f64) {
-            let problem = format!("= {delay} s must lie between 0 and {IN_FLIGHT} times sensor.period");
-            return refuse("sensor.delay", problem);
+            let problem =
+                format!("= {delay} s must lie between 0 and {IN_FLIGHT} times `sensors.line.period`");
+            return refuse("sensors.line.delay", problem);
         }
         if !(0.0..=1.0).contains(&drop_probability) {
             let problem = format!("= {drop_probability} must lie between 0 and 1");
-            return refuse("sensor.drop.probability", problem);
+            return refuse("sensors.line.drop_probability", problem);
         }
-        self.triads.iter().zip(&NAMES).try_for_each(|(triad, names)| triad.check(names))
+        let check = |(i, triad): (usize, &Triad)| triad.check(&format!("sensors.triads[{i}]"));
+        self.triads.iter().enumerate().try_for_each(check)
     }
 
     /// Draws the normal noise of the three sensors at a tick, and a random number in [0, 1) that

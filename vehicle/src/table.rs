@@ -11,7 +11,7 @@ use std::path::Path;
 /// Points and the second derivatives of the spline there. Before the first and after the last point
 /// the angles are held.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Table {
+pub struct LookupTable {
     times: Vec<f64>,
     angles: Vec<Vector3<f64>>,
     curvatures: Vec<Vector3<f64>>,
@@ -28,7 +28,7 @@ const COLUMNS: [(&str, &[(&str, f64)]); 4] = [
 const MOST_POINTS: usize = 100_000;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-impl Table {
+impl LookupTable {
     /// Makes the spline through `angles` (rad) at strictly increasing `times` (s); both have the
     /// same length.
     ///
@@ -41,11 +41,11 @@ impl Table {
         Ok(Self { times, angles, curvatures })
     }
 
-    /// Refuses a table that [`Table::new`] could not have made, because a restored table may be
-    /// corrupt.
+    /// Refuses a table that [`LookupTable::new`] could not have made, because a restored table may
+    /// be corrupt.
     ///
     /// # Errors
-    /// Reports the same errors as [`Table::new`], and second derivatives that are missing or not
+    /// Reports the same errors as [`LookupTable::new`], and second derivatives that are missing or not
     /// finite.
     pub fn check(&self) -> Result<(), Error> {
         check(&self.times, &self.angles)?;
@@ -53,8 +53,7 @@ impl Table {
         if self.curvatures.len() == self.times.len() && finite {
             return Ok(());
         }
-        let problem = "has other curvatures than points".into();
-        Err(Error::Parameter { name: "reference table", problem })
+        Err(Error::of("reference table", "has other curvatures than points"))
     }
 
     /// Reads a CSV file with the headings `time_s` and, in any order, `alpha_deg` or `alpha_rad`,
@@ -70,8 +69,8 @@ impl Table {
         }
     }
 
-    /// Reads a table in the form of [`Table::from_csv_file`] from any reader; `file` names it in
-    /// messages.
+    /// Reads a table in the form of [`LookupTable::from_csv_file`] from any reader; `file` names it
+    /// in messages.
     ///
     /// # Errors
     /// Names the file, line and column at fault.
@@ -183,7 +182,7 @@ impl Table {
 }
 
 fn check(times: &[f64], angles: &[Vector3<f64>]) -> Result<(), Error> {
-    let refuse = |problem: String| Err(Error::Parameter { name: "reference table", problem });
+    let refuse = |problem: String| Err(Error::of("reference table", problem));
     if times.len() > MOST_POINTS {
         return refuse(too_many());
     }

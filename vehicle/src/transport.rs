@@ -12,7 +12,7 @@ pub const LONGEST: f64 = 1.0;
 /// Largest number of changes of the command that can be under way at a time.
 pub const UNDER_WAY: usize = 10_000;
 /// Name of the delay in error messages.
-const NAME: &str = "actuation.delay";
+const NAME: &str = "moment_delay";
 
 /// Commanded moment that differs from the one before it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,7 +40,7 @@ impl Transport {
     pub fn new(delay: f64) -> Result<Option<Self>, Error> {
         if !(0.0..=LONGEST).contains(&delay) {
             let problem = format!("= {delay} s must lie between 0 and {LONGEST} s");
-            return Err(Error::Parameter { name: NAME, problem });
+            return Err(Error::of(NAME, problem));
         }
         Ok((delay > 0.0).then(|| Self { delay, changes: VecDeque::new() }))
     }
@@ -95,7 +95,7 @@ impl Transport {
                 "= {} s at t = {time} s: the moment changed more than {UNDER_WAY} times within it; use longer communication steps or a shorter delay",
                 self.delay
             );
-            return Err(Error::Parameter { name: NAME, problem });
+            return Err(Error::of(NAME, problem));
         }
         self.changes.push_back(Change { time, moment });
         Ok(())
@@ -114,7 +114,7 @@ impl Transport {
             "= {} s delays a moment that is held over each communication step; give its inputs no derivatives",
             self.delay
         );
-        Err(Error::Parameter { name: NAME, problem })
+        Err(Error::of(NAME, problem))
     }
 
     /// Moment (N m) that acts at `time` (s).
@@ -206,11 +206,11 @@ mod tests {
             count += 1;
         }
         let text = last.unwrap_err().to_string();
-        assert!(text.contains("actuation.delay") && text.contains("10000"), "{text}");
+        assert!(text.contains("`moment_delay`") && text.contains("10000"), "{text}");
         // The first moment is zero, which is no change.
         assert_eq!(count as usize, UNDER_WAY + 2);
         for delay in [-0.1, 1.1, f64::NAN] {
-            assert!(Transport::new(delay).unwrap_err().to_string().contains("actuation.delay"));
+            assert!(Transport::new(delay).unwrap_err().to_string().contains("`moment_delay`"));
         }
         assert_eq!(Transport::new(0.0).unwrap(), None);
     }

@@ -59,16 +59,6 @@ impl Default for Triad {
     }
 }
 
-/// Names of a sensor's values, as the units have them.
-pub(crate) struct Names {
-    pub(crate) matrix: &'static str,
-    pub(crate) bias: &'static str,
-    pub(crate) noise: &'static str,
-    pub(crate) bandwidth: &'static str,
-    pub(crate) range: &'static str,
-    pub(crate) resolution: &'static str,
-}
-
 /// Memory that a sensor keeps from one sample to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
@@ -81,24 +71,25 @@ pub struct Memory {
 }
 
 impl Triad {
-    /// Refuses negative values and values that are not finite.
-    pub(crate) fn check(&self, names: &Names) -> Result<(), Error> {
+    /// Refuses negative values and values that are not finite; `path` leads to this sensor.
+    pub(crate) fn check(&self, path: &str) -> Result<(), Error> {
         for (name, value) in [
-            (names.noise, self.noise),
-            (names.bandwidth, self.bandwidth),
-            (names.range, self.range),
-            (names.resolution, self.resolution),
+            ("noise", self.noise),
+            ("bandwidth", self.bandwidth),
+            ("range", self.range),
+            ("resolution", self.resolution),
         ] {
             if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::Parameter { name, problem: format!("= {value} must not be negative") });
+                let problem = format!("= {value} must not be negative");
+                return Err(Error::of(format!("{path}.{name}"), problem));
             }
         }
         for (name, finite) in [
-            (names.matrix, self.matrix.iter().all(|value| value.is_finite())),
-            (names.bias, self.bias.iter().all(|value| value.is_finite())),
+            ("matrix", self.matrix.iter().all(|value| value.is_finite())),
+            ("bias", self.bias.iter().all(|value| value.is_finite())),
         ] {
             if !finite {
-                return Err(Error::Parameter { name, problem: "holds a value that is not finite".into() });
+                return Err(Error::of(format!("{path}.{name}"), "holds a value that is not finite"));
             }
         }
         Ok(())

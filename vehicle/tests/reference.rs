@@ -2,8 +2,8 @@
 //! and tables that are refused.
 
 use nalgebra::Vector3;
-use vehicle::reference::{Course, Segment, Wave};
-use vehicle::table::Table;
+use vehicle::profile::{Course, Segment, Wave};
+use vehicle::table::LookupTable;
 use vehicle::{Profile, Reference, Scenario};
 
 /// Largest difference between the profile's rates and accelerations and the numerical derivatives
@@ -29,10 +29,10 @@ fn smooth(t: f64) -> Vector3<f64> {
     Vector3::new(0.2 + 0.1 * (0.5 * t).sin(), 0.05 * (0.3 * t).cos(), -0.5 + 0.002 * t * t)
 }
 
-fn smooth_table(points: u32) -> Table {
+fn smooth_table(points: u32) -> LookupTable {
     let times: Vec<f64> = (0..=points).map(|k| 20.0 * f64::from(k) / f64::from(points)).collect();
     let angles = times.iter().map(|&t| smooth(t)).collect();
-    Table::new(times, angles).unwrap()
+    LookupTable::new(times, angles).unwrap()
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn oracle_spline_reproduces_polynomials_of_its_degree() {
         let times: Vec<f64> = (0..points).map(|k| f64::from(k) * (1.0 + 0.1 * f64::from(k))).collect();
         let polynomial =
             |t: f64| Vector3::new(1.0 + t, 2.0 - t.powi(degree.min(2)), t.powi(degree) - 3.0 * t);
-        let table = Table::new(times.clone(), times.iter().map(|&t| polynomial(t)).collect()).unwrap();
+        let table = LookupTable::new(times.clone(), times.iter().map(|&t| polynomial(t)).collect()).unwrap();
         for k in 0..=100 {
             let t = times[times.len() - 1] * f64::from(k) / 100.0;
             let error = (table.at(t).angles - polynomial(t)).amax();
@@ -134,12 +134,12 @@ fn table_is_held_beyond_its_ends() {
     for (time, end) in [(-1.0, 0.0), (20.5, 20.0), (1e9, 20.0)] {
         assert_eq!(table.at(time), Reference { angles: table.at(end).angles, ..Reference::default() });
     }
-    let one = Table::new(vec![1.0], vec![Vector3::repeat(0.1)]).unwrap();
+    let one = LookupTable::new(vec![1.0], vec![Vector3::repeat(0.1)]).unwrap();
     assert_eq!(one.at(1.0).angles, Vector3::repeat(0.1));
 }
 
-fn read(text: &str) -> Result<Table, vehicle::Error> {
-    Table::from_csv("turn.csv", text.as_bytes())
+fn read(text: &str) -> Result<LookupTable, vehicle::Error> {
+    LookupTable::from_csv("turn.csv", text.as_bytes())
 }
 
 #[test]
@@ -170,18 +170,18 @@ fn csv_faults_are_named_with_file_line_and_column() {
         let message = read(&text).unwrap_err().to_string();
         assert!(message.contains(named) && message.contains("turn.csv"), "{message}\nshould hold {named}");
     }
-    let missing = Table::from_csv_file("no/such.csv".as_ref()).unwrap_err().to_string();
+    let missing = LookupTable::from_csv_file("no/such.csv".as_ref()).unwrap_err().to_string();
     assert!(missing.contains("no/such.csv"), "{missing}");
 }
 
 #[test]
 fn a_table_of_more_points_than_anybody_needs_is_refused() {
-    let of = |n: u32| Table::new((0..n).map(f64::from).collect(), vec![Vector3::zeros(); n as usize]);
+    let of = |n: u32| LookupTable::new((0..n).map(f64::from).collect(), vec![Vector3::zeros(); n as usize]);
     assert!(of(100_000).is_ok());
     let text = of(100_001).unwrap_err().to_string();
     assert!(text.contains("more than 100000 points"), "{text}");
     let lines: Vec<_> = (0..=100_000).map(|k| format!("{k},0,0,0")).collect();
     let csv = format!("time_s,alpha_deg,beta_deg,sigma_deg\n{}", lines.join("\n"));
-    let text = Table::from_csv("it.csv", csv.as_bytes()).unwrap_err().to_string();
+    let text = LookupTable::from_csv("it.csv", csv.as_bytes()).unwrap_err().to_string();
     assert!(text.contains("it.csv, line 100002") && text.contains("points"), "{text}");
 }

@@ -37,7 +37,7 @@ impl Pwpf {
     pub fn check(&self) -> Result<(), DesignError> {
         let positive = [
             ("pwpf.gain", self.gain),
-            ("pwpf.timeConstant", self.time_constant),
+            ("pwpf.time_constant", self.time_constant),
             ("pwpf.period", self.period),
         ];
         for (name, value) in positive {

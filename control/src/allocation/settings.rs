@@ -113,10 +113,10 @@ impl Settings {
     pub(super) fn ratio(&self) -> Result<u64, DesignError> {
         let positive = [
             ("period", self.period),
-            ("dynamicPressure.reference", self.effectors.reference_pressure),
-            ("weight.moment[1]", self.weight_moment.x),
-            ("weight.moment[2]", self.weight_moment.y),
-            ("weight.moment[3]", self.weight_moment.z),
+            ("effectors.reference_pressure", self.effectors.reference_pressure),
+            ("weight_moment.x", self.weight_moment.x),
+            ("weight_moment.y", self.weight_moment.y),
+            ("weight_moment.z", self.weight_moment.z),
         ];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
@@ -124,9 +124,9 @@ impl Settings {
             }
         }
         let not_negative = [
-            ("weight.jet", self.weight_jet),
-            ("weight.surface", self.weight_surface),
-            ("threshold.dynamicPressure", self.threshold),
+            ("weight_jet", self.weight_jet),
+            ("weight_surface", self.weight_surface),
+            ("threshold", self.threshold),
         ];
         for (name, value) in not_negative {
             if !(0.0..f64::INFINITY).contains(&value) {
@@ -135,7 +135,7 @@ impl Settings {
         }
         let Effectors { effectiveness, jet_moments, min, max, rate, .. } = &self.effectors;
         if let Some(&value) = effectiveness.iter().chain(jet_moments).find(|value| !value.is_finite()) {
-            let (name, low, high) = ("effectiveness", f64::NEG_INFINITY, f64::INFINITY);
+            let (name, low, high) = ("effectors.effectiveness", f64::NEG_INFINITY, f64::INFINITY);
             return Err(DesignError::OutOfRange { name, value, low, high });
         }
         for i in 0..SURFACES {

@@ -121,7 +121,8 @@ pub struct Settings {
 /// The constants printed in Chai 2022, section 5.1, computed from the raw data.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PaperConstants {
-    /// Bound r̄₀ = √(1 + tan β̄). The proof of Lemma 1 has tan²; the printed number lacks the square.
+    /// Bound r̄₀ = √(1 + tan β̄). The proof of Lemma 1 has tan²; the printed number lacks the
+    /// square.
     pub r0: f64,
     /// Bound r̄₁: the rate limit in rad/s. It is not a bound of ‖Ṙ‖ for all |β| ≤ 10°.
     pub r1: f64,
@@ -238,6 +239,7 @@ impl Design {
         }
         let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
         let reach = error.reach_forever().ok_or(DesignError::Unstable {
+            name: "period_feedback",
             k1: s.feedback.k1,
             k2: s.feedback.k2,
             period: s.period_feedback,
@@ -296,11 +298,11 @@ fn robust(s: &Settings) -> Result<(f64, Tightening, Assessment), DesignError> {
 
 fn ratio(s: &Settings) -> Result<usize, DesignError> {
     let positive = [
-        ("period.feedback", s.period_feedback),
-        ("period.optimisation", s.period_optimisation),
-        ("limit.rate", s.limit_rate),
-        ("limit.moment", s.limit_moment),
-        ("observer.timeConstant", s.observer.time_constant),
+        ("period_feedback", s.period_feedback),
+        ("period_optimisation", s.period_optimisation),
+        ("limit_rate", s.limit_rate),
+        ("limit_moment", s.limit_moment),
+        ("observer.time_constant", s.observer.time_constant),
         ("observer.stiffness", s.observer.stiffness),
     ];
     for (name, value) in positive {
@@ -310,12 +312,12 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
     }
     for (i, &value) in s.p.iter().enumerate() {
         if !(value >= 0.0 && value.is_finite()) {
-            return Err(DesignError::Weight { name: "P", index: i + 1, value });
+            return Err(DesignError::Weight { name: "p", index: i + 1, value });
         }
     }
     for (i, &value) in s.q.iter().enumerate() {
         if !(value > 0.0 && value.is_finite()) {
-            return Err(DesignError::Weight { name: "Q", index: i + 1, value });
+            return Err(DesignError::Weight { name: "q", index: i + 1, value });
         }
     }
     if s.horizon == 0 {
@@ -323,18 +325,18 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
     }
     if !(0.0..1.0).contains(&s.inertia_error) {
         return Err(DesignError::OutOfRange {
-            name: "inertia.error",
+            name: "inertia_error",
             value: s.inertia_error,
             low: 0.0,
             high: 1.0,
         });
     }
     let ranges = [
-        ("estimation.angleError", s.angle_error, 1.0),
-        ("estimation.rateError", s.rate_error, 1.0),
+        ("angle_error", s.angle_error, 1.0),
+        ("rate_error", s.rate_error, 1.0),
         ("delay", s.delay, 1.0),
-        ("guarantee.sideslip", s.sideslip_domain, 0.8),
-        ("disturbance.bound", s.disturbance_bound, f64::MAX),
+        ("sideslip_domain", s.sideslip_domain, 0.8),
+        ("disturbance_bound", s.disturbance_bound, f64::MAX),
     ];
     for (name, value, high) in ranges {
         if !(0.0..high).contains(&value) {

@@ -125,8 +125,8 @@ const DRIFT_MIXED: f64 = 2.0 * CURVATURE;
 /// Bound on the second derivative of Ẇ x by the angles, relative to ‖x‖², from the third
 /// derivatives of W.
 const DRIFT_BY_ANGLES_TWICE: f64 = 8.0;
-/// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; for the sideslip it
-/// is the smallest rate. See [`braking`].
+/// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; for the sideslip
+/// it is the smallest rate. See [`braking`].
 pub(super) const BRAKING: f64 = 0.01;
 
 impl Geometry {
@@ -148,8 +148,8 @@ impl Geometry {
     }
 }
 
-/// Bounds on the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain ‖ω‖ ≤ ω̄,
-/// ‖m‖ ≤ M̄, |β| ≤ β̄.
+/// Bounds on the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain ‖ω‖ ≤
+/// ω̄, ‖m‖ ≤ M̄, |β| ≤ β̄.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Dynamics {
     pub geometry: Geometry,
@@ -279,8 +279,8 @@ pub struct Assessment {
     /// Share of the moment limit that is left after a constant corner of Δ̄, the errors and the
     /// delay, at the attitude that needs most.
     pub moment_left: f64,
-    /// Largest ‖x̃_ω‖ at the end of the horizon, rad/s. From there the motion brakes and keeps every
-    /// limit for ever.
+    /// Largest ‖x̃_ω‖ at the end of the horizon, rad/s. From there the motion brakes and keeps
+    /// every limit for ever.
     pub terminal_rate: f64,
 }
 
@@ -291,8 +291,8 @@ impl Assessment {
     }
 }
 
-/// Smallest acceptable bound on ‖x̃_ω‖ at the end of the horizon, 0.2°/s in rad/s; below it there is
-/// no room to move at all.
+/// Smallest acceptable bound on ‖x̃_ω‖ at the end of the horizon, 0.2°/s in rad/s; below it there
+/// is no room to move at all.
 const SMALLEST_TERMINAL_RATE: f64 = 3.5e-3;
 
 /// Computes tightening and assessment of `settings`.
@@ -303,6 +303,7 @@ const SMALLEST_TERMINAL_RATE: f64 = 3.5e-3;
 pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignError> {
     let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
     let unstable = || DesignError::Unstable {
+        name: "period_feedback",
         k1: s.feedback.k1,
         k2: s.feedback.k2,
         period: s.period_feedback,
@@ -492,9 +493,9 @@ fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessm
 
 use crate::linearise::TURN_BY_ANGLES as TURN_OF_RATES;
 
-/// Returns the largest ‖I W s‖ over the corners s of the unit box at any α and |β| ≤ β̄, kg m². With
-/// the larger eigenvalue λ of I² in the plane of symmetry, ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy² y_y²
-/// for y = W s. α turns y in that plane, and y_x² + y_z² = cos²β (s₁ sin β + s₃)² + s₂².
+/// Returns the largest ‖I W s‖ over the corners s of the unit box at any α and |β| ≤ β̄, kg m².
+/// With the larger eigenvalue λ of I² in the plane of symmetry, ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy²
+/// y_y² for y = W s. α turns y in that plane, and y_x² + y_z² = cos²β (s₁ sin β + s₃)² + s₂².
 fn bearing(s: &Settings) -> f64 {
     let square = s.body.inertia * s.body.inertia;
     let any = s.body.inertia.symmetric_eigenvalues().max() * 3.0_f64.sqrt();
@@ -509,7 +510,8 @@ fn bearing(s: &Settings) -> f64 {
     (3.0 * yy + (plane - yy).max(0.0) * across).sqrt().min(any)
 }
 
-/// Loss of the rate limit by a deviation, rad/s: ‖W (x̃_ω + o_ω)‖ ≤ ‖W̃ x̃_ω‖ + ‖(W − W̃) x̃_ω‖ + ‖o_ω‖.
+/// Loss of the rate limit by a deviation, rad/s: ‖W (x̃_ω + o_ω)‖ ≤ ‖W̃ x̃_ω‖ + ‖(W − W̃) x̃_ω‖ +
+/// ‖o_ω‖.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RateLoss {
     constant: f64,

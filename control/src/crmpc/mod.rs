@@ -125,9 +125,10 @@ impl Clone for Memory {
 /// use vehicle::Scenario;
 ///
 /// let scenario = Scenario { duration: 4.0, ..Scenario::crmpc2022() };
-/// let mut law = Crmpc::new(Settings::new(Constraints::Robust))?;
+/// let settings = Settings::new(Constraints::Robust);
+/// let mut law = Crmpc::new(settings)?;
 /// let mut memory = law.memory();
-/// fly(&mut law, &mut memory, &scenario, |sample| {
+/// fly(&mut law, &mut memory, settings.period_feedback, &scenario, |sample| {
 ///     assert_eq!(sample.memory.standing, Standing::InForce, "the limits are guaranteed from the first tick on");
 /// })?;
 /// assert_eq!(memory.report.fallbacks, 0);
@@ -523,10 +524,6 @@ impl Crmpc {
 impl Controller for Crmpc {
     type Memory = Memory;
 
-    fn period(&self) -> f64 {
-        self.settings.period_feedback
-    }
-
     fn memory(&self) -> Memory {
         Memory { plan: Plan::new(self.settings.horizon), ..Memory::default() }
     }
@@ -536,7 +533,7 @@ impl Controller for Crmpc {
         states.len() == n + 1 && accelerations.len() == n && multipliers.len() == n
     }
 
-    fn update(
+    fn command(
         &mut self,
         memory: &mut Memory,
         tick: u64,
@@ -571,8 +568,9 @@ impl Controller for Crmpc {
         } else {
             linearise::moment(body, &measured.angles, &angle_rates, &commanded)
         };
-        let excess = moment.norm() / limit_moment;
         if robust {
+            // The guarantee is judged by the moment before the limit.
+            let excess = moment.norm() / limit_moment;
             let explained = self.explains(within, &off_angles, &off_rates, &(commanded - a));
             let explained = explained && self.credible(memory);
             let kept = excess <= 1.0 + 1e-9 && measured.rates.norm() <= self.rate_shown();
@@ -582,21 +580,25 @@ impl Controller for Crmpc {
             if memory.standing == Standing::Pending && memory.pending == 0 {
                 memory.standing = Standing::InForce;
             }
-        }
-        // Without a solution nothing else keeps the moment within its limit.
-        let limited = excess > 1.0 && (robust || memory.report.status == Status::Fallback);
-        let moment = if limited { moment / excess } else { moment };
-        if robust {
-            let acceleration = if limited {
-                let u = kinematics::r(&measured.angles) * self.settings.body.inverse * moment;
-                u + self.settings.body.drift(&measured.angles, &angle_rates)
-            } else {
-                commanded
-            };
-            memory.observed.remember(&angle_rates, &acceleration);
+            memory.observed.remember([&measured.angles, &angle_rates], &commanded);
         }
         memory.ended = memory.ended.saturating_add(u32::from(assured && !memory.assured()));
         moment
+    }
+
+    /// The paper's sets leave the limit to the optimisation. Without a solution, and with the
+    /// robust set, the command is limited as well.
+    fn limit(&self, memory: &Memory) -> f64 {
+        let robust = self.settings.constraints == Constraints::Robust;
+        if robust || memory.report.status == Status::Fallback {
+            self.settings.limit_moment
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    fn limited(&mut self, memory: &mut Memory, applied: &Vector3<f64>) {
+        memory.observed.limit(&self.settings.body, applied);
     }
 }
 

@@ -3,6 +3,8 @@
 use super::design::{Constraints, InitialState, Settings};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use vehicle::dynamics::RigidBody;
+use vehicle::kinematics;
 
 /// Largest size of the estimate, relative to the bound of the disturbance.
 const BEYOND: f64 = 2.0;
@@ -12,9 +14,9 @@ const BEYOND: f64 = 2.0;
 pub struct Observed {
     /// Estimated disturbance Δ̂, rad/s².
     pub disturbance: Vector3<f64>,
-    /// Rates x_ω at the last tick and the acceleration commanded there; `None` before the first
-    /// tick.
-    last: Option<[Vector3<f64>; 2]>,
+    /// Angles and rates x_ω at the last tick and the acceleration commanded there; `None` before
+    /// the first tick.
+    last: Option<[Vector3<f64>; 3]>,
 }
 
 impl Observed {
@@ -25,7 +27,7 @@ impl Observed {
         if s.constraints != Constraints::Robust {
             return;
         }
-        if let Some([before, commanded]) = self.last {
+        if let Some([_, before, commanded]) = self.last {
             let residual = (rates - before) / s.period_feedback - commanded;
             let weight = -(-s.period_feedback / s.observer.time_constant).exp_m1();
             self.disturbance += (residual - self.disturbance) * weight;
@@ -34,9 +36,17 @@ impl Observed {
         }
     }
 
-    /// Stores rates and command for the next tick.
-    pub(super) fn remember(&mut self, rates: &Vector3<f64>, commanded: &Vector3<f64>) {
-        self.last = Some([*rates, *commanded]);
+    /// Stores angles, rates and command for the next tick.
+    pub(super) fn remember(&mut self, state: [&Vector3<f64>; 2], commanded: &Vector3<f64>) {
+        self.last = Some([*state[0], *state[1], *commanded]);
+    }
+
+    /// Replaces the stored command by the acceleration that `applied` (N m) gives.
+    pub(super) fn limit(&mut self, body: &RigidBody, applied: &Vector3<f64>) {
+        if let Some([angles, rates, commanded]) = &mut self.last {
+            let u = kinematics::r(angles) * body.inverse * applied;
+            *commanded = u + body.drift(angles, rates);
+        }
     }
 
     /// Returns the shift of the reference's angles. Under a constant Δ the vehicle comes to rest

@@ -128,10 +128,11 @@ impl Clone for Memory {
 /// use control::Controller;
 /// use vehicle::Scenario;
 ///
-/// let mut law = Dlmpc::new(Settings::published())?;
+/// let settings = Settings::published();
+/// let mut law = Dlmpc::new(settings)?;
 /// let mut memory = law.memory();
 /// let scenario = Scenario { duration: 4.0, ..Scenario::crmpc2022() };
-/// fly(&mut law, &mut memory, &scenario, |_| ())?;
+/// fly(&mut law, &mut memory, settings.period_feedback, &scenario, |_| ())?;
 /// assert_eq!(memory.report.solves, 20, "the outer layer optimises five times a second");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -342,8 +343,9 @@ impl Dlmpc {
         let s = e + memory.integral * gamma;
         let acceleration = -(growth * gamma + s * q + signed_power(&s, rho) * p);
         let moment = rates.cross(&(body.inertia * rates)) + body.inertia * acceleration;
+        // The inner law limits its moment itself: the integral must not wind up while the moment
+        // is smaller than required, and the published runs depend on the rounding of this scaling.
         let share = within(moment.norm(), self.settings.limit_moment);
-        // The integral must not wind up while the moment is smaller than required.
         if share >= 1.0 {
             memory.integral += growth * self.settings.period_feedback;
         }
@@ -355,10 +357,6 @@ impl Dlmpc {
 impl Controller for Dlmpc {
     type Memory = Memory;
 
-    fn period(&self) -> f64 {
-        self.settings.period_feedback
-    }
-
     fn memory(&self) -> Memory {
         Memory { plan: Plan::new(self.settings.horizon), ..Memory::default() }
     }
@@ -368,7 +366,7 @@ impl Controller for Dlmpc {
         angles.len() == n + 1 && commands.len() == n && multipliers.len() == n
     }
 
-    fn update(
+    fn command(
         &mut self,
         memory: &mut Memory,
         tick: u64,

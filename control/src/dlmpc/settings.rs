@@ -113,31 +113,31 @@ impl Settings {
     pub(super) fn ratio(&self) -> Result<u64, DesignError> {
         let SlidingMode { q, p, gamma, rho } = self.sliding_mode;
         let positive = [
-            ("limit.rate", self.limit_rate),
-            ("limit.moment", self.limit_moment),
-            ("period.optimisation", self.period_optimisation),
-            ("period.feedback", self.period_feedback),
+            ("limit_rate", self.limit_rate),
+            ("limit_moment", self.limit_moment),
+            ("period_optimisation", self.period_optimisation),
+            ("period_feedback", self.period_feedback),
             ("horizon", self.horizon as f64),
-            ("slidingMode.rho", rho),
+            ("sliding_mode.rho", rho),
         ];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(DesignError::NotPositive { name, value });
             }
         }
-        for (name, weights) in [("P", self.p), ("Q", self.q)] {
+        for (name, weights) in [("p", self.p), ("q", self.q)] {
             for (i, value) in weights.into_iter().enumerate() {
-                if !(value.is_finite() && (value > 0.0 || (name == "P" && value == 0.0))) {
+                if !(value.is_finite() && (value > 0.0 || (name == "p" && value == 0.0))) {
                     return Err(DesignError::Weight { name, index: i + 1, value });
                 }
             }
         }
         // Far from the manifold s⁺ = (1 − q T) s, which must not grow.
         let ranges = [
-            ("slidingMode.q", q, 2.0 / self.period_feedback),
-            ("slidingMode.p", p, f64::INFINITY),
-            ("slidingMode.gamma", gamma, f64::INFINITY),
-            ("slidingMode.rho", rho, 1.0),
+            ("sliding_mode.q", q, 2.0 / self.period_feedback),
+            ("sliding_mode.p", p, f64::INFINITY),
+            ("sliding_mode.gamma", gamma, f64::INFINITY),
+            ("sliding_mode.rho", rho, 1.0),
         ];
         for (name, value, high) in ranges {
             if !(0.0..high).contains(&value) {

@@ -275,8 +275,6 @@ pub struct Estimate {
 
 type Nine = SVector<f64, 9>;
 
-const SENSORS: [&str; 3] = ["gyroscope", "accelerometer", "magnetometer"];
-
 /// Largest number of steps that are interpolated between two samples that arrived.
 const MOST_STEPS: f64 = 1000.0;
 
@@ -362,8 +360,8 @@ impl Estimator {
         let s = &settings;
         let positive = [
             ("period", s.period),
-            ("lost.after", s.lost_after),
-            ("calibration.duration", s.calibration_duration),
+            ("lost_after", s.lost_after),
+            ("calibration_duration", s.calibration_duration),
         ];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
@@ -372,16 +370,16 @@ impl Estimator {
         }
         let nyquist = 0.5 / s.period;
         let limits = [
-            ("filter.cutoff", s.cutoff, nyquist),
-            ("fusion.proportional", s.gains.proportional, 1.0 / s.period),
-            ("fusion.integral", s.gains.integral, 1.0 / (s.period * s.period)),
-            ("sensor.delay", s.sensor_delay, 1.0),
-            ("rest.duration", s.rest_duration, f64::MAX),
+            ("cutoff", s.cutoff, nyquist),
+            ("gains.proportional", s.gains.proportional, 1.0 / s.period),
+            ("gains.integral", s.gains.integral, 1.0 / (s.period * s.period)),
+            ("sensor_delay", s.sensor_delay, 1.0),
+            ("rest_duration", s.rest_duration, f64::MAX),
         ];
-        for (sensor, gate) in SENSORS.iter().zip(&s.gates) {
+        for (i, gate) in s.gates.iter().enumerate() {
             for (what, value) in [("range", gate.range), ("jump", gate.jump)] {
                 if !(value > 0.0 && value <= LARGEST_RANGE) {
-                    let name = format!("{sensor}.{what}");
+                    let name = format!("gates[{i}].{what}");
                     return Err(DesignError::Setting { name, value });
                 }
             }
@@ -391,10 +389,10 @@ impl Estimator {
                 return Err(DesignError::OutOfRange { name, value, low: 0.0, high });
             }
         }
-        for (sensor, correction) in SENSORS.iter().zip(&s.corrections) {
+        for (i, correction) in s.corrections.iter().enumerate() {
             let determinant = correction.matrix.determinant();
             if !(determinant.abs() > 0.0 && determinant.is_finite()) {
-                return Err(DesignError::Singular { name: format!("{sensor}.matrix") });
+                return Err(DesignError::Singular { name: format!("corrections[{i}].matrix") });
             }
         }
         Ok(Self { settings, filter: LowPass::new(s.cutoff, s.period) })

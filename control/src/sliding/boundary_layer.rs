@@ -26,9 +26,9 @@ impl Reaching for BoundaryLayer {
 
     fn check(&self, period: f64) -> Result<(), DesignError> {
         super::all_positive("reaching.eta", &self.eta)?;
-        super::all_positive("boundaryLayer.h", &self.h)?;
+        super::all_positive("reaching.h", &self.h)?;
         let steepest = self.eta.iter().zip(&self.h).map(|(eta, h)| eta / h).fold(0.0, f64::max);
-        super::sampled_decay("reaching.eta / boundaryLayer.h", steepest, period)
+        super::sampled_decay("reaching.eta / reaching.h", steepest, period)
     }
 
     fn sliding_rate(&self, (): &(), s: &Vector3<f64>) -> Vector3<f64> {

@@ -29,8 +29,9 @@ pub struct FblSettings {
 /// use control::sliding::{Fbl, FblSettings};
 /// use vehicle::Scenario;
 ///
-/// let mut law = Fbl::new(FblSettings::published())?;
-/// let summary = fly(&mut law, &mut (), &Scenario::tvsmc2015(), |_| ())?;
+/// let settings = FblSettings::published();
+/// let mut law = Fbl::new(settings)?;
+/// let summary = fly(&mut law, &mut (), settings.period, &Scenario::tvsmc2015(), |_| ())?;
 /// assert!(summary.error_rms.to_degrees() < 5.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -47,13 +48,13 @@ impl Fbl {
     /// unstable.
     pub fn new(settings: FblSettings) -> Result<Self, DesignError> {
         let FblSettings { period, kp, kd, .. } = settings;
-        for (name, value) in [("period.feedback", period), ("gain.p", kp), ("gain.d", kd)] {
+        for (name, value) in [("period", period), ("kp", kp), ("kd", kd)] {
             all_positive(name, &[value])?;
         }
         let (k1, k2) = (-kp, -kd);
         let radius = SampledError::new(Gain { k1, k2 }, period).spectral_radius();
         if radius >= 1.0 {
-            return Err(DesignError::Unstable { k1, k2, period, radius });
+            return Err(DesignError::Unstable { name: "period", k1, k2, period, radius });
         }
         Ok(Self { settings })
     }
@@ -62,11 +63,7 @@ impl Fbl {
 impl Controller for Fbl {
     type Memory = ();
 
-    fn period(&self) -> f64 {
-        self.settings.period
-    }
-
-    fn update(
+    fn command(
         &mut self,
         _memory: &mut (),
         _tick: u64,

@@ -58,18 +58,20 @@ pub struct Commanded {
     pub moment: Vector3<f64>,
     /// Angles Θ at that tick, rad.
     pub angles: Vector3<f64>,
-    /// Loss K M − (v − B) by the limit on M, rad/s².
+    /// Loss K M − (v − B) by a limit on M, rad/s².
     pub cut: Vector3<f64>,
 }
 
 impl Commanded {
-    /// Returns the moment `wanted` (N m) scaled into ‖M‖ ≤ `limit` (N m), with the loss by the
-    /// scaling.
-    pub(crate) fn new(body: &RigidBody, measured: &Measurement, wanted: Vector3<f64>, limit: f64) -> Self {
-        let excess = wanted.norm() / limit;
-        let moment = if excess > 1.0 { wanted / excess } else { wanted };
-        let angles = measured.angles;
-        Self { moment, angles, cut: gain(body, &angles, moment - wanted) }
+    /// Returns the command of `moment` (N m), of which no limit has taken anything.
+    pub(crate) fn new(measured: &Measurement, moment: Vector3<f64>) -> Self {
+        Self { moment, angles: measured.angles, cut: Vector3::zeros() }
+    }
+
+    /// Takes `applied` (N m) for the command, and the rest for lost.
+    pub(crate) fn limit(&mut self, body: &RigidBody, applied: &Vector3<f64>) {
+        self.cut = gain(body, &self.angles, applied - self.moment);
+        self.moment = *applied;
     }
 
     /// Returns v_achieved − v = K (M_achieved − M_wanted), rad/s², with the moment that was
@@ -113,10 +115,11 @@ pub struct Memory<Integral> {
 /// use control::Controller;
 /// use vehicle::Scenario;
 ///
-/// let mut law = SotvsmcDo::new(Settings::sotvsmc_do())?;
+/// let settings = Settings::sotvsmc_do();
+/// let mut law = SotvsmcDo::new(settings)?;
 /// let mut memory = law.memory();
 /// let mut last = f64::INFINITY;
-/// fly(&mut law, &mut memory, &Scenario::tvsmc2015(), |sample| {
+/// fly(&mut law, &mut memory, settings.period, &Scenario::tvsmc2015(), |sample| {
 ///     last = (sample.measured.angles - sample.reference.angles).norm().to_degrees();
 /// })?;
 /// assert!(last < 0.01, "the observer leaves no error at rest: {last} deg");
@@ -134,8 +137,8 @@ impl<R: Reaching> Tvsmc<R> {
     /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings<R>) -> Result<Self, DesignError> {
         let Settings { period, surface, reaching, observer, threshold, .. } = &settings;
-        all_positive("period.feedback", &[*period])?;
-        all_positive("antiWindupThreshold", &[*threshold])?;
+        all_positive("period", &[*period])?;
+        all_positive("threshold", &[*threshold])?;
         surface.check()?;
         reaching.check(*period)?;
         observer.as_ref().map_or(Ok(()), Observer::check)?;
@@ -161,13 +164,9 @@ impl<R: Reaching> Tvsmc<R> {
 impl<R: Reaching> Controller for Tvsmc<R> {
     type Memory = Memory<R::Memory>;
 
-    fn period(&self) -> f64 {
-        self.settings.period
-    }
-
     /// The moment at a tick does not depend on the moment achieved before it, which has effect from
     /// the next tick on. This avoids an algebraic loop with actuators that respond at once.
-    fn update(
+    fn command(
         &mut self,
         memory: &mut Self::Memory,
         _tick: u64,
@@ -175,7 +174,7 @@ impl<R: Reaching> Controller for Tvsmc<R> {
         measured: &Measurement,
         reference: ReferenceAt,
     ) -> Vector3<f64> {
-        let Settings { body, limit_moment, surface, reaching, anti_windup, .. } = &self.settings;
+        let Settings { body, surface, reaching, anti_windup, .. } = &self.settings;
         let reference = reference(time);
         let (error, angle_rates) = tracking_error(measured, &reference);
         let re_anchor = *anti_windup && memory.saturated;
@@ -198,8 +197,12 @@ impl<R: Reaching> Controller for Tvsmc<R> {
         let wanted = linearise::moment(body, &measured.angles, &angle_rates, &v);
         memory.sliding = s;
         memory.drive = v - b;
-        memory.commanded = Commanded::new(body, measured, wanted, *limit_moment);
-        memory.commanded.moment
+        memory.commanded = Commanded::new(measured, wanted);
+        wanted
+    }
+
+    fn limited(&mut self, memory: &mut Self::Memory, applied: &Vector3<f64>) {
+        memory.commanded.limit(&self.settings.body, applied);
     }
 }
 

@@ -30,7 +30,7 @@ impl Observer {
     /// Returns an error for gains that are not positive.
     pub(super) fn check(&self) -> Result<(), DesignError> {
         super::all_positive("observer.lambda", &self.lambda)?;
-        super::all_positive("observer.L", &self.l)
+        super::all_positive("observer.l", &self.l)
     }
 
     /// Returns the state (24) after `period` (s) by Euler's rule, with ṡ = `drive` + Δv,

@@ -96,7 +96,7 @@ mod tests {
         let text = law.check(0.01).unwrap_err().to_string();
         assert!(text.contains("(46)") && text.contains("axis 2"), "{text}");
         let text = SecondOrder { m: 2.0, ..LAW }.check(0.01).unwrap_err().to_string();
-        assert!(text.contains("reaching.m = 2"), "{text}");
+        assert!(text.contains("`reaching.m` = 2"), "{text}");
     }
 
     #[test]

@@ -13,8 +13,6 @@ pub struct Settings<R> {
     pub body: RigidBody,
     /// Time between ticks, s.
     pub period: f64,
-    /// Limit on ‖M‖ into which the command is scaled, N m; infinite for none.
-    pub limit_moment: f64,
     /// Gains of the sliding surface.
     pub surface: Surface,
     /// Reaching law with its gains.
@@ -78,7 +76,6 @@ impl<R> Settings<R> {
         Self {
             body: body(),
             period: file.period,
-            limit_moment: f64::INFINITY,
             surface: file.surface,
             reaching,
             observer,

@@ -2,13 +2,13 @@
 //! found.
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
-use super::Optimising;
 use super::flight::Random;
+use super::{FEEDBACK, Optimising};
 use control::Measurement;
 use control::report::Report;
 use nalgebra::Vector3;
 use vehicle::kinematics;
-use vehicle::reference::Profile;
+use vehicle::profile::Profile;
 use vehicle::scenario::Scenario;
 
 /// Largest errors of the angles and rates, deg and deg/s.
@@ -68,7 +68,7 @@ impl Case {
     /// Returns the reports of three optimisations, each with its shortest time: the first one
     /// (cold), the one after the kick, and the one that follows.
     pub fn optimise<C: Optimising>(&self, law: &mut C, repetitions: usize) -> [Report; 3] {
-        let (period, ratio) = (law.period(), law.ratio());
+        let (period, ratio) = (FEEDBACK, law.ratio());
         let mut memory = law.memory();
         let begin = (self.time / period).round() as u64 / ratio * ratio;
         let reference = |time: f64| self.reference.at(time);

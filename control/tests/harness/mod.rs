@@ -16,6 +16,9 @@ use nalgebra::Vector3;
 use vehicle::disturbance::{Disturbance, Kind};
 use vehicle::scenario::Scenario;
 
+/// Time between two evaluations of every controller here, that of Chai 2022, section 5.1, s.
+pub const FEEDBACK: f64 = 0.04;
+
 /// Returns the settings of Chai 2022 with these sets.
 pub fn settings(constraints: Constraints) -> Settings {
     Settings::new(constraints)
@@ -96,8 +99,9 @@ pub fn simulate<C: Controller>(
     mut observe: impl FnMut(&C::Memory, u64, &Measurement),
 ) -> Outcome {
     let scenario = Scenario { inertia_scale, disturbance, ..Scenario::crmpc2022() };
-    let flown =
-        fly(controller, memory, &scenario, |sample| observe(sample.memory, sample.tick, &sample.measured));
+    let flown = fly(controller, memory, FEEDBACK, &scenario, |sample| {
+        observe(sample.memory, sample.tick, &sample.measured);
+    });
     let Ok(Summary { error_rms, moment_rms, largest_rate, largest_moment }) = flown else {
         let lost = f64::INFINITY;
         return Outcome { ems_deg: lost, cms: lost, rate: lost, moment: lost };

@@ -55,7 +55,7 @@ pub fn scenario(seed: u64) -> Vec<Truth> {
     let mut controller = Crmpc::new(super::settings(Constraints::Robust)).unwrap();
     let mut memory = Memory::default();
     let mut moment = Vector3::zeros();
-    let every = (controller.period() / PERIOD).round() as u64;
+    let every = (super::FEEDBACK / PERIOD).round() as u64;
     (0..)
         .zip(times(scenario.duration))
         .map(|(k, time)| {

@@ -25,11 +25,7 @@ impl Default for Pd {
 impl Controller for Pd {
     type Memory = ();
 
-    fn period(&self) -> f64 {
-        0.04 // s
-    }
-
-    fn update(&mut self, (): &mut (), _: u64, t: f64, x: &Measurement, at: ReferenceAt) -> Vector3<f64> {
+    fn command(&mut self, (): &mut (), _: u64, t: f64, x: &Measurement, at: ReferenceAt) -> Vector3<f64> {
         let (rates, wanted) = (r(&x.angles) * x.rates, at(t));
         let (error, error_rate) = (x.angles - wanted.angles, rates - wanted.rates);
         let a = wanted.accelerations - error * self.gains.0 - error_rate * self.gains.1;
@@ -42,6 +38,10 @@ impl Law for Pd {
     type Settings = Self;
     const NAME: &'static str = "PD";
     const DESCRIPTION: &'static str = "Proportional and derivative attitude control";
+
+    fn period() -> f64 {
+        0.04 // s
+    }
 
     fn declare(own: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         own.real(parameter("gain.p", "Gain on the angles").real().min(0.0), |m| &mut m.law.gains.0)

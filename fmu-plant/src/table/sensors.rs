@@ -1,14 +1,10 @@
 //! Variables of the sensors and of their calibration.
 
-use super::{AXES, Plant, RATES, TRAJECTORY_INPUTS, vector};
+use super::{AXES, Plant, RATES, TRAJECTORY_INPUTS, none, vector};
 use crate::parameters::{MEMS_SENSORS, NO_SENSORS};
+use crate::roles::Unknown;
 use fmi2_export::table::{Common, Real, discrete_output, output, parameter};
 use model_description::unit::{self, Unit};
-
-/// Position of the first of the nine readings in the table.
-pub(super) const FIRST: usize = 113;
-/// Position of the sample's time in the table.
-pub(super) const TIME: usize = FIRST + 9;
 
 struct Sensor {
     name: &'static str,
@@ -71,14 +67,17 @@ fn measured(mut table: Plant) -> Plant {
             common.real().unit((sensor.unit)()).nominal(sensor.nominal)
         };
         let axes = if i == 0 { AXES } else { [("x", "forward"), ("y", "right"), ("z", "downward")] };
-        table = vector(table, axes, declare, move |m| &mut m.output.measured.readings[i]);
+        let role = |axis| Unknown::Measured(3 * i + axis).into();
+        table = vector(table, axes, declare, role, move |m| &mut m.output.measured.readings[i]);
     }
     let time = output("measured.time", "Time at which the newest sample was taken");
     let number =
         discrete_output("measured.sample", "Number of the newest sample, from 1; 0 before the first");
-    table
-        .real(seconds(time), |m| &mut m.output.measured.time)
-        .integer(number, (Some(0), None), |m| &mut m.output.measured.number)
+    table.real(seconds(time), |m| &mut m.output.measured.time).role(Unknown::MeasuredTime).integer(
+        number,
+        (Some(0), None),
+        |m| &mut m.output.measured.number,
+    )
 }
 
 fn seconds(common: Common) -> Real {
@@ -125,7 +124,7 @@ fn errors(mut table: Plant, i: usize, sensor: &Sensor) -> Plant {
     let resolution = own("resolution", "step of the converter; 0 for none");
     let start = declare("freeze.start", "time from which it repeats its last value");
     let end = declare("freeze.end", "time at which it no longer repeats its last value");
-    vector(table, AXES, bias, move |m| &mut m.parameters.triads[i].bias)
+    vector(table, AXES, bias, none, move |m| &mut m.parameters.triads[i].bias)
         .real(noise.min(0.0), move |m| &mut m.parameters.triads[i].noise)
         .real(bandwidth.unit(unit::frequency()).min(0.0).nominal(50.0), move |m| {
             &mut m.parameters.triads[i].bandwidth
@@ -145,7 +144,7 @@ fn surroundings(table: Plant) -> Plant {
     let axes = [("north", ""), ("east", ""), ("down", "")];
     let gravity = gravity.real().unit(unit::acceleration()).min(0.0).nominal(10.0);
     let table = table.real(gravity, |m| &mut m.parameters.surroundings.gravity);
-    vector(table, axes, field, |m| &mut m.parameters.surroundings.field)
+    vector(table, axes, field, none, |m| &mut m.parameters.surroundings.field)
 }
 
 fn calibration(table: Plant) -> Plant {

@@ -1,0 +1,33 @@
+//! Errors of a model's crate name fields, and the user of a unit is told variables.
+
+/// Pairs of the path of a field and the name of its variable, or of a group of them. A pair also
+/// stands for what lies below the field. Fields without a pair have the names of their variables.
+pub type Fields = [(&'static str, &'static str)];
+
+/// Returns the message of an error in which fields stand in backticks, with the names of their
+/// variables instead.
+///
+/// ```
+/// use fmi2_export::fields::by_variable;
+///
+/// let fields = [("period", "period.feedback"), ("gates[0]", "gyroscope")];
+/// let error = "`gates[0].range` = 0 and `period` = 0 must be positive";
+/// assert_eq!(
+///     by_variable(&error, &fields),
+///     "gyroscope.range = 0 and period.feedback = 0 must be positive"
+/// );
+/// ```
+pub fn by_variable(error: &impl ToString, fields: &Fields) -> String {
+    let name = |field: &str| {
+        let below = |(path, variable): &(&str, &str)| {
+            let rest = field.strip_prefix(path)?;
+            (rest.is_empty() || rest.starts_with('.')).then(|| format!("{variable}{rest}"))
+        };
+        // The longest path comes closest to the field.
+        let found = fields.iter().filter_map(|pair| Some((pair.0.len(), below(pair)?)));
+        found.max().map_or_else(|| field.to_owned(), |(_, name)| name)
+    };
+    let error = error.to_string();
+    let parts = error.split('`').enumerate();
+    parts.map(|(i, part)| if i % 2 == 1 { name(part) } else { part.to_owned() }).collect()
+}

@@ -1,0 +1,115 @@
+//! What a variable is to the equations, so that nothing depends on its position in the table.
+
+use fmi2_export::table::{Common, Real};
+use fmi2_export::{Enumeration, Table};
+
+/// What a calculated variable is. States and derivatives are counted in the order attitude, rates,
+/// deflections.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Unknown {
+    State(usize),
+    Derivative(usize),
+    AppliedMoment(usize),
+    Delta,
+    DisturbanceMoment(usize),
+    DynamicPressure,
+    Measured(usize),
+    /// Time of the sample, which depends on nothing.
+    MeasuredTime,
+}
+
+/// What a state or an input is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Known {
+    State(usize),
+    Moment(usize),
+    DisturbanceMoment(usize),
+    Surface(usize),
+    Jet(usize),
+    Trajectory(usize),
+}
+
+/// What a variable is to the equations. Parameters have no role.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Role {
+    pub(crate) unknown: Option<Unknown>,
+    pub(crate) known: Option<Known>,
+}
+
+impl Role {
+    /// A state is calculated, and derivatives by it exist.
+    pub(crate) fn state(i: usize) -> Self {
+        Self { unknown: Some(Unknown::State(i)), known: Some(Known::State(i)) }
+    }
+}
+
+impl From<Unknown> for Role {
+    fn from(unknown: Unknown) -> Self {
+        Self { unknown: Some(unknown), known: None }
+    }
+}
+
+impl From<Known> for Role {
+    fn from(known: Known) -> Self {
+        Self { unknown: None, known: Some(known) }
+    }
+}
+
+/// Table of variables with the role of each.
+pub(crate) struct Variables<M> {
+    pub(crate) table: Table<M>,
+    pub(crate) roles: Vec<Role>,
+}
+
+impl<M: 'static> Variables<M> {
+    pub(crate) fn new() -> Self {
+        Self { table: Table::new(), roles: Vec::new() }
+    }
+
+    fn add(mut self, declare: impl FnOnce(Table<M>) -> Table<M>) -> Self {
+        self.roles.push(Role::default());
+        Self { table: declare(self.table), ..self }
+    }
+
+    /// Gives the last variable its role.
+    pub(crate) fn role(mut self, role: impl Into<Role>) -> Self {
+        if let Some(last) = self.roles.last_mut() {
+            *last = role.into();
+        }
+        self
+    }
+
+    pub(crate) fn real(
+        self,
+        declaration: Real,
+        field: impl Fn(&mut M) -> &mut f64 + Send + Sync + 'static,
+    ) -> Self {
+        self.add(|table| table.real(declaration, field))
+    }
+
+    pub(crate) fn integer<I: Copy + TryFrom<i32> + TryInto<i32>>(
+        self,
+        common: Common,
+        limits: (Option<i32>, Option<i32>),
+        field: impl Fn(&mut M) -> &mut I + Copy + Send + Sync + 'static,
+    ) -> Self {
+        self.add(|table| table.integer(common, limits, field))
+    }
+
+    pub(crate) fn boolean(
+        self,
+        common: Common,
+        field: impl Fn(&mut M) -> &mut bool + Send + Sync + 'static,
+    ) -> Self {
+        self.add(|table| table.boolean(common, field))
+    }
+
+    pub(crate) fn enumeration<T: Copy + PartialEq + Send + Sync>(
+        self,
+        common: Common,
+        of: &'static Enumeration<T>,
+        field: impl Fn(&mut M) -> &mut T + Copy + Send + Sync + 'static,
+    ) -> Self {
+        self.add(|table| table.enumeration(common, of, field))
+    }
+}
