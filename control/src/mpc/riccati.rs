@@ -7,11 +7,10 @@
 //! the motion stays well inside them. Every iterate is checked, and a ball enters the problem as
 //! soon as an iterate comes near it.
 
+use super::balls::{Balls, Constraints};
 use super::budget::Budget;
 use super::lq::Unconstrained;
-use super::problem::{
-    Balls, Constraints, End, Multipliers, Outcome, Problem, Solution, Start, State, apply, dot, zero_state,
-};
+use super::problem::{End, Multipliers, Outcome, Problem, Solution, Start, State, apply, dot, zero_state};
 use super::sweep::{Blocks, Gain, Quadratic, minimiser};
 use nalgebra::{Matrix3, SVector, Vector3};
 
