@@ -26,7 +26,6 @@ pub mod problem;
 pub mod riccati;
 mod settings;
 mod shortcuts;
-mod sweep;
 
 pub use balls::{Ball, Balls, Constraints};
 pub use bounds::{Bounded, Bounds};
