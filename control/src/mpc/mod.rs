@@ -22,6 +22,7 @@ pub mod conic;
 pub mod layout;
 pub mod lq;
 pub mod optimiser;
+mod passes;
 pub mod problem;
 pub mod riccati;
 mod settings;

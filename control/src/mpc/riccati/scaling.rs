@@ -4,13 +4,12 @@ use super::Riccati;
 use super::stage::Stage;
 use super::sweep::{Blocks, Gain, Quadratic};
 use crate::mpc::balls::Constraints;
-use crate::mpc::problem::{Cost, Problem, Start, zero_state};
+use crate::mpc::problem::{Problem, Start, zero_state};
 use nalgebra::{Matrix3, Vector3};
 
 impl<const O: usize> Stage<O> {
-    /// Returns the Hessian of the stage with its balls, (5).
-    fn hessian(&self, cost: &Cost<O>) -> Quadratic<O> {
-        let mut quadratic = Quadratic::diagonal(&cost.state, &cost.input);
+    /// Adds the balls to the Hessian of the stage, (5).
+    fn add_balls(&self, quadratic: &mut Quadratic<O>) {
         let Stage { balls, slopes, state_pair, input_pair, .. } = self;
         if input_pair.watched {
             quadratic.add_ball(&balls.input, &slopes.input, input_pair.multiplier, input_pair.scaling());
@@ -19,7 +18,6 @@ impl<const O: usize> Stage<O> {
             let (multiplier, scaling) = (state_pair.multiplier, state_pair.scaling());
             quadratic.add_state_ball(&balls.state, &slopes.state, multiplier, scaling);
         }
-        quadratic
     }
 }
 
@@ -30,7 +28,8 @@ impl<const O: usize> Riccati<O> {
         let last = self.horizon;
         let mut p = self.end_weight(problem);
         for stage in self.stages[..last].iter_mut().rev() {
-            let quadratic = stage.hessian(problem.cost);
+            let mut quadratic = Quadratic::diagonal(&problem.cost.state, &problem.cost.input);
+            stage.add_balls(&mut quadratic);
             stage.gain = Gain::factor(&quadratic, problem.chain, &mut p)?;
         }
         self.add_start_weight(problem, &mut p);

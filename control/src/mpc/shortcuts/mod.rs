@@ -7,7 +7,8 @@ mod windows;
 mod without_balls;
 
 use super::bounds::Bounded;
-use super::optimiser::{Optimiser, Sample, Search};
+use super::optimiser::{Optimiser, Sample};
+use super::passes::Search;
 use crate::report::Status;
 
 /// A cheaper way to the optimum.
