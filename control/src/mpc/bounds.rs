@@ -59,8 +59,8 @@ pub trait Bounded<const O: usize> {
     /// with the bounds about itself: by its input, or by its state at the interval's end.
     ///
     /// If the bounds depend on the motion, those of the satisfied intervals are written to
-    /// `bounds`. They may be smaller than those of [`Self::bounds_about`], where a smaller bound
-    /// is cheaper and suffices. Intervals between the first and the last violated one may be left out.
+    /// `bounds`. They may be smaller than those of [`Self::bounds_about`], where a smaller bound is
+    /// cheaper and suffices. Intervals between the first and the last violated one may be left out.
     fn violated(&self, motion: &Motion<O>, of: Range<usize>, bounds: &mut Bounds) -> Option<Range<usize>>;
 
     /// Computes the bounds of the intervals `of` about `motion`: for the input of each, and for the

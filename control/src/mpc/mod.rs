@@ -2,8 +2,8 @@
 //!
 //! | | |
 //! |---|---|
-//! | [`problem`], [`balls`], [`bounds`] | the problem, its balls, and their bounds as a function of the motion |
-//! | [`optimiser`], `shortcuts` | one optimisation, and its cheaper ways to the optimum |
+//! | [`problem`], [`balls`], [`bounds`] | problem, balls, and their bounds as a function of the motion |
+//! | [`optimiser`], `passes`, `shortcuts` | one optimisation, and its cheaper ways to the optimum |
 //! | [`lq`] | the problem without balls |
 //! | [`riccati`] | the interior point method |
 //! | [`conic`] | the cone solver behind it |

@@ -55,7 +55,8 @@ impl SolverSettings {
         }
     }
 
-    /// Returns whether the Riccati method is tried first, with the balls as functions of the motion.
+    /// Returns whether the Riccati method is tried first, with the balls as functions of the
+    /// motion.
     pub(super) fn is_exact_riccati(&self) -> bool {
         (self.method, self.nonlinearity) == (Method::Riccati, Nonlinearity::Exact)
     }

@@ -77,8 +77,8 @@ impl<const O: usize> Riccati<O> {
         (TO_BOUNDARY * self.longest(problem)).min(1.0)
     }
 
-    /// Computes Newton's direction with the present factors: the feedforward (8) backwards, then the
-    /// motion and the pairs (9) forwards.
+    /// Computes Newton's direction with the present factors: the feedforward (8) backwards, then
+    /// the motion and the pairs (9) forwards.
     fn newton<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) {
         let last = self.horizon;
         let mut p = self.end_slope(problem, &Pair::effective);

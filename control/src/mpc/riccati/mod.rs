@@ -1,5 +1,5 @@
-//! Primal-dual interior point method on the Riccati recursion. The numbers of equations are those of
-//! docs/solver.md.
+//! Primal-dual interior point method on the Riccati recursion. The numbers of equations are those
+//! of docs/solver.md.
 //!
 //! Balls are written c = ½(‖y‖² − 1) ≤ 0 with one slack s and one multiplier λ each. Every iterate
 //! satisfies the chain of integrators exactly, so that Newton's method is left with three

@@ -31,7 +31,8 @@ const FAR_FROM_FEASIBLE: f64 = 1e-3;
 pub(super) struct Progress {
     /// Tolerance of the residual of the balls.
     pub feasibility: f64,
-    /// Number of iterations in which the residual must halve, and the growth that restarts the count.
+    /// Number of iterations in which the residual must halve, and the growth that restarts the
+    /// count.
     patience: (u32, f64),
     /// Whether the first guess comes from a similar problem.
     warm: bool,

@@ -83,9 +83,9 @@ impl<const O: usize> Riccati<O> {
         0.5 * (inner + dot(end, &problem.end.weighted(end)))
     }
 
-    /// Computes ∇L from the end to the start, (2) and (3). `visit` receives two parts of the slope in each
-    /// input: the stage's own, and the part of all later stages. The slope in E_0 remains in
-    /// `first`.
+    /// Computes ∇L from the end to the start, (2) and (3). `visit` receives two parts of the slope
+    /// in each input: the stage's own, and the part of all later stages. The slope in E_0 remains
+    /// in `first`.
     fn adjoint<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,

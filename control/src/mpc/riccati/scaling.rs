@@ -22,8 +22,8 @@ impl<const O: usize> Stage<O> {
 }
 
 impl<const O: usize> Riccati<O> {
-    /// Runs the backward recursion (7) for P and the gains, on the Hessians (5). Returns `None` if some
-    /// M is not positive definite.
+    /// Runs the backward recursion (7) for P and the gains, on the Hessians (5). Returns `None` if
+    /// some M is not positive definite.
     pub(super) fn factor<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> Option<()> {
         let last = self.horizon;
         let mut p = self.end_weight(problem);

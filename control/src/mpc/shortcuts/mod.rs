@@ -1,6 +1,10 @@
 //! Cheaper ways to the optimum, cheapest first. Each leaves constraints out, solves the rest, and
 //! checks what it has left out. If the result satisfies that too, it is the optimum of the whole
 //! problem, so that no way loses accuracy.
+//!
+//! The gains in the files' heads are the times of `cargo bench -p control --bench optimisation`
+//! (250 samples of 50 s) without and with the shortcut, in the same run. The checks have a shortcut
+//! of their own, `few_stages` of CRMPC.
 
 mod terminal_ball;
 mod windows;

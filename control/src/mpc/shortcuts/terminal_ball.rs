@@ -1,4 +1,8 @@
 //! The optimum with the terminal ball as the only constraint.
+//!
+//! Gain: none in the mean (0.009 ms, CRMPC paper) or in the longest time. It is kept because
+//! `solver.status` tells it apart, and because a window would change the last digits of the
+//! results.
 
 use super::{Bounded, Optimiser, Sample, Search, Shortcut, Status};
 use crate::mpc::lq::Unconstrained;
@@ -34,8 +38,8 @@ impl<const O: usize, B: Bounded<O>> Shortcut<O, B> for TerminalBallAlone {
     }
 }
 
-/// Writes the optimum from the start of the arrival costs with ‖E_N‖_G = `radius` into `motion` and returns its
-/// multiplier for half the cost. It applies to a start whose optimum without balls ends
+/// Writes the optimum from the start of the arrival costs with ‖E_N‖_G = `radius` into `motion` and
+/// returns its multiplier for half the cost. It applies to a start whose optimum without balls ends
 /// outside; the result is `None` if no solution is found.
 ///
 /// The end minimises (E − Ē)ᵀΠ⁻¹(E − Ē) + EᵀG E, so that (Π⁻¹ + (1 + λ)G) E = Π⁻¹Ē. As 1/‖E‖_G

@@ -1,4 +1,6 @@
 //! The optimum without balls.
+//!
+//! Gain: mean time 0.036 → 0.031 ms (CRMPC robust), 0.013 → 0.009 (paper), 0.013 → 0.011 (DLMPC).
 
 use super::{Bounded, Optimiser, Sample, Search, Shortcut, Status};
 
