@@ -1,10 +1,10 @@
 //! Time of one optimisation of CRMPC and of DLMPC's outer layer on the scenario of Chai 2022
 //! (white noise, inertia + 5 %).
 //!
-//! First the distribution over every sample of 50 s is printed, with the exits that come before the
-//! cone program of the whole horizon, and without them. Each sample is repeated from the same
-//! memory, and the smallest time counts, because other load on the machine can only add to it. Then
-//! Criterion times single samples of CRMPC.
+//! First the distribution over every sample of 50 s is printed, with the shortcuts that come before
+//! the whole horizon, and without them. Each sample is repeated from the same memory, and the
+//! smallest time counts, because other load on the machine can only add to it. Then Criterion times
+//! single samples of CRMPC.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
@@ -96,16 +96,16 @@ fn print_distribution<C: Optimising>(name: &str, controller: &mut C, ticks: &[Ti
 
 /// The ways of solving that are compared.
 const WAYS: [(&str, SolverSettings); 4] = [
-    ("exits, then riccati", WAY),
-    ("riccati", SolverSettings { exits: false, ..WAY }),
-    ("riccati, frozen", SolverSettings { exits: false, nonlinearity: Nonlinearity::Frozen, ..WAY }),
-    ("cone", SolverSettings { exits: false, method: Method::Cone, ..WAY }),
+    ("shortcuts, then riccati", WAY),
+    ("riccati", SolverSettings { shortcuts: false, ..WAY }),
+    ("riccati, frozen", SolverSettings { shortcuts: false, nonlinearity: Nonlinearity::Frozen, ..WAY }),
+    ("cone", SolverSettings { shortcuts: false, method: Method::Cone, ..WAY }),
 ];
 const WAY: SolverSettings = SolverSettings {
     method: Method::Riccati,
     nonlinearity: Nonlinearity::Exact,
     max_iterations: 50,
-    exits: true,
+    shortcuts: true,
     time_budget: 0.0,
     iteration_budget: 0,
 };
@@ -160,7 +160,7 @@ fn optimisations(criterion: &mut Criterion) {
             });
         }
         if let Some(tick) = after(0.2, Status::Constrained) {
-            let cone = SolverSettings { exits: false, method: Method::Cone, ..WAY };
+            let cone = SolverSettings { shortcuts: false, method: Method::Cone, ..WAY };
             let mut whole = Crmpc::new(crmpc::Settings { solver: cone, ..settings(constraints) }).unwrap();
             group.bench_function("whole horizon", |bencher| {
                 bencher.iter_batched_ref(

@@ -15,8 +15,9 @@ use balls::Sets;
 use control::Crmpc;
 use control::crmpc::Constraints;
 use control::mpc::Budget;
+use control::mpc::balls::Frozen;
 use control::mpc::lq::Unconstrained;
-use control::mpc::problem::{End, Frozen, Problem, Solution, Start};
+use control::mpc::problem::{End, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
 use control::mpc::{self, Chain, Cost, per_axis};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
@@ -54,7 +55,7 @@ fn riccati(criterion: &mut Criterion) {
     });
 
     let mut frozen = Frozen::new(n);
-    frozen.set(&sets, &cold.motion);
+    frozen.set(&sets, &cold.motion, 0);
     iterations(criterion, "exact", &cold, || Problem {
         chain: &chain,
         cost: &cost,

@@ -45,9 +45,9 @@ fn write_samples(out: &mut impl Write, set: &str, settings: &Settings, repetitio
         Crmpc::new(settings).unwrap()
     };
     let mut ways = [
-        ("exits, riccati", with(|_| ())),
-        ("riccati", with(|solver| solver.exits = false)),
-        ("cone", with(|solver| (solver.exits, solver.method) = (false, Method::Cone))),
+        ("shortcuts, riccati", with(|_| ())),
+        ("riccati", with(|solver| solver.shortcuts = false)),
+        ("cone", with(|solver| (solver.shortcuts, solver.method) = (false, Method::Cone))),
     ];
     let mut ticks: Vec<(u64, Memory, control::Measurement)> = Vec::new();
     let mut before = ways[0].1.memory();

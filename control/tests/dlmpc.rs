@@ -162,10 +162,10 @@ fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
 }
 
 #[test]
-fn exits_change_nothing_along_a_run() {
+fn shortcuts_change_nothing_along_a_run() {
     let settings = Settings::published();
     let frozen = SolverSettings { nonlinearity: Nonlinearity::Frozen, ..settings.solver };
-    let cone = SolverSettings { method: Method::Cone, exits: false, ..frozen };
+    let cone = SolverSettings { method: Method::Cone, shortcuts: false, ..frozen };
     let [mut with, mut without] =
         [frozen, cone].map(|solver| Dlmpc::new(Settings { solver, ..settings }).unwrap());
     let limit = Settings::published().limit_rate;

@@ -1,4 +1,4 @@
-//! The optimisation of CRMPC: its exits, its fallback (31), and the independence of its solvers
+//! The optimisation of CRMPC: its shortcuts, its fallback (31), and the independence of its solvers
 //! from earlier samples.
 
 mod harness;
@@ -31,7 +31,7 @@ fn controller(constraints: Constraints) -> Crmpc {
 /// Returns the controller with the cone program of the whole horizon at every sample.
 fn cone(constraints: Constraints) -> Crmpc {
     let settings = settings(constraints);
-    let solver = SolverSettings { method: Method::Cone, exits: false, ..settings.solver };
+    let solver = SolverSettings { method: Method::Cone, shortcuts: false, ..settings.solver };
     Crmpc::new(Settings { solver, ..settings }).unwrap()
 }
 
@@ -78,7 +78,7 @@ fn recorded(constraints: Constraints) -> Vec<Recorded> {
 }
 
 #[test]
-fn exits_lead_to_the_optimum_of_the_whole_horizon() {
+fn shortcuts_lead_to_the_optimum_of_the_whole_horizon() {
     // These are first optimisations, which iterate to convergence, from random states at random
     // times.
     let cube = |half_deg: f64| {
@@ -181,7 +181,7 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
 }
 
 #[test]
-fn exits_change_nothing_along_a_run() {
+fn shortcuts_change_nothing_along_a_run() {
     // The balls are functions of the motion in the first way, and linearised in the second, which
     // is the cone solver's.
     let ways = [(Nonlinearity::Exact, Method::Riccati), (Nonlinearity::Frozen, Method::Cone)];
@@ -190,7 +190,7 @@ fn exits_change_nothing_along_a_run() {
             let settings = settings(constraints);
             let solver = SolverSettings { nonlinearity, ..settings.solver };
             let mut with = Crmpc::new(Settings { solver, ..settings }).unwrap();
-            let solver = SolverSettings { method, exits: false, ..solver };
+            let solver = SolverSettings { method, shortcuts: false, ..solver };
             let mut without = Crmpc::new(Settings { solver, ..settings }).unwrap();
             let limit = settings.limit_moment;
             let mut counts = [0, 0];
@@ -221,7 +221,7 @@ fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins(
                     initial_state,
                     ..settings(constraints)
                 };
-                let solver = SolverSettings { method, exits: false, ..settings.solver };
+                let solver = SolverSettings { method, shortcuts: false, ..settings.solver };
                 let mut controller = Crmpc::new(Settings { solver, ..settings }).unwrap();
                 let mut memory = Memory::default();
                 controller.update(&mut memory, 0, 0.0, &measured, &reference());

@@ -6,13 +6,14 @@ mod balls;
 
 use balls::Sets;
 use control::mpc::Budget;
+use control::mpc::balls::Frozen;
 use control::mpc::certificate::Certificate;
-use control::mpc::conic::{ConicSolver, Structure};
+use control::mpc::conic::ConicSolver;
 use control::mpc::lq::Unconstrained;
-use control::mpc::problem::{End, Frozen, Outcome, Problem, Solution, Start};
+use control::mpc::problem::{End, Outcome, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
 use control::mpc::{
-    Balls, Bounded, Chain, Constraints, Cost, Layout, Motion, Optimiser, SolverSettings, State,
+    Balls, Bounded, Bounds, Chain, Constraints, Cost, Layout, Motion, Optimiser, SolverSettings, State,
 };
 use control::report::Status;
 use nalgebra::{SMatrix, SVector, Vector3};
@@ -102,7 +103,7 @@ impl Solvers {
     fn new(shape: Shape, start: Option<[Vec<SVector<f64, 2>>; 3]>) -> Self {
         let chain = Chain::new(0.2);
         let faces = start.iter().flatten().map(Vec::len).sum();
-        let cone = ConicSolver::new(Structure {
+        let layout = Layout {
             chain,
             cost: shape.cost,
             horizon: shape.horizon,
@@ -110,8 +111,9 @@ impl Solvers {
             terminal: shape.terminal,
             start,
             scale: [0.1, 0.1],
-            max_iterations: MAX_ITERATIONS,
-        });
+            standstill: 1e-6,
+        };
+        let cone = ConicSolver::new(layout, MAX_ITERATIONS);
         Self {
             chain,
             unconstrained: Unconstrained::new(shape.horizon, &chain, &shape.cost),
@@ -140,7 +142,7 @@ impl Solvers {
         };
         let mut solution = Solution::new(shape.horizon);
         unconstrained.solve(&sample.start, affine, &mut solution.motion);
-        frozen.set(&sets, &solution.motion);
+        frozen.set(&sets, &solution.motion, 0);
         let end = &solution.motion.states[shape.horizon];
         let radius = shape.terminal.then(|| (sample.radius * shape.cost.end_square(end).sqrt()).max(1e-4));
         let zero = [Vector3::zeros(); 2];
@@ -339,43 +341,40 @@ fn oracle_balls_that_only_the_iterates_come_near_are_found() {
     assert!((optima[0] - optima[1]).abs() <= 1e-8 * optima[0], "{optima:?}");
 }
 
-/// Sets that the Riccati method cannot evaluate: after the first call of `tighten` their values are
-/// not numbers.
+/// Sets that the Riccati method cannot evaluate: after the first computation of bounds their values
+/// are not numbers.
 struct Spoilt {
     sets: Sets,
-    tightened: usize,
+    computed: Cell<usize>,
 }
 
-impl Constraints<2> for Spoilt {
+impl Bounded<2> for Spoilt {
     fn has_state_balls(&self) -> bool {
         true
     }
 
-    fn balls(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> Balls<2> {
+    fn balls(&self, k: usize, state: &State<2>, input: &Vector3<f64>, _: Option<(f64, f64)>) -> Balls<2> {
         let mut balls = self.sets.balls(k, state, input);
-        if self.tightened == 1 {
+        if self.computed.get() == 1 {
             balls.input.value *= f64::NAN;
         }
         balls
     }
-}
 
-impl Bounded<2> for Spoilt {
-    fn tighten(&mut self, _: &Motion<2>, _: Range<usize>) {
-        self.tightened += 1;
+    fn squares(&self, k: usize, state: &State<2>, input: &Vector3<f64>, bounds: (f64, f64)) -> (f64, f64) {
+        let Balls { state, input } = self.balls(k, state, input, Some(bounds));
+        (state.value.norm_squared(), input.value.norm_squared())
     }
 
-    fn violated(&mut self, motion: &Motion<2>, skip: Range<usize>) -> Option<Range<usize>> {
-        let violates = |&k: &usize| {
-            !skip.contains(&k) && self.sets.squares(k, &motion.states[k], &motion.inputs[k]).1 > 1.0
-        };
-        let first = (0..motion.inputs.len()).find(violates)?;
-        let last = (first..motion.inputs.len()).rfind(violates).unwrap_or(first);
+    fn bounds_about(&self, _: &Motion<2>, _: Range<usize>, _: &mut Bounds) {
+        self.computed.update(|computed| computed + 1);
+    }
+
+    fn violated(&self, motion: &Motion<2>, mut of: Range<usize>, _: &mut Bounds) -> Option<Range<usize>> {
+        let violates = |k: usize| self.sets.squares(k, &motion.states[k], &motion.inputs[k]).1 > 1.0;
+        let first = of.find(|&k| violates(k))?;
+        let last = of.rev().find(|&k| violates(k)).unwrap_or(first);
         Some(first..last + 1)
-    }
-
-    fn terminal_radius(&self) -> Option<f64> {
-        None
     }
 }
 
@@ -397,22 +396,23 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
     let body = Scenario::crmpc2022().inertia.body(1.0).unwrap();
     let previous = Motion::new(horizon);
     // The spoilt sets are valid again when the cone solver asks.
-    for (tightened, status) in [(0, Status::Cone), (1, Status::Constrained)] {
-        let solver = SolverSettings { exits: false, ..SolverSettings::new(MAX_ITERATIONS) };
+    for (computed, status) in [(0, Status::Cone), (1, Status::Constrained)] {
+        let solver = SolverSettings { shortcuts: false, ..SolverSettings::new(MAX_ITERATIONS) };
         let mut optimiser = Optimiser::new(layout.clone(), solver).unwrap();
         let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
-        let mut spoilt = Spoilt { sets, tightened };
+        let spoilt = Spoilt { sets, computed: Cell::new(computed) };
         let report =
-            optimiser.optimise(&mut spoilt, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
+            optimiser.optimise(&spoilt, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
         assert_eq!(report.status, status);
         assert!(report.certificate.feasibility < 0.1, "{report:?}");
     }
     // With no time left, neither solver is started.
-    let solver = SolverSettings { exits: false, time_budget: 1e-9, ..SolverSettings::new(MAX_ITERATIONS) };
+    let solver =
+        SolverSettings { shortcuts: false, time_budget: 1e-9, ..SolverSettings::new(MAX_ITERATIONS) };
     let mut optimiser = Optimiser::new(layout, solver).unwrap();
     let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
-    let mut sets = Spoilt { sets, tightened: 1 };
+    let sets = Spoilt { sets, computed: Cell::new(1) };
     optimiser.begin();
-    let report = optimiser.optimise(&mut sets, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
+    let report = optimiser.optimise(&sets, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
     assert_eq!((report.status, report.iterations), (Status::Fallback, 0));
 }

@@ -4,6 +4,7 @@ use crate::call::{Call, State};
 use crate::logger::{Category, Logger};
 use crate::model::{Context, EventInfo, Failure};
 use crate::saved;
+use crate::scalar::Scalar;
 use crate::types::{Interface, Status};
 use crate::unit::{Export, Extrapolation, FmuUnit, MAX_INPUT_DERIVATIVE_ORDER, Progress};
 use model_description::ModelDescription;
@@ -67,31 +68,16 @@ pub(crate) struct Setting {
     pub(crate) resources: Option<PathBuf>,
 }
 
-/// Type of a variable's value, with the functions by which the shell accesses and checks it.
-pub(crate) trait Scalar: PartialEq + Sized {
-    const TYPE: &'static str;
+/// Access to the variables of a unit by the type of their value.
+pub(crate) trait Typed: Scalar {
     /// Returns the result of `look` for the variable's value, or `None` if the variable has another
     /// type.
     fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R>;
     /// Sets the variable, which must have this type.
     fn put(self, unit: &mut dyn FmuUnit, reference: usize);
-    /// Whether replacing this value by `other` would change nothing.
-    fn same(&self, other: &Self) -> bool {
-        self == other
-    }
-    /// Says why the value cannot be given to the importer as that of a variable of this kind, or
-    /// `None` if it can.
-    fn unpresentable(&self, _kind: &Kind) -> Option<&'static str> {
-        None
-    }
-    /// Says why the value is not allowed for a variable of this kind, or `None` if it is.
-    fn problem(&self, _kind: &Kind) -> Option<String> {
-        None
-    }
 }
 
-impl Scalar for f64 {
-    const TYPE: &'static str = "Real";
+impl Typed for f64 {
     fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
         unit.real(reference).map(|value| look(value))
     }
@@ -100,52 +86,18 @@ impl Scalar for f64 {
             *field = self;
         }
     }
-    fn same(&self, other: &Self) -> bool {
-        // Zero and −0 are equal, but results computed from them can differ.
-        self.to_bits() == other.to_bits()
-    }
-    fn unpresentable(&self, _kind: &Kind) -> Option<&'static str> {
-        (!self.is_finite()).then_some("is not a finite number; an input or a parameter is too large")
-    }
-    fn problem(&self, kind: &Kind) -> Option<String> {
-        if !self.is_finite() {
-            return Some("is not a finite number".into());
-        }
-        match kind {
-            Kind::Real { min: Some(min), .. } if self < min => Some(format!("is below the minimum {min}")),
-            Kind::Real { max: Some(max), .. } if self > max => Some(format!("is above the maximum {max}")),
-            _ => None,
-        }
-    }
 }
 
-impl Scalar for i32 {
-    const TYPE: &'static str = "Integer or Enumeration";
+impl Typed for i32 {
     fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
         unit.integer(reference).map(|value| look(&value))
     }
     fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
         unit.set_integer(reference, self);
     }
-    fn unpresentable(&self, kind: &Kind) -> Option<&'static str> {
-        // Only a value that `Enumeration::number` does not find has no number.
-        (matches!(kind, Kind::Enumeration { .. }) && *self < 1)
-            .then_some("holds a value that its enumeration does not list")
-    }
-    fn problem(&self, kind: &Kind) -> Option<String> {
-        match kind {
-            Kind::Integer { min: Some(min), .. } if self < min => Some(format!("is below the minimum {min}")),
-            Kind::Integer { max: Some(max), .. } if self > max => Some(format!("is above the maximum {max}")),
-            Kind::Enumeration { of, .. } if *self < 1 || *self as usize > of.items.len() => {
-                Some(format!("is not an item of {}: these are 1 to {}", of.name, of.items.len()))
-            }
-            _ => None,
-        }
-    }
 }
 
-impl Scalar for bool {
-    const TYPE: &'static str = "Boolean";
+impl Typed for bool {
     fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
         unit.boolean(reference).map(|value| look(value))
     }
@@ -156,8 +108,7 @@ impl Scalar for bool {
     }
 }
 
-impl Scalar for String {
-    const TYPE: &'static str = "String";
+impl Typed for String {
     fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
         unit.string(reference).map(|value| look(value))
     }
@@ -351,7 +302,7 @@ impl Instance {
     }
 
     /// Says why there is no field of type `T` for the value reference.
-    fn misfit<T: Scalar>(&self, reference: u32) -> Failure {
+    fn misfit<T: Typed>(&self, reference: u32) -> Failure {
         match self.variable(reference) {
             Ok(Variable { name, .. }) => {
                 Failure::Error(format!("'{name}' (value reference {reference}) is not of type {}", T::TYPE))
@@ -360,12 +311,12 @@ impl Instance {
         }
     }
 
-    fn expect_type<T: Scalar>(&mut self, reference: u32) -> Outcome {
+    fn expect_type<T: Typed>(&mut self, reference: u32) -> Outcome {
         T::look(self.unit.as_mut(), reference as usize, |_| ()).ok_or_else(|| self.misfit::<T>(reference))
     }
 
     /// Gives the values of the variables to `sink`, each with its position in `references`.
-    pub(crate) fn get<T: Scalar>(&mut self, references: &[u32], mut sink: impl FnMut(usize, &T)) -> Outcome {
+    pub(crate) fn get<T: Typed>(&mut self, references: &[u32], mut sink: impl FnMut(usize, &T)) -> Outcome {
         let calculated = |&reference: &u32| {
             self.description.variables.get(reference as usize).is_some_and(Variable::is_calculated)
         };
@@ -402,7 +353,7 @@ impl Instance {
     }
 
     /// Sets all variables, or none if one value is refused.
-    pub(crate) fn set<T: Scalar + std::fmt::Debug>(
+    pub(crate) fn set<T: Typed + std::fmt::Debug>(
         &mut self,
         references: &[u32],
         value: impl Fn(usize) -> Result<T, String>,

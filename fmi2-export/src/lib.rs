@@ -26,6 +26,7 @@ pub mod model;
 mod numbers;
 mod resource;
 mod saved;
+mod scalar;
 pub mod table;
 #[doc(hidden)]
 pub mod types;

@@ -1,7 +1,7 @@
 //! Table of a unit's variables: the FMI attributes of each, and the field of the model that holds
 //! its value.
 
-use crate::instance::Scalar;
+use crate::scalar::Scalar;
 use model_description::DefaultExperiment;
 use model_description::unit::Unit;
 use model_description::variable::{Causality, EnumerationType, Kind, Variability, Variable};

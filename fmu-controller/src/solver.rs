@@ -101,7 +101,7 @@ pub(crate) fn parameters<L: Law>(
     );
     let iterations =
         parameter("solver.maxIterations", "Iteration limit of each solver in each of its passes");
-    let exits = parameter(
+    let shortcuts = parameter(
         "solver.exits",
         "Whether cheaper ways to the same optimum are tried first: the optimum without constraints, that with the terminal ball alone, \
          then windows of the horizon; otherwise the whole horizon is solved each time",
@@ -118,7 +118,7 @@ pub(crate) fn parameters<L: Law>(
         .enumeration(method, &METHODS, move |m| &mut solver(&mut m.law).method)
         .enumeration(nonlinearity, &NONLINEARITIES, move |m| &mut solver(&mut m.law).nonlinearity)
         .integer(iterations, (Some(1), Some(1000)), move |m| &mut solver(&mut m.law).max_iterations)
-        .boolean(exits, move |m| &mut solver(&mut m.law).exits)
+        .boolean(shortcuts, move |m| &mut solver(&mut m.law).shortcuts)
         .real(budget.real().unit(unit::time()).min(0.0).nominal(1e-3), move |m| {
             &mut solver(&mut m.law).time_budget
         })

@@ -29,7 +29,7 @@ import nlp
 from conftest import ROOT, TARGET
 
 N, H = nlp.HORIZON, nlp.STEP
-OURS = ["exits, riccati", "riccati", "cone"]
+OURS = ["shortcuts, riccati", "riccati", "cone"]
 # The solvers get the cost in deg^2, so that their absolute tolerances make sense.
 SCALE = (180.0 / np.pi) ** 2
 # Our solver stops at the same step length.

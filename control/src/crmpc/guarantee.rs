@@ -8,7 +8,7 @@ mod lemmas;
 
 pub use lemmas::Lemmas;
 
-use super::design::{InitialState, Settings};
+use super::settings::{InitialState, Settings};
 use crate::error::DesignError;
 use crate::error_dynamics::{Reach, SampledError};
 use nalgebra::Vector3;

@@ -6,24 +6,26 @@
 //! is seen in the preview and never enters the dynamics.
 
 mod design;
+mod few_stages;
 mod guarantee;
 mod observer;
 mod plan;
 mod published;
+mod robust;
 mod sets;
+mod settings;
 
 pub use crate::report::{Report, Status};
-pub use design::{
-    Constraints, Design, Guarantee, InitialState, ObserverSettings, PaperConstants, Settings,
-    held_terminal_weight, step_response_peak, terminal_weight,
-};
+pub use design::{Design, PaperConstants, held_terminal_weight, step_response_peak, terminal_weight};
 #[doc(hidden)]
 pub use guarantee::Lemmas;
 pub use guarantee::{Assessment, Deviation, Geometry, Tightening};
 pub use observer::Observed;
 pub use plan::Plan;
 pub use published::Published;
-pub use sets::{Bounds, Margins};
+pub use robust::Margins;
+pub use sets::Bounds;
+pub use settings::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
@@ -213,7 +215,7 @@ impl Crmpc {
     /// Returns the bounds of the last optimisation, for benchmarks and tests that solve the same
     /// problem by other means.
     pub fn bounds(&self) -> Bounds {
-        self.sets.bounds()
+        self.sets.bounds(self.optimiser.bounds())
     }
 
     /// Runs one optimisation at `time` from the measured state (Θ, x_ω). The plan and the report
@@ -409,7 +411,7 @@ impl Crmpc {
             memory.plan.errors(&self.sets.references, &mut self.previous);
             (&self.previous, &memory.plan.multipliers[..])
         });
-        self.optimiser.optimise(&mut self.sets, &error, &self.affine, previous)
+        self.optimiser.optimise(&self.sets, &error, &self.affine, previous)
     }
 
     /// Makes the optimum the plan in force.

@@ -1,6 +1,6 @@
 //! Observer that estimates the disturbance from the rates.
 
-use super::design::{Constraints, InitialState, Settings};
+use super::settings::{Constraints, InitialState, Settings};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;

@@ -1,6 +1,6 @@
 //! The published settings, from `data/crmpc-2022.toml`.
 
-use super::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
+use super::settings::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
 use crate::error_dynamics::Gain;
 use crate::mpc::SolverSettings;
 use serde::Deserialize;

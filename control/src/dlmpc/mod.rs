@@ -163,12 +163,21 @@ const CHECK_SLACK: f64 = 1e-9;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
 const ANGLE_SCALE: f64 = 0.1;
 
-impl mpc::Constraints<1> for RateLimit {
+impl RateLimit {
+    /// Returns ‖R⁻¹(Θ) v‖², relative to the limit.
+    fn square(&self, k: usize, state: &State<1>, input: &Vector3<f64>) -> f64 {
+        let reference = &self.references[k];
+        let rates = linearise::body_rates(&(reference.angles + state[0]), &(reference.rates + input));
+        rates.norm_squared() / (self.limit * self.limit)
+    }
+}
+
+impl Bounded<1> for RateLimit {
     fn has_state_balls(&self) -> bool {
         false
     }
 
-    fn balls(&self, k: usize, state: &State<1>, input: &Vector3<f64>) -> Balls<1> {
+    fn balls(&self, k: usize, state: &State<1>, input: &Vector3<f64>, _: Option<(f64, f64)>) -> Balls<1> {
         let reference = &self.references[k];
         let command = reference.rates + input;
         let kinematics = InverseKinematics::at(&(reference.angles + state[0]));
@@ -182,30 +191,21 @@ impl mpc::Constraints<1> for RateLimit {
         Balls { state: Ball::default(), input }
     }
 
-    fn squares(&self, k: usize, state: &State<1>, input: &Vector3<f64>) -> (f64, f64) {
-        let reference = &self.references[k];
-        let rates = linearise::body_rates(&(reference.angles + state[0]), &(reference.rates + input));
-        (0.0, rates.norm_squared() / (self.limit * self.limit))
+    fn squares(&self, k: usize, state: &State<1>, input: &Vector3<f64>, _: (f64, f64)) -> (f64, f64) {
+        (0.0, self.square(k, state, input))
     }
-}
 
-impl Bounded<1> for RateLimit {
-    fn tighten(&mut self, _: &Motion<1>, _: Range<usize>) {}
-
-    fn violated(&mut self, motion: &Motion<1>, skip: Range<usize>) -> Option<Range<usize>> {
+    fn violated(
+        &self,
+        motion: &Motion<1>,
+        mut of: Range<usize>,
+        _: &mut mpc::Bounds,
+    ) -> Option<Range<usize>> {
         let bound = (1.0 + CHECK_SLACK).powi(2);
-        let violates = |&k: &usize| {
-            !skip.contains(&k)
-                && mpc::Constraints::squares(self, k, &motion.states[k], &motion.inputs[k]).1 > bound
-        };
-        let n = motion.inputs.len();
-        let first = (0..n).find(violates)?;
-        let last = (first..n).rfind(violates).unwrap_or(first);
+        let violates = |k: usize| self.square(k, &motion.states[k], &motion.inputs[k]) > bound;
+        let first = of.find(|&k| violates(k))?;
+        let last = of.rev().find(|&k| violates(k)).unwrap_or(first);
         Some(first..last + 1)
-    }
-
-    fn terminal_radius(&self) -> Option<f64> {
-        None
     }
 }
 
@@ -263,7 +263,7 @@ impl Dlmpc {
         let start = [measured - self.rates.references[0].angles];
         memory.plan.errors(&self.rates.references, &mut self.previous);
         let previous = (!first).then_some((&self.previous, &memory.plan.multipliers[..]));
-        let mut report = self.optimiser.optimise(&mut self.rates, &start, &self.affine, previous);
+        let mut report = self.optimiser.optimise(&self.rates, &start, &self.affine, previous);
         if report.status == Status::Fallback {
             self.track(&mut memory.plan, measured);
             memory.plan.errors(&self.rates.references, &mut self.previous);

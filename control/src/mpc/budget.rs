@@ -1,6 +1,6 @@
 //! Limits of one optimisation: computing time, and iterations of all solvers together.
 
-use super::optimiser::SolverSettings;
+use super::settings::SolverSettings;
 use std::time::{Duration, Instant};
 
 /// The cone solver is started only if the remaining time is at least this many times the elapsed

@@ -1,7 +1,8 @@
 //! Proof that a motion is the optimum. It is evaluated independently of the solvers; only the
 //! multipliers come from them.
 
-use super::problem::{Balls, Constraints, Motion, Problem, Solution, Start, State, dot};
+use super::balls::{Balls, Constraints};
+use super::problem::{Motion, Problem, Solution, Start, State, dot};
 use nalgebra::Vector3;
 
 /// Residuals of the conditions of Karush, Kuhn and Tucker, with the constraints as functions of the

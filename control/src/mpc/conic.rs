@@ -4,36 +4,18 @@
 //! The unknowns are the scaled errors E_k, k = 0..=N. The inputs are eliminated, as the error of
 //! the last derivative changes by h v_k = E_{k+1} − E_k − d_k.
 
-use super::problem::{Balls, Cost, Frozen, Outcome, Problem, Solution, Start, of_axis};
+use super::balls::{Balls, Frozen};
+use super::layout::Layout;
+use super::problem::{Outcome, Problem, Solution, Start, of_axis};
 use crate::conic_program::{ConicProgram, Optimum, Triplets};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT, ZeroConeT};
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
-
-/// The parts of the problem that do not change between samples.
-#[derive(Clone, Debug)]
-pub struct Structure<const O: usize> {
-    /// Chain of integrators with its matrices A and B.
-    pub chain: super::Chain<O>,
-    /// Weights of the quadratic cost.
-    pub cost: Cost<O>,
-    /// Number of intervals of the horizon.
-    pub horizon: usize,
-    /// Whether the states have balls of their own.
-    pub state_balls: bool,
-    /// Whether the last state must lie in the terminal ball.
-    pub terminal: bool,
-    /// Normals of the set of admissible initial states; `None` if the initial state is given.
-    pub start: Option<[Vec<SVector<f64, O>>; 3]>,
-    /// Typical sizes of the errors, by which the unknowns are scaled.
-    pub scale: [f64; O],
-    /// Largest number of iterations of one solution.
-    pub max_iterations: u32,
-}
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 /// The cone program together with its solver.
 pub struct ConicSolver<const O: usize> {
-    structure: Structure<O>,
+    layout: Layout<O>,
+    max_iterations: u32,
     program: ConicProgram,
     /// Positions of each stage's ball coefficients in the matrix, and of its rows in the right
     /// side.
@@ -57,8 +39,8 @@ impl<const O: usize> ConicSolver<O> {
     /// # Errors
     /// Returns the solver's own message if it refuses the data, for example weights that are not
     /// positive semidefinite.
-    pub fn new(structure: Structure<O>) -> Result<Self, String> {
-        let Structure { chain, horizon: n, scale, .. } = &structure;
+    pub fn new(layout: Layout<O>, max_iterations: u32) -> Result<Self, String> {
+        let Layout { chain, horizon: n, scale, .. } = &layout;
         let n = *n;
         let column = |k: usize, i: usize, axis: usize| 3 * (O * k + i) + axis;
         let top = O - 1;
@@ -85,7 +67,7 @@ impl<const O: usize> ConicSolver<O> {
             cones.push(ZeroConeT(row));
         }
         let start_row = row;
-        match &structure.start {
+        match &layout.start {
             None => {
                 for i in 0..3 * O {
                     a.push(row, i, 1.0);
@@ -117,13 +99,13 @@ impl<const O: usize> ConicSolver<O> {
             cones.push(SecondOrderConeT(4));
             slots
         };
-        let stages = if structure.state_balls { n } else { 0 };
+        let stages = if layout.state_balls { n } else { 0 };
         let mut state_slots: Vec<Slots<O>> = (1..=stages).map(|k| ball(&mut a, k, false)).collect();
         let mut input_slots: Vec<Slots<O>> = (0..n).map(|k| ball(&mut a, k, true)).collect();
-        let terminal_row = structure.terminal.then(|| {
+        let terminal_row = layout.terminal.then(|| {
             // Terminal ball ‖Lᵀ E_N‖ ≤ ε with G = L Lᵀ, divided by the scale.
             for axis in 0..3 {
-                let root = square_root(&of_axis(&structure.cost.end, axis));
+                let root = square_root(&of_axis(&layout.cost.end, axis));
                 for i in 0..O {
                     for j in 0..O {
                         a.push(
@@ -151,9 +133,9 @@ impl<const O: usize> ConicSolver<O> {
         for slots in state_slots.iter().chain(&input_slots) {
             right_side[slots.row] = 1.0;
         }
-        let cost = cost_matrix(&structure);
-        let program = ConicProgram::new(cost, matrix, right_side, &cones, structure.max_iterations)?;
-        Ok(Self { structure, program, state_slots, input_slots, start_row, terminal_row })
+        let cost = cost_matrix(&layout);
+        let program = ConicProgram::new(cost, matrix, right_side, &cones, max_iterations)?;
+        Ok(Self { layout, max_iterations, program, state_slots, input_slots, start_row, terminal_row })
     }
 
     /// Solves `problem` within the given number of iterations and time (s). The motion in
@@ -165,8 +147,8 @@ impl<const O: usize> ConicSolver<O> {
         (iterations, seconds): (u32, f64),
     ) -> Outcome {
         self.update(problem);
-        self.program.limit(iterations.min(self.structure.max_iterations), seconds);
-        let Structure { chain, scale, horizon: n, .. } = &self.structure;
+        self.program.limit(iterations.min(self.max_iterations), seconds);
+        let Layout { chain, scale, horizon: n, .. } = &self.layout;
         let (found, iterations) = self.program.solve();
         let Some(Optimum { x, duals }) = found else { return Outcome::Failed(iterations) };
         let Solution { motion, multipliers } = solution;
@@ -214,7 +196,7 @@ impl<const O: usize> ConicSolver<O> {
     }
 
     fn update(&mut self, problem: &Problem<O, Frozen<O>>) {
-        let Structure { chain, cost, scale, .. } = &self.structure;
+        let Layout { chain, cost, scale, .. } = &self.layout;
         let top = O - 1;
         let h = chain.step;
         self.program.linear_cost.fill(0.0);
@@ -309,8 +291,8 @@ fn square_root<const O: usize>(g: &SMatrix<f64, O, O>) -> SMatrix<f64, O, O> {
 }
 
 /// Returns P of ½ xᵀP x for the cost Σ EᵀW E + V/h² (ΔE)² + E_NᵀG E_N: upper triangle, scaled.
-fn cost_matrix<const O: usize>(structure: &Structure<O>) -> CscMatrix<f64> {
-    let Structure { chain, cost, horizon: n, scale, .. } = structure;
+fn cost_matrix<const O: usize>(layout: &Layout<O>) -> CscMatrix<f64> {
+    let Layout { chain, cost, horizon: n, scale, .. } = layout;
     let (top, h2) = (O - 1, chain.step * chain.step);
     let mut triplets = Triplets::default();
     for k in 0..=*n {

@@ -1,8 +1,8 @@
 //! Finite-horizon linear-quadratic optimum: the problem without balls. Gains and weights depend on
 //! the cost alone and are computed once; the affine terms cost one sweep per sample.
 
-use super::problem::{Chain, Cost, Motion, PerAxis, State, apply, dot, of_axis, per_axis, zero_state};
-use nalgebra::{SMatrix, SVector, Vector3};
+use super::problem::{Chain, Cost, Motion, PerAxis, State, apply, of_axis, per_axis, zero_state};
+use nalgebra::{SMatrix, Vector3};
 
 /// One stage of the backward recursion, v = K E − M⁻¹Bᵀ(P⁺d + p⁺).
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +45,7 @@ pub struct Unconstrained<const O: usize> {
 }
 
 /// Computes a matrix for each axis with ordinary matrices; used only at construction.
-fn each_axis<const O: usize>(f: impl Fn(usize) -> SMatrix<f64, O, O>) -> PerAxis<O> {
+fn each_axis<const O: usize>(mut f: impl FnMut(usize) -> SMatrix<f64, O, O>) -> PerAxis<O> {
     per_axis(&[f(0), f(1), f(2)])
 }
 
@@ -68,17 +68,6 @@ impl<const O: usize> Unconstrained<O> {
                 let next: SMatrix<f64, O, O> = of_axis(&gain.next_weight, axis);
                 let curvature = cost.input[axis] + b.dot(&(next * b));
                 let feedback = -(b.transpose() * next * a) / curvature;
-                information(axis) + a.transpose() * next * (a + b * feedback)
-            });
-            // P is symmetric up to rounding; the sum with its transpose removes the error.
-            weight = each_axis(|axis| {
-                let full: SMatrix<f64, O, O> = of_axis(&weight, axis);
-                (full + full.transpose()) * 0.5
-            });
-            for axis in 0..3 {
-                let next: SMatrix<f64, O, O> = of_axis(&gain.next_weight, axis);
-                let curvature = cost.input[axis] + b.dot(&(next * b));
-                let feedback = -(b.transpose() * next * a) / curvature;
                 let closed_loop = a + b * feedback;
                 for i in 0..O {
                     gain.feedback[i][axis] = feedback[i];
@@ -87,7 +76,10 @@ impl<const O: usize> Unconstrained<O> {
                         gain.closed_loop_transposed[i][j][axis] = closed_loop[(j, i)];
                     }
                 }
-            }
+                // P is symmetric up to rounding; the sum with its transpose removes the error.
+                let full = information(axis) + a.transpose() * next * closed_loop;
+                (full + full.transpose()) * 0.5
+            });
             gains.push(gain);
         }
         gains.reverse();
@@ -108,13 +100,9 @@ impl<const O: usize> Unconstrained<O> {
                 (next + next.transpose()) * 0.5
             });
             // The first nonzero Π has rank one, but then the state before it is known anyway.
-            let smoother = each_axis(|axis| {
-                of_axis(&next, axis)
-                    .try_inverse()
-                    .map_or_else(SMatrix::zeros, |inverse| counted(axis) * a.transpose() * inverse)
-            });
             let next_weight =
                 each_axis(|axis| of_axis(&next, axis).try_inverse().unwrap_or_else(SMatrix::zeros));
+            let smoother = each_axis(|axis| counted(axis) * a.transpose() * of_axis(&next_weight, axis));
             arrivals.push(Arrival { discount, smoother, next_weight });
             spread = next;
         }
@@ -233,57 +221,6 @@ impl<const O: usize> Unconstrained<O> {
             motion.inputs[j] = moved / self.chain.step;
         }
     }
-
-    /// Writes the optimum from `start` with ‖E_N‖_G = `radius` into `motion` and returns its
-    /// multiplier for half the cost. It applies to a start whose optimum without balls ends
-    /// outside; the result is `None` if no solution is found.
-    ///
-    /// The end minimises (E − Ē)ᵀΠ⁻¹(E − Ē) + EᵀG E, so that (Π⁻¹ + (1 + λ)G) E = Π⁻¹Ē. As 1/‖E‖_G
-    /// is nearly linear in λ, a secant method finds λ in a few steps.
-    pub fn solve_onto_terminal_ball(
-        &mut self,
-        start: &State<O>,
-        affine: &[State<O>],
-        radius: f64,
-        motion: &mut Motion<O>,
-    ) -> Option<f64> {
-        let n = self.arrivals.len();
-        if n < O {
-            return None;
-        }
-        self.arrive(start, affine);
-        let (weight, mean) = self.arrival(n);
-        let pull = apply(weight, &mean);
-        let end_of = |lambda: f64| -> Option<(State<O>, f64)> {
-            let mut end = zero_state();
-            for axis in 0..3 {
-                let sum: SMatrix<f64, O, O> =
-                    of_axis(weight, axis) + of_axis(&self.end, axis) * (1.0 + lambda);
-                let solution = sum.try_inverse()? * SVector::<f64, O>::from_fn(|i, _| pull[i][axis]);
-                for (i, slot) in end.iter_mut().enumerate() {
-                    slot[axis] = solution[i];
-                }
-            }
-            let norm = dot(&end, &apply(&self.end, &end)).sqrt();
-            Some((end, radius / norm - 1.0))
-        };
-
-        let (mut lambda, mut excess) = (0.0, end_of(0.0)?.1);
-        let mut next = 1.0;
-        for _ in 0..SECANT_STEPS {
-            let (end, left) = end_of(next)?;
-            if left.abs() <= SECANT_TOLERANCE {
-                motion.states[n] = end;
-                self.trace_back(n, affine, motion);
-                motion.roll_out(&self.chain, affine);
-                return Some(next * radius * radius);
-            }
-            let slope = (left - excess) / (next - lambda);
-            (lambda, excess) = (next, left);
-            next = (lambda - left / slope).max(0.0);
-        }
-        None
-    }
 }
 
 /// Returns the costate P⁺d + p⁺ behind a stage.
@@ -292,22 +229,18 @@ fn costate<const O: usize>(gain: &Gain<O>, next_slope: &State<O>, d: &State<O>) 
     std::array::from_fn(|i| next_slope[i] + moved[i])
 }
 
-/// Limits of the secant search for λ.
-const SECANT_STEPS: usize = 30;
-const SECANT_TOLERANCE: f64 = 1e-12;
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
-    use nalgebra::{DMatrix, DVector};
+    use nalgebra::{DMatrix, DVector, SVector};
 
-    const N: usize = 20;
+    pub(in crate::mpc) const N: usize = 20;
 
-    fn chain<const O: usize>() -> Chain<O> {
+    pub(in crate::mpc) fn chain<const O: usize>() -> Chain<O> {
         Chain::new(0.2)
     }
 
-    fn cost<const O: usize>() -> Cost<O> {
+    pub(in crate::mpc) fn cost<const O: usize>() -> Cost<O> {
         let end = SMatrix::<f64, O, O>::from_fn(|i, j| if i == j { 80.0 - 40.0 * i as f64 } else { 30.0 });
         Cost {
             state: std::array::from_fn(|i| Vector3::new(10.0, 7.0, 3.0) / (1.0 + i as f64)),
@@ -316,19 +249,19 @@ mod tests {
         }
     }
 
-    fn start<const O: usize>() -> State<O> {
+    pub(in crate::mpc) fn start<const O: usize>() -> State<O> {
         std::array::from_fn(|i| Vector3::new(0.1, -0.2, 0.05) / (1.0 + i as f64))
     }
 
     /// Affine terms with a jump at stage 13.
-    fn affine<const O: usize>() -> Vec<State<O>> {
+    pub(in crate::mpc) fn affine<const O: usize>() -> Vec<State<O>> {
         let d = |k: usize| if k == 13 { 0.08 } else { 1e-3 * k as f64 };
         (0..N)
             .map(|k| std::array::from_fn(|i| Vector3::new(d(k), -d(k), 0.5 * d(k)) / (1.0 + i as f64)))
             .collect()
     }
 
-    fn optimum<const O: usize>() -> (Unconstrained<O>, Motion<O>) {
+    pub(in crate::mpc) fn optimum<const O: usize>() -> (Unconstrained<O>, Motion<O>) {
         let mut lq = Unconstrained::new(N, &chain(), &cost());
         let mut motion = Motion::new(N);
         lq.solve(&start(), &affine(), &mut motion);
@@ -337,7 +270,7 @@ mod tests {
 
     /// Slope of the cost in every input, by differences of the cost of the resulting motion. They
     /// are exact for a quadratic.
-    fn slopes<const O: usize>(motion: &Motion<O>, terminal: f64) -> DVector<f64> {
+    pub(in crate::mpc) fn slopes<const O: usize>(motion: &Motion<O>, terminal: f64) -> DVector<f64> {
         let (chain, affine) = (chain(), affine());
         let mut cost = cost::<O>();
         let value = |cost: &Cost<O>, motion: &Motion<O>, i: usize, change: f64| {
@@ -409,20 +342,5 @@ mod tests {
     fn oracle_parts_of_the_horizon_give_the_optimum_of_the_whole() {
         assert_parts_give_the_whole::<1>();
         assert_parts_give_the_whole::<2>();
-    }
-
-    #[test]
-    fn oracle_the_terminal_ball_adds_its_multiplier_to_the_end() {
-        let (mut lq, motion) = optimum::<2>();
-        let norm = cost().end_square(&motion.states[N]).sqrt();
-        for share in [0.99, 0.5, 0.01] {
-            let radius = share * norm;
-            let mut onto = Motion::new(N);
-            let multiplier = lq.solve_onto_terminal_ball(&start(), &affine(), radius, &mut onto).unwrap();
-            assert!(multiplier > 0.0);
-            assert!((cost().end_square(&onto.states[N]).sqrt() - radius).abs() < 1e-9 * radius);
-            let slope = slopes(&onto, multiplier / (radius * radius)).amax();
-            assert!(slope < 1e-8, "{share}: {slope}");
-        }
     }
 }

@@ -1,6 +1,7 @@
-//! The structured problem: chains of integrators, quadratic cost and ball constraints.
+//! The structured problem: chains of integrators, quadratic cost, and the conditions on both ends.
+//! Its balls are in [`super::balls`].
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, SVector, Vector3};
 
 /// The tracking error of one stage: the errors of the three axes, then those of their derivatives
 /// up to order O − 1.
@@ -115,140 +116,6 @@ pub(super) fn dot<const O: usize>(a: &State<O>, b: &State<O>) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 
-/// A ball ‖y(E, v)‖ ≤ 1 at a point, with y and its derivatives, all divided by the bound.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ball<const O: usize> {
-    /// Value of y at the point.
-    pub value: Vector3<f64>,
-    /// Derivative of y by the state, ∂y/∂E.
-    pub by_state: [Matrix3<f64>; O],
-    /// Derivative of y by the input, ∂y/∂v.
-    pub by_input: Matrix3<f64>,
-}
-
-impl<const O: usize> Default for Ball<O> {
-    fn default() -> Self {
-        Self { value: Vector3::zeros(), by_state: [Matrix3::zeros(); O], by_input: Matrix3::zeros() }
-    }
-}
-
-impl<const O: usize> Ball<O> {
-    /// Returns y at a changed state and input; exact if y is linear.
-    fn at(&self, state: &State<O>, input: &Vector3<f64>) -> Vector3<f64> {
-        self.value + self.change(state, input)
-    }
-
-    /// Returns the linear change of y for a change of state and input.
-    pub fn change(&self, state: &State<O>, input: &Vector3<f64>) -> Vector3<f64> {
-        self.by_state.iter().zip(state).fold(self.by_input * input, |sum, (by, e)| sum + by * e)
-    }
-}
-
-/// The balls that constrain the state and the input of one stage.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Balls<const O: usize> {
-    /// Ball on the state alone, for k = 1..=N; zero if there is none.
-    pub state: Ball<O>,
-    /// Ball on state and input, for k = 0..N.
-    pub input: Ball<O>,
-}
-
-/// The ball constraints of a problem, one state ball and one input ball for each stage.
-pub trait Constraints<const O: usize> {
-    /// Returns whether the sizes of the balls follow the evaluated motion. The derivatives of the
-    /// sizes are left out.
-    fn follows(&self) -> bool {
-        false
-    }
-
-    /// Returns whether the states have balls of their own.
-    fn has_state_balls(&self) -> bool;
-
-    /// Returns the balls of stage `k` at (E_k, v_k) with their derivatives. The balls on E_0 and on
-    /// v_N are not used.
-    fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> Balls<O>;
-
-    /// Returns only the two values ‖y‖², of the state ball and of the input ball.
-    fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> (f64, f64) {
-        let Balls { state, input } = self.balls(k, state, input);
-        (state.value.norm_squared(), input.value.norm_squared())
-    }
-}
-
-/// A view of constraints that starts at stage `first`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct From<'a, C> {
-    pub constraints: &'a C,
-    pub first: usize,
-}
-
-impl<const O: usize, C: Constraints<O>> Constraints<O> for From<'_, C> {
-    fn has_state_balls(&self) -> bool {
-        self.constraints.has_state_balls()
-    }
-
-    fn follows(&self) -> bool {
-        self.constraints.follows()
-    }
-
-    fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> Balls<O> {
-        self.constraints.balls(self.first + k, state, input)
-    }
-
-    fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> (f64, f64) {
-        self.constraints.squares(self.first + k, state, input)
-    }
-}
-
-/// Constraints that are linearised about a motion: ‖c + J_E E_k + J_v v_k‖ ≤ 1.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Frozen<const O: usize> {
-    /// Values at E = 0 and v = 0 with derivatives, for k = 0..=N.
-    balls: Vec<Balls<O>>,
-    state_balls: bool,
-}
-
-impl<const O: usize> Frozen<O> {
-    /// Allocates linearised constraints for `horizon` intervals.
-    pub fn new(horizon: usize) -> Self {
-        Self { balls: vec![Balls::default(); horizon + 1], state_balls: true }
-    }
-
-    /// Linearises `constraints` about `motion`.
-    pub fn set(&mut self, constraints: &impl Constraints<O>, motion: &Motion<O>) {
-        self.state_balls = constraints.has_state_balls();
-        for (k, balls) in self.balls.iter_mut().enumerate() {
-            let state = &motion.states[k];
-            let input = motion.inputs.get(k).copied().unwrap_or_default();
-            *balls = constraints.balls(k, state, &input);
-            balls.state.value -= balls.state.change(state, &Vector3::zeros());
-            balls.input.value -= balls.input.change(state, &input);
-        }
-    }
-
-    pub(super) fn stages(&self) -> &[Balls<O>] {
-        &self.balls
-    }
-}
-
-impl<const O: usize> Constraints<O> for Frozen<O> {
-    fn has_state_balls(&self) -> bool {
-        self.state_balls
-    }
-
-    fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> Balls<O> {
-        let mut balls = self.balls[k];
-        balls.state.value = balls.state.at(state, &Vector3::zeros());
-        balls.input.value = balls.input.at(state, input);
-        balls
-    }
-
-    fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> (f64, f64) {
-        let Balls { state: of_state, input: of_input } = &self.balls[k];
-        (of_state.at(state, &Vector3::zeros()).norm_squared(), of_input.at(state, input).norm_squared())
-    }
-}
-
 /// Condition on the first state of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start<'a, const O: usize> {
@@ -295,6 +162,14 @@ pub struct Problem<'a, const O: usize, C> {
     pub constraints: &'a C,
     /// Cost of the last state E_N, with its terminal ball.
     pub end: End<'a, O>,
+}
+
+impl<'a, const O: usize, C> Problem<'a, O, C> {
+    /// Returns the problem with other balls.
+    pub(super) fn with<D>(&self, constraints: &'a D) -> Problem<'a, O, D> {
+        let Self { chain, cost, start, affine, end, .. } = *self;
+        Problem { chain, cost, start, affine, constraints, end }
+    }
 }
 
 /// A motion of the tracking error over the horizon.

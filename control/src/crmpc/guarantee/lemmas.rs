@@ -1,6 +1,6 @@
 //! The numbers on which the guarantee rests, for its machine check.
 
-use super::super::design::Settings;
+use super::super::settings::Settings;
 use super::{
     BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Dynamics, Parts, TURN, TURN_OF_RATES, bearing,
     gyroscopic,

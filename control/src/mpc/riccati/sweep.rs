@@ -1,6 +1,7 @@
 //! One stage of the Riccati recursion of a chain of integrators, in 3×3 blocks.
 
-use super::problem::{Ball, Chain, State, zero_state};
+use crate::mpc::balls::Ball;
+use crate::mpc::problem::{Chain, State, zero_state};
 use nalgebra::{Matrix3, Vector3};
 
 /// A symmetric matrix on a state, in 3×3 blocks. Only the blocks on and above the diagonal are

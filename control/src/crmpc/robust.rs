@@ -1,0 +1,232 @@
+//! The robust set: bounds on ‖ω̃‖ and ‖m̃‖ about a motion, for which the limits hold whatever the
+//! error dynamics do (docs/guarantee.md).
+
+use super::design::Design;
+use super::guarantee::{self, Dynamics};
+use super::settings::Settings;
+use crate::linearise::{self, BodyMotion, InverseKinematics, Linear, Linearisation};
+use crate::mpc::Motion;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use std::cell::OnceCell;
+use vehicle::dynamics::RigidBody;
+use vehicle::reference::Reference;
+
+/// The robust set: the data from which its bounds follow.
+#[derive(Clone, Debug)]
+pub(super) struct Robust {
+    pub settings: Settings,
+    pub design: Design,
+    pub dynamics: Dynamics,
+    /// Feedback ticks since the nominal motion began at the measured state.
+    pub age: usize,
+    /// Applied share of the tightening; below 1 only for best effort.
+    pub share: f64,
+}
+
+/// Share of the limits that the bounds of the robust set leave free, and that the check of a motion
+/// may use. It is needed because the bounds of an optimum are those about a neighbouring motion.
+const RESERVE: f64 = 1e-3;
+/// Share of a limit that replaces an empty set in the optimisation, which needs balls with an
+/// interior. No plan within it is certified.
+const EMPTY: f64 = 1e-3;
+
+/// Bounds of one interval, and the norms to which they apply. A bound is negative where nothing is
+/// left of its limit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interval {
+    /// Norm of the body rates at the interval's end, ‖ω̃‖, and its bound, rad/s.
+    pub rate: f64,
+    pub rate_bound: f64,
+    /// Norm of the moment at the interval's start, ‖m̃‖, and its bound, N m.
+    pub moment: f64,
+    pub moment_bound: f64,
+}
+
+impl Interval {
+    /// Returns whether both norms keep their bounds, enlarged by these reserves.
+    pub(super) fn keeps(&self, (of_rate, of_moment): (f64, f64)) -> bool {
+        self.rate <= self.rate_bound + of_rate && self.moment <= self.moment_bound + of_moment
+    }
+}
+
+/// Margins that the first interval of a plan leaves to the limits, beyond the reserve for
+/// deviations from the plan, as shares of the limits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Margins {
+    /// Margin to the rate limit at the interval's end.
+    pub rate: f64,
+    /// Margin to the moment limit in the interval.
+    pub moment: f64,
+}
+
+/// One stage of a motion, with its kinematics on demand.
+pub(super) struct Point {
+    pub angles: Vector3<f64>,
+    /// Derivative of the angles, x_ω.
+    pub rates: Vector3<f64>,
+    /// Norm of the rates, ‖x_ω‖.
+    pub size: f64,
+    /// Acceleration a; zero at the last stage.
+    pub acceleration: Vector3<f64>,
+    /// Norm of the acceleration, ‖a‖.
+    pub pull: f64,
+    turned: OnceCell<InverseKinematics>,
+}
+
+impl Point {
+    pub(super) fn new(angles: Vector3<f64>, rates: Vector3<f64>, acceleration: Vector3<f64>) -> Self {
+        let (size, pull) = (rates.norm(), acceleration.norm());
+        Self { angles, rates, size, acceleration, pull, turned: OnceCell::new() }
+    }
+
+    pub(super) fn at(references: &[Reference], motion: &Motion<2>, k: usize) -> Self {
+        let Reference { angles, rates, accelerations } = &references[k];
+        let acceleration = motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input);
+        Self::new(angles + motion.states[k][0], rates + motion.states[k][1], acceleration)
+    }
+
+    /// Returns W, which is computed at its first use.
+    pub(super) fn turned(&self) -> &InverseKinematics {
+        self.turned.get_or_init(|| InverseKinematics::at(&self.angles))
+    }
+
+    pub(super) fn motion(&self, body: &RigidBody) -> BodyMotion {
+        self.turned().motion(body, &self.rates)
+    }
+}
+
+impl Robust {
+    pub(super) fn new(settings: &Settings, design: &Design) -> Self {
+        let dynamics = Dynamics::new(settings);
+        Self { settings: *settings, design: design.clone(), dynamics, age: 0, share: 1.0 }
+    }
+
+    /// Returns the parts of the rate limit and of the moment limit that the bounds leave free.
+    pub(super) fn reserves(&self) -> (f64, f64) {
+        (RESERVE * self.settings.limit_rate, RESERVE * self.settings.limit_moment)
+    }
+
+    /// Returns the bounds on ‖ω̃‖ and ‖m̃‖, enlarged where the set is empty.
+    pub(super) fn nonempty(&self, (rate, moment): (f64, f64)) -> (f64, f64) {
+        let Settings { limit_rate, limit_moment, .. } = self.settings;
+        (rate.max(EMPTY * limit_rate), moment.max(EMPTY * limit_moment))
+    }
+
+    /// Returns the bounds on ‖ω̃‖ and ‖m̃‖ of stage `k` about the linearised motion there.
+    pub(super) fn bounds_at(&self, k: usize, at: &Linearisation, here: &Point) -> (f64, f64) {
+        let moment = if k < self.settings.horizon {
+            self.moment_bound_about(k, &at.moment, here, self.moment_after(here))
+        } else {
+            f64::INFINITY
+        };
+        (self.rate_bound(k, at.rates.by_angles.norm(), here, here), moment)
+    }
+
+    /// Returns ‖m̃‖ at the end of an interval that begins at `here`, with a held, N m.
+    fn moment_after(&self, here: &Point) -> f64 {
+        let Settings { body, period_optimisation: h, .. } = &self.settings;
+        let Point { angles, rates, acceleration: a, .. } = here;
+        let angles = angles + (rates + a * (0.5 * h)) * *h;
+        linearise::moment(body, &angles, &(rates + a * *h), a).norm()
+    }
+
+    /// Returns the bounds of interval `k` about the motion, with the norms.
+    pub(super) fn interval(&self, k: usize, here: &Point, next: &Point) -> Interval {
+        let body = &self.settings.body;
+        let at = here.turned().linearise(body, &here.rates, &here.acceleration).moment;
+        let after = next.motion(body);
+        let moment_after = after.moment(&here.acceleration).norm();
+        Interval {
+            rate: after.rates.norm(),
+            rate_bound: self.rate_bound(k + 1, norm_of_columns(&after.rates_by_angles), next, here),
+            moment: at.value.norm(),
+            moment_bound: self.moment_bound_about(k, &at, here, moment_after),
+        }
+    }
+
+    /// Returns [`Self::moment_bound`] about a linearised moment.
+    fn moment_bound_about(&self, k: usize, at: &Linear, here: &Point, after: f64) -> f64 {
+        let feedback = largest_over_box(&at.by_acceleration);
+        let slopes = (at.by_angles.norm(), at.by_rates.norm());
+        self.moment_bound(k, at.value.norm(), after, feedback, slopes, here)
+    }
+
+    /// Returns the feedback ticks from the beginning of the nominal motion to prediction step `k`.
+    fn tick(&self, k: usize) -> usize {
+        self.age + k * self.design.ratio
+    }
+
+    pub(super) fn deviation(&self, k: usize) -> &guarantee::Deviation {
+        self.design.tightening.at(self.tick(k))
+    }
+
+    /// Returns the bound on ‖ω̃‖ at prediction step k for which ‖ω‖ keeps its limit there and in
+    /// the intervals before and after, whatever the error dynamics do. `by_angles` is the norm of
+    /// ∂ω/∂(α, β), and `before` is the point before.
+    pub(super) fn rate_bound(&self, k: usize, by_angles: f64, here: &Point, before: &Point) -> f64 {
+        let Settings { limit_rate, limit_moment, period_optimisation: h, horizon, .. } = self.settings;
+        let reserve = self.reserves().0;
+        // Between two steps ‖ω̃‖ may exceed both values by h²/8 times its second derivative. The
+        // optimisation does not know the point before, so both accelerations are replaced by one
+        // that is rarely exceeded. The bound is then the same in the optimisation and in the check
+        // of its result.
+        let typical = limit_moment / self.design.largest_inertia;
+        let a = here.pull.max(before.pull).max(typical);
+        let size = here.size + 2.0 * h * a;
+        let curved = 0.125 * h * h * Dynamics::rate_curvature(size, a);
+        let loss = self.design.tightening.rate_loss(self.tick(k)).at(by_angles, here.size) + curved;
+        let bound = limit_rate - reserve - self.share * loss;
+        // This uses ‖x̃_ω‖ ≤ sec β ‖ω̃‖.
+        if k == horizon {
+            bound.min(self.design.assessment.terminal_rate * here.angles.y.cos() - reserve)
+        } else {
+            bound
+        }
+    }
+
+    /// Returns the bound on ‖m̃‖ at the start of prediction interval k for which ‖m‖ keeps its
+    /// limit at each of its feedback ticks. With a held, ‖m̃‖ moves from `value` to `after` within
+    /// the interval. `feedback` is the largest ‖I R⁻¹ s‖ over the corners s of the shape, and
+    /// `slopes` are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖.
+    pub(super) fn moment_bound(
+        &self,
+        k: usize,
+        value: f64,
+        after: f64,
+        feedback: f64,
+        slopes: (f64, f64),
+        here: &Point,
+    ) -> f64 {
+        let Settings { limit_moment, period_optimisation: h, .. } = self.settings;
+        let a = here.pull;
+        let size = here.size + h * a;
+        let by_angles = self.design.largest_inertia * guarantee::TURN * 3.0_f64.sqrt();
+        let loss = self.design.tightening.moment_loss(self.tick(k));
+        let loss = loss.at((feedback, by_angles), slopes, (size, a));
+        let within = (after - value).max(0.0) + 0.125 * h * h * self.dynamics.moment_curvature(size, a);
+        limit_moment - self.reserves().1 - self.share * loss - within
+    }
+
+    /// Returns the margins of the first interval.
+    pub(super) fn margins(&self, first: &Point, second: &Point) -> Margins {
+        let Interval { rate, rate_bound, moment, moment_bound } = self.interval(0, first, second);
+        let Settings { limit_rate, limit_moment, .. } = self.settings;
+        let left = |bound: f64, value: f64, limit: f64| (bound - value) / limit + RESERVE;
+        Margins { rate: left(rate_bound, rate, limit_rate), moment: left(moment_bound, moment, limit_moment) }
+    }
+}
+
+/// Returns the Frobenius norm of the matrix with these columns.
+pub(super) fn norm_of_columns(columns: &[Vector3<f64>; 2]) -> f64 {
+    (columns[0].norm_squared() + columns[1].norm_squared()).sqrt()
+}
+
+/// Returns max ‖M s‖ over |s_i| ≤ 1. The maximum is at a corner, where each product of two columns
+/// has the product of their signs.
+pub(super) fn largest_over_box(m: &Matrix3<f64>) -> f64 {
+    let [x, y, z] = std::array::from_fn(|i| m.column(i));
+    let (xy, xz, yz) = (x.dot(&y), x.dot(&z), y.dot(&z));
+    let products = (xy + xz + yz).max(xy - xz - yz).max(xz - xy - yz).max(yz - xy - xz);
+    (x.norm_squared() + y.norm_squared() + z.norm_squared() + 2.0 * products).sqrt()
+}

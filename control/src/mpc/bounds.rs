@@ -1,0 +1,121 @@
+//! The bounds of the balls. They are a value that a pure function computes from a motion and that
+//! the optimiser holds, or they follow the iterates of the solver.
+
+use super::balls::{Balls, Constraints};
+use super::problem::{Motion, State};
+use nalgebra::Vector3;
+use std::ops::Range;
+
+/// Largest norms that the balls allow at each stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bounds {
+    /// Bounds on the states of stages 0..=N; the first one has no effect.
+    pub state: Vec<f64>,
+    /// Bounds on the inputs of intervals 0..N.
+    pub input: Vec<f64>,
+}
+
+impl Bounds {
+    /// Returns no bounds for `horizon` intervals.
+    pub fn unlimited(horizon: usize) -> Self {
+        Self { state: vec![f64::INFINITY; horizon + 1], input: vec![f64::INFINITY; horizon] }
+    }
+
+    /// Sets the bounds of interval `k`: on the state at its end, and on its input.
+    pub fn set(&mut self, k: usize, (state, input): (f64, f64)) {
+        (self.state[k + 1], self.input[k]) = (state, input);
+    }
+
+    /// Returns the bounds of stage `k`; the last stage has no input.
+    fn at(&self, k: usize) -> (f64, f64) {
+        (self.state[k], self.input.get(k).copied().unwrap_or(f64::INFINITY))
+    }
+}
+
+/// The motion about which the bounds are computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum About {
+    /// A fixed motion.
+    #[default]
+    Motion,
+    /// The iterates of the solver. The derivatives of the bounds are left out.
+    Iterates,
+}
+
+/// The constraints of a controller: balls whose bounds are a function of the motion.
+pub trait Bounded<const O: usize> {
+    /// Returns whether the states have balls of their own.
+    fn has_state_balls(&self) -> bool;
+
+    /// Returns the balls of stage `k` at (E_k, v_k) with their derivatives. The bounds on state and
+    /// input are the given ones, or those about (E_k, v_k) itself (`None`).
+    fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>, bounds: Option<(f64, f64)>)
+    -> Balls<O>;
+
+    /// Returns only the two values ‖y‖², of the state ball and of the input ball.
+    fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>, bounds: (f64, f64)) -> (f64, f64);
+
+    /// Returns the range from the first to the last of the intervals `of` that `motion` violates
+    /// with the bounds about itself: by its input, or by its state at the interval's end.
+    ///
+    /// If the bounds depend on the motion, those of the satisfied intervals are written to
+    /// `bounds`. They may be smaller than those of [`Self::bounds_about`], where a smaller bound is
+    /// cheaper and suffices. Intervals between the first and the last violated one may be left out.
+    fn violated(&self, motion: &Motion<O>, of: Range<usize>, bounds: &mut Bounds) -> Option<Range<usize>>;
+
+    /// Computes the bounds of the intervals `of` about `motion`: for the input of each, and for the
+    /// state at its end. Bounds that do not depend on the motion need no implementation.
+    fn bounds_about(&self, _motion: &Motion<O>, _of: Range<usize>, _bounds: &mut Bounds) {}
+
+    /// Returns whether the bounds depend on the motion.
+    fn depends_on_motion(&self) -> bool {
+        false
+    }
+
+    /// Returns whether the bounds of a first optimisation follow its iterates. The solver then
+    /// satisfies the balls only as closely as the derivatives that are left out permit.
+    fn follows_at_first(&self) -> bool {
+        self.depends_on_motion()
+    }
+
+    /// Returns whether no motion from this start can satisfy the constraints. `false` leaves the
+    /// question open.
+    fn out_of_reach(&self, _start: &State<O>) -> bool {
+        false
+    }
+
+    /// Returns the radius ε of the terminal ball, if there is one.
+    fn terminal_radius(&self) -> Option<f64> {
+        None
+    }
+}
+
+/// The constraints with their bounds, from stage `first` on, as a solver receives them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Within<'a, B> {
+    pub bounded: &'a B,
+    pub bounds: &'a Bounds,
+    pub about: About,
+    pub first: usize,
+}
+
+impl<const O: usize, B: Bounded<O>> Constraints<O> for Within<'_, B> {
+    fn follows(&self) -> bool {
+        self.about == About::Iterates
+    }
+
+    fn has_state_balls(&self) -> bool {
+        self.bounded.has_state_balls()
+    }
+
+    fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> Balls<O> {
+        let k = self.first + k;
+        let fixed = (self.about == About::Motion).then(|| self.bounds.at(k));
+        self.bounded.balls(k, state, input, fixed)
+    }
+
+    fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> (f64, f64) {
+        let k = self.first + k;
+        self.bounded.squares(k, state, input, self.bounds.at(k))
+    }
+}

@@ -1,0 +1,64 @@
+//! Structure of an optimisation problem: what does not change between samples.
+
+use super::problem::{Chain, Cost, Motion};
+use nalgebra::SVector;
+use std::ops::Range;
+
+/// Structure of a controller's optimisation problem.
+#[derive(Clone, Debug)]
+pub struct Layout<const O: usize> {
+    /// Chain of integrators with its matrices A and B.
+    pub chain: Chain<O>,
+    /// Weights of the quadratic cost.
+    pub cost: Cost<O>,
+    /// Number of intervals of the horizon.
+    pub horizon: usize,
+    /// Whether the states have balls of their own.
+    pub state_balls: bool,
+    /// Whether the last state must lie in a terminal ball.
+    pub terminal: bool,
+    /// Normals of the set of admissible initial states; `None` if the initial state is given.
+    pub start: Option<[Vec<SVector<f64, O>>; 3]>,
+    /// Typical sizes of the errors and their derivatives.
+    pub scale: [f64; O],
+    /// Largest change of any error between passes at which the first optimisation has converged.
+    pub standstill: f64,
+}
+
+/// Smallest number of intervals that a window adds before and after the violated ones.
+pub(super) const MARGIN: usize = 3;
+/// Relative tolerance in the check of the terminal ball, for rounding.
+const CHECK_SLACK: f64 = 1e-9;
+
+impl<const O: usize> Layout<O> {
+    /// Returns `radius` if the motion ends outside the terminal ball.
+    pub(super) fn ends_outside(&self, motion: &Motion<O>, radius: Option<f64>) -> Option<f64> {
+        let square = self.cost.end_square(&motion.states[self.horizon]);
+        radius.filter(|radius| square > radius * radius * (1.0 + CHECK_SLACK))
+    }
+
+    /// Returns the violated intervals with a margin; with `terminal`, the range extends to the last
+    /// interval.
+    pub(super) fn window(&self, violated: Option<Range<usize>>, terminal: bool) -> Option<Range<usize>> {
+        let n = self.horizon;
+        let violated = match (violated, terminal) {
+            (Some(violated), true) => violated.start..n,
+            (None, true) => n..n,
+            (violated, false) => violated?,
+        };
+        Some(self.widen(&violated, MARGIN + violated.len() / 2))
+    }
+
+    /// Returns whether it pays to solve for these intervals alone, which may be at most three
+    /// quarters of the horizon.
+    pub(super) fn is_worth_a_window(&self, range: &Range<usize>) -> bool {
+        4 * range.len() <= 3 * self.horizon
+    }
+
+    /// Extends the range by `margin` intervals before and after.
+    fn widen(&self, range: &Range<usize>, margin: usize) -> Range<usize> {
+        let start = range.start.saturating_sub(margin);
+        // Fewer steps than the order cannot reach every state.
+        (if start < O { 0 } else { start })..(range.end + margin).min(self.horizon)
+    }
+}

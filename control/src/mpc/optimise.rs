@@ -1,0 +1,55 @@
+//! One optimisation: the shortcuts, then the interior point method over the whole horizon, then the
+//! cone solver.
+
+use super::bounds::{About, Bounded};
+use super::certificate::Certificate;
+use super::optimiser::{Optimiser, Report, Sample};
+use super::problem::{Motion, State};
+use super::search::Search;
+use super::shortcuts;
+use crate::report::Status;
+
+impl<const O: usize> Optimiser<O> {
+    /// Solves one optimisation from `start`. `previous` holds the earlier plan from the present
+    /// time on, with its multipliers. Without it, the bounds and the linearised balls are set about
+    /// each solution again until the solution stops changing.
+    pub fn optimise<B: Bounded<O>>(
+        &mut self,
+        bounded: &B,
+        start: &State<O>,
+        affine: &[State<O>],
+        previous: Option<(&Motion<O>, &[[f64; 2]])>,
+    ) -> Report {
+        let sample = Sample { bounded, start, affine, previous };
+        self.without_constraints(start, affine);
+        let outside = self.layout.ends_outside(&self.solution.motion, bounded.terminal_radius());
+        let mut search = Search { outside, ..Search::default() };
+        let shortcuts = self.settings.shortcuts && self.layout.start.is_none();
+        let status = shortcuts::in_order()
+            .into_iter()
+            .filter(|_| shortcuts)
+            .find_map(|shortcut| shortcut.optimum(self, &sample, &mut search))
+            .unwrap_or_else(|| self.over_whole_horizon(&sample, &mut search));
+        // The laws follow another plan in a fallback.
+        let found = status != Status::Fallback;
+        let certificate = if found { self.certificate(&sample, true) } else { Certificate::default() };
+        Report { status, iterations: search.iterations, certificate, settled: search.settled }
+    }
+
+    /// Finds the optimum by the solvers for the whole horizon.
+    fn over_whole_horizon<B: Bounded<O>>(&mut self, sample: &Sample<O, B>, search: &mut Search) -> Status {
+        self.prepare(sample, search);
+        if sample.previous.is_none() && self.settings.is_exact_riccati() {
+            if let Some(status) = self.settle(sample, search, Self::by_riccati) {
+                return status;
+            }
+            // From here on the bounds are those about the motion that the search has left.
+            self.about.clone_from(&self.solution.motion);
+            (search.about, search.pass) = (About::Motion, 0);
+        }
+        let by_any = |this: &mut Self, sample: &Sample<O, B>, search: &mut Search| {
+            this.by_riccati(sample, search).or_else(|| this.by_cone(sample, search))
+        };
+        self.settle(sample, search, by_any).unwrap_or(Status::Fallback)
+    }
+}

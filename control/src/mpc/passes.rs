@@ -1,0 +1,127 @@
+//! Passes of an optimisation. Each has the bounds (and linearised balls) about a fixed motion, or
+//! about the iterates: first about the previous plan, then about the optimum of the last pass.
+
+use super::bounds::{About, Bounded};
+use super::layout::MARGIN;
+use super::optimiser::{Optimiser, Sample};
+use super::problem::Solution;
+use super::search::Search;
+use super::settings::{Method, Nonlinearity};
+use crate::report::Status;
+use std::mem::replace;
+
+/// A multiplier counts as active above this share of the largest one.
+const ACTIVE: f64 = 1e-3;
+/// Largest number of passes until an optimum satisfies the bounds about itself.
+const SETTLING_PASSES: usize = 8;
+/// Largest number of passes until a first optimisation with linearised balls stands still.
+const FIRST_PASSES: usize = 20;
+
+impl<const O: usize> Optimiser<O> {
+    /// Chooses the first guess and the motion about which the first bounds are computed. This is
+    /// done once, by the first way that iterates.
+    pub(super) fn prepare<B: Bounded<O>>(&mut self, sample: &Sample<O, B>, search: &mut Search) {
+        if replace(&mut search.begun, true) {
+            return;
+        }
+        let is_given = self.layout.start.is_none();
+        search.hopeless = is_given && sample.bounded.out_of_reach(sample.start);
+        if search.hopeless {
+            return;
+        }
+        let Some((previous, active)) = sample.previous else {
+            self.about.clone_from(&self.solution.motion);
+            if self.settings.is_exact_riccati() && sample.bounded.follows_at_first() {
+                search.about = About::Iterates;
+            }
+            return;
+        };
+        self.about.clone_from(previous);
+        // Where the terminal ball is active, each sample has one more stage to reach it, and
+        // successive plans differ too much for a warm start.
+        if self.settings.method == Method::Riccati && is_given && search.outside.is_none() {
+            self.start_warm(sample, active, search);
+        }
+        self.about.states[0] = *sample.start;
+    }
+
+    /// Takes the previous plan and its multipliers as first guess if some of them are active in the
+    /// range to be solved. A window is extended by the active stages just beyond its end, as it
+    /// would otherwise have to grow.
+    fn start_warm<B>(&mut self, sample: &Sample<O, B>, active: &[[f64; 2]], search: &mut Search) {
+        let n = self.layout.horizon;
+        let mut range = search.window.clone().unwrap_or(0..n);
+        let more_than = |least: f64| move |&[state, input]: &[f64; 2]| state.max(input) > least;
+        if !active[range.clone()].iter().any(more_than(0.0)) {
+            return;
+        }
+        let largest = active.iter().flatten().copied().fold(0.0, f64::max);
+        let is_active = more_than(ACTIVE * largest);
+        while let Some(last) = active[range.end..(range.end + MARGIN).min(n)].iter().rposition(is_active) {
+            range.end += last + 1;
+        }
+        if let Some(window) = &mut search.window {
+            window.end = range.end;
+        }
+        // The motion must satisfy the chain over the whole range to be solved.
+        if !self.layout.is_worth_a_window(&range) {
+            search.window = None;
+            range = 0..n;
+        }
+        let Self { unconstrained, about, solution, .. } = self;
+        let Solution { motion, multipliers } = solution;
+        motion.states[range.start] = if range.start == 0 { *sample.start } else { about.states[range.start] };
+        unconstrained.track(range.start, range.end, about, sample.affine, motion);
+        for k in range {
+            [multipliers.state[k], multipliers.input[k]] = active[k];
+        }
+        search.warm = true;
+    }
+
+    /// Repeats `way` with the bounds (and linearised balls) about its last optimum until one is
+    /// final. Returns `None` as soon as `way` finds none.
+    pub(super) fn settle<B: Bounded<O>>(
+        &mut self,
+        sample: &Sample<O, B>,
+        search: &mut Search,
+        way: impl Fn(&mut Self, &Sample<O, B>, &mut Search) -> Option<Status>,
+    ) -> Option<Status> {
+        loop {
+            let status = way(self, sample, search)?;
+            search.pass += 1;
+            if self.is_final(sample, search) {
+                return Some(status);
+            }
+            search.warm = true;
+        }
+    }
+
+    /// Returns whether the optimum of a pass is final; otherwise `about` is set for the next pass.
+    fn is_final<B: Bounded<O>>(&mut self, sample: &Sample<O, B>, search: &mut Search) -> bool {
+        let Self { layout, settings, about, bounds, own, solution, .. } = self;
+        let motion = &solution.motion;
+        if sample.previous.is_some() && settings.nonlinearity == Nonlinearity::Frozen {
+            return true;
+        }
+        if sample.previous.is_none() && !settings.is_exact_riccati() {
+            let moved = about.distance(motion);
+            about.clone_from(motion);
+            return moved < layout.standstill || search.pass == FIRST_PASSES;
+        }
+        if replace(&mut search.about, About::Motion) == About::Iterates {
+            sample.bounded.bounds_about(motion, 0..layout.horizon, bounds);
+        }
+        // The intervals outside a window have already been checked.
+        let solved = search.window.clone().unwrap_or(0..layout.horizon);
+        search.settled =
+            !sample.bounded.depends_on_motion() || sample.bounded.violated(motion, solved, own).is_none();
+        if search.pass == 1 {
+            about.clone_from(motion);
+        } else {
+            // Where the bounds change more than the motion, whole steps would alternate between two
+            // motions.
+            about.halve_the_way_to(motion);
+        }
+        search.settled || search.pass == SETTLING_PASSES
+    }
+}

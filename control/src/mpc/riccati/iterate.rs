@@ -1,0 +1,47 @@
+//! The iterate of the interior point method.
+
+use super::pair::Pair;
+use super::stage::{Face, Stage};
+use super::sweep::Blocks;
+use crate::mpc::lq::Unconstrained;
+use crate::mpc::problem::{State, zero_state};
+use nalgebra::Matrix3;
+
+/// The optimum without balls that continues the motion after the last stage.
+pub struct Rest<'a, const O: usize> {
+    /// Solved optimum without balls over the whole horizon.
+    pub unconstrained: &'a Unconstrained<O>,
+    /// Affine terms d of the whole horizon.
+    pub affine: &'a [State<O>],
+}
+
+/// The solver with its iterate and scratch memory. Nothing is carried from one problem to the next.
+pub struct Riccati<const O: usize> {
+    pub(super) stages: Vec<Stage<O>>,
+    pub(super) terminal: Pair,
+    pub(super) faces: Vec<Face<O>>,
+    /// Weight P and slope p of the first stage.
+    pub(super) first: (Blocks<O>, State<O>),
+    /// Number of intervals of the present problem.
+    pub(super) horizon: usize,
+    pub(super) max_iterations: u32,
+}
+
+impl<const O: usize> Riccati<O> {
+    /// Allocates a solver for `horizon` intervals and at most `faces` normals of the initial set.
+    pub fn new(horizon: usize, faces: usize, max_iterations: u32) -> Self {
+        Self {
+            stages: vec![Stage::new(); horizon + 1],
+            terminal: Pair::default(),
+            faces: Vec::with_capacity(2 * faces),
+            first: ([[Matrix3::zeros(); O]; O], zero_state()),
+            horizon,
+            max_iterations,
+        }
+    }
+
+    /// Returns the number of intervals of the last problem.
+    pub fn horizon(&self) -> usize {
+        self.horizon
+    }
+}

@@ -1,0 +1,97 @@
+//! Primal-dual interior point method on the Riccati recursion. The numbers of equations are those
+//! of docs/solver.md.
+//!
+//! Balls are written c = ½(‖y‖² − 1) ≤ 0 with one slack s and one multiplier λ each. Every iterate
+//! satisfies the chain of integrators exactly, so that Newton's method is left with three
+//! residuals: stationarity of the inputs, c + s, and sλ. The Hessian contains the curvature of
+//! ½‖y‖² exactly; the curvature of y itself is left out (Gauss-Newton). Balls are left out while
+//! the motion stays well inside them. Every iterate is checked, and a ball enters the problem as
+//! soon as an iterate comes near it.
+
+mod direction;
+mod iterate;
+mod pair;
+mod progress;
+mod residuals;
+mod scaling;
+mod stage;
+mod start;
+mod step;
+mod sweep;
+
+pub use iterate::{Rest, Riccati};
+
+use super::balls::Constraints;
+use super::budget::Budget;
+use super::problem::{Outcome, Problem, Solution, Start};
+use direction::Direction;
+use pair::Pair;
+use progress::{Progress, give_up};
+
+impl<const O: usize> Riccati<O> {
+    /// Solves `problem`, which covers the stages of `solution` from `first` on. Their motion is the
+    /// first guess, which must satisfy the chain; it is replaced if the optimum is found. With a
+    /// `rest`, stages beyond the end that an iterate nearly violates are included in the problem.
+    pub fn solve<C: Constraints<O>>(
+        &mut self,
+        problem: &Problem<O, C>,
+        solution: &mut Solution<O>,
+        first: usize,
+        warm: bool,
+        budget: &mut Budget,
+        rest: Option<&Rest<O>>,
+    ) -> Outcome {
+        let problem = &mut Problem { ..*problem };
+        self.begin(problem, solution, first, warm);
+        let mut progress = Progress::new(problem.constraints.follows(), warm);
+        for iteration in 0..=self.max_iterations {
+            let residuals = self.residuals(problem);
+            if residuals.converged(progress.feasibility) {
+                self.write(problem, solution, first);
+                return Outcome::Solved(iteration);
+            }
+            if iteration == self.max_iterations || !budget.take() {
+                return Outcome::Failed(iteration);
+            }
+            if self.factor(problem).is_none() {
+                return give_up(iteration, &residuals);
+            }
+            let Direction { length, centre } = self.direction(problem, &residuals);
+            let length = match progress.damp(iteration, &residuals, length) {
+                Ok(length) => length,
+                Err(outcome) => return outcome,
+            };
+            self.step(problem, length);
+            if let Some(rest) = rest {
+                self.extend(problem, rest, first);
+            }
+            self.include_near(problem, centre, &residuals);
+        }
+        Outcome::Failed(self.max_iterations)
+    }
+
+    /// Writes the optimum into `solution`.
+    fn write<C: Constraints<O>>(&self, problem: &Problem<O, C>, solution: &mut Solution<O>, first: usize) {
+        let Solution { motion, multipliers } = solution;
+        let state_balls = problem.constraints.has_state_balls();
+        for (k, stage) in self.stages[..=self.horizon].iter().enumerate() {
+            let multiplier = |pair: &Pair| if pair.watched { pair.multiplier } else { 0.0 };
+            motion.states[first + k] = stage.state;
+            if k > 0 && state_balls {
+                multipliers.state[first + k - 1] = multiplier(&stage.state_pair);
+            }
+            if k < self.horizon {
+                motion.inputs[first + k] = stage.input;
+                multipliers.input[first + k] = multiplier(&stage.input_pair);
+            }
+        }
+        if problem.end.radius.is_some() {
+            multipliers.terminal = self.terminal.multiplier;
+        }
+        if let Start::Within(..) = problem.start {
+            multipliers.start = self.start_slope(problem, &|pair| pair.multiplier);
+            multipliers.start_gap =
+                self.faces.iter().map(|face| face.pair.multiplier * face.pair.c.abs()).sum();
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Scaling (5) of the balls, and factorisation (7) of the Newton system.
+
+use super::iterate::Riccati;
+use super::stage::Stage;
+use super::sweep::{Blocks, Gain, Quadratic};
+use crate::mpc::balls::Constraints;
+use crate::mpc::problem::{Problem, Start, zero_state};
+use nalgebra::{Matrix3, Vector3};
+
+impl<const O: usize> Stage<O> {
+    /// Adds the balls to the Hessian of the stage, (5).
+    fn add_balls(&self, quadratic: &mut Quadratic<O>) {
+        let Stage { balls, slopes, state_pair, input_pair, .. } = self;
+        if input_pair.watched {
+            quadratic.add_ball(&balls.input, &slopes.input, input_pair.multiplier, input_pair.scaling());
+        }
+        if state_pair.watched {
+            let (multiplier, scaling) = (state_pair.multiplier, state_pair.scaling());
+            quadratic.add_state_ball(&balls.state, &slopes.state, multiplier, scaling);
+        }
+    }
+}
+
+impl<const O: usize> Riccati<O> {
+    /// Runs the backward recursion (7) for P and the gains, on the Hessians (5). Returns `None` if
+    /// some M is not positive definite.
+    pub(super) fn factor<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> Option<()> {
+        let last = self.horizon;
+        let mut p = self.end_weight(problem);
+        for stage in self.stages[..last].iter_mut().rev() {
+            let mut quadratic = Quadratic::diagonal(&problem.cost.state, &problem.cost.input);
+            stage.add_balls(&mut quadratic);
+            stage.gain = Gain::factor(&quadratic, problem.chain, &mut p)?;
+        }
+        self.add_start_weight(problem, &mut p);
+        self.first.0 = p;
+        Some(())
+    }
+
+    /// Returns the weight P_N of the last stage, with its balls.
+    fn end_weight<C: Constraints<O>>(&self, problem: &Problem<O, C>) -> Blocks<O> {
+        let stage = &self.stages[self.horizon];
+        let mut quadratic = Quadratic::diagonal(&zero_state(), &Vector3::zeros());
+        let (mut weight, mut outer) = (1.0, 0.0);
+        if let Some(radius) = problem.end.radius {
+            weight += self.terminal.multiplier / (radius * radius);
+            outer = self.terminal.scaling() / radius.powi(4);
+        }
+        let slope = problem.end.weighted(&stage.state);
+        for i in 0..O {
+            for j in i..O {
+                quadratic.q[i][j] = Matrix3::from_diagonal(&(problem.end.weight[i][j] * weight))
+                    + slope[i] * outer * slope[j].transpose();
+            }
+        }
+        let pair = &stage.state_pair;
+        if pair.watched {
+            quadratic.add_state_ball(
+                &stage.balls.state,
+                &stage.slopes.state,
+                pair.multiplier,
+                pair.scaling(),
+            );
+        }
+        quadratic.q
+    }
+
+    /// Adds to P_0 the part of the conditions on the start.
+    fn add_start_weight<C>(&self, problem: &Problem<O, C>, p: &mut Blocks<O>) {
+        for face in &self.faces {
+            for i in 0..O {
+                for j in i..O {
+                    p[i][j][(face.axis, face.axis)] += face.pair.scaling() * face.normal[i] * face.normal[j];
+                }
+            }
+        }
+        if let Start::Arrival(weight, _) = &problem.start {
+            for i in 0..O {
+                for j in i..O {
+                    p[i][j] += Matrix3::from_diagonal(&weight[i][j]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! Progress of the search for the optimum.
+
+use super::bounds::About;
+use std::ops::Range;
+
+/// Progress of the search for the optimum.
+#[allow(clippy::struct_excessive_bools)] // They do not exclude each other.
+#[derive(Default)]
+pub(super) struct Search {
+    /// Radius of the terminal ball, if the optimum without balls ends outside it.
+    pub outside: Option<f64>,
+    /// Window of the horizon to solve for, if it is not the whole horizon.
+    pub window: Option<Range<usize>>,
+    /// Whether the first guess has been chosen.
+    pub begun: bool,
+    /// Whether the arrival cost has been computed.
+    pub arrived: bool,
+    /// Motion about which the bounds of the present pass are computed.
+    pub about: About,
+    /// Number of passes so far; the bounds are computed anew for each.
+    pub pass: usize,
+    /// Whether the multipliers come from a similar problem.
+    pub warm: bool,
+    /// Number of iterations over all passes and solvers.
+    pub iterations: u32,
+    /// Whether the last solver concluded that no motion satisfies the balls.
+    pub hopeless: bool,
+    /// Whether the optimum satisfies the bounds about itself.
+    pub settled: bool,
+}

@@ -1,0 +1,25 @@
+//! The optimum without balls.
+//!
+//! Gain: mean time 0.036 → 0.031 ms (CRMPC robust), 0.013 → 0.009 (paper), 0.013 → 0.011 (DLMPC).
+
+use super::{Bounded, Optimiser, Sample, Search, Shortcut, Status};
+
+pub(super) struct WithoutBalls;
+
+impl<const O: usize, B: Bounded<O>> Shortcut<O, B> for WithoutBalls {
+    fn optimum(
+        &self,
+        optimiser: &mut Optimiser<O>,
+        sample: &Sample<O, B>,
+        search: &mut Search,
+    ) -> Option<Status> {
+        if search.outside.is_some() {
+            return None;
+        }
+        // The optimiser has begun with this motion.
+        let violated = optimiser.violated(sample, &(0..0));
+        search.settled = violated.is_none();
+        search.window = optimiser.layout.window(violated, false);
+        search.settled.then_some(Status::Unconstrained)
+    }
+}
