@@ -13,10 +13,8 @@ use optimum::{OptimalAllocation, Weights};
 use pwpf::Modulator;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
-use vehicle::effectors::{JETS, Jets, SURFACES, Surfaces};
+use vehicle::effectors::{JETS, Jets, Surfaces};
 
-/// Effectiveness D_A of the surfaces, Wu 2015 (58), N m/rad.
-type SurfaceMatrix = SMatrix<f64, 3, SURFACES>;
 /// Effectiveness D_RCS of the jets, N m at full thrust.
 type JetMatrix = SMatrix<f64, 3, JETS>;
 

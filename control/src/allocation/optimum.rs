@@ -4,11 +4,13 @@
 //! δ_RCS = u. The range of a surface within its limits of position and rate is middle ± half. A
 //! surface that may not move has half = 0, so that the program always has an interior.
 
-use super::SurfaceMatrix;
 use crate::conic_program::{ConicProgram, Triplets};
 use clarabel::solver::SupportedConeT::{NonnegativeConeT, SecondOrderConeT};
 use nalgebra::{SMatrix, Vector3};
 use vehicle::effectors::{JETS, Jets, SURFACES, Surfaces};
+
+/// Effectiveness D_A of the surfaces, Wu 2015 (58), N m/rad.
+pub(super) type SurfaceMatrix = SMatrix<f64, 3, SURFACES>;
 
 /// Typical moment, by which the cone is scaled, N m.
 const MOMENT_SCALE: f64 = 1e4;
