@@ -7,16 +7,18 @@ use std::path::Path;
 use tempfile::TempDir;
 use zip::ZipArchive;
 
-/// An archive may hold this much when unpacked, bytes.
+/// Largest size of an archive's content when unpacked, bytes.
 const SIZE_LIMIT: u64 = 1 << 30;
-/// An archive may hold this many entries.
+/// Largest number of entries in an archive.
 const ENTRY_LIMIT: usize = 20_000;
 
-/// Unpacks into a new temporary folder, which vanishes with the value returned.
+/// Unpacks an archive into a new temporary folder, which is removed when the returned value is
+/// dropped.
 ///
 /// # Errors
-/// If the file is no archive, or one with absolute paths, paths that lead out of the folder, duplicate names, links,
-/// encrypted entries, or more content than any FMU has.
+/// Returns an error if the file is not an archive, or if the archive has absolute paths, paths that
+/// lead out of the folder, duplicate names, links, encrypted entries, or more content than any FMU
+/// has.
 pub fn unpack(path: &Path) -> Result<TempDir, Error> {
     unpack_limited(path, SIZE_LIMIT, ENTRY_LIMIT)
 }
@@ -47,7 +49,8 @@ fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<Te
         if entry.is_symlink() {
             return Err(refuse(format!("refused: entry \"{name}\" is a symbolic link")));
         }
-        // Of the temporary folder nobody knows: a fault is told by archive and entry.
+        // A fault names the archive and the entry, because a reader does not know the temporary
+        // folder.
         let fault = |source: io::Error| refuse(format!("entry \"{name}\" cannot be unpacked: {source}"));
         let target = folder.path().join(&name);
         if name.ends_with('/') {
@@ -58,7 +61,8 @@ fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<Te
             fs::create_dir_all(parent).map_err(fault)?;
         }
         let mut out = File::create_new(&target).map_err(fault)?;
-        // The sizes an archive declares are claims: count what really comes out.
+        // The sizes that an archive declares may be wrong, so the bytes that are unpacked are
+        // counted.
         let written = io::copy(&mut (&mut entry).take(left + 1), &mut out).map_err(fault)?;
         left = left.checked_sub(written).ok_or_else(|| {
             refuse(format!("refused: unpacks to more than {} MiB", size_limit.div_ceil(1 << 20)))
@@ -67,7 +71,7 @@ fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<Te
     Ok(folder)
 }
 
-/// Why an entry of this name must not be written, if so.
+/// Returns the reason why an entry of this name must not be written; `None` if it may be.
 pub fn unsafe_name(name: &str) -> Option<&'static str> {
     if name.is_empty() {
         Some("has no name")

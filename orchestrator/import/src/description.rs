@@ -43,12 +43,12 @@ pub struct ModelDescription {
 pub struct Interface {
     /// Name of the library in the archive, without file extension.
     pub model_identifier: String,
-    /// Attributes that are set to `true`, as `name`, and those with a number, as `name=value`.
+    /// Attributes that are set to `true`, as `name`, and attributes with a number, as `name=value`.
     pub capabilities: Vec<String>,
 }
 
 impl Interface {
-    /// Whether a capability flag is set.
+    /// Returns whether a capability flag is set.
     pub fn has(&self, capability: &str) -> bool {
         self.capabilities.iter().any(|name| name == capability)
     }
@@ -119,7 +119,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Name of the type in FMI.
+    /// Returns the name of the type in FMI.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Real { .. } => "Real",
@@ -135,7 +135,7 @@ impl ModelDescription {
     /// Parses the text of `modelDescription.xml`.
     ///
     /// # Errors
-    /// A line that says what is wrong with the text, and where.
+    /// Returns a line that says what is wrong with the text, and where.
     pub fn parse(text: &str) -> Result<Self, String> {
         read::description(&Element::parse(text)?)
     }
@@ -145,7 +145,7 @@ impl ModelDescription {
         self.variables.iter().enumerate().find(|(_, variable)| variable.name == name)
     }
 
-    /// Names of the variables with this causality.
+    /// Returns the names of the variables with this causality.
     pub fn names<'a>(&'a self, causality: &'a str) -> impl Iterator<Item = &'a str> + Clone {
         self.variables.iter().filter(move |v| v.causality == causality).map(|v| v.name.as_str())
     }
@@ -306,8 +306,8 @@ mod read {
         })
     }
 
-    /// Positions of the inputs that each output depends on, by the position of the output; only for
-    /// outputs that declare them.
+    /// Returns the positions of the inputs that each output depends on, by the position of the
+    /// output. Only outputs that declare their dependencies have an entry.
     fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<usize>>, String> {
         let unknowns = root.child("ModelStructure").into_iter().flat_map(|of| of.list("Outputs", "Unknown"));
         let mut dependencies = BTreeMap::new();
@@ -348,7 +348,8 @@ pub enum Carrier {
 }
 
 impl Carrier {
-    /// Carrier of a type; `None` for texts, which are not transferred.
+    /// Returns the type in which values of a kind are transferred; `None` for texts, which are not
+    /// transferred.
     pub fn of(kind: &Kind) -> Option<Self> {
         match kind {
             Kind::Real { .. } => Some(Self::Real),

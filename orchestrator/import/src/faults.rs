@@ -10,7 +10,7 @@ pub const CAUSALITIES: [&str; 6] =
 /// Values of `variability` that the same section of FMI 2.0 allows.
 const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
 
-/// Finds the faults of a description: one line for each, in the order of the file.
+/// Lists the faults of a description, one line for each, in the order of the file.
 pub fn faults(description: &ModelDescription) -> Vec<String> {
     let mut faults = Vec::new();
     if description.co_simulation.is_none() && description.model_exchange.is_none() {

@@ -31,7 +31,7 @@ impl Fmu {
     /// Unpacks an archive and reads its description.
     ///
     /// # Errors
-    /// If the archive is unsafe or damaged, or is not an FMI 2.0 FMU.
+    /// Returns an error if the archive is unsafe or damaged, or is not an FMI 2.0 FMU.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
         let folder = archive::unpack(path)?;
@@ -48,14 +48,14 @@ impl Fmu {
         })
     }
 
-    /// Platforms for which the archive has binaries, by FMI's names.
+    /// Returns the platforms for which the archive has binaries, by FMI's names.
     pub fn platforms(&self) -> Vec<String> {
         let binaries = self.folder.path().join("binaries");
         names_in(&binaries).into_iter().filter(|name| binaries.join(name).is_dir()).collect()
     }
 
-    /// Faults of the archive that do not keep it from being opened: one line for each fault of the
-    /// description and of the library for this platform.
+    /// Lists the faults of the archive that do not keep it from being opened: one line for each
+    /// fault of the description and of the library for this platform.
     pub fn faults(&self) -> Vec<String> {
         let mut faults = faults::faults(&self.description);
         if self.description.co_simulation.is_some() {
@@ -70,8 +70,8 @@ impl Fmu {
     /// Loads the shared library of the FMU.
     ///
     /// # Errors
-    /// A line that says what is missing or why the library cannot be loaded, and names the entry of
-    /// the archive.
+    /// Returns a line that says what is missing or why the library cannot be loaded, and names the
+    /// entry of the archive.
     fn load(&self) -> Result<Functions, String> {
         let interface = self.description.co_simulation.as_ref().ok_or("offers no co-simulation")?;
         let platforms = self.platforms();
@@ -117,8 +117,8 @@ impl Fmu {
     /// Loads the library and instantiates a co-simulation unit called `name`.
     ///
     /// # Errors
-    /// If the FMU has no binary for this platform or offers no co-simulation, if the library cannot be loaded, or if the
-    /// FMU refuses.
+    /// Returns an error if the FMU has no binary for this platform or offers no co-simulation, if
+    /// the library cannot be loaded, or if the FMU refuses.
     pub fn instantiate(&self, name: &str) -> Result<FmuUnit, Error> {
         let refuse = |message: String| Error::Fmu { path: self.path.clone(), message };
         let functions = self.load().map_err(refuse)?;
@@ -133,7 +133,8 @@ impl Fmu {
     }
 }
 
-/// Names of the entries of a folder, sorted; empty if the folder does not exist.
+/// Returns the names of the entries of a folder, sorted. There are none if the folder does not
+/// exist.
 fn names_in(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<String> =

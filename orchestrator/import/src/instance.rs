@@ -82,7 +82,7 @@ impl Functions {
         }
     }
 
-    /// A line about the version that the library reports, if it is missing or not FMI 2.0.
+    /// Returns a line about the version that the library reports, if it is missing or not FMI 2.0.
     pub(crate) fn version_fault(&self) -> Option<String> {
         let Some(get_version) = self.get_version else {
             return Some("its library has no fmi2GetVersion".into());

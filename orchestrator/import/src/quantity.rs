@@ -1,26 +1,29 @@
-//! Physical units by an FMU's own definitions: conversion of `"2 deg/s2"`, and whether two variables may be connected.
+//! Physical units, as the FMU defines them: conversion of texts such as `"2 deg/s2"`, and the check
+//! whether two variables may be connected.
 
 use crate::names;
 
-/// A unit: `base = factor · value + offset` in SI base units, and what it can be shown in.
+/// A unit, defined by `base = factor · value + offset` in SI base units, with its display units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnitDefinition {
-    /// Name, for example `rad/s`.
+    /// Name of the unit, for example `rad/s`.
     pub name: String,
-    /// Exponents of kg, m, s, A, K, mol, cd, rad; `None` if the FMU does not say.
+    /// Exponents of kg, m, s, A, K, mol, cd and rad; `None` if the FMU does not state them.
     pub exponents: Option<[i32; 8]>,
-    /// Multiplier to SI base units.
+    /// Factor of the conversion to SI base units.
     pub factor: f64,
-    /// Summand to SI base units.
+    /// Offset of the conversion to SI base units.
     pub offset: f64,
     /// Display units as name, factor, offset: `display = factor · value + offset`.
     pub displays: Vec<(String, f64, f64)>,
 }
 
-/// Reads `"2 deg/s2"` as a value in the unit `wanted`; a bare `"2"` is in that unit already.
+/// Converts a text such as `"2 deg/s2"` to a value in the unit `wanted`. A bare `"2"` is already in
+/// that unit.
 ///
 /// # Errors
-/// If the text is not a number with a unit that the FMU defines and that measures the same as `wanted`.
+/// Returns an error if the text is not a number with a unit that the FMU defines and that measures
+/// the same quantity as `wanted`.
 pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Result<f64, String> {
     let text = text.trim();
     if let Ok(value) = text.parse::<f64>() {
@@ -40,7 +43,8 @@ pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Re
         .iter()
         .find(|unit| unit.name == wanted)
         .ok_or_else(|| format!("the FMU does not define its unit \"{wanted}\": give a plain number"))?;
-    // A display unit of the variable's own unit is read first: another unit may have one of the same name.
+    // A display unit of the variable's own unit takes precedence, because another unit may have a
+    // display unit of the same name.
     let own = target.displays.iter().find(|(display, ..)| display == name);
     if let Some((_, factor, offset)) = own {
         return Ok((value - offset) / factor);
@@ -69,10 +73,10 @@ pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Re
     Ok((unit.factor * in_unit + unit.offset - target.offset) / target.factor)
 }
 
-/// How values in the one unit become values in the other.
+/// Returns the scaling that converts values in one unit to values in another.
 ///
 /// # Errors
-/// Says how the units differ, if they do not measure the same thing.
+/// Returns an error that says how the units differ, if they do not measure the same quantity.
 pub fn conversion(
     from: Option<&str>,
     from_units: &[UnitDefinition],
@@ -81,7 +85,7 @@ pub fn conversion(
 ) -> Result<Scaling, String> {
     let unchanged = Ok(Scaling::default());
     let (Some(from), Some(to)) = (from, to) else {
-        // An FMU that knows no units at all cannot be held to them.
+        // An FMU that defines no units at all cannot be held to them.
         let known = [(from, from_units), (to, to_units)];
         return if from == to || known.iter().any(|(unit, units)| unit.is_none() && units.is_empty()) {
             unchanged
@@ -105,38 +109,38 @@ pub fn conversion(
     }
 }
 
-/// value ↦ factor · value + offset
+/// A linear conversion, value ↦ factor · value + offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scaling {
-    /// The factor.
+    /// Factor by which values are multiplied.
     pub factor: f64,
-    /// The offset.
+    /// Offset that is added after the multiplication.
     pub offset: f64,
 }
 
 impl Default for Scaling {
-    /// Leaves every value as it is.
+    /// Returns the scaling that leaves every value as it is.
     fn default() -> Self {
         Self { factor: 1.0, offset: 0.0 }
     }
 }
 
 impl Scaling {
-    /// The scaled value.
+    /// Returns the scaled value.
     pub fn of(self, value: f64) -> f64 {
         self.factor * value + self.offset
     }
 
-    /// This one, and then `next`.
+    /// Returns the scaling that applies this one first, and `next` afterwards.
     #[must_use]
     pub fn then(self, next: Self) -> Self {
         Self { factor: next.factor * self.factor, offset: next.of(self.offset) }
     }
 }
 
-/// A number for a text, without what rounding left in its last digits.
+/// Rounds a number for a text, so that its last digits show no rounding errors.
 pub fn rounded(time: f64) -> f64 {
-    // Of a large time fewer digits after the point are known.
+    // A large time has fewer reliable digits after the point.
     let digits = if time.abs() < 1e5 { 1e9 } else { 1e4 };
     (time * digits).round() / digits
 }
@@ -200,7 +204,8 @@ mod tests {
         assert!(scaling(Some("rad"), Some("rad/s")).is_err());
         assert_eq!(scaling(Some("min"), Some("s")).unwrap().of(2.0), 120.0);
         assert_eq!(scaling(Some("s"), Some("min")).unwrap().of(30.0), 0.5);
-        // Another name for the same unit is no mismatch, and what knows no units fits all.
+        // Another name for the same unit is no mismatch, and a description without units fits every
+        // unit.
         let mut renamed = units.clone();
         renamed[0].name = "radian".into();
         assert_eq!(conversion(Some("rad"), &units, Some("radian"), &renamed), Ok(Scaling::default()));
