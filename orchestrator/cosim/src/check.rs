@@ -1,5 +1,5 @@
-//! Checks an experiment in one pass: everything it names is looked up, and everything that cannot
-//! be run is refused. Only the units themselves can fail after that.
+//! Checks an experiment in one pass: every name in it is looked up, and everything that cannot be
+//! run is refused. After that only the units themselves can fail.
 
 use crate::clock::Clock;
 use crate::delay;
@@ -17,11 +17,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-/// Checks an experiment against what its archives say. Archives that are already in `opened` are
-/// not opened again.
+/// Checks an experiment against the model descriptions of its FMUs. Archives that are already in
+/// `opened` are not opened again.
 ///
 /// # Errors
-/// If anything is wrong with the experiment or with the archive of an FMU.
+/// Returns an error if anything is wrong with the experiment or with the archive of an FMU.
 pub fn check(experiment: Experiment, fmu_dirs: &[PathBuf], opened: &mut Opened) -> Result<System, Error> {
     let simulation = &experiment.simulation;
     let clock = Clock::new(simulation.start, simulation.stop, simulation.step)
@@ -152,7 +152,7 @@ fn check_single_instances(experiment: &Experiment, order: &[String], fmus: &[Rc<
     Ok(())
 }
 
-/// Names of the components, in the order in which their inputs are set.
+/// Returns the names of the components, in the order in which their inputs are set.
 fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
     let refuse = |message: String| Err(experiment.source.error(&(0..0), message));
     let names: Vec<&str> = experiment.components.keys().map(String::as_str).collect();

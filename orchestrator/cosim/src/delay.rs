@@ -1,11 +1,11 @@
 //! Effective delay of each feedback loop, derived from the connections, the coupling and the
 //! dependencies that the FMUs declare for their outputs.
+//!
 //! An output that depends on its unit's inputs at the same instant is *direct*. If such an output
 //! is read before its unit's inputs are set (always with Jacobi coupling; with Gauss–Seidel if the
 //! unit comes later in the order), the reader gets the value of the previous communication point,
 //! which delays it by one of its steps. An output that depends on states alone is never late. A
 //! loop in which every output is direct is algebraic: no order of calls solves it.
-//! which every output is direct is algebraic: no order of calls solves it.
 
 use crate::experiment::Coupling;
 use crate::settings::{Setting, SettingValue};
@@ -26,7 +26,7 @@ pub struct FeedbackLoop {
     pub undeclared: Vec<usize>,
 }
 
-/// How an output depends on an input of its unit.
+/// Way in which an output depends on an input of its unit.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Passage {
     /// The output depends on the input through states only.
@@ -112,8 +112,8 @@ fn measure(
     FeedbackLoop { components: components.to_vec(), ticks, undeclared }
 }
 
-/// An order of the components in which Gauss–Seidel coupling has no delay, as far as there is one:
-/// a component whose outputs depend on its inputs at the same instant comes before those that read
+/// Finds an order of the components in which Gauss–Seidel coupling has no delay, if there is one: a
+/// component whose outputs depend on its inputs at the same instant comes before those that read
 /// them. Otherwise the order of `parts` is kept.
 pub fn order(parts: &[Part], wires: &[Wire]) -> Vec<usize> {
     let is_direct = |wire: &Wire| {
@@ -226,8 +226,8 @@ pub fn warnings(parts: &[Part], settings: &[Vec<Setting>], loops: &[FeedbackLoop
     warnings
 }
 
-/// Value of a real parameter in s, from the experiment or otherwise its start value; `None` if
-/// there is no such parameter.
+/// Returns the value of a real parameter in s, from the experiment or otherwise its start value;
+/// `None` if there is no such parameter.
 fn duration(name: &str, part: Part, settings: &[Setting]) -> Option<f64> {
     let (_, variable) = part.description.find(name)?;
     let is_duration = matches!(&variable.kind, Kind::Real { unit: Some(unit), .. } if unit == "s");

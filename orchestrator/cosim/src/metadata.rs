@@ -1,4 +1,5 @@
-//! `results.json`: everything that is needed to know, years later, what `results.csv` came from.
+//! Content of `results.json`: everything that is needed to know, years later, how `results.csv` was
+//! made.
 
 use crate::error::Error;
 use crate::pacing;
@@ -10,7 +11,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// The content of the file. `failure` is why the run ended early, if it did.
+/// Returns the content of `results.json`. If the run ended early, `failure` is the reason.
 pub fn metadata(
     system: &System,
     parameters: &Parameters,

@@ -1,4 +1,4 @@
-//! Seeds of random numbers: which parameters they are, and whether one is of any effect.
+//! Finds the parameters that are seeds of random numbers, and those seeds that have no effect.
 
 use crate::error::Error;
 use crate::interrupt::Interrupt;
@@ -7,16 +7,17 @@ use crate::system::System;
 use fmu_import::warnings;
 use tracing::subscriber::{NoSubscriber, with_default};
 
-/// Whether a parameter is a seed: by its name, which FMI leaves as the only sign.
+/// Returns whether a parameter is a seed. Its name decides, because FMI offers no other sign.
 pub fn is_seed(name: &str) -> bool {
     name.rsplit('.').next() == Some("seed")
 }
 
-/// The seeds from the command line that change nothing, as that of a disturbance that is constant: `component.parameter`. Two runs with
-/// different seeds are compared tick by tick until they differ, which is soon where the seed is of any effect.
+/// Finds the seeds, as `component.parameter`, that the command line sets and that change nothing,
+/// for example the seed of a constant disturbance. Two runs with different seeds are compared tick
+/// by tick until they differ, which is soon if the seed has an effect.
 ///
 /// # Errors
-/// If the comparison was ended from outside.
+/// Returns an error if the comparison was ended from outside.
 pub(crate) fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
     let mut idle = Vec::new();
     for (component, settings) in system.settings.iter().enumerate() {
@@ -28,7 +29,7 @@ pub(crate) fn without_effect(system: &System, interrupt: &Interrupt) -> Result<V
             }
             let mut other = system.settings.clone();
             other[component][index].value = SettingValue::Integer(if seed > 0 { seed - 1 } else { seed + 1 });
-            // What the units say comes again in the run itself.
+            // Messages of the units are hidden here, because they appear again in the run itself.
             let same = with_default(NoSubscriber::default(), || {
                 let _warnings = warnings::collect();
                 are_same(system, &other, interrupt)
@@ -36,7 +37,7 @@ pub(crate) fn without_effect(system: &System, interrupt: &Interrupt) -> Result<V
             match same {
                 Ok(true) => idle.push(path),
                 Err(error @ Error::Interrupted { .. }) => return Err(error),
-                // So does a failure.
+                // A run that fails is taken as one that differs.
                 Ok(false) | Err(_) => {}
             }
         }
@@ -44,7 +45,8 @@ pub(crate) fn without_effect(system: &System, interrupt: &Interrupt) -> Result<V
     Ok(idle)
 }
 
-/// Whether all that is looked at but computing times stays the same with `others` as settings.
+/// Returns whether all observed values except computing times stay the same if the settings are
+/// replaced by `others`.
 fn are_same(system: &System, others: &[Vec<Setting>], interrupt: &Interrupt) -> Result<bool, Error> {
     let timings = system.timings();
     let bits = |values: &[f64]| {

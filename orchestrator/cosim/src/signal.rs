@@ -1,5 +1,5 @@
-//! What is looked at in a run: a variable, the difference of two, or the norm of several, and any of
-//! them as a multiple of another variable.
+//! Signals that are observed in a run: a variable, the difference of two, or the norm of several.
+//! Each of them may be divided by another variable.
 //!
 //! ```text
 //! plant.rate.p
@@ -13,23 +13,23 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::iter;
 
-/// A signal as it is written.
+/// A signal as an experiment or a study describes it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
 #[serde(try_from = "String", into = "String")]
 #[schemars(with = "String")]
 pub struct Signal {
     pub(crate) terms: Vec<Term<String>>,
     pub(crate) norm: bool,
-    /// The variable that the whole is divided by.
+    /// Variable that the whole signal is divided by.
     pub(crate) over: Option<String>,
 }
 
-/// `component.variable`, with what is subtracted from it.
+/// A variable, and the variable that is subtracted from it, if any.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Term<Variable> {
-    /// The variable.
+    /// Variable that the term starts from.
     pub value: Variable,
-    /// What is subtracted from it.
+    /// Variable that is subtracted.
     pub minus: Option<Variable>,
 }
 
@@ -84,36 +84,36 @@ impl Signal {
         terms.chain(&self.over).map(String::as_str)
     }
 
-    /// The variables it is made of.
+    /// Returns the names of all variables in the signal.
     pub fn paths(&self) -> BTreeSet<&str> {
         self.all().collect()
     }
 }
 
-/// A signal with its variables found: places among a sample's values.
+/// A signal whose variables have been found among the values of a sample.
 #[derive(Clone, Debug)]
 pub struct Resolved {
-    /// The terms that are added, or whose norm is taken.
+    /// Terms of the signal: a single one, or those whose norm is taken.
     pub terms: Vec<Term<usize>>,
     /// Whether the norm is taken.
     pub norm: bool,
-    /// What the whole is divided by.
+    /// Index of the value that the whole signal is divided by.
     pub over: Option<usize>,
-    /// Factor from the unit of its variables to its own.
+    /// Factor from the unit of the variables to the unit of the signal.
     pub factor: f64,
-    /// The unit that [`Self::value`] is in.
+    /// Unit of [`Self::value`].
     pub unit: String,
-    /// Whether it is a single variable that is no real number.
+    /// Whether the signal is a single variable that is not a real number.
     pub is_integer: bool,
 }
 
 impl Resolved {
-    /// The variable at a place of a sample's values, as it is.
+    /// Creates a signal that is the variable at an index of a sample's values.
     pub fn variable(place: usize) -> Self {
         Self::of(Term { value: place, minus: None })
     }
 
-    /// The difference of two variables at places of a sample's values.
+    /// Creates a signal that is the difference of two variables at indices of a sample's values.
     pub fn difference(place: usize, minus: usize) -> Self {
         Self::of(Term { value: place, minus: Some(minus) })
     }
@@ -123,7 +123,7 @@ impl Resolved {
         Self { terms, norm: false, over: None, factor: 1.0, unit: String::new(), is_integer: false }
     }
 
-    /// The signal in a sample, in its unit.
+    /// Computes the value of the signal in a sample, in the signal's unit.
     pub fn value(&self, values: &[f64]) -> f64 {
         let term = |term: &Term<usize>| values[term.value] - term.minus.map_or(0.0, |minus| values[minus]);
         let value = if self.norm {

@@ -1,5 +1,6 @@
-//! Resolves the names of an experiment, once, into value references: connections and recorded variables. What does not
-//! fit is refused with its place in the file and the nearest right name.
+//! Resolves the names of an experiment into value references, once: the connections and the
+//! recorded variables. A name that does not fit is refused with its place in the file and the
+//! nearest right name.
 
 use crate::document::Source;
 use crate::error::Error;
@@ -12,7 +13,8 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use toml::Spanned;
 
-/// A component's name and its FMU's description. Everywhere, a component's position here is its index.
+/// A component's name and its FMU's description. The position of a component in a list of parts is
+/// its index everywhere.
 #[derive(Clone, Copy)]
 pub struct Part<'a> {
     /// Name of the component in the experiment.
@@ -26,11 +28,11 @@ pub struct Part<'a> {
 pub struct Port {
     /// Index of the component.
     pub component: usize,
-    /// Position in the description's variables.
+    /// Position of the variable in the model description.
     pub variable: usize,
     /// Value reference of the variable.
     pub reference: u32,
-    /// Type in which its value is transferred.
+    /// Type in which the value of the variable is transferred.
     pub carrier: Carrier,
 }
 
@@ -45,7 +47,7 @@ pub struct Wire {
     pub scaling: Scaling,
 }
 
-/// A variable in the results.
+/// A column of the results, which records one variable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Column {
     /// Full name of the variable, `component.variable`.
@@ -54,7 +56,7 @@ pub(crate) struct Column {
     pub port: Port,
 }
 
-/// One side of a connection, or a recorded variable, with the component found.
+/// One side of a connection, or a recorded variable, whose component has been found.
 struct Reference<'a> {
     source: &'a Source,
     span: Range<usize>,
@@ -91,7 +93,7 @@ impl<'a> Reference<'a> {
         self.refuse(format!("\"{}\" has no {causality} \"{}\"{hint}", self.part.name, self.rest))
     }
 
-    /// The variable called `name`, which must have this causality.
+    /// Finds the variable called `name`, which must have this causality.
     fn port(&self, name: &str, causality: &'a str) -> Result<Port, Error> {
         let (position, variable) = self.part.description.find(name).ok_or_else(|| self.unknown(causality))?;
         if variable.causality != causality {
@@ -116,8 +118,9 @@ fn port(component: usize, position: usize, variable: &Variable) -> Option<Port> 
 /// Resolves the connections of an experiment.
 ///
 /// # Errors
-/// Names that do not exist, wrong causalities, types or units that do not match, inputs connected twice, and inputs that
-/// are neither connected, nor given a value, nor declared to stay unconnected.
+/// Returns an error if a name does not exist, a causality is wrong, types or units do not match, or
+/// an input is connected twice. It also returns one if an input is neither connected, nor given a
+/// value, nor declared to stay unconnected.
 pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>, Error> {
     let source = &experiment.source;
     let mut wires: Vec<Wire> = Vec::new();
@@ -161,7 +164,8 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
     Ok(wires)
 }
 
-/// The pairs of names that two patterns stand for: every rest that is an output there and a variable here.
+/// Lists the pairs of names that two patterns stand for: each output that begins with the first
+/// prefix is paired with the variable of the same rest behind the second prefix, if there is one.
 fn expand(
     from: &Reference,
     from_prefix: &str,
@@ -188,7 +192,7 @@ fn expand(
     Ok(pairs)
 }
 
-/// How values of the output become values of the input, by their units.
+/// Determines how values of the output are converted to values of the input, by their units.
 fn check_match(
     start: Port,
     end: Port,
@@ -236,7 +240,7 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
             let text = pattern.get_ref();
             let refuse = |message| Err(experiment.source.error(&pattern.span(), message));
             let mut meant = inputs.iter().filter(|(_, name)| names::matches(text, name)).peekable();
-            // All inputs may be none.
+            // The pattern "*" may stand for no input at all.
             if meant.peek().is_none() && text != "*" && !component.is_exchanged {
                 let hint = names::hint(text, inputs.iter().map(|(_, name)| *name));
                 return refuse(format!("\"{}\" has no input \"{text}\"{hint}", part.name));
@@ -276,7 +280,8 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
     Ok(())
 }
 
-/// Patterns that mean exactly `open` among `all`: a group is named by its prefix where all of it is open.
+/// Finds patterns that stand for exactly `open` among `all`: a group is named by its prefix if all
+/// of its inputs are open.
 fn shortest_patterns<'a>(open: &[&str], all: &(impl Iterator<Item = &'a str> + Clone)) -> String {
     let mut patterns: Vec<String> = Vec::new();
     for name in open {
@@ -292,11 +297,12 @@ fn shortest_patterns<'a>(open: &[&str], all: &(impl Iterator<Item = &'a str> + C
     patterns.iter().map(|pattern| format!("\"{pattern}\"")).collect::<Vec<_>>().join(", ")
 }
 
-/// Resolves the recorded variables. A pattern stands for inputs, outputs and local variables; a parameter or a text is
-/// recorded neither by it nor, for a text, at all.
+/// Resolves the recorded variables. A pattern stands for inputs, outputs and local variables; a
+/// parameter is recorded only if it is named in full, and a text never is.
 ///
 /// # Errors
-/// Names that do not exist, patterns that mean nothing, texts.
+/// Returns an error if a name does not exist, a pattern stands for nothing, or a variable is a
+/// text.
 pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Column>, Error> {
     let mut columns: Vec<Column> = Vec::new();
     for text in &experiment.record.variables {
@@ -341,7 +347,7 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
     Ok(columns)
 }
 
-/// Finds one variable by its full name, if there is such a one.
+/// Finds one variable by its full name, if it exists.
 pub(crate) fn find(path: &str, parts: &[Part]) -> Option<Port> {
     let (name, rest) = names::split(path)?;
     let component = parts.iter().position(|part| part.name == name)?;

@@ -18,7 +18,7 @@ const COLORS: [Color; 6] = [
 /// Draws the figure and writes it to a file.
 ///
 /// # Errors
-/// If the file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn draw(
     path: &Path,
     title: &str,

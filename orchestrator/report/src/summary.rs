@@ -1,4 +1,4 @@
-//! Prints the outcome of a run to standard output.
+//! Prints the outcome of a run or of a study to standard output.
 
 use crate::guarantee::told;
 use crate::metrics::{Metrics, Value};
@@ -10,7 +10,7 @@ use fmu_import::quantity::rounded;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// What came of a run.
+/// Outcome of a run.
 #[derive(Debug)]
 pub struct Report {
     /// Metrics of the run.
@@ -27,7 +27,7 @@ pub struct Report {
 /// Prints the summary of a run.
 ///
 /// # Errors
-/// If the text cannot be written.
+/// Returns an error if the text cannot be written.
 pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Result<()> {
     let (System { clock, experiment, order, loops, .. }, metrics) = (system, &report.metrics);
     let coupling = match experiment.simulation.coupling {
@@ -97,7 +97,7 @@ pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Re
 /// Prints the outcome of a reproduction.
 ///
 /// # Errors
-/// If the text cannot be written.
+/// Returns an error if the text cannot be written.
 pub fn reproduction(report: &reproduce::Report, out: &mut impl Write) -> io::Result<()> {
     let (run, kept) = report.parts;
     writeln!(out, "{}", report.title)?;
@@ -149,7 +149,8 @@ fn guarantee(metrics: &Metrics) -> Option<String> {
     Some(course + if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" })
 }
 
-/// The lines of the metrics that the experiment wants in the summary.
+/// Returns the lines for the metrics that the experiment wants in the summary, as headings and
+/// texts.
 fn asked(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
     let mut lines: Vec<(String, String)> = Vec::new();
     for name in &observe.summary {

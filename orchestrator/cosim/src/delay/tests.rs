@@ -80,7 +80,8 @@ fn with_duration(mut unit: ModelDescription, name: &str, unit_name: &str) -> Mod
     unit
 }
 
-/// Warnings of controller and plant with these values of `delay` and `actuation.delay`, steps of 0.04 s.
+/// Returns the warnings for a controller and a plant with these values of `delay` and
+/// `actuation.delay`, at a step of 0.04 s.
 fn warned(counted_on: Option<f64>, transport: Option<f64>, coupling: Coupling) -> Vec<String> {
     let controller = with_duration(unit(&[Some(true)]), "delay", "s");
     let plant = with_duration(unit(&[Some(false)]), "actuation.delay", "s");

@@ -204,7 +204,7 @@ impl Pacer {
     /// deadlines.
     ///
     /// # Errors
-    /// If a deadline was missed and the settings say that this ends the run.
+    /// Returns an error if a deadline was missed and the settings say that this ends the run.
     pub fn check(&mut self, tick: u64) -> Result<(), Error> {
         let time = self.clock.time(tick);
         if let Some(woken) = self.woken {
@@ -268,8 +268,8 @@ impl Pacer {
         self.elapsed = now.saturating_sub(self.began);
     }
 
-    /// Instant of a communication point on the timer. Ticks continue beyond the stop time, because
-    /// deadlines may lie there.
+    /// Returns the instant of a communication point on the timer. Ticks continue beyond the stop
+    /// time, because deadlines may lie there.
     fn release(&self, tick: u64) -> Duration {
         let simulated = if tick <= self.clock.ticks() {
             self.clock.time(tick) - self.clock.start()

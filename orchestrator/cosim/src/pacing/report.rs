@@ -131,7 +131,7 @@ impl RealTime {
     /// Prints the timing report, below the summary of the run.
     ///
     /// # Errors
-    /// If the text cannot be written.
+    /// Returns an error if the text cannot be written.
     pub fn print(&self, order: &[String], out: &mut impl Write) -> io::Result<()> {
         let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
         line(

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::path::PathBuf;
 
 const VALUES: [f64; 5] = [0.1 + 0.2, 1e-300, f64::MAX, -0.0, 5e-324];
-/// Every second tick, and the last.
+/// Rows that are expected: every second tick, and the last one.
 const ROWS: [usize; 4] = [0, 2, 3, 4];
 
 fn column(name: &str, place: usize, carrier: Carrier) -> Column {

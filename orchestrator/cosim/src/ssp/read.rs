@@ -20,7 +20,8 @@ use toml::Spanned;
 
 /// An experiment that was read from an archive.
 pub struct Loaded {
-    /// The experiment; components of subsystems are called `subsystem/component`.
+    /// Experiment that the archive describes. Components of subsystems are called
+    /// `subsystem/component`.
     pub experiment: Experiment,
     /// The opened FMUs of the archive.
     pub opened: Opened,
@@ -28,20 +29,21 @@ pub struct Loaded {
     pub entries: Entries,
 }
 
-/// The entries of an archive, unpacked until this goes.
+/// Entries of an archive, which stay unpacked as long as this value lives.
 pub struct Entries {
     path: PathBuf,
     folder: TempDir,
 }
 
 impl Entries {
-    /// An error of one of its FMUs, with the names of the archive and of the entry.
+    /// Rewrites an error of one of the FMUs so that it names the archive and the entry.
     pub fn named(&self, error: Error) -> Error {
         of_entry(error, &self.path, self.folder.path())
     }
 }
 
-/// An FMU in an archive is called by the names of both, not by where it was unpacked.
+/// Rewrites an error of an FMU so that it names the archive and the entry, and not the temporary
+/// folder.
 fn of_entry(error: Error, archive: &Path, folder: &Path) -> Error {
     match error {
         Error::Import(Import::Fmu { path, message }) => {
@@ -61,7 +63,7 @@ struct Own {
     description: String,
     step: f64,
     coupling: Coupling,
-    /// Components with their periods, in their order.
+    /// Names of the components with their periods, in the order in which their inputs are set.
     order: Vec<(String, u32)>,
     recorded: Vec<String>,
     record_every: u32,
@@ -119,12 +121,13 @@ impl Own {
     }
 }
 
-/// Reads an archive. The stop time and the step come from `overrides`, or else from the archive and from what its FMUs propose
-/// (the smallest step). The order of the components is the one without delay, where there is one.
+/// Reads an archive. The stop time and the step come from `overrides`, or otherwise from the
+/// archive; without a step there, the smallest one that an FMU proposes is taken. The components
+/// are ordered so that there is no delay, if this is possible.
 ///
 /// # Errors
-/// If the archive is faulty, or needs what this program does not support: components other than
-/// FMUs for co-simulation, mappings of parameters, or signal dictionaries.
+/// Returns an error if the archive is faulty, or needs what this program does not support:
+/// components other than FMUs for co-simulation, mappings of parameters, or signal dictionaries.
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let folder = archive::unpack(path)?;
     let refuse = |message: String| Error::from(Import::Fmu { path: path.to_path_buf(), message });
@@ -179,7 +182,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         seen("input").chain(seen("output")).collect::<Vec<_>>()
     });
     let texts = |name: &String| {
-        // A text can be neither recorded nor shown.
+        // Texts can be neither recorded nor shown.
         wiring::find(name, &parts(&structure.components, &opened, &structure.folder)).is_some()
     };
     let mut experiment = Experiment {

@@ -1,5 +1,5 @@
-//! The system of an SSP archive: its components, connections and values, with those of its
-//! subsystems.
+//! The system of an SSP archive: its components, connections and parameter values, including those
+//! of its subsystems.
 
 use super::FMU;
 use crate::experiment::{Component, Connection};
@@ -32,10 +32,11 @@ impl Found {
     }
 }
 
-/// A connector: name of the component or of the subsystem, and its own.
+/// A connector, given by the name of its component or subsystem and its own name. The name of the
+/// outermost system is empty.
 type Node = (String, String);
 
-/// A connection that ends at a connector.
+/// A connection, without the connector that it ends at.
 #[derive(Clone)]
 struct Edge {
     start: Node,
@@ -43,7 +44,7 @@ struct Edge {
     scaling: Scaling,
 }
 
-/// A system with its subsystems in one.
+/// A system into which its subsystems have been merged.
 pub(super) struct Structure {
     pub(super) folder: PathBuf,
     pub(super) components: Vec<Found>,
@@ -55,7 +56,7 @@ pub(super) struct Structure {
 struct Walk {
     components: Vec<Found>,
     edges: BTreeMap<Node, Edge>,
-    /// Values of systems, by the full name of what they are for.
+    /// Parameter values that belong to systems, by the full name of the variable.
     parameters: Vec<(String, Value)>,
 }
 
@@ -83,7 +84,8 @@ impl Structure {
 }
 
 impl Walk {
-    /// `path` is the name of the system, empty for the outermost.
+    /// Adds a system and its subsystems. The `path` is the name of the system, which is empty for
+    /// the outermost one.
     fn system(&mut self, system: &Element, path: &str, folder: &Path) -> Result<(), String> {
         let inside = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}/{name}") };
         for (name, value) in parameters(system, folder)? {
@@ -146,13 +148,15 @@ impl Walk {
         Ok(())
     }
 
-    /// The connections of components, straight through the connectors of systems.
+    /// Returns the connections between components, in which the connectors of systems have been
+    /// passed over.
     fn connections(&self) -> Result<Vec<Connection>, String> {
         let is_component = |node: &Node| self.components.iter().any(|component| component.name == node.0);
         let mut connections = Vec::new();
         for (end, edge) in self.edges.iter().filter(|(end, _)| is_component(end)) {
             let (mut edge, mut steps) = (edge.clone(), 0);
-            // From the end back to the component that everything comes from; none, if it comes from outside.
+            // The connection is followed from its end back to the component that the value comes
+            // from. There is none if the value comes from outside.
             while !is_component(&edge.start) {
                 let Some(before) = self.edges.get(&edge.start) else { break };
                 edge = Edge {
@@ -179,7 +183,7 @@ impl Walk {
     }
 }
 
-/// The parameter values bound to a component or a system, in their order.
+/// Returns the parameter values that are bound to a component or a system, in their order.
 fn parameters(element: &Element, folder: &Path) -> Result<Vec<(String, Value)>, String> {
     let mut values = Vec::new();
     for binding in element.list("ParameterBindings", "ParameterBinding") {
@@ -219,7 +223,7 @@ fn value(parameter: &Element) -> Result<Value, String> {
         "Real" => {
             let number: f64 = text.trim().parse().map_err(|_| fault("real number"))?;
             match typed.attribute("unit") {
-                // Converted like the text of an experiment, by the units of the FMU.
+                // The value is converted by the units of the FMU, like a text in an experiment.
                 Some(unit) => Value::String(format!("{number:?} {unit}")),
                 None => Value::Float(number),
             }
@@ -235,7 +239,7 @@ fn value(parameter: &Element) -> Result<Value, String> {
     })
 }
 
-/// A file of the archive by its URI.
+/// Converts the URI of a file to its path in the archive.
 fn file(uri: &str) -> Result<String, String> {
     let path = percent_decode_str(uri).decode_utf8().map_err(|_| format!("\"{uri}\" is not UTF-8"))?;
     match archive::unsafe_name(&path) {

@@ -1,4 +1,4 @@
-//! A drawn SVG as PNG, with a font of its own, so that it looks the same everywhere.
+//! Converts a drawn SVG to PNG, with a font of its own, so that it looks the same on every machine.
 
 use cosim::error::Error;
 use resvg::tiny_skia::{Pixmap, Transform};
@@ -6,13 +6,13 @@ use resvg::usvg::{Options, Tree, fontdb::Database};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Pixels of the PNG for one of the SVG.
+/// Number of pixels of the PNG for each one of the SVG.
 const SCALE: f32 = 2.0;
 
 /// Writes the text of an SVG file as a PNG file.
 ///
 /// # Errors
-/// If it cannot be drawn or written.
+/// Returns an error if the SVG cannot be drawn, or the file cannot be written.
 pub fn write(svg: &str, path: &Path) -> Result<(), Error> {
     let failed = |reason: String| Error::file(path)(std::io::Error::other(reason));
     let mut fonts = Database::new();

@@ -11,14 +11,14 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type DrawError = Box<dyn std::error::Error>;
 
 const FONT: &str = "sans-serif";
-/// Width of a figure, of a legend beside a panel, height of a panel with one and with several columns, px.
+/// Width of a figure, width of a legend beside a panel, and height of a panel, px.
 const WIDTH: u32 = 1000;
 const LEGEND_WIDTH: u32 = 120;
 const HEIGHT: u32 = 260;
-/// Height of title and of a row of the legend above the panels, px.
+/// Height of the title, and of a row of the legend above the panels, px.
 const TITLE_HEIGHT: u32 = 40;
 const LEGEND_HEIGHT: u32 = 20;
-/// Width of a letter in the legend, px, at most.
+/// Largest width of a letter in the legend, px.
 const LETTER: u32 = 7;
 
 impl From<Color> for RGBColor {
@@ -30,15 +30,15 @@ impl From<Color> for RGBColor {
 /// Writes a figure to a file.
 ///
 /// # Errors
-/// If the file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write(figure: &Figure, path: &Path) -> Result<(), Error> {
     std::fs::write(path, text(figure).map_err(|error| Error::file(path)(error))?).map_err(Error::file(path))
 }
 
-/// The figure as the text of an SVG file.
+/// Draws a figure as the text of an SVG file.
 ///
 /// # Errors
-/// If something cannot be drawn.
+/// Returns an error if a part of the figure cannot be drawn.
 pub fn text(figure: &Figure) -> std::io::Result<String> {
     let mut text = String::new();
     draw(figure, &mut text).map_err(|error| std::io::Error::other(error.to_string()))?;
@@ -83,7 +83,7 @@ fn draw(figure: &Figure, text: &mut String) -> Result<(), DrawError> {
     Ok(())
 }
 
-/// The first curve of each name.
+/// Returns the first curve of each name, for the legend.
 fn legend<'a>(curves: impl Iterator<Item = &'a Curve>) -> Vec<&'a Curve> {
     let mut entries: Vec<&Curve> = Vec::new();
     for curve in curves {
@@ -94,7 +94,7 @@ fn legend<'a>(curves: impl Iterator<Item = &'a Curve>) -> Vec<&'a Curve> {
     entries
 }
 
-/// Legend entries in lines that fit the figure.
+/// Arranges the entries of a legend in lines that fit the width of the figure.
 fn arrange<'a>(entries: &[&'a Curve]) -> Vec<Vec<&'a Curve>> {
     let mut lines: Vec<Vec<&Curve>> = Vec::new();
     let mut used = 0;
@@ -112,7 +112,7 @@ fn arrange<'a>(entries: &[&'a Curve]) -> Vec<Vec<&'a Curve>> {
     lines
 }
 
-/// Draws an entry of a legend; returns where the next may begin.
+/// Draws an entry of a legend and returns the horizontal position at which the next one may begin.
 fn draw_entry(curve: &Curve, area: &Area, (x, y): (i32, i32)) -> Result<i32, DrawError> {
     let color = RGBColor::from(curve.color);
     let middle = y + 7;
@@ -136,7 +136,7 @@ fn draw_entry(curve: &Curve, area: &Area, (x, y): (i32, i32)) -> Result<i32, Dra
     Ok(x + entry_width(curve).cast_signed())
 }
 
-/// Room for an entry of a legend, px.
+/// Returns the width that an entry of a legend takes, px.
 fn entry_width(curve: &Curve) -> u32 {
     50 + LETTER * curve.name.chars().count() as u32
 }
@@ -145,7 +145,7 @@ fn is_dashed(shape: &Shape) -> bool {
     matches!(shape, Shape::Dashed | Shape::Horizontal | Shape::Vertical)
 }
 
-/// How opaque an area is.
+/// Returns the opacity of an area.
 fn fill(shape: &Shape) -> f64 {
     if *shape == Shape::Steps { 0.45 } else { 0.25 }
 }
@@ -160,7 +160,7 @@ fn style(curve: &Curve) -> ShapeStyle {
 }
 
 fn draw_panel(panel: &Panel, area: &Area, lowest: bool) -> Result<(), DrawError> {
-    // A logarithmic axis is a linear one for the logarithm, with other labels.
+    // A logarithmic axis is drawn as a linear axis of the logarithm, with other labels.
     let place = |x: f64| if panel.log_x { x.log10() } else { x };
     let (left, right) = panel.range(true);
     let (left, right) = (place(left), place(right));
@@ -239,13 +239,14 @@ fn draw_panel(panel: &Panel, area: &Area, lowest: bool) -> Result<(), DrawError>
     Ok(())
 }
 
-/// Digits after the point that tell the labels of an axis apart.
+/// Returns the number of digits after the point that is needed to tell the labels of an axis apart.
 fn decimals(range: f64) -> usize {
     // An axis has about six labels.
     (-(range / 6.0).log10().floor()).clamp(0.0, 12.0) as usize
 }
 
-/// A number with at most so many digits after the point, and neither `-0` nor trailing zeros.
+/// Formats a number with at most this many digits after the point, without `-0` and without
+/// trailing zeros.
 fn plain(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };

@@ -1,8 +1,8 @@
 use super::*;
 use cosim::experiment::Measure;
 
-/// Angles and their references (rad), moment as a multiple of its limit, time and number of the
-/// solver's solutions.
+/// Creates meters for angles and their references (rad), the moment as a multiple of its limit, and
+/// the number of the solver's solutions.
 fn meters() -> Meters {
     let difference = |axis: usize| Resolved {
         factor: 1_f64.to_degrees(),
@@ -54,7 +54,7 @@ fn oracle_metrics_by_hand() {
             [3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0],
             // The error is (0, 0, 1), with square 1.
             [1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0],
-            // The stop begins no step, and does not count for the means.
+            // No step begins at the stop time, so this row does not count for the means.
             [2.0, 2.0, 2.0, 0.0, 0.0, 0.0, 1.2, 2.0],
         ],
     );

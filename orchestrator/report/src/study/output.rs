@@ -1,4 +1,4 @@
-//! Writes what a study came to: figures, numbers and the page.
+//! Writes the figures, the numbers and the page of a study.
 
 use super::claims;
 use super::kept::write_whole;
@@ -9,10 +9,10 @@ use cosim::error::Error;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A claim, in our words, with its verdict.
+/// A claim in our words, with its verdict.
 pub(super) type Judgement = (String, claims::Verdict);
 
-/// Writes figures, numbers and page. Returns the verdicts and the files.
+/// Writes the figures, the numbers and the page. Returns the verdicts and the names of the files.
 pub(super) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Vec<String>), Error> {
     let study = results.study;
     let fault = |message: String| study.source.error(&(0..0), message);
@@ -40,7 +40,7 @@ pub(super) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Ve
     Ok((verdicts, files))
 }
 
-/// All numbers, for other programs.
+/// Returns all numbers as JSON, for other programs.
 fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
     let study = results.study;
     let runs: serde_json::Map<String, Value> = study

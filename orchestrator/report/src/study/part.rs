@@ -1,4 +1,5 @@
-//! One part of the work of a study: a run for some values of its parameter, from the experiment to what is kept of it.
+//! One part of the work of a study: a run for some values of its parameter, from reading the
+//! experiment to the results that are kept.
 
 use super::definition::Study;
 use super::runs::Run;
@@ -56,7 +57,8 @@ pub struct Member {
 }
 
 impl Member {
-    /// Whether this member had the same results as another one, apart from the computing times that `timings` names.
+    /// Returns whether this member has the same results as another one, apart from the computing
+    /// times that `timings` names.
     pub fn moves_as(&self, other: &Self, timings: &[String]) -> bool {
         let timeless = |metrics: &Metrics| {
             let mut metrics = Metrics { step_us: BTreeMap::new(), ..metrics.clone() };
@@ -107,7 +109,7 @@ pub struct Spread {
 /// Tolerance with which bounds count as met, because of rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// The signals that a study wants of a run: as time series, and as bands.
+/// Signals that the figures of a study need from a run.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Wanted {
     /// Signals that are drawn as lines.
@@ -138,7 +140,7 @@ impl Wanted {
     }
 }
 
-/// A run of a study, ready to be made for any value of its parameter.
+/// A run of a study that has been prepared, so that it can be made for any value of its parameter.
 pub(super) struct Preparation<'a> {
     study: &'a Study,
     run: &'a Run,
@@ -150,10 +152,10 @@ pub(super) struct Preparation<'a> {
 }
 
 impl<'a> Preparation<'a> {
-    /// Collects what is wanted of a run, and reads its experiment.
+    /// Collects the signals that are drawn of a run, and reads its experiment.
     ///
     /// # Errors
-    /// If the experiment cannot be read, or has not what the run changes in it.
+    /// Returns an error if the experiment cannot be read, or lacks what the run changes in it.
     pub(super) fn new(study: &'a Study, run: &'a Run, fmu_dirs: &'a [PathBuf]) -> Result<Self, Error> {
         let wanted = Wanted::of(study, run);
         let experiment =
@@ -161,10 +163,11 @@ impl<'a> Preparation<'a> {
         Ok(Self { study, run, wanted, experiment, fmu_dirs })
     }
 
-    /// The experiment with all names resolved, for the member with this number.
+    /// Checks the experiment for the member with this number, with all names resolved.
     ///
     /// # Errors
-    /// Everything that is wrong with the experiment, the FMUs, or the signals.
+    /// Returns an error if anything is wrong with the experiment, the FMUs, or the parameter that
+    /// is varied.
     pub(super) fn system(&self, member: u32, opened: &mut Opened) -> Result<System, Single> {
         let mut experiment = self.experiment.clone();
         if let Some(vary) = &self.run.vary {
@@ -185,10 +188,10 @@ impl<'a> Preparation<'a> {
         system.resolve(signal).map_err(|message| self.fault(&message))
     }
 
-    /// Checks that everything is there that will be asked for.
+    /// Checks that everything exists that the study asks of this run.
     ///
     /// # Errors
-    /// An error that names the missing item.
+    /// Returns an error that names the missing item.
     pub(super) fn check(&self, opened: &mut Opened) -> Result<(), Error> {
         let mut system = self.system(0, opened).map_err(|source| self.failed(source))?;
         let bounded = self.study.bounds_of(self.run).flat_map(|(_, signals)| signals);
@@ -205,7 +208,7 @@ impl<'a> Preparation<'a> {
     /// Runs the members with these numbers.
     ///
     /// # Errors
-    /// If a unit fails, or if the run was asked to end.
+    /// Returns an error if a unit fails, or if the run was asked to end.
     pub(super) fn execute(
         &self,
         range: Range<u32>,
@@ -233,7 +236,7 @@ impl<'a> Preparation<'a> {
             if number == 0 {
                 outcome.parameters = system.parameters(&mut master)?;
             }
-            // Computing times mean nothing if the run shares the machine.
+            // Computing times are only meaningful if the run has the machine for itself.
             if self.run.timed && number == 0 {
                 master.measure_time();
             }
@@ -294,7 +297,7 @@ impl Compared {
     }
 }
 
-/// Compares signals with a bound.
+/// A comparison of signals with a bound during the run.
 struct Bounded<'a> {
     id: &'a str,
     signals: Vec<Resolved>,
@@ -311,10 +314,10 @@ impl Observer for Bounded<'_> {
     }
 }
 
-/// A series holds about this many points at most.
+/// Approximate largest number of points of a time series.
 const POINTS: u64 = 4000;
 
-/// Records signals at every n-th communication point.
+/// An observer that records signals at every n-th communication point.
 struct Watch {
     stride: u64,
     resolved: Vec<(Signal, Resolved)>,

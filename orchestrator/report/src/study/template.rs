@@ -1,4 +1,4 @@
-//! What a study says once and uses often.
+//! Templates and lists, with which a study describes a repeated table only once.
 //!
 //! ```toml
 //! [lists]
@@ -12,10 +12,13 @@
 //! panel = [{ use = "error", each = "axes", x_range = [0.0, 5.0] }]    # two panels
 //! ```
 //!
-//! A table in a list may have `use`, the name of a template or several, and `each`, a list or the name of one. It then stands for one
-//! table for each row of the list and each template, in this order: the template, over which goes what the table says itself, with
-//! the row's values in the place of their names in braces. A text that is nothing but such a name becomes the value as it is, number
-//! or list. A template may use others; a row's values hold in all that is used and listed inside.
+//! A table in a list may have the keys `use`, which names one template or several, and `each`,
+//! which is a list of rows or the name of one. It then stands for several tables: one for each
+//! template and each row, with all templates of the first row first. Each of these is the template,
+//! in which the keys of the table itself take precedence. The names in braces are replaced by the
+//! row's values; a text that is only such a name becomes the value itself, be it a number or a
+//! list. A template may use other templates, and the values of a row apply in everything that is
+//! used and listed inside.
 
 use cosim::document::{overlay, texts};
 use fmu_import::names;
@@ -24,16 +27,17 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
-/// A place, and what is wrong there.
+/// The place of a fault, and a message that describes it.
 pub(super) type Fault = (Range<usize>, String);
 
-/// Templates may use each other so many deep; more must be a circle.
+/// Largest depth to which templates may use each other. A greater depth must be a circle.
 const DEPTH: usize = 8;
 
-/// Puts what is meant in the place of all that uses a template or stands for each row of a list.
+/// Replaces each table that uses a template, or that stands for the rows of a list, by the tables
+/// that it stands for.
 ///
 /// # Errors
-/// Names a template, a list or a value that is not there.
+/// Returns an error that names the template, the list or the value that does not exist.
 pub(super) fn expand(study: &mut DeTable) -> Result<(), Fault> {
     let mut shared = |key: &str| match study.remove(key).map(|value| (value.span(), value.into_inner())) {
         None => Ok(DeTable::new()),
@@ -52,10 +56,10 @@ pub(super) fn expand(study: &mut DeTable) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Puts other texts in the place of those of which `change` makes something.
+/// Replaces each text for which `change` returns another one.
 ///
 /// # Errors
-/// What `change` says, with its place.
+/// Returns the error of `change`, with the place of the text.
 pub(super) fn rewrite(
     value: &mut Spanned<DeValue>,
     change: &impl Fn(&str) -> Result<Option<String>, String>,
@@ -80,7 +84,7 @@ struct Shared<'i> {
 }
 
 impl<'i> Shared<'i> {
-    /// Expands the lists inside a value; `row` are the values that hold there.
+    /// Expands the lists inside a value. The values of `row` apply there.
     fn inside(&self, value: &mut Spanned<DeValue<'i>>, row: &DeTable<'i>, depth: usize) -> Result<(), Fault> {
         match value.get_mut() {
             DeValue::Table(table) => {
@@ -98,7 +102,7 @@ impl<'i> Shared<'i> {
         }
     }
 
-    /// Adds what an item of a list stands for to `all`.
+    /// Adds the tables that an item of a list stands for to `all`.
     fn item(
         &self,
         mut item: Spanned<DeValue<'i>>,
@@ -144,7 +148,8 @@ impl<'i> Shared<'i> {
         Ok(())
     }
 
-    /// The rows of a list that is named or written out; without one a single row without values.
+    /// Returns the rows of a list that is named or written out. Without a list there is a single
+    /// row without values.
     fn rows(&self, each: Option<&Spanned<DeValue<'i>>>) -> Result<Vec<DeTable<'i>>, Fault> {
         let Some(each) = each else { return Ok(vec![DeTable::new()]) };
         let list = match each.get_ref() {
@@ -174,7 +179,7 @@ fn find<'a, 'i>(
     })
 }
 
-/// The names in braces in a text, each with its place.
+/// Returns the names in braces in a text, each with its place.
 fn variables(text: &str) -> impl Iterator<Item = (&str, Range<usize>)> {
     text.match_indices('{').filter_map(|(start, _)| {
         let (name, _) = text[start + 1..].split_once('}')?;
@@ -183,7 +188,7 @@ fn variables(text: &str) -> impl Iterator<Item = (&str, Range<usize>)> {
     })
 }
 
-/// Puts the row's values in the place of their names.
+/// Replaces the names in braces by the row's values.
 fn substitute<'i>(value: &mut Spanned<DeValue<'i>>, row: &DeTable<'i>) {
     match value.get_mut() {
         DeValue::String(text) => {
