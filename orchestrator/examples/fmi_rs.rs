@@ -1,6 +1,7 @@
-//! Runs FMUs by fmi-rs alone: its importer, its simulation of one unit, and two units wired by hand. Writes CSV.
+//! Runs FMUs with fmi-rs alone: its importer, its simulation of one unit, and two units that are
+//! wired by hand. The results are written as CSV.
 //!
-//! `fmi_rs cs|me FMU STEP STOP OUT`, `fmi_rs loop CONTROLLER PLANT STEP STOP OUT`
+//! The usage is `fmi_rs cs|me FMU STEP STOP OUT` or `fmi_rs loop CONTROLLER PLANT STEP STOP OUT`.
 
 use fmi_rs::fmi2::builder::FMU2Builder;
 use fmi_rs::fmi2::types::fmi2Status;
@@ -15,7 +16,8 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::sync::Arc;
 
-/// What the plant gives to the controller, and the controller to the plant.
+/// Variables that the plant passes to the controller, and variables that the controller passes to
+/// the plant.
 const STATE: [&str; 6] = ["attitude.alpha", "attitude.beta", "attitude.sigma", "rate.p", "rate.q", "rate.r"];
 const MOMENT: [&str; 3] = ["moment.x", "moment.y", "moment.z"];
 
@@ -33,7 +35,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// One unit with its start values, by the library's own simulation. In model exchange by its Euler method.
+/// Simulates one unit with its start values, with the library's own simulation. Model exchange uses
+/// the library's Euler method.
 #[expect(clippy::arc_with_non_send_sync, reason = "what the library wants")]
 fn alone(kind: &str, path: &str, step: f64, stop: f64, out: &str) -> Result<(), Box<dyn Error>> {
     let opened = FMU2Builder::new(&path)?;
@@ -71,7 +74,7 @@ fn alone(kind: &str, path: &str, step: f64, stop: f64, out: &str) -> Result<(), 
     Ok(())
 }
 
-/// A unit that is stepped by hand, and the value references of what it gives and takes.
+/// A unit that is stepped by hand, with the value references of its outputs and inputs.
 struct Unit {
     fmu: Arc<FMU2<CS>>,
     state: Vec<u32>,
@@ -95,7 +98,8 @@ fn done(status: fmi2Status) -> Result<(), Box<dyn Error>> {
     if status == fmi2Status::Ok { Ok(()) } else { Err(format!("{status:?}").into()) }
 }
 
-/// At each communication point the state goes to the controller, then its moment to the plant.
+/// Simulates a closed loop. At each communication point the state goes to the controller, and then
+/// the moment to the plant.
 fn closed_loop(controller: &str, plant: &str, step: f64, stop: f64, out: &str) -> Result<(), Box<dyn Error>> {
     let (controller, plant) = (Unit::new(controller)?, Unit::new(plant)?);
     let (mut state, mut moment) = ([0.0; 6], [0.0; 3]);

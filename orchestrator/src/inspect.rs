@@ -1,4 +1,4 @@
-//! Prints what an FMU says of itself.
+//! Prints what an FMU says about itself, and checks it.
 
 use crate::catalogue::{self, Filter};
 use crate::failure::Failure;
@@ -8,10 +8,12 @@ use fmu_import::fmu::Fmu;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Prints interfaces, platforms and variables of an archive: those that the filter lets through.
+/// Prints the interfaces and platforms of an archive, and those of its variables that fit the
+/// filter.
 ///
 /// # Errors
-/// If it is no FMU, if the filter lets nothing through, or the text cannot be written.
+/// Returns an error if the archive is no FMU, if no variable fits the filter, or if the text cannot
+/// be written.
 pub(crate) fn inspect(
     path: &Path,
     filter: &Filter,
@@ -28,10 +30,12 @@ pub(crate) fn inspect(
     Ok(())
 }
 
-/// Says what is wrong with an archive: its description and its library, which is loaded. Nothing is said of one in order.
+/// Checks the description of an archive and its library, which is loaded for this, and prints each
+/// fault. It prints nothing if there is none.
 ///
 /// # Errors
-/// If there are faults, if it is no FMU at all, or if the text cannot be written.
+/// Returns an error if there are faults, if the archive is no FMU at all, or if the text cannot be
+/// written.
 pub(crate) fn check(path: &Path, out: &mut impl Write) -> Result<(), Failure> {
     let faults = Fmu::open(path)?.faults();
     for fault in &faults {
@@ -89,7 +93,7 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
             }
         }
         for row in [&header].into_iter().chain(&rows) {
-            // By hand, as the formatter refuses widths beyond 16 bits.
+            // The cells are padded by hand, because the formatter refuses widths beyond 16 bits.
             let pad = |(cell, width): (&String, usize)| {
                 format!("{cell}{}", " ".repeat(width.saturating_sub(cell.chars().count())))
             };
@@ -100,7 +104,7 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Cells that are longer move the rest of their row, and no other.
+/// Largest width to which a column is padded. A longer cell shifts only the rest of its own row.
 const WIDEST: usize = 80;
 
 fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
@@ -130,7 +134,7 @@ fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
     [name, kind, variable.variability.clone(), unit, start, variable.description.clone()]
 }
 
-/// A start value in its display unit, to the digits that people read.
+/// Converts a start value to its display unit, rounded to the digits that people read.
 fn shown(description: &ModelDescription, unit: Option<&str>, display: &str, start: &str) -> Option<f64> {
     let unit = description.units.iter().find(|u| Some(u.name.as_str()) == unit)?;
     let (_, factor, offset) = unit.displays.iter().find(|(name, ..)| name == display)?;

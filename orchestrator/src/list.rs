@@ -1,4 +1,4 @@
-//! Lists the experiments, studies and FMUs there are.
+//! Lists the experiments, studies and FMUs that are found.
 
 use crate::failure::Failure;
 use cosim::error::Error;
@@ -11,11 +11,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::{fs, iter};
 
-/// Prints the experiments and studies below a folder with their titles, and the FMUs below it. Without a folder: those here,
-/// and all others that are found from here.
+/// Prints the experiments and studies below a folder with their titles, and the FMUs below it.
+/// Without a folder it prints those below the current one, and all others that the program finds
+/// from any folder.
 ///
 /// # Errors
-/// If the folder is not there, or the text cannot be written.
+/// Returns an error if the folder does not exist, or if the text cannot be written.
 pub(crate) fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Failure> {
     if let Some(folder) = folder
         && !folder.is_dir()
@@ -32,7 +33,8 @@ pub(crate) fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Fa
     let tables = find("toml", elsewhere);
     let mut rows: Vec<(PathBuf, String)> = Vec::new();
     for path in &tables {
-        // Other TOML files are no experiments; an experiment with a fault is shown with it.
+        // Other TOML files are no experiments, and are skipped. A faulty experiment is shown with
+        // its fault.
         let Ok(text) = fs::read_to_string(path) else { continue };
         if search::is_experiment(&text) {
             let title =

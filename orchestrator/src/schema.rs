@@ -1,7 +1,9 @@
-//! JSON Schemas of experiment and study files, made from the types that read them, so that editors complete and check these files.
+//! JSON Schemas of experiment and study files, made from the types that read them, so that editors
+//! can complete and check these files.
 //!
-//! What a file leaves out may come from one that it extends, or from a template. So a schema knows every key and its type but asks for
-//! none; what is missing is told when the file is read.
+//! Keys that a file leaves out may come from one that it extends, or from a template. A schema
+//! therefore knows every key and its type but requires none; missing keys are reported when the
+//! file is read.
 
 use cosim::experiment::Experiment;
 use cosim_report::study::definition::Study;
@@ -10,16 +12,16 @@ use schemars::transform::{RecursiveTransform, Transform};
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
 
-/// A kind of file.
+/// Kind of file that a schema describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Kind {
-    /// An experiment.
+    /// The file describes an experiment.
     Experiment,
-    /// A study.
+    /// The file describes a study.
     Study,
 }
 
-/// The schema of a kind of file.
+/// Returns the schema of a kind of file as text.
 pub(crate) fn text(kind: Kind) -> String {
     let mut schema = match kind {
         Kind::Experiment => schema_of::<Experiment>(json!({
@@ -45,7 +47,7 @@ pub(crate) fn text(kind: Kind) -> String {
         }
     };
     RecursiveTransform(|schema: &mut Schema| drop(schema.remove("required"))).transform(&mut schema);
-    // A schema is plain JSON.
+    // A schema is plain JSON, so that this cannot fail.
     serde_json::to_string_pretty(&schema).unwrap_or_default() + "\n"
 }
 
@@ -65,8 +67,8 @@ fn texts(description: &str) -> Value {
     json!({ "description": description, "type": ["string", "array"], "items": { "type": "string" } })
 }
 
-/// Allows what templates need: `use` and `each` in every table, and the name of a row's value in braces for a number, a truth value or a
-/// list.
+/// Allows what templates need: `use` and `each` in every table, and the name of a row's value in
+/// braces in place of a number, a truth value or a list.
 fn with_templates(schema: &mut Schema) {
     if let Some(properties) = properties(schema).filter(|properties| !properties.contains_key("templates")) {
         properties.insert("use".into(), texts("Templates that this table builds upon, one table for each."));

@@ -29,7 +29,7 @@ const POINTS: usize = 2000;
 /// A curve, as pairs of time and value.
 type Points = Vec<(f64, f64)>;
 
-/// The courses of a chart.
+/// Points of a chart's curves and of the references that they follow.
 #[derive(Debug, Default)]
 struct Chart {
     values: Vec<Points>,
@@ -195,7 +195,7 @@ fn recorded(frame: &mut Frame, state: &State, area: Rect) {
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
 
-/// A row of numbers for each panel, and one for what its curves are to follow.
+/// Returns a row of numbers for each panel, followed by a row for the references if there are any.
 fn numbers(state: &State) -> Vec<Line<'static>> {
     let Some(values) = state.values() else { return Vec::new() };
     let row = |label: &str, panel: &Panel, values: Vec<f64>| {
@@ -216,7 +216,7 @@ fn numbers(state: &State) -> Vec<Line<'static>> {
     rows.collect()
 }
 
-/// Norms of panels against their limits.
+/// Returns a bar for each panel with a limit, which compares the norm of its values with the limit.
 fn bars(state: &State) -> Vec<LineGauge<'static>> {
     let values = state.values();
     let limited = state.scene.panels.iter().filter_map(|panel| {
@@ -240,7 +240,7 @@ fn bars(state: &State) -> Vec<LineGauge<'static>> {
                 panel.unit,
                 ratio * 100.0
             );
-            // What is not a number is not within a limit.
+            // A value that is not a number is not within a limit, so the bar is drawn full.
             let filled = if ratio.is_nan() { 1.0 } else { ratio.clamp(0.0, 1.0) };
             let gauge = LineGauge::default().filled_symbol(line::THICK_HORIZONTAL).ratio(filled).label(label);
             gauge.filled_style(color).unfilled_style(Color::DarkGray)
@@ -248,7 +248,7 @@ fn bars(state: &State) -> Vec<LineGauge<'static>> {
         .collect()
 }
 
-/// The lines of variables that the experiment names.
+/// Returns the lines of variables that the experiment names.
 fn readings(state: &State) -> Vec<Line<'static>> {
     let Some(values) = state.values() else { return Vec::new() };
     let line = |(heading, variables): &(String, Vec<Probed>)| {
@@ -265,7 +265,8 @@ fn readings(state: &State) -> Vec<Line<'static>> {
     state.scene.readings.iter().map(line).collect()
 }
 
-/// Whether the limits are guaranteed at present; red once that was lost or broken.
+/// Returns a line that says whether the guarantee is in force. It turns red once the guarantee was
+/// lost or broken.
 fn guarantee(state: &State) -> Option<Line<'static>> {
     let course = state.now.guarantee.as_ref()?;
     let status = |value: f64| format!(" ({})", course.name_of(value));

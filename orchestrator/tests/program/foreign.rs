@@ -1,10 +1,11 @@
-//! Units of other makers, imitated by a unit in C: what they do differently runs, and what is wrong with them is told.
+//! Units of other makers, imitated by a unit in C. What they do differently must run, and their
+//! faults must be reported.
 
 use crate::bench::{Bench, LOOP, Recipe};
 use std::fs;
 use std::process::Command;
 
-/// One line on standard error, which names the archive and nothing of the temporary folder.
+/// Checks that standard error holds one line, which names the archive and not the temporary folder.
 fn told(errors: &str) -> &str {
     assert_eq!(errors.lines().count(), 1, "{errors}");
     assert!(errors.starts_with("error: Unit.fmu: ") || errors.contains("/Unit.fmu: "), "{errors}");
@@ -63,7 +64,8 @@ fn a_unit_may_end_the_simulation() {
     assert_eq!(code, 0);
     assert!(errors.contains("plant ended the simulation at t = 2 s"), "{errors}");
 
-    // Without fmi2Terminated it is a failure, and says how far the unit got.
+    // Without fmi2Terminated the discarded step is a failure, whose message says how far the unit
+    // got.
     let (code, _, errors) = Bench::new().run(&fails);
     assert_eq!(code, 1);
     let last = "error: plant failed at t = 2 s in doStep: out of propellant at 2; it got as far as t = 3 s (fmi2Discard)";
@@ -72,7 +74,7 @@ fn a_unit_may_end_the_simulation() {
 
 #[test]
 fn a_status_that_does_not_exist_is_a_failure_of_that_call() {
-    // The logger is given it as well.
+    // The logger receives the same status.
     let description = changed(" min=\"2\" max=\"4\" start=\"3\"", " start=\"3\"");
     let bench = Bench::made(LOOP, &Recipe { description: &description, ..Recipe::default() });
     for status in ["-7", "42", "99"] {
@@ -104,7 +106,7 @@ fn what_is_wrong_with_a_library_is_told_by_its_entry() {
         ),
         "{misnamed}"
     );
-    // e_machine of ELF: 183 is AArch64.
+    // The field e_machine of an ELF file is 183 for AArch64.
     let for_arm = |mut bytes: Vec<u8>| {
         bytes[18..20].copy_from_slice(&[183, 0]);
         bytes

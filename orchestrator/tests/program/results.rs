@@ -1,4 +1,4 @@
-//! What a run measures, writes and says.
+//! Tests of what a run measures, writes and prints.
 
 use crate::bench::{Bench, LOOP};
 use std::fs;
@@ -9,7 +9,7 @@ fn oracle_a_run_writes_its_results() {
     let (code, summary, errors) = bench.run(&["--set", "gain.gain=500 mm", "--set", "gain.kind=rough"]);
     assert_eq!(code, 0, "{errors}");
     assert!(summary.contains("loop delay        none (gain -> plant -> gain)"), "{summary}");
-    // x⁺ = x + x/2.
+    // The state follows x⁺ = x + x/2.
     let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
     let expected = "time,gain.output.direct,plant.output.integral,plant.steps\n\
                     0.0,0.5,1.0,0\n1.0,0.75,1.5,1\n2.0,1.125,2.25,2\n3.0,1.6875,3.375,3\n";
@@ -29,7 +29,7 @@ fn oracle_a_run_writes_its_results() {
     }
 }
 
-/// The loop with what is to be measured, watched and drawn of it.
+/// Creates a bench whose loop has a section that says what is measured, watched and drawn.
 fn observed(section: &str) -> Bench {
     Bench::with(&format!("{LOOP}{section}"))
 }
@@ -117,7 +117,7 @@ fn a_law_that_counts_on_another_delay_is_warned_of_in_one_line() {
     };
     let jacobi = ["--coupling", "jacobi", "--set", "gain.delay=1.25", "--set", "plant.actuation.delay=0.25"];
     let errors = warnings(&jacobi);
-    // The plant has a parameter of this name, too, and counts on nothing.
+    // The plant also has a parameter of this name, which stays at 0.
     assert_eq!(errors.lines().count(), 1, "{errors}");
     let told =
         "plant.delay = 0 s, but the loop gain -> plant -> gain has a delay of 1 s: set plant.delay = 1";
@@ -151,13 +151,13 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
         let line = summary.lines().find(|line| line.starts_with("  guarantee ")).unwrap().to_string();
         (line, bench.json("out/loop/metrics.json"))
     };
-    // Its input is 1, 1.5, 2.25, 3.375; margins of 1 - input/largest, and half of that.
+    // The input is 1, 1.5, 2.25, 3.375; the margins are 1 - input/largest, and half of that.
     let (line, metrics) = guarantee("2");
     assert_eq!(line, "  guarantee         in force at 50.0 % of the ticks, lost at t = 2 s (exceeded)");
     assert_eq!((&metrics["guarantee_share"], &metrics["guarantee_lost_at"]), (&0.5.into(), &2.0.into()));
     assert_eq!(metrics["guarantee_rate_margin_min"], 0.25);
     assert_eq!(metrics["guarantee_moment_margin_min"], 0.125);
-    // No limits are known.
+    // The experiment names no limits.
     assert!(metrics["guarantee_broken"].is_null());
     let (line, metrics) = guarantee("3.75");
     assert_eq!(line, "  guarantee         in force throughout, margins 5.0 % (moment), 10.0 % (rate)");
@@ -175,7 +175,8 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
 #[test]
 fn a_failing_unit_ends_the_run_with_its_own_words_and_keeps_the_results() {
     let bench = Bench::new();
-    // fmi2Discard, fmi2Error, and fmi2Fatal, after which not even fmi2FreeInstance may be called.
+    // The statuses are fmi2Discard, fmi2Error, and fmi2Fatal, after which not even fmi2FreeInstance
+    // may be called.
     for (status, name) in [("2", "fmi2Discard"), ("3", "fmi2Error"), ("4", "fmi2Fatal")] {
         let status = format!("plant.fail.status={status}");
         let (code, _, errors) = bench.run(&["--set", "plant.fail.time=2", "--set", &status]);
@@ -237,7 +238,7 @@ fn results_can_be_left_out_or_labelled() {
     let names = "time [s],gain.output.direct [m],plant.output.integral [m],plant.steps,gain.guarantee.status";
     assert_eq!(labelled[0], names);
     let item = labelled[1].rsplit(',').next().unwrap();
-    // Whichever way, the numbers have their names beside them.
+    // The metadata name the items of enumerations in any case.
     let columns = &bench.json("out/loop/results.json")["columns"];
     assert_eq!(columns[3]["items"]["1"], item, "{columns}");
     assert!(columns[0]["items"].is_null() && columns[0]["unit"] == "m");

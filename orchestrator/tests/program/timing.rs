@@ -1,4 +1,5 @@
-//! Runs with the wall clock, runs that are ended, and what they leave behind.
+//! Tests of runs with the wall clock, of runs that are ended early, and of the files that they
+//! leave.
 
 use crate::bench::Bench;
 use std::fs;
@@ -25,7 +26,7 @@ fn a_run_in_real_time_takes_its_time() {
     assert!(fs::read_to_string(bench.path("out/loop/realtime.svg")).unwrap().contains("wake-up jitter, ms"));
 }
 
-/// No machine steps units in a nanosecond.
+/// A real-time factor that leaves a nanosecond for each step, which no machine can keep.
 const IMPOSSIBLE: &str = "1e9";
 
 #[test]
@@ -61,7 +62,7 @@ fn every_missed_deadline_is_counted_and_what_was_done_is_said() {
 #[test]
 fn a_slow_unit_is_named() {
     let bench = Bench::new();
-    // 20 ms from tick to tick, and a step of the plant takes 50 ms.
+    // There are 20 ms from tick to tick, but a step of the plant takes 50 ms.
     let (code, summary, errors) = bench.run(&["--real-time", "50", "--set", "plant.pause=0.05"]);
     assert_eq!(code, 0, "{errors}");
     let worst = summary.lines().find(|line| line.contains("worst miss")).unwrap();
@@ -108,7 +109,7 @@ fn the_live_view_wants_a_terminal() {
     assert!(!bench.path("out").exists());
 }
 
-/// Starts the program, sends it a signal once `awaited` is there, and gives back its exit code.
+/// Starts the program, sends it a signal once the file `awaited` exists, and returns its exit code.
 #[cfg(unix)]
 fn signalled(bench: &Bench, arguments: &[&str], signal: &str, awaited: &str) -> Option<i32> {
     let mut child = bench
@@ -131,7 +132,7 @@ fn signalled(bench: &Bench, arguments: &[&str], signal: &str, awaited: &str) -> 
 fn a_signal_ends_any_run_and_keeps_its_results() {
     let bench = Bench::new();
     fs::create_dir(bench.path("tmp")).unwrap();
-    // A step takes ten hours, or as long as the unit does.
+    // A step takes ten hours in the paced run, and as long as the unit takes in the usual one.
     let paced = ["run", "loop.toml", "--force", "--real-time", "2.7e-5"];
     let usual = ["run", "loop.toml", "--force", "--stop", "1000", "--set", "plant.pause=0.02"];
     for (arguments, signal, code) in
@@ -252,7 +253,7 @@ fn standard_error_that_cannot_be_written_ends_no_run() {
         command.stdout(Stdio::null()).stderr(full).status().unwrap().code()
     };
     assert_eq!(run(&[]), Some(0));
-    // With a warning.
+    // This run prints a warning.
     assert_eq!(run(&["--set", "gain.delay=0.5"]), Some(0));
     assert_eq!(run(&["--set", "gain.gian=0.5"]), Some(2));
     assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(), 5);

@@ -1,4 +1,4 @@
-//! What the command line and the files are refused for, and what is found.
+//! Tests of what the program refuses, in the command line and in files, and of what it finds.
 
 use crate::bench::{Bench, LOOP};
 use std::fs;
@@ -6,7 +6,8 @@ use std::io::Write;
 use std::path::Path;
 use zip::write::SimpleFileOptions;
 
-/// Whether a line of the list shows this file with this title, among those of the project if the program was built there.
+/// Returns whether a line of the list shows this file with this title. If the program was built in
+/// the project, the list also shows the project's files.
 fn lists(text: &str, file: &str, title: &str) -> bool {
     text.lines().any(|line| line.contains(file) && line.ends_with(title))
 }
@@ -57,7 +58,7 @@ fn usage_that_is_nearly_right_is_told_what_it_lacks() {
     assert!(code == 2 && errors.contains("--ssp"), "{errors}");
     let (code, _, errors) = bench.call(&["reproduce", "loop", "--members", "0"]);
     assert!(code == 2 && errors.contains("--members"), "{errors}");
-    // A unit without inputs that are left: all of none stay unconnected.
+    // The pattern leaves all inputs of this component unconnected, however many there are.
     let lonely = LOOP.replace(
         "[components.plant]",
         "[components.other]\nfmu = \"Unit.fmu\"\nunconnected = [\"*\"]\n[components.plant]",
@@ -65,7 +66,7 @@ fn usage_that_is_nearly_right_is_told_what_it_lacks() {
     let bench = Bench::with(&lonely);
     let (code, summary, errors) = bench.run(&[]);
     assert_eq!(code, 0, "{errors}");
-    // What the order leaves out comes last.
+    // A component that the order leaves out comes last.
     assert!(summary.contains("gain, plant, other"), "{summary}");
 }
 
@@ -74,7 +75,7 @@ fn a_unit_is_exchanged_from_the_command_line() {
     let experiment =
         LOOP.replace("[components.plant]", "[components.gain.parameters]\ngain = 3.0\n[components.plant]");
     let bench = Bench::with(&experiment);
-    // Another unit, that lacks what is set of the first.
+    // The new unit lacks a parameter that the experiment sets.
     let mut old = zip::ZipArchive::new(fs::File::open(bench.path("Unit.fmu")).unwrap()).unwrap();
     fs::create_dir(bench.path("mine")).unwrap();
     let mut zip = zip::ZipWriter::new(fs::File::create(bench.path("mine/My.fmu")).unwrap());
@@ -229,11 +230,11 @@ fn inputs_without_connection_must_be_meant() {
     let open = LOOP.replace("[[connections]]\nfrom = \"gain.output.direct\"\nto = \"plant.input\"\n", "");
     let message = Bench::with(&open).refusal(&[]);
     assert!(message.contains("inputs of \"plant\" are not connected: input"), "{message}");
-    // The line that the message proposes is the remedy.
+    // The line that the message proposes solves the problem.
     let (_, line) = message.split_once("[components.plant]: ").unwrap();
     let meant = open.replace("[components.plant]\n", &format!("[components.plant]\n{line}"));
     assert_eq!(Bench::with(&meant).run(&[]).0, 0);
-    // A value will do as well.
+    // A value for the input solves it as well.
     let bench = Bench::with(&open);
     assert_eq!(bench.run(&["--set", "plant.input=3"]).0, 0);
     assert!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().contains("\n3.0,20.0,10.0,3\n"));
@@ -271,7 +272,7 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     let (code, _, errors) = bench.call(&["run", "longer", "--quiet"]);
     assert_eq!(code, 0, "{errors}");
     assert!(results("longer").starts_with(&results("loop")) && results("longer") != results("loop"));
-    // What is kept of the run, what is shown and what is packed is the whole.
+    // The kept, the shown and the packed experiment are the merged whole.
     let kept = bench.json("out/longer/results.json");
     let (code, shown, _) = bench.call(&["show", "longer"]);
     assert!(code == 0 && kept["experiment"]["text"] == shown && !shown.contains("extends"), "{shown}");
@@ -282,7 +283,8 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     assert_eq!(code, 0, "{errors}");
     let (code, _, errors) = bench.call(&["run", "longer.ssp", "--quiet", "--out", "out/packed"]);
     assert_eq!(code, 0, "{errors}");
-    // A fault is told with the file that has it; without a title a file is no experiment of its own.
+    // A fault is reported with the file that contains it. A file without a title is no experiment
+    // of its own.
     fs::write(bench.path("loop.toml"), LOOP.replace("plant.steps", "plant.stepz")).unwrap();
     let (code, _, errors) = bench.call(&["run", "more/longer.toml", "--force"]);
     assert!(code == 2 && errors.contains("loop.toml:18: ") && errors.contains("\"steps\""), "{errors}");

@@ -8,7 +8,7 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::buffer::Cell;
 
-/// The picture, line by line without trailing spaces.
+/// Returns the drawn view, line by line without trailing spaces.
 fn picture(state: &State, width: u16, height: u16) -> Vec<String> {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
     terminal.draw(|frame| draw(frame, state)).unwrap();
@@ -109,7 +109,7 @@ fn a_picture_shows_angles_limits_solver_and_deadlines() {
         "moment          x     0.0000      y    60.0000      z   -80.0000 kN m",
     ];
     assert_eq!(picture[13..18], expected);
-    // ‖(3, 4, 0)‖ of 5 and ‖(0, 60, -80)‖ of 100: both at their limits.
+    // Both norms are at their limits: ‖(3, 4, 0)‖ = 5 of 5, and ‖(0, 60, -80)‖ = 100 of 100.
     assert!(picture[18].starts_with("rate           5.000 of 5.000 deg/s  100.0 % ━"), "{}", picture[18]);
     assert!(picture[19].starts_with("moment       100.000 of 100.000 kN m   100.0 % ━"), "{}", picture[19]);
     assert_eq!(
@@ -121,7 +121,7 @@ fn a_picture_shows_angles_limits_solver_and_deadlines() {
             "q: end the run, keep the results",
         ]
     );
-    // The curves are there: braille dots in both charts.
+    // Braille dots in both charts show that the curves are drawn.
     let dots = |columns: std::ops::Range<usize>| {
         let rows = picture[3..12].iter().map(|row| row.chars().skip(columns.start).take(columns.len()));
         rows.flatten().any(|symbol| ('\u{2801}'..='\u{28ff}').contains(&symbol))
