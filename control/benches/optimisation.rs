@@ -35,10 +35,21 @@ fn run<C: Optimising>(controller: &mut C) -> Vec<Tick<C::Memory>> {
     let mut before = controller.memory();
     let mut memory = controller.memory();
     let mut ticks = Vec::new();
-    simulate(controller, &mut memory, 1.05, disturbance(Kind::White), |after, number, &measured| {
-        ticks.push(Tick { number, before: before.clone(), measured, status: C::report(after).status });
-        before.clone_from(after);
-    });
+    simulate(
+        controller,
+        &mut memory,
+        1.05,
+        disturbance(Kind::White),
+        |after, number, &measured| {
+            ticks.push(Tick {
+                number,
+                before: before.clone(),
+                measured,
+                status: C::report(after).status,
+            });
+            before.clone_from(after);
+        },
+    );
     ticks
 }
 
@@ -98,7 +109,10 @@ fn print_distribution<C: Optimising>(name: &str, controller: &mut C, ticks: &[Ti
 const WAYS: [(&str, SolverSettings); 4] = [
     ("shortcuts, then riccati", WAY),
     ("riccati", SolverSettings { shortcuts: false, ..WAY }),
-    ("riccati, frozen", SolverSettings { shortcuts: false, nonlinearity: Nonlinearity::Frozen, ..WAY }),
+    (
+        "riccati, frozen",
+        SolverSettings { shortcuts: false, nonlinearity: Nonlinearity::Frozen, ..WAY },
+    ),
     ("cone", SolverSettings { shortcuts: false, method: Method::Cone, ..WAY }),
 ];
 const WAY: SolverSettings = SolverSettings {
@@ -119,8 +133,12 @@ fn print_all<C: Optimising>(name: &str, new: impl Fn(SolverSettings) -> C) {
 }
 
 fn distributions() {
-    for (name, constraints) in [("CRMPC robust", Constraints::Robust), ("CRMPC paper", Constraints::Paper)] {
-        print_all(name, |solver| Crmpc::new(crmpc::Settings { solver, ..settings(constraints) }).unwrap());
+    for (name, constraints) in
+        [("CRMPC robust", Constraints::Robust), ("CRMPC paper", Constraints::Paper)]
+    {
+        print_all(name, |solver| {
+            Crmpc::new(crmpc::Settings { solver, ..settings(constraints) }).unwrap()
+        });
     }
     let (published, tuned) = (dlmpc::Settings::published(), dlmpc::Settings::tuned());
     for (name, settings) in [("DLMPC published", published), ("DLMPC tuned", tuned)] {
@@ -138,7 +156,8 @@ fn optimisations(criterion: &mut Criterion) {
         let mut group = criterion.benchmark_group(name);
         let after = |time: f64, status: Status| {
             let first = (time / FEEDBACK).round() as u64;
-            let mut optimised = ticks.iter().filter(|tick| tick.number >= first && tick.number % ratio == 0);
+            let mut optimised =
+                ticks.iter().filter(|tick| tick.number >= first && tick.number % ratio == 0);
             optimised.find(|tick| tick.status == status)
         };
         let situations = [
@@ -161,7 +180,8 @@ fn optimisations(criterion: &mut Criterion) {
         }
         if let Some(tick) = after(0.2, Status::Constrained) {
             let cone = SolverSettings { shortcuts: false, method: Method::Cone, ..WAY };
-            let mut whole = Crmpc::new(crmpc::Settings { solver: cone, ..settings(constraints) }).unwrap();
+            let mut whole =
+                Crmpc::new(crmpc::Settings { solver: cone, ..settings(constraints) }).unwrap();
             group.bench_function("whole horizon", |bencher| {
                 bencher.iter_batched_ref(
                     || tick.before.clone(),

@@ -43,8 +43,11 @@ fn riccati(criterion: &mut Criterion) {
     let reference = (scenario.reference).at(0.0).angles;
     let start = [scenario.initial_angles - reference, Vector3::zeros()];
     let affine = vec![[Vector3::zeros(); 2]; n];
-    let sets =
-        Sets { body: settings.body, printed: false, bounds: (settings.limit_rate, settings.limit_moment) };
+    let sets = Sets {
+        body: settings.body,
+        printed: false,
+        bounds: (settings.limit_rate, settings.limit_moment),
+    };
     let radius = design.paper.map(|paper| paper.epsilon1.min(paper.epsilon2));
     let end = || End { weight: &cost.end, slope: [Vector3::zeros(); 2], radius };
 
@@ -82,16 +85,20 @@ fn iterations<'a, C: mpc::Constraints<2> + 'a>(
 ) {
     let problem = problem();
     let mut group = criterion.benchmark_group(name);
-    for (name, most) in [("1 iteration", 1), ("2 iterations", 2), ("3 iterations", 3), ("to the optimum", 50)]
+    for (name, most) in
+        [("1 iteration", 1), ("2 iterations", 2), ("3 iterations", 3), ("to the optimum", 50)]
     {
         let mut riccati = Riccati::new(problem.affine.len(), 0, most);
-        let outcome = riccati.solve(&problem, &mut cold.clone(), 0, false, &mut Budget::unlimited(), None);
+        let outcome =
+            riccati.solve(&problem, &mut cold.clone(), 0, false, &mut Budget::unlimited(), None);
         // With fewer iterations the benchmark's name would be wrong.
         assert!(outcome.solved() == (most == 50), "{outcome:?}");
         group.bench_function(name, |bencher| {
             bencher.iter_batched_ref(
                 || cold.clone(),
-                |solution| riccati.solve(&problem, solution, 0, false, &mut Budget::unlimited(), None),
+                |solution| {
+                    riccati.solve(&problem, solution, 0, false, &mut Budget::unlimited(), None)
+                },
                 BatchSize::SmallInput,
             );
         });

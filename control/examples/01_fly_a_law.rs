@@ -19,12 +19,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if sample.tick % 25 == 0 {
             let error = (sample.measured.angles - sample.reference.angles).norm().to_degrees();
             let rate = sample.measured.rates.norm().to_degrees();
-            println!("{:5.1} s {error:7.3}° {rate:6.3}°/s {:8.0} N m", sample.time, sample.moment.norm());
+            println!(
+                "{:5.1} s {error:7.3}° {rate:6.3}°/s {:8.0} N m",
+                sample.time,
+                sample.moment.norm()
+            );
         }
     })?;
 
     println!("EMS {:.3}°", summary.error_rms.to_degrees());
-    println!("largest rate {:.0} % of its limit", 100.0 * summary.largest_rate / scenario.limit_rate);
-    println!("largest moment {:.0} % of its limit", 100.0 * summary.largest_moment / scenario.limit_moment);
+    println!(
+        "largest rate {:.0} % of its limit",
+        100.0 * summary.largest_rate / scenario.limit_rate
+    );
+    println!(
+        "largest moment {:.0} % of its limit",
+        100.0 * summary.largest_moment / scenario.limit_moment
+    );
     Ok(())
 }

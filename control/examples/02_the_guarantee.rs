@@ -14,8 +14,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = Settings::new(Constraints::Robust);
 
     // Errors of the measured rates have to be made up for by moment that the disturbance needs as well.
-    let with_errors =
-        Settings { angle_error: 0.25_f64.to_radians(), rate_error: 0.25_f64.to_radians(), ..settings };
+    let with_errors = Settings {
+        angle_error: 0.25_f64.to_radians(),
+        rate_error: 0.25_f64.to_radians(),
+        ..settings
+    };
     if let Err(refusal) = Crmpc::new(with_errors) {
         println!("with errors of 0.25° and 0.25°/s: {refusal}\n");
     }

@@ -29,9 +29,10 @@ fn flown(known: f64) -> Result<(f64, f64), Box<dyn std::error::Error>> {
     let (mut rate, mut moment) = (0.0_f64, 0.0_f64);
     for tick in 0..1250_u32 {
         let [from, to] = [tick, tick + 1].map(|k| 0.04 * f64::from(k));
-        let measured = Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
-        let command =
-            law.update(&mut memory, tick.into(), from, &measured, &|time| scenario.reference.at(time));
+        let measured =
+            Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
+        let command = law
+            .update(&mut memory, tick.into(), from, &measured, &|time| scenario.reference.at(time));
         plant.advance(from, to, command)?;
         (rate, moment) = (rate.max(plant.rates().norm()), moment.max(command.norm()));
     }

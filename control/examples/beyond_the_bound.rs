@@ -16,7 +16,8 @@ use control::Controller;
 use control::crmpc::{Constraints, Guarantee, Settings};
 use control::delay::{Delayed, Latency};
 use harness::{
-    Case, FEEDBACK, Kept, Outcome, adversaries, constant, in_parallel, lqr, run, settings, simulate, square,
+    Case, FEEDBACK, Kept, Outcome, adversaries, constant, in_parallel, lqr, run, settings,
+    simulate, square,
 };
 
 /// Runs with an EMS above this count as lost, deg.
@@ -30,7 +31,8 @@ fn main() {
     );
     for scale in [1.0, 1.2, 1.4, 1.7, 2.0] {
         let bound = scale * published.disturbance_bound;
-        let told = Settings { disturbance_bound: bound, guarantee: Guarantee::BestEffort, ..published };
+        let told =
+            Settings { disturbance_bound: bound, guarantee: Guarantee::BestEffort, ..published };
         let families = [
             ("constant", constant()),
             ("square waves", square(&[1.0, 4.0, 20.0])),
@@ -50,13 +52,16 @@ fn main() {
                 let latency = Latency::default();
                 let mut law = Delayed::new(lqr(), body, FEEDBACK, latency, limit_moment).unwrap();
                 let mut memory = law.memory();
-                let outcome = simulate(&mut law, &mut memory, case.inertia_scale, larger(case), |_, _, _| {});
+                let outcome =
+                    simulate(&mut law, &mut memory, case.inertia_scale, larger(case), |_, _, _| {});
                 (outcome, Kept { fallbacks: 0, in_force: 0.0, broken: false })
             });
             let crmpc = [robust(&published), robust(&told)];
             let only = crmpc.each_ref().map(|all| {
                 let pairs = all.iter().zip(&regulated);
-                pairs.filter(|((crmpc, _), (lqr, _))| crmpc.ems_deg > LOST && lqr.ems_deg <= LOST).count()
+                pairs
+                    .filter(|((crmpc, _), (lqr, _))| crmpc.ems_deg > LOST && lqr.ems_deg <= LOST)
+                    .count()
             });
             let [published, told] = crmpc.map(|all| shown(&all));
             println!(

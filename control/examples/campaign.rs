@@ -13,7 +13,8 @@ mod harness;
 
 use control::crmpc::Constraints;
 use harness::{
-    Case, Kept, Outcome, adversaries, constant, in_parallel, lqr, run, settings, simulate, square, white,
+    Case, Kept, Outcome, adversaries, constant, in_parallel, lqr, run, settings, simulate, square,
+    white,
 };
 
 fn main() {
@@ -32,7 +33,16 @@ fn main() {
     ];
     println!(
         "{:7} {:27} {:>4} {:>9} {:>9} {:>9} {:>11} {:>9} {:>10} {:>6}  largest at",
-        "", "", "runs", "mean EMS", "max EMS", "max rate", "max moment", "fallbacks", "in force", "broken"
+        "",
+        "",
+        "runs",
+        "mean EMS",
+        "max EMS",
+        "max rate",
+        "max moment",
+        "fallbacks",
+        "in force",
+        "broken"
     );
     for (name, cases) in &families {
         let crmpc = |constraints| {
@@ -44,7 +54,8 @@ fn main() {
         report("paper", name, cases, &crmpc(Constraints::Paper));
         let regulated = in_parallel(cases, |case| {
             let disturbance = case.disturbance.clone();
-            let outcome = simulate(&mut lqr(), &mut (), case.inertia_scale, disturbance, |(), _, _| {});
+            let outcome =
+                simulate(&mut lqr(), &mut (), case.inertia_scale, disturbance, |(), _, _| {});
             (outcome, Kept { fallbacks: 0, in_force: 0.0, broken: false })
         });
         report("LQR", name, cases, &regulated);
@@ -56,7 +67,8 @@ fn report(controller: &str, family: &str, cases: &[Case], outcomes: &[(Outcome, 
         let values = outcomes.iter().map(|(outcome, _)| value(outcome)).enumerate();
         values.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::NAN))
     };
-    let mean = outcomes.iter().map(|(outcome, _)| outcome.ems_deg).sum::<f64>() / outcomes.len() as f64;
+    let mean =
+        outcomes.iter().map(|(outcome, _)| outcome.ems_deg).sum::<f64>() / outcomes.len() as f64;
     let fallbacks: u32 = outcomes.iter().map(|(_, kept)| kept.fallbacks).sum();
     let in_force = outcomes.iter().map(|(_, kept)| kept.in_force).fold(1.0, f64::min);
     let broken = outcomes.iter().filter(|(_, kept)| kept.broken).count();

@@ -15,8 +15,8 @@ use ahrs::{Ahrs as _, Madgwick, Mahony};
 use control::estimation::fusion::{Fusion, Gains, triad};
 use control::estimation::{Settings, angles, mems_corrections};
 use harness::platform::{
-    CALIBRATION_DURATION, PERIOD, Truth, calibrated, errors, estimates, felt, lines, mems, rest, rms,
-    scenario,
+    CALIBRATION_DURATION, PERIOD, Truth, calibrated, errors, estimates, felt, lines, mems, rest,
+    rms, scenario,
 };
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -74,7 +74,8 @@ fn east_north_up() -> Matrix3<f64> {
 /// Returns the rotation to body axes from north, east, down, from a quaternion (w, x, y, z) that
 /// leads from the body to other Earth axes.
 fn from_quaternion([w, x, y, z]: [f64; 4], earth: &Matrix3<f64>) -> Rotation3<f64> {
-    let to_earth = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix();
+    let to_earth =
+        UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix();
     Rotation3::from_matrix_unchecked(to_earth.matrix().transpose() * earth)
 }
 
@@ -151,7 +152,8 @@ fn fusion(gain: f32, learns: bool) -> Filter {
 }
 
 fn vqf(tau_acc: f64, tau_mag: f64, rest: bool) -> Filter {
-    let name = format!("vqf-rs, {tau_acc} s, {tau_mag} s, {}", if rest { "rest seen" } else { "no rest" });
+    let name =
+        format!("vqf-rs, {tau_acc} s, {tau_mag} s, {}", if rest { "rest seen" } else { "no rest" });
     filter(name, move |_| {
         let parameters = vqf_rs::Params {
             tau_acc,
@@ -200,9 +202,12 @@ fn main() {
     filters.push(ours(Gains { proportional: 1.0, integral: 0.1 }));
     filters.extend([(0.5, 0.02), (1.0, 0.1), (2.0, 0.2)].map(|(p, i)| mahony(p, i)));
     filters.extend([0.01, 0.02, 0.05].map(madgwick));
-    filters.extend([(0.5, true), (0.5, false), (2.0, false)].map(|(gain, learns)| fusion(gain, learns)));
     filters.extend(
-        [(3.0, 9.0, true), (3.0, 9.0, false), (1.0, 1.0, false)].map(|(acc, mag, rest)| vqf(acc, mag, rest)),
+        [(0.5, true), (0.5, false), (2.0, false)].map(|(gain, learns)| fusion(gain, learns)),
+    );
+    filters.extend(
+        [(3.0, 9.0, true), (3.0, 9.0, false), (1.0, 1.0, false)]
+            .map(|(acc, mag, rest)| vqf(acc, mag, rest)),
     );
     let corrections = mems_corrections();
     let seeds = 1..=10;
@@ -227,7 +232,10 @@ fn main() {
             }
         }
         let [still, moving, biased] = sums.map(f64::sqrt);
-        println!("{:38} {still:9.4} {moving:9.4} {biased:9.4} {time:6.0} {allocations:6.1}", filter.name);
+        println!(
+            "{:38} {still:9.4} {moving:9.4} {biased:9.4} {time:6.0} {allocations:6.1}",
+            filter.name
+        );
     }
 
     let settings = Settings { corrections, ..Settings::default() };

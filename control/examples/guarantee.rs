@@ -15,7 +15,9 @@ fn main() {
     println!(
         "    K        delay   errors, deg and deg/s   largest bound, deg/s2   left of the moment at 2 deg/s2"
     );
-    for (k1, k2) in [(-5.0, -5.0), (-4.0, -4.5), (-3.0, -4.0), (-2.0, -4.0), (-2.0, -3.0), (-1.0, -2.0)] {
+    for (k1, k2) in
+        [(-5.0, -5.0), (-4.0, -4.5), (-3.0, -4.0), (-2.0, -4.0), (-2.0, -3.0), (-1.0, -2.0)]
+    {
         for delay in [0.0, 0.04, 0.117] {
             for error_deg in [0.0, 0.05, 0.1, 0.2] {
                 let error = f64::to_radians(error_deg);
@@ -35,7 +37,8 @@ fn main() {
 
 fn print(settings: &Settings, error_deg: f64) {
     let design = |disturbance_bound: f64| Design::new(&Settings { disturbance_bound, ..*settings });
-    let left = design(settings.disturbance_bound).map_or(f64::NAN, |design| design.assessment.moment_left);
+    let left =
+        design(settings.disturbance_bound).map_or(f64::NAN, |design| design.assessment.moment_left);
     let holds = |bound: f64| design(bound).is_ok_and(|design| design.counted >= 1.0);
     let (mut low, mut high) = (0.0, 0.1);
     for _ in 0..30 {

@@ -15,14 +15,16 @@ use harness::flight::{Tried, random_settings, tried};
 use harness::in_parallel;
 
 fn main() {
-    let arguments: Vec<u64> = std::env::args().skip(1).filter_map(|text| text.parse().ok()).collect();
+    let arguments: Vec<u64> =
+        std::env::args().skip(1).filter_map(|text| text.parse().ok()).collect();
     let &[first, count] = arguments.as_slice() else {
         eprintln!("usage: random_settings FIRST COUNT");
         std::process::exit(2);
     };
     let seeds: Vec<u64> = (first..first + count).collect();
     let outcomes = in_parallel(&seeds, |&seed| tried(&random_settings(seed), seed));
-    let (mut flown, mut defects, mut fallbacks, mut refused, mut named, mut broken) = (0, 0, 0, 0, 0, 0);
+    let (mut flown, mut defects, mut fallbacks, mut refused, mut named, mut broken) =
+        (0, 0, 0, 0, 0, 0);
     let (mut rate, mut moment) = (0.0f64, 0.0f64);
     for (seed, outcome) in seeds.iter().zip(outcomes) {
         match outcome {

@@ -36,7 +36,12 @@ fn main() -> io::Result<()> {
     Ok(())
 }
 
-fn write_samples(out: &mut impl Write, set: &str, settings: &Settings, repetitions: usize) -> io::Result<()> {
+fn write_samples(
+    out: &mut impl Write,
+    set: &str,
+    settings: &Settings,
+    repetitions: usize,
+) -> io::Result<()> {
     let scenario = Scenario::crmpc2022();
     let reference = |time: f64| scenario.reference.at(time);
     let with = |change: fn(&mut SolverSettings)| {
@@ -71,7 +76,13 @@ fn write_samples(out: &mut impl Write, set: &str, settings: &Settings, repetitio
         for _ in 0..repetitions.max(1) {
             for (i, (_, controller)) in ways.iter_mut().enumerate() {
                 let mut memory = before.clone();
-                black_box(controller.update(&mut memory, *tick, time, black_box(measured), &reference));
+                black_box(controller.update(
+                    &mut memory,
+                    *tick,
+                    time,
+                    black_box(measured),
+                    &reference,
+                ));
                 best[i] = best[i].min(memory.report.time);
                 reports[i] = memory.report;
             }
@@ -98,7 +109,8 @@ fn write_samples(out: &mut impl Write, set: &str, settings: &Settings, repetitio
         let previous = before.started.then(|| {
             let plan = &before.plan;
             let states: Vec<_> = plan.states.iter().map(|x| <[f64; 6]>::from(*x)).collect();
-            let accelerations: Vec<_> = plan.accelerations.iter().map(|a| <[f64; 3]>::from(*a)).collect();
+            let accelerations: Vec<_> =
+                plan.accelerations.iter().map(|a| <[f64; 3]>::from(*a)).collect();
             json!({ "states": states, "accelerations": accelerations })
         });
         let sample = json!({

@@ -74,8 +74,11 @@ fn score(gains: SlidingMode, seeds: RangeInclusive<u64>) -> Score {
 }
 
 fn front(scores: &[Score]) -> Vec<Score> {
-    let mut front: Vec<Score> =
-        scores.iter().filter(|own| !scores.iter().any(|other| other.dominates(own))).copied().collect();
+    let mut front: Vec<Score> = scores
+        .iter()
+        .filter(|own| !scores.iter().any(|other| other.dominates(own)))
+        .copied()
+        .collect();
     front.sort_by(|a, b| a.ems_deg.total_cmp(&b.ems_deg));
     front.dedup_by(|a, b| a.ems_deg == b.ems_deg && a.cms == b.cms);
     front
@@ -96,7 +99,11 @@ const CRITERIA: [Criterion; 2] = [
         allows: |own, published| own.ems_deg <= published.ems_deg && own.rate <= published.rate,
         objective: |own| own.cms,
     },
-    Criterion { name: "within limits", allows: |own, _| own.rate <= 1.0, objective: |own| own.ems_deg },
+    Criterion {
+        name: "within limits",
+        allows: |own, _| own.rate <= 1.0,
+        objective: |own| own.ems_deg,
+    },
 ];
 
 impl Criterion {
@@ -115,11 +122,14 @@ impl Criterion {
         let mut share = 0.4;
         'steps: while share > 0.04 {
             for changes in [1, 2] {
-                let more =
-                    in_parallel(&neighbours(&chosen.gains, share, changes), |&gains| score(gains, 1..=seeds));
+                let more = in_parallel(&neighbours(&chosen.gains, share, changes), |&gains| {
+                    score(gains, 1..=seeds)
+                });
                 let better = self.sorted(&more, published).into_iter().next();
                 tried.extend(more);
-                if let Some(better) = better.filter(|own| (self.objective)(own) < (self.objective)(&chosen)) {
+                if let Some(better) =
+                    better.filter(|own| (self.objective)(own) < (self.objective)(&chosen))
+                {
                     chosen = better;
                     continue 'steps;
                 }
@@ -185,8 +195,12 @@ fn main() {
     for criterion in CRITERIA {
         // The best sets of the grid are evaluated again with all seeds, as the largest rate of
         // three seeds is a weak bound.
-        let starts: Vec<SlidingMode> =
-            criterion.sorted(&coarse, &coarse_published).iter().take(STARTS).map(|own| own.gains).collect();
+        let starts: Vec<SlidingMode> = criterion
+            .sorted(&coarse, &coarse_published)
+            .iter()
+            .take(STARTS)
+            .map(|own| own.gains)
+            .collect();
         tried.extend(in_parallel(&starts, |&gains| score(gains, 1..=seeds)));
         let mut best: Option<Score> = None;
         for start in criterion.sorted(&tried, &published).into_iter().take(DESCENTS) {

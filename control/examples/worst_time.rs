@@ -76,8 +76,10 @@ fn go<C: Optimising>(
             // other.
             let law = &mut new(budget);
             let repetitions = if budget > 0.0 { 1 } else { REPETITIONS };
-            let reports: Vec<[Report; 3]> =
-                seeds.iter().map(|&seed| Case::random(seed, size).optimise(law, repetitions)).collect();
+            let reports: Vec<[Report; 3]> = seeds
+                .iter()
+                .map(|&seed| Case::random(seed, size).optimise(law, repetitions))
+                .collect();
             for (situation, title) in SITUATIONS.iter().enumerate() {
                 let own: Vec<Report> = reports.iter().map(|reports| reports[situation]).collect();
                 print(&format!("{name}, {title}"), &seeds, &own);
@@ -86,8 +88,10 @@ fn go<C: Optimising>(
         "list" => {
             let law = &mut new(0.0);
             let most = |reports: &[Report; 3]| reports.iter().map(|report| report.iterations).max();
-            let mut all: Vec<(u64, [Report; 3])> =
-                seeds.iter().map(|&seed| (seed, Case::random(seed, 1.0).optimise(law, 1))).collect();
+            let mut all: Vec<(u64, [Report; 3])> = seeds
+                .iter()
+                .map(|&seed| (seed, Case::random(seed, 1.0).optimise(law, 1)))
+                .collect();
             all.sort_by_key(|(_, reports)| std::cmp::Reverse(most(reports)));
             for (seed, reports) in all.iter().take(LISTED) {
                 let [cold, kicked, next] = reports.map(|report| report.iterations);
@@ -95,7 +99,8 @@ fn go<C: Optimising>(
             }
         }
         "search" => {
-            let (evaluations, size) = (number(4).unwrap_or(1000.0) as usize, number(5).unwrap_or(1.0));
+            let (evaluations, size) =
+                (number(4).unwrap_or(1000.0) as usize, number(5).unwrap_or(1.0));
             let worst = in_parallel(&seeds, |&seed| search(&mut new(0.0), seed, evaluations, size));
             for (situation, title) in SITUATIONS.iter().enumerate() {
                 let own: Vec<Report> = worst.iter().map(|reports| reports[situation]).collect();
@@ -149,7 +154,8 @@ fn print(title: &str, seeds: &[u64], reports: &[Report]) {
         let mean = |value: fn(&Report) -> f64| {
             own.iter().map(|(_, report)| value(report)).sum::<f64>() / own.len() as f64
         };
-        let (mean_iterations, mean_ms) = (mean(|r| f64::from(r.iterations)), mean(|r| r.time * 1e3));
+        let (mean_iterations, mean_ms) =
+            (mean(|r| f64::from(r.iterations)), mean(|r| r.time * 1e3));
         let last = (own.len() - 1) as f64;
         let place = |share: f64| (last * share).round() as usize;
         own.sort_by_key(|(_, report)| report.iterations);

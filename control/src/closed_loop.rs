@@ -79,7 +79,8 @@ pub fn fly<C: Controller>(
     let mut summary = Summary::default();
     for tick in 0..ticks {
         let time = tick as f64 * period;
-        let measured = Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
+        let measured =
+            Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
         let moment = controller.update(memory, tick, time, &measured, &reference);
         let now = reference(time);
         observe(&Sample { tick, time, measured, reference: now, moment, memory });

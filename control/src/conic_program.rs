@@ -83,7 +83,8 @@ impl ConicProgram {
         let settings = self.solver.settings();
         // Unchanged limits need no update, which would allocate.
         if (settings.max_iter, settings.time_limit) != (iterations, seconds) {
-            let settings = DefaultSettings { max_iter: iterations, time_limit: seconds, ..settings.clone() };
+            let settings =
+                DefaultSettings { max_iter: iterations, time_limit: seconds, ..settings.clone() };
             // Both settings may be changed at any time.
             let _ = self.solver.update_settings(settings);
         }

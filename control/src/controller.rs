@@ -37,7 +37,9 @@ impl Preview<'_> {
         match self {
             Self::Profile(profile) => profile.at(time),
             Self::External(reference, until) if time <= *until => *reference,
-            Self::External(reference, _) => Reference { angles: reference.angles, ..Reference::default() },
+            Self::External(reference, _) => {
+                Reference { angles: reference.angles, ..Reference::default() }
+            }
         }
     }
 

@@ -97,7 +97,8 @@ impl Predictor {
     pub fn predict(&self, under_way: &[Vector3<f64>], measured: &Measurement) -> Measurement {
         let mut state = plant::state(&measured.angles, &measured.rates);
         for age in (1..=self.count).rev() {
-            let moment = under_way.len().checked_sub(age).map_or_else(Vector3::zeros, |i| under_way[i]);
+            let moment =
+                under_way.len().checked_sub(age).map_or_else(Vector3::zeros, |i| under_way[i]);
             let load = Load { moment, ..Load::default() };
             // The newest command, of age 1, acts for the last period of the delay.
             let begin = (self.delay - age as f64 * self.period).max(0.0);
@@ -169,7 +170,12 @@ impl<C: Controller> Delayed<C> {
         let Latency { measurement, action } = latency;
         if !(0.0..=LONGEST).contains(&measurement) {
             let name = "latency.measurement";
-            return Err(DesignError::OutOfRange { name, value: measurement, low: 0.0, high: LONGEST });
+            return Err(DesignError::OutOfRange {
+                name,
+                value: measurement,
+                low: 0.0,
+                high: LONGEST,
+            });
         }
         if !(0.0..=LONGEST).contains(&action) {
             return Err(DesignError::Delay { value: action, longest: LONGEST });
@@ -198,7 +204,10 @@ impl<C: Controller> Controller for Delayed<C> {
     type Memory = Memory<C::Memory>;
 
     fn memory(&self) -> Self::Memory {
-        Memory { inner: self.inner.memory(), under_way: vec![Vector3::zeros(); self.predictor.count] }
+        Memory {
+            inner: self.inner.memory(),
+            under_way: vec![Vector3::zeros(); self.predictor.count],
+        }
     }
 
     fn fits(&self, memory: &Self::Memory) -> bool {
@@ -218,7 +227,8 @@ impl<C: Controller> Controller for Delayed<C> {
             return self.inner.command(inner, tick, time, measured, reference);
         }
         let predicted = self.predictor.predict(under_way, measured);
-        let moment = self.inner.command(inner, tick, time + self.latency.action, &predicted, reference);
+        let moment =
+            self.inner.command(inner, tick, time + self.latency.action, &predicted, reference);
         // A default memory has no room yet.
         under_way.resize(self.predictor.count, Vector3::zeros());
         under_way.rotate_left(1);

@@ -71,7 +71,9 @@ pub enum DesignError {
         value: f64,
     },
     /// A weight must not be negative, and weights on the input must be positive.
-    #[error("`{name}`[{index}] = {value} is not allowed: P must not be negative, Q must be positive")]
+    #[error(
+        "`{name}`[{index}] = {value} is not allowed: P must not be negative, Q must be positive"
+    )]
     Weight {
         /// Name of the weight, p or q.
         name: &'static str,
@@ -228,7 +230,9 @@ fn no_guarantee(error: &DesignError) -> String {
     }
     let mut accepted = Vec::new();
     match disturbance {
-        Some(bound) => accepted.push(format!("`disturbance_bound` = {:.4} deg/s2", down(bound.to_degrees()))),
+        Some(bound) => {
+            accepted.push(format!("`disturbance_bound` = {:.4} deg/s2", down(bound.to_degrees())))
+        }
         None => accepted.push("no `disturbance_bound`".into()),
     }
     if let Some((angle, rate)) = errors {

@@ -203,8 +203,11 @@ impl SampledError {
     /// whose measurement was taken after v; then `latency` ≤ u < `latency` + `period`. From there
     /// on it fades by Φ. The bounds are the integrals of the absolute responses.
     pub fn reach(&self, steps: usize) -> Vec<Reach> {
-        let unseen =
-            Reach { angle: 0.5 * self.latency * self.latency, rate: self.latency, ..Reach::default() };
+        let unseen = Reach {
+            angle: 0.5 * self.latency * self.latency,
+            rate: self.latency,
+            ..Reach::default()
+        };
         let within = (self.latency, self.latency + self.period);
         let mut reach = unseen;
         let mut all = Vec::with_capacity(steps + 1);
@@ -330,7 +333,9 @@ impl SampledError {
         }
         let (rest, shift) = (basis * impulse, basis * Vector2::new(lateral, 0.0));
         for i in 0..2 {
-            generators.push(vectors[i] * ((rest[i].abs() + shift[i].abs()) / (1.0 - eigenvalues[i].abs())));
+            generators.push(
+                vectors[i] * ((rest[i].abs() + shift[i].abs()) / (1.0 - eigenvalues[i].abs())),
+            );
         }
         Some(InvariantSet { generators, gain: self.gain, latency: self.latency })
     }
@@ -379,14 +384,21 @@ mod tests {
                 (set.rate, held.rate, reach.rate),
                 (set.feedback, held.feedback, reach.feedback),
             ] {
-                assert!(outer >= exact * (1.0 - 1e-12) && held < 1.25 * exact, "{outer} {held} {exact}");
+                assert!(
+                    outer >= exact * (1.0 - 1e-12) && held < 1.25 * exact,
+                    "{outer} {held} {exact}"
+                );
             }
         }
     }
 
     /// Largest |angle|, |rate| and |K ô| at each tick over all signs of the sources' responses
     /// (`respond`): by superposition this is the sum over the sources.
-    fn superposed(steps: usize, sources: usize, respond: impl Fn(usize) -> Vec<[f64; 5]>) -> Vec<[f64; 5]> {
+    fn superposed(
+        steps: usize,
+        sources: usize,
+        respond: impl Fn(usize) -> Vec<[f64; 5]>,
+    ) -> Vec<[f64; 5]> {
         let mut sums = vec![[0.0; 5]; steps + 1];
         for source in 0..sources {
             for (sum, value) in sums.iter_mut().zip(respond(source)) {
@@ -401,7 +413,9 @@ mod tests {
     fn assert_agree(found: &[Reach], expected: &[[f64; 5]], tolerance: f64) {
         for (n, (found, expected)) in found.iter().zip(expected).enumerate() {
             let Reach { angle, rate, seen_angle, seen_rate, feedback, .. } = *found;
-            for (found, expected) in [angle, rate, seen_angle, seen_rate, feedback].iter().zip(expected) {
+            for (found, expected) in
+                [angle, rate, seen_angle, seen_rate, feedback].iter().zip(expected)
+            {
                 assert!(
                     (found - expected).abs() <= tolerance * (1.0 + expected),
                     "tick {n}: {found} {expected}"
@@ -465,7 +479,8 @@ mod tests {
                             }
                         }
                         let own = seen + fresh;
-                        [own.x, own.y, seen.x, seen.y, (error.gain.row() * seen).x].map(|value| value * pulse)
+                        [own.x, own.y, seen.x, seen.y, (error.gain.row() * seen).x]
+                            .map(|value| value * pulse)
                     })
                     .collect()
             });
@@ -478,7 +493,10 @@ mod tests {
         // Here the response does not change its sign within a period. (26) is for constant
         // disturbances.
         let reach = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04).reach_forever().unwrap();
-        assert!((reach.angle - 0.2).abs() < 1e-4 && (reach.feedback - 1.2473).abs() < 1e-4, "{reach:?}");
+        assert!(
+            (reach.angle - 0.2).abs() < 1e-4 && (reach.feedback - 1.2473).abs() < 1e-4,
+            "{reach:?}"
+        );
     }
 
     #[test]

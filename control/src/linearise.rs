@@ -75,9 +75,13 @@ impl InverseKinematics {
     #[inline]
     fn columns(&self) -> ([Vector3<f64>; 3], [Vector3<f64>; 3]) {
         let (sb, cb) = self.beta;
-        let w = [self.turn(-cb * sb, cb * cb, 0.0), self.turn(0.0, 0.0, 1.0), self.turn(-cb, -sb, 0.0)];
-        let w_beta =
-            [self.turn(sb * sb - cb * cb, -2.0 * sb * cb, 0.0), Vector3::zeros(), self.turn(sb, -cb, 0.0)];
+        let w =
+            [self.turn(-cb * sb, cb * cb, 0.0), self.turn(0.0, 0.0, 1.0), self.turn(-cb, -sb, 0.0)];
+        let w_beta = [
+            self.turn(sb * sb - cb * cb, -2.0 * sb * cb, 0.0),
+            Vector3::zeros(),
+            self.turn(sb, -cb, 0.0),
+        ];
         (w, w_beta)
     }
 
@@ -111,7 +115,9 @@ impl InverseKinematics {
         BodyMotion {
             rates,
             rates_by_angles: by_angles,
-            moment_by_acceleration: Matrix3::from_columns(&self.columns().0.map(|w| body.inertia * w)),
+            moment_by_acceleration: Matrix3::from_columns(
+                &self.columns().0.map(|w| body.inertia * w),
+            ),
             moment_at_rest: body.inertia * omega_dot + rates.cross(&(body.inertia * rates)),
         }
     }
@@ -232,12 +238,17 @@ impl InverseKinematics {
 
         // Product rule: ∂(ω × I ω) = ∂ω × I ω + ω × I ∂ω.
         let momentum = body.inertia * rates;
-        let moment_by = |omega_dot: &Vector3<f64>, omega: &Vector3<f64>, momentum_by: &Vector3<f64>| {
-            body.inertia * omega_dot + omega.cross(&momentum) + rates.cross(momentum_by)
-        };
+        let moment_by =
+            |omega_dot: &Vector3<f64>, omega: &Vector3<f64>, momentum_by: &Vector3<f64>| {
+                body.inertia * omega_dot + omega.cross(&momentum) + rates.cross(momentum_by)
+            };
         let momentum_by_rates = w.map(|w| body.inertia * w);
         let by_angle = |i: usize| {
-            moment_by(&omega_dot_by_angles[i], &rates_by_angles[i], &(body.inertia * rates_by_angles[i]))
+            moment_by(
+                &omega_dot_by_angles[i],
+                &rates_by_angles[i],
+                &(body.inertia * rates_by_angles[i]),
+            )
         };
         let by_rate = |i: usize| moment_by(&omega_dot_by_rates[i], &w[i], &momentum_by_rates[i]);
         Linearisation {
@@ -315,7 +326,8 @@ impl InverseKinematics {
         let torque_to_input = r * body.inverse;
         Linear {
             value: r * gamma,
-            by_angles: torque_to_input * moment.by_angles + Matrix3x2::from_columns(&[by_alpha, by_beta]),
+            by_angles: torque_to_input * moment.by_angles
+                + Matrix3x2::from_columns(&[by_alpha, by_beta]),
             by_rates: torque_to_input * moment.by_rates,
             // This derivative is R I⁻¹ I R⁻¹.
             by_acceleration: Matrix3::identity(),
@@ -353,15 +365,24 @@ mod tests {
         let inertia = body.inertia.symmetric_eigenvalues();
         // The directions and sizes form a lattice from a low-discrepancy sequence.
         let at = |i: usize, j: usize| {
-            let irrational =
-                [0.754_877_7, 0.569_840_3, 0.430_159_7, 0.324_717_9, 0.245_122_3, 0.185_037_6, 0.139_680_6];
+            let irrational = [
+                0.754_877_7,
+                0.569_840_3,
+                0.430_159_7,
+                0.324_717_9,
+                0.245_122_3,
+                0.185_037_6,
+                0.139_680_6,
+            ];
             (0.5 + i as f64 * irrational[j]).fract() * 2.0 - 1.0
         };
         let mut tightest = [0.0_f64; 4];
         for i in 1..20_000 {
             let angles = Vector3::new(3.1 * at(i, 0), 1.5 * at(i, 1), 0.0);
-            let x = Vector3::new(at(i, 2), at(i, 3), at(i, 4)) * 10.0_f64.powf(2.0 * at(i, 5) - 1.0);
-            let a = Vector3::new(at(i, 4), at(i, 2), at(i, 6)) * 10.0_f64.powf(2.0 * at(i, 6) - 1.0);
+            let x =
+                Vector3::new(at(i, 2), at(i, 3), at(i, 4)) * 10.0_f64.powf(2.0 * at(i, 5) - 1.0);
+            let a =
+                Vector3::new(at(i, 4), at(i, 2), at(i, 6)) * 10.0_f64.powf(2.0 * at(i, 6) - 1.0);
             let exact = linearise(&body, &angles, &x, &a);
             let ratio = inertia.max() / inertia.min();
             let bounds = MomentSlopeBounds::new(x.norm(), a.norm(), ratio);
@@ -405,7 +426,10 @@ mod tests {
         for (y, linear) in [exact.rates, exact.moment, exact_input].iter().enumerate() {
             assert!((linear.value - all(&point)[y]).norm() <= 1e-12 * linear.value.norm());
             let motion = InverseKinematics::at(&angles).motion(&body, &rates);
-            assert!((motion.moment(&a) - exact.moment.value).norm() <= 1e-12 * exact.moment.value.norm());
+            assert!(
+                (motion.moment(&a) - exact.moment.value).norm()
+                    <= 1e-12 * exact.moment.value.norm()
+            );
             for i in 0..9 {
                 let step = 1e-5;
                 let (mut plus, mut minus) = (point, point);

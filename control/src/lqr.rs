@@ -61,15 +61,20 @@ impl Lqr {
         if !(settings.period > 0.0 && settings.period.is_finite()) {
             return Err(DesignError::NotPositive { name: "period", value: settings.period });
         }
+        let weights = settings
+            .p
+            .iter()
+            .enumerate()
+            .map(|(i, &value)| ("p", i, value, i >= 3 && value >= 0.0));
         let weights =
-            settings.p.iter().enumerate().map(|(i, &value)| ("p", i, value, i >= 3 && value >= 0.0));
-        let weights = weights.chain(settings.q.iter().enumerate().map(|(i, &value)| ("q", i, value, false)));
+            weights.chain(settings.q.iter().enumerate().map(|(i, &value)| ("q", i, value, false)));
         for (name, i, value, zero_allowed) in weights {
             if !(value.is_finite() && (value > 0.0 || zero_allowed)) {
                 return Err(DesignError::Weight { name, index: i + 1, value });
             }
         }
-        let gains = std::array::from_fn(|i| riccati_gain(settings.p[i], settings.p[i + 3], settings.q[i]));
+        let gains =
+            std::array::from_fn(|i| riccati_gain(settings.p[i], settings.p[i + 3], settings.q[i]));
         for Gain { k1, k2 } in gains {
             let radius = SampledError::new(Gain { k1, k2 }, settings.period).spectral_radius();
             if radius >= 1.0 {

@@ -142,7 +142,9 @@ impl TwoLoopSettings {
             let high = 1.0 / period;
             return Err(DesignError::OutOfRange { name: "filter", value: *filter, low: 0.0, high });
         }
-        if let Some(&value) = disturbance.iter().find(|value| !(0.0..f64::INFINITY).contains(*value)) {
+        if let Some(&value) =
+            disturbance.iter().find(|value| !(0.0..f64::INFINITY).contains(*value))
+        {
             return Err(DesignError::OutOfRange {
                 name: "disturbance",
                 value,
@@ -293,7 +295,12 @@ impl TwoLoopSmc {
 
     /// Returns the filtered command. It starts at the measured motion and follows a smooth
     /// reference without lag.
-    fn filter(&self, memory: &TwoLoopMemory, measured: &Measurement, reference: &Reference) -> Reference {
+    fn filter(
+        &self,
+        memory: &TwoLoopMemory,
+        measured: &Measurement,
+        reference: &Reference,
+    ) -> Reference {
         let TwoLoopSettings { filter: w, period, .. } = self.settings;
         if w == 0.0 {
             return *reference;
@@ -305,9 +312,11 @@ impl TwoLoopSmc {
             let (d, d_rate) = (command.angles - before.angles, command.rates - before.rates);
             let (slope, decay) = (d_rate + d * w, (-w * period).exp());
             let (a, b) = (before.accelerations, reference.accelerations);
-            let moved = before.angles + before.rates * period + (a * 2.0 + b) * (period * period / 6.0);
+            let moved =
+                before.angles + before.rates * period + (a * 2.0 + b) * (period * period / 6.0);
             let angles = moved + (d + slope * period) * decay;
-            let rates = before.rates + (a + b) * (0.5 * period) + (d_rate - slope * (w * period)) * decay;
+            let rates =
+                before.rates + (a + b) * (0.5 * period) + (d_rate - slope * (w * period)) * decay;
             (angles, rates)
         } else {
             (measured.angles, self.settings.kinematics.r(&measured.angles) * measured.rates)
@@ -331,8 +340,17 @@ impl Controller for TwoLoopSmc {
         measured: &Measurement,
         reference: ReferenceAt,
     ) -> Vector3<f64> {
-        let TwoLoopSettings { form, kinematics, body, period, outer, inner, anti_windup, threshold, .. } =
-            &self.settings;
+        let TwoLoopSettings {
+            form,
+            kinematics,
+            body,
+            period,
+            outer,
+            inner,
+            anti_windup,
+            threshold,
+            ..
+        } = &self.settings;
         let reference = reference(time);
         let command = self.filter(memory, measured, &reference);
         let rests = *anti_windup && memory.saturated;
@@ -341,7 +359,8 @@ impl Controller for TwoLoopSmc {
                 memory.outer_integral += memory.angle_error * *period;
                 memory.inner_integral += memory.rate_error * *period;
             }
-            memory.saturated = memory.commanded.shortfall(body, measured.achieved_moment).norm() > *threshold;
+            memory.saturated =
+                memory.commanded.shortfall(body, measured.achieved_moment).norm() > *threshold;
         }
         let Measurement { angles, rates, .. } = measured;
         let inverse = kinematics.r_inverse(angles);
@@ -352,7 +371,8 @@ impl Controller for TwoLoopSmc {
         let e_w = command.angles - angles;
         let e_w_dot = command.rates - angle_rates;
         let s_w = outer.sliding(&e_w, &memory.outer_integral);
-        let x = command.rates + outer.k().component_mul(&e_w) + outer.layer.value(&s_w) * outer_sign;
+        let x =
+            command.rates + outer.k().component_mul(&e_w) + outer.layer.value(&s_w) * outer_sign;
         let omega_c = inverse * x;
         // The derivative ω̇_c follows from ω_c = R⁻¹ x.
         let integrand = if rests { Vector3::zeros() } else { outer.k().component_mul(&e_w) };

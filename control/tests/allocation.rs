@@ -54,7 +54,10 @@ fn assert_within_limits(before: &Memory, after: &Memory, what: &str) {
         let (old, new) = (before.surfaces[i].to_degrees(), after.surfaces[i].to_degrees());
         // The tolerance covers the rounding of degrees alone.
         assert!(new >= min[i] - 1e-13 && new <= max[i] + 1e-13, "{what}: surface {i} at {new} deg");
-        assert!((new - old).abs() <= 10.0 * 0.01 + 1e-13, "{what}: surface {i} from {old} to {new} deg");
+        assert!(
+            (new - old).abs() <= 10.0 * 0.01 + 1e-13,
+            "{what}: surface {i} from {old} to {new} deg"
+        );
     }
     assert!(after.duty.iter().all(|duty| (0.0..=1.0).contains(duty)), "{what}");
     assert_eq!(after.surfaces.rows(6, 2).amax(), 0.0, "{what}: rudders");
@@ -80,10 +83,14 @@ fn published_limits_hold_at_every_sample_of_200_random_cases() {
                 assert_eq!(memory.report.status, Status::Optimal, "{what}");
                 assert_within_limits(&before, &memory, &what);
                 let matrix = Effectors::published();
-                let achieved = matrix.moment_of_surfaces(&memory.surfaces, command.dynamic_pressure)
+                let achieved = matrix
+                    .moment_of_surfaces(&memory.surfaces, command.dynamic_pressure)
                     + matrix.moment_of_jets(&memory.duty);
                 assert!((achieved - memory.achieved).norm() <= 1e-9 * size, "{what}");
-                assert!((command.moment - achieved - memory.residual).norm() <= 1e-9 * size, "{what}");
+                assert!(
+                    (command.moment - achieved - memory.residual).norm() <= 1e-9 * size,
+                    "{what}"
+                );
             }
         }
     }
@@ -164,7 +171,10 @@ fn blending_asks_no_more_of_the_surfaces_than_the_jets_can_make_up_for() {
         let memory = settled(&mut allocator(Method::Blending), 600, &command(moment, PRESSURE));
         assert!(memory.residual.norm() < 1.0, "{memory:?}");
         let by_surfaces = Effectors::published().moment_of_surfaces(&memory.surfaces, PRESSURE);
-        assert!((by_surfaces - Vector3::from(moment)).norm() > 2e4, "the jets must be needed: {by_surfaces}");
+        assert!(
+            (by_surfaces - Vector3::from(moment)).norm() > 2e4,
+            "the jets must be needed: {by_surfaces}"
+        );
     }
 }
 
@@ -174,7 +184,8 @@ fn without_an_optimum_the_previous_allocation_is_kept_within_the_limits() {
         let mut memory = settled(&mut allocator(method), 40, &command([8e4, -1e5, -2e4], PRESSURE));
         let before = memory;
         let mut stopped =
-            Allocator::new(Settings { max_iterations: 1, ..settings(method, JetCommand::Duty) }).unwrap();
+            Allocator::new(Settings { max_iterations: 1, ..settings(method, JetCommand::Duty) })
+                .unwrap();
         let wanted = command([-8e4, 1e5, 2e4], PRESSURE);
         stopped.update(&mut memory, 0, &wanted);
         assert_eq!(memory.report.status, Status::Fallback);
@@ -224,7 +235,11 @@ fn runs_repeat_bit_for_bit() {
         let mut memory = Memory::default();
         for tick in 0..500 {
             let t = tick as f64 * 1e-3;
-            allocator.update(&mut memory, tick, &command([1e5 * t.sin(), 2e5 * t.cos(), -3e4 * t], PRESSURE));
+            allocator.update(
+                &mut memory,
+                tick,
+                &command([1e5 * t.sin(), 2e5 * t.cos(), -3e4 * t], PRESSURE),
+            );
         }
         memory.report.time = 0.0;
         memory
@@ -238,7 +253,9 @@ fn settings_that_cannot_work_are_refused_by_name() {
     let refusal = |change: Change| {
         let mut settings = Settings::published();
         change(&mut settings);
-        Allocator::new(settings).err().map_or_else(String::new, |error: DesignError| error.to_string())
+        Allocator::new(settings)
+            .err()
+            .map_or_else(String::new, |error: DesignError| error.to_string())
     };
     let cases: [(Change, &str); 9] = [
         (&|s| s.period = 0.0, "period"),

@@ -5,7 +5,9 @@ mod harness;
 
 use control::crmpc::{Constraints, InitialState, Settings, Status};
 use control::{Crmpc, crmpc::Memory};
-use harness::{Case, adversaries, constant, disturbance, in_parallel, settings, simulate, square, white};
+use harness::{
+    Case, adversaries, constant, disturbance, in_parallel, settings, simulate, square, white,
+};
 use nalgebra::{Vector2, Vector3, Vector6};
 use vehicle::disturbance::{Disturbance, Kind};
 use vehicle::scenario::Scenario;
@@ -17,8 +19,9 @@ fn assert_robust(cases: &[Case]) -> f64 {
 }
 
 fn assert_keeps_limits(settings: &Settings, cases: &[Case]) -> f64 {
-    let outcomes =
-        in_parallel(cases, |case| harness::run(settings, case.inertia_scale, case.disturbance.clone()));
+    let outcomes = in_parallel(cases, |case| {
+        harness::run(settings, case.inertia_scale, case.disturbance.clone())
+    });
     for (case, (outcome, kept)) in cases.iter().zip(&outcomes) {
         let name = &case.name;
         assert!(outcome.rate <= 1.0, "{name}: rate {} of its limit", outcome.rate);
@@ -84,8 +87,13 @@ fn paper_set_tracks_better_and_violates_both_limits() {
 fn lqr_violates_both_limits() {
     // Chai 2022, section 5.2 says the same.
     for case in white(1..=3, 0.04) {
-        let outcome =
-            simulate(&mut harness::lqr(), &mut (), case.inertia_scale, case.disturbance, |(), _, _| {});
+        let outcome = simulate(
+            &mut harness::lqr(),
+            &mut (),
+            case.inertia_scale,
+            case.disturbance,
+            |(), _, _| {},
+        );
         assert!(outcome.rate > 1.0 && outcome.moment > 1.0, "{}: {outcome:?}", case.name);
     }
 }
@@ -98,20 +106,29 @@ fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_se
     let normals = design.invariant.as_ref().unwrap().normals();
     let mut largest = 0.0f64;
     let mut memory = Memory::default();
-    simulate(&mut controller, &mut memory, 1.05, disturbance(Kind::White), |memory, tick, measured| {
-        if tick % design.ratio as u64 == 0 {
-            assert_eq!(memory.report.status, Status::Constrained);
-            let angle_rates = vehicle::kinematics::r(&measured.angles) * measured.rates;
-            for i in 0..3 {
-                let o = Vector2::new(measured.angles[i], angle_rates[i])
-                    - Vector2::new(memory.nominal[i], memory.nominal[3 + i]);
-                let bound = settings.disturbance_bound;
-                let size = normals.iter().map(|normal| normal.dot(&o).abs() / bound).fold(0.0, f64::max);
-                assert!(size <= 1.0 + 1e-6, "tick {tick}: {size}");
-                largest = largest.max(size);
+    simulate(
+        &mut controller,
+        &mut memory,
+        1.05,
+        disturbance(Kind::White),
+        |memory, tick, measured| {
+            if tick % design.ratio as u64 == 0 {
+                assert_eq!(memory.report.status, Status::Constrained);
+                let angle_rates = vehicle::kinematics::r(&measured.angles) * measured.rates;
+                for i in 0..3 {
+                    let o = Vector2::new(measured.angles[i], angle_rates[i])
+                        - Vector2::new(memory.nominal[i], memory.nominal[3 + i]);
+                    let bound = settings.disturbance_bound;
+                    let size = normals
+                        .iter()
+                        .map(|normal| normal.dot(&o).abs() / bound)
+                        .fold(0.0, f64::max);
+                    assert!(size <= 1.0 + 1e-6, "tick {tick}: {size}");
+                    largest = largest.max(size);
+                }
             }
-        }
-    });
+        },
+    );
     assert_eq!(memory.report.fallbacks, 0);
     assert!(largest > 0.9, "the freedom is not used: {largest}");
 }
@@ -129,7 +146,8 @@ fn around_the_nominal_motion(
     let (mut nominal, mut deviations) = (Vec::new(), Vec::new());
     simulate(&mut controller, &mut memory, inertia_scale, disturbance, |memory, _, measured| {
         let angle_rates = vehicle::kinematics::r(&measured.angles) * measured.rates;
-        let state = Vector6::from_fn(|i, _| if i < 3 { measured.angles[i] } else { angle_rates[i - 3] });
+        let state =
+            Vector6::from_fn(|i, _| if i < 3 { measured.angles[i] } else { angle_rates[i - 3] });
         nominal.push(memory.nominal.map(f64::to_bits).into());
         deviations.push(state - memory.nominal);
     });
@@ -145,7 +163,11 @@ fn a_nominal_motion_that_starts_from_its_own_plan_knows_no_disturbance() {
             let (nominal, deviations) =
                 around_the_nominal_motion(constraints, case.inertia_scale, case.disturbance);
             assert!(nominal == undisturbed, "{}", case.name);
-            assert!(deviations.iter().any(|o| o.amax() > 1e-3), "{}: nothing disturbed it", case.name);
+            assert!(
+                deviations.iter().any(|o| o.amax() > 1e-3),
+                "{}: nothing disturbed it",
+                case.name
+            );
         }
     }
 }
@@ -172,7 +194,8 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
         let bound = bound + design.tightening.mismatch;
         for kind in [Kind::Constant, Kind::Square, Kind::AlongRate] {
             let direction = Vector3::new(1.0, -1.0, 1.0);
-            let deviations = deviations(Disturbance { direction, square_period: 10.0, ..disturbance(kind) });
+            let deviations =
+                deviations(Disturbance { direction, square_period: 10.0, ..disturbance(kind) });
             let (angle, rate) = (largest(&deviations, [0, 1, 2]), largest(&deviations, [3, 4, 5]));
             assert!(angle <= reach.angle * bound + slack, "{constraints:?}, {kind:?}: {angle}");
             assert!(rate <= reach.rate * bound + rate_slack, "{constraints:?}, {kind:?}: {rate}");
@@ -183,7 +206,10 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
                 let last = deviations.last().unwrap() / settings(constraints).disturbance_bound;
                 for i in 0..3 {
                     let settled = direction[i] / feedback.k1.abs();
-                    assert!((last[i] - settled).abs() < 1e-4 * settled.abs(), "{constraints:?}: {last}");
+                    assert!(
+                        (last[i] - settled).abs() < 1e-4 * settled.abs(),
+                        "{constraints:?}: {last}"
+                    );
                     assert!(last[3 + i].abs() < 1e-4, "{constraints:?}: {last}");
                 }
             }
@@ -193,7 +219,8 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
 
 #[test]
 fn robust_around_a_nominal_motion_of_its_own_keeps_both_limits() {
-    let settings = Settings { initial_state: InitialState::Nominal, ..settings(Constraints::Robust) };
+    let settings =
+        Settings { initial_state: InitialState::Nominal, ..settings(Constraints::Robust) };
     let mut cases = white(1..=2, 0.04);
     cases.extend(adversaries(0.04));
     cases.extend(square(&[2.5]));
@@ -229,12 +256,19 @@ fn without_disturbance_nothing_is_constrained_once_the_jump_is_over() {
     let mut controller = Crmpc::new(settings(Constraints::Robust)).unwrap();
     let jump = Scenario::crmpc2022().reference.jumps().next().unwrap();
     let mut constrained = Vec::new();
-    simulate(&mut controller, &mut Memory::default(), 1.0, Disturbance::default(), |memory, tick, _| {
-        if memory.report.status == Status::Constrained {
-            constrained.push(tick as f64 * harness::FEEDBACK);
-        }
-    });
-    let within = |from: f64, to: f64| constrained.iter().filter(|&&time| from <= time && time < to).count();
+    simulate(
+        &mut controller,
+        &mut Memory::default(),
+        1.0,
+        Disturbance::default(),
+        |memory, tick, _| {
+            if memory.report.status == Status::Constrained {
+                constrained.push(tick as f64 * harness::FEEDBACK);
+            }
+        },
+    );
+    let within =
+        |from: f64, to: f64| constrained.iter().filter(|&&time| from <= time && time < to).count();
     assert_eq!(constrained.first(), Some(&0.0));
     // While the jump is ahead within the horizon, the plan for it is constrained.
     assert!(within(jump - 19.0, jump - 2.0) > 400, "{constrained:?}");

@@ -69,7 +69,9 @@ impl Late {
     }
 
     fn advance(&mut self, to: f64) -> Result<(), Error> {
-        while let Some(&(acts, _)) = self.commands.get(self.reached.len()).filter(|(acts, _)| *acts <= to) {
+        while let Some(&(acts, _)) =
+            self.commands.get(self.reached.len()).filter(|(acts, _)| *acts <= to)
+        {
             self.go(acts)?;
             self.reached.push(self.plant.state);
         }
@@ -96,7 +98,8 @@ impl Late {
             let measured = Measurement { angles, rates, ..Measurement::default() };
             observe(controller, &memory, &measured);
             errors.push((angles - reference.at(time).angles).norm().to_degrees());
-            let moment = controller.update(&mut memory, tick, time, &measured, &|time| reference.at(time));
+            let moment =
+                controller.update(&mut memory, tick, time, &measured, &|time| reference.at(time));
             self.commands.push((time + self.delay, saturated(moment, self.moment_limit)));
         }
         self.advance(duration)?;
@@ -112,7 +115,8 @@ fn rms(values: &[f64]) -> f64 {
 fn largest_error<C: Controller>(mut late: Late, mut controller: Delayed<C>, period: f64) -> f64 {
     let mut predicted = Vec::new();
     late.run(&mut controller, period, 10.0, |controller, memory, measured| {
-        let Measurement { angles, rates, .. } = controller.predictor().predict(&memory.under_way, measured);
+        let Measurement { angles, rates, .. } =
+            controller.predictor().predict(&memory.under_way, measured);
         predicted.push(state(&angles, &rates));
     })
     .unwrap();
@@ -162,8 +166,11 @@ fn oracle_the_loop_moves_as_one_without_delay_that_begins_later() {
         for (tick, reached) in late.reached.iter().enumerate() {
             let time = delay + tick as f64 * 0.04;
             assert!((plant.state - reached).amax() < 1e-11, "{delay} s, tick {tick}");
-            let measured =
-                Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
+            let measured = Measurement {
+                angles: plant.angles(),
+                rates: plant.rates(),
+                ..Measurement::default()
+            };
             let moment = lqr().update(&mut (), 0, time, &measured, &|time| reference.at(time));
             plant.advance(time, time + 0.04, moment).unwrap();
         }
@@ -193,12 +200,16 @@ fn regress_prediction_keeps_tracking_and_effort_that_a_delay_spoils() {
     let (none, without, with) = (of(0.0, false), of(0.1, false), of(0.1, true));
     // The EMS between 10 and 25 s is 0.0040 deg, without prediction 0.0245 deg; the CMS is 0.282,
     // without prediction 0.340.
-    assert!(with.settled_deg < 1.01 * none.settled_deg && without.settled_deg > 6.0 * none.settled_deg);
+    assert!(
+        with.settled_deg < 1.01 * none.settled_deg && without.settled_deg > 6.0 * none.settled_deg
+    );
     assert!(with.cms < 1.01 * none.cms && without.cms > 1.2 * none.cms);
     // The EMS over the whole time is no measure of it, because the start dominates. A loop that
     // does not know the commands under way commands more and is less damped, which hides the dead
     // time: 1.642, 1.653 and 1.720 deg.
-    assert!(none.ems_deg < without.ems_deg && without.ems_deg < with.ems_deg && with.ems_deg < 1.73);
+    assert!(
+        none.ems_deg < without.ems_deg && without.ems_deg < with.ems_deg && with.ems_deg < 1.73
+    );
 }
 
 #[test]
@@ -218,7 +229,8 @@ fn moments<C: Controller>(controller: &mut C, ticks: u32) -> Vec<Vector3<f64>> {
     let mut memory = controller.memory();
     let mut tick = |k: u32| {
         let (from, to) = (0.04 * f64::from(k), 0.04 * f64::from(k + 1));
-        let measured = Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
+        let measured =
+            Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
         let reference = |time: f64| scenario.reference.at(time);
         let moment = controller.update(&mut memory, u64::from(k), from, &measured, &reference);
         plant.advance(from, to, moment).unwrap();
@@ -288,8 +300,11 @@ impl Controller for Probe {
 fn the_law_is_told_the_time_at_which_its_moment_acts() {
     let mut controller = delayed(Probe::default(), 0.1);
     let achieved_moment = Some(Vector3::new(1.0, 2.0, 3.0));
-    let measured =
-        Measurement { rates: Vector3::new(0.0, 0.1, 0.0), achieved_moment, ..Measurement::default() };
+    let measured = Measurement {
+        rates: Vector3::new(0.0, 0.1, 0.0),
+        achieved_moment,
+        ..Measurement::default()
+    };
     let reference = |time: f64| Reference { angles: Vector3::repeat(time), ..Reference::default() };
     // A default memory works as well.
     let mut memory = Memory::default();
@@ -320,7 +335,10 @@ fn what_cannot_work_is_refused() {
     let body = settings(Constraints::Robust).body;
     for delay in [-0.01, 1.01, f64::NAN, f64::INFINITY] {
         let refusal = limited(lqr(), FEEDBACK, delay, f64::INFINITY).map(|_| ());
-        assert!(matches!(refusal, Err(DesignError::Delay { longest: 1.0, .. })), "{delay}: {refusal:?}");
+        assert!(
+            matches!(refusal, Err(DesignError::Delay { longest: 1.0, .. })),
+            "{delay}: {refusal:?}"
+        );
     }
     let latency = Latency { measurement: -0.01, action: 0.1 };
     let old = Delayed::new(lqr(), body, FEEDBACK, latency, f64::INFINITY).map(|_| ());

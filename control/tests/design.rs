@@ -5,8 +5,8 @@
 use control::DesignError;
 use control::crmpc::Published;
 use control::crmpc::{
-    Constraints, Design, Guarantee, PaperConstants, Settings, held_terminal_weight, step_response_peak,
-    terminal_weight,
+    Constraints, Design, Guarantee, PaperConstants, Settings, held_terminal_weight,
+    step_response_peak, terminal_weight,
 };
 use control::error_dynamics::{Gain, SampledError};
 use nalgebra::{Matrix2, Vector2};
@@ -26,7 +26,10 @@ fn gain(k: f64) -> Gain {
 #[track_caller]
 fn assert_digits(value: f64, printed: f64, decimals: i32) {
     let tolerance = 0.5 * 10f64.powi(-decimals) * (1.0 + 1e-9);
-    assert!((value - printed).abs() <= tolerance, "{value} is not {printed} to {decimals} decimals");
+    assert!(
+        (value - printed).abs() <= tolerance,
+        "{value} is not {printed} to {decimals} decimals"
+    );
 }
 
 #[test]
@@ -41,8 +44,10 @@ fn published_terminal_weight_satisfies_15_with_equality() {
         // Every number in the equation is an integer, so the residual is exactly zero.
         let row = settings.terminal.row();
         let p = Vector2::new(settings.p[i], settings.p[3 + i]);
-        let residual =
-            a.transpose() * g + g * a + row.transpose() * row * settings.q[i] + Matrix2::from_diagonal(&p);
+        let residual = a.transpose() * g
+            + g * a
+            + row.transpose() * row * settings.q[i]
+            + Matrix2::from_diagonal(&p);
         assert_eq!(residual, Matrix2::zeros());
         assert_eq!(terminal_weight(settings.terminal, p, settings.q[i]), g);
     }
@@ -65,7 +70,10 @@ fn oracle_terminal_law_never_leaves_a_ball_in_the_norm_of_g_but_a_euclidean_one(
 #[test]
 fn published_bounds_of_lemma_1() {
     let (ours, printed) = (constants(&settings()), Published::crmpc2022());
-    assert_eq!([printed.r0, printed.r1, printed.omega, printed.condition], [1.0846, 0.0873, 0.1511, 2.6094]);
+    assert_eq!(
+        [printed.r0, printed.r1, printed.omega, printed.condition],
+        [1.0846, 0.0873, 0.1511, 2.6094]
+    );
     assert_digits(ours.r0, printed.r0, 4);
     assert_digits(ours.r1, printed.r1, 4);
     assert_digits(ours.omega, printed.omega, 4);
@@ -119,7 +127,8 @@ fn oracle_second_terminal_radius_with_the_triangle_inequality() {
     let terminal_gain = settings.terminal.k1.hypot(settings.terminal.k2);
     let radius = |sign: f64| {
         let factor = ours.r0 * ours.condition * ours.omega + sign * ours.r1;
-        eigenvalues.min().sqrt() * (ours.u_tube - factor * ours.x_tube - settings.reference_acceleration)
+        eigenvalues.min().sqrt()
+            * (ours.u_tube - factor * ours.x_tube - settings.reference_acceleration)
             / terminal_gain
     };
     assert_digits(radius(-1.0), printed.epsilon2, 4);
@@ -133,8 +142,11 @@ fn published_tubes_of_the_angles() {
     // 5.1.
     for (k, printed_deg) in [(-5.0, 0.2), (-10.0, 0.1)] {
         let with = |bound_deg: f64| {
-            let settings =
-                Settings { feedback: gain(k), disturbance_bound: bound_deg.to_radians(), ..settings() };
+            let settings = Settings {
+                feedback: gain(k),
+                disturbance_bound: bound_deg.to_radians(),
+                ..settings()
+            };
             constants(&settings).angle_tube.to_degrees()
         };
         assert!((with(1.0) - printed_deg).abs() < 1e-12);
@@ -198,7 +210,11 @@ fn oracle_sampled_bounds() {
         let reach = SampledError::new(gain(k), period).reach_forever().unwrap();
         for (i, value) in [reach.angle, reach.rate, reach.feedback].into_iter().enumerate() {
             assert_digits(held[i], expected[i], 4);
-            assert!(value >= held[i] * (1.0 - 1e-12) && value <= 1.1 * held[i], "K {k}: {value} {}", held[i]);
+            assert!(
+                value >= held[i] * (1.0 - 1e-12) && value <= 1.1 * held[i],
+                "K {k}: {value} {}",
+                held[i]
+            );
         }
     }
 }
@@ -229,7 +245,9 @@ fn oracle_bang_bang_disturbance_reaches_the_sampled_bounds() {
         let responses: Vec<Vec<[f64; 3]>> = (0..PARTS)
             .map(|part| {
                 let mut impulse = Simulation::new(gain(k), period);
-                impulse.advance(&std::array::from_fn::<f64, PARTS, _>(|i| if i == part { 1.0 } else { 0.0 }));
+                impulse.advance(&std::array::from_fn::<f64, PARTS, _>(|i| {
+                    if i == part { 1.0 } else { 0.0 }
+                }));
                 let respond = |_| {
                     let outputs = impulse.outputs();
                     impulse.advance(&[0.0]);
@@ -348,7 +366,8 @@ fn oracle_invariant_set_holds_what_can_be_reached_and_is_less_than_half_larger()
         let error = SampledError::new(gain(k), period);
         let set = error.invariant_set(0.25 * period * period).unwrap().reach();
         let least = error.reach_forever().unwrap();
-        let pairs = [(set.angle, least.angle), (set.rate, least.rate), (set.feedback, least.feedback)];
+        let pairs =
+            [(set.angle, least.angle), (set.rate, least.rate), (set.feedback, least.feedback)];
         for (of_set, least) in pairs {
             assert!(of_set >= least * (1.0 - 1e-12), "K {k}, period {period}: {of_set} {least}");
             assert!(of_set < 1.5 * least, "K {k}, period {period}: {of_set} {least}");
@@ -362,7 +381,8 @@ fn oracle_errors_of_the_rate_ask_for_moment_at_once() {
     // one, a tick after the plan began.
     let rate_error = 1e-3;
     let exact = settings();
-    let noisy = Settings { rate_error, guarantee: Guarantee::BestEffort, disturbance_bound: 0.0, ..exact };
+    let noisy =
+        Settings { rate_error, guarantee: Guarantee::BestEffort, disturbance_bound: 0.0, ..exact };
     let exact = Settings { disturbance_bound: 0.0, ..exact };
     let [exact, noisy] = [exact, noisy].map(|settings| Design::new(&settings).unwrap());
     assert_eq!(noisy.counted, 1.0);
@@ -379,7 +399,8 @@ fn oracle_sampled_terminal_weight_decreases_where_the_continuous_one_does_not() 
     let Settings { terminal, period_optimisation: h, p, q, .. } = settings;
     let held = SampledError::new(terminal, h);
     let p = Vector2::new(p[0], p[3]);
-    let load = (Matrix2::from_diagonal(&p) + terminal.row().transpose() * terminal.row() * q[0]) * h;
+    let load =
+        (Matrix2::from_diagonal(&p) + terminal.row().transpose() * terminal.row() * q[0]) * h;
     let rest = |g: &Matrix2<f64>| held.transition().transpose() * g * held.transition() - g + load;
     let printed = rest(&terminal_weight(terminal, p, q[0])).symmetric_eigenvalues();
     assert!((printed.min() - 1.6).abs() < 0.05 && (printed.max() - 50.0).abs() < 0.5, "{printed}");
@@ -399,7 +420,8 @@ fn a_terminal_gain_that_is_not_stable_when_held_is_refused_by_name() {
 
 #[test]
 fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
-    let settings = Settings { disturbance_bound: 2.5f64.to_radians(), ..Settings::new(Constraints::Robust) };
+    let settings =
+        Settings { disturbance_bound: 2.5f64.to_radians(), ..Settings::new(Constraints::Robust) };
     let error = Design::new(&settings).unwrap_err();
     let DesignError::NoGuarantee { moment_left, disturbance: Some(largest), .. } = error else {
         panic!("{error}")
@@ -407,7 +429,8 @@ fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
     assert!(moment_left < 0.0 && error.to_string().contains("`disturbance_bound`"), "{error}");
     Design::new(&Settings { disturbance_bound: largest, ..settings }).unwrap();
     Design::new(&Settings { disturbance_bound: 1.01 * largest, ..settings }).unwrap_err();
-    let counted = Design::new(&Settings { guarantee: Guarantee::BestEffort, ..settings }).unwrap().counted;
+    let counted =
+        Design::new(&Settings { guarantee: Guarantee::BestEffort, ..settings }).unwrap().counted;
     assert!((counted * settings.disturbance_bound / largest - 1.0).abs() < 1e-6, "{counted}");
 }
 

@@ -120,7 +120,8 @@ fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
     for (time, start) in
         [(0.0, Scenario::crmpc2022().initial_angles), (15.0, reference()(15.0).angles + offset)]
     {
-        let measured = Measurement { angles: start, rates: Vector3::zeros(), ..Measurement::default() };
+        let measured =
+            Measurement { angles: start, rates: Vector3::zeros(), ..Measurement::default() };
         let mut memory = Memory::default();
         dlmpc().update(&mut memory, 0, time, &measured, &reference());
         assert_eq!(memory.report.status, Status::Constrained);
@@ -142,7 +143,8 @@ fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
         let constraints = program.constraints(&v);
         let scale = settings.limit_rate.powi(2);
         assert!(constraints.max() <= 1e-6 * scale, "{}", constraints.max() / scale);
-        let active: Vec<usize> = (0..constraints.len()).filter(|&k| constraints[k] > -1e-5 * scale).collect();
+        let active: Vec<usize> =
+            (0..constraints.len()).filter(|&k| constraints[k] > -1e-5 * scale).collect();
         assert!(active.len() >= 2, "{active:?}");
         let columns: Vec<_> = (0..v.len())
             .map(|i| {
@@ -176,7 +178,11 @@ fn shortcuts_change_nothing_along_a_run() {
         counts[usize::from(memory.report.status == Status::Constrained)] += 1;
         assert_eq!(whole.report.status, Status::Cone);
         let (cost, cost_whole) = (memory.report.cost, whole.report.cost);
-        assert!((cost - cost_whole).abs() <= 1e-7 * cost_whole, "tick {}: {cost} {cost_whole}", sample.tick);
+        assert!(
+            (cost - cost_whole).abs() <= 1e-7 * cost_whole,
+            "tick {}: {cost} {cost_whole}",
+            sample.tick
+        );
         let difference = (memory.rate_command - whole.rate_command).norm() / limit;
         assert!(difference < 1e-4, "tick {}: {difference}", sample.tick);
     }
@@ -186,9 +192,11 @@ fn shortcuts_change_nothing_along_a_run() {
 #[test]
 fn without_a_solution_the_shifted_plan_is_tracked_within_the_limit() {
     let settings = Settings::published();
-    let mut failing =
-        Dlmpc::new(Settings { solver: SolverSettings { max_iterations: 1, ..settings.solver }, ..settings })
-            .unwrap();
+    let mut failing = Dlmpc::new(Settings {
+        solver: SolverSettings { max_iterations: 1, ..settings.solver },
+        ..settings
+    })
+    .unwrap();
     let limit = settings.limit_rate * (1.0 + 1e-12);
     let mut found = 0;
     for sample in optimisations() {
@@ -231,7 +239,8 @@ impl Controller for Interrupted {
         measured: &Measurement,
         reference: control::controller::ReferenceAt,
     ) -> Vector3<f64> {
-        let controller = if self.during.contains(&tick) { &mut self.failing } else { &mut self.working };
+        let controller =
+            if self.during.contains(&tick) { &mut self.failing } else { &mut self.working };
         controller.command(memory, tick, time, measured, reference)
     }
 }
@@ -263,7 +272,11 @@ fn a_solver_that_fails_is_outlived() {
 
 /// Returns the rates under the inner law alone, one sample after another. The attitude rests at a
 /// constant reference, so that the commanded rates are zero and ω⁺ = ω + T ω̇.
-fn inner_law(sliding_mode: SlidingMode, rates: Vector3<f64>, ticks: u64) -> Vec<(Vector3<f64>, Memory)> {
+fn inner_law(
+    sliding_mode: SlidingMode,
+    rates: Vector3<f64>,
+    ticks: u64,
+) -> Vec<(Vector3<f64>, Memory)> {
     let settings = Settings { sliding_mode, ..Settings::published() };
     let mut controller = Dlmpc::new(settings).unwrap();
     let still = Reference { angles: Vector3::new(0.2, 0.1, -0.5), ..Reference::default() };
@@ -274,8 +287,8 @@ fn inner_law(sliding_mode: SlidingMode, rates: Vector3<f64>, ticks: u64) -> Vec<
             let moment = controller.update(&mut memory, tick, 0.0, &measured, &|_| still);
             assert_eq!(memory.rate_command, Vector3::zeros());
             let seen = (moment, memory.clone());
-            measured.rates +=
-                settings.body.angular_acceleration(&measured.rates, &moment) * settings.period_feedback;
+            measured.rates += settings.body.angular_acceleration(&measured.rates, &moment)
+                * settings.period_feedback;
             seen
         })
         .collect()
@@ -287,18 +300,31 @@ fn oracle_sampled_sliding_mode_chatters_with_the_closed_form_amplitude() {
     let period = Settings::published().period_feedback;
     for (q, p, rho) in [(5.0, 5.0, 0.7), (0.0, 5.0, 0.7), (2.0, 3.0, 0.6)] {
         let amplitude = (p * period / (2.0 - q * period)).powf(1.0 / (1.0 - rho));
-        let seen = inner_law(SlidingMode { q, p, gamma: 0.0, rho }, Vector3::new(5e-3, -3e-3, 1e-3), 400);
+        let seen =
+            inner_law(SlidingMode { q, p, gamma: 0.0, rho }, Vector3::new(5e-3, -3e-3, 1e-3), 400);
         for pair in seen[300..].windows(2) {
             let (now, next) = (pair[0].1.sliding, pair[1].1.sliding);
             for i in 0..3 {
-                assert!((now[i].abs() - amplitude).abs() < 1e-6 * amplitude, "{} {amplitude}", now[i]);
+                assert!(
+                    (now[i].abs() - amplitude).abs() < 1e-6 * amplitude,
+                    "{} {amplitude}",
+                    now[i]
+                );
                 assert!(now[i] * next[i] < 0.0);
             }
         }
         // The manifold's own gain changes it little.
-        let seen = inner_law(SlidingMode { q, p, gamma: 0.15, rho }, Vector3::new(5e-3, -3e-3, 1e-3), 2000);
+        let seen = inner_law(
+            SlidingMode { q, p, gamma: 0.15, rho },
+            Vector3::new(5e-3, -3e-3, 1e-3),
+            2000,
+        );
         for (_, memory) in &seen[1900..] {
-            assert!((memory.sliding.amax() - amplitude).abs() < 0.05 * amplitude, "{}", memory.sliding);
+            assert!(
+                (memory.sliding.amax() - amplitude).abs() < 0.05 * amplitude,
+                "{}",
+                memory.sliding
+            );
         }
     }
 }
@@ -337,7 +363,8 @@ fn oracle_inner_law_is_the_reaching_law() {
         }
         let e = sample.measured.rates - memory.rate_command;
         let s = e + sample.before.integral * gamma;
-        let growth = settings.body.angular_acceleration(&sample.measured.rates, &moment) + power(e) * gamma;
+        let growth =
+            settings.body.angular_acceleration(&sample.measured.rates, &moment) + power(e) * gamma;
         assert!(
             (growth + s * q + power(s) * p).norm() < 1e-12 * (1.0 + growth.norm()),
             "tick {}",
@@ -384,7 +411,13 @@ fn tuned_gains_spend_less_moment_at_no_larger_error() {
             white(21..=26, 0.04).into_iter().filter(|case| case.inertia_scale > 1.0).collect();
         let outcomes = in_parallel(&cases, |case| {
             let (scale, noise) = (case.inertia_scale, case.disturbance.clone());
-            simulate(&mut Dlmpc::new(settings).unwrap(), &mut Memory::default(), scale, noise, |_, _, _| {})
+            simulate(
+                &mut Dlmpc::new(settings).unwrap(),
+                &mut Memory::default(),
+                scale,
+                noise,
+                |_, _, _| {},
+            )
         });
         let n = outcomes.len() as f64;
         let ems_deg = outcomes.iter().map(|outcome| outcome.ems_deg).sum::<f64>() / n;
@@ -409,7 +442,8 @@ fn another_evaluation_of_a_tick_leaves_no_trace() {
         disturbed.evaluate(&mut disturbed_controller, wrong, &preview);
         disturbed.evaluate(&mut disturbed_controller, measured, &preview);
         calm.evaluate(&mut calm_controller, measured, &preview);
-        let ((moment, memory), (calm_moment, calm_memory)) = (disturbed.in_force(), calm.in_force());
+        let ((moment, memory), (calm_moment, calm_memory)) =
+            (disturbed.in_force(), calm.in_force());
         assert_eq!(moment, calm_moment, "tick {tick}");
         assert_eq!(timeless(memory), timeless(calm_memory), "tick {tick}");
         disturbed.commit();
@@ -439,7 +473,8 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
                 for (sampled, controller) in [(&mut restored, &mut fresh), (&mut copy, &mut used)] {
                     sampled.evaluate(controller, &later.measured, &preview);
                 }
-                let ((moment, memory), (moment_used, memory_used)) = (restored.in_force(), copy.in_force());
+                let ((moment, memory), (moment_used, memory_used)) =
+                    (restored.in_force(), copy.in_force());
                 assert_eq!(moment, moment_used, "saved at tick {tick}");
                 assert_eq!(timeless(memory), timeless(memory_used), "saved at tick {tick}");
                 restored.commit();

@@ -4,8 +4,8 @@ mod harness;
 
 use control::estimation::ellipsoid::Correction;
 use control::estimation::{
-    self, Alignment, CalibrationMode, CalibrationStatus, Estimate, Estimator, Health, Settings, angles,
-    mems_corrections,
+    self, Alignment, CalibrationMode, CalibrationStatus, Estimate, Estimator, Health, Settings,
+    angles, mems_corrections,
 };
 use harness::platform::{
     CALIBRATION_DURATION, CALIBRATION_SEED, PERIOD, Truth, calibrated, calibration, config, errors,
@@ -68,8 +68,18 @@ fn regress_the_corrections_in_the_data_file_are_those_of_the_flight() {
     let found = calibrated(&mems(CALIBRATION_SEED), CALIBRATION_DURATION).corrections;
     for (found, file) in found.iter().zip(&CALIBRATED.corrections) {
         let size = file.matrix.norm();
-        assert!((found.matrix - file.matrix).norm() < 1e-9 * size, "{} {}", found.matrix, file.matrix);
-        assert!((found.bias - file.bias).norm() < 1e-9 / size.min(1.0), "{} {}", found.bias, file.bias);
+        assert!(
+            (found.matrix - file.matrix).norm() < 1e-9 * size,
+            "{} {}",
+            found.matrix,
+            file.matrix
+        );
+        assert!(
+            (found.bias - file.bias).norm() < 1e-9 / size.min(1.0),
+            "{} {}",
+            found.bias,
+            file.bias
+        );
     }
 }
 
@@ -95,7 +105,10 @@ fn a_calibration_flight_cut_short_is_refused() {
         assert_eq!(memory.estimate.health, wanted, "t = {}", truth.time);
     }
     assert_eq!(memory.calibration.status, CalibrationStatus::Refused);
-    assert_eq!(memory.calibration.correction, settings.corrections[2], "the given one stays in use");
+    assert_eq!(
+        memory.calibration.correction, settings.corrections[2],
+        "the given one stays in use"
+    );
     let [found, wanted] = [memory.estimate.angles, motion[motion.len() - 1].angles]
         .map(|angles| Rotation3::from_matrix_unchecked(body_from_velocity(&angles)));
     assert!(found.angle_to(&wanted) < 2f64.to_radians(), "and the attitude is found with it");
@@ -125,7 +138,11 @@ fn oracle_without_errors_a_steady_turn_is_followed_exactly() {
     let rate = 5f64.to_radians();
     let turning = |time: f64| {
         let angles = Vector3::new(0.2, 0.1, rate * time);
-        Truth { time, angles, rates: Kinematics::Printed.r_inverse(&angles) * Vector3::new(0.0, 0.0, rate) }
+        Truth {
+            time,
+            angles,
+            rates: Kinematics::Printed.r_inverse(&angles) * Vector3::new(0.0, 0.0, rate),
+        }
     };
     let motion: Vec<_> = (0..1000).map(|k| turning(f64::from(k) * PERIOD)).collect();
     let lines = lines(&motion, &ideal());
@@ -146,7 +163,11 @@ fn without_prediction_the_angles_are_late_by_the_delays() {
     let rate = 5f64.to_radians();
     let turning = |time: f64| {
         let angles = Vector3::new(0.0, 0.0, rate * time);
-        Truth { time, angles, rates: Kinematics::Printed.r_inverse(&angles) * Vector3::new(0.0, 0.0, rate) }
+        Truth {
+            time,
+            angles,
+            rates: Kinematics::Printed.r_inverse(&angles) * Vector3::new(0.0, 0.0, rate),
+        }
     };
     let motion: Vec<_> = (0..1000).map(|k| turning(f64::from(k) * PERIOD)).collect();
     let lines = lines(&motion, &ideal());
@@ -160,7 +181,9 @@ fn without_prediction_the_angles_are_late_by_the_delays() {
 fn the_printed_kinematics_get_the_rates_that_they_take() {
     let motion = scenario(1);
     let lines = lines(&motion, &ideal());
-    let of = |kinematics| errors(&motion, &estimates(&Settings { kinematics, ..sharp() }, &lines), 0.02)[1];
+    let of = |kinematics| {
+        errors(&motion, &estimates(&Settings { kinematics, ..sharp() }, &lines), 0.02)[1]
+    };
     let (printed, exact) = (of(Kinematics::Printed), of(Kinematics::Exact));
     assert!(printed.norm() < 0.03, "one tick late: {printed}");
     assert!(exact.norm() > 1.5 * printed.norm(), "what the printed R lacks: {exact}");
@@ -265,7 +288,10 @@ fn settings_that_cannot_work_are_refused_by_name() {
             "corrections[0].matrix",
             Settings { corrections: [singular, s.corrections[1], s.corrections[2]], ..s },
         ),
-        ("corrections[2].matrix", Settings { corrections: [s.corrections[0], s.corrections[1], nan], ..s }),
+        (
+            "corrections[2].matrix",
+            Settings { corrections: [s.corrections[0], s.corrections[1], nan], ..s },
+        ),
     ] {
         let text = Estimator::new(settings).unwrap_err().to_string();
         assert!(text.contains(name), "{name}: {text}");
@@ -283,7 +309,8 @@ fn error_after(
     let mut lines = good[..number + 550].to_vec();
     change(&mut lines[number]);
     let mut worst = 0.0_f64;
-    let wanted = Rotation3::from_matrix_unchecked(body_from_velocity(&Scenario::crmpc2022().initial_angles));
+    let wanted =
+        Rotation3::from_matrix_unchecked(body_from_velocity(&Scenario::crmpc2022().initial_angles));
     for estimate in &estimates(settings, &lines)[number + 500..] {
         let found = Rotation3::from_matrix_unchecked(body_from_velocity(&estimate.angles));
         let error = found.angle_to(&wanted).to_degrees();
@@ -302,13 +329,21 @@ fn five_seconds_after_any_single_bad_sample_the_attitude_is_known_to_a_degree() 
     for (settings, number) in [1, 2, 3, 300].into_iter().flat_map(|n| [(settings, n), (given, n)]) {
         for sensor in 0..3 {
             let range = settings.gates[sensor].range;
-            for value in [0.0, 0.01 * range, 0.3 * range, range, 1.1 * range, 100.0, 1e160, f64::MAX] {
+            for value in
+                [0.0, 0.01 * range, 0.3 * range, range, 1.1 * range, 100.0, 1e160, f64::MAX]
+            {
                 for sign in [1.0, -1.0] {
-                    let directions = [Vector3::x(), Vector3::y(), Vector3::z(), Vector3::repeat(1.0)];
+                    let directions =
+                        [Vector3::x(), Vector3::y(), Vector3::z(), Vector3::repeat(1.0)];
                     for direction in directions {
                         let bad = direction * (sign * value);
-                        let error = error_after(&settings, &good, number, |line| line.readings[sensor] = bad);
-                        assert!(error < 1.0, "sample {number}, sensor {sensor}, {bad:?}: {error} deg");
+                        let error = error_after(&settings, &good, number, |line| {
+                            line.readings[sensor] = bad
+                        });
+                        assert!(
+                            error < 1.0,
+                            "sample {number}, sensor {sensor}, {bad:?}: {error} deg"
+                        );
                     }
                 }
             }

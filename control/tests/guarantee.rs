@@ -39,7 +39,8 @@ fn flights(settings: &Settings, sights: &[Sight]) -> Vec<Flight> {
 
 fn assert_kept(flights: &[Flight]) {
     let shown: Vec<Shown> = in_parallel(flights, Flight::fly);
-    for (Flight { disturbance, sight, settings, duration, .. }, shown) in flights.iter().zip(shown) {
+    for (Flight { disturbance, sight, settings, duration, .. }, shown) in flights.iter().zip(shown)
+    {
         assert!(shown.assumed && !shown.defective(), "{disturbance:?}, {sight:?}: {shown:?}");
         // The guarantee is in force from the instant at which the first command acts.
         let before = (settings.delay / settings.period_feedback).ceil() * settings.period_feedback;
@@ -61,7 +62,10 @@ fn guarantee_is_kept_without_delay_and_errors() {
 
 #[test]
 fn guarantee_is_kept_with_a_delay_of_one_period() {
-    assert_kept(&flights(&Settings { delay: 0.04, ..settings(Constraints::Robust) }, &[Sight::Exact]));
+    assert_kept(&flights(
+        &Settings { delay: 0.04, ..settings(Constraints::Robust) },
+        &[Sight::Exact],
+    ));
 }
 
 #[test]
@@ -71,14 +75,18 @@ fn guarantee_is_kept_with_a_long_delay_and_a_soft_gain() {
 
 /// Returns errors of every kind within their bounds.
 fn erroneous() -> [Sight; 4] {
-    let courses = [Course::White, Course::Switching(0.2), Course::AlongRate(-1.0), Course::AlongMoment(1.0)];
+    let courses =
+        [Course::White, Course::Switching(0.2), Course::AlongRate(-1.0), Course::AlongMoment(1.0)];
     courses.map(Sight::Errors)
 }
 
 #[test]
 fn guarantee_is_kept_with_erroneous_measurements() {
     let error = f64::to_radians(0.02);
-    assert_kept(&flights(&Settings { angle_error: error, rate_error: error, ..soft() }, &erroneous()));
+    assert_kept(&flights(
+        &Settings { angle_error: error, rate_error: error, ..soft() },
+        &erroneous(),
+    ));
 }
 
 #[test]
@@ -113,7 +121,10 @@ fn guarantee_is_kept_with_sensors_and_estimator() {
 #[test]
 fn guarantee_is_kept_from_random_starts_along_random_references() {
     let flights: Vec<Flight> = (1..=24)
-        .map(|seed| Flight { duration: 15.0, ..Flight::random(&settings(Constraints::Robust), seed) })
+        .map(|seed| Flight {
+            duration: 15.0,
+            ..Flight::random(&settings(Constraints::Robust), seed)
+        })
         .collect();
     let mut in_force = 0.0;
     for (flight, shown) in flights.iter().zip(in_parallel(&flights, Flight::fly)) {
@@ -127,7 +138,8 @@ fn guarantee_is_kept_from_random_starts_along_random_references() {
 fn accepted_settings_keep_the_guarantee_and_refused_ones_name_bounds_that_are_accepted() {
     let seeds: Vec<u64> = (1..=60).collect();
     let (mut flown, mut named) = (0, 0);
-    for (seed, outcome) in seeds.iter().zip(in_parallel(&seeds, |&seed| tried(&random_settings(seed), seed)))
+    for (seed, outcome) in
+        seeds.iter().zip(in_parallel(&seeds, |&seed| tried(&random_settings(seed), seed)))
     {
         match outcome {
             Tried::Flown(shown) => {

@@ -89,7 +89,8 @@ fn every_optimum_of_the_paper_from_a_random_start_shows_that_it_is_one() {
     let parts: Vec<&[u64]> = seeds.chunks(100).collect();
     let optimise = |part: &&[u64]| {
         let law = &mut crmpc(Constraints::Paper);
-        let of = |&seed: &u64| Case::random(seed, 1.0).optimise(law, 1).map(|report| (seed, report));
+        let of =
+            |&seed: &u64| Case::random(seed, 1.0).optimise(law, 1).map(|report| (seed, report));
         part.iter().flat_map(of).collect::<Vec<_>>()
     };
     for (seed, report) in in_parallel(&parts, optimise).concat() {
@@ -116,7 +117,8 @@ fn oracle_where_no_optimisation_is_begun_no_moment_keeps_the_rates() {
         // The moment is affine in the second derivative of the angles.
         let moment = |acceleration| kinematics.moment(&settings.body, &x_omega, &acceleration);
         let at_rest = moment(Vector3::zeros());
-        let slope = Matrix3::from_columns(&[0, 1, 2].map(|axis| moment(Vector3::ith(axis, 1.0)) - at_rest));
+        let slope =
+            Matrix3::from_columns(&[0, 1, 2].map(|axis| moment(Vector3::ith(axis, 1.0)) - at_rest));
         let inverse = slope.try_inverse().unwrap();
         // Returns the rates relative to their limit after an interval that begins with this moment.
         let after = |moment: Vector3<f64>| {
@@ -143,11 +145,12 @@ fn budgeted(budget: u32, kind: Kind) -> (harness::Outcome, Memory, u32, bool) {
     let mut controller = Crmpc::new(Settings { solver, ..settings }).unwrap();
     let mut memory = Memory::default();
     let (mut most, mut broken, mut before) = (0, false, false);
-    let outcome = simulate(&mut controller, &mut memory, 1.05, disturbance(kind), |memory, _, measured| {
-        most = most.max(memory.report.iterations);
-        broken |= before && measured.rates.norm() > settings.limit_rate;
-        before = memory.standing == Standing::InForce;
-    });
+    let outcome =
+        simulate(&mut controller, &mut memory, 1.05, disturbance(kind), |memory, _, measured| {
+            most = most.max(memory.report.iterations);
+            broken |= before && measured.rates.norm() > settings.limit_rate;
+            before = memory.standing == Standing::InForce;
+        });
     (outcome, memory, most, broken)
 }
 
@@ -156,7 +159,9 @@ fn a_budget_of_iterations_is_never_exceeded_and_costs_no_limit() {
     let budgets = [0, 1, 2, 3, 4, 6, 8];
     let cases: Vec<(u32, Kind)> = budgets
         .into_iter()
-        .flat_map(|budget| [Kind::White, Kind::AlongRate, Kind::AgainstMoment].map(|kind| (budget, kind)))
+        .flat_map(|budget| {
+            [Kind::White, Kind::AlongRate, Kind::AgainstMoment].map(|kind| (budget, kind))
+        })
         .collect();
     let runs = in_parallel(&cases, |&(budget, kind)| (budget, budgeted(budget, kind)));
     for (budget, (outcome, memory, most, broken)) in runs {
@@ -173,7 +178,8 @@ fn a_budget_of_iterations_is_never_exceeded_and_costs_no_limit() {
 #[test]
 fn a_run_with_a_budget_of_iterations_repeats_bit_for_bit() {
     let [first, second] = [0; 2].map(|_| budgeted(4, Kind::White).1);
-    let timeless = |memory: Memory| Memory { report: Report { time: 0.0, ..memory.report }, ..memory };
+    let timeless =
+        |memory: Memory| Memory { report: Report { time: 0.0, ..memory.report }, ..memory };
     assert_eq!(timeless(first), timeless(second));
 }
 

@@ -94,8 +94,11 @@ fn shortcuts_lead_to_the_optimum_of_the_whole_horizon() {
         let property = |(size, offset, rates, sample): (f64, [f64; 3], [f64; 3], u64)| {
             let time = sample as f64 * 0.2;
             let angles = reference()(time).angles + Vector3::from(offset) * size;
-            let measured =
-                Measurement { angles, rates: Vector3::from(rates) * size, ..Measurement::default() };
+            let measured = Measurement {
+                angles,
+                rates: Vector3::from(rates) * size,
+                ..Measurement::default()
+            };
             let [(status, cost, moment), (status_whole, cost_whole, moment_whole)] =
                 [&with, &without].map(|controller| {
                     let mut memory = Memory::default();
@@ -111,7 +114,8 @@ fn shortcuts_lead_to_the_optimum_of_the_whole_horizon() {
             prop_assert!(difference < 1e-4, "{status:?}: {difference}");
             Ok(())
         };
-        let config = ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() };
+        let config =
+            ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() };
         let random = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
         TestRunner::new_with_rng(config, random).run(&states, property).unwrap();
         assert!(counts.iter().all(|count| count.get() >= 10), "{constraints:?}: {counts:?}");
@@ -124,11 +128,14 @@ fn oracle_terminal_constraint_is_a_ball_in_the_norm_of_g() {
     let mut controller = controller(Constraints::Paper);
     let (g, paper) = (controller.design().g, controller.design().paper.unwrap());
     let epsilon = paper.epsilon1.min(paper.epsilon2);
-    let Settings { horizon, period_optimisation, period_feedback, .. } = settings(Constraints::Paper);
+    let Settings { horizon, period_optimisation, period_feedback, .. } =
+        settings(Constraints::Paper);
     let mut active = 0;
     for sample in recorded(Constraints::Paper) {
         let (memory, _) = sample.update(&mut controller);
-        let end = reference()(sample.tick as f64 * period_feedback + horizon as f64 * period_optimisation);
+        let end = reference()(
+            sample.tick as f64 * period_feedback + horizon as f64 * period_optimisation,
+        );
         let state = memory.plan.states[horizon];
         let axis = |i: usize| Vector2::new(state[i] - end.angles[i], state[3 + i] - end.rates[i]);
         let norm = (0..3).map(|i| (g[i] * axis(i)).dot(&axis(i))).sum::<f64>().sqrt();
@@ -162,7 +169,8 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
 
         let angle_rates = kinematics::r(&angles) * rates;
         let nominal = memory.nominal;
-        let (angle, rate) = (angles - nominal.fixed_rows::<3>(0), angle_rates - nominal.fixed_rows::<3>(3));
+        let (angle, rate) =
+            (angles - nominal.fixed_rows::<3>(0), angle_rates - nominal.fixed_rows::<3>(3));
         let expected = memory.plan.accelerations[0] + angle * feedback.k1 + rate * feedback.k2;
         // This is the state to which that acceleration leads by the middle of the period
         // (docs/guarantee.md).
@@ -200,7 +208,10 @@ fn shortcuts_change_nothing_along_a_run() {
                 counts[usize::from(memory.report.status == Status::Constrained)] += 1;
                 let (cost, cost_whole) = (memory.report.cost, whole.report.cost);
                 let tick = sample.tick;
-                assert!((cost - cost_whole).abs() <= 1e-7 * cost_whole, "tick {tick}: {cost} {cost_whole}");
+                assert!(
+                    (cost - cost_whole).abs() <= 1e-7 * cost_whole,
+                    "tick {tick}: {cost} {cost_whole}"
+                );
                 let difference = (moment - moment_whole).norm() / limit;
                 assert!(difference < 1e-4, "tick {tick}: {difference}");
             }
@@ -211,7 +222,8 @@ fn shortcuts_change_nothing_along_a_run() {
 
 #[test]
 fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins() {
-    let measured = Measurement { angles: Scenario::crmpc2022().initial_angles, ..Measurement::default() };
+    let measured =
+        Measurement { angles: Scenario::crmpc2022().initial_angles, ..Measurement::default() };
     for constraints in [Constraints::Robust, Constraints::Paper] {
         for initial_state in [InitialState::Measured, InitialState::Nominal, InitialState::Tube] {
             let [cost, cost_cone] = [Method::Riccati, Method::Cone].map(|method| {
@@ -225,7 +237,8 @@ fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins(
                 let mut controller = Crmpc::new(Settings { solver, ..settings }).unwrap();
                 let mut memory = Memory::default();
                 controller.update(&mut memory, 0, 0.0, &measured, &reference());
-                let expected = if method == Method::Riccati { Status::Constrained } else { Status::Cone };
+                let expected =
+                    if method == Method::Riccati { Status::Constrained } else { Status::Cone };
                 assert_eq!(memory.report.status, expected, "{constraints:?}, {initial_state:?}");
                 memory.report.cost
             });
@@ -253,8 +266,14 @@ fn every_way_to_the_optimum_shows_that_it_is_one() {
                 seen.push(status);
             }
         }
-        assert!(seen.contains(&Status::Unconstrained) && seen.contains(&Status::Constrained), "{seen:?}");
-        assert!(constraints == Constraints::Robust || seen.contains(&Status::TerminalBall), "{seen:?}");
+        assert!(
+            seen.contains(&Status::Unconstrained) && seen.contains(&Status::Constrained),
+            "{seen:?}"
+        );
+        assert!(
+            constraints == Constraints::Robust || seen.contains(&Status::TerminalBall),
+            "{seen:?}"
+        );
     }
 }
 
@@ -282,13 +301,16 @@ fn assert_is_shifted(
 #[test]
 fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
     let settings = settings(Constraints::Paper);
-    let mut failing =
-        Crmpc::new(Settings { solver: SolverSettings { max_iterations: 1, ..settings.solver }, ..settings })
-            .unwrap();
+    let mut failing = Crmpc::new(Settings {
+        solver: SolverSettings { max_iterations: 1, ..settings.solver },
+        ..settings
+    })
+    .unwrap();
     let recorded = recorded(Constraints::Paper);
     let constrained = |sample: &&Recorded| {
         sample.tick > 0
-            && sample.update(&mut controller(Constraints::Paper)).0.report.status == Status::Constrained
+            && sample.update(&mut controller(Constraints::Paper)).0.report.status
+                == Status::Constrained
     };
     let samples: Vec<_> = recorded.iter().filter(constrained).take(3).collect();
     assert_eq!(samples.len(), 3);
@@ -317,11 +339,14 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
             let reference = at(k);
             for i in 0..3 {
                 let state = &after.plan.states[k];
-                let e = Vector2::new(state[i] - reference.angles[i], state[3 + i] - reference.rates[i]);
+                let e =
+                    Vector2::new(state[i] - reference.angles[i], state[3 + i] - reference.rates[i]);
                 if k < settings.horizon {
                     let v = after.plan.accelerations[k][i] - reference.accelerations[i];
                     cost += h
-                        * (settings.p[i] * e.x * e.x + settings.p[3 + i] * e.y * e.y + settings.q[i] * v * v);
+                        * (settings.p[i] * e.x * e.x
+                            + settings.p[3 + i] * e.y * e.y
+                            + settings.q[i] * v * v);
                 } else {
                     cost += (e.transpose() * failing.design().g[i] * e).x;
                 }
@@ -397,7 +422,8 @@ impl Controller for Interrupted {
         measured: &Measurement,
         reference: control::controller::ReferenceAt,
     ) -> Vector3<f64> {
-        let controller = if self.during.contains(&tick) { &mut self.failing } else { &mut self.working };
+        let controller =
+            if self.during.contains(&tick) { &mut self.failing } else { &mut self.working };
         controller.command(memory, tick, time, measured, reference)
     }
 
@@ -427,13 +453,18 @@ fn run_failing(during: Range<u64>) -> (harness::Outcome, [u32; 2], Memory) {
     // These are optimisations without an optimum, at which the plan was kept or given up.
     let mut fallbacks = [0, 0];
     let mut last = 0;
-    let outcome =
-        simulate(&mut controller, &mut memory, 1.05, disturbance(Kind::White), |memory, tick, _| {
+    let outcome = simulate(
+        &mut controller,
+        &mut memory,
+        1.05,
+        disturbance(Kind::White),
+        |memory, tick, _| {
             let without = matches!(memory.report.status, Status::Fallback | Status::Kept);
             fallbacks[usize::from(!during.contains(&tick))] +=
                 u32::from(without && memory.report.solves > last);
             last = memory.report.solves;
-        });
+        },
+    );
     (outcome, fallbacks, memory)
 }
 
@@ -443,7 +474,10 @@ fn a_solver_that_fails_for_a_while_costs_no_limit() {
     // about the jump.
     for during in [10..50, 200..300, 575..660] {
         let (outcome, [inside, outside], memory) = run_failing(during.clone());
-        assert!(inside > 0 && outside == 0, "{during:?}: {inside} fallbacks inside, {outside} outside");
+        assert!(
+            inside > 0 && outside == 0,
+            "{during:?}: {inside} fallbacks inside, {outside} outside"
+        );
         assert!(outcome.rate <= 1.0 && outcome.moment <= 1.0, "{during:?}: {outcome:?}");
         assert_eq!(memory.report.status, Status::Unconstrained, "{during:?}");
     }
@@ -455,7 +489,10 @@ fn a_solver_that_fails_from_the_start_is_outlived() {
     // reference without a solver.
     for during in [0..5, 0..u64::MAX] {
         let (outcome, [inside, outside], memory) = run_failing(during.clone());
-        assert!(inside > 0 && outside < 25, "{during:?}: {inside} fallbacks inside, {outside} outside");
+        assert!(
+            inside > 0 && outside < 25,
+            "{during:?}: {inside} fallbacks inside, {outside} outside"
+        );
         assert!(outcome.rate <= 1.0 && outcome.moment <= 1.0 + 1e-12, "{during:?}: {outcome:?}");
         assert!(outcome.ems_deg < 2.5, "{during:?}: {outcome:?}");
         assert_eq!(memory.report.status, Status::Unconstrained, "{during:?}");
@@ -484,7 +521,8 @@ fn another_evaluation_of_a_tick_leaves_no_trace() {
         disturbed.evaluate(&mut disturbed_controller, wrong, &preview);
         disturbed.evaluate(&mut disturbed_controller, measured, &preview);
         calm.evaluate(&mut calm_controller, measured, &preview);
-        let ((moment, memory), (calm_moment, calm_memory)) = (disturbed.in_force(), calm.in_force());
+        let ((moment, memory), (calm_moment, calm_memory)) =
+            (disturbed.in_force(), calm.in_force());
         assert_eq!(moment, calm_moment, "tick {tick} {:?} {:?}", memory.report, calm_memory.report);
         assert_eq!(timeless(memory), timeless(calm_memory), "tick {tick}");
         disturbed.commit();
@@ -519,7 +557,9 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
                 let mut copy = sampled.clone();
                 let mut fresh = controller(constraints);
                 for later in &truth[tick..tick + 7] {
-                    for (sampled, controller) in [(&mut restored, &mut fresh), (&mut copy, &mut used)] {
+                    for (sampled, controller) in
+                        [(&mut restored, &mut fresh), (&mut copy, &mut used)]
+                    {
                         sampled.evaluate(controller, later, &preview);
                     }
                     let ((moment, memory), (moment_used, memory_used)) =

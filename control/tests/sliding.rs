@@ -77,7 +77,11 @@ fn sotvsmc_do() -> SotvsmcDo {
 /// Compares angles in deg, to 2 % or half a unit of the last digit given.
 fn assert_rms(outcome: &Outcome, expected: [f64; 3], digit: f64) {
     for (found, expected) in outcome.rms.iter().zip(expected) {
-        assert!((found - expected).abs() <= (0.02 * expected).max(0.5 * digit), "{:?}", outcome.rms);
+        assert!(
+            (found - expected).abs() <= (0.02 * expected).max(0.5 * digit),
+            "{:?}",
+            outcome.rms
+        );
     }
 }
 
@@ -158,8 +162,8 @@ fn oracle_determinant_of_k() {
     let body = inertia.body(1.0).unwrap();
     let angles = Vector3::new(0.5, 0.3, 1.0);
     let k = kinematics::r(&angles) * body.inverse;
-    let expected =
-        1.0 / (angles.y.cos() * inertia.Iyy * (inertia.Ixx * inertia.Izz - inertia.Ixz * inertia.Ixz));
+    let expected = 1.0
+        / (angles.y.cos() * inertia.Iyy * (inertia.Ixx * inertia.Izz - inertia.Ixz * inertia.Ixz));
     assert!((k.determinant() - expected).abs() < 1e-12 * expected);
 }
 
@@ -258,11 +262,14 @@ fn settings_that_cannot_work_are_refused_by_name() {
     assert!(text.contains("reaching.h"), "{text}");
     let text = refusal(Settings { surface: Surface { lambda: -1.0, ..good.surface }, ..good });
     assert!(text.contains("surface.lambda") && text.contains("-1"), "{text}");
-    let observer = good.observer.map(|observer| Observer { l: [0.005, f64::NAN, 0.01], ..observer });
+    let observer =
+        good.observer.map(|observer| Observer { l: [0.005, f64::NAN, 0.01], ..observer });
     let text = refusal(Settings { observer, ..good });
     assert!(text.contains("observer.l`"), "{text}");
-    let text = Fbl::new(FblSettings { kd: -3.0, ..FblSettings::published() }).unwrap_err().to_string();
+    let text =
+        Fbl::new(FblSettings { kd: -3.0, ..FblSettings::published() }).unwrap_err().to_string();
     assert!(text.contains("`kd`"), "{text}");
-    let text = Fbl::new(FblSettings { period: 1.0, ..FblSettings::published() }).unwrap_err().to_string();
+    let text =
+        Fbl::new(FblSettings { period: 1.0, ..FblSettings::published() }).unwrap_err().to_string();
     assert!(text.contains("spectral radius"), "{text}");
 }

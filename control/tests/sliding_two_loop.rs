@@ -41,11 +41,13 @@ fn run(
     let mut plant = Plant::new(&scenario.config(period), 0.0).unwrap();
     let reference = |time: f64| scenario.reference.at(time);
     let moments = Vector3::zeros();
-    let mut outcome = Outcome { rest: 0.0, settling: 0.0, moment: 0.0, moments, integrals: (0.0, 0.0) };
+    let mut outcome =
+        Outcome { rest: 0.0, settling: 0.0, moment: 0.0, moments, integrals: (0.0, 0.0) };
     let mut achieved_moment = None;
     for tick in 0..(scenario.duration / period).round() as u64 {
         let time = tick as f64 * period;
-        let measured = Measurement { angles: plant.angles(), rates: plant.rates(), achieved_moment };
+        let measured =
+            Measurement { angles: plant.angles(), rates: plant.rates(), achieved_moment };
         let error = (measured.angles - reference(time).angles).amax().to_degrees();
         if error > 0.5 {
             outcome.settling = time + period;
@@ -77,14 +79,18 @@ fn regress_steps_settle_with_a_moment_within_the_actuators_reach_about_each_axis
     // (scripts/oracles/reach.py). The disturbance alone takes 1e5 N m of it.
     let reach = Vector3::new(179.57e3, 302.24e3, 104.54e3);
     assert!((reach - outcome.moments).min() > 0.0, "{outcome:?}");
-    assert!((outcome.settling - 4.39).abs() < 0.05 && (outcome.rest - 0.087).abs() < 0.005, "{outcome:?}");
+    assert!(
+        (outcome.settling - 4.39).abs() < 0.05 && (outcome.rest - 0.087).abs() < 0.005,
+        "{outcome:?}"
+    );
     assert!(outcome.integrals.0 < 2e-3 && outcome.integrals.1 < 3e-3, "{outcome:?}");
 }
 
 #[test]
 fn regress_steps_without_filter_ask_for_millions_of_newton_metres() {
     let ours = TwoLoopSettings::ours();
-    let layer = |rho, epsilon| FiniteTimeLayer { rho: [rho; 3], epsilon: [epsilon; 3], b: [0.5; 3] };
+    let layer =
+        |rho, epsilon| FiniteTimeLayer { rho: [rho; 3], epsilon: [epsilon; 3], b: [0.5; 3] };
     let outer = Loop { k: [1.0; 3], layer: layer(0.06, 0.01) };
     let inner = Loop { k: [4.0; 3], layer: layer(0.5, 0.01) };
     let outcome = direct(&TwoLoopSettings { filter: 0.0, outer, inner, ..ours });
@@ -94,16 +100,21 @@ fn regress_steps_without_filter_ask_for_millions_of_newton_metres() {
 
 #[test]
 fn regress_integrals_that_rest_in_saturation_do_not_wind_up() {
-    let settings = |anti_windup| TwoLoopSettings { filter: 0.0, anti_windup, ..TwoLoopSettings::ours() };
+    let settings =
+        |anti_windup| TwoLoopSettings { filter: 0.0, anti_windup, ..TwoLoopSettings::ours() };
     let limited = |anti_windup| run(&settings(anti_windup), 1.9e5, false, |moment| moment);
     let (with, without) = (limited(true), limited(false));
     assert!((with.settling - 9.22).abs() < 0.05 && with.rest < 0.1, "{with:?}");
     assert!(with.integrals.0 < 0.02 && with.integrals.1 < 0.003, "{with:?}");
     assert!(without.rest > 90.0, "the attitude is lost: {without:?}");
     // The same limit acts in actuators whose moment is measured.
-    let measured =
-        run(&settings(true), f64::INFINITY, true, |moment| moment / (moment.norm() / 1.9e5).max(1.0));
-    assert!((measured.settling - with.settling).abs() < 0.011 && measured.rest < 0.3, "{measured:?}");
+    let measured = run(&settings(true), f64::INFINITY, true, |moment| {
+        moment / (moment.norm() / 1.9e5).max(1.0)
+    });
+    assert!(
+        (measured.settling - with.settling).abs() < 0.011 && measured.rest < 0.3,
+        "{measured:?}"
+    );
 }
 
 /// Returns the matrix P of φ = P Θ.
@@ -128,7 +139,8 @@ fn oracle_rate_command_is_the_same_in_the_papers_order() {
     settings.outer.k = [0.5, 0.6, 0.7];
     settings.outer.layer.rho = [0.02, 0.03, 0.04];
     let angles = Vector3::new(0.3, 0.05, -0.4);
-    let measured = Measurement { angles, rates: Vector3::new(0.01, -0.02, 0.03), ..Measurement::default() };
+    let measured =
+        Measurement { angles, rates: Vector3::new(0.01, -0.02, 0.03), ..Measurement::default() };
     let reference = Reference {
         angles: Vector3::new(0.31, 0.0, -0.3),
         rates: Vector3::new(0.01, 0.02, -0.03),
@@ -154,15 +166,18 @@ fn sliding_and_its_rate(settings: &TwoLoopSettings) -> [(Vector3<f64>, Vector3<f
     let reference = Reference { angles: Vector3::new(0.02, 0.013, -0.007), ..Reference::default() };
     let measured = Measurement { rates: Vector3::new(0.01, -0.02, 0.03), ..Measurement::default() };
     let mut memory = TwoLoopMemory::default();
-    let moment = TwoLoopSmc::new(*settings).unwrap().update(&mut memory, 0, 0.0, &measured, &|_| reference);
+    let moment =
+        TwoLoopSmc::new(*settings).unwrap().update(&mut memory, 0, 0.0, &measured, &|_| reference);
     let before = memory;
     let step = 1e-6;
     // The step is short enough for a finite difference: the plant moves under that moment, then the
     // errors of both loops follow from its state.
     let state = plant::state(&measured.angles, &measured.rates);
     let load = Load { moment, ..Load::default() };
-    let state = state + plant::derivative(&settings.body, Kinematics::Printed, &state, &load) * step;
-    let later = Measurement { angles: plant::angles(&state), rates: plant::rates(&state), ..measured };
+    let state =
+        state + plant::derivative(&settings.body, Kinematics::Printed, &state, &load) * step;
+    let later =
+        Measurement { angles: plant::angles(&state), rates: plant::rates(&state), ..measured };
     let mut short = TwoLoopSmc::new(TwoLoopSettings { period: step, ..*settings }).unwrap();
     short.update(&mut memory, 1, step, &later, &|_| reference);
     [
@@ -184,7 +199,8 @@ fn oracle_reaching_law_of_the_inner_loop() {
 #[test]
 fn oracle_with_the_sign_of_10_the_inner_sliding_variable_grows() {
     // The printed sign gives ds_n/dt = +ρ f SAT(s_n/ε).
-    let settings = TwoLoopSettings { filter: 0.0, form: Form::PrintedSign, ..TwoLoopSettings::ours() };
+    let settings =
+        TwoLoopSettings { filter: 0.0, form: Form::PrintedSign, ..TwoLoopSettings::ours() };
     let [_, (s, rate)] = sliding_and_its_rate(&settings);
     let expected = settings.inner.layer.value(&s);
     assert!((rate - expected).norm() < 1e-4 * expected.norm());
@@ -195,7 +211,8 @@ fn oracle_with_the_sign_of_10_the_inner_sliding_variable_grows() {
 fn oracle_with_the_minus_sign_of_f_the_outer_sliding_variable_grows() {
     // If ω follows ω_c, ds_w/dt = R (ω_c − ω) + ρ |f| SAT(s_w/ε). In (11) two minus signs make
     // ds_n/dt = −ρ |f| SAT(s_n/ε).
-    let settings = TwoLoopSettings { filter: 0.0, form: Form::PrintedFactor, ..TwoLoopSettings::ours() };
+    let settings =
+        TwoLoopSettings { filter: 0.0, form: Form::PrintedFactor, ..TwoLoopSettings::ours() };
     let [(s_w, rate_w), (s_n, rate_n)] = sliding_and_its_rate(&settings);
     // There is no integral yet, so s_n = ω_c − ω.
     let expected = kinematics::r(&Vector3::zeros()) * s_n + settings.outer.layer.value(&s_w);
@@ -225,8 +242,11 @@ fn regress_printed_forms_lose_the_attitude() {
         let mut plant = Plant::new(&scenario.config(0.01), 0.0).unwrap();
         let reference = |time: f64| scenario.reference.at(time);
         (0..2000_u32).map(|tick| f64::from(tick) * 0.01).find(|&time| {
-            let measured =
-                Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
+            let measured = Measurement {
+                angles: plant.angles(),
+                rates: plant.rates(),
+                ..Measurement::default()
+            };
             let moment = controller.update(&mut memory, 0, time, &measured, &reference);
             plant.advance(time, time + 0.01, moment).unwrap();
             (measured.angles - reference(time).angles).amax() > 30f64.to_radians()

@@ -13,7 +13,8 @@ use control::mpc::lq::Unconstrained;
 use control::mpc::problem::{End, Outcome, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
 use control::mpc::{
-    Balls, Bounded, Bounds, Chain, Constraints, Cost, Layout, Motion, Optimiser, SolverSettings, State,
+    Balls, Bounded, Bounds, Chain, Constraints, Cost, Layout, Motion, Optimiser, SolverSettings,
+    State,
 };
 use control::report::Status;
 use nalgebra::{SMatrix, SVector, Vector3};
@@ -44,8 +45,12 @@ fn shape() -> impl Strategy<Value = Shape> {
         let h = 0.2;
         let of = |decade: f64, typical: f64| h * typical * 10.0_f64.powf(decade);
         let (p1, p2, q) = (of(angle, 50.0), of(rate, 50.0), of(input, 10.0));
-        let each =
-            SMatrix::<f64, 2, 2>::new(8.0 * p1, 3.0 * (p1 * p2).sqrt(), 3.0 * (p1 * p2).sqrt(), 4.0 * p2);
+        let each = SMatrix::<f64, 2, 2>::new(
+            8.0 * p1,
+            3.0 * (p1 * p2).sqrt(),
+            3.0 * (p1 * p2).sqrt(),
+            4.0 * p2,
+        );
         let cost = Cost {
             state: [Vector3::repeat(p1), Vector3::new(p2, 2.0 * p2, 0.5 * p2)],
             input: Vector3::new(q, 0.7 * q, 2.0 * q),
@@ -74,15 +79,14 @@ fn sample() -> impl Strategy<Value = Sample> {
         [-half..half, -half..half, -half..half].prop_map(Vector3::from)
     };
     let jump = (0.0..1.0f64, [-0.09..0.09f64, -0.02..0.02, -0.09..0.09]);
-    (cube(20.0), cube(4.0), jump, any::<bool>(), (-0.3..1.0f64, -0.3..1.0f64), 0.3..1.5f64).prop_map(
-        |(angles, rates, jump, printed, bounds, radius)| Sample {
+    (cube(20.0), cube(4.0), jump, any::<bool>(), (-0.3..1.0f64, -0.3..1.0f64), 0.3..1.5f64)
+        .prop_map(|(angles, rates, jump, printed, bounds, radius)| Sample {
             start: [angles, rates],
             jump,
             printed,
             bounds,
             radius,
-        },
-    )
+        })
 }
 
 /// The solvers of one shape.
@@ -144,18 +148,21 @@ impl Solvers {
         unconstrained.solve(&sample.start, affine, &mut solution.motion);
         frozen.set(&sets, &solution.motion, 0);
         let end = &solution.motion.states[shape.horizon];
-        let radius = shape.terminal.then(|| (sample.radius * shape.cost.end_square(end).sqrt()).max(1e-4));
+        let radius =
+            shape.terminal.then(|| (sample.radius * shape.cost.end_square(end).sqrt()).max(1e-4));
         let zero = [Vector3::zeros(); 2];
         let problem = Problem {
             chain,
             cost: &shape.cost,
-            start: normals.map_or(Start::Fixed(sample.start), |normals| Start::Within(sample.start, normals)),
+            start: normals
+                .map_or(Start::Fixed(sample.start), |normals| Start::Within(sample.start, normals)),
             affine,
             constraints: &*frozen,
             end: End { weight: &shape.cost.end, slope: zero, radius },
         };
         let mut judged = solution.clone();
-        let outcome = riccati.solve(&problem, &mut solution, 0, false, &mut Budget::unlimited(), None);
+        let outcome =
+            riccati.solve(&problem, &mut solution, 0, false, &mut Budget::unlimited(), None);
         let verdict = cone.solve(&problem, &mut judged, (u32::MAX, f64::INFINITY));
         let of = |outcome, solution: &Solution<2>| {
             (outcome, shape.cost.of(&solution.motion), Certificate::of(&problem, solution, false))
@@ -165,8 +172,12 @@ impl Solvers {
 }
 
 fn runner(cases: u32) -> TestRunner {
-    let config =
-        ProptestConfig { cases, failure_persistence: None, max_shrink_iters: 0, ..ProptestConfig::default() };
+    let config = ProptestConfig {
+        cases,
+        failure_persistence: None,
+        max_shrink_iters: 0,
+        ..ProptestConfig::default()
+    };
     TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha))
 }
 
@@ -216,7 +227,11 @@ fn oracle_riccati_and_cone_agree_on_the_cost_of_5500_random_problems() {
 fn published() -> Shape {
     let settings = control::crmpc::Settings::new(control::crmpc::Constraints::Robust);
     let h = settings.period_optimisation;
-    let g = control::crmpc::terminal_weight(settings.terminal, nalgebra::Vector2::new(50.0, 50.0), 10.0);
+    let g = control::crmpc::terminal_weight(
+        settings.terminal,
+        nalgebra::Vector2::new(50.0, 50.0),
+        10.0,
+    );
     let cost = Cost {
         state: [Vector3::repeat(50.0 * h); 2],
         input: Vector3::repeat(10.0 * h),
@@ -245,7 +260,10 @@ fn oracle_riccati_and_cone_agree_wherever_the_reference_jumps() {
     let mut solvers = Solvers::new(published(), None);
     for k in 0..solvers.shape.horizon {
         let jump = (k as f64 / solvers.shape.horizon as f64 + 1e-9, [0.012, 0.0, -0.087]);
-        assert_agree(solvers.solve(&Sample { jump, ..MODERATE }, None), &format!("jump in interval {k}"));
+        assert_agree(
+            solvers.solve(&Sample { jump, ..MODERATE }, None),
+            &format!("jump in interval {k}"),
+        );
     }
 }
 
@@ -256,11 +274,17 @@ fn oracle_riccati_and_cone_agree_in_degenerate_cases() {
     // it.
     let limit = 5.0_f64.to_radians();
     let start = [Vector3::new(0.3, 0.05, -0.2), Vector3::new(0.0, 0.0, 0.999 * limit)];
-    assert_agree(solvers.solve(&Sample { start, ..MODERATE }, None), "rate at its bound at the start");
+    assert_agree(
+        solvers.solve(&Sample { start, ..MODERATE }, None),
+        "rate at its bound at the start",
+    );
     // These are balls so large that none is active, and an end that is almost given.
     assert_agree(solvers.solve(&Sample { bounds: (3.0, 3.0), ..MODERATE }, None), "no ball active");
     let jump = (0.99, [0.012, 0.0, -0.087]);
-    assert_agree(solvers.solve(&Sample { radius: 1e-3, jump, ..MODERATE }, None), "tiny terminal ball");
+    assert_agree(
+        solvers.solve(&Sample { radius: 1e-3, jump, ..MODERATE }, None),
+        "tiny terminal ball",
+    );
     // One axis is already at its reference.
     let start = [Vector3::new(0.3, 0.0, 0.0), Vector3::zeros()];
     assert_agree(solvers.solve(&Sample { start, ..MODERATE }, None), "one axis only");
@@ -353,7 +377,13 @@ impl Bounded<2> for Spoilt {
         true
     }
 
-    fn balls(&self, k: usize, state: &State<2>, input: &Vector3<f64>, _: Option<(f64, f64)>) -> Balls<2> {
+    fn balls(
+        &self,
+        k: usize,
+        state: &State<2>,
+        input: &Vector3<f64>,
+        _: Option<(f64, f64)>,
+    ) -> Balls<2> {
         let mut balls = self.sets.balls(k, state, input);
         if self.computed.get() == 1 {
             balls.input.value *= f64::NAN;
@@ -361,7 +391,13 @@ impl Bounded<2> for Spoilt {
         balls
     }
 
-    fn squares(&self, k: usize, state: &State<2>, input: &Vector3<f64>, bounds: (f64, f64)) -> (f64, f64) {
+    fn squares(
+        &self,
+        k: usize,
+        state: &State<2>,
+        input: &Vector3<f64>,
+        bounds: (f64, f64),
+    ) -> (f64, f64) {
         let Balls { state, input } = self.balls(k, state, input, Some(bounds));
         (state.value.norm_squared(), input.value.norm_squared())
     }
@@ -370,8 +406,14 @@ impl Bounded<2> for Spoilt {
         self.computed.update(|computed| computed + 1);
     }
 
-    fn violated(&self, motion: &Motion<2>, mut of: Range<usize>, _: &mut Bounds) -> Option<Range<usize>> {
-        let violates = |k: usize| self.sets.squares(k, &motion.states[k], &motion.inputs[k]).1 > 1.0;
+    fn violated(
+        &self,
+        motion: &Motion<2>,
+        mut of: Range<usize>,
+        _: &mut Bounds,
+    ) -> Option<Range<usize>> {
+        let violates =
+            |k: usize| self.sets.squares(k, &motion.states[k], &motion.inputs[k]).1 > 1.0;
         let first = of.find(|&k| violates(k))?;
         let last = of.rev().find(|&k| violates(k)).unwrap_or(first);
         Some(first..last + 1)
@@ -401,18 +443,26 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
         let mut optimiser = Optimiser::new(layout.clone(), solver).unwrap();
         let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
         let spoilt = Spoilt { sets, computed: Cell::new(computed) };
-        let report =
-            optimiser.optimise(&spoilt, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
+        let report = optimiser.optimise(
+            &spoilt,
+            &MODERATE.start,
+            &affine,
+            Some((&previous, &[[0.0; 2]; 100])),
+        );
         assert_eq!(report.status, status);
         assert!(report.certificate.feasibility < 0.1, "{report:?}");
     }
     // With no time left, neither solver is started.
-    let solver =
-        SolverSettings { shortcuts: false, time_budget: 1e-9, ..SolverSettings::new(MAX_ITERATIONS) };
+    let solver = SolverSettings {
+        shortcuts: false,
+        time_budget: 1e-9,
+        ..SolverSettings::new(MAX_ITERATIONS)
+    };
     let mut optimiser = Optimiser::new(layout, solver).unwrap();
     let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
     let sets = Spoilt { sets, computed: Cell::new(1) };
     optimiser.begin();
-    let report = optimiser.optimise(&sets, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
+    let report =
+        optimiser.optimise(&sets, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
     assert_eq!((report.status, report.iterations), (Status::Fallback, 0));
 }

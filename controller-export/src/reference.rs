@@ -31,13 +31,21 @@ pub static PROFILES: Enumeration<Choice> = Enumeration {
     name: "ReferenceProfile",
     description: "Where the reference attitude comes from",
     items: &[
-        (Choice::Crmpc2022, "crmpc2022", "the profile of Chai 2022, section 5.1, with its jump at 25 s"),
+        (
+            Choice::Crmpc2022,
+            "crmpc2022",
+            "the profile of Chai 2022, section 5.1, with its jump at 25 s",
+        ),
         (Choice::Tvsmc2015, "tvsmc2015", "the profile of Wu 2015, section 6"),
         (Choice::TwoLoop, "twoLoop", "the step of Jia, Zhou and Zhou, section V"),
         (Choice::Constant, "constant", "reference.angle"),
         (Choice::Sine, "sine", "reference.angle plus reference.amplitude times a sine"),
         (Choice::Table, "table", "interpolated from the file reference.file"),
-        (Choice::External, "external", "the inputs reference.external, taken as constant over a preview"),
+        (
+            Choice::External,
+            "external",
+            "the inputs reference.external, taken as constant over a preview",
+        ),
     ],
 };
 
@@ -119,12 +127,12 @@ impl Source {
 /// Reads the table from the file name as given, or from the unit's resources.
 fn table(file: &str, context: &Context) -> Result<LookupTable, Failure> {
     if file.is_empty() {
-        let text =
-            "reference.profile is 'table' but reference.file is empty; set it to the path of a CSV file";
+        let text = "reference.profile is 'table' but reference.file is empty; set it to the path of a CSV file";
         return Err(Failure::Error(text.into()));
     }
     let path = Path::new(file);
-    let inside = context.resources.map(|folder| folder.join(path)).filter(|inside| inside.is_file());
+    let inside =
+        context.resources.map(|folder| folder.join(path)).filter(|inside| inside.is_file());
     let path = if path.is_file() { path.into() } else { inside.unwrap_or_else(|| path.into()) };
     let problem = |error| format!("reference.file: {}", by_variable(&error, &[]));
     LookupTable::from_csv_file(&path).map_err(|error| Failure::Error(problem(error)))

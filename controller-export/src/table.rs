@@ -4,7 +4,9 @@ use crate::law::{ControllerFmu, Law};
 use crate::reference::PROFILES;
 use control::delay;
 use fmi2_export::fields::Fields;
-use fmi2_export::table::{Common, Description, Real, Table, discrete_output, input, output, parameter};
+use fmi2_export::table::{
+    Common, Description, Real, Table, discrete_output, input, output, parameter,
+};
 use model_description::DefaultExperiment;
 use model_description::unit;
 use nalgebra::Vector3;
@@ -103,7 +105,10 @@ fn inputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
         let text = format!(
             "{meaning} moment that the actuators really give; for laws with an observer, others ignore it"
         );
-        input(&format!("achievedMoment.{axis}"), &capital(&text)).real().unit(unit::moment()).nominal(1e5)
+        input(&format!("achievedMoment.{axis}"), &capital(&text))
+            .real()
+            .unit(unit::moment())
+            .nominal(1e5)
     };
     let table = vector(table, ANGLES, angle, |m| &mut m.input.measured.angles);
     let table = vector(table, RATES, rate, |m| &mut m.input.measured.rates);
@@ -117,8 +122,11 @@ fn inputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     };
     let angles = external("external", "Reference", unit::angle());
     let rates = external("externalRate", "First derivative of the reference", unit::angular_rate());
-    let accelerations =
-        external("externalAcceleration", "Second derivative of the reference", unit::angular_acceleration());
+    let accelerations = external(
+        "externalAcceleration",
+        "Second derivative of the reference",
+        unit::angular_acceleration(),
+    );
     let table = vector(table, ANGLES, angles, |m| &mut m.input.reference.angles);
     let table = vector(table, ANGLES, rates, |m| &mut m.input.reference.rates);
     vector(table, ANGLES, accelerations, |m| &mut m.input.reference.accelerations)
@@ -131,16 +139,22 @@ fn outputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
         common.real().unit(unit::moment()).nominal(1e5)
     };
     let table = vector(table, AXES, moment, |m| &mut m.output.moment);
-    let in_force = |name: &'static str, external: &'static str, what: &'static str, unit: unit::Unit| {
-        move |axis: &str, meaning: &str| {
-            let common = output(&format!("{name}.{axis}"), &format!("{what} of the {meaning} in force"));
-            let source = format!("reference.{external}.{axis}");
-            common.depends_on([source.as_str()]).real().unit(unit.clone()).nominal(0.1)
-        }
-    };
+    let in_force =
+        |name: &'static str, external: &'static str, what: &'static str, unit: unit::Unit| {
+            move |axis: &str, meaning: &str| {
+                let common =
+                    output(&format!("{name}.{axis}"), &format!("{what} of the {meaning} in force"));
+                let source = format!("reference.{external}.{axis}");
+                common.depends_on([source.as_str()]).real().unit(unit.clone()).nominal(0.1)
+            }
+        };
     let angles = in_force("reference", "external", "Reference", unit::angle());
-    let rates =
-        in_force("referenceRate", "externalRate", "First derivative of the reference", unit::angular_rate());
+    let rates = in_force(
+        "referenceRate",
+        "externalRate",
+        "First derivative of the reference",
+        unit::angular_rate(),
+    );
     let accelerations = in_force(
         "referenceAcceleration",
         "externalAcceleration",
@@ -164,11 +178,15 @@ fn reference<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> 
     };
     let amplitude = |axis: &str, meaning: &str| {
         let text = format!("Amplitude of the {meaning} if reference.profile is 'sine'");
-        parameter(&format!("reference.amplitude.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
+        parameter(&format!("reference.amplitude.{axis}"), &text)
+            .real()
+            .unit(unit::angle())
+            .nominal(0.1)
     };
     let frequency =
         parameter("reference.frequency", "Angular frequency if reference.profile is 'sine'").real();
-    let phase = parameter("reference.phase", "Phase at t = 0 if reference.profile is 'sine'").real();
+    let phase =
+        parameter("reference.phase", "Phase at t = 0 if reference.profile is 'sine'").real();
     let table = table
         .enumeration(profile, &PROFILES, |m| &mut m.parameters.reference.profile)
         .string(file, |m| &mut m.parameters.reference.file);
@@ -187,7 +205,8 @@ fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     };
     let rate = parameter("limit.rate", "Limit on the norm of the body rates").real();
     let moment = parameter("limit.moment", "Limit on the norm of the control moment").real();
-    let saturation = parameter("saturation", "Whether the commanded moment is scaled into limit.moment");
+    let saturation =
+        parameter("saturation", "Whether the commanded moment is scaled into limit.moment");
     let delay = parameter(
         "delay",
         "Time from a tick until the moment that it leads to acts on the vehicle; the law predicts the state over it",
@@ -207,11 +226,18 @@ fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
             &mut m.parameters.inertia.Izz
         })
         .real(
-            moment_of_inertia("inertia.Ixz", "Product of inertia, which stands in the tensor as -Ixz,"),
+            moment_of_inertia(
+                "inertia.Ixz",
+                "Product of inertia, which stands in the tensor as -Ixz,",
+            ),
             |m| &mut m.parameters.inertia.Ixz,
         )
-        .real(rate.unit(unit::angular_rate()).min(1e-6).nominal(0.1), |m| &mut m.parameters.limit_rate)
-        .real(moment.unit(unit::moment()).min(1e-3).nominal(1e5), |m| &mut m.parameters.limit_moment)
+        .real(rate.unit(unit::angular_rate()).min(1e-6).nominal(0.1), |m| {
+            &mut m.parameters.limit_rate
+        })
+        .real(moment.unit(unit::moment()).min(1e-3).nominal(1e5), |m| {
+            &mut m.parameters.limit_moment
+        })
         .boolean(saturation, |m| &mut m.parameters.saturation)
         .real(delay.real().unit(unit::time()).min(0.0).max(delay::LONGEST).nominal(0.1), |m| {
             &mut m.parameters.latency.action
@@ -244,7 +270,8 @@ pub fn gains<L: Law>(
     field: impl Fn(&mut L) -> &mut [f64; 3] + Copy + Send + Sync + 'static,
 ) -> Table<ControllerFmu<L>> {
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
-        let real = parameter(&format!("{name}[{}]", i + 1), &format!("{text}: {meaning}")).real().min(0.0);
+        let real =
+            parameter(&format!("{name}[{}]", i + 1), &format!("{text}: {meaning}")).real().min(0.0);
         let real = match unit {
             Some(unit) => real.unit(unit.clone()),
             None => real,

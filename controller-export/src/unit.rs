@@ -88,8 +88,9 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
     }
 
     fn is_designed(&self, device: &Designed<L>) -> bool {
-        self.vehicle()
-            .is_ok_and(|vehicle| device.vehicle == vehicle && device.settings == self.law.settings(&vehicle))
+        self.vehicle().is_ok_and(|vehicle| {
+            device.vehicle == vehicle && device.settings == self.law.settings(&vehicle)
+        })
     }
 
     fn period(device: &Designed<L>) -> f64 {
@@ -122,9 +123,15 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
         L::warning(&before.inner, &after.inner)
     }
 
-    fn show(&mut self, time: f64, _device: &Designed<L>, (moment, memory): (Vector3<f64>, &Self::Memory)) {
+    fn show(
+        &mut self,
+        time: f64,
+        _device: &Designed<L>,
+        (moment, memory): (Vector3<f64>, &Self::Memory),
+    ) {
         self.law.show(&memory.inner);
-        self.output = Output { moment, reference: self.source.preview(time, &self.input.reference).at(time) };
+        self.output =
+            Output { moment, reference: self.source.preview(time, &self.input.reference).at(time) };
     }
 
     fn fits(device: &Designed<L>, memory: &Self::Memory) -> bool {

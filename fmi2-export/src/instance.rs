@@ -72,13 +72,21 @@ pub(crate) struct Setting {
 pub(crate) trait Typed: Scalar {
     /// Returns the result of `look` for the variable's value, or `None` if the variable has another
     /// type.
-    fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R>;
+    fn look<R>(
+        unit: &mut dyn FmuUnit,
+        reference: usize,
+        look: impl FnOnce(&Self) -> R,
+    ) -> Option<R>;
     /// Sets the variable, which must have this type.
     fn put(self, unit: &mut dyn FmuUnit, reference: usize);
 }
 
 impl Typed for f64 {
-    fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+    fn look<R>(
+        unit: &mut dyn FmuUnit,
+        reference: usize,
+        look: impl FnOnce(&Self) -> R,
+    ) -> Option<R> {
         unit.real(reference).map(|value| look(value))
     }
     fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
@@ -89,7 +97,11 @@ impl Typed for f64 {
 }
 
 impl Typed for i32 {
-    fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+    fn look<R>(
+        unit: &mut dyn FmuUnit,
+        reference: usize,
+        look: impl FnOnce(&Self) -> R,
+    ) -> Option<R> {
         unit.integer(reference).map(|value| look(&value))
     }
     fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
@@ -98,7 +110,11 @@ impl Typed for i32 {
 }
 
 impl Typed for bool {
-    fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+    fn look<R>(
+        unit: &mut dyn FmuUnit,
+        reference: usize,
+        look: impl FnOnce(&Self) -> R,
+    ) -> Option<R> {
         unit.boolean(reference).map(|value| look(value))
     }
     fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
@@ -109,7 +125,11 @@ impl Typed for bool {
 }
 
 impl Typed for String {
-    fn look<R>(unit: &mut dyn FmuUnit, reference: usize, look: impl FnOnce(&Self) -> R) -> Option<R> {
+    fn look<R>(
+        unit: &mut dyn FmuUnit,
+        reference: usize,
+        look: impl FnOnce(&Self) -> R,
+    ) -> Option<R> {
         unit.string(reference).map(|value| look(value))
     }
     fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
@@ -120,7 +140,11 @@ impl Typed for String {
 }
 
 impl Instance {
-    pub(crate) fn new(export: &Export, description: Arc<ModelDescription>, setting: Setting) -> Self {
+    pub(crate) fn new(
+        export: &Export,
+        description: Arc<ModelDescription>,
+        setting: Setting,
+    ) -> Self {
         let Setting { guid, interface, logger, resources } = setting;
         let states = description.states();
         let mut progress = Progress::default();
@@ -166,7 +190,8 @@ impl Instance {
             }
             Err(panic) => {
                 self.progress.state = State::Fatal;
-                let text = format!("{}: defect in the unit: {}", call.name, panic_text(panic.as_ref()));
+                let text =
+                    format!("{}: defect in the unit: {}", call.name, panic_text(panic.as_ref()));
                 self.logger.log(Category::Fatal, &text);
                 // Dropping the panic's payload could run code of the unit again.
                 mem::forget(panic);
@@ -304,19 +329,25 @@ impl Instance {
     /// Says why there is no field of type `T` for the value reference.
     fn misfit<T: Typed>(&self, reference: u32) -> Failure {
         match self.variable(reference) {
-            Ok(Variable { name, .. }) => {
-                Failure::Error(format!("'{name}' (value reference {reference}) is not of type {}", T::TYPE))
-            }
+            Ok(Variable { name, .. }) => Failure::Error(format!(
+                "'{name}' (value reference {reference}) is not of type {}",
+                T::TYPE
+            )),
             Err(failure) => failure,
         }
     }
 
     fn expect_type<T: Typed>(&mut self, reference: u32) -> Outcome {
-        T::look(self.unit.as_mut(), reference as usize, |_| ()).ok_or_else(|| self.misfit::<T>(reference))
+        T::look(self.unit.as_mut(), reference as usize, |_| ())
+            .ok_or_else(|| self.misfit::<T>(reference))
     }
 
     /// Gives the values of the variables to `sink`, each with its position in `references`.
-    pub(crate) fn get<T: Typed>(&mut self, references: &[u32], mut sink: impl FnMut(usize, &T)) -> Outcome {
+    pub(crate) fn get<T: Typed>(
+        &mut self,
+        references: &[u32],
+        mut sink: impl FnMut(usize, &T),
+    ) -> Outcome {
         let calculated = |&reference: &u32| {
             self.description.variables.get(reference as usize).is_some_and(Variable::is_calculated)
         };
@@ -363,18 +394,21 @@ impl Instance {
             let variable = self.variable(reference)?;
             self.settable(variable)?;
             let name = &variable.name;
-            let value = value(i).map_err(|problem| Failure::Error(format!("'{name}': {problem}")))?;
+            let value =
+                value(i).map_err(|problem| Failure::Error(format!("'{name}': {problem}")))?;
             if let Some(problem) = value.problem(&variable.kind) {
                 return error(format!("'{name}' = {value:?} {problem}; it keeps its value"));
             }
         }
         for (i, &reference) in references.iter().enumerate() {
             let value = value(i).map_err(Failure::Error)?;
-            let same = T::look(self.unit.as_mut(), reference as usize, |before| before.same(&value));
+            let same =
+                T::look(self.unit.as_mut(), reference as usize, |before| before.same(&value));
             if same != Some(true) {
                 value.put(self.unit.as_mut(), reference as usize);
                 self.stale = true;
-                if self.description.variables[reference as usize].causality == Causality::Parameter {
+                if self.description.variables[reference as usize].causality == Causality::Parameter
+                {
                     self.progress.initialized = false;
                 }
             }
@@ -389,7 +423,9 @@ impl Instance {
         let name = &variable.name;
         let state = self.progress.state;
         match variable.causality {
-            Causality::Parameter if !matches!(state, State::Instantiated | State::InitializationMode) => {
+            Causality::Parameter
+                if !matches!(state, State::Instantiated | State::InitializationMode) =>
+            {
                 error(format!(
                     "'{name}' is a fixed parameter: it can be set before and in initialization mode only"
                 ))
@@ -449,8 +485,8 @@ impl Instance {
 
     pub(crate) fn restore(&mut self, handle: *const Saved) -> Outcome {
         let position = self.find(handle)?;
-        let payload =
-            saved::unwrap(&self.guid, self.interface, &self.saved[position].0).map_err(Failure::Error)?;
+        let payload = saved::unwrap(&self.guid, self.interface, &self.saved[position].0)
+            .map_err(Failure::Error)?;
         self.progress = self.unit.restore(payload, self.interface)?;
         self.progress.extrapolations.reserve(self.description.variables.len());
         self.stale = true;
@@ -486,7 +522,9 @@ impl Instance {
             self.expect_type::<f64>(reference)?;
             let variable = self.variable(reference)?;
             let name = &variable.name;
-            if variable.causality != Causality::Input || variable.variability != Variability::Continuous {
+            if variable.causality != Causality::Input
+                || variable.variability != Variability::Continuous
+            {
                 return error(format!("'{name}' is not a continuous input"));
             }
             if order < 1 || order as usize > MAX_INPUT_DERIVATIVE_ORDER {
@@ -501,11 +539,12 @@ impl Instance {
         for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
             let reference = reference as usize;
             let all = &mut self.progress.extrapolations;
-            let position = all.iter().position(|input| input.reference == reference).unwrap_or_else(|| {
-                let derivatives = [0.0; MAX_INPUT_DERIVATIVE_ORDER];
-                all.push(Extrapolation { reference, base: 0.0, derivatives });
-                all.len() - 1
-            });
+            let position =
+                all.iter().position(|input| input.reference == reference).unwrap_or_else(|| {
+                    let derivatives = [0.0; MAX_INPUT_DERIVATIVE_ORDER];
+                    all.push(Extrapolation { reference, base: 0.0, derivatives });
+                    all.len() - 1
+                });
             all[position].derivatives[order as usize - 1] = value;
         }
         Ok(())
@@ -630,7 +669,11 @@ impl Instance {
     }
 
     pub(crate) fn event_indicators(&mut self, indicators: &mut [f64]) -> Outcome {
-        Self::expect_length("event indicators", indicators.len(), self.description.event_indicators)?;
+        Self::expect_length(
+            "event indicators",
+            indicators.len(),
+            self.description.event_indicators,
+        )?;
         self.refresh()?;
         self.unit.event_indicators(indicators);
         Ok(())
@@ -661,7 +704,10 @@ impl Instance {
             self.expect_type::<f64>(reference)?;
             let variable = self.variable(reference)?;
             if !variable.is_calculated() {
-                return error(format!("'{}' is set from outside, so it has no derivative", variable.name));
+                return error(format!(
+                    "'{}' is set from outside, so it has no derivative",
+                    variable.name
+                ));
             }
         }
         for &reference in knowns {
@@ -677,7 +723,8 @@ impl Instance {
             *sum = 0.0;
             for (&known, seed) in knowns.iter().zip(seed) {
                 let time = self.progress.time;
-                *sum += self.unit.partial_derivative(time, unknown as usize, known as usize)? * seed;
+                *sum +=
+                    self.unit.partial_derivative(time, unknown as usize, known as usize)? * seed;
             }
         }
         Ok(())

@@ -3,7 +3,13 @@
 //! [`export_fmus!`](crate::export_fmus) makes an exported function of the same name from each of
 //! them. They are `unsafe` like any C function, because a pointer that is neither null nor as the
 //! standard demands cannot be recognized.
-#![allow(unsafe_code, non_snake_case, clippy::missing_safety_doc, clippy::too_many_arguments, missing_docs)]
+#![allow(
+    unsafe_code,
+    non_snake_case,
+    clippy::missing_safety_doc,
+    clippy::too_many_arguments,
+    missing_docs
+)]
 #![allow(clippy::not_unsafe_ptr_arg_deref)]
 
 use crate::call::{Call, table};
@@ -39,7 +45,9 @@ struct Busy<'a>(&'a AtomicBool);
 impl<'a> Busy<'a> {
     /// Claims the instance, or returns `None` if a call is under way.
     fn begin(busy: &'a AtomicBool) -> Option<Self> {
-        busy.compare_exchange(false, true, Ordering::Acquire, Ordering::Relaxed).is_ok().then(|| Self(busy))
+        busy.compare_exchange(false, true, Ordering::Acquire, Ordering::Relaxed)
+            .is_ok()
+            .then(|| Self(busy))
     }
 }
 
@@ -53,10 +61,16 @@ impl Drop for Busy<'_> {
 /// of an instance that another call is using must not be touched, so both are refused without a
 /// message. The caller promises that `component` is null or came from [`fmi2Instantiate`] and was
 /// not freed.
-unsafe fn run(component: Component, call: &Call, body: impl FnOnce(&mut Instance) -> Outcome) -> Status {
+unsafe fn run(
+    component: Component,
+    call: &Call,
+    body: impl FnOnce(&mut Instance) -> Outcome,
+) -> Status {
     // SAFETY: if not null, `component` came from fmi2Instantiate, which leaked a `Box<Shared>`, and
     // was not freed. Only a shared reference is made, so other calls may hold one too.
-    let Some(shared) = (unsafe { component.cast::<Shared>().as_ref() }) else { return Status::Error };
+    let Some(shared) = (unsafe { component.cast::<Shared>().as_ref() }) else {
+        return Status::Error;
+    };
     let Some(_busy) = Busy::begin(&shared.busy) else { return Status::Error };
     // SAFETY: `_busy` holds the flag, so no other call has a reference to the instance. The flag is
     // cleared when `_busy` is dropped, after the last use of this reference.
@@ -127,7 +141,8 @@ unsafe fn text<'a>(name: &str, pointer: *const c_char) -> Result<&'a str, String
 /// fails.
 pub fn fmu_model_descriptions(exports: &[Export]) -> *mut c_char {
     let json = || {
-        let descriptions: Vec<_> = exports.iter().map(|export| &*export.described().description).collect();
+        let descriptions: Vec<_> =
+            exports.iter().map(|export| &*export.described().description).collect();
         CString::new(serde_json::to_vec(&descriptions).ok()?).ok()
     };
     catch_unwind(AssertUnwindSafe(json)).ok().flatten().map_or(null_mut(), CString::into_raw)
@@ -175,15 +190,18 @@ pub unsafe fn fmi2Instantiate(
         let interface = Interface::from_c(fmu_type).ok_or_else(|| {
             format!("fmuType {fmu_type} is neither 0 (model exchange) nor 1 (co-simulation)")
         })?;
-        let export = exports.iter().find(|export| export.described().guid == guid).ok_or_else(|| {
-            let list: Vec<_> = exports.iter().map(Export::described).collect();
-            let list: Vec<_> =
-                list.iter().map(|unit| format!("{} {}", unit.description.name, unit.guid)).collect();
-            format!(
-                "no unit with GUID '{guid}' in this library, which holds {}: pack it again",
-                list.join(", ")
-            )
-        })?;
+        let export =
+            exports.iter().find(|export| export.described().guid == guid).ok_or_else(|| {
+                let list: Vec<_> = exports.iter().map(Export::described).collect();
+                let list: Vec<_> = list
+                    .iter()
+                    .map(|unit| format!("{} {}", unit.description.name, unit.guid))
+                    .collect();
+                format!(
+                    "no unit with GUID '{guid}' in this library, which holds {}: pack it again",
+                    list.join(", ")
+                )
+            })?;
         let Described { guid, description } = export.described();
         let (guid, description) = (guid.clone(), description.clone());
         if interface == Interface::ModelExchange && !description.model_exchange {
@@ -240,8 +258,10 @@ pub unsafe fn fmi2SetDebugLogging(
         // SAFETY: the importer vouches for the array, as `slice` requires.
         let categories = unsafe { slice("categories", categories, n_categories) }?;
         // SAFETY: the standard demands NUL-terminated texts, and `text` refuses null.
-        let names =
-            categories.iter().map(|&name| unsafe { text("categories", name) }).collect::<Result<Vec<_>, _>>();
+        let names = categories
+            .iter()
+            .map(|&name| unsafe { text("categories", name) })
+            .collect::<Result<Vec<_>, _>>();
         let names = names.map_err(Failure::Error)?;
         if let Some(unknown) = instance.logger().choose(logging_on != 0, &names) {
             instance.warn(&format!("fmi2SetDebugLogging: there is no log category '{unknown}'"));
@@ -301,7 +321,12 @@ pub unsafe fn fmi2Reset(component: Component) -> Status {
 
 // Getting and setting
 
-pub unsafe fn fmi2GetReal(component: Component, vr: *const u32, n: usize, value: *mut f64) -> Status {
+pub unsafe fn fmi2GetReal(
+    component: Component,
+    vr: *const u32,
+    n: usize,
+    value: *mut f64,
+) -> Status {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for both arrays, as `slice` and `room` require.
         let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
@@ -311,7 +336,12 @@ pub unsafe fn fmi2GetReal(component: Component, vr: *const u32, n: usize, value:
     unsafe { run(component, &table::GET_REAL, body) }
 }
 
-pub unsafe fn fmi2GetInteger(component: Component, vr: *const u32, n: usize, value: *mut c_int) -> Status {
+pub unsafe fn fmi2GetInteger(
+    component: Component,
+    vr: *const u32,
+    n: usize,
+    value: *mut c_int,
+) -> Status {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for both arrays, as `slice` and `room` require.
         let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
@@ -321,7 +351,12 @@ pub unsafe fn fmi2GetInteger(component: Component, vr: *const u32, n: usize, val
     unsafe { run(component, &table::GET_INTEGER, body) }
 }
 
-pub unsafe fn fmi2GetBoolean(component: Component, vr: *const u32, n: usize, value: *mut c_int) -> Status {
+pub unsafe fn fmi2GetBoolean(
+    component: Component,
+    vr: *const u32,
+    n: usize,
+    value: *mut c_int,
+) -> Status {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for both arrays, as `slice` and `room` require.
         let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
@@ -350,7 +385,12 @@ pub unsafe fn fmi2GetString(
     unsafe { run(component, &table::GET_STRING, body) }
 }
 
-pub unsafe fn fmi2SetReal(component: Component, vr: *const u32, n: usize, value: *const f64) -> Status {
+pub unsafe fn fmi2SetReal(
+    component: Component,
+    vr: *const u32,
+    n: usize,
+    value: *const f64,
+) -> Status {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
@@ -360,7 +400,12 @@ pub unsafe fn fmi2SetReal(component: Component, vr: *const u32, n: usize, value:
     unsafe { run(component, &table::SET_REAL, body) }
 }
 
-pub unsafe fn fmi2SetInteger(component: Component, vr: *const u32, n: usize, value: *const c_int) -> Status {
+pub unsafe fn fmi2SetInteger(
+    component: Component,
+    vr: *const u32,
+    n: usize,
+    value: *const c_int,
+) -> Status {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
@@ -370,7 +415,12 @@ pub unsafe fn fmi2SetInteger(component: Component, vr: *const u32, n: usize, val
     unsafe { run(component, &table::SET_INTEGER, body) }
 }
 
-pub unsafe fn fmi2SetBoolean(component: Component, vr: *const u32, n: usize, value: *const c_int) -> Status {
+pub unsafe fn fmi2SetBoolean(
+    component: Component,
+    vr: *const u32,
+    n: usize,
+    value: *const c_int,
+) -> Status {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
@@ -409,7 +459,8 @@ pub unsafe fn fmi2GetFMUstate(component: Component, state: *mut *mut c_void) -> 
         // SAFETY: `check_room` refused null, and the standard demands that `*state` is initialized,
         // with null or a handle.
         let present = unsafe { state.read() };
-        let handle = instance.save((!present.is_null()).then(|| present.cast::<Saved>().cast_const()))?;
+        let handle =
+            instance.save((!present.is_null()).then(|| present.cast::<Saved>().cast_const()))?;
         // SAFETY: the importer vouches for the result pointer, as `put` requires.
         unsafe { put("FMUstate", state, handle.cast_mut().cast()) }
     };
@@ -471,7 +522,8 @@ pub unsafe fn fmi2SerializeFMUstate(
             return error(format!("room for {size} bytes, but the state has {}", bytes.len()));
         }
         // SAFETY: the importer vouches for the array, as `room` requires.
-        unsafe { room("serializedState", serialized.cast::<u8>(), bytes.len()) }?.copy_from_slice(bytes);
+        unsafe { room("serializedState", serialized.cast::<u8>(), bytes.len()) }?
+            .copy_from_slice(bytes);
         Ok(())
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
@@ -488,8 +540,8 @@ pub unsafe fn fmi2DeSerializeFMUstate(
     let body = |instance: &mut Instance| {
         check_room::<*mut c_void>("FMUstate", state.is_null(), 1)?;
         // SAFETY: the importer vouches for the array, as `slice` requires.
-        let handle =
-            instance.deserialize(unsafe { slice("serializedState", serialized.cast::<u8>(), size) }?)?;
+        let handle = instance
+            .deserialize(unsafe { slice("serializedState", serialized.cast::<u8>(), size) }?)?;
         // SAFETY: the importer vouches for the result pointer, as `put` requires.
         unsafe { put("FMUstate", state, handle.cast_mut().cast()) }
     };
@@ -584,20 +636,26 @@ pub unsafe fn fmi2SetTime(component: Component, time: f64) -> Status {
 
 pub unsafe fn fmi2SetContinuousStates(component: Component, x: *const f64, nx: usize) -> Status {
     // SAFETY: the importer vouches for the array, as `slice` requires.
-    let body = |instance: &mut Instance| instance.set_continuous_states(unsafe { slice("x", x, nx) }?);
+    let body =
+        |instance: &mut Instance| instance.set_continuous_states(unsafe { slice("x", x, nx) }?);
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SET_CONTINUOUS_STATES, body) }
 }
 
 pub unsafe fn fmi2GetDerivatives(component: Component, derivatives: *mut f64, nx: usize) -> Status {
     // SAFETY: the importer vouches for the array, as `room` requires.
-    let body =
-        |instance: &mut Instance| instance.derivatives(unsafe { room("derivatives", derivatives, nx) }?);
+    let body = |instance: &mut Instance| {
+        instance.derivatives(unsafe { room("derivatives", derivatives, nx) }?)
+    };
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_DERIVATIVES, body) }
 }
 
-pub unsafe fn fmi2GetEventIndicators(component: Component, indicators: *mut f64, ni: usize) -> Status {
+pub unsafe fn fmi2GetEventIndicators(
+    component: Component,
+    indicators: *mut f64,
+    ni: usize,
+) -> Status {
     let body =
         // SAFETY: the importer vouches for the array, as `room` requires.
         |instance: &mut Instance| instance.event_indicators(unsafe { room("eventIndicators", indicators, ni) }?);
@@ -618,7 +676,8 @@ pub unsafe fn fmi2GetNominalsOfContinuousStates(
     nx: usize,
 ) -> Status {
     // SAFETY: the importer vouches for the array, as `room` requires.
-    let body = |instance: &mut Instance| instance.nominals(unsafe { room("x_nominal", nominals, nx) }?);
+    let body =
+        |instance: &mut Instance| instance.nominals(unsafe { room("x_nominal", nominals, nx) }?);
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_NOMINALS, body) }
 }
@@ -659,7 +718,12 @@ pub unsafe fn fmi2GetRealOutputDerivatives(
     unsafe { run(component, &table::GET_OUTPUT_DERIVATIVES, body) }
 }
 
-pub unsafe fn fmi2DoStep(component: Component, point: f64, size: f64, _no_set_state_prior: c_int) -> Status {
+pub unsafe fn fmi2DoStep(
+    component: Component,
+    point: f64,
+    size: f64,
+    _no_set_state_prior: c_int,
+) -> Status {
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::DO_STEP, |instance| instance.do_step(point, size)) }
 }
@@ -693,7 +757,11 @@ pub unsafe fn fmi2GetRealStatus(component: Component, kind: c_int, value: *mut f
     unsafe { run(component, &table::GET_REAL_STATUS, body) }
 }
 
-pub unsafe fn fmi2GetIntegerStatus(component: Component, kind: c_int, _value: *mut c_int) -> Status {
+pub unsafe fn fmi2GetIntegerStatus(
+    component: Component,
+    kind: c_int,
+    _value: *mut c_int,
+) -> Status {
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_INTEGER_STATUS, |_| no_status(kind)) }
 }
@@ -708,7 +776,11 @@ pub unsafe fn fmi2GetBooleanStatus(component: Component, kind: c_int, value: *mu
     unsafe { run(component, &table::GET_BOOLEAN_STATUS, body) }
 }
 
-pub unsafe fn fmi2GetStringStatus(component: Component, kind: c_int, value: *mut *const c_char) -> Status {
+pub unsafe fn fmi2GetStringStatus(
+    component: Component,
+    kind: c_int,
+    value: *mut *const c_char,
+) -> Status {
     let body = |_: &mut Instance| match kind {
         // SAFETY: the importer vouches for the result pointer, as `put` requires.
         PENDING_STATUS => unsafe { put("value", value, c"no step is pending".as_ptr()) },

@@ -61,7 +61,8 @@ impl Logger {
     pub(crate) fn new(callbacks: Option<&Callbacks>, instance: CString, on: bool) -> Self {
         Self {
             callback: callbacks.and_then(|callbacks| callbacks.logger),
-            environment: callbacks.map_or(std::ptr::null_mut(), |callbacks| callbacks.component_environment),
+            environment: callbacks
+                .map_or(std::ptr::null_mut(), |callbacks| callbacks.component_environment),
             instance,
             active: if on { EVERYTHING } else { ALWAYS },
         }

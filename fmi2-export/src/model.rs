@@ -139,7 +139,12 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     ///
     /// # Errors
     /// Names a pair of variables that has no derivative.
-    fn partial_derivative(&mut self, _time: f64, _unknown: usize, _known: usize) -> Result<f64, Failure> {
+    fn partial_derivative(
+        &mut self,
+        _time: f64,
+        _unknown: usize,
+        _known: usize,
+    ) -> Result<f64, Failure> {
         Err(Failure::Error("this unit offers no directional derivatives".into()))
     }
 }

@@ -14,7 +14,9 @@ use std::path::PathBuf;
 pub(crate) fn folder(uri: &str) -> Result<PathBuf, String> {
     let Some(rest) = strip_scheme(uri) else {
         return match uri.split_once("://") {
-            Some((scheme, _)) => Err(format!("resource location '{uri}' has scheme '{scheme}', not 'file'")),
+            Some((scheme, _)) => {
+                Err(format!("resource location '{uri}' has scheme '{scheme}', not 'file'"))
+            }
             None => Ok(PathBuf::from(uri)),
         };
     };
@@ -28,9 +30,9 @@ pub(crate) fn folder(uri: &str) -> Result<PathBuf, String> {
     };
     let relative = !rest.starts_with('/');
     let path = path.trim_matches('/');
-    let path = percent_decode_str(path)
-        .decode_utf8()
-        .map_err(|_| format!("resource location '{uri}' is not UTF-8 once its percent encoding is undone"))?;
+    let path = percent_decode_str(path).decode_utf8().map_err(|_| {
+        format!("resource location '{uri}' is not UTF-8 once its percent encoding is undone")
+    })?;
     let drive = path.as_bytes().get(1) == Some(&b':');
     Ok(PathBuf::from(if drive || relative { path.into_owned() } else { format!("/{path}") }))
 }
@@ -62,11 +64,16 @@ mod tests {
     #[test]
     fn percent_encoding_is_undone() {
         let expected = Path::new("/tmp/ein Raum/Größe/100%");
-        for uri in ["file:///tmp/ein%20Raum/Gr%C3%B6%c3%9fe/100%25/", "file:///tmp/ein%20Raum/Größe/100%25"]
-        {
+        for uri in [
+            "file:///tmp/ein%20Raum/Gr%C3%B6%c3%9fe/100%25/",
+            "file:///tmp/ein%20Raum/Größe/100%25",
+        ] {
             assert_eq!(folder(uri).as_deref(), Ok(expected), "{uri}");
         }
-        assert_eq!(folder("file:///C:/fmu/resources").as_deref(), Ok(Path::new("C:/fmu/resources")));
+        assert_eq!(
+            folder("file:///C:/fmu/resources").as_deref(),
+            Ok(Path::new("C:/fmu/resources"))
+        );
     }
 
     #[test]

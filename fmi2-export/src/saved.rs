@@ -37,9 +37,16 @@ pub(crate) fn wrap(guid: &str, interface: Interface, payload: &[u8]) -> Box<[u8]
 ///
 /// # Errors
 /// Says why the bytes are not a state of this unit.
-pub(crate) fn unwrap<'a>(guid: &str, interface: Interface, bytes: &'a [u8]) -> Result<&'a [u8], String> {
+pub(crate) fn unwrap<'a>(
+    guid: &str,
+    interface: Interface,
+    bytes: &'a [u8],
+) -> Result<&'a [u8], String> {
     let Some((header, payload)) = bytes.split_at_checked(HEADER) else {
-        return Err(format!("the saved state is truncated: {} bytes, fewer than its header", bytes.len()));
+        return Err(format!(
+            "the saved state is truncated: {} bytes, fewer than its header",
+            bytes.len()
+        ));
     };
     let (magic, header) = header.split_at(MAGIC.len());
     let (version, header) = header.split_at(4);
@@ -54,10 +61,14 @@ pub(crate) fn unwrap<'a>(guid: &str, interface: Interface, bytes: &'a [u8]) -> R
     }
     if owner != guid.as_bytes() {
         let owner = String::from_utf8_lossy(owner);
-        return Err(format!("the saved state belongs to a unit with GUID {owner}, this one has {guid}"));
+        return Err(format!(
+            "the saved state belongs to a unit with GUID {owner}, this one has {guid}"
+        ));
     }
     if kind != [interface as u8] {
-        return Err("the saved state is of the other interface (co-simulation or model exchange)".into());
+        return Err(
+            "the saved state is of the other interface (co-simulation or model exchange)".into()
+        );
     }
     if length != (payload.len() as u64).to_le_bytes() {
         return Err(format!("the saved state is truncated or too long: {} bytes", bytes.len()));

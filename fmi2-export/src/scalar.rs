@@ -27,15 +27,20 @@ impl Scalar for f64 {
         self.to_bits() == other.to_bits()
     }
     fn unpresentable(&self, _kind: &Kind) -> Option<&'static str> {
-        (!self.is_finite()).then_some("is not a finite number; an input or a parameter is too large")
+        (!self.is_finite())
+            .then_some("is not a finite number; an input or a parameter is too large")
     }
     fn problem(&self, kind: &Kind) -> Option<String> {
         if !self.is_finite() {
             return Some("is not a finite number".into());
         }
         match kind {
-            Kind::Real { min: Some(min), .. } if self < min => Some(format!("is below the minimum {min}")),
-            Kind::Real { max: Some(max), .. } if self > max => Some(format!("is above the maximum {max}")),
+            Kind::Real { min: Some(min), .. } if self < min => {
+                Some(format!("is below the minimum {min}"))
+            }
+            Kind::Real { max: Some(max), .. } if self > max => {
+                Some(format!("is above the maximum {max}"))
+            }
             _ => None,
         }
     }
@@ -50,8 +55,12 @@ impl Scalar for i32 {
     }
     fn problem(&self, kind: &Kind) -> Option<String> {
         match kind {
-            Kind::Integer { min: Some(min), .. } if self < min => Some(format!("is below the minimum {min}")),
-            Kind::Integer { max: Some(max), .. } if self > max => Some(format!("is above the maximum {max}")),
+            Kind::Integer { min: Some(min), .. } if self < min => {
+                Some(format!("is below the minimum {min}"))
+            }
+            Kind::Integer { max: Some(max), .. } if self > max => {
+                Some(format!("is above the maximum {max}"))
+            }
             Kind::Enumeration { of, .. } if *self < 1 || *self as usize > of.items.len() => {
                 Some(format!("is not an item of {}: these are 1 to {}", of.name, of.items.len()))
             }

@@ -45,7 +45,8 @@ impl<T: PartialEq> Enumeration<T> {
     }
 
     fn described(&self) -> EnumerationType {
-        let items = self.items.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect();
+        let items =
+            self.items.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect();
         EnumerationType { name: self.name.into(), description: self.description.into(), items }
     }
 }
@@ -183,7 +184,11 @@ impl<M: 'static> Table<M> {
                 }
             }),
         };
-        self.push(common, Kind::Enumeration { of: of.described(), start: None }, Access::Integer(access));
+        self.push(
+            common,
+            Kind::Enumeration { of: of.described(), start: None },
+            Access::Integer(access),
+        );
         self
     }
 

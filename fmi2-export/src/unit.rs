@@ -68,12 +68,15 @@ impl Progress {
         }
         let possible = match interface {
             Interface::ModelExchange => !matches!(state, State::StepComplete | State::StepFailed),
-            Interface::CoSimulation => !matches!(state, State::EventMode | State::ContinuousTimeMode),
+            Interface::CoSimulation => {
+                !matches!(state, State::EventMode | State::ContinuousTimeMode)
+            }
         };
         if *state == State::Fatal || !possible {
             return Some(format!("a unit cannot go on in state {}", state.name()));
         }
-        let running = matches!(state, State::EventMode | State::ContinuousTimeMode | State::StepComplete);
+        let running =
+            matches!(state, State::EventMode | State::ContinuousTimeMode | State::StepComplete);
         if running && !initialized {
             return Some("it runs but was not initialized".into());
         }
@@ -85,7 +88,9 @@ impl Progress {
                     && *causality == Causality::Input
                     && *variability == Variability::Continuous
             });
-            right && input.base.is_finite() && input.derivatives.iter().all(|value| value.is_finite())
+            right
+                && input.base.is_finite()
+                && input.derivatives.iter().all(|value| value.is_finite())
         };
         if extrapolations.len() > table.entries.len() || !extrapolations.iter().all(continuous) {
             return Some("it holds derivatives of what is not a continuous input".into());
@@ -124,7 +129,12 @@ pub(crate) trait FmuUnit: Send {
     fn set_continuous_states(&mut self, states: &[f64]);
     fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure>;
     fn event_indicators(&self, indicators: &mut [f64]);
-    fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure>;
+    fn partial_derivative(
+        &mut self,
+        time: f64,
+        unknown: usize,
+        known: usize,
+    ) -> Result<f64, Failure>;
 }
 
 struct Bound<M> {
@@ -165,7 +175,9 @@ impl<M: Model> FmuUnit for Bound<M> {
     }
 
     fn set_integer(&mut self, reference: usize, value: i32) {
-        if let Some(Access::Integer(field)) = self.table.entries.get(reference).map(|entry| &entry.access) {
+        if let Some(Access::Integer(field)) =
+            self.table.entries.get(reference).map(|entry| &entry.access)
+        {
             (field.set)(&mut self.model, value);
         }
     }
@@ -215,7 +227,8 @@ impl<M: Model> FmuUnit for Bound<M> {
     }
 
     fn restore(&mut self, payload: &[u8], interface: Interface) -> Result<Progress, Failure> {
-        let unfit = |problem: String| Failure::Error(format!("the saved state does not fit: {problem}"));
+        let unfit =
+            |problem: String| Failure::Error(format!("the saved state does not fit: {problem}"));
         let ((progress, mut model), rest): ((Progress, M), _) =
             postcard::take_from_bytes(payload).map_err(|error| unfit(error.to_string()))?;
         if let Some(problem) = progress.problem(&self.table, interface) {
@@ -234,7 +247,13 @@ impl<M: Model> FmuUnit for Bound<M> {
         }
         let Progress { time, start_time, state, initialized, .. } = progress;
         let failed = matches!(state, State::StepFailed | State::Error | State::Terminated);
-        model.restored(Restoration { before: &mut self.model, time, start_time, initialized, failed })?;
+        model.restored(Restoration {
+            before: &mut self.model,
+            time,
+            start_time,
+            initialized,
+            failed,
+        })?;
         self.model = model;
         Ok(progress)
     }
@@ -255,7 +274,12 @@ impl<M: Model> FmuUnit for Bound<M> {
         self.model.event_indicators(indicators);
     }
 
-    fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure> {
+    fn partial_derivative(
+        &mut self,
+        time: f64,
+        unknown: usize,
+        known: usize,
+    ) -> Result<f64, Failure> {
         self.model.partial_derivative(time, unknown, known)
     }
 }
@@ -311,13 +335,24 @@ pub fn describe<M: Model>() -> ModelDescription {
         let mut variable = entry.variable;
         if !variable.is_calculated() {
             match (&mut variable.kind, &entry.access) {
-                (Kind::Real { start, .. }, Access::Real(field)) => *start = Some(*field(&mut model)),
-                (Kind::Integer { start, .. } | Kind::Enumeration { start, .. }, Access::Integer(field)) => {
+                (Kind::Real { start, .. }, Access::Real(field)) => {
+                    *start = Some(*field(&mut model))
+                }
+                (
+                    Kind::Integer { start, .. } | Kind::Enumeration { start, .. },
+                    Access::Integer(field),
+                ) => {
                     *start = Some((field.get)(&mut model));
                 }
-                (Kind::Boolean { start }, Access::Boolean(field)) => *start = Some(*field(&mut model)),
-                (Kind::String { start }, Access::String(field)) => *start = Some(field(&mut model).clone()),
-                _ => unreachable!("Table::push is called with a kind and a field of the same type only"),
+                (Kind::Boolean { start }, Access::Boolean(field)) => {
+                    *start = Some(*field(&mut model))
+                }
+                (Kind::String { start }, Access::String(field)) => {
+                    *start = Some(field(&mut model).clone())
+                }
+                _ => unreachable!(
+                    "Table::push is called with a kind and a field of the same type only"
+                ),
             }
         }
         variables.push(variable);

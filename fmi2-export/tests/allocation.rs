@@ -56,7 +56,10 @@ fn a_step_allocates_nothing() {
             assert_eq!(fmi2::fmi2SetReal(c, &9, 1, &f64::from(k)), Status::Ok);
             assert_eq!(fmi2::fmi2SetRealInputDerivatives(c, &9, 1, &1, &0.5), Status::Ok);
             assert_eq!(fmi2::fmi2DoStep(c, f64::from(k) * 0.1, 0.1, 1), Status::Ok);
-            assert_eq!(fmi2::fmi2GetReal(c, references.as_ptr(), 4, values.as_mut_ptr()), Status::Ok);
+            assert_eq!(
+                fmi2::fmi2GetReal(c, references.as_ptr(), 4, values.as_mut_ptr()),
+                Status::Ok
+            );
         }
         assert_eq!(COUNT.get(), before);
         // A reset allocates, which shows that the counter works.

@@ -1,6 +1,8 @@
 //! `ControlAllocator` divides the commanded moment among surfaces and jets.
 
-use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Report, Settings, Status};
+use control::allocation::{
+    Allocator, Command, JetCommand, Memory, Method, Report, Settings, Status,
+};
 use controller_export::sampled::{SampledFmu, SampledUnit, Ticks};
 use controller_export::table::AXES;
 use fmi2_export::fields::{Fields, by_variable};
@@ -17,7 +19,11 @@ static METHODS: Enumeration<Method> = Enumeration {
     name: "AllocationMethod",
     description: "How the moment is divided",
     items: &[
-        (Method::Optimal, "optimal", "least moment error and use of the jets, over all effectors together"),
+        (
+            Method::Optimal,
+            "optimal",
+            "least moment error and use of the jets, over all effectors together",
+        ),
         (
             Method::Blending,
             "blending",
@@ -131,7 +137,9 @@ impl SampledUnit for AllocatorUnit {
 
     fn evaluate(&self, allocator: &mut Allocator, ticks: &mut Ticks<Self>) -> Result<(), Failure> {
         let command = self.command;
-        if !(command.moment.iter().all(|value| value.is_finite()) && command.dynamic_pressure.is_finite()) {
+        if !(command.moment.iter().all(|value| value.is_finite())
+            && command.dynamic_pressure.is_finite())
+        {
             return Err(Failure::Error("moment or dynamicPressure is not a finite number".into()));
         }
         ticks.evaluate_with(command, |memory, tick| allocator.update(memory, tick, &command));
@@ -139,8 +147,9 @@ impl SampledUnit for AllocatorUnit {
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
-        (after.report.fallbacks > before.report.fallbacks)
-            .then_some("the optimisation did not succeed: the previous allocation is kept (solver.fallbacks)")
+        (after.report.fallbacks > before.report.fallbacks).then_some(
+            "the optimisation did not succeed: the previous allocation is kept (solver.fallbacks)",
+        )
     }
 
     fn show(&mut self, _time: f64, _allocator: &Allocator, ((), memory): ((), &Memory)) {
@@ -171,11 +180,14 @@ const INPUTS: [&str; 4] = ["moment.x", "moment.y", "moment.z", "dynamicPressure"
 fn inputs(mut table: Variables) -> Variables {
     for (i, (axis, meaning)) in AXES.into_iter().enumerate() {
         let common = input(&format!("moment.{axis}"), &format!("Commanded {meaning} moment"));
-        table =
-            table.real(common.real().unit(unit::moment()).nominal(1e5), move |m| &mut m.command.moment[i]);
+        table = table.real(common.real().unit(unit::moment()).nominal(1e5), move |m| {
+            &mut m.command.moment[i]
+        });
     }
-    let pressure =
-        input("dynamicPressure", "Dynamic pressure, which the surfaces' moments are proportional to");
+    let pressure = input(
+        "dynamicPressure",
+        "Dynamic pressure, which the surfaces' moments are proportional to",
+    );
     table.real(pressure.real().unit(unit::pressure()).min(0.0).nominal(1e3), |m| {
         &mut m.command.dynamic_pressure
     })
@@ -188,8 +200,9 @@ fn sampled(name: &str, text: &str) -> Common {
 fn outputs(mut table: Variables) -> Variables {
     for (i, name) in Effectors::published().names.iter().enumerate() {
         let common = sampled(&format!("surface[{}]", i + 1), &format!("Deflection of the {name}"));
-        table =
-            table.real(common.real().unit(unit::angle()).nominal(0.1), move |m| &mut m.output.surfaces[i]);
+        table = table.real(common.real().unit(unit::angle()).nominal(0.1), move |m| {
+            &mut m.output.surfaces[i]
+        });
     }
     for i in 0..JETS {
         let text = format!("Command to jet {}: on (1) or off (0), or the duty cycle", i + 1);
@@ -213,16 +226,21 @@ fn outputs(mut table: Variables) -> Variables {
         "moment that the last allocation leaves: commanded minus achieved, before modulation",
         |m| &mut m.output.residual,
     );
-    let table = moment(table, "modulatedMoment", "moment of surface and jet commands as they are now", |m| {
-        &mut m.output.modulated
-    });
-    let table = moment(table, "momentBySurfaces", "moment of the surfaces of the last allocation", |m| {
-        &mut m.output.by_surfaces
-    });
+    let table = moment(
+        table,
+        "modulatedMoment",
+        "moment of surface and jet commands as they are now",
+        |m| &mut m.output.modulated,
+    );
+    let table =
+        moment(table, "momentBySurfaces", "moment of the surfaces of the last allocation", |m| {
+            &mut m.output.by_surfaces
+        });
     let status = sampled("solver.status", "How the allocation in force came about");
     let iterations = sampled("solver.iterations", "Iterations of the last allocation");
     let fallbacks = sampled("solver.fallbacks", "Allocations so far that did not succeed");
-    let time = sampled("solver.time", "Wall-clock time of the last allocation; differs from run to run");
+    let time =
+        sampled("solver.time", "Wall-clock time of the last allocation; differs from run to run");
     table
         .enumeration(status, &STATUSES, |m| &mut m.output.report.status)
         .integer(iterations, (None, None), |m| &mut m.output.report.iterations)
@@ -240,7 +258,8 @@ fn moment(
         let mut meaning = meaning.to_string();
         meaning[..1].make_ascii_uppercase();
         let common = sampled(&format!("{name}.{axis}"), &format!("{meaning} {text}"));
-        table = table.real(common.real().unit(unit::moment()).nominal(1e5), move |m| &mut field(m)[i]);
+        table =
+            table.real(common.real().unit(unit::moment()).nominal(1e5), move |m| &mut field(m)[i]);
     }
     table
 }
@@ -248,15 +267,24 @@ fn moment(
 fn schedule(table: Variables) -> Variables {
     let method = parameter("method", "How the moment is divided among the effectors");
     let jets = parameter("jets", "What goes to the jets");
-    let period = parameter("period", "Time between allocations; with 'pwpf' a whole multiple of pwpf.period");
-    let threshold =
-        parameter("threshold.dynamicPressure", "Dynamic pressure from which 'blending' uses the surfaces");
+    let period = parameter(
+        "period",
+        "Time between allocations; with 'pwpf' a whole multiple of pwpf.period",
+    );
+    let threshold = parameter(
+        "threshold.dynamicPressure",
+        "Dynamic pressure from which 'blending' uses the surfaces",
+    );
     let iterations = parameter("solver.maxIterations", "Iteration limit of the cone solver");
     let mut table = table
         .enumeration(method, &METHODS, |m| &mut m.settings.method)
         .enumeration(jets, &JET_COMMANDS, |m| &mut m.settings.jets)
-        .real(period.real().unit(unit::time()).min(1e-4).max(10.0).nominal(0.01), |m| &mut m.settings.period)
-        .real(threshold.real().unit(unit::pressure()).min(0.0).nominal(1e3), |m| &mut m.settings.threshold)
+        .real(period.real().unit(unit::time()).min(1e-4).max(10.0).nominal(0.01), |m| {
+            &mut m.settings.period
+        })
+        .real(threshold.real().unit(unit::pressure()).min(0.0).nominal(1e3), |m| {
+            &mut m.settings.threshold
+        })
         .integer(iterations, (Some(1), Some(1000)), |m| &mut m.settings.max_iterations);
     for (i, (_, meaning)) in AXES.into_iter().enumerate() {
         let text = format!("W1: weight on the {meaning} moment that is left, 1/(N m)");
@@ -276,7 +304,8 @@ fn schedule(table: Variables) -> Variables {
 fn effectors(mut table: Variables) -> Variables {
     let names = Effectors::published().names;
     let limit = |name: &str, i: usize, text: &str| {
-        parameter(&format!("limit.{name}[{}]", i + 1), &format!("{text} of the {}", names[i])).real()
+        parameter(&format!("limit.{name}[{}]", i + 1), &format!("{text} of the {}", names[i]))
+            .real()
     };
     for i in 0..SURFACES {
         let declaration =
@@ -298,7 +327,8 @@ fn effectors(mut table: Variables) -> Variables {
         let common = parameter(&format!("surfaceAllowed[{}]", i + 1), &text);
         table = table.boolean(common, move |m| &mut m.settings.effectors.allowed[i]);
     }
-    let pressure = parameter("dynamicPressure.reference", "Dynamic pressure that surfaceMoment belongs to");
+    let pressure =
+        parameter("dynamicPressure.reference", "Dynamic pressure that surfaceMoment belongs to");
     table = table.real(pressure.real().unit(unit::pressure()).min(0.0).nominal(1e3), |m| {
         &mut m.settings.effectors.reference_pressure
     });
@@ -306,9 +336,10 @@ fn effectors(mut table: Variables) -> Variables {
         for (j, name) in names.iter().enumerate() {
             let text = format!("D_A: {meaning} moment by deflection of the {name}");
             let common = parameter(&format!("surfaceMoment[{},{}]", i + 1, j + 1), &text);
-            table = table.real(common.real().unit(unit::moment_by_angle()).nominal(1e5), move |m| {
-                &mut m.settings.effectors.effectiveness[(i, j)]
-            });
+            table = table
+                .real(common.real().unit(unit::moment_by_angle()).nominal(1e5), move |m| {
+                    &mut m.settings.effectors.effectiveness[(i, j)]
+                });
         }
     }
     for (i, (_, meaning)) in AXES.into_iter().enumerate() {

@@ -1,7 +1,9 @@
 //! Parameters and outputs of `CRMPC`.
 
 use crate::solver;
-use control::crmpc::{Constraints, Crmpc, Guarantee, InitialState, Margins, Memory, Settings, Standing};
+use control::crmpc::{
+    Constraints, Crmpc, Guarantee, InitialState, Margins, Memory, Settings, Standing,
+};
 use control::error::DesignError;
 use control::error_dynamics::Gain;
 use control::report::Report;
@@ -52,7 +54,11 @@ static INITIAL_STATES: Enumeration<InitialState> = Enumeration {
     description: "Where the nominal motion starts",
     items: &[
         (InitialState::Measured, "measured", "the nominal motion starts at the measured state"),
-        (InitialState::Tube, "tube", "it starts anywhere in an invariant set around the measured state"),
+        (
+            InitialState::Tube,
+            "tube",
+            "it starts anywhere in an invariant set around the measured state",
+        ),
         (
             InitialState::Nominal,
             "nominal",
@@ -78,7 +84,11 @@ static STANDINGS: Enumeration<Standing> = Enumeration {
     description: "Whether the guarantee of the robust set is in force at the last tick, and why not",
     items: &[
         (Standing::None, "none", "no optimisation yet, or sets that guarantee nothing"),
-        (Standing::Pending, "pending", "a plan is certified, but its first command has not acted yet"),
+        (
+            Standing::Pending,
+            "pending",
+            "a plan is certified, but its first command has not acted yet",
+        ),
         (Standing::InForce, "inForce", "the limits are kept for as long as the assumptions hold"),
         (Standing::Refused, "refused", "the design does not hold for the settings: best effort"),
         (
@@ -86,7 +96,11 @@ static STANDINGS: Enumeration<Standing> = Enumeration {
             "uncertified",
             "no plan has been found that keeps the conditions of the guarantee",
         ),
-        (Standing::Exceeded, "exceeded", "the vehicle is further from the plan than the assumptions explain"),
+        (
+            Standing::Exceeded,
+            "exceeded",
+            "the vehicle is further from the plan than the assumptions explain",
+        ),
     ],
 };
 
@@ -143,7 +157,10 @@ impl Law for CrmpcLaw {
             rates: shown_vector(&memory.nominal.fixed_rows::<3>(3).into()),
             in_force: memory.standing == Standing::InForce,
             standing: memory.standing,
-            margins: Margins { rate: shown(memory.margins.rate), moment: shown(memory.margins.moment) },
+            margins: Margins {
+                rate: shown(memory.margins.rate),
+                moment: shown(memory.margins.moment),
+            },
             disturbance: shown_vector(&memory.observed.disturbance),
             report: solver::shown_report(&memory.report),
         };
@@ -156,12 +173,12 @@ impl Law for CrmpcLaw {
             (_, Standing::Exceeded) if ends => Some(
                 "the guarantee is no longer in force: the vehicle is further from the plan than disturbance.bound, inertia.error, estimation.*, measurement.age and delay explain",
             ),
-            (Standing::None, Standing::Uncertified) => {
-                Some("the guarantee is not in force: no plan keeps its conditions from the present state")
-            }
-            (Standing::None, Standing::Refused) => {
-                Some("constraints = robust cannot be guaranteed with these settings; it runs as best effort")
-            }
+            (Standing::None, Standing::Uncertified) => Some(
+                "the guarantee is not in force: no plan keeps its conditions from the present state",
+            ),
+            (Standing::None, Standing::Refused) => Some(
+                "constraints = robust cannot be guaranteed with these settings; it runs as best effort",
+            ),
             _ => solver::warning(&before.report, &after.report),
         }
     }
@@ -198,11 +215,18 @@ fn gains(table: Controller) -> Controller {
     ];
     for (name, of, gain) in sets {
         let k1 =
-            parameter(&format!("{name}.k1"), &format!("Gain on the angles of the {of}, negative")).real();
-        let k2 = parameter(&format!("{name}.k2"), &format!("Gain on the rates of the {of}, negative")).real();
+            parameter(&format!("{name}.k1"), &format!("Gain on the angles of the {of}, negative"))
+                .real();
+        let k2 =
+            parameter(&format!("{name}.k2"), &format!("Gain on the rates of the {of}, negative"))
+                .real();
         table = table
-            .real(k1.unit(unit::gain_angle()).max(0.0).nominal(5.0), move |m| &mut gain(&mut m.law).k1)
-            .real(k2.unit(unit::gain_rate()).max(0.0).nominal(5.0), move |m| &mut gain(&mut m.law).k2);
+            .real(k1.unit(unit::gain_angle()).max(0.0).nominal(5.0), move |m| {
+                &mut gain(&mut m.law).k1
+            })
+            .real(k2.unit(unit::gain_rate()).max(0.0).nominal(5.0), move |m| {
+                &mut gain(&mut m.law).k2
+            });
     }
     table
 }
@@ -212,7 +236,8 @@ fn bounds(table: Controller) -> Controller {
         "disturbance.bound",
         "Bound on each component of the disturbance of the angles' second derivatives that the sets are tightened for",
     );
-    let inertia = parameter("inertia.error", "Relative inertia error that the robust set is tightened for");
+    let inertia =
+        parameter("inertia.error", "Relative inertia error that the robust set is tightened for");
     let angle_error = parameter(
         "estimation.angleError",
         "Bound on the error of each angle given that the robust set is tightened for; it changes no faster than estimation.rateError",
@@ -221,10 +246,14 @@ fn bounds(table: Controller) -> Controller {
         "estimation.rateError",
         "Bound on the error of the derivative of each angle, as it follows from what is given, that the robust set is tightened for",
     );
-    let sideslip =
-        parameter("bound.sideslip", "Sideslip angle up to which the bounds of the paper's design hold");
-    let rate =
-        parameter("bound.referenceRate", "Bound on the reference's rate in the paper's terminal set (13)");
+    let sideslip = parameter(
+        "bound.sideslip",
+        "Sideslip angle up to which the bounds of the paper's design hold",
+    );
+    let rate = parameter(
+        "bound.referenceRate",
+        "Bound on the reference's rate in the paper's terminal set (13)",
+    );
     let acceleration = parameter(
         "bound.referenceAcceleration",
         "Bound on the reference's acceleration in the paper's terminal set (13)",
@@ -252,14 +281,18 @@ fn bounds(table: Controller) -> Controller {
 }
 
 fn guarantee(table: Controller) -> Controller {
-    let sideslip = parameter("guarantee.sideslip", "Sideslip angle up to which the guarantee is given");
+    let sideslip =
+        parameter("guarantee.sideslip", "Sideslip angle up to which the guarantee is given");
     let active = parameter(
         "observer.active",
         "Whether the robust set's reference is shifted by what the observed disturbance does to the vehicle",
     );
-    let time = parameter("observer.timeConstant", "Time constant of the disturbance observer's filter");
-    let stiffness =
-        parameter("observer.stiffness", "Observed disturbance over the shift of the reference's angles");
+    let time =
+        parameter("observer.timeConstant", "Time constant of the disturbance observer's filter");
+    let stiffness = parameter(
+        "observer.stiffness",
+        "Observed disturbance over the shift of the reference's angles",
+    );
     table
         .enumeration(parameter("guarantee.policy", GUARANTEES.description), &GUARANTEES, |m| {
             &mut m.law.settings.guarantee
@@ -284,7 +317,10 @@ fn outputs(table: Controller) -> Controller {
     };
     let rate = |axis: &str, meaning: &str| {
         let text = format!("Rate of the nominal {meaning} at the last tick");
-        sampled(&format!("nominalRate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
+        sampled(&format!("nominalRate.{axis}"), &text)
+            .real()
+            .unit(unit::angular_rate())
+            .nominal(0.05)
     };
     let table = vector(table, ANGLES, nominal, |m| &mut m.law.shown.angles);
     let table = vector(table, ANGLES, rate, |m| &mut m.law.shown.rates);

@@ -105,7 +105,8 @@ fn weights(mut table: Controller) -> Controller {
         table = table.real(p, move |m| &mut m.law.settings.p[i]);
     }
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
-        let text = format!("Diagonal entry {} of Q: weight on the error rate of the {meaning}", i + 1);
+        let text =
+            format!("Diagonal entry {} of Q: weight on the error rate of the {meaning}", i + 1);
         let q = parameter(&format!("weight.Q[{}]", i + 1), &text).real().min(0.0).nominal(10.0);
         table = table.real(q, move |m| &mut m.law.settings.q[i]);
     }
@@ -113,13 +114,21 @@ fn weights(mut table: Controller) -> Controller {
 }
 
 fn sliding_mode(table: Controller) -> Controller {
-    let q = parameter("slidingMode.q", "Linear reaching gain of the inner layer, below 2/period.feedback");
+    let q = parameter(
+        "slidingMode.q",
+        "Linear reaching gain of the inner layer, below 2/period.feedback",
+    );
     let p = parameter("slidingMode.p", "Reaching gain of the power rho");
-    let gamma =
-        parameter("slidingMode.gamma", "Gain of the sliding manifold, on the integral of the power rho");
-    let rho = parameter("slidingMode.rho", "Power of manifold and reaching law, above 0 and below 1");
+    let gamma = parameter(
+        "slidingMode.gamma",
+        "Gain of the sliding manifold, on the integral of the power rho",
+    );
+    let rho =
+        parameter("slidingMode.rho", "Power of manifold and reaching law, above 0 and below 1");
     table
-        .real(q.real().unit(unit::gain_rate()).min(0.0).nominal(5.0), |m| &mut m.law.settings.sliding_mode.q)
+        .real(q.real().unit(unit::gain_rate()).min(0.0).nominal(5.0), |m| {
+            &mut m.law.settings.sliding_mode.q
+        })
         .real(p.real().min(0.0).nominal(5.0), |m| &mut m.law.settings.sliding_mode.p)
         .real(gamma.real().min(0.0).nominal(0.1), |m| &mut m.law.settings.sliding_mode.gamma)
         .real(rho.real().min(0.0).max(1.0), |m| &mut m.law.settings.sliding_mode.rho)
@@ -128,12 +137,20 @@ fn sliding_mode(table: Controller) -> Controller {
 fn outputs(table: Controller) -> Controller {
     let sampled = sampled_output;
     let command = |axis: &str, meaning: &str| {
-        let text = format!("Body {meaning} rate that the outer layer commands, held for period.optimisation");
-        sampled(&format!("rateCommand.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
+        let text = format!(
+            "Body {meaning} rate that the outer layer commands, held for period.optimisation"
+        );
+        sampled(&format!("rateCommand.{axis}"), &text)
+            .real()
+            .unit(unit::angular_rate())
+            .nominal(0.05)
     };
     let sliding = |axis: &str, meaning: &str| {
         let text = format!("Sliding variable of the {meaning} rate at the last tick");
-        sampled(&format!("slidingVariable.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.01)
+        sampled(&format!("slidingVariable.{axis}"), &text)
+            .real()
+            .unit(unit::angular_rate())
+            .nominal(0.01)
     };
     let time = sampled(
         "innerLaw.time",

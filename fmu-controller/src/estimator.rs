@@ -1,8 +1,8 @@
 //! `AttitudeEstimator`: attitude and rates from gyroscope, accelerometer and magnetometer.
 
 use control::estimation::{
-    Alignment, Calibration, CalibrationMode, CalibrationStatus, Estimate, Estimator, Health, LARGEST_RANGE,
-    Line, Memory, Settings, mems_corrections,
+    Alignment, Calibration, CalibrationMode, CalibrationStatus, Estimate, Estimator, Health,
+    LARGEST_RANGE, Line, Memory, Settings, mems_corrections,
 };
 use controller_export::sampled::{SampledFmu, SampledUnit, Ticks};
 use controller_export::table::{ANGLES, AXES, RATES, vector};
@@ -22,7 +22,11 @@ static KINEMATICS: Enumeration<Kinematics> = Enumeration {
     name: "EstimatorKinematics",
     description: "Which body rates are shown",
     items: &[
-        (Kinematics::Printed, "printed", "rates that the matrix R as printed takes for those of the angles"),
+        (
+            Kinematics::Printed,
+            "printed",
+            "rates that the matrix R as printed takes for those of the angles",
+        ),
         (Kinematics::Exact, "exact", "rates of the platform"),
     ],
 };
@@ -31,7 +35,11 @@ static ALIGNMENTS: Enumeration<Alignment> = Enumeration {
     description: "Where the attitude comes from at the beginning",
     items: &[
         (Alignment::Measured, "measured", "from the first samples"),
-        (Alignment::Given, "given", "initial.alpha, initial.beta, initial.sigma: the platform was put there"),
+        (
+            Alignment::Given,
+            "given",
+            "initial.alpha, initial.beta, initial.sigma: the platform was put there",
+        ),
     ],
 };
 static MODES: Enumeration<CalibrationMode> = Enumeration {
@@ -53,7 +61,11 @@ static STATUSES: Enumeration<CalibrationStatus> = Enumeration {
         (CalibrationStatus::Given, "given", "the parameters"),
         (CalibrationStatus::Collecting, "collecting", "readings are collected"),
         (CalibrationStatus::Fitted, "fitted", "the fitted ellipsoid"),
-        (CalibrationStatus::Refused, "refused", "the parameters, as the readings determine no ellipsoid"),
+        (
+            CalibrationStatus::Refused,
+            "refused",
+            "the parameters, as the readings determine no ellipsoid",
+        ),
     ],
 };
 static HEALTH: Enumeration<Health> = Enumeration {
@@ -152,7 +164,8 @@ impl SampledUnit for EstimatorUnit {
 
     fn evaluate(&self, estimator: &mut Estimator, ticks: &mut Ticks<Self>) -> Result<(), Failure> {
         let line = self.line;
-        if !(line.time.is_finite() && line.readings.iter().flatten().all(|value| value.is_finite())) {
+        if !(line.time.is_finite() && line.readings.iter().flatten().all(|value| value.is_finite()))
+        {
             return Err(Failure::Error("an input 'measured' is not a finite number".into()));
         }
         let time = ticks.next_time();
@@ -161,7 +174,9 @@ impl SampledUnit for EstimatorUnit {
         if [angles, rates, gyroscope_bias].iter().flatten().all(|value| value.is_finite()) {
             return Ok(());
         }
-        Err(Failure::Error(format!("the estimate at t = {time} s is not finite; see the inputs 'measured'")))
+        Err(Failure::Error(format!(
+            "the estimate at t = {time} s is not finite; see the inputs 'measured'"
+        )))
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
@@ -192,7 +207,8 @@ fn at_rest() -> Line {
 
 /// Returns the warning of a tick for the log of the importer.
 fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
-    let comes = |health: Health| after.estimate.health == health && before.estimate.health != health;
+    let comes =
+        |health: Health| after.estimate.health == health && before.estimate.health != health;
     if comes(Health::Lost) {
         Some("no usable samples for longer than lost.after: the attitude is lost (health)")
     } else if comes(Health::Frozen) {
@@ -203,7 +219,9 @@ fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
             "a sample was left out, beyond the sensor's range or too far from the last one (health, rejectedSamples)",
         )
     } else if comes(Health::Uncalibrated) {
-        Some("the readings determine no ellipsoid: the given calibration stays in use (calibration.status)")
+        Some(
+            "the readings determine no ellipsoid: the given calibration stays in use (calibration.status)",
+        )
     } else {
         None
     }
@@ -291,9 +309,11 @@ fn inputs(mut table: Variables) -> Variables {
         "measured.sample",
         "Number of the newest sample, from 1; 0 before the first, and throughout if samples are not counted",
     );
-    table
-        .real(seconds(time).nominal(1.0), |m| &mut m.line.time)
-        .integer(sample, (Some(0), None), |m| &mut m.line.sample)
+    table.real(seconds(time).nominal(1.0), |m| &mut m.line.time).integer(
+        sample,
+        (Some(0), None),
+        |m| &mut m.line.sample,
+    )
 }
 
 fn sampled(name: &str, text: &str) -> Common {
@@ -310,7 +330,9 @@ fn outputs(table: Variables) -> Variables {
         common.real().unit(unit::angular_rate()).nominal(0.05)
     };
     let bias = |axis: &str, _: &str| {
-        let text = format!("Estimated bias of the gyroscope along {axis}: given, seen at rest, and learned");
+        let text = format!(
+            "Estimated bias of the gyroscope along {axis}: given, seen at rest, and learned"
+        );
         let common = sampled(&format!("estimatedBias.{axis}"), &text);
         common.real().unit(unit::angular_rate()).nominal(0.01)
     };
@@ -328,8 +350,10 @@ fn outputs(table: Variables) -> Variables {
         "rejectedSamples",
         "Samples so far of which a reading, or the time, could not be believed and was left out",
     );
-    let delay = sampled("filter.delay", "Phase delay of sensors and low-pass filter at low frequencies");
-    let status = sampled("calibration.status", "Where the magnetometer's calibration in force comes from");
+    let delay =
+        sampled("filter.delay", "Phase delay of sensors and low-pass filter at low frequencies");
+    let status =
+        sampled("calibration.status", "Where the magnetometer's calibration in force comes from");
     let residual = sampled(
         "calibration.residual",
         "Root mean square of the fitted readings' distance from the ellipsoid, as a share of its size",
@@ -365,8 +389,9 @@ fn outputs(table: Variables) -> Variables {
 fn start(table: Variables) -> Variables {
     let alignment = parameter("alignment", "Where the attitude comes from at the beginning");
     let angle = |axis: &str, meaning: &str| {
-        let text =
-            format!("The {meaning} shown before the first sample, and begun with if alignment is 'given'");
+        let text = format!(
+            "The {meaning} shown before the first sample, and begun with if alignment is 'given'"
+        );
         let common = parameter(&format!("initial.{axis}"), &text);
         common.real().unit(unit::angle()).nominal(0.1)
     };
@@ -388,29 +413,37 @@ fn start(table: Variables) -> Variables {
 
 fn stages(table: Variables) -> Variables {
     let period = parameter("period", "Time between ticks, and between samples");
-    let cutoff =
-        parameter("filter.cutoff", "Cut-off frequency of the low-pass filter on all readings; 0 for none");
+    let cutoff = parameter(
+        "filter.cutoff",
+        "Cut-off frequency of the low-pass filter on all readings; 0 for none",
+    );
     let prediction =
         parameter("prediction", "Whether the delays of line, sensors and filter are made up for");
     let delay = parameter(
         "sensor.delay",
         "Delay of the sensors' own filters at low frequencies, used with sensor.set = 2",
     );
-    let proportional =
-        parameter("fusion.proportional", "Proportional gain: errors of attitude fall with this rate");
+    let proportional = parameter(
+        "fusion.proportional",
+        "Proportional gain: errors of attitude fall with this rate",
+    );
     let integral = parameter(
         "fusion.integral",
         "Integral gain, with which the gyroscope's bias is learned; 0 for never",
     );
-    let lost =
-        parameter("lost.after", "Time without a usable sample after which the attitude counts as lost");
+    let lost = parameter(
+        "lost.after",
+        "Time without a usable sample after which the attitude counts as lost",
+    );
     let frozen = parameter(
         "frozen.samples",
         "Equal readings in a row from which a sensor counts as frozen; 0 for never, as for sensors without noise",
     );
     table
         .real(seconds(period).min(1e-4).max(10.0).nominal(0.01), |m| &mut m.settings.period)
-        .real(cutoff.real().unit(unit::frequency()).min(0.0).nominal(10.0), |m| &mut m.settings.cutoff)
+        .real(cutoff.real().unit(unit::frequency()).min(0.0).nominal(10.0), |m| {
+            &mut m.settings.cutoff
+        })
         .boolean(prediction, |m| &mut m.settings.prediction)
         .real(seconds(delay).min(0.0).nominal(0.01), |m| &mut m.settings.sensor_delay)
         .real(proportional.real().unit(unit::gain_rate()).min(0.0).nominal(1.0), |m| {
@@ -427,7 +460,10 @@ fn gates(mut table: Variables) -> Variables {
     for (i, sensor) in SENSORS.iter().enumerate() {
         let range = parameter(
             &format!("{}.range", sensor.name),
-            &format!("Largest reading of the {} along an axis; a larger one is left out", sensor.name),
+            &format!(
+                "Largest reading of the {} along an axis; a larger one is left out",
+                sensor.name
+            ),
         );
         let jump = parameter(
             &format!("{}.jump", sensor.name),

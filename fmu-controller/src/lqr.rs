@@ -16,7 +16,8 @@ pub struct LqrLaw {
 
 impl Default for LqrLaw {
     fn default() -> Self {
-        let Settings { body, p, q, period_feedback: period, .. } = Settings::new(Constraints::Robust);
+        let Settings { body, p, q, period_feedback: period, .. } =
+            Settings::new(Constraints::Robust);
         Self { settings: LqrSettings { body, p, q, period } }
     }
 }

@@ -26,7 +26,11 @@ static STATUSES: Enumeration<Status> = Enumeration {
         (Status::Constrained, "constrained", "the optimum by the Riccati method"),
         (Status::Cone, "cone", "the optimum by the cone solver"),
         (Status::Fallback, "fallback", "the previous plan, shifted, with the terminal law"),
-        (Status::Kept, "kept", "the previous plan as it is, which keeps the conditions of the guarantee"),
+        (
+            Status::Kept,
+            "kept",
+            "the previous plan as it is, which keeps the conditions of the guarantee",
+        ),
     ],
 };
 
@@ -65,8 +69,10 @@ pub(crate) fn outputs<L: Law>(
     let sampled = sampled_output;
     let status = sampled("solver.status", "How the plan in force came about");
     let cost = sampled("solver.cost", "Optimal cost of the plan in force");
-    let time = sampled("solver.time", "Wall-clock time of the last optimisation; differs from run to run");
-    let iterations = sampled("solver.iterations", "Iterations of the last optimisation, over all its passes");
+    let time =
+        sampled("solver.time", "Wall-clock time of the last optimisation; differs from run to run");
+    let iterations =
+        sampled("solver.iterations", "Iterations of the last optimisation, over all its passes");
     let residual = sampled(
         "solver.residual",
         "Residual of the conditions of optimality of the plan in force, relative; with the constraints as functions of the plan",
@@ -93,8 +99,10 @@ pub(crate) fn parameters<L: Law>(
     table: Table<ControllerFmu<L>>,
     solver: impl Fn(&mut L) -> &mut SolverSettings + Copy + Send + Sync + 'static,
 ) -> Table<ControllerFmu<L>> {
-    let method =
-        parameter("solver", "Which solver is asked first where the exits do not lead to the optimum");
+    let method = parameter(
+        "solver",
+        "Which solver is asked first where the exits do not lead to the optimum",
+    );
     let nonlinearity = parameter(
         "solver.nonlinearity",
         "What the Riccati method is given; the cone solver is always given linearised constraints",

@@ -38,7 +38,8 @@ fn ready<M: Model>(change: impl FnOnce(&mut M)) -> M {
 
 fn step<M: Model>(unit: &mut M, from: f64, to: f64) {
     // The assumptions of CRMPC do not explain the motion of inputs that jump.
-    unit.step(from, to, &Held, &mut |text| assert!(text.contains("the guarantee is"), "{text}")).unwrap();
+    unit.step(from, to, &Held, &mut |text| assert!(text.contains("the guarantee is"), "{text}"))
+        .unwrap();
     unit.calculate(to).unwrap();
 }
 
@@ -58,7 +59,8 @@ fn descriptions_are_consistent_and_interchangeable() {
         wanted.map(|v| v.name.clone()).collect()
     };
     let (crmpc, dlmpc, lqr) = (describe::<Crmpc>(), describe::<Dlmpc>(), describe::<Lqr>());
-    let sliding = [describe::<Fbl>(), describe::<Btvsmc>(), describe::<BtvsmcDo>(), describe::<SotvsmcDo>()];
+    let sliding =
+        [describe::<Fbl>(), describe::<Btvsmc>(), describe::<BtvsmcDo>(), describe::<SotvsmcDo>()];
     for other in [&crmpc, &dlmpc].into_iter().chain(&sliding) {
         other.check().unwrap();
         lqr.check().unwrap();
@@ -103,7 +105,10 @@ fn assert_any_communication_steps_give_the_same_moments<L: Law>(delay: f64) {
             for part in 0..parts {
                 step(&mut unit, at(part), at(part + 1));
             }
-            assert_eq!(unit.output.moment, *expected, "{parts} steps of an optimisation period, period {k}");
+            assert_eq!(
+                unit.output.moment, *expected,
+                "{parts} steps of an optimisation period, period {k}"
+            );
         }
     }
 }
@@ -151,7 +156,8 @@ fn parameters_that_cannot_work_are_refused_by_name() {
 
 #[test]
 fn the_external_reference_is_followed() {
-    let mut unit: Lqr = ready(|unit: &mut Lqr| unit.parameters.reference.profile = Choice::External);
+    let mut unit: Lqr =
+        ready(|unit: &mut Lqr| unit.parameters.reference.profile = Choice::External);
     unit.input.reference.angles = unit.input.measured.angles;
     unit.input.reference.rates = Vector3::zeros();
     unit.input.reference.accelerations = Vector3::zeros();
@@ -216,7 +222,8 @@ fn saturated_loop(start: f64, delay: f64, ticks: u32) -> Vec<State> {
     (unit.parameters.saturation, unit.parameters.latency.action) = (true, delay);
     unit.initialize(&Context { start_time: start, ..context() }).unwrap();
     let mut config = Scenario::crmpc2022().config(0.01);
-    (config.inertia_scale, config.disturbance, config.moment_delay) = (1.0, Disturbance::default(), delay);
+    (config.inertia_scale, config.disturbance, config.moment_delay) =
+        (1.0, Disturbance::default(), delay);
     let mut plant = Plant::new(&config, start).unwrap();
     let mut go = |k: u32| {
         let [from, to] = [k, k + 1].map(|k| start + 0.04 * f64::from(k));
@@ -265,9 +272,11 @@ fn a_delay_out_of_range_is_refused_by_name() {
 #[test]
 fn a_time_budget_of_any_length_is_worked_with() {
     for budget in [1e9, 1e19, 1e300, f64::MAX] {
-        let mut crmpc: Crmpc = ready(|unit: &mut Crmpc| unit.law.settings.solver.time_budget = budget);
+        let mut crmpc: Crmpc =
+            ready(|unit: &mut Crmpc| unit.law.settings.solver.time_budget = budget);
         crmpc.calculate(0.0).unwrap();
-        let mut dlmpc: Dlmpc = ready(|unit: &mut Dlmpc| unit.law.settings.solver.time_budget = budget);
+        let mut dlmpc: Dlmpc =
+            ready(|unit: &mut Dlmpc| unit.law.settings.solver.time_budget = budget);
         dlmpc.calculate(0.0).unwrap();
         assert!(crmpc.output.moment.norm() > 0.0 && dlmpc.output.moment.norm() > 0.0, "{budget} s");
     }
@@ -278,5 +287,7 @@ fn variants_have_an_observer_if_their_published_settings_have_one() {
     fn agrees<V: tvsmc::Variant>() -> bool {
         V::published().observer.is_some() == V::OBSERVER
     }
-    assert!(agrees::<tvsmc::Btvsmc>() && agrees::<tvsmc::BtvsmcDo>() && agrees::<tvsmc::SotvsmcDo>());
+    assert!(
+        agrees::<tvsmc::Btvsmc>() && agrees::<tvsmc::BtvsmcDo>() && agrees::<tvsmc::SotvsmcDo>()
+    );
 }

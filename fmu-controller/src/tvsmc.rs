@@ -1,7 +1,9 @@
 //! `BTVSMC`, `BTVSMC_DO`, `SOTVSMC_DO`: parameters and outputs of the time-varying sliding modes.
 
 use control::error::DesignError;
-use control::sliding::{BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc};
+use control::sliding::{
+    BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc,
+};
 use controller_export::table::{self, ANGLES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::Table;
@@ -24,7 +26,9 @@ pub trait Variant: Sized + Send + Sync + 'static {
     /// Returns the published settings of the variant.
     fn published() -> Settings<Self::Reaching>;
     /// Adds the parameters of the reaching law.
-    fn reaching(table: Table<ControllerFmu<TvsmcLaw<Self>>>) -> Table<ControllerFmu<TvsmcLaw<Self>>>;
+    fn reaching(
+        table: Table<ControllerFmu<TvsmcLaw<Self>>>,
+    ) -> Table<ControllerFmu<TvsmcLaw<Self>>>;
 }
 
 /// Parameters and outputs of a time-varying sliding mode.
@@ -91,14 +95,19 @@ impl<V: Variant> Law for TvsmcLaw<V> {
     }
 }
 
-fn surface<V: Variant>(table: Table<ControllerFmu<TvsmcLaw<V>>>) -> Table<ControllerFmu<TvsmcLaw<V>>> {
+fn surface<V: Variant>(
+    table: Table<ControllerFmu<TvsmcLaw<V>>>,
+) -> Table<ControllerFmu<TvsmcLaw<V>>> {
     let c = ("surface.c", "Gain c of the sliding surface on the error");
-    let lambda = parameter("surface.lambda", "Rate at which the surface's offset decays").real().min(0.0);
+    let lambda =
+        parameter("surface.lambda", "Rate at which the surface's offset decays").real().min(0.0);
     table::gains(table, c, Some(&unit::gain_rate()), |law| &mut law.settings.surface.c)
         .real(lambda.unit(unit::gain_rate()), |m| &mut m.law.settings.surface.lambda)
 }
 
-fn anti_windup<V: Variant>(table: Table<ControllerFmu<TvsmcLaw<V>>>) -> Table<ControllerFmu<TvsmcLaw<V>>> {
+fn anti_windup<V: Variant>(
+    table: Table<ControllerFmu<TvsmcLaw<V>>>,
+) -> Table<ControllerFmu<TvsmcLaw<V>>> {
     let on = parameter(
         "antiWindup",
         "Whether the surface is laid anew through the state while the actuators saturate; false as in the paper",
@@ -114,7 +123,9 @@ fn anti_windup<V: Variant>(table: Table<ControllerFmu<TvsmcLaw<V>>>) -> Table<Co
         })
 }
 
-fn observer<V: Variant>(mut table: Table<ControllerFmu<TvsmcLaw<V>>>) -> Table<ControllerFmu<TvsmcLaw<V>>> {
+fn observer<V: Variant>(
+    mut table: Table<ControllerFmu<TvsmcLaw<V>>>,
+) -> Table<ControllerFmu<TvsmcLaw<V>>> {
     for i in 0..3 {
         let text = format!("Gain lambda{i} of the disturbance observer");
         let gain = parameter(&format!("observer.lambda{i}"), &text).real().min(0.0);
@@ -124,19 +135,28 @@ fn observer<V: Variant>(mut table: Table<ControllerFmu<TvsmcLaw<V>>>) -> Table<C
     table::gains(table, l, None, |law| &mut law.observer.l)
 }
 
-fn outputs<V: Variant>(table: Table<ControllerFmu<TvsmcLaw<V>>>) -> Table<ControllerFmu<TvsmcLaw<V>>> {
+fn outputs<V: Variant>(
+    table: Table<ControllerFmu<TvsmcLaw<V>>>,
+) -> Table<ControllerFmu<TvsmcLaw<V>>> {
     let sampled = |name: String, text: String| sampled_output(&name, &text);
     let sliding = |axis: &str, meaning: &str| {
         let text = format!("Sliding variable of the {meaning} at the last tick");
-        sampled(format!("slidingVariable.{axis}"), text).real().unit(unit::angular_rate()).nominal(1e-3)
+        sampled(format!("slidingVariable.{axis}"), text)
+            .real()
+            .unit(unit::angular_rate())
+            .nominal(1e-3)
     };
     let of_sliding = |axis: &str, meaning: &str| {
         let text = format!("Observer's estimate z0 of the sliding variable of the {meaning}");
-        sampled(format!("slidingEstimate.{axis}"), text).real().unit(unit::angular_rate()).nominal(1e-3)
+        sampled(format!("slidingEstimate.{axis}"), text)
+            .real()
+            .unit(unit::angular_rate())
+            .nominal(1e-3)
     };
     let of_disturbance = |axis: &str, meaning: &str| {
-        let text =
-            format!("Observer's estimate of the uncertainty in the second derivative of the {meaning}");
+        let text = format!(
+            "Observer's estimate of the uncertainty in the second derivative of the {meaning}"
+        );
         let common = sampled(format!("disturbanceEstimate.{axis}"), text);
         common.real().unit(unit::angular_acceleration()).nominal(0.01)
     };
@@ -154,8 +174,9 @@ fn boundary_layer<V: Variant<Reaching = BoundaryLayer>>(
 ) -> Table<ControllerFmu<TvsmcLaw<V>>> {
     let eta = ("reaching.eta", "Reaching gain eta");
     let h = ("boundaryLayer.h", "Thickness h of the boundary layer");
-    let table =
-        table::gains(table, eta, Some(&unit::angular_acceleration()), |law| &mut law.settings.reaching.eta);
+    let table = table::gains(table, eta, Some(&unit::angular_acceleration()), |law| {
+        &mut law.settings.reaching.eta
+    });
     table::gains(table, h, Some(&unit::angular_rate()), |law| &mut law.settings.reaching.h)
 }
 
@@ -173,7 +194,9 @@ impl Variant for Btvsmc {
         Settings::btvsmc()
     }
 
-    fn reaching(table: Table<ControllerFmu<TvsmcLaw<Self>>>) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
+    fn reaching(
+        table: Table<ControllerFmu<TvsmcLaw<Self>>>,
+    ) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
         boundary_layer(table)
     }
 }
@@ -192,7 +215,9 @@ impl Variant for BtvsmcDo {
         Settings::btvsmc_do()
     }
 
-    fn reaching(table: Table<ControllerFmu<TvsmcLaw<Self>>>) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
+    fn reaching(
+        table: Table<ControllerFmu<TvsmcLaw<Self>>>,
+    ) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
         boundary_layer(table)
     }
 }
@@ -211,15 +236,19 @@ impl Variant for SotvsmcDo {
         Settings::sotvsmc_do()
     }
 
-    fn reaching(table: Table<ControllerFmu<TvsmcLaw<Self>>>) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
+    fn reaching(
+        table: Table<ControllerFmu<TvsmcLaw<Self>>>,
+    ) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
         let text = |what| ("reaching.".to_owned() + what, "Reaching gain ".to_owned() + what);
         let [(n1, t1), (n2, t2), (n3, t3), (n4, t4)] = ["k1", "k2", "k3", "k4"].map(text);
         let table = table::gains(table, (&n1, &t1), None, |law| &mut law.settings.reaching.k1);
         let rate = unit::gain_rate();
-        let table = table::gains(table, (&n2, &t2), Some(&rate), |law| &mut law.settings.reaching.k2);
+        let table =
+            table::gains(table, (&n2, &t2), Some(&rate), |law| &mut law.settings.reaching.k2);
         let table = table::gains(table, (&n3, &t3), None, |law| &mut law.settings.reaching.k3);
         let angle = unit::gain_angle();
-        let table = table::gains(table, (&n4, &t4), Some(&angle), |law| &mut law.settings.reaching.k4);
+        let table =
+            table::gains(table, (&n4, &t4), Some(&angle), |law| &mut law.settings.reaching.k4);
         let m = parameter("reaching.m", "Exponent m of the reaching law, above 2").real().min(2.0);
         table.real(m, |m| &mut m.law.settings.reaching.m)
     }

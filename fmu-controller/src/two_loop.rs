@@ -16,8 +16,16 @@ static FORMS: Enumeration<Form> = Enumeration {
     description: "Signs of the reaching terms",
     items: &[
         (Form::Corrected, "corrected", "both loops come to their sliding surfaces"),
-        (Form::PrintedSign, "printedSign", "minus I rho SIGN(s_n) in the inner loop, as (10) is printed"),
-        (Form::PrintedFactor, "printedFactor", "f of (7) and (11) with the minus sign it is printed with"),
+        (
+            Form::PrintedSign,
+            "printedSign",
+            "minus I rho SIGN(s_n) in the inner loop, as (10) is printed",
+        ),
+        (
+            Form::PrintedFactor,
+            "printedFactor",
+            "f of (7) and (11) with the minus sign it is printed with",
+        ),
     ],
 };
 static KINEMATICS: Enumeration<OuterKinematics> = Enumeration {
@@ -59,7 +67,8 @@ impl Law for TwoLoopLaw {
     type Settings = TwoLoopSettings;
 
     const NAME: &'static str = "TwoLoopSMC";
-    const DESCRIPTION: &'static str = "Two-loop sliding-mode attitude controller of Jia, Zhou and Zhou";
+    const DESCRIPTION: &'static str =
+        "Two-loop sliding-mode attitude controller of Jia, Zhou and Zhou";
     const DOCUMENTATION: &'static str = include_str!("two_loop.html");
     const FIELDS: &'static Fields = &[
         ("filter", "commandFilter.frequency"),
@@ -98,8 +107,10 @@ impl Law for TwoLoopLaw {
         self.inner_sliding = shown_vector(&memory.inner_sliding);
         self.rate_command = shown_vector(&memory.rate_command);
         let gain = |of: &Loop| Vector3::from(of.k);
-        self.outer_integral = shown_vector(&gain(&self.settings.outer).component_mul(&memory.outer_integral));
-        self.inner_integral = shown_vector(&gain(&self.settings.inner).component_mul(&memory.inner_integral));
+        self.outer_integral =
+            shown_vector(&gain(&self.settings.outer).component_mul(&memory.outer_integral));
+        self.inner_integral =
+            shown_vector(&gain(&self.settings.inner).component_mul(&memory.inner_integral));
     }
 }
 
@@ -119,7 +130,9 @@ fn reaching(
     let parameters: [(&str, &str, Option<&unit::Unit>, Field); 4] = [
         ("k", "Gain K on the integral of the error", Some(&gain), |l| &mut l.k),
         ("rho", "Reaching gain rho", Some(rho), |l| &mut l.layer.rho),
-        ("epsilon", "Thickness epsilon of the boundary layer", Some(epsilon), |l| &mut l.layer.epsilon),
+        ("epsilon", "Thickness epsilon of the boundary layer", Some(epsilon), |l| {
+            &mut l.layer.epsilon
+        }),
         ("b", "Power b of the finite-time factor, below 1", None, |l| &mut l.layer.b),
     ];
     for (symbol, text, unit, field) in parameters {
@@ -138,7 +151,9 @@ fn reaching(
 
 fn actuators(mut table: Controller) -> Controller {
     for (i, axis) in ["x", "y", "z"].into_iter().enumerate() {
-        let text = format!("Bound on the disturbance moment about {axis} that the inner loop must overcome");
+        let text = format!(
+            "Bound on the disturbance moment about {axis} that the inner loop must overcome"
+        );
         let bound = parameter(&format!("disturbanceMoment.bound[{}]", i + 1), &text).real();
         table = table.real(bound.unit(unit::moment()).min(0.0).nominal(1e5), move |m| {
             &mut m.law.settings.disturbance[i]
@@ -164,9 +179,11 @@ fn actuators(mut table: Controller) -> Controller {
 fn printed(table: Controller) -> Controller {
     let form = parameter("form", "Signs of the reaching terms");
     let kinematics = parameter("kinematics", "What the outer loop takes for R");
-    table
-        .enumeration(form, &FORMS, |m| &mut m.law.settings.form)
-        .enumeration(kinematics, &KINEMATICS, |m| &mut m.law.settings.kinematics)
+    table.enumeration(form, &FORMS, |m| &mut m.law.settings.form).enumeration(
+        kinematics,
+        &KINEMATICS,
+        |m| &mut m.law.settings.kinematics,
+    )
 }
 
 fn outputs(table: Controller) -> Controller {
@@ -177,7 +194,10 @@ fn outputs(table: Controller) -> Controller {
     };
     let inner = |axis: &str, meaning: &str| {
         let text = format!("Sliding variable of the {meaning} rate at the last tick");
-        sampled(format!("innerSlidingVariable.{axis}"), text).real().unit(unit::angular_rate()).nominal(1e-2)
+        sampled(format!("innerSlidingVariable.{axis}"), text)
+            .real()
+            .unit(unit::angular_rate())
+            .nominal(1e-2)
     };
     let command = |axis: &str, meaning: &str| {
         let text = format!("Body {meaning} rate that the outer loop commands");
@@ -188,8 +208,12 @@ fn outputs(table: Controller) -> Controller {
         sampled(format!("integral.{axis}"), text).real().unit(unit::angle()).nominal(1e-2)
     };
     let inner_integral = |axis: &str, meaning: &str| {
-        let text = format!("Part of the sliding variable of the {meaning} rate that is its integral");
-        sampled(format!("innerIntegral.{axis}"), text).real().unit(unit::angular_rate()).nominal(1e-2)
+        let text =
+            format!("Part of the sliding variable of the {meaning} rate that is its integral");
+        sampled(format!("innerIntegral.{axis}"), text)
+            .real()
+            .unit(unit::angular_rate())
+            .nominal(1e-2)
     };
     let table = vector(table, ANGLES, outer, |m| &mut m.law.outer_sliding);
     let table = vector(table, RATES, inner, |m| &mut m.law.inner_sliding);

@@ -22,7 +22,9 @@ impl Inputs<ReentryPlant> for Held {
 fn steps(criterion: &mut Criterion) {
     let mut started = ReentryPlant::new();
     started.initialize(&Context { start_time: 0.0, stop_time: None, resources: None }).unwrap();
-    for (name, outputs) in [("plant step of 0.04 s", false), ("plant step of 0.04 s with outputs", true)] {
+    for (name, outputs) in
+        [("plant step of 0.04 s", false), ("plant step of 0.04 s with outputs", true)]
+    {
         let (mut unit, mut k) = (started.clone(), 0);
         criterion.bench_function(name, |bencher| {
             bencher.iter(|| {

@@ -6,7 +6,9 @@ use crate::parameters::{ACTUATIONS, KINDS, KINEMATICS};
 use crate::plant::{MOTION, ReentryPlant};
 use crate::roles::{Known, Role, Unknown, Variables};
 use fmi2_export::fields::Fields;
-use fmi2_export::table::{Description, Real, discrete_input, discrete_output, input, output, parameter};
+use fmi2_export::table::{
+    Description, Real, discrete_input, discrete_output, input, output, parameter,
+};
 use model_description::DefaultExperiment;
 use model_description::unit;
 use nalgebra::Vector3;
@@ -51,9 +53,13 @@ pub(crate) fn role(position: usize) -> Role {
 fn all() -> Plant {
     let variables = trajectory(deflection_rates(commands(actuated(inputs(outputs(Plant::new()))))));
     let table = disturbance(initial(inertia(variables)));
-    let step = parameter("integrator.step", "Longest step of the Runge-Kutta integration in co-simulation");
-    let table = table
-        .real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| &mut m.parameters.step);
+    let step = parameter(
+        "integrator.step",
+        "Longest step of the Runge-Kutta integration in co-simulation",
+    );
+    let table = table.real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| {
+        &mut m.parameters.step
+    });
     delay(sensors::all(kinematics(actuation(table))))
 }
 
@@ -107,7 +113,10 @@ fn outputs(table: Plant) -> Plant {
     let deflections: Vec<String> = (1..=SURFACES).map(|i| format!("deflection[{i}]")).collect();
     let actuators: Vec<&str> = jets.iter().chain(&deflections).map(String::as_str).collect();
     let angle = |axis: &str, meaning: &str| {
-        output(&format!("attitude.{axis}"), &sentence(meaning)).real().unit(unit::angle()).nominal(0.1)
+        output(&format!("attitude.{axis}"), &sentence(meaning))
+            .real()
+            .unit(unit::angle())
+            .nominal(0.1)
     };
     let rate = |axis: &str, meaning: &str| {
         let text = format!("Body {meaning} rate");
@@ -115,16 +124,21 @@ fn outputs(table: Plant) -> Plant {
     };
     let angle_rate = |axis: &str, meaning: &str| {
         // The rates of the angles follow Wu 2015 (1); they depend on sigma through the trajectory.
-        let depends =
-            if axis == "beta" { vec!["attitude.alpha", "rate.p", "rate.r"] } else { motion.to_vec() };
-        let common = output(&format!("attitudeRate.{axis}"), &format!("Time derivative of the {meaning}"))
-            .depends_on(["attitude.sigma"])
-            .depends_on(TRAJECTORY_INPUTS.map(|(name, ..)| name));
+        let depends = if axis == "beta" {
+            vec!["attitude.alpha", "rate.p", "rate.r"]
+        } else {
+            motion.to_vec()
+        };
+        let common =
+            output(&format!("attitudeRate.{axis}"), &format!("Time derivative of the {meaning}"))
+                .depends_on(["attitude.sigma"])
+                .depends_on(TRAJECTORY_INPUTS.map(|(name, ..)| name));
         let real = common.depends_on(depends).real().unit(unit::angular_rate()).nominal(0.05);
         real.derivative_of(&format!("attitude.{axis}"))
     };
     let acceleration = |axis: &str, meaning: &str| {
-        let common = output(&format!("angularAcceleration.{axis}"), &format!("Body {meaning} acceleration"));
+        let common =
+            output(&format!("angularAcceleration.{axis}"), &format!("Body {meaning} acceleration"));
         let real = common
             .depends_on(motion)
             .depends_on(moment)
@@ -138,7 +152,8 @@ fn outputs(table: Plant) -> Plant {
             &format!("appliedMoment.{axis}"),
             &format!("Control {meaning} moment that acts on the vehicle"),
         );
-        let common = common.depends_on([format!("moment.{axis}").as_str()]).depends_on(actuators.clone());
+        let common =
+            common.depends_on([format!("moment.{axis}").as_str()]).depends_on(actuators.clone());
         common.real().unit(unit::moment()).nominal(1e5)
     };
     let delta = |axis: &str, meaning: &str| {
@@ -160,8 +175,13 @@ fn outputs(table: Plant) -> Plant {
     };
     let table = vector(table, ANGLES, angle, Role::state, |m| &mut m.output.angles);
     let table = vector(table, RATES, rate, |i| Role::state(3 + i), |m| &mut m.output.rates);
-    let table =
-        vector(table, ANGLES, angle_rate, |i| Unknown::Derivative(i).into(), |m| &mut m.output.angle_rates);
+    let table = vector(
+        table,
+        ANGLES,
+        angle_rate,
+        |i| Unknown::Derivative(i).into(),
+        |m| &mut m.output.angle_rates,
+    );
     let table = vector(
         table,
         RATES,
@@ -169,8 +189,13 @@ fn outputs(table: Plant) -> Plant {
         |i| Unknown::Derivative(3 + i).into(),
         |m| &mut m.output.angular_acceleration,
     );
-    let table =
-        vector(table, AXES, applied, |i| Unknown::AppliedMoment(i).into(), |m| &mut m.output.applied_moment);
+    let table = vector(
+        table,
+        AXES,
+        applied,
+        |i| Unknown::AppliedMoment(i).into(),
+        |m| &mut m.output.applied_moment,
+    );
     let table = vector(table, ANGLES, delta, |_| Unknown::Delta.into(), |m| &mut m.output.delta);
     vector(
         table,
@@ -187,24 +212,35 @@ fn inputs(table: Plant) -> Plant {
         common.real().unit(unit::moment()).nominal(1e5)
     };
     let external = |axis: &str, meaning: &str| {
-        let common = input(&format!("disturbanceMoment.{axis}"), &format!("External {meaning} moment"));
+        let common =
+            input(&format!("disturbanceMoment.{axis}"), &format!("External {meaning} moment"));
         common.real().unit(unit::moment()).nominal(1e4)
     };
     let table = vector(table, AXES, control, |i| Known::Moment(i).into(), |m| &mut m.input.moment);
-    vector(table, AXES, external, |i| Known::DisturbanceMoment(i).into(), |m| &mut m.input.disturbance_moment)
+    vector(
+        table,
+        AXES,
+        external,
+        |i| Known::DisturbanceMoment(i).into(),
+        |m| &mut m.input.disturbance_moment,
+    )
 }
 
 /// Adds the deflections of the surfaces and the flight condition.
 fn actuated(mut table: Plant) -> Plant {
     for (i, name) in Effectors::published().names.iter().enumerate() {
-        let common = output(&format!("deflection[{}]", i + 1), &format!("Deflection of the {name}"));
+        let common =
+            output(&format!("deflection[{}]", i + 1), &format!("Deflection of the {name}"));
         let real = common.real().unit(unit::angle()).nominal(0.1);
         let role = Role::state(MOTION + i);
         table = table.real(real, move |m| &mut m.output.deflections[i]).role(role);
     }
-    let pressure = output("flight.dynamicPressure", "Dynamic pressure of the flight, with density.scale");
+    let pressure =
+        output("flight.dynamicPressure", "Dynamic pressure of the flight, with density.scale");
     table
-        .real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| &mut m.output.dynamic_pressure)
+        .real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| {
+            &mut m.output.dynamic_pressure
+        })
         .role(Unknown::DynamicPressure)
 }
 
@@ -225,7 +261,8 @@ fn commands(mut table: Plant) -> Plant {
 
 fn deflection_rates(mut table: Plant) -> Plant {
     for (i, name) in Effectors::published().names.iter().enumerate() {
-        let (command, deflection) = (format!("surface[{}]", i + 1), format!("deflection[{}]", i + 1));
+        let (command, deflection) =
+            (format!("surface[{}]", i + 1), format!("deflection[{}]", i + 1));
         let text = format!("Rate of the deflection of the {name}: its limit, or zero at rest");
         let common = output(&format!("deflectionRate[{}]", i + 1), &text)
             .depends_on([command.as_str(), deflection.as_str()]);
@@ -242,7 +279,9 @@ const TRAJECTORY_INPUTS: [TrajectoryInput; 7] = [
     ("trajectory.flightPathAngle", "Flight path angle above the horizon", false, |t| {
         &mut t.flight_path_angle
     }),
-    ("trajectory.heading", "Heading of the velocity, from north to east", false, |t| &mut t.heading),
+    ("trajectory.heading", "Heading of the velocity, from north to east", false, |t| {
+        &mut t.heading
+    }),
     ("trajectory.latitude", "Latitude, north positive", false, |t| &mut t.latitude),
     ("trajectory.flightPathAngleRate", "Time derivative of the flight path angle", true, |t| {
         &mut t.flight_path_angle_rate
@@ -262,7 +301,8 @@ fn trajectory(mut table: Plant) -> Plant {
         } else {
             real.unit(unit::angle()).nominal(0.1)
         };
-        table = table.real(real, move |m| field(&mut m.input.trajectory)).role(Known::Trajectory(i));
+        table =
+            table.real(real, move |m| field(&mut m.input.trajectory)).role(Known::Trajectory(i));
     }
     table
 }
@@ -282,15 +322,21 @@ fn kinematics(table: Plant) -> Plant {
 }
 
 fn actuation(table: Plant) -> Plant {
-    let altitude = parameter("flight.altitude", "Geometric altitude; gives air density and speed of sound");
+    let altitude =
+        parameter("flight.altitude", "Geometric altitude; gives air density and speed of sound");
     let mach = parameter("flight.mach", "Mach number");
-    let density =
-        parameter("density.scale", "Factor from the standard atmosphere's density: 0.9 is 10 % less");
+    let density = parameter(
+        "density.scale",
+        "Factor from the standard atmosphere's density: 0.9 is 10 % less",
+    );
     let aerodynamics = parameter(
         "aerodynamics.scale",
         "Factor from the nominal to the vehicle's surface effectiveness: 0.9 is 10 % less",
     );
-    let duty = parameter("jets.duty", "Jets give any thrust between 0 and 1 instead of switching on at 0.5");
+    let duty = parameter(
+        "jets.duty",
+        "Jets give any thrust between 0 and 1 instead of switching on at 0.5",
+    );
     let symmetric = parameter(
         "jets.symmetric",
         "Jet 4 as the mirror image of jet 8 instead of the printed column, which breaks the symmetry",
@@ -299,12 +345,15 @@ fn actuation(table: Plant) -> Plant {
         .enumeration(parameter("actuation", ACTUATIONS.description), &ACTUATIONS, |m| {
             &mut m.parameters.actuation
         })
-        .real(altitude.real().unit(unit::length()).min(0.0).max(atmosphere::TOP).nominal(1e4), |m| {
-            &mut m.parameters.flight.altitude
-        })
+        .real(
+            altitude.real().unit(unit::length()).min(0.0).max(atmosphere::TOP).nominal(1e4),
+            |m| &mut m.parameters.flight.altitude,
+        )
         .real(mach.real().min(0.0).max(100.0).nominal(10.0), |m| &mut m.parameters.flight.mach)
         .real(density.real().min(0.0).max(10.0).nominal(1.0), |m| &mut m.parameters.density_scale)
-        .real(aerodynamics.real().min(0.0).max(10.0).nominal(1.0), |m| &mut m.parameters.aerodynamics_scale)
+        .real(aerodynamics.real().min(0.0).max(10.0).nominal(1.0), |m| {
+            &mut m.parameters.aerodynamics_scale
+        })
         .boolean(duty, |m| &mut m.parameters.jet_duty)
         .boolean(symmetric, |m| &mut m.parameters.jet_symmetric)
 }
@@ -312,19 +361,29 @@ fn actuation(table: Plant) -> Plant {
 fn delay(table: Plant) -> Plant {
     let text = "Time after which the input moment acts, held over each step; co-simulation with actuation = moment only";
     let delay = parameter("actuation.delay", text).real().unit(unit::time());
-    table.real(delay.min(0.0).max(transport::LONGEST).nominal(0.1), |m| &mut m.parameters.moment_delay)
+    table.real(delay.min(0.0).max(transport::LONGEST).nominal(0.1), |m| {
+        &mut m.parameters.moment_delay
+    })
 }
 
 fn inertia(table: Plant) -> Plant {
     let entry = |name: &str, text: &str| {
         parameter(&format!("inertia.{name}"), text).real().unit(unit::inertia()).nominal(1e6)
     };
-    let scale =
-        parameter("inertia.scale", "Factor from the nominal inertia to the vehicle's: 1.05 is 5 % more");
+    let scale = parameter(
+        "inertia.scale",
+        "Factor from the nominal inertia to the vehicle's: 1.05 is 5 % more",
+    );
     table
-        .real(entry("Ixx", "Nominal roll moment of inertia").min(0.0), |m| &mut m.parameters.inertia.Ixx)
-        .real(entry("Iyy", "Nominal pitch moment of inertia").min(0.0), |m| &mut m.parameters.inertia.Iyy)
-        .real(entry("Izz", "Nominal yaw moment of inertia").min(0.0), |m| &mut m.parameters.inertia.Izz)
+        .real(entry("Ixx", "Nominal roll moment of inertia").min(0.0), |m| {
+            &mut m.parameters.inertia.Ixx
+        })
+        .real(entry("Iyy", "Nominal pitch moment of inertia").min(0.0), |m| {
+            &mut m.parameters.inertia.Iyy
+        })
+        .real(entry("Izz", "Nominal yaw moment of inertia").min(0.0), |m| {
+            &mut m.parameters.inertia.Izz
+        })
         .real(entry("Ixz", "Nominal roll-yaw product of inertia; the tensor holds -Ixz"), |m| {
             &mut m.parameters.inertia.Ixz
         })
@@ -334,11 +393,13 @@ fn inertia(table: Plant) -> Plant {
 fn initial(table: Plant) -> Plant {
     let angle = |axis: &str, meaning: &str| {
         let limit = if axis == "beta" { BETA_LIMIT } else { 2.0 * std::f64::consts::PI };
-        let common = parameter(&format!("initial.{axis}"), &format!("{} at the start", sentence(meaning)));
+        let common =
+            parameter(&format!("initial.{axis}"), &format!("{} at the start", sentence(meaning)));
         common.real().unit(unit::angle()).min(-limit).max(limit).nominal(0.1)
     };
     let rate = |axis: &str, meaning: &str| {
-        let common = parameter(&format!("initial.{axis}"), &format!("Body {meaning} rate at the start"));
+        let common =
+            parameter(&format!("initial.{axis}"), &format!("Body {meaning} rate at the start"));
         common.real().unit(unit::angular_rate()).min(-10.0).max(10.0).nominal(0.05)
     };
     let table = vector(table, ANGLES, angle, none, |m| &mut m.parameters.initial_angles);
@@ -350,12 +411,22 @@ fn disturbance(table: Plant) -> Plant {
         "disturbance.bound",
         "Bound on each component of the disturbance on the attitude's acceleration",
     );
-    let period =
-        parameter("disturbance.period", "Time for which white, alongRate and againstMoment hold a value");
-    let seed = parameter("disturbance.seed", "Seed of the white noise: the same seed gives the same noise");
+    let period = parameter(
+        "disturbance.period",
+        "Time for which white, alongRate and againstMoment hold a value",
+    );
+    let seed = parameter(
+        "disturbance.seed",
+        "Seed of the white noise: the same seed gives the same noise",
+    );
     let direction = |axis: &str, meaning: &str| {
-        let text = format!("Factor on the bound for constant and square: component of the {meaning}");
-        parameter(&format!("disturbance.direction.{axis}"), &text).real().min(-1.0).max(1.0).nominal(1.0)
+        let text =
+            format!("Factor on the bound for constant and square: component of the {meaning}");
+        parameter(&format!("disturbance.direction.{axis}"), &text)
+            .real()
+            .min(-1.0)
+            .max(1.0)
+            .nominal(1.0)
     };
     let square = parameter(
         "disturbance.square.period",
@@ -363,17 +434,23 @@ fn disturbance(table: Plant) -> Plant {
     );
     let offset = |axis: &str, meaning: &str| {
         let text = format!("Constant part of the sine disturbance's {meaning} moment");
-        parameter(&format!("disturbance.sine.offset.{axis}"), &text).real().unit(unit::moment()).nominal(1e4)
+        parameter(&format!("disturbance.sine.offset.{axis}"), &text)
+            .real()
+            .unit(unit::moment())
+            .nominal(1e4)
     };
     let start = parameter("disturbance.start", "Time from which the disturbance acts");
     let end = parameter("disturbance.end", "Time at which the disturbance ends");
     let time = |common: fmi2_export::table::Common| common.real().unit(unit::time());
 
     let table = table
-        .enumeration(parameter("disturbance.kind", KINDS.description), &KINDS, |m| &mut m.parameters.kind)
-        .real(bound.real().unit(unit::angular_acceleration()).min(0.0).max(10.0).nominal(0.03), |m| {
-            &mut m.parameters.bound
+        .enumeration(parameter("disturbance.kind", KINDS.description), &KINDS, |m| {
+            &mut m.parameters.kind
         })
+        .real(
+            bound.real().unit(unit::angular_acceleration()).min(0.0).max(10.0).nominal(0.03),
+            |m| &mut m.parameters.bound,
+        )
         .real(time(period).min(1e-4).nominal(0.04), |m| &mut m.parameters.period)
         .integer(seed, (Some(0), None), |m| &mut m.parameters.seed);
     let table = vector(table, ANGLES, direction, none, |m| &mut m.parameters.direction)
@@ -387,19 +464,30 @@ fn sine(table: Plant, which: &'static str, i: usize) -> Plant {
     let name = |part: &str| format!("disturbance.sine.{which}.{part}");
     let amplitude = |axis: &str, meaning: &str| {
         let text = format!("Amplitude of the {which} sinusoid's {meaning} moment");
-        parameter(&name(&format!("amplitude.{axis}")), &text).real().unit(unit::moment()).nominal(1e4)
+        parameter(&name(&format!("amplitude.{axis}")), &text)
+            .real()
+            .unit(unit::moment())
+            .nominal(1e4)
     };
-    let frequency = parameter(&name("frequency"), &format!("Angular frequency of the {which} sinusoid"));
+    let frequency =
+        parameter(&name("frequency"), &format!("Angular frequency of the {which} sinusoid"));
     let phase = parameter(&name("phase"), &format!("Phase of the {which} sinusoid at time 0"));
     vector(table, AXES, amplitude, none, move |m| &mut m.parameters.waves[i].amplitude)
         .real(frequency.real().unit(unit::angular_rate()).min(0.0).nominal(1.0), move |m| {
             &mut m.parameters.waves[i].frequency
         })
-        .real(phase.real().unit(unit::angle()).nominal(1.0), move |m| &mut m.parameters.waves[i].phase)
+        .real(phase.real().unit(unit::angle()).nominal(1.0), move |m| {
+            &mut m.parameters.waves[i].phase
+        })
 }
 
 /// Returns the text with a capital letter at its beginning.
 fn sentence(text: &str) -> String {
     let mut characters = text.chars();
-    characters.next().map(|first| first.to_ascii_uppercase()).into_iter().chain(characters).collect()
+    characters
+        .next()
+        .map(|first| first.to_ascii_uppercase())
+        .into_iter()
+        .chain(characters)
+        .collect()
 }

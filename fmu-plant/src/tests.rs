@@ -67,8 +67,10 @@ fn calculated(unit: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {
     let last = o.deflection_rates.iter().copied();
     let readings = o.measured.readings;
     let measured = readings.iter().flatten().copied().chain([o.measured.time]);
-    let groups =
-        (0..21).zip(all.iter().flatten().copied()).chain((27..36).zip(rest)).chain((54..62).zip(last));
+    let groups = (0..21)
+        .zip(all.iter().flatten().copied())
+        .chain((27..36).zip(rest))
+        .chain((54..62).zip(last));
     groups.chain((MEASURED..).zip(measured)).collect()
 }
 
@@ -108,7 +110,10 @@ fn positions_and_names_agree() {
     assert_eq!((names[27].as_str(), names[34].as_str()), ("deflection[1]", "deflection[8]"));
     assert_eq!((names[36].as_str(), names[43].as_str()), ("surface[1]", "surface[8]"));
     assert_eq!((names[44].as_str(), names[53].as_str()), ("jet[1]", "jet[10]"));
-    assert_eq!((names[54].as_str(), names[61].as_str()), ("deflectionRate[1]", "deflectionRate[8]"));
+    assert_eq!(
+        (names[54].as_str(), names[61].as_str()),
+        ("deflectionRate[1]", "deflectionRate[8]")
+    );
     assert_eq!(
         (names[62].as_str(), names[68].as_str()),
         ("trajectory.flightPathAngle", "trajectory.latitudeRate")
@@ -142,13 +147,16 @@ fn the_description_holds() {
     let deflections = (27..35).map(|i| (i, i + 27));
     assert_eq!(description.states(), motion.chain(deflections).collect::<Vec<_>>());
     assert_eq!(description.event_indicators, 8);
-    for variable in description.variables.iter().filter(|variable| variable.causality == Causality::Input) {
+    for variable in
+        description.variables.iter().filter(|variable| variable.causality == Causality::Input)
+    {
         let discrete = ["surface[", "jet["].iter().any(|name| variable.name.starts_with(name));
         let expected = if discrete { Variability::Discrete } else { Variability::Continuous };
         assert_eq!(variable.variability, expected, "{}", variable.name);
     }
     let scenario = Scenario::crmpc2022();
-    let start = |name: &str| match &description.variables[description.position(name).unwrap()].kind {
+    let start = |name: &str| match &description.variables[description.position(name).unwrap()].kind
+    {
         variable::Kind::Real { start, .. } => start.unwrap(),
         variable::Kind::Integer { start, .. } | variable::Kind::Enumeration { start, .. } => {
             f64::from(start.unwrap())
@@ -175,7 +183,8 @@ fn the_description_holds() {
     ] {
         assert_eq!(start(name), value, "{name}");
     }
-    let described = |text: &str| text.len() > 8 && text.starts_with(|c: char| c.is_ascii_uppercase());
+    let described =
+        |text: &str| text.len() > 8 && text.starts_with(|c: char| c.is_ascii_uppercase());
     for variable in &description.variables {
         assert!(described(&variable.description), "{}: {}", variable.name, variable.description);
     }
@@ -339,7 +348,9 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
     assert!((duty.partial_derivative(0.0, 14, 44).unwrap() - 19897.0).abs() < 1e-9, "yaw by jet 1");
     let mut exact = along_a_trajectory(Kind::None, Kinematics::Exact);
     assert!(exact.partial_derivative(0.0, 8, 63).unwrap() != 0.0, "bank rate by heading");
-    assert!((exact.partial_derivative(0.0, 6, 65).unwrap() + 0.5f64.cos() / 0.2f64.cos()).abs() < 1e-15);
+    assert!(
+        (exact.partial_derivative(0.0, 6, 65).unwrap() + 0.5f64.cos() / 0.2f64.cos()).abs() < 1e-15
+    );
 }
 
 #[test]
@@ -474,7 +485,11 @@ fn oracle_model_exchange_agrees_with_co_simulation() {
             step(&mut cs, 0.04 * f64::from(k), 0.04 * f64::from(k + 1)).unwrap();
         }
         let events = exchange(&mut me, 0.0, 2.0);
-        assert_same_motion(&outputs(&mut cs, 2.0), &outputs(&mut me, 2.0), &format!("kind {kind:?}"));
+        assert_same_motion(
+            &outputs(&mut cs, 2.0),
+            &outputs(&mut me, 2.0),
+            &format!("kind {kind:?}"),
+        );
         let expected = [1, 38, 3, 3, 6, 38, 38][kind as usize];
         assert_eq!(events.len(), expected, "kind {kind:?}");
     }
@@ -502,7 +517,11 @@ fn oracle_model_exchange_agrees_with_co_simulation_under_surfaces_and_jets() {
             exchange(&mut me, begin, end);
             let [cs, me] = [&mut cs, &mut me].map(|unit| outputs(unit, end));
             assert_same_motion(&cs, &me, &format!("kind {kind:?}, duty {duty}, tick {k}"));
-            assert!((cs.deflections - me.deflections).amax() < 1e-13, "{}", cs.deflections - me.deflections);
+            assert!(
+                (cs.deflections - me.deflections).amax() < 1e-13,
+                "{}",
+                cs.deflections - me.deflections
+            );
             assert!((cs.applied_moment - me.applied_moment).amax() < 1e-7);
         }
     }
@@ -691,7 +710,10 @@ fn with_a_moment_actuators_stay_at_rest_and_commands_do_nothing() {
     }
     let output = outputs(&mut commanded, 0.5);
     assert_eq!(output, outputs(&mut plain, 0.5));
-    assert_eq!((output.applied_moment, output.deflections), (plain.input.moment, Surfaces::zeros()));
+    assert_eq!(
+        (output.applied_moment, output.deflections),
+        (plain.input.moment, Surfaces::zeros())
+    );
 }
 
 #[test]
@@ -813,7 +835,9 @@ fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_excha
     singular[1] = 1.6;
     let mut unit = in_model_exchange(Kind::None);
     unit.set_continuous_states(&singular);
-    assert!(matches!(unit.calculate(0.1), Err(Failure::Discard(text)) if text.contains("singular")));
+    assert!(
+        matches!(unit.calculate(0.1), Err(Failure::Discard(text)) if text.contains("singular"))
+    );
     let mut unit = started(|_| {});
     unit.set_continuous_states(&singular);
     assert!(matches!(unit.calculate(0.0), Err(Failure::Error(text)) if text.contains("singular")));
@@ -823,7 +847,9 @@ fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_excha
         unit.parameters.initial_angles = Vector3::new(0.0, 1.5, 0.0);
         unit.parameters.initial_rates = Vector3::new(0.0, 0.0, -0.5);
     });
-    assert!(matches!(step(&mut unit, 0.0, 1.0), Err(Failure::Error(text)) if text.contains("beta")));
+    assert!(
+        matches!(step(&mut unit, 0.0, 1.0), Err(Failure::Error(text)) if text.contains("beta"))
+    );
 }
 
 #[test]
@@ -831,7 +857,9 @@ fn a_wrong_moment_is_an_error_and_the_unit_starts_again() {
     let mut unit = started(|_| {});
     unit.input.moment.x = f64::NAN;
     assert!(matches!(unit.calculate(0.0), Err(Failure::Error(text)) if text.contains("moment")));
-    assert!(matches!(step(&mut unit, 0.0, 0.04), Err(Failure::Error(text)) if text.contains("moment")));
+    assert!(
+        matches!(step(&mut unit, 0.0, 0.04), Err(Failure::Error(text)) if text.contains("moment"))
+    );
     unit.input.moment.x = 0.0;
     unit.initialize(&CONTEXT).unwrap();
     step(&mut unit, 0.0, 0.04).unwrap();
@@ -909,7 +937,10 @@ fn moments_under_way_are_part_of_the_saved_state() {
 fn a_delay_is_refused_by_name_where_it_cannot_work() {
     let text = |failure: Failure| failure.to_string();
     let in_model_exchange = text(delayed(0.1).new_discrete_states(0.0).unwrap_err());
-    assert!(in_model_exchange.contains("actuation.delay") && in_model_exchange.contains("co-simulation"));
+    assert!(
+        in_model_exchange.contains("actuation.delay")
+            && in_model_exchange.contains("co-simulation")
+    );
     assert!(delayed(0.0).new_discrete_states(0.0).is_ok());
     let ramp = text(delayed(0.1).step(0.0, 0.04, &Ramp(1e5), &mut |_| {}).unwrap_err());
     assert!(ramp.contains("actuation.delay") && ramp.contains("derivatives"), "{ramp}");

@@ -67,7 +67,9 @@ impl Model for ReentryPlant {
             disturbance_moment: plant.disturbance_moment(time, &self.input, &held),
             deflections: plant.deflections,
             deflection_rates: plant.deflection_rates(&held),
-            indicators: plant.time_left(&held).map(|left| if left.is_finite() { left } else { AT_REST }),
+            indicators: plant
+                .time_left(&held)
+                .map(|left| if left.is_finite() { left } else { AT_REST }),
             dynamic_pressure: self.dynamic_pressure,
             measured: if self.event_driven {
                 plant.measured_since_held(time, &self.input)
@@ -109,12 +111,17 @@ impl Model for ReentryPlant {
             plant.fits(before, from.time, from.failed)
         } else {
             let config = self.parameters.config().map_err(failed)?;
-            plant.fits(&Plant::new(&config, from.start_time).map_err(failed)?, from.time, from.failed)
+            plant.fits(
+                &Plant::new(&config, from.start_time).map_err(failed)?,
+                from.time,
+                from.failed,
+            )
         };
         if fits {
             return Ok(());
         }
-        let text = "the saved state does not fit: its plant is not that of its parameters and its time";
+        let text =
+            "the saved state does not fit: its plant is not that of its parameters and its time";
         Err(Failure::Error(text.into()))
     }
 
@@ -153,18 +160,31 @@ impl Model for ReentryPlant {
         let Some(plant) = &mut self.plant else { return Ok(EventInfo::default()) };
         let before = plant.deflections;
         plant.hold(time, &self.input, &self.command);
-        Ok(EventInfo { next_event_time: plant.next_event(time), states_changed: plant.deflections != before })
+        Ok(EventInfo {
+            next_event_time: plant.next_event(time),
+            states_changed: plant.deflections != before,
+        })
     }
 
-    fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure> {
+    fn partial_derivative(
+        &mut self,
+        time: f64,
+        unknown: usize,
+        known: usize,
+    ) -> Result<f64, Failure> {
         let plant = self.ready()?;
         self.check(&plant.state, time)?;
         let held = self.held(plant, time);
-        let (partials, turn_rate_by_trajectory) = plant.partial_derivatives(time, &self.input, &held);
-        let (applied_by_moment, applied_by_deflections) = plant.applied_moment_by_moment_and_deflections();
+        let (partials, turn_rate_by_trajectory) =
+            plant.partial_derivatives(time, &self.input, &held);
+        let (applied_by_moment, applied_by_deflections) =
+            plant.applied_moment_by_moment_and_deflections();
         // In model exchange, commands are taken at events only.
-        let applied_by_jets =
-            if self.event_driven { SMatrix::zeros() } else { plant.applied_moment_by_jets(&self.command) };
+        let applied_by_jets = if self.event_driven {
+            SMatrix::zeros()
+        } else {
+            plant.applied_moment_by_jets(&self.command)
+        };
         let by_applied = |column: Vector3<f64>, i: usize| (partials.by_moment * column)[i];
         Ok(match (table::role(unknown).unknown, table::role(known).known) {
             (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::State(j @ 0..MOTION))) => {
@@ -205,7 +225,9 @@ impl Model for ReentryPlant {
             (Some(_), Some(_)) => 0.0,
             _ => {
                 let text = "there are derivatives of outputs by states and inputs only";
-                return Err(Failure::Error(format!("variable {unknown} by variable {known}: {text}")));
+                return Err(Failure::Error(format!(
+                    "variable {unknown} by variable {known}: {text}"
+                )));
             }
         })
     }

@@ -71,9 +71,11 @@ fn deviation(
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
     let [rate_error, angle_error, tau, delay] =
         [s.rate_error, s.angle_error, s.period_feedback, s.delay].map(number);
-    let errors: Bounds = std::array::from_fn(|i| errors[0][i] * angle_error + errors[1][i] * rate_error);
+    let errors: Bounds =
+        std::array::from_fn(|i| errors[0][i] * angle_error + errors[1][i] * rate_error);
     let swing = shifts.map(|shift| shift * drive.swing);
-    let between = tau.square() / number(8.0) * (drive.norm * (Interval::ONE + reach[4]) + root3 * errors[4]);
+    let between =
+        tau.square() / number(8.0) * (drive.norm * (Interval::ONE + reach[4]) + root3 * errors[4]);
     [
         reach[0] * drive.norm_of_two + root2 * errors[0] + swing[0] + between,
         reach[1] * drive.norm + root3 * errors[1] + swing[1],
@@ -81,7 +83,9 @@ fn deviation(
         reach[3] * drive.norm + root3 * errors[3] + swing[3],
         reach[4] * number(s.disturbance_bound) + errors[4],
         reach[4] * drive.mismatch + swing[4],
-        drive.inertia * number(s.limit_moment) * (reach[4] + drive.turning * (reach[5] + delay * reach[4])),
+        drive.inertia
+            * number(s.limit_moment)
+            * (reach[4] + drive.turning * (reach[5] + delay * reach[4])),
     ]
 }
 
@@ -107,8 +111,8 @@ fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
     let a = number(lemmas.braking) * x;
     let rates = rate + turn_by_angles * x * angle + half * curvature * x * angle.square() + x;
 
-    let slope_by_angles =
-        largest * (turn_by_angles * a + curvature * x.square()) + turn_by_angles * gyroscopic * x.square();
+    let slope_by_angles = largest * (turn_by_angles * a + curvature * x.square())
+        + turn_by_angles * gyroscopic * x.square();
     let slope_by_rates = (largest * number(lemmas.drift_by_rates) + gyroscopic) * x;
     let by_feedback = feedback * number(lemmas.bearing) + feedback_norm * largest + feedback_moment;
     let (four, twelve, further) = (number(4.0), number(12.0), x + seen_rate);
@@ -117,7 +121,8 @@ fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
         + (largest * mixed + four * spread) * further * seen_angle * seen_rate
         + half * (largest * twice + twelve * spread) * further.square() * seen_angle.square();
     let nominal = largest * (a + drift * x.square()) + half * spread * x.square();
-    let moment = by_feedback + slope_by_angles * seen_angle + slope_by_rates * seen_rate + second + nominal;
+    let moment =
+        by_feedback + slope_by_angles * seen_angle + slope_by_rates * seen_rate + second + nominal;
     [rates, moment]
 }
 
@@ -156,7 +161,9 @@ pub fn check(
     let sums = [limit.angle, limit.rate, limit.feedback, limit.feedback_age];
     let last = reach.last()?;
     let names = ["Σ angle", "Σ rate", "Σ feedback", "Σ feedback times age"];
-    for ((name, bound), truth) in names.into_iter().zip(sums).zip([last[0], last[1], last[4], last[5]]) {
+    for ((name, bound), truth) in
+        names.into_iter().zip(sums).zip([last[0], last[1], last[4], last[5]])
+    {
         note(&format!("{name} of a disturbance, for ever"), bound, truth);
     }
     let names = [

@@ -7,7 +7,12 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 /// Numbers in which the formulas can be evaluated: intervals, intervals with derivatives, or plain
 /// numbers.
 pub trait Number:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
 {
     /// Makes a number that does not depend on the coordinates.
     fn constant(value: f64) -> Self;
@@ -99,7 +104,9 @@ impl<const N: usize> Mul for Dual<N> {
     fn mul(self, other: Self) -> Self {
         Self {
             value: self.value * other.value,
-            slope: std::array::from_fn(|i| self.slope[i] * other.value + self.value * other.slope[i]),
+            slope: std::array::from_fn(|i| {
+                self.slope[i] * other.value + self.value * other.slope[i]
+            }),
         }
     }
 }
@@ -110,7 +117,10 @@ impl<const N: usize> Div for Dual<N> {
     #[allow(clippy::suspicious_arithmetic_impl)]
     fn div(self, other: Self) -> Self {
         let value = self.value / other.value;
-        Self { value, slope: std::array::from_fn(|i| (self.slope[i] - value * other.slope[i]) / other.value) }
+        Self {
+            value,
+            slope: std::array::from_fn(|i| (self.slope[i] - value * other.slope[i]) / other.value),
+        }
     }
 }
 
@@ -125,7 +135,9 @@ mod tests {
         let [x, y] = [2.0, 1.0].map(Interval::point);
         let (x, y) = (Dual::<2>::coordinate(0, x), Dual::coordinate(1, y));
         let f = x.squared() / (x + y);
-        for (found, expected) in [(f.value, 4.0 / 3.0), (f.slope[0], 8.0 / 9.0), (f.slope[1], -4.0 / 9.0)] {
+        for (found, expected) in
+            [(f.value, 4.0 / 3.0), (f.slope[0], 8.0 / 9.0), (f.slope[1], -4.0 / 9.0)]
+        {
             assert!(found.contains(expected) && found.width() < 1e-14, "{found:?} {expected}");
         }
     }

@@ -111,7 +111,12 @@ impl Body {
     }
 
     /// Acceleration F(Θ, x, m) of the attitude angles.
-    fn acceleration(&self, angles: &[Series; 2], x: &Vector<Series>, m: &Vector<Series>) -> Vector<Series> {
+    fn acceleration(
+        &self,
+        angles: &[Series; 2],
+        x: &Vector<Series>,
+        m: &Vector<Series>,
+    ) -> Vector<Series> {
         let ((sa, ca), (sb, cb)) = (angles[0].sin_cos(), angles[1].sin_cos());
         let turn = Turn::new(sb, cb);
         let rates = Self::rates(angles, x);
@@ -122,7 +127,12 @@ impl Body {
     }
 
     /// Moment m(Θ, x, a) that gives the acceleration a.
-    fn moment(&self, angles: &[Series; 2], x: &Vector<Series>, a: &Vector<Series>) -> Vector<Series> {
+    fn moment(
+        &self,
+        angles: &[Series; 2],
+        x: &Vector<Series>,
+        a: &Vector<Series>,
+    ) -> Vector<Series> {
         let ((sa, ca), (sb, cb)) = (angles[0].sin_cos(), angles[1].sin_cos());
         let turn = Turn::new(sb, cb);
         let rates = Self::rates(angles, x);
@@ -189,7 +199,9 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
         ([alpha, beta], x, m)
     };
     let held = |[alpha, beta]: [f64; 2]| [Series::constant(alpha), Series::constant(beta)];
-    let along = |[alpha, beta]: [f64; 2], o: [f64; 2]| [Series::line(alpha, o[0]), Series::line(beta, o[1])];
+    let along = |[alpha, beta]: [f64; 2], o: [f64; 2]| {
+        [Series::line(alpha, o[0]), Series::line(beta, o[1])]
+    };
     let line = |x: &Vector<f64>, v: &Vector<f64>| std::array::from_fn(|i| Series::line(x[i], v[i]));
     let acceleration = |z: &[f64; COORDINATES]| {
         let (angles, x, m) = state(z);
@@ -197,11 +209,17 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
     };
     let by_rates = |z: &[f64; COORDINATES]| {
         let (angles, x, m) = state(z);
-        norm(&coefficient(&body.acceleration(&held(angles), &line(&x, &unit(&z[10..])), &vector(&m)), 1))
+        norm(&coefficient(
+            &body.acceleration(&held(angles), &line(&x, &unit(&z[10..])), &vector(&m)),
+            1,
+        ))
     };
     let by_angles = |z: &[f64; COORDINATES]| {
         let (angles, x, m) = state(z);
-        norm(&coefficient(&body.acceleration(&along(angles, angle_unit(z)), &vector(&x), &vector(&m)), 1))
+        norm(&coefficient(
+            &body.acceleration(&along(angles, angle_unit(z)), &vector(&x), &vector(&m)),
+            1,
+        ))
     };
     let jerk = |z: &[f64; COORDINATES]| {
         let (from, x, m) = state(z);
@@ -215,8 +233,9 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
         let angles = std::array::from_fn(|i| Series([from[i], x[i], 0.5 * motion[i].0[1]]));
         2.0 * norm(&coefficient(&body.acceleration(&angles, &motion, &m), 2))
     };
-    let nominal =
-        |z: &[f64; COORDINATES], (x, a): (f64, f64)| (angles(z), ball(&z[2..5], x), ball(&z[5..8], a));
+    let nominal = |z: &[f64; COORDINATES], (x, a): (f64, f64)| {
+        (angles(z), ball(&z[2..5], x), ball(&z[5..8], a))
+    };
     let moment_by_angles = |z: &[f64; COORDINATES]| {
         let (angles, x, a) = nominal(z, sizes);
         norm(&coefficient(&body.moment(&along(angles, angle_unit(z)), &vector(&x), &vector(&a)), 1))
@@ -258,7 +277,12 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
 
 /// Returns bounds of the same nine quantities from the verified inequalities, which hold with
 /// certainty.
-fn from_lemmas(s: &Settings, sup: &Suprema, sizes: (f64, f64), curved: (f64, f64)) -> [Interval; 9] {
+fn from_lemmas(
+    s: &Settings,
+    sup: &Suprema,
+    sizes: (f64, f64),
+    curved: (f64, f64),
+) -> [Interval; 9] {
     let number = Interval::from;
     let (two, half) = (number(2.0), number(0.5));
     let upper = |of: Interval| number(of.high);
@@ -288,7 +312,8 @@ fn from_lemmas(s: &Settings, sup: &Suprema, sizes: (f64, f64), curved: (f64, f64
         + by_angles * acceleration
         + by_rates * (by_rates * acceleration + by_angles * rate);
     let (x, a) = (number(sizes.0), number(sizes.1));
-    let moment_by_angles = largest * (turn * a + curvature * x.square()) + bilinear * turn * x.square();
+    let moment_by_angles =
+        largest * (turn * a + curvature * x.square()) + bilinear * turn * x.square();
     let moment_by_rates = (largest * two * drift + bilinear) * x;
     let nominal = largest * (a + drift * x.square()) + half * bilinear * x.square();
     let (x, a) = (number(curved.0), number(curved.1));
@@ -354,7 +379,8 @@ mod tests {
         let held = angles.map(Series::constant);
         let found = coefficient(&body.acceleration(&held, &vector(&x), &vector(&m)), 0);
         let attitude = Vector3::new(angles[0], angles[1], 0.4);
-        let r = control::linearise::InverseKinematics::at(&attitude).matrix().try_inverse().unwrap();
+        let r =
+            control::linearise::InverseKinematics::at(&attitude).matrix().try_inverse().unwrap();
         let expected = s.body.drift(&attitude, &x.into()) + r * s.body.inverse * Vector3::from(m);
         assert!((Vector3::from(found) - expected).norm() < 1e-14);
         let found = coefficient(&body.moment(&held, &vector(&x), &vector(&found)), 0);

@@ -47,7 +47,8 @@ pub(crate) fn lemma1() -> bool {
     let diagonal = [c.times(&c).times(&square), square.times(&square), square.times(&square)];
     (0..3).all(|i| {
         (0..3).all(|j| {
-            let product = (0..3).fold(zero.clone(), |sum, k| sum.plus(&columns[i][k].times(&columns[j][k])));
+            let product =
+                (0..3).fold(zero.clone(), |sum, k| sum.plus(&columns[i][k].times(&columns[j][k])));
             let expected = if i == j { &diagonal[i] } else { &zero };
             product.plus(&expected.minus()).is_zero()
         })
@@ -60,7 +61,8 @@ mod tests {
 
     #[test]
     fn oracle_sine_and_cosine_in_u() {
-        let (n, s, c) = (Polynomial(vec![1, 0, 1]), Polynomial(vec![0, 2]), Polynomial(vec![1, 0, -1]));
+        let (n, s, c) =
+            (Polynomial(vec![1, 0, 1]), Polynomial(vec![0, 2]), Polynomial(vec![1, 0, -1]));
         assert!(s.times(&s).plus(&c.times(&c)).plus(&n.times(&n).minus()).is_zero());
         assert!(!s.plus(&c).is_zero());
         assert!(lemma1());

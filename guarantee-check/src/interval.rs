@@ -185,8 +185,12 @@ impl Mul for Interval {
         if other == Self::ONE {
             return self;
         }
-        let ends =
-            [self.low * other.low, self.low * other.high, self.high * other.low, self.high * other.high];
+        let ends = [
+            self.low * other.low,
+            self.low * other.high,
+            self.high * other.low,
+            self.high * other.high,
+        ];
         if ends.iter().any(|end| end.is_nan()) {
             return Self::ALL;
         }
@@ -213,7 +217,8 @@ mod tests {
 
     #[test]
     fn oracle_operations_enclose_exact_results() {
-        let (third, tenth) = (Interval::ONE / Interval::from(3.0), Interval::ONE / Interval::from(10.0));
+        let (third, tenth) =
+            (Interval::ONE / Interval::from(3.0), Interval::ONE / Interval::from(10.0));
         // As real numbers, 3 · (1/3) = 1 and 0.3 − 3 · 0.1 = 0, though not as rounded ones.
         assert!((third * Interval::from(3.0)).contains(1.0));
         assert!(tenth.contains(0.1) && tenth.low < tenth.high && tenth.width() < 1e-16);
@@ -233,7 +238,9 @@ mod tests {
             let exp = Interval::point(x).exp();
             for (found, expected) in [(sine, x.sin()), (cosine, x.cos()), (exp, x.exp())] {
                 assert!(
-                    found.low <= expected + 1e-15 && found.high >= expected - 1e-15 && found.width() < 1e-13
+                    found.low <= expected + 1e-15
+                        && found.high >= expected - 1e-15
+                        && found.width() < 1e-13
                 );
             }
             assert!((sine.square() + cosine.square()).contains(1.0));

@@ -10,7 +10,9 @@
 use crate::dual::{Dual, Number};
 use crate::identity;
 use crate::interval::Interval;
-use crate::kinematics::{Turn, Vector, cross, dot, scaled, sine_cosine, square, sum, times, turned};
+use crate::kinematics::{
+    Turn, Vector, cross, dot, scaled, sine_cosine, square, sum, times, turned,
+};
 use crate::search::{Effort, supremum};
 use control::crmpc::{Lemmas, Settings};
 use nalgebra::Matrix3;
@@ -141,7 +143,9 @@ pub fn half_angles(sideslip: f64) -> Interval {
 
 /// Rows of I divided by `scale`, for the inertia exactly as the settings hold it.
 pub fn rows(inertia: &Matrix3<f64>, scale: f64) -> [Vector<Interval>; 3] {
-    std::array::from_fn(|i| std::array::from_fn(|j| Interval::from(inertia[(i, j)]) / Interval::from(scale)))
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| Interval::from(inertia[(i, j)]) / Interval::from(scale))
+    })
 }
 
 /// Inverse by cofactors: its columns are vector products of the rows, divided by the determinant.
@@ -162,7 +166,8 @@ fn gyroscopic<const N: usize>(
 ) -> [Vector<Dual<N>>; 3] {
     let momentum = times(inertia, omega);
     std::array::from_fn(|j| {
-        let unit: Vector<Dual<N>> = std::array::from_fn(|i| Dual::constant(if i == j { 1.0 } else { 0.0 }));
+        let unit: Vector<Dual<N>> =
+            std::array::from_fn(|i| Dual::constant(if i == j { 1.0 } else { 0.0 }));
         sum(cross(&unit, &momentum), cross(omega, &times(inertia, &unit)))
     })
 }
@@ -176,19 +181,39 @@ pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema)
     let r = lemma1(&mut search, lemmas, s.sideslip_domain);
     let (spin, spin_inverse, largest, inverse) = inertia(&mut search, s, lemmas);
     let bearing = bearing(&mut search, s, lemmas);
-    let suprema =
-        Suprema { drift, curvature, turn, mixed, twice, spin, spin_inverse, largest, inverse, r, bearing };
+    let suprema = Suprema {
+        drift,
+        curvature,
+        turn,
+        mixed,
+        twice,
+        spin,
+        spin_inverse,
+        largest,
+        inverse,
+        r,
+        bearing,
+    };
     (search.findings, suprema)
 }
 
-fn geometry(search: &mut Search, lemmas: &Lemmas) -> (Interval, Interval, Interval, Interval, Interval) {
+fn geometry(
+    search: &mut Search,
+    lemmas: &Lemmas,
+) -> (Interval, Interval, Interval, Interval, Interval) {
     let u = search.u;
     let three = [u, SIDE, SIDE];
-    let drift =
-        search.check("‖Ẇ x‖ ≤ b ‖x‖²", lemmas.drift, 1.0, 3, three, |chart, &[u, a, b]| {
+    let drift = search.check(
+        "‖Ẇ x‖ ≤ b ‖x‖²",
+        lemmas.drift,
+        1.0,
+        3,
+        three,
+        |chart, &[u, a, b]| {
             let x = space(chart, a, b);
             square(&turn(u).drift(&x)) / square(&x).squared()
-        });
+        },
+    );
     search.check(
         "‖∂(Ẇ x)/∂x‖ ≤ b ‖x‖ (Frobenius)",
         lemmas.drift_by_rates,
@@ -200,17 +225,21 @@ fn geometry(search: &mut Search, lemmas: &Lemmas) -> (Interval, Interval, Interv
             let column = |j: usize| {
                 let unit: Vector<Dual<3>> =
                     std::array::from_fn(|i| Dual::constant(if i == j { 1.0 } else { 0.0 }));
-                square(&sum(turn.along(&[[x[0], x[1]]], &unit), turn.along(&[[unit[0], unit[1]]], &x)))
+                square(&sum(
+                    turn.along(&[[x[0], x[1]]], &unit),
+                    turn.along(&[[unit[0], unit[1]]], &x),
+                ))
             };
             (column(0) + column(1) + column(2)) / square(&x)
         },
     );
     let statement = "‖∂²(W y)/∂(α, β)²‖ ≤ b ‖y‖ (Frobenius)";
-    let curvature = search.check(statement, lemmas.curvature, 1.0, 3, three, |chart, &[u, a, b]| {
-        let (y, turn) = (space(chart, a, b), turn(u));
-        let of = |i, j| square(&turn.derivative(i, j, &y));
-        (of(2, 0) + of(1, 1) + of(1, 1) + of(0, 2)) / square(&y)
-    });
+    let curvature =
+        search.check(statement, lemmas.curvature, 1.0, 3, three, |chart, &[u, a, b]| {
+            let (y, turn) = (space(chart, a, b), turn(u));
+            let of = |i, j| square(&turn.derivative(i, j, &y));
+            (of(2, 0) + of(1, 1) + of(1, 1) + of(0, 2)) / square(&y)
+        });
     let statement = "‖∂(W y)/∂(α, β)‖ ≤ b ‖y‖ (Frobenius)";
     search.check(statement, lemmas.turn_by_angles, 1.0, 3, three, |chart, &[u, a, b]| {
         let (y, turn) = (space(chart, a, b), turn(u));
@@ -223,18 +252,25 @@ fn geometry(search: &mut Search, lemmas: &Lemmas) -> (Interval, Interval, Interv
         square(&turn(u).along(&[o], &y)) / (length(&o) * square(&y))
     });
     let statement = "‖∂²(Ẇ x)/∂(α, β)∂x‖ ≤ b ‖x‖";
-    let mixed = search.check(statement, lemmas.drift_mixed, 1.0, 6, four, |chart, &[u, o, a, b]| {
-        let (o, x) = (plane(chart % 2, o), space(chart / 2, a, b));
-        let value = turn(u).along(&[o, [x[0], x[1]]], &x);
-        Dual::constant(4.0) * square(&value) / (length(&o) * square(&x).squared())
-    });
+    let mixed =
+        search.check(statement, lemmas.drift_mixed, 1.0, 6, four, |chart, &[u, o, a, b]| {
+            let (o, x) = (plane(chart % 2, o), space(chart / 2, a, b));
+            let value = turn(u).along(&[o, [x[0], x[1]]], &x);
+            Dual::constant(4.0) * square(&value) / (length(&o) * square(&x).squared())
+        });
     let statement = "‖∂²(Ẇ x)/∂(α, β)²‖ ≤ b ‖x‖²";
-    let twice =
-        search.check(statement, lemmas.drift_by_angles_twice, 1.0, 6, four, |chart, &[u, o, a, b]| {
+    let twice = search.check(
+        statement,
+        lemmas.drift_by_angles_twice,
+        1.0,
+        6,
+        four,
+        |chart, &[u, o, a, b]| {
             let (o, x) = (plane(chart % 2, o), space(chart / 2, a, b));
             let value = turn(u).along(&[o, o, [x[0], x[1]]], &x);
             square(&value) / (length(&o) * square(&x)).squared()
-        });
+        },
+    );
     (drift, curvature, by_turn, mixed, twice)
 }
 
@@ -246,31 +282,41 @@ fn lemma1(search: &mut Search, lemmas: &Lemmas, sideslip: f64) -> Interval {
     } else {
         (Interval::ALL, Interval::ALL)
     };
-    search
-        .findings
-        .push(Finding { statement: "‖W‖ ≤ b (exact identity)".into(), bound: 1.0, truth: one });
-    search
-        .findings
-        .push(Finding { statement: "‖R‖ ≤ b (exact identity)".into(), bound: lemmas.r, truth: r });
+    search.findings.push(Finding {
+        statement: "‖W‖ ≤ b (exact identity)".into(),
+        bound: 1.0,
+        truth: one,
+    });
+    search.findings.push(Finding {
+        statement: "‖R‖ ≤ b (exact identity)".into(),
+        bound: lemmas.r,
+        truth: r,
+    });
     r
 }
 
-fn inertia(search: &mut Search, s: &Settings, lemmas: &Lemmas) -> (Interval, Interval, Interval, Interval) {
+fn inertia(
+    search: &mut Search,
+    s: &Settings,
+    lemmas: &Lemmas,
+) -> (Interval, Interval, Interval, Interval) {
     // The inertia is divided by its largest moment, so that all numbers are near one.
     let unit = lemmas.largest;
     let rows = rows(&s.body.inertia, unit);
     let inverse = known::<2>(&inverse(&rows));
     let rows = known::<2>(&rows);
     let two = [SIDE, SIDE];
-    let largest = search.check("‖I y‖ ≤ b ‖y‖", lemmas.largest, unit, 3, two, |chart, &[a, b]| {
-        let y = space(chart, a, b);
-        square(&times(&rows, &y)) / square(&y)
-    });
+    let largest =
+        search.check("‖I y‖ ≤ b ‖y‖", lemmas.largest, unit, 3, two, |chart, &[a, b]| {
+            let y = space(chart, a, b);
+            square(&times(&rows, &y)) / square(&y)
+        });
     let statement = "‖I⁻¹ y‖ ≤ b ‖y‖";
-    let of_inverse = search.check(statement, 1.0 / lemmas.smallest, 1.0 / unit, 3, two, |chart, &[a, b]| {
-        let y = space(chart, a, b);
-        square(&times(&inverse, &y)) / square(&y)
-    });
+    let of_inverse =
+        search.check(statement, 1.0 / lemmas.smallest, 1.0 / unit, 3, two, |chart, &[a, b]| {
+            let y = space(chart, a, b);
+            square(&times(&inverse, &y)) / square(&y)
+        });
     let statement = "‖∂(ω × I ω)/∂ω‖ ≤ b ‖ω‖ (Frobenius)";
     search.check(statement, lemmas.gyroscopic.0, unit, 3, two, |chart, &[a, b]| {
         let omega = space(chart, a, b);

@@ -52,7 +52,8 @@ impl Arguments {
     fn settings(&self) -> Result<Settings, String> {
         let mut s = Settings::new(Constraints::Robust);
         let degrees = |value: Option<f64>, otherwise: f64| value.map_or(otherwise, f64::to_radians);
-        s.feedback = Gain { k1: self.k1.unwrap_or(s.feedback.k1), k2: self.k2.unwrap_or(s.feedback.k2) };
+        s.feedback =
+            Gain { k1: self.k1.unwrap_or(s.feedback.k1), k2: self.k2.unwrap_or(s.feedback.k2) };
         s.delay = self.delay.unwrap_or(s.delay);
         s.disturbance_bound = degrees(self.disturbance_deg, s.disturbance_bound);
         s.inertia_error = self.inertia_error.unwrap_or(s.inertia_error);
@@ -69,9 +70,9 @@ impl Arguments {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let report = arguments
-        .settings()
-        .and_then(|settings| Report::new(&settings, arguments.gap).map_err(|error| error.to_string()));
+    let report = arguments.settings().and_then(|settings| {
+        Report::new(&settings, arguments.gap).map_err(|error| error.to_string())
+    });
     let report = match report {
         Ok(report) => report,
         Err(error) => {
@@ -100,7 +101,12 @@ fn main() -> ExitCode {
         }
     }
     for (axis, printed) in report.printed_terminal.iter().enumerate() {
-        println!("The same with the printed G, axis {}: [{:.6}, {:.6}]", axis + 1, printed.low, printed.high);
+        println!(
+            "The same with the printed G, axis {}: [{:.6}, {:.6}]",
+            axis + 1,
+            printed.low,
+            printed.high
+        );
     }
     println!("\nThe horizon may end with ‖x‖ ≤ {:.6} rad/s.", report.terminal_rate);
     if report.holds() {

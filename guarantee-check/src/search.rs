@@ -148,6 +148,9 @@ mod tests {
         let unit = Interval::new(0.0, 1.0);
         let effort = Effort { gap: 1e-9, goal: f64::INFINITY, boxes: 100_000 };
         let found = supremum(&f, 1, [unit, unit], effort);
-        assert!(found.low <= 1.0 / 27.0 && found.high >= 1.0 / 27.0 && found.width() < 1e-9, "{found:?}");
+        assert!(
+            found.low <= 1.0 / 27.0 && found.high >= 1.0 / 27.0 && found.width() < 1e-9,
+            "{found:?}"
+        );
     }
 }

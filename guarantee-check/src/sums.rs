@@ -120,7 +120,8 @@ impl Axis {
     /// Bounds on the effect of any |Δ| ≤ 1 within 0, 1, …, `steps` periods, and last for ever.
     pub fn reach(&self, steps: usize) -> Vec<Bounds> {
         let unseen = [Interval::from(0.5) * self.latency.square(), self.latency];
-        let (mut seen, mut feedback, mut age) = ([Interval::ZERO; 2], Interval::ZERO, Interval::ZERO);
+        let (mut seen, mut feedback, mut age) =
+            ([Interval::ZERO; 2], Interval::ZERO, Interval::ZERO);
         let mut all = Vec::with_capacity(steps + 2);
         let bounds = |seen: &Pair, feedback: Interval, age: Interval| {
             [seen[0] + unseen[0], seen[1] + unseen[1], seen[0], seen[1], feedback, age]
@@ -143,7 +144,11 @@ impl Axis {
         let old = end + Interval::from(steps as f64) * self.period;
         let more = |value: Interval, by: Interval| value + Interval::new(0.0, by.high);
         let seen = seen.map(|seen| more(seen, tail));
-        all.push(bounds(&seen, more(feedback, gain * tail), more(age, gain * (tail * old + moment))));
+        all.push(bounds(
+            &seen,
+            more(feedback, gain * tail),
+            more(age, gain * (tail * old + moment)),
+        ));
         all
     }
 
@@ -186,7 +191,14 @@ impl Axis {
             [own[0], own[1], own[0] + newest[0], own[1] + newest[1], feedback, Interval::ZERO]
         };
         let mut all = Vec::with_capacity(steps + 2);
-        all.push([newest[0], newest[1], Interval::ZERO, Interval::ZERO, Interval::ZERO, Interval::ZERO]);
+        all.push([
+            newest[0],
+            newest[1],
+            Interval::ZERO,
+            Interval::ZERO,
+            Interval::ZERO,
+            Interval::ZERO,
+        ]);
         let mut largest = [Interval::ZERO; 3];
         for (n, power) in self.transitions(steps).enumerate() {
             let value = applied(&power, &first);
@@ -231,7 +243,8 @@ pub fn terminal_decrease(s: &Settings) -> [[Interval; 2]; 3] {
 fn decrease(s: &Settings, weight: &Matrix2<f64>, p: Vector2<f64>, q: f64) -> Interval {
     let phi = step(s.terminal, s.period_optimisation);
     let gain = [s.terminal.k1, s.terminal.k2].map(Interval::from);
-    let g: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| Interval::from(weight[(i, j)])));
+    let g: Matrix =
+        std::array::from_fn(|i| std::array::from_fn(|j| Interval::from(weight[(i, j)])));
     let after = product(&transposed(&phi), &product(&g, &phi));
     let h = Interval::from(s.period_optimisation);
     let of = |i: usize, j: usize| {

@@ -21,7 +21,9 @@ fn assert_all(findings: &[Finding]) {
 #[test]
 fn every_bound_holds_for_the_published_settings_and_with_a_delay() {
     let delayed = [with(-3.0, -4.0, 0.04), with(-2.0, -4.0, 0.04), with(-2.0, -4.0, 0.116)];
-    for settings in [Settings::new(Constraints::Robust), with(-5.0, -5.0, 0.0)].into_iter().chain(delayed) {
+    for settings in
+        [Settings::new(Constraints::Robust), with(-5.0, -5.0, 0.0)].into_iter().chain(delayed)
+    {
         let report = Report::new(&settings, GAP).unwrap();
         for (_, findings) in report.sections() {
             assert!(!findings.is_empty());
@@ -70,8 +72,11 @@ fn bounds_that_are_too_small_are_found_false() {
     bounds.acceleration *= 0.9;
     let (mut findings, suprema) = lemmas::check(&settings, &bounds, GAP);
     findings.extend(dynamics::check(&settings, &bounds, &suprema, 0.05));
-    let wrong: Vec<&str> =
-        findings.iter().filter(|finding| finding.fails()).map(|finding| finding.statement.as_str()).collect();
+    let wrong: Vec<&str> = findings
+        .iter()
+        .filter(|finding| finding.fails())
+        .map(|finding| finding.statement.as_str())
+        .collect();
     let expected = [
         "‖Ẇ x‖ ≤ b ‖x‖²",
         "‖∂(Ẇ x)/∂x‖ ≤ b ‖x‖ (Frobenius)",
@@ -87,8 +92,9 @@ fn a_terminal_rate_that_is_too_large_is_found_false() {
     let settings = Settings::new(Constraints::Robust);
     let design = control::crmpc::Design::new(&settings).unwrap();
     let rate = design.assessment.terminal_rate;
-    let at =
-        |rate: f64| assessment::check(&settings, &Lemmas::new(&settings), &design.tightening, rate).unwrap();
+    let at = |rate: f64| {
+        assessment::check(&settings, &Lemmas::new(&settings), &design.tightening, rate).unwrap()
+    };
     let false_ones = |rate: f64| at(rate).iter().filter(|finding| finding.fails()).count();
     assert_eq!(false_ones(rate), 0);
     assert_eq!(false_ones(1.01 * rate), 1);

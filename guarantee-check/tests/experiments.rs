@@ -31,14 +31,16 @@ fn parameters(file: &Path) -> Table {
     };
     let beside = |base: &Value| file.parent().unwrap().join(base.as_str().unwrap());
     let mut all: Table = bases.iter().flat_map(|base| parameters(&beside(base))).collect();
-    let own = table["components"].get("controller").and_then(|controller| controller.get("parameters"));
+    let own =
+        table["components"].get("controller").and_then(|controller| controller.get("parameters"));
     all.extend(own.and_then(Value::as_table).cloned().unwrap_or_default());
     all
 }
 
 /// The settings of the component `controller`.
 fn settings(experiment: &str) -> Settings {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../orchestrator/experiments/crmpc-2022");
+    let folder =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../orchestrator/experiments/crmpc-2022");
     let parameters = parameters(&folder.join(experiment));
     assert_eq!(parameters["limit.moment"].as_float(), Some(1.356e5), "a value of the base");
     let mut s = Settings::new(Constraints::Robust);
@@ -60,7 +62,8 @@ fn settings(experiment: &str) -> Settings {
             "period.optimisation" => s.period_optimisation = quantity(value),
             // The bounds do not depend on the other parameters, which have these prefixes.
             _ => {
-                let free = ["reference.", "weight.", "terminal.", "tube.", "inertia.I", "saturation"];
+                let free =
+                    ["reference.", "weight.", "terminal.", "tube.", "inertia.I", "saturation"];
                 assert!(free.iter().any(|prefix| name.starts_with(prefix)), "{name}");
             }
         }

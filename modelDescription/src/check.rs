@@ -21,7 +21,9 @@ impl ModelDescription {
                 && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
         };
         if !identifier(&self.name) {
-            return Some("the name must be a C identifier, as FMI makes it the model identifier".into());
+            return Some(
+                "the name must be a C identifier, as FMI makes it the model identifier".into(),
+            );
         }
         if !self.co_simulation && !self.model_exchange {
             return Some("is neither for co-simulation nor for model exchange".into());
@@ -56,13 +58,17 @@ impl ModelDescription {
                 return Some(format!("'{state}' has a second derivative, '{name}'"));
             }
             match &variable.kind {
-                Kind::Real { unit: Some(unit), .. } if *units.entry(&unit.name).or_insert(unit) != unit => {
+                Kind::Real { unit: Some(unit), .. }
+                    if *units.entry(&unit.name).or_insert(unit) != unit =>
+                {
                     return Some(format!(
                         "'{name}' defines unit '{}' differently from a variable before it",
                         unit.name
                     ));
                 }
-                Kind::Enumeration { of, .. } if *enumerations.entry(&of.name).or_insert(of) != of => {
+                Kind::Enumeration { of, .. }
+                    if *enumerations.entry(&of.name).or_insert(of) != of =>
+                {
                     return Some(format!(
                         "'{name}' defines '{}' differently from a variable before it",
                         of.name
@@ -75,10 +81,14 @@ impl ModelDescription {
     }
 
     fn find_problem_in(&self, variable: &Variable) -> Option<String> {
-        if variable.variability == Variability::Continuous && !matches!(variable.kind, Kind::Real { .. }) {
+        if variable.variability == Variability::Continuous
+            && !matches!(variable.kind, Kind::Real { .. })
+        {
             return Some("is not a Real, so it must be fixed or discrete".into());
         }
-        if (variable.causality == Causality::Parameter) != (variable.variability == Variability::Fixed) {
+        if (variable.causality == Causality::Parameter)
+            != (variable.variability == Variability::Fixed)
+        {
             return Some("must be both a parameter and fixed, or neither".into());
         }
         let known = |name: &&String| {
@@ -93,7 +103,9 @@ impl ModelDescription {
         }
         if let Some(state) = variable.derivative_of() {
             let continuous = |other: &Variable| {
-                other.name == state && other.is_calculated() && other.variability == Variability::Continuous
+                other.name == state
+                    && other.is_calculated()
+                    && other.variability == Variability::Continuous
             };
             if !self.variables.iter().any(continuous) {
                 return Some(format!(
@@ -119,7 +131,8 @@ impl ModelDescription {
         };
         if present != wanted {
             return Some(
-                if wanted { "needs a start value" } else { "is calculated and has a start value" }.into(),
+                if wanted { "needs a start value" } else { "is calculated and has a start value" }
+                    .into(),
             );
         }
         (!in_range).then(|| "has a start value outside its limits".into())
@@ -127,7 +140,9 @@ impl ModelDescription {
 }
 
 fn within<T: PartialOrd>(min: Option<T>, value: Option<T>, max: Option<T>) -> bool {
-    value.is_none_or(|value| min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max))
+    value.is_none_or(|value| {
+        min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max)
+    })
 }
 
 /// Whether a name follows FMI's structured naming convention without quoted names: `a.b[1,2].c`, or
@@ -135,11 +150,13 @@ fn within<T: PartialOrd>(min: Option<T>, value: Option<T>, max: Option<T>) -> bo
 fn structured(name: &str) -> bool {
     let inner = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')')).unwrap_or(name);
     inner.split('.').all(|part| {
-        let (word, indices) = part.split_once('[').map_or((part, None), |(word, rest)| (word, Some(rest)));
+        let (word, indices) =
+            part.split_once('[').map_or((part, None), |(word, rest)| (word, Some(rest)));
         let index = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
         word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
             && word.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
-            && indices
-                .is_none_or(|rest| rest.strip_suffix(']').is_some_and(|list| list.split(',').all(index)))
+            && indices.is_none_or(|rest| {
+                rest.strip_suffix(']').is_some_and(|list| list.split(',').all(index))
+            })
     })
 }

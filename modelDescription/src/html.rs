@@ -66,8 +66,14 @@ impl ModelDescription {
         write!(page, "<p class=\"quiet\">{author}. Licence: {license}.</p>\n</body>\n</html>\n")
     }
 
-    fn write_table(&self, page: &mut String, title: &str, causality: Causality) -> std::fmt::Result {
-        let rows: Vec<_> = self.variables.iter().filter(|variable| variable.causality == causality).collect();
+    fn write_table(
+        &self,
+        page: &mut String,
+        title: &str,
+        causality: Causality,
+    ) -> std::fmt::Result {
+        let rows: Vec<_> =
+            self.variables.iter().filter(|variable| variable.causality == causality).collect();
         if rows.is_empty() {
             return Ok(());
         }
@@ -79,8 +85,11 @@ impl ModelDescription {
              <tr><th>Name</th><th>Unit</th>{start}<th>Limits</th><th>Description</th></tr>\n"
         )?;
         for variable in rows {
-            let start =
-                if started { format!("<td>{}</td>", escape(start_value(variable))) } else { String::new() };
+            let start = if started {
+                format!("<td>{}</td>", escape(start_value(variable)))
+            } else {
+                String::new()
+            };
             writeln!(
                 page,
                 "<tr><td><code>{}</code></td><td>{}</td>{start}<td>{}</td><td>{}</td></tr>",
@@ -102,7 +111,12 @@ impl ModelDescription {
                 continue;
             }
             seen.push(&of.name);
-            write!(page, "<h2>{}</h2>\n<p>{}</p>\n<dl>\n", escape(&of.name), escape(&of.description))?;
+            write!(
+                page,
+                "<h2>{}</h2>\n<p>{}</p>\n<dl>\n",
+                escape(&of.name),
+                escape(&of.description)
+            )?;
             for ((item, description), value) in of.items.iter().zip(1..) {
                 let (item, description) = (escape(item), escape(description));
                 writeln!(page, "<dt>{value} <code>{item}</code></dt><dd>{description}</dd>")?;
@@ -140,8 +154,8 @@ fn start_value(variable: &Variable) -> String {
         Kind::Real { start: Some(start), unit, .. } => {
             let display = unit.as_ref().and_then(|unit| unit.display.as_ref());
             let shown = display.filter(|_| *start != 0.0);
-            let shown =
-                shown.map(|display| format!(" = {} {}", number(start * display.factor), display.name));
+            let shown = shown
+                .map(|display| format!(" = {} {}", number(start * display.factor), display.name));
             number(*start) + &shown.unwrap_or_default()
         }
         Kind::Integer { start: Some(start), .. } => start.to_string(),

@@ -17,17 +17,20 @@ use std::path::Path;
 pub fn descriptions(path: &Path) -> Result<Vec<ModelDescription>, Error> {
     let lacking = |problem: String| Error::NoDescriptions { path: path.to_owned(), problem };
     // The system would search for a bare file name on its library path.
-    let file = path.canonicalize().map_err(|source| Error::File { path: path.to_owned(), source })?;
+    let file =
+        path.canonicalize().map_err(|source| Error::File { path: path.to_owned(), source })?;
     // SAFETY: opening runs the library's initializers. The user named the library as one to be
     // opened, and so vouches that they are sound.
     let library = unsafe { libloading::Library::new(&file) }
         .map_err(|source| Error::Open { path: path.to_owned(), source })?;
     // SAFETY: the type is that of the function which export_fmus! defines under this name.
-    let describe = unsafe { library.get::<unsafe extern "C" fn() -> *mut c_char>(c"fmu_model_descriptions") }
-        .map_err(|_| lacking("no function fmu_model_descriptions".into()))?;
+    let describe =
+        unsafe { library.get::<unsafe extern "C" fn() -> *mut c_char>(c"fmu_model_descriptions") }
+            .map_err(|_| lacking("no function fmu_model_descriptions".into()))?;
     // SAFETY: the type is that of the function which export_fmus! defines under this name.
-    let free = unsafe { library.get::<unsafe extern "C" fn(*mut c_char)>(c"fmu_free_model_descriptions") }
-        .map_err(|_| lacking("no function fmu_free_model_descriptions".into()))?;
+    let free =
+        unsafe { library.get::<unsafe extern "C" fn(*mut c_char)>(c"fmu_free_model_descriptions") }
+            .map_err(|_| lacking("no function fmu_free_model_descriptions".into()))?;
     // SAFETY: the function takes no arguments and has no preconditions, and the library is still
     // loaded.
     let text = unsafe { describe() };

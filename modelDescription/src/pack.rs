@@ -21,7 +21,8 @@ pub struct Extras {
 
 /// Text that keeps the folder in the archive, because some importers pass no resource location for
 /// a unit without it.
-const RESOURCES_README: &str = "Files that the unit reads while it initializes. This unit needs none.\n";
+const RESOURCES_README: &str =
+    "Files that the unit reads while it initializes. This unit needs none.\n";
 
 /// Folder and file suffix of libraries on the platform for which this program was built.
 fn platform() -> (&'static str, &'static str) {
@@ -69,14 +70,18 @@ pub fn pack(
     let path = output.join(format!("{name}.fmu"));
     // The archive gets another name first, so that nobody ever opens half an archive.
     let partial = output.join(format!("{name}.fmu.part"));
-    let file = File::create(&partial).map_err(|source| Error::File { path: partial.clone(), source })?;
+    let file =
+        File::create(&partial).map_err(|source| Error::File { path: partial.clone(), source })?;
     write_archive(BufWriter::new(file), &entries)
         .map_err(|source| Error::Archive { path: path.clone(), source })?;
     fs::rename(&partial, &path).map_err(|source| Error::File { path: path.clone(), source })?;
     Ok(path)
 }
 
-fn write_archive(file: BufWriter<File>, entries: &[(String, Vec<u8>)]) -> zip::result::ZipResult<()> {
+fn write_archive(
+    file: BufWriter<File>,
+    entries: &[(String, Vec<u8>)],
+) -> zip::result::ZipResult<()> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default());
@@ -110,7 +115,11 @@ fn add_licenses(entries: &mut Vec<(String, Vec<u8>)>, licenses: &[PathBuf]) -> R
     Ok(())
 }
 
-fn add_folder(entries: &mut Vec<(String, Vec<u8>)>, prefix: &str, folder: &Path) -> Result<(), Error> {
+fn add_folder(
+    entries: &mut Vec<(String, Vec<u8>)>,
+    prefix: &str,
+    folder: &Path,
+) -> Result<(), Error> {
     let failed = |source| Error::File { path: folder.to_owned(), source };
     for entry in fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();

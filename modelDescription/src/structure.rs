@@ -61,7 +61,11 @@ impl ModelDescription {
 
     /// Value references, ascending, of the inputs and parameters on which the variable at
     /// `reference` depends at initialization, where the states follow from the parameters.
-    pub(crate) fn initial_dependencies(&self, reference: usize, states: &[(usize, usize)]) -> Vec<usize> {
+    pub(crate) fn initial_dependencies(
+        &self,
+        reference: usize,
+        states: &[(usize, usize)],
+    ) -> Vec<usize> {
         let inputs = self.dependencies(reference, states);
         let known = |(i, variable): (usize, &Variable)| match variable.causality {
             Causality::Parameter => Some(i),

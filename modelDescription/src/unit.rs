@@ -34,7 +34,8 @@ pub struct Unit {
 }
 
 fn unit(name: &str, [kg, m, s, rad]: [i32; 4], display: Option<&str>) -> Unit {
-    let display = display.map(|name| DisplayUnit { name: name.into(), factor: 180.0 / std::f64::consts::PI });
+    let display =
+        display.map(|name| DisplayUnit { name: name.into(), factor: 180.0 / std::f64::consts::PI });
     Unit { name: name.into(), kg, m, s, ampere: 0, kelvin: 0, rad, display }
 }
 

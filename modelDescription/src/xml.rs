@@ -52,7 +52,8 @@ impl ModelDescription {
             self.write_enumerations(xml)?;
             parent(xml, "LogCategories", vec![], |xml| {
                 LOG_CATEGORIES.iter().try_for_each(|(name, description)| {
-                    let attributes = vec![("name", (*name).into()), ("description", (*description).into())];
+                    let attributes =
+                        vec![("name", (*name).into()), ("description", (*description).into())];
                     leaf(xml, "Category", attributes)
                 })
             })?;
@@ -157,7 +158,8 @@ impl ModelDescription {
         enumerations.sort_by(|a, b| a.name.cmp(&b.name));
         parent(xml, "TypeDefinitions", vec![], |xml| {
             enumerations.iter().try_for_each(|of| {
-                let attributes = vec![("name", of.name.clone()), ("description", of.description.clone())];
+                let attributes =
+                    vec![("name", of.name.clone()), ("description", of.description.clone())];
                 parent(xml, "SimpleType", attributes, |xml| {
                     parent(xml, "Enumeration", vec![], |xml| {
                         of.items.iter().zip(1..).try_for_each(|((name, description), value)| {
@@ -187,7 +189,8 @@ impl ModelDescription {
         ];
         parent(xml, "ScalarVariable", attributes, |xml| match &variable.kind {
             Kind::Real { unit, min, max, nominal, start, derivative_of } => {
-                let index = derivative_of.as_deref().and_then(|name| self.position(name)).map(|i| i + 1);
+                let index =
+                    derivative_of.as_deref().and_then(|name| self.position(name)).map(|i| i + 1);
                 let display = unit.as_ref().and_then(|unit| unit.display.as_ref());
                 let attributes = [
                     ("unit", unit.as_ref().map(|unit| unit.name.clone())),
@@ -202,12 +205,20 @@ impl ModelDescription {
             }
             Kind::Integer { min, max, start } => {
                 let attributes = [("min", *min), ("max", *max), ("start", *start)];
-                leaf(xml, "Integer", given(attributes.map(|(name, x)| (name, x.map(|x| x.to_string())))))
+                leaf(
+                    xml,
+                    "Integer",
+                    given(attributes.map(|(name, x)| (name, x.map(|x| x.to_string())))),
+                )
             }
-            Kind::Boolean { start } => leaf(xml, "Boolean", given([("start", start.map(|x| x.to_string()))])),
+            Kind::Boolean { start } => {
+                leaf(xml, "Boolean", given([("start", start.map(|x| x.to_string()))]))
+            }
             Kind::Enumeration { of, start } => {
-                let attributes =
-                    [("declaredType", Some(of.name.clone())), ("start", start.map(|x| x.to_string()))];
+                let attributes = [
+                    ("declaredType", Some(of.name.clone())),
+                    ("start", start.map(|x| x.to_string())),
+                ];
                 leaf(xml, "Enumeration", given(attributes))
             }
             Kind::String { start } => leaf(xml, "String", given([("start", start.clone())])),
@@ -242,8 +253,13 @@ fn unknowns(
     }
     parent(xml, name, vec![], |xml| {
         list.iter().try_for_each(|&i| {
-            let known: Vec<_> = dependencies(i).iter().map(|known| (known + 1).to_string()).collect();
-            leaf(xml, "Unknown", vec![("index", (i + 1).to_string()), ("dependencies", known.join(" "))])
+            let known: Vec<_> =
+                dependencies(i).iter().map(|known| (known + 1).to_string()).collect();
+            leaf(
+                xml,
+                "Unknown",
+                vec![("index", (i + 1).to_string()), ("dependencies", known.join(" "))],
+            )
         })
     })
 }

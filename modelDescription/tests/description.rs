@@ -14,7 +14,14 @@ fn variable(name: &str, causality: Causality, variability: Variability, kind: Ki
 }
 
 fn real(start: Option<f64>) -> Kind {
-    Kind::Real { unit: Some(angle()), min: None, max: None, nominal: None, start, derivative_of: None }
+    Kind::Real {
+        unit: Some(angle()),
+        min: None,
+        max: None,
+        nominal: None,
+        start,
+        derivative_of: None,
+    }
 }
 
 /// A unit with these positions: 0 parameter, 1 enumeration, 2 input, 3 state, 4 derivative, 5
@@ -67,7 +74,12 @@ fn unit() -> ModelDescription {
         co_simulation: true,
         model_exchange: true,
         event_indicators: 0,
-        default_experiment: DefaultExperiment { start: 0.0, stop: 50.0, tolerance: 1e-4, step: 0.04 },
+        default_experiment: DefaultExperiment {
+            start: 0.0,
+            stop: 50.0,
+            tolerance: 1e-4,
+            step: 0.04,
+        },
         variables,
     }
 }
@@ -98,7 +110,10 @@ fn contradictions_are_found_and_name_the_variable() {
         (|unit| unit.variables[5].dependencies.push("gain".into()), "'y' depends on 'gain'"),
         (|unit| unit.variables[5].dependencies.push("v".into()), "'y' depends on 'v'"),
         (|unit| unit.variables[2].kind = real(None), "'u[1]' needs a start value"),
-        (|unit| unit.variables[5].kind = real(Some(1.0)), "'y' is calculated and has a start value"),
+        (
+            |unit| unit.variables[5].kind = real(Some(1.0)),
+            "'y' is calculated and has a start value",
+        ),
         (|unit| unit.variables[6].variability = Variability::Continuous, "'count' is not a Real"),
         (
             |unit| unit.variables[0].variability = Variability::Discrete,
@@ -237,8 +252,11 @@ fn the_archive_is_complete_and_the_same_every_time() {
     fs::create_dir_all(at("data/deep")).unwrap();
     fs::write(at("data/z.csv"), "1").unwrap();
     fs::write(at("data/deep/a.csv"), "2").unwrap();
-    let extras =
-        Extras { resources: Some(at("data")), licenses: vec![at("LICENSE-A"), at("LICENSE-B")], icons: None };
+    let extras = Extras {
+        resources: Some(at("data")),
+        licenses: vec![at("LICENSE-A"), at("LICENSE-B")],
+        icons: None,
+    };
     let path = pack(&unit(), &at("library"), folder.path(), &extras).unwrap();
     assert_eq!(path, at("Small.fmu"));
     let first = fs::read(&path).unwrap();
@@ -286,7 +304,7 @@ fn files_that_are_no_unit_library_are_refused() {
     fs::write(&text, "not a library").unwrap();
     let error = library::descriptions(&text).unwrap_err();
     assert!(matches!(error, Error::Open { .. }), "{error}");
-    let missing =
-        pack(&unit(), &folder.path().join("nothing"), folder.path(), &Extras::default()).unwrap_err();
+    let missing = pack(&unit(), &folder.path().join("nothing"), folder.path(), &Extras::default())
+        .unwrap_err();
     assert!(missing.to_string().contains("nothing"));
 }

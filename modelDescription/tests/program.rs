@@ -35,7 +35,9 @@ fn a_library_without_units_is_told_how_to_get_some() {
     let folder = tempfile::tempdir().unwrap();
     // The library is certain to exist, because this test itself runs with it.
     let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
-    let Some(library) = maps.split_whitespace().find(|path| path.contains("libc.so")) else { return };
+    let Some(library) = maps.split_whitespace().find(|path| path.contains("libc.so")) else {
+        return;
+    };
     let output = fmu_pack(&[library, "--output", folder.path().to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&output.stderr).contains("export_fmus!"));

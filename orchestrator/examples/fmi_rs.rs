@@ -1,6 +1,7 @@
-//! Runs FMUs by fmi-rs alone: its importer, its simulation of one unit, and two units wired by hand. Writes CSV.
+//! Runs FMUs with fmi-rs alone: its importer, its simulation of one unit, and two units that are
+//! wired by hand. The results are written as CSV.
 //!
-//! `fmi_rs cs|me FMU STEP STOP OUT`, `fmi_rs loop CONTROLLER PLANT STEP STOP OUT`
+//! The usage is `fmi_rs cs|me FMU STEP STOP OUT` or `fmi_rs loop CONTROLLER PLANT STEP STOP OUT`.
 
 use fmi_rs::fmi2::builder::FMU2Builder;
 use fmi_rs::fmi2::types::fmi2Status;
@@ -15,32 +16,39 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::sync::Arc;
 
-/// What the plant gives to the controller, and the controller to the plant.
-const STATE: [&str; 6] = ["attitude.alpha", "attitude.beta", "attitude.sigma", "rate.p", "rate.q", "rate.r"];
+/// Variables that the plant passes to the controller, and variables that the controller passes to
+/// the plant.
+const STATE: [&str; 6] =
+    ["attitude.alpha", "attitude.beta", "attitude.sigma", "rate.p", "rate.q", "rate.r"];
 const MOMENT: [&str; 3] = ["moment.x", "moment.y", "moment.z"];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments[..] {
-        [kind @ ("cs" | "me"), fmu, step, stop, out] => alone(kind, fmu, step.parse()?, stop.parse()?, out),
+        [kind @ ("cs" | "me"), fmu, step, stop, out] => {
+            alone(kind, fmu, step.parse()?, stop.parse()?, out)
+        }
         ["loop", controller, plant, step, stop, out] => {
             closed_loop(controller, plant, step.parse()?, stop.parse()?, out)
         }
-        _ => {
-            Err("usage: fmi_rs cs|me FMU STEP STOP OUT, or fmi_rs loop CONTROLLER PLANT STEP STOP OUT".into())
-        }
+        _ => Err(
+            "usage: fmi_rs cs|me FMU STEP STOP OUT, or fmi_rs loop CONTROLLER PLANT STEP STOP OUT"
+                .into(),
+        ),
     }
 }
 
-/// One unit with its start values, by the library's own simulation. In model exchange by its Euler method.
+/// Simulates one unit with its start values, with the library's own simulation. Model exchange uses
+/// the library's Euler method.
 #[expect(clippy::arc_with_non_send_sync, reason = "what the library wants")]
 fn alone(kind: &str, path: &str, step: f64, stop: f64, out: &str) -> Result<(), Box<dyn Error>> {
     let opened = FMU2Builder::new(&path)?;
     let description = Arc::new(opened.model_description);
     let outputs = description.modelVariables.iter().enumerate();
     let outputs = outputs.filter(|(_, variable)| variable.causality == Causality::Output);
-    let trajectories = Trajectories::new(description.clone(), outputs.map(|(index, _)| index).collect());
+    let trajectories =
+        Trajectories::new(description.clone(), outputs.map(|(index, _)| index).collect());
     let recorder = Arc::new(Recorder::new(trajectories));
     let settings = SimulationSettings {
         unzipdir: opened.unzipdir.path().to_path_buf(),
@@ -65,13 +73,18 @@ fn alone(kind: &str, path: &str, step: f64, stop: f64, out: &str) -> Result<(), 
     if kind == "cs" {
         cs::simulate(&settings, None, recorder.clone())?;
     } else {
-        me::simulate(&settings, &ForwardEulerFactory { fixed_step_size: step }, None, recorder.clone())?;
+        me::simulate(
+            &settings,
+            &ForwardEulerFactory { fixed_step_size: step },
+            None,
+            recorder.clone(),
+        )?;
     }
     csv::write_csv(&recorder.trajectories.borrow(), out)?;
     Ok(())
 }
 
-/// A unit that is stepped by hand, and the value references of what it gives and takes.
+/// A unit that is stepped by hand, with the value references of its outputs and inputs.
 struct Unit {
     fmu: Arc<FMU2<CS>>,
     state: Vec<u32>,
@@ -83,7 +96,8 @@ impl Unit {
     fn new(path: &str) -> Result<Self, Box<dyn Error>> {
         let opened = FMU2Builder::new(&Path::new(path))?;
         let references = |names: &[&str]| -> Result<Vec<u32>, Box<dyn Error>> {
-            let reference = |name: &&str| Ok(opened.model_description.variable_by_name(name)?.valueReference);
+            let reference =
+                |name: &&str| Ok(opened.model_description.variable_by_name(name)?.valueReference);
             names.iter().map(reference).collect()
         };
         let (state, moment) = (references(&STATE)?, references(&MOMENT)?);
@@ -95,8 +109,15 @@ fn done(status: fmi2Status) -> Result<(), Box<dyn Error>> {
     if status == fmi2Status::Ok { Ok(()) } else { Err(format!("{status:?}").into()) }
 }
 
-/// At each communication point the state goes to the controller, then its moment to the plant.
-fn closed_loop(controller: &str, plant: &str, step: f64, stop: f64, out: &str) -> Result<(), Box<dyn Error>> {
+/// Simulates a closed loop. At each communication point the state goes to the controller, and then
+/// the moment to the plant.
+fn closed_loop(
+    controller: &str,
+    plant: &str,
+    step: f64,
+    stop: f64,
+    out: &str,
+) -> Result<(), Box<dyn Error>> {
     let (controller, plant) = (Unit::new(controller)?, Unit::new(plant)?);
     let (mut state, mut moment) = ([0.0; 6], [0.0; 3]);
     let mut pass_on = || -> Result<String, Box<dyn Error>> {

@@ -1,4 +1,5 @@
-//! Which of a unit's variables are shown, and all that is known of them as JSON.
+//! Chooses which variables of a unit are shown, and prints everything that is known about them as
+//! JSON.
 
 use cosim::error::Error;
 use fmu_import::description::{Interface, Kind, ModelDescription, Variable};
@@ -7,12 +8,14 @@ use fmu_import::names;
 use serde_json::{Value, json};
 use std::io::{self, Write};
 
-/// Chooses variables.
+/// Choice of the variables that are shown.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct Filter {
-    /// Variables to show: a name, a pattern with *, or a part of a name. All, if it is left out.
+    /// Show only these variables: a name, a pattern with *, or a part of a name. Without it all
+    /// variables are shown.
     pub(crate) pattern: Option<String>,
-    /// Variables of this causality only: parameter, calculatedParameter, input, output, local or independent.
+    /// Show only variables of this causality: parameter, calculatedParameter, input, output, local
+    /// or independent.
     #[arg(long)]
     pub(crate) causality: Option<String>,
 }
@@ -21,15 +24,16 @@ impl Filter {
     fn fits(&self, variable: &Variable) -> bool {
         let by_name = self.pattern.as_ref().is_none_or(|pattern| {
             names::matches(pattern, &variable.name)
-                || (!pattern.contains('*') && variable.name.to_lowercase().contains(&pattern.to_lowercase()))
+                || (!pattern.contains('*')
+                    && variable.name.to_lowercase().contains(&pattern.to_lowercase()))
         });
         by_name && self.causality.as_ref().is_none_or(|causality| *causality == variable.causality)
     }
 
-    /// Leaves only what it lets through.
+    /// Removes the variables that do not fit from a description.
     ///
     /// # Errors
-    /// If that is nothing.
+    /// Returns an error if no variable fits.
     pub(crate) fn apply(&self, description: &mut ModelDescription) -> Result<(), Error> {
         if self.pattern.is_none() && self.causality.is_none() {
             return Ok(());
@@ -39,25 +43,30 @@ impl Filter {
         if !description.variables.is_empty() {
             return Ok(());
         }
-        let causality = self.causality.as_ref().map_or(String::new(), |c| format!(" of causality {c}"));
-        let (name, hint) = self.pattern.as_ref().map_or((String::new(), String::new()), |pattern| {
-            (format!(" that fits \"{pattern}\""), names::hint(pattern, known.iter().map(String::as_str)))
-        });
+        let causality =
+            self.causality.as_ref().map_or(String::new(), |c| format!(" of causality {c}"));
+        let (name, hint) =
+            self.pattern.as_ref().map_or((String::new(), String::new()), |pattern| {
+                (
+                    format!(" that fits \"{pattern}\""),
+                    names::hint(pattern, known.iter().map(String::as_str)),
+                )
+            });
         let model = &description.model_name;
         Err(Error::experiment(format!("{model} has no variable{causality}{name}{hint}")))
     }
 }
 
-/// Prints an archive's description as JSON.
+/// Prints the description of an archive as JSON.
 ///
 /// # Errors
-/// If the text cannot be written.
+/// Returns an error if the text cannot be written.
 pub(crate) fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     let d = &fmu.description;
     let interface = |interface: &Option<Interface>| {
-        interface
-            .as_ref()
-            .map(|i| json!({ "model_identifier": i.model_identifier, "capabilities": i.capabilities }))
+        interface.as_ref().map(
+            |i| json!({ "model_identifier": i.model_identifier, "capabilities": i.capabilities }),
+        )
     };
     let experiment = &d.default_experiment;
     let all = json!({

@@ -1,17 +1,17 @@
-//! Why the program ends with an exit code other than 0.
+//! Errors with which the program ends, and their exit codes.
 
 use cosim::error::Error as Single;
 use cosim_report::error::Error as Study;
 use std::io;
 use std::path::PathBuf;
 
-/// All errors of the program.
+/// An error with which the program ends.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {
-    /// A run failed, or could not be begun.
+    /// A run failed, or it could not start.
     #[error(transparent)]
     Single(#[from] Single),
-    /// A study failed, or could not be begun.
+    /// A study failed, or it could not start.
     #[error(transparent)]
     Study(#[from] Study),
     /// An FMU cannot be used.
@@ -31,8 +31,9 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// The exit code: 1 for a run that failed, 2 for bad usage or a bad experiment, 3 for a run
-    /// that was lost, 130 or 143 for one that a signal ended.
+    /// Returns the exit code of the program: 1 for a run that failed, for an FMU with faults and
+    /// for output that cannot be written, 2 for bad usage or a bad experiment, 3 for a run that was
+    /// lost, and 130 or 143 for a run that a signal ended.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Single(error) => error.exit_code(),
@@ -42,7 +43,7 @@ impl Failure {
         }
     }
 
-    /// Whether standard output was closed by its reader, which is no failure.
+    /// Returns whether standard output was closed by its reader, which is no failure.
     pub(crate) fn is_broken_pipe(&self) -> bool {
         matches!(self, Self::Output(source) if source.kind() == io::ErrorKind::BrokenPipe)
     }

@@ -1,4 +1,4 @@
-//! Prints what an FMU says of itself.
+//! Prints what an FMU says about itself, and checks it.
 
 use crate::catalogue::{self, Filter};
 use crate::failure::Failure;
@@ -8,10 +8,12 @@ use fmu_import::fmu::Fmu;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Prints interfaces, platforms and variables of an archive: those that the filter lets through.
+/// Prints the interfaces and platforms of an archive, and those of its variables that fit the
+/// filter.
 ///
 /// # Errors
-/// If it is no FMU, if the filter lets nothing through, or the text cannot be written.
+/// Returns an error if the archive is no FMU, if no variable fits the filter, or if the text cannot
+/// be written.
 pub(crate) fn inspect(
     path: &Path,
     filter: &Filter,
@@ -28,10 +30,12 @@ pub(crate) fn inspect(
     Ok(())
 }
 
-/// Says what is wrong with an archive: its description and its library, which is loaded. Nothing is said of one in order.
+/// Checks the description of an archive and its library, which is loaded for this, and prints each
+/// fault. It prints nothing if there is none.
 ///
 /// # Errors
-/// If there are faults, if it is no FMU at all, or if the text cannot be written.
+/// Returns an error if there are faults, if the archive is no FMU at all, or if the text cannot be
+/// written.
 pub(crate) fn check(path: &Path, out: &mut impl Write) -> Result<(), Failure> {
     let faults = Fmu::open(path)?.faults();
     for fault in &faults {
@@ -55,7 +59,9 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     line("GUID", &d.guid)?;
     line("platforms", &fmu.platforms().join(", "))?;
     let interface = |i: &Option<Interface>| {
-        i.as_ref().map_or(String::new(), |i| format!("{}: {}", i.model_identifier, i.capabilities.join(", ")))
+        i.as_ref().map_or(String::new(), |i| {
+            format!("{}: {}", i.model_identifier, i.capabilities.join(", "))
+        })
     };
     line("co-simulation", &interface(&d.co_simulation))?;
     line("model exchange", &interface(&d.model_exchange))?;
@@ -66,8 +72,10 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
         ("step", experiment.step, " s"),
         ("tolerance", experiment.tolerance, ""),
     ];
-    let proposed: Vec<String> =
-        named.iter().filter_map(|(name, value, unit)| value.map(|v| format!("{name} {v:?}{unit}"))).collect();
+    let proposed: Vec<String> = named
+        .iter()
+        .filter_map(|(name, value, unit)| value.map(|v| format!("{name} {v:?}{unit}")))
+        .collect();
     line("experiment", &proposed.join(", "))?;
 
     let mut unknown: Vec<&str> = d.variables.iter().map(|v| v.causality.as_str()).collect();
@@ -81,7 +89,8 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
             continue;
         }
         writeln!(out, "\n{} ({})", causality.escape_default(), rows.len())?;
-        let header = ["name", "type", "variability", "unit", "start", "description"].map(String::from);
+        let header =
+            ["name", "type", "variability", "unit", "start", "description"].map(String::from);
         let mut widths = [0; 6];
         for row in rows.iter().chain([&header]) {
             for (width, cell) in widths.iter_mut().zip(row) {
@@ -89,7 +98,7 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
             }
         }
         for row in [&header].into_iter().chain(&rows) {
-            // By hand, as the formatter refuses widths beyond 16 bits.
+            // The cells are padded by hand, because the formatter refuses widths beyond 16 bits.
             let pad = |(cell, width): (&String, usize)| {
                 format!("{cell}{}", " ".repeat(width.saturating_sub(cell.chars().count())))
             };
@@ -100,7 +109,7 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Cells that are longer move the rest of their row, and no other.
+/// Largest width to which a column is padded. A longer cell shifts only the rest of its own row.
 const WIDEST: usize = 80;
 
 fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
@@ -110,7 +119,9 @@ fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
     match &variable.kind {
         Kind::Real { unit: own, display_unit, .. } => {
             unit = own.clone().unwrap_or_default();
-            if let Some(display) = display_unit.as_ref().filter(|display| Some(*display) != own.as_ref()) {
+            if let Some(display) =
+                display_unit.as_ref().filter(|display| Some(*display) != own.as_ref())
+            {
                 if let Some(shown) = shown(description, own.as_deref(), display, &start) {
                     start = format!("{start} ({shown} {display})");
                 }
@@ -130,8 +141,13 @@ fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
     [name, kind, variable.variability.clone(), unit, start, variable.description.clone()]
 }
 
-/// A start value in its display unit, to the digits that people read.
-fn shown(description: &ModelDescription, unit: Option<&str>, display: &str, start: &str) -> Option<f64> {
+/// Converts a start value to its display unit, rounded to the digits that people read.
+fn shown(
+    description: &ModelDescription,
+    unit: Option<&str>,
+    display: &str,
+    start: &str,
+) -> Option<f64> {
     let unit = description.units.iter().find(|u| Some(u.name.as_str()) == unit)?;
     let (_, factor, offset) = unit.displays.iter().find(|(name, ..)| name == display)?;
     let value = factor * start.parse::<f64>().ok()? + offset;

@@ -1,4 +1,4 @@
-//! Lists the experiments, studies and FMUs there are.
+//! Lists the experiments, studies and FMUs that are found.
 
 use crate::failure::Failure;
 use cosim::error::Error;
@@ -11,11 +11,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::{fs, iter};
 
-/// Prints the experiments and studies below a folder with their titles, and the FMUs below it. Without a folder: those here,
-/// and all others that are found from here.
+/// Prints the experiments and studies below a folder with their titles, and the FMUs below it.
+/// Without a folder it prints those below the current one, and all others that the program finds
+/// from any folder.
 ///
 /// # Errors
-/// If the folder is not there, or the text cannot be written.
+/// Returns an error if the folder does not exist, or if the text cannot be written.
 pub(crate) fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Failure> {
     if let Some(folder) = folder
         && !folder.is_dir()
@@ -25,18 +26,21 @@ pub(crate) fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Fa
     let here = folder.unwrap_or(Path::new("."));
     let find = |extension: &str, others: Vec<PathBuf>| {
         let mut known = BTreeSet::new();
-        let all = iter::once(here.to_path_buf()).chain(others).flat_map(|root| files(&root, extension));
-        all.filter(|path| fs::canonicalize(path).is_ok_and(|path| known.insert(path))).collect::<Vec<_>>()
+        let all =
+            iter::once(here.to_path_buf()).chain(others).flat_map(|root| files(&root, extension));
+        all.filter(|path| fs::canonicalize(path).is_ok_and(|path| known.insert(path)))
+            .collect::<Vec<_>>()
     };
     let elsewhere = if folder.is_none() { search::experiments() } else { Vec::new() };
     let tables = find("toml", elsewhere);
     let mut rows: Vec<(PathBuf, String)> = Vec::new();
     for path in &tables {
-        // Other TOML files are no experiments; an experiment with a fault is shown with it.
+        // Other TOML files are no experiments, and are skipped. A faulty experiment is shown with
+        // its fault.
         let Ok(text) = fs::read_to_string(path) else { continue };
         if search::is_experiment(&text) {
-            let title =
-                Experiment::parse(path, text).map_or_else(|error| format!("FAULT {error}"), |e| e.title);
+            let title = Experiment::parse(path, text)
+                .map_or_else(|error| format!("FAULT {error}"), |e| e.title);
             rows.push((path.clone(), title));
         }
     }
@@ -46,7 +50,8 @@ pub(crate) fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Fa
         .into_iter()
         .filter(|path| path.file_name().is_some_and(|name| name == "study.toml"))
         .map(|path| {
-            let title = Study::load(&path).map_or_else(|error| format!("FAULT {error}"), |study| study.title);
+            let title = Study::load(&path)
+                .map_or_else(|error| format!("FAULT {error}"), |study| study.title);
             (path, title)
         })
         .collect();
@@ -68,7 +73,8 @@ pub(crate) fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Fa
 
 fn print(what: &str, rows: &[(PathBuf, String)], out: &mut impl Write) -> Result<(), Failure> {
     writeln!(out, "{what} ({})", rows.len())?;
-    let width = rows.iter().map(|(path, _)| path.display().to_string().chars().count()).max().unwrap_or(0);
+    let width =
+        rows.iter().map(|(path, _)| path.display().to_string().chars().count()).max().unwrap_or(0);
     for (path, text) in rows {
         writeln!(out, "  {:<width$}  {text}", path.display().to_string())?;
     }

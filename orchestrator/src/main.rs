@@ -1,4 +1,4 @@
-//! The command line.
+//! The command line of the orchestrator.
 
 use clap::{CommandFactory, Parser, Subcommand};
 mod catalogue;
@@ -30,11 +30,13 @@ use tracing_subscriber::EnvFilter;
 
 /// Runs FMI 2.0 co-simulation experiments.
 ///
-/// Exit code 0: fine; 1: the run failed; 2: bad usage or a bad experiment; 3: the attitude was lost, as the experiment defines it;
-/// 130 or 143: ended by Ctrl-C or SIGTERM. Log messages go to standard error; the
-/// environment variable RUST_LOG chooses how many (error, warn, info, debug).
+/// The exit code is 0 if all went well, 1 if a run failed, 2 for bad usage or a bad experiment, 3
+/// if the attitude was lost as the experiment defines it, and 130 or 143 if Ctrl-C or SIGTERM ended
+/// the run. Log messages go to standard error; the environment variable RUST_LOG chooses how many
+/// there are (error, warn, info, debug).
 ///
-/// Experiments and FMUs are also found beside the program and in the folders of the environment variable ORCHESTRATOR_PATH.
+/// Experiments and FMUs are also looked for beside the program and in the folders of the
+/// environment variable ORCHESTRATOR_PATH.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -46,130 +48,148 @@ struct Arguments {
 enum Command {
     /// Run an experiment and write results.csv, results.json, metrics.json and plot.svg.
     ///
-    /// With --real-time the run keeps in step with the wall clock, and says how well in the summary, in metrics.json and in
-    /// realtime.svg. Ctrl-C and SIGTERM end a run and keep its results.
+    /// With --real-time the run keeps in step with the wall clock; the summary, metrics.json and
+    /// realtime.svg show how well it did. Ctrl-C and SIGTERM end a run and keep its results.
     Run {
-        /// Experiment: a file, an SSP archive, or the name of one that `list` shows.
+        /// Experiment to run: a file, an SSP archive, or the name of an experiment that `list`
+        /// shows.
         experiment: PathBuf,
         /// Folder for the results [default: out/<name of the experiment>].
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
-        /// A further folder with FMUs, besides the experiment's own and target/fmu. May be given several times.
+        /// Look for FMUs in this folder, too, besides the experiment's own and target/fmu. The
+        /// option may be given several times.
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
         overrides: Overrides,
-        /// No progress and no summary.
+        /// Show neither progress nor summary.
         #[arg(long)]
         quiet: bool,
-        /// Run in step with the wall clock, FACTOR times as fast: 1, if it is left out, is real time.
+        /// Run in step with the wall clock, FACTOR times as fast. Without a FACTOR the run keeps
+        /// real time.
         #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1", allow_negative_numbers = true)]
         real_time: Option<Factor>,
-        /// What is done about a missed deadline, that is if a component's values for one of its communication points are not
-        /// there at its next one. All are counted and reported.
+        /// Choose what happens after a missed deadline, that is, if the values that a component
+        /// computes at one of its communication points are not ready at its next one. All missed
+        /// deadlines are counted and reported.
         #[arg(long, value_enum, default_value_t, requires = "real_time")]
         on_miss: OnMiss,
-        /// Ask for real-time scheduling (SCHED_FIFO of this priority, 1 to 99; 50 if it is left out) and for memory that is
-        /// never swapped out. What the system refuses is reported, and the run goes on without.
+        /// Ask for real-time scheduling (SCHED_FIFO with this priority, 1 to 99; 50 if it is left
+        /// out) and for memory that is never swapped out. If the system refuses either, the refusal
+        /// is reported and the run continues without it.
         #[arg(long, value_name = "PRIORITY", num_args = 0..=1, default_missing_value = "50", requires = "real_time",
               value_parser = clap::value_parser!(u8).range(1..=99))]
         priority: Option<u8>,
-        /// Show the run on the terminal while it goes on; q ends it and keeps the results.
+        /// Show the run on the terminal while it is in progress. The key q ends the run and keeps
+        /// its results.
         #[arg(long, conflicts_with = "quiet")]
         live: bool,
         #[command(flatten)]
         files: Files,
-        /// Replace the results of an earlier run in the folder; without it they are left alone and nothing is run.
+        /// Replace the results of an earlier run in the folder. Without this option they are left
+        /// alone and nothing is run.
         #[arg(long)]
         force: bool,
     },
-    /// Run a paper's comparison and write report.html, with figures, tables and a verdict on each claim.
+    /// Repeat a paper's comparison and write report.html, with figures, tables and a verdict on
+    /// each claim.
     ///
-    /// What is finished is kept: after an interruption the same command goes on where it stopped.
+    /// Finished parts are kept: after an interruption, the same command continues where it stopped.
     Reproduce {
-        /// Study: a folder below orchestrator/experiments, a folder with a study.toml, or such a file.
+        /// Study to run: a folder below orchestrator/experiments, a folder with a study.toml, or
+        /// such a file.
         study: PathBuf,
         /// Folder for the results [default: out/<folder of the study>].
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
-        /// A further folder with FMUs, besides the study's own and target/fmu. May be given several times.
+        /// Look for FMUs in this folder, too, besides the study's own and target/fmu. The option
+        /// may be given several times.
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
-        /// Threads [default: one for each core].
+        /// Number of threads [default: one for each core].
         #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
         jobs: usize,
-        /// At most so many values of the parameter that a run varies, for a quick look.
+        /// Run at most this many values of a parameter that a run varies, for a quick look.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
         members: Option<u32>,
-        /// Run everything again, even what is finished.
+        /// Run everything again, including what is finished.
         #[arg(long)]
         fresh: bool,
-        /// No progress and no summary.
+        /// Show neither progress nor summary.
         #[arg(long)]
         quiet: bool,
     },
-    /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs included.
+    /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs
+    /// included.
     Pack {
-        /// Experiment: a file, or the name of one that `list` shows.
+        /// Experiment to pack: a file, or the name of an experiment that `list` shows.
         experiment: PathBuf,
-        /// As an SSP archive, which is what there is.
+        /// Write an SSP archive, which is the only form there is.
         #[arg(long)]
         ssp: bool,
-        /// The archive [default: <name of the experiment>.ssp].
+        /// Path of the archive [default: <name of the experiment>.ssp].
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
-        /// A further folder with FMUs, besides the experiment's own and target/fmu. May be given several times.
+        /// Look for FMUs in this folder, too, besides the experiment's own and target/fmu. The
+        /// option may be given several times.
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
         overrides: Overrides,
-        /// Leave outputs that are enumerations out of the connectors: libcosim aborts where there is one.
+        /// Write no connectors for outputs that are enumerations, because libcosim aborts if there
+        /// is one.
         #[arg(long)]
         no_enumerations: bool,
-        /// Replace the archive if there is one.
+        /// Replace the archive if it exists.
         #[arg(long)]
         force: bool,
     },
     /// Show the variables and capabilities of an FMU.
     Inspect {
-        /// The archive.
+        /// Path of the FMU.
         fmu: PathBuf,
         #[command(flatten)]
         filter: Filter,
-        /// As JSON, for other programs.
+        /// Print JSON, for other programs.
         #[arg(long)]
         json: bool,
-        /// Say what is wrong with it, its library included, instead. Ends with 1 if anything is.
+        /// Report the faults of the FMU and of its library instead. The exit code is 1 if there are
+        /// any.
         #[arg(long, conflicts_with_all = ["json", "pattern", "causality"])]
         check: bool,
     },
-    /// Print an experiment with all that it extends merged into one text, which runs as the experiment does.
+    /// Print an experiment with everything that it extends merged into one text, which runs as the
+    /// experiment does.
     Show {
-        /// Experiment: a file, or the name of one that `list` shows.
+        /// Experiment to print: a file, or the name of an experiment that `list` shows.
         experiment: PathBuf,
     },
-    /// Print the JSON Schema of a kind of file, by which editors complete and check it.
+    /// Print the JSON Schema of a kind of file, with which editors complete and check such files.
     Schema {
-        /// The kind of file.
+        /// Kind of file that the schema describes.
         #[arg(value_enum)]
         kind: schema::Kind,
     },
-    /// Write a script that completes commands and options in a shell, for example `orchestrator completions bash`.
+    /// Write a script that completes commands and options in a shell, for example `orchestrator
+    /// completions bash`.
     Completions {
-        /// The shell.
+        /// Shell that the script is for.
         shell: clap_complete::Shell,
     },
     /// List experiments, studies and FMUs.
     List {
-        /// Folder to look in [default: this one, and where experiments and FMUs are found from any folder].
+        /// Folder to search [default: the current one, and those where experiments and FMUs are
+        /// found from any folder].
         folder: Option<PathBuf>,
     },
 }
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    // Of a thousand runs the warnings are counted in the report.
-    let usual = if matches!(arguments.command, Command::Reproduce { .. }) { "error" } else { "warn" };
+    // A study may have a thousand runs; its report counts their warnings instead.
+    let usual =
+        if matches!(arguments.command, Command::Reproduce { .. }) { "error" } else { "warn" };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(usual));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
@@ -181,17 +201,18 @@ fn main() -> ExitCode {
 
     let mut out = BufWriter::new(stdout());
     let interrupt = Interrupt::default();
-    let outcome =
-        execute(arguments.command, &mut out, &interrupt).and_then(|()| out.flush().map_err(Failure::from));
+    let outcome = execute(arguments.command, &mut out, &interrupt)
+        .and_then(|()| out.flush().map_err(Failure::from));
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if error.is_broken_pipe() => {
-            // What could not be written must not be tried again when the writer is dropped.
+            // Output that could not be written must not be written again when the writer is
+            // dropped.
             let _ = out.into_parts();
             ExitCode::SUCCESS
         }
         Err(error) => {
-            // There is no one left to tell if it cannot be written.
+            // If standard error cannot be written either, there is nobody left to tell.
             let _ = writeln!(stderr(), "error: {error}");
             ExitCode::from(error.exit_code())
         }
@@ -217,23 +238,32 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             force,
         } => {
             let experiment = search::experiment(&experiment)?;
-            let (mut system, entries) = if experiment.extension().is_some_and(|extension| extension == "ssp")
-            {
-                let ssp::Loaded { experiment, mut opened, entries } = ssp::load(&experiment, &overrides)?;
-                let system = check(experiment, &fmu_dir, &mut opened);
-                (system.map_err(|error| entries.named(error))?, Some(entries))
-            } else {
-                let mut experiment = Experiment::load(&experiment)?;
-                experiment.apply(&overrides)?;
-                (check(experiment, &fmu_dir, &mut Opened::default())?, None)
-            };
+            let (mut system, entries) =
+                if experiment.extension().is_some_and(|extension| extension == "ssp") {
+                    let ssp::Loaded { experiment, mut opened, entries } =
+                        ssp::load(&experiment, &overrides)?;
+                    let system = check(experiment, &fmu_dir, &mut opened);
+                    (system.map_err(|error| entries.named(error))?, Some(entries))
+                } else {
+                    let mut experiment = Experiment::load(&experiment)?;
+                    experiment.apply(&overrides)?;
+                    (check(experiment, &fmu_dir, &mut Opened::default())?, None)
+                };
             let real_time = real_time.map(|factor| pacing::Settings { factor, on_miss, priority });
-            let options =
-                Options { out: folder, quiet, real_time, live, files, force, interrupt: interrupt.clone() };
-            let report = run::run(&mut system, &options).map_err(|error| match (error, &entries) {
-                (Failure::Single(error), Some(entries)) => entries.named(error).into(),
-                (error, _) => error,
-            })?;
+            let options = Options {
+                out: folder,
+                quiet,
+                real_time,
+                live,
+                files,
+                force,
+                interrupt: interrupt.clone(),
+            };
+            let report =
+                run::run(&mut system, &options).map_err(|error| match (error, &entries) {
+                    (Failure::Single(error), Some(entries)) => entries.named(error).into(),
+                    (error, _) => error,
+                })?;
             if !quiet {
                 summary::summary(&system, &report, out)?;
                 out.flush()?;
@@ -241,7 +271,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             match report.ended {
                 None | Some(Error::Interrupted { request: Request::Quit, .. }) => Ok(()),
                 Some(error @ Error::EndedByUnit { .. }) => {
-                    // The summary has said so already.
+                    // The summary has already said so.
                     if quiet {
                         tracing::warn!("{error}");
                     }
@@ -253,15 +283,29 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Reproduce { study, out: folder, fmu_dir, jobs, members, fresh, quiet } => {
             let study = Study::load_with(&reproduce::find(&study)?, members)?;
             let interrupt = interrupt.clone();
-            let options =
-                reproduce::Options { out: folder, fmu_dirs: fmu_dir, jobs, fresh, quiet, interrupt };
+            let options = reproduce::Options {
+                out: folder,
+                fmu_dirs: fmu_dir,
+                jobs,
+                fresh,
+                quiet,
+                interrupt,
+            };
             let report = reproduce::reproduce(&study, &options)?;
             if !quiet {
                 summary::reproduction(&report, out)?;
             }
             Ok(())
         }
-        Command::Pack { experiment: path, ssp, out: archive, fmu_dir, overrides, no_enumerations, force } => {
+        Command::Pack {
+            experiment: path,
+            ssp,
+            out: archive,
+            fmu_dir,
+            overrides,
+            no_enumerations,
+            force,
+        } => {
             if !ssp {
                 return Err(Error::experiment(
                     "pack wants the form of the archive, of which there is one: --ssp",
@@ -271,8 +315,9 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             let path = search::experiment(&path)?;
             let mut experiment = Experiment::load(&path)?;
             experiment.apply(&overrides)?;
-            let archive = archive
-                .unwrap_or_else(|| PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("ssp"));
+            let archive = archive.unwrap_or_else(|| {
+                PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("ssp")
+            });
             if archive.exists() && !force {
                 let path = archive.display();
                 return Err(Error::experiment(format!(
@@ -285,7 +330,9 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             Ok(packed(&system, &archive, out)?)
         }
         Command::Inspect { fmu, check: true, .. } => inspect::check(&fmu, out),
-        Command::Inspect { fmu, filter, json, check: false } => inspect::inspect(&fmu, &filter, json, out),
+        Command::Inspect { fmu, filter, json, check: false } => {
+            inspect::inspect(&fmu, &filter, json, out)
+        }
         Command::Show { experiment } => show(&experiment, out),
         Command::Schema { kind } => Ok(out.write_all(schema::text(kind).as_bytes())?),
         Command::Completions { shell } => {
@@ -296,13 +343,13 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
     }
 }
 
-/// Prints an experiment with all that it extends.
+/// Prints an experiment with everything that it extends.
 fn show(experiment: &Path, out: &mut impl Write) -> Result<(), Failure> {
     let experiment = Experiment::load(&search::experiment(experiment)?)?;
     Ok(out.write_all(experiment.source.whole().as_bytes())?)
 }
 
-/// Prints what a packed archive holds, and which settings the standard cannot store.
+/// Prints the components in a packed archive, and which setting the standard cannot store.
 fn packed(system: &System, archive: &Path, out: &mut impl Write) -> std::io::Result<()> {
     writeln!(out, "{}: {}", archive.display(), system.order.join(", "))?;
     let step = system.experiment.simulation.step;

@@ -1,5 +1,5 @@
-//! Runs an experiment and writes its results: what is recorded, measured, drawn or shown is done by
-//! observers of the system.
+//! Runs an experiment and writes its results. Observers of the system record, measure, draw and
+//! show it.
 
 use crate::failure::Failure;
 use crate::live::{self, Live, scene::Scene};
@@ -26,21 +26,21 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Instant;
 
-/// Which files a run writes, and how.
+/// Choice of the files that a run writes, and of their format.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub(crate) struct Files {
     /// Write no results.csv.
     #[arg(long)]
     no_csv: bool,
-    /// The file of the recorded variables.
+    /// Choose the format of the file of recorded variables.
     #[arg(long, value_enum, value_name = "FORMAT", default_value_t, conflicts_with = "no_csv")]
     format: Format,
     /// Draw no plot.svg.
     #[arg(long)]
     no_plot: bool,
-    /// Head the columns of results.csv with name [unit], and write items of enumerations by name.
-    /// Without it the header holds the names alone and every cell is a number, as FMPy and NumPy
-    /// read it; results.json has units and items.
+    /// Write the header of results.csv as name [unit], and items of enumerations by their names.
+    /// Without this option the header holds the names alone and every cell is a number, as FMPy and
+    /// NumPy expect; results.json holds the units and items.
     #[arg(long, conflicts_with = "no_csv")]
     labels: bool,
 }
@@ -49,8 +49,7 @@ impl Files {
     /// Rejects options that would have no effect.
     fn check(self) -> Result<(), Error> {
         if self.labels && self.format != Format::Csv {
-            let problem =
-                "--labels is about results.csv: results.parquet has units and items in its metadata";
+            let problem = "--labels is about results.csv: results.parquet has units and items in its metadata";
             return Err(Error::experiment(problem));
         }
         Ok(())
@@ -66,7 +65,7 @@ pub(crate) struct Options {
     pub(crate) quiet: bool,
     /// Settings of a run that is paced by the wall clock; `None` runs as fast as possible.
     pub(crate) real_time: Option<pacing::Settings>,
-    /// Whether the run is shown on the terminal while it goes on.
+    /// Whether the run is shown on the terminal while it is in progress.
     pub(crate) live: bool,
     /// Choice of the files that the run writes.
     pub(crate) files: Files,
@@ -80,7 +79,7 @@ pub(crate) struct Options {
 /// to then are written as well.
 ///
 /// # Errors
-/// If a unit fails, or if a file cannot be written.
+/// Returns an error if a unit fails, or if a file cannot be written.
 pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Failure> {
     if options.live {
         live::check_terminal()?;
@@ -145,7 +144,8 @@ pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Fail
         recorder.finish()?;
         files.insert(0, format.file());
     }
-    let metadata = metadata::metadata(system, &parameters, options.real_time, outcome.as_ref().err());
+    let metadata =
+        metadata::metadata(system, &parameters, options.real_time, outcome.as_ref().err());
     write_json(&out.join("results.json"), &metadata)?;
     let reached = clock.step() * meters.seen().saturating_sub(1) as f64;
     let mut metrics = Metrics {
@@ -183,7 +183,7 @@ pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Fail
     Ok(Report { metrics, out, files, ended })
 }
 
-/// Warns of missed deadlines and refused priorities if no summary is printed.
+/// Warns of missed deadlines and of a refused priority if no summary is printed.
 fn warn(real_time: &RealTime, quiet: bool) {
     if !quiet {
         return;
@@ -191,7 +191,9 @@ fn warn(real_time: &RealTime, quiet: bool) {
     if let Some(done) = real_time.done_about_it() {
         tracing::warn!("{} of {} deadlines missed; {done}", real_time.misses, real_time.deadlines);
     }
-    if let Priority::Refused(reason) | Priority::Fifo { unlocked: Some(reason), .. } = &real_time.priority {
+    if let Priority::Refused(reason) | Priority::Fifo { unlocked: Some(reason), .. } =
+        &real_time.priority
+    {
         tracing::warn!("--priority: {reason}");
     }
 }

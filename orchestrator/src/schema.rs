@@ -1,7 +1,9 @@
-//! JSON Schemas of experiment and study files, made from the types that read them, so that editors complete and check these files.
+//! JSON Schemas of experiment and study files, made from the types that read them, so that editors
+//! can complete and check these files.
 //!
-//! What a file leaves out may come from one that it extends, or from a template. So a schema knows every key and its type but asks for
-//! none; what is missing is told when the file is read.
+//! Keys that a file leaves out may come from one that it extends, or from a template. A schema
+//! therefore knows every key and its type but requires none; missing keys are reported when the
+//! file is read.
 
 use cosim::experiment::Experiment;
 use cosim_report::study::definition::Study;
@@ -10,16 +12,16 @@ use schemars::transform::{RecursiveTransform, Transform};
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
 
-/// A kind of file.
+/// Kind of file that a schema describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Kind {
-    /// An experiment.
+    /// The file describes an experiment.
     Experiment,
-    /// A study.
+    /// The file describes a study.
     Study,
 }
 
-/// The schema of a kind of file.
+/// Returns the schema of a kind of file as text.
 pub(crate) fn text(kind: Kind) -> String {
     let mut schema = match kind {
         Kind::Experiment => schema_of::<Experiment>(json!({
@@ -44,8 +46,9 @@ pub(crate) fn text(kind: Kind) -> String {
             schema
         }
     };
-    RecursiveTransform(|schema: &mut Schema| drop(schema.remove("required"))).transform(&mut schema);
-    // A schema is plain JSON.
+    RecursiveTransform(|schema: &mut Schema| drop(schema.remove("required")))
+        .transform(&mut schema);
+    // A schema is plain JSON, so that this cannot fail.
     serde_json::to_string_pretty(&schema).unwrap_or_default() + "\n"
 }
 
@@ -65,11 +68,16 @@ fn texts(description: &str) -> Value {
     json!({ "description": description, "type": ["string", "array"], "items": { "type": "string" } })
 }
 
-/// Allows what templates need: `use` and `each` in every table, and the name of a row's value in braces for a number, a truth value or a
-/// list.
+/// Allows what templates need: `use` and `each` in every table, and the name of a row's value in
+/// braces in place of a number, a truth value or a list.
 fn with_templates(schema: &mut Schema) {
-    if let Some(properties) = properties(schema).filter(|properties| !properties.contains_key("templates")) {
-        properties.insert("use".into(), texts("Templates that this table builds upon, one table for each."));
+    if let Some(properties) =
+        properties(schema).filter(|properties| !properties.contains_key("templates"))
+    {
+        properties.insert(
+            "use".into(),
+            texts("Templates that this table builds upon, one table for each."),
+        );
         let each = json!({
             "description": "A list of rows or its name: one table for each row, with the row's values for their names in braces.",
             "type": ["string", "array"],
@@ -111,11 +119,13 @@ mod tests {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../docs/{name}.md"));
             let page = std::fs::read_to_string(&path).unwrap();
             let is_part = |c: char| c.is_alphanumeric() || c == '_';
-            let code = page.split('`').skip(1).step_by(2).flat_map(|code| code.split(|c| !is_part(c)));
+            let code =
+                page.split('`').skip(1).step_by(2).flat_map(|code| code.split(|c| !is_part(c)));
             let explained: BTreeSet<&str> = code.collect();
             let schema: Value = serde_json::from_str(&text(kind)).unwrap();
             let definitions = schema["definitions"].as_object().unwrap().values();
-            let tables = definitions.chain([&schema]).filter_map(|table| table["properties"].as_object());
+            let tables =
+                definitions.chain([&schema]).filter_map(|table| table["properties"].as_object());
             for key in tables.flat_map(Map::keys) {
                 assert!(explained.contains(key.as_str()), "{}: {key}", path.display());
             }

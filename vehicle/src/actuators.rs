@@ -130,7 +130,8 @@ impl Actuators {
 
     /// Whether a restored drive holds only values that a drive can have.
     pub(crate) fn fits(drive: &Drive) -> bool {
-        (0..SURFACES).all(|i| drive.target[i].is_finite() && [-1.0, 0.0, 1.0].contains(&drive.direction[i]))
+        (0..SURFACES)
+            .all(|i| drive.target[i].is_finite() && [-1.0, 0.0, 1.0].contains(&drive.direction[i]))
             && drive.thrust.iter().all(|value| value.is_finite())
     }
 
@@ -154,7 +155,8 @@ impl Actuators {
     pub fn settle(&self, time: f64, drive: &Drive, deflections: &mut Surfaces) {
         let way = drive.target - *deflections;
         for i in 0..SURFACES {
-            let left = if drive.direction[i] == 0.0 { way[i].abs() } else { drive.direction[i] * way[i] };
+            let left =
+                if drive.direction[i] == 0.0 { way[i].abs() } else { drive.direction[i] * way[i] };
             if left <= self.rate[i] * tolerance(time) {
                 deflections[i] = drive.target[i];
             }
@@ -191,11 +193,15 @@ mod tests {
     fn actuators(jet_mode: JetMode) -> Actuators {
         let effectors = Effectors::published();
         let dynamic_pressure = effectors.reference_pressure;
-        Actuators::new(&Config { effectors, jet_mode, dynamic_pressure, aerodynamics_scale: 1.0 }).unwrap()
+        Actuators::new(&Config { effectors, jet_mode, dynamic_pressure, aerodynamics_scale: 1.0 })
+            .unwrap()
     }
 
     fn surfaces(deflections_deg: [f64; SURFACES]) -> Command {
-        Command { surfaces: Surfaces::from(deflections_deg).map(f64::to_radians), jets: Jets::zeros() }
+        Command {
+            surfaces: Surfaces::from(deflections_deg).map(f64::to_radians),
+            jets: Jets::zeros(),
+        }
     }
 
     fn degrees(deflections: &Surfaces) -> Surfaces {
@@ -206,7 +212,12 @@ mod tests {
 
     /// Returns the exact motion from rest at zero until `end`, followed from one arrival to the
     /// next, and the times of the arrivals.
-    fn moved(actuators: &Actuators, command: &Command, begin: f64, end: f64) -> (Surfaces, Vec<f64>) {
+    fn moved(
+        actuators: &Actuators,
+        command: &Command,
+        begin: f64,
+        end: f64,
+    ) -> (Surfaces, Vec<f64>) {
         let mut deflections = Surfaces::zeros();
         let (mut time, mut arrivals) = (begin, Vec::new());
         loop {
@@ -239,7 +250,10 @@ mod tests {
         }
         let effectors = Effectors::published();
         let rest = moved(&actuators, &surfaces(FAR), 2.0, 9.0).0;
-        assert_eq!((rest[0], rest[4], rest[5]), (effectors.min[0], effectors.max[4], effectors.min[5]));
+        assert_eq!(
+            (rest[0], rest[4], rest[5]),
+            (effectors.min[0], effectors.max[4], effectors.min[5])
+        );
         assert_eq!(rest[3], (-3f64).to_radians(), "the command itself, without rounding");
     }
 
@@ -277,7 +291,11 @@ mod tests {
             assert_eq!(deflections[3], expected, "{left}");
             let after = actuators.commanded(0.3, &surfaces(FAR), &deflections);
             assert_eq!(actuators.rates(&after)[3] == 0.0, arrives, "{left}");
-            assert_eq!(actuators.time_left(&after, &deflections)[3] == f64::INFINITY, arrives, "{left}");
+            assert_eq!(
+                actuators.time_left(&after, &deflections)[3] == f64::INFINITY,
+                arrives,
+                "{left}"
+            );
         }
     }
 
@@ -290,7 +308,8 @@ mod tests {
             let time = 0.013 * f64::from(k);
             let drive = actuators.commanded(time, &command, &often);
             for i in 0..SURFACES {
-                often[i] += actuators.rates(&drive)[i] * actuators.time_left(&drive, &often)[i].min(0.013);
+                often[i] +=
+                    actuators.rates(&drive)[i] * actuators.time_left(&drive, &often)[i].min(0.013);
             }
             actuators.settle(time + 0.013, &drive, &mut often);
             let once = moved(&actuators, &command, 0.0, time + 0.013).0;
@@ -316,7 +335,9 @@ mod tests {
         let actuators = actuators(JetMode::OnOff);
         let mut command = Command::default();
         let full = Vector3::new(0.0, -498.0, 19897.0);
-        for (value, on) in [(0.0, 0.0), (0.4999, 0.0), (0.5, 1.0), (1.0, 1.0), (7.0, 1.0), (-7.0, 0.0)] {
+        for (value, on) in
+            [(0.0, 0.0), (0.4999, 0.0), (0.5, 1.0), (1.0, 1.0), (7.0, 1.0), (-7.0, 0.0)]
+        {
             command.jets[0] = value;
             let drive = actuators.commanded(0.0, &command, &Surfaces::zeros());
             assert_eq!(actuators.moment(&drive, &Surfaces::zeros()), full * on, "{value}");
@@ -363,8 +384,12 @@ mod tests {
     #[test]
     fn a_negative_scale_is_refused_by_name() {
         let effectors = Effectors::published();
-        let config =
-            Config { effectors, jet_mode: JetMode::OnOff, dynamic_pressure: 1e3, aerodynamics_scale: -1.0 };
+        let config = Config {
+            effectors,
+            jet_mode: JetMode::OnOff,
+            dynamic_pressure: 1e3,
+            aerodynamics_scale: -1.0,
+        };
         let text = Actuators::new(&config).unwrap_err().to_string();
         assert!(text.contains("`actuators.aerodynamics_scale`"));
     }

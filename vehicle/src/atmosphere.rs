@@ -11,8 +11,15 @@ const HEAT_RATIO: f64 = 1.4;
 const EARTH_RADIUS: f64 = 6_356_766.0; // m
 const SEA_LEVEL: (f64, f64) = (288.15, 101_325.0); // K, Pa
 /// Base (geopotential m) and temperature gradient (K/m) of each layer.
-const LAYERS: [(f64, f64); 7] =
-    [(0.0, -6.5e-3), (11e3, 0.0), (20e3, 1e-3), (32e3, 2.8e-3), (47e3, 0.0), (51e3, -2.8e-3), (71e3, -2e-3)];
+const LAYERS: [(f64, f64); 7] = [
+    (0.0, -6.5e-3),
+    (11e3, 0.0),
+    (20e3, 1e-3),
+    (32e3, 2.8e-3),
+    (47e3, 0.0),
+    (51e3, -2.8e-3),
+    (71e3, -2e-3),
+];
 
 /// Largest geometric altitude of the model, m.
 pub const TOP: f64 = 86e3;
@@ -43,7 +50,9 @@ pub fn air(altitude: f64) -> Result<Air, Error> {
     let height = EARTH_RADIUS * altitude / (EARTH_RADIUS + altitude); // geopotential
     let weight = GRAVITY * MOLAR_MASS / GAS_CONSTANT;
     let (mut temperature, mut pressure) = SEA_LEVEL;
-    for (i, &(base, gradient)) in LAYERS.iter().enumerate().take_while(|(_, layer)| layer.0 <= height) {
+    for (i, &(base, gradient)) in
+        LAYERS.iter().enumerate().take_while(|(_, layer)| layer.0 <= height)
+    {
         let top = LAYERS.get(i + 1).map_or(height, |next| next.0.min(height));
         let above = temperature + gradient * (top - base);
         pressure *= if gradient == 0.0 {
@@ -151,7 +160,8 @@ mod tests {
             close(below.pressure, above.pressure, 1e-9);
             close(below.temperature, above.temperature, 1e-9);
         }
-        let densities: Vec<f64> = (0..=86).map(|km| air(f64::from(km) * 1e3).unwrap().density).collect();
+        let densities: Vec<f64> =
+            (0..=86).map(|km| air(f64::from(km) * 1e3).unwrap().density).collect();
         assert!(densities.windows(2).all(|pair| pair[0] > pair[1]));
     }
 

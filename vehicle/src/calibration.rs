@@ -60,11 +60,17 @@ impl Sequence {
 
     /// State and its derivative at `time` (s) after the start. The rates ω follow from Θ̇ with the
     /// matrix R in use and a trajectory that does not turn.
-    pub fn motion(&self, kinematics: Kinematics, initial: &Vector3<f64>, time: f64) -> (State, State) {
+    pub fn motion(
+        &self,
+        kinematics: Kinematics,
+        initial: &Vector3<f64>,
+        time: f64,
+    ) -> (State, State) {
         let [angles, angle_rates, angle_accelerations] = self.angles_and_derivatives(initial, time);
         let r_inverse = kinematics.r_inverse(&angles);
         let rates = r_inverse * angle_rates;
-        let r_dot = kinematics.r_alpha(&angles) * angle_rates.x + kinematics.r_beta(&angles) * angle_rates.y;
+        let r_dot = kinematics.r_alpha(&angles) * angle_rates.x
+            + kinematics.r_beta(&angles) * angle_rates.y;
         // Θ̈ = Ṙ ω + R ω̇
         let accelerations = r_inverse * (angle_accelerations - r_dot * rates);
         (state(&angles, &rates), state(&angle_rates, &accelerations))

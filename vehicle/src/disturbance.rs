@@ -121,7 +121,10 @@ impl Disturbance {
     pub fn check(&self) -> Result<(), Error> {
         let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
         if !(self.bound >= 0.0 && self.bound.is_finite()) {
-            return refuse("disturbance.bound", format!("= {} rad/s2 must not be negative", self.bound));
+            return refuse(
+                "disturbance.bound",
+                format!("= {} rad/s2 must not be negative", self.bound),
+            );
         }
         if !(self.period > 0.0 && self.period.is_finite()) {
             return refuse("disturbance.period", format!("= {} s must be positive", self.period));
@@ -154,7 +157,9 @@ impl Disturbance {
 
     /// Whether the disturbance acts at `time` (s).
     pub fn acts(&self, time: f64) -> bool {
-        self.kind != Kind::None && time + tolerance(time) >= self.start && time + tolerance(time) < self.end
+        self.kind != Kind::None
+            && time + tolerance(time) >= self.start
+            && time + tolerance(time) < self.end
     }
 
     /// Origin (s) and length (s) of the intervals over which Δ is held; `origin` is the start of
@@ -193,13 +198,16 @@ impl Disturbance {
             Kind::None | Kind::Sine => Vector3::zeros(),
             Kind::White => Vector3::from(uniform(self.seed, tick)) * self.bound,
             Kind::Constant => self.direction * self.bound,
-            Kind::Square => self.direction * if tick.rem_euclid(2) == 0 { self.bound } else { -self.bound },
+            Kind::Square => {
+                self.direction * if tick.rem_euclid(2) == 0 { self.bound } else { -self.bound }
+            }
             // d‖ω‖²/dt contains 2 ωᵀ R⁻¹ Δ
             Kind::AlongRate => {
                 signs(&view.kinematics.r_inverse(&view.angles).tr_mul(&view.rates)) * self.bound
             }
             Kind::AgainstMoment => {
-                signs(&(view.kinematics.r(&view.angles) * (view.body.inverse * view.moment))) * -self.bound
+                signs(&(view.kinematics.r(&view.angles) * (view.body.inverse * view.moment)))
+                    * -self.bound
             }
         }
     }

@@ -34,7 +34,8 @@ impl Inertia {
     /// and no principal moment may exceed the sum of the other two.
     pub fn body(&self, scale: f64) -> Result<RigidBody, Error> {
         let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
-        for (name, value) in [("inertia.Ixx", self.Ixx), ("inertia.Iyy", self.Iyy), ("inertia.Izz", self.Izz)]
+        for (name, value) in
+            [("inertia.Ixx", self.Ixx), ("inertia.Iyy", self.Iyy), ("inertia.Izz", self.Izz)]
         {
             if !(value > 0.0 && value.is_finite()) {
                 return refuse(name, format!("= {value} kg m2 must be positive"));
@@ -50,9 +51,11 @@ impl Inertia {
         };
         let principal = self.matrix().symmetric_eigenvalues();
         if 2.0 * principal.max() > principal.sum() {
-            let problem =
-                "violate the triangle inequality: no principal moment may exceed the sum of the others";
-            return refuse("inertia.Ixx`, `inertia.Iyy`, `inertia.Izz`, `inertia.Ixz", problem.into());
+            let problem = "violate the triangle inequality: no principal moment may exceed the sum of the others";
+            return refuse(
+                "inertia.Ixx`, `inertia.Iyy`, `inertia.Izz`, `inertia.Ixz",
+                problem.into(),
+            );
         }
         Ok(body)
     }
@@ -77,7 +80,11 @@ impl RigidBody {
 
     /// Angular acceleration ω̇ = I⁻¹ (m − ω × I ω) in rad/s², Chai 2022 (1b) without Δ_m; `rates`
     /// in rad/s, `moment` in N m.
-    pub fn angular_acceleration(&self, rates: &Vector3<f64>, moment: &Vector3<f64>) -> Vector3<f64> {
+    pub fn angular_acceleration(
+        &self,
+        rates: &Vector3<f64>,
+        moment: &Vector3<f64>,
+    ) -> Vector3<f64> {
         self.inverse * (moment - rates.cross(&(self.inertia * rates)))
     }
 

@@ -68,7 +68,8 @@ impl Effectors {
     /// Says which entry is missing, unknown or out of range.
     pub fn from_toml(file: &str, text: &str) -> Result<Self, Error> {
         let refuse = |problem: String| Error::Effectors { file: file.into(), problem };
-        let File { surfaces, jets } = toml::from_str(text).map_err(|error| refuse(error.to_string()))?;
+        let File { surfaces, jets } =
+            toml::from_str(text).map_err(|error| refuse(error.to_string()))?;
         let effectors = Self {
             effectiveness: matrix(&surfaces.effectiveness_deg) * 1f64.to_degrees(),
             reference_pressure: surfaces.reference_pressure,
@@ -112,7 +113,9 @@ impl Effectors {
         if !finite(self.effectiveness.as_slice().iter()) {
             return Err("surfaces.effectiveness_deg holds a value that is not finite".into());
         }
-        if !finite(self.jet_moments.as_slice().iter()) || !finite(self.symmetric_jet_4.as_slice().iter()) {
+        if !finite(self.jet_moments.as_slice().iter())
+            || !finite(self.symmetric_jet_4.as_slice().iter())
+        {
             return Err("jets.moment or symmetric_jet_4 holds a value that is not finite".into());
         }
         Ok(())
@@ -124,7 +127,11 @@ impl Effectors {
     }
 
     /// Moment D_A δ_A of Wu 2015 (57) in N m, for `deflections` (rad) at a dynamic pressure (Pa).
-    pub fn moment_of_surfaces(&self, deflections: &Surfaces, dynamic_pressure: f64) -> Vector3<f64> {
+    pub fn moment_of_surfaces(
+        &self,
+        deflections: &Surfaces,
+        dynamic_pressure: f64,
+    ) -> Vector3<f64> {
         self.effectiveness * deflections * (dynamic_pressure / self.reference_pressure)
     }
 
@@ -249,7 +256,10 @@ mod tests {
         deflections[1] = -1f64.to_radians();
         let at_reference = [2750.0 + 2800.0, -10200.0 + 1750.0, -2000.0 - 650.0];
         near(effectors.moment_of_surfaces(&deflections, 2859.0), at_reference);
-        near(effectors.moment_of_surfaces(&deflections, 1429.5), at_reference.map(|moment| moment / 2.0));
+        near(
+            effectors.moment_of_surfaces(&deflections, 1429.5),
+            at_reference.map(|moment| moment / 2.0),
+        );
         assert_eq!(
             effectors.effectiveness_at(1429.5) * deflections,
             effectors.moment_of_surfaces(&deflections, 1429.5)
@@ -287,7 +297,8 @@ mod tests {
             ("true, false, false]", "true, false]", "allowed"),
         ] {
             assert!(EFFECTORS.1.contains(from), "{from}");
-            let message = Effectors::from_toml("my.toml", &EFFECTORS.1.replacen(from, to, 1)).unwrap_err();
+            let message =
+                Effectors::from_toml("my.toml", &EFFECTORS.1.replacen(from, to, 1)).unwrap_err();
             let message = message.to_string();
             assert!(message.contains("my.toml") && message.contains(named), "{message}");
         }

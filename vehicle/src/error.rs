@@ -43,7 +43,9 @@ pub enum Error {
         problem: String,
     },
     /// The sideslip angle reached ±90°, where the attitude angles are singular.
-    #[error("sideslip beta = {beta_deg:.3} deg at t = {time} s: the attitude angles are singular at 90 deg")]
+    #[error(
+        "sideslip beta = {beta_deg:.3} deg at t = {time} s: the attitude angles are singular at 90 deg"
+    )]
     Singular {
         /// Time at which this happened, s.
         time: f64,

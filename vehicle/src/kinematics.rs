@@ -69,7 +69,17 @@ pub fn r_beta_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
     let (sb, cb) = angles.y.sin_cos();
     let tb = sb / cb;
     let sec2 = 1.0 / (cb * cb);
-    Matrix3::new(-2.0 * ca * sec2 * tb, 0.0, -2.0 * sa * sec2 * tb, 0.0, 0.0, 0.0, ca * cb, sb, cb * sa)
+    Matrix3::new(
+        -2.0 * ca * sec2 * tb,
+        0.0,
+        -2.0 * sa * sec2 * tb,
+        0.0,
+        0.0,
+        0.0,
+        ca * cb,
+        sb,
+        cb * sa,
+    )
 }
 
 /// Form of the attitude kinematics, which differ in the bank rate.
@@ -95,7 +105,13 @@ impl Kinematics {
 
     /// Returns the derivative of `matrix` plus sin β times its alpha row in the bank row, given the
     /// derivatives `slope` of `matrix` and `sb_slope` of sin β. The printed form has no such term.
-    fn complete(self, slope: Matrix3<f64>, matrix: &Matrix3<f64>, sb: f64, sb_slope: f64) -> Matrix3<f64> {
+    fn complete(
+        self,
+        slope: Matrix3<f64>,
+        matrix: &Matrix3<f64>,
+        sb: f64,
+        sb_slope: f64,
+    ) -> Matrix3<f64> {
         match self {
             Self::Printed => slope,
             Self::Exact => {
@@ -214,7 +230,8 @@ impl Trajectory {
     /// 2015 (1), which prints −.
     pub fn turn_rate(&self, earth_rate: f64) -> Vector3<f64> {
         let around = self.longitude_rate + earth_rate;
-        let (climb, turn, north) = (self.flight_path_angle_rate, self.heading_rate, self.latitude_rate);
+        let (climb, turn, north) =
+            (self.flight_path_angle_rate, self.heading_rate, self.latitude_rate);
         if [around, climb, turn, north] == [0.0; 4] {
             return Vector3::zeros();
         }

@@ -34,8 +34,8 @@ pub struct Load {
 /// R Δ_m of (4b) put into the rate equation.
 pub fn derivative(body: &RigidBody, kinematics: Kinematics, state: &State, load: &Load) -> State {
     let (angles, rates) = (angles(state), rates(state));
-    let acceleration =
-        body.angular_acceleration(&rates, &load.moment) + kinematics.r_inverse(&angles) * load.delta;
+    let acceleration = body.angular_acceleration(&rates, &load.moment)
+        + kinematics.r_inverse(&angles) * load.delta;
     let mut angle_rates = kinematics.r(&angles) * rates;
     if load.turn_rate != Vector3::zeros() {
         angle_rates += kinematics.turn(&angles) * load.turn_rate;
@@ -55,7 +55,12 @@ pub struct Partials {
 }
 
 /// Returns the partial derivatives of [`derivative`].
-pub fn partial_derivatives(body: &RigidBody, kinematics: Kinematics, state: &State, load: &Load) -> Partials {
+pub fn partial_derivatives(
+    body: &RigidBody,
+    kinematics: Kinematics,
+    state: &State,
+    load: &Load,
+) -> Partials {
     let (angles, rates) = (angles(state), rates(state));
     let (r, r_inverse) = (kinematics.r(&angles), kinematics.r_inverse(&angles));
     let (r_alpha, r_beta) = (kinematics.r_alpha(&angles), kinematics.r_beta(&angles));
@@ -253,7 +258,11 @@ impl Plant {
             transport,
             calibration: config.calibration.map(|sequence| Calibration { sequence, initial }),
             surroundings: config.surroundings,
-            sensors: config.sensors.as_ref().map(|sensors| Sensors::new(sensors, start_time)).transpose()?,
+            sensors: config
+                .sensors
+                .as_ref()
+                .map(|sensors| Sensors::new(sensors, start_time))
+                .transpose()?,
             step: config.step,
             start_time,
             held: None,
@@ -269,7 +278,8 @@ impl Plant {
         let held = self.held.as_ref().is_none_or(|held| {
             held.since.is_finite() && (self.actuators.is_none() || Actuators::fits(&held.drive))
         });
-        let period = self.disturbance.intervals(self.start_time).map_or(self.step, |(_, length)| length);
+        let period =
+            self.disturbance.intervals(self.start_time).map_or(self.step, |(_, length)| length);
         held && check_resolution(time, period).is_ok()
             && self.state.iter().chain(&self.deflections).all(|value| value.is_finite())
             && self.same_configuration(built)
@@ -343,7 +353,8 @@ impl Plant {
     /// has come, the disturbance is drawn from the present state and `input`, each time anew at the
     /// same tick; otherwise the one already held stays.
     pub fn in_force(&self, time: f64, input: &Input, command: &Command) -> Held {
-        let commanded = |actuators: &Actuators| actuators.commanded(time, command, &self.deflections);
+        let commanded =
+            |actuators: &Actuators| actuators.commanded(time, command, &self.deflections);
         self.drawn(time, input, self.actuators.as_ref().map_or_else(Drive::default, commanded))
     }
 
@@ -358,8 +369,16 @@ impl Plant {
             _ => {
                 let (angles, rates) = (self.angles(), self.rates());
                 let moment = self.control_moment(input, delayed, &drive, 0.0);
-                let view = View { body: &self.body, kinematics: self.kinematics, angles, rates, moment };
-                Held { tick, since: time, sample: self.disturbance.sample(tick, &view), acts, drive, delayed }
+                let view =
+                    View { body: &self.body, kinematics: self.kinematics, angles, rates, moment };
+                Held {
+                    tick,
+                    since: time,
+                    sample: self.disturbance.sample(tick, &view),
+                    acts,
+                    drive,
+                    delayed,
+                }
             }
         }
     }
@@ -381,7 +400,8 @@ impl Plant {
     /// taken.
     fn hold_between(&mut self, time: f64, input: &Input, before: &Held) -> Held {
         self.sense(time, input);
-        let directed = |actuators: &Actuators| actuators.directed(time, before.drive, &self.deflections);
+        let directed =
+            |actuators: &Actuators| actuators.directed(time, before.drive, &self.deflections);
         let drive = self.actuators.as_ref().map_or_else(Drive::default, directed);
         *self.held.insert(self.drawn(time, input, drive))
     }
@@ -431,11 +451,13 @@ impl Plant {
 
     /// Partial derivatives of [`Plant::applied_moment`] with respect to the input moment (3 × 3)
     /// and the deflections (3 × 8).
-    pub fn applied_moment_by_moment_and_deflections(&self) -> (Matrix3<f64>, SMatrix<f64, 3, SURFACES>) {
+    pub fn applied_moment_by_moment_and_deflections(
+        &self,
+    ) -> (Matrix3<f64>, SMatrix<f64, 3, SURFACES>) {
         let at_once = if self.transport.is_some() { Matrix3::zeros() } else { Matrix3::identity() };
-        self.actuators
-            .as_ref()
-            .map_or((at_once, SMatrix::zeros()), |all| (Matrix3::zeros(), *all.moment_by_deflections()))
+        self.actuators.as_ref().map_or((at_once, SMatrix::zeros()), |all| {
+            (Matrix3::zeros(), *all.moment_by_deflections())
+        })
     }
 
     /// Partial derivative of the applied moment with respect to the jet commands at the instant at
@@ -535,8 +557,9 @@ impl Plant {
                 None => self.hold(time, &input(time), command),
                 Some(before) => self.hold_between(time, &input(time), &before),
             };
-            let cut =
-                self.next_change(time, &held).filter(|&change| change > time && change + tolerance(to) < to);
+            let cut = self
+                .next_change(time, &held)
+                .filter(|&change| change > time && change + tolerance(to) < to);
             let end = cut.unwrap_or(to);
             let steps = equal_steps(end - time, self.step);
             let h = (end - time) / steps as f64;

@@ -30,7 +30,10 @@ impl Surroundings {
     pub fn check(&self) -> Result<(), Error> {
         let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
         if !(self.gravity >= 0.0 && self.gravity.is_finite()) {
-            return refuse("surroundings.gravity", format!("= {} m/s2 must not be negative", self.gravity));
+            return refuse(
+                "surroundings.gravity",
+                format!("= {} m/s2 must not be negative", self.gravity),
+            );
         }
         if !self.field.iter().all(|value| value.is_finite()) {
             return refuse("surroundings.field", "holds a value that is not finite".into());
@@ -98,7 +101,8 @@ impl Pose {
 
     /// Specific force (m/s²) and magnetic field (T) in body axes.
     fn fields(&self, surroundings: &Surroundings) -> [Vector3<f64>; 2] {
-        let body_from_level = body_from_velocity(&self.angles) * velocity_from_level(&self.trajectory);
+        let body_from_level =
+            body_from_velocity(&self.angles) * velocity_from_level(&self.trajectory);
         let lift = Vector3::new(0.0, 0.0, -surroundings.gravity);
         [body_from_level * lift, body_from_level * surroundings.field]
     }
@@ -124,16 +128,21 @@ impl Pose {
             alpha -= Vector3::new(sa * cb, 0.0, -ca * cb) * (self.alpha_rate * sb);
             let mut beta = rate.column_mut(1);
             beta -= (Vector3::new(ca * sb, -cb, sa * sb) * sb + axis * cb) * self.alpha_rate;
-            by_trajectory.fixed_rows_mut::<3>(0).copy_from(&(axis * alpha_rate_by_trajectory * -sb));
+            by_trajectory
+                .fixed_rows_mut::<3>(0)
+                .copy_from(&(axis * alpha_rate_by_trajectory * -sb));
         }
         // A field that is fixed in space turns against the body: v̇ = −ω × v.
         let by_angles = Kinematics::Exact.r_inverse(&self.angles);
         let body_from_velocity = body_from_velocity(&self.angles);
         let (sg, cg) = self.trajectory.flight_path_angle.sin_cos();
-        let by_course = [Vector3::y(), Vector3::new(-sg, 0.0, cg)].map(|axis| body_from_velocity * axis);
+        let by_course =
+            [Vector3::y(), Vector3::new(-sg, 0.0, cg)].map(|axis| body_from_velocity * axis);
         for (row, field) in [3, 6].into_iter().zip(self.fields(surroundings)) {
             for i in 0..3 {
-                by_state.fixed_view_mut::<3, 1>(row, i).copy_from(&field.cross(&by_angles.column(i)));
+                by_state
+                    .fixed_view_mut::<3, 1>(row, i)
+                    .copy_from(&field.cross(&by_angles.column(i)));
             }
             for (i, axis) in by_course.iter().enumerate() {
                 by_trajectory.fixed_view_mut::<3, 1>(row, i).copy_from(&field.cross(axis));

@@ -54,7 +54,10 @@ impl Profile {
     /// Returns a reference that is `before` (rad) for t ≤ `time` (s) and `after` (rad) for t >
     /// `time`.
     pub fn step(before: Vector3<f64>, after: Vector3<f64>, time: f64) -> Self {
-        Self::Piecewise(vec![Segment::constant(time, before), Segment::constant(f64::INFINITY, after)])
+        Self::Piecewise(vec![
+            Segment::constant(time, before),
+            Segment::constant(f64::INFINITY, after),
+        ])
     }
 
     /// Returns the reference `mean + amplitude · sin(frequency · t + phase)`, with angles and phase
@@ -63,7 +66,11 @@ impl Profile {
         let (sine, cosine) = (phase.cos(), phase.sin());
         let angles = [0, 1, 2].map(|i| Course {
             constant: mean[i],
-            waves: vec![Wave { frequency, sine: amplitude[i] * sine, cosine: amplitude[i] * cosine }],
+            waves: vec![Wave {
+                frequency,
+                sine: amplitude[i] * sine,
+                cosine: amplitude[i] * cosine,
+            }],
         });
         Self::Piecewise(vec![Segment { until: f64::INFINITY, angles }])
     }

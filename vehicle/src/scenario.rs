@@ -249,7 +249,10 @@ impl FileCourse {
             sine: wave.sine_deg.to_radians(),
             cosine: wave.cosine_deg.to_radians(),
         };
-        Course { constant: self.constant_deg.to_radians(), waves: self.wave.into_iter().map(wave).collect() }
+        Course {
+            constant: self.constant_deg.to_radians(),
+            waves: self.wave.into_iter().map(wave).collect(),
+        }
     }
 }
 
@@ -295,16 +298,23 @@ mod tests {
         // The first segment applies at the jump, however the 625th tick of 0.04 s is rounded.
         let accumulated = (0..625).fold(0.0, |time, _| time + 0.04);
         for time in [625.0 * 0.04, 125.0 * 0.2, 25f64.next_up(), accumulated] {
-            assert!((reference.at(time).angles - reference.at(25.0).angles).norm() < 1e-9, "{time}");
+            assert!(
+                (reference.at(time).angles - reference.at(25.0).angles).norm() < 1e-9,
+                "{time}"
+            );
         }
     }
 
     #[test]
     fn published_data_of_crmpc2022() {
         let scenario = Scenario::crmpc2022();
-        assert_eq!(scenario.inertia, Inertia { Ixx: 588791.0, Iyy: 1303212.0, Izz: 1534163.0, Ixz: 24242.0 });
+        assert_eq!(
+            scenario.inertia,
+            Inertia { Ixx: 588791.0, Iyy: 1303212.0, Izz: 1534163.0, Ixz: 24242.0 }
+        );
         assert!(
-            (scenario.initial_angles.map(f64::to_degrees) - Vector3::new(7.5, 10.0, -30.0)).amax() < 1e-13
+            (scenario.initial_angles.map(f64::to_degrees) - Vector3::new(7.5, 10.0, -30.0)).amax()
+                < 1e-13
         );
         assert!((scenario.limit_rate - 0.0873).abs() < 5e-5);
         assert_eq!(scenario.limit_moment, 1.356e5);
@@ -318,7 +328,9 @@ mod tests {
         for time in [0.0, 3.0, 17.5] {
             let printed = (0.5 + (0.1f64 * time).sin() + time.sin()) * 1e4; // Wu 2015, (66)
             assert!((scenario.disturbance.moment(time) - Vector3::repeat(printed)).amax() < 1e-9);
-            assert!((degrees(&scenario.reference, time) - Vector3::new(30.0, 0.0, 60.0)).amax() < 1e-13);
+            assert!(
+                (degrees(&scenario.reference, time) - Vector3::new(30.0, 0.0, 60.0)).amax() < 1e-13
+            );
         }
     }
 

@@ -30,8 +30,12 @@ impl SensorData {
     /// Returns the data of the embedded file.
     pub fn embedded() -> Self {
         let file = file();
-        let Calibration { alpha_rate_deg_s, sigma_rate_deg_s, beta_amplitude_deg, beta_frequency_deg_s } =
-            file.calibration;
+        let Calibration {
+            alpha_rate_deg_s,
+            sigma_rate_deg_s,
+            beta_amplitude_deg,
+            beta_frequency_deg_s,
+        } = file.calibration;
         Self {
             surroundings: Surroundings {
                 gravity: file.surroundings.gravity,
@@ -57,8 +61,9 @@ impl SensorData {
 
 fn file() -> &'static File {
     // This cannot fail: a test reads the embedded file.
-    static READ: LazyLock<File> =
-        LazyLock::new(|| toml::from_str(TEXT).unwrap_or_else(|error| panic!("sensors.toml: {error}")));
+    static READ: LazyLock<File> = LazyLock::new(|| {
+        toml::from_str(TEXT).unwrap_or_else(|error| panic!("sensors.toml: {error}"))
+    });
     &READ
 }
 
@@ -153,7 +158,9 @@ impl Sensor {
     fn triad(&self) -> Triad {
         let unit = self.unit.factor();
         Triad {
-            matrix: self.matrix.map_or_else(Matrix3::identity, |rows| Matrix3::from(rows).transpose()),
+            matrix: self
+                .matrix
+                .map_or_else(Matrix3::identity, |rows| Matrix3::from(rows).transpose()),
             bias: self.bias * unit,
             noise: self.noise * unit,
             bandwidth: self.bandwidth,

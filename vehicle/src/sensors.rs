@@ -91,8 +91,9 @@ impl Config {
             return refuse("sensors.line.period", format!("= {period} s must be positive"));
         }
         if !(delay >= 0.0 && delay / period <= IN_FLIGHT as f64) {
-            let problem =
-                format!("= {delay} s must lie between 0 and {IN_FLIGHT} times `sensors.line.period`");
+            let problem = format!(
+                "= {delay} s must lie between 0 and {IN_FLIGHT} times `sensors.line.period`"
+            );
             return refuse("sensors.line.delay", problem);
         }
         if !(0.0..=1.0).contains(&drop_probability) {
@@ -108,7 +109,8 @@ impl Config {
     fn draw(&self, tick: i64) -> ([Vector3<f64>; 3], f64) {
         // The inverted seed gives another sequence than that of a disturbance with the same seed.
         let [a, b, c, d, e, f, g, h, i, j, chance] = uniform(!self.seed, tick);
-        let [first, second, third, fourth, fifth] = [[a, b], [c, d], [e, f], [g, h], [i, j]].map(normal_pair);
+        let [first, second, third, fourth, fifth] =
+            [[a, b], [c, d], [e, f], [g, h], [i, j]].map(normal_pair);
         let noise = [
             Vector3::new(first[0], first[1], second[0]),
             Vector3::new(second[1], third[0], third[1]),
@@ -128,12 +130,21 @@ impl Sensors {
         check_resolution(start, config.line.period)?;
         let length = (config.line.delay / config.line.period) as usize + 2;
         let arrived = Sample { time: start, ..Sample::default() };
-        Ok(Self { config: *config, start, before: None, last: None, line: vec![None; length], arrived })
+        Ok(Self {
+            config: *config,
+            start,
+            before: None,
+            last: None,
+            line: vec![None; length],
+            arrived,
+        })
     }
 
     /// Whether both have the same configuration and start time.
     pub(crate) fn same_configuration(&self, other: &Self) -> bool {
-        self.config == other.config && self.start == other.start && self.line.len() == other.line.len()
+        self.config == other.config
+            && self.start == other.start
+            && self.line.len() == other.line.len()
     }
 
     /// Whether restored sensors are possible at `time` (s), which means that none of their samples
@@ -198,10 +209,9 @@ impl Sensors {
     fn newest(&self, time: f64) -> Sample {
         let Some(last) = self.last else { return self.arrived };
         let newest = self.tick_arrived(time).min(last.tick);
-        let on_the_line = (0..=newest)
-            .rev()
-            .take(self.line.len())
-            .find_map(|tick| self.line[self.slot(tick)].filter(|taken| taken.tick == tick && !taken.dropped));
+        let on_the_line = (0..=newest).rev().take(self.line.len()).find_map(|tick| {
+            self.line[self.slot(tick)].filter(|taken| taken.tick == tick && !taken.dropped)
+        });
         on_the_line.map_or(self.arrived, |taken| taken.sample())
     }
 
@@ -227,8 +237,9 @@ impl Sensors {
 
     /// Newest sample that would have arrived after a call of [`Sensors::take`] at `time` (s).
     pub fn shown(&self, time: f64, felt: &Readings) -> Sample {
-        let due =
-            self.due(time, felt).filter(|taken| taken.tick <= self.tick_arrived(time) && !taken.dropped);
+        let due = self
+            .due(time, felt)
+            .filter(|taken| taken.tick <= self.tick_arrived(time) && !taken.dropped);
         due.map_or_else(|| self.newest(time), |taken| taken.sample())
     }
 }

@@ -65,7 +65,9 @@ impl LookupTable {
         let file = path.display().to_string();
         match std::fs::File::open(path) {
             Ok(reader) => Self::from_csv(&file, reader),
-            Err(error) => Err(Error::Table { file, line: None, column: None, problem: error.to_string() }),
+            Err(error) => {
+                Err(Error::Table { file, line: None, column: None, problem: error.to_string() })
+            }
         }
     }
 
@@ -86,7 +88,8 @@ impl LookupTable {
             .trim(csv::Trim::All)
             .flexible(true)
             .from_reader(reader);
-        let headings = reader.headers().map_err(|error| refuse(Some(1), None, error.to_string()))?.clone();
+        let headings =
+            reader.headers().map_err(|error| refuse(Some(1), None, error.to_string()))?.clone();
         let heading_line = headings.position().map(csv::Position::line);
         let mut columns = Vec::new();
         for (quantity, forms) in COLUMNS {
@@ -119,7 +122,11 @@ impl LookupTable {
         if let Some(unknown) =
             headings.iter().enumerate().find(|(i, _)| columns.iter().all(|column| column.0 != *i))
         {
-            return Err(refuse(heading_line, Some(unknown.1), "is not known here; remove it".into()));
+            return Err(refuse(
+                heading_line,
+                Some(unknown.1),
+                "is not known here; remove it".into(),
+            ));
         }
 
         let (mut times, mut angles) = (Vec::new(), Vec::new());
@@ -129,7 +136,8 @@ impl LookupTable {
             })?;
             let line = record.position().map(csv::Position::line);
             if record.len() != headings.len() {
-                let problem = format!("{} values where the headings name {}", record.len(), headings.len());
+                let problem =
+                    format!("{} values where the headings name {}", record.len(), headings.len());
                 return Err(refuse(line, None, problem));
             }
             let mut row = [0.0; 4];
@@ -175,7 +183,8 @@ impl LookupTable {
         let (c0, c1) = (self.curvatures[i], self.curvatures[i + 1]);
         Reference {
             angles: y0 * a + y1 * b + (c0 * (a * a * a - a) + c1 * (b * b * b - b)) * (h * h / 6.0),
-            rates: (y1 - y0) / h + (c1 * (3.0 * b * b - 1.0) - c0 * (3.0 * a * a - 1.0)) * (h / 6.0),
+            rates: (y1 - y0) / h
+                + (c1 * (3.0 * b * b - 1.0) - c0 * (3.0 * a * a - 1.0)) * (h / 6.0),
             accelerations: c0 * a + c1 * b,
         }
     }

@@ -53,9 +53,11 @@ impl Transport {
     /// Whether restored commands are possible at `time` (s). A step that has `failed` may have gone
     /// beyond `time`.
     pub(crate) fn fits(&self, time: f64, failed: bool) -> bool {
-        let past =
-            |change: &Change| failed && change.time.is_finite() || change.time <= time + tolerance(time);
-        let ascend = self.changes.iter().zip(self.changes.iter().skip(1)).all(|(a, b)| a.time < b.time);
+        let past = |change: &Change| {
+            failed && change.time.is_finite() || change.time <= time + tolerance(time)
+        };
+        let ascend =
+            self.changes.iter().zip(self.changes.iter().skip(1)).all(|(a, b)| a.time < b.time);
         let finite = |change: &Change| change.moment.iter().all(|value| value.is_finite());
         ascend
             && self.changes.len() <= UNDER_WAY + 2
@@ -119,7 +121,9 @@ impl Transport {
 
     /// Moment (N m) that acts at `time` (s).
     pub fn moment(&self, time: f64) -> Vector3<f64> {
-        self.arrived(time).checked_sub(1).map_or_else(Vector3::zeros, |last| self.changes[last].moment)
+        self.arrived(time)
+            .checked_sub(1)
+            .map_or_else(Vector3::zeros, |last| self.changes[last].moment)
     }
 
     /// Time (s) at which the next change after `time` arrives, if one is under way.
@@ -146,7 +150,8 @@ mod tests {
         for k in 0..100 {
             let time = 0.04 * f64::from(k);
             transport.command(time, pitch(f64::from(k + 1))).unwrap();
-            for (offset, arrived) in [(0.0, k - 3), (0.019, k - 3), (0.021, k - 2), (0.039, k - 2)] {
+            for (offset, arrived) in [(0.0, k - 3), (0.019, k - 3), (0.021, k - 2), (0.039, k - 2)]
+            {
                 let expected = f64::from((arrived + 1).max(0));
                 assert_eq!(transport.moment(time + offset).y, expected, "{k}, {offset}");
             }

@@ -89,7 +89,10 @@ impl Triad {
             ("bias", self.bias.iter().all(|value| value.is_finite())),
         ] {
             if !finite {
-                return Err(Error::of(format!("{path}.{name}"), "holds a value that is not finite"));
+                return Err(Error::of(
+                    format!("{path}.{name}"),
+                    "holds a value that is not finite",
+                ));
             }
         }
         Ok(())
@@ -106,7 +109,8 @@ impl Triad {
         before: Option<(&Memory, f64)>,
     ) -> Memory {
         let input = self.matrix * felt + self.bias;
-        let filtered = before.map_or(input, |(before, elapsed)| self.filtered(&input, before, elapsed));
+        let filtered =
+            before.map_or(input, |(before, elapsed)| self.filtered(&input, before, elapsed));
         let value = match before {
             Some((before, _)) if self.freeze.holds(time) => before.value,
             _ => (filtered + noise * self.noise).map(|value| self.convert(value)),
@@ -127,6 +131,10 @@ impl Triad {
 
     fn convert(&self, value: f64) -> f64 {
         let value = if self.range == 0.0 { value } else { value.clamp(-self.range, self.range) };
-        if self.resolution == 0.0 { value } else { (value / self.resolution).round() * self.resolution }
+        if self.resolution == 0.0 {
+            value
+        } else {
+            (value / self.resolution).round() * self.resolution
+        }
     }
 }

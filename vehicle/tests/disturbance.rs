@@ -90,7 +90,8 @@ fn oracle_random_access_gives_the_generator_s_sequence() {
     let unit = Disturbance { bound: 1.0, seed: 42, ..of(Kind::White) };
     let mut generator = Pcg64::seed_from_u64(42);
     for tick in 0..1000 {
-        let expected = Vector3::from_fn(|_, _| (generator.next_u64() >> 11) as f64 * 2f64.powi(-52) - 1.0);
+        let expected =
+            Vector3::from_fn(|_, _| (generator.next_u64() >> 11) as f64 * 2f64.powi(-52) - 1.0);
         assert_eq!(unit.sample(tick, &still(&body)), expected, "tick {tick}");
     }
 }
@@ -112,7 +113,8 @@ fn oracle_white_noise_has_the_moments_of_a_uniform_distribution_and_no_memory() 
         let samples: Vec<_> = (0..n).map(|tick| unit.sample(tick, &still(&body))).collect();
         let mean = samples.iter().sum::<Vector3<f64>>() / n as f64;
         let variance = samples.iter().map(|s| s.component_mul(s)).sum::<Vector3<f64>>() / n as f64;
-        let next = samples.windows(2).map(|w| w[0].component_mul(&w[1])).sum::<Vector3<f64>>() / n as f64;
+        let next =
+            samples.windows(2).map(|w| w[0].component_mul(&w[1])).sum::<Vector3<f64>>() / n as f64;
         let across = samples.iter().map(|s| s.x * s.y + s.y * s.z).sum::<f64>() / n as f64;
         // The bounds are five standard deviations of each estimate.
         assert!(mean.amax() < 0.0092, "{mean}");
@@ -127,8 +129,9 @@ fn different_seeds_are_uncorrelated() {
     let body = body();
     let sum: f64 = (0..10_000)
         .map(|tick| {
-            let [a, b] = [7, 8]
-                .map(|seed| Disturbance { bound: 1.0, seed, ..of(Kind::White) }.sample(tick, &still(&body)));
+            let [a, b] = [7, 8].map(|seed| {
+                Disturbance { bound: 1.0, seed, ..of(Kind::White) }.sample(tick, &still(&body))
+            });
             a.dot(&b)
         })
         .sum();
@@ -138,7 +141,8 @@ fn different_seeds_are_uncorrelated() {
 #[test]
 fn square_wave_begins_positive_at_its_start() {
     let body = body();
-    let square = Disturbance { start: 1.0, direction: Vector3::new(1.0, 0.0, -0.5), ..of(Kind::Square) };
+    let square =
+        Disturbance { start: 1.0, direction: Vector3::new(1.0, 0.0, -0.5), ..of(Kind::Square) };
     let at = |time: f64| square.sample(square.tick(0.0, time), &still(&body));
     let high = Vector3::new(0.035, 0.0, -0.0175);
     for (time, expected) in [(1.0, high), (2.4, high), (2.5, -high), (3.9, -high), (4.0, high)] {

@@ -4,10 +4,13 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
 use vehicle::kinematics::{Kinematics, TRAJECTORY, Trajectory};
-use vehicle::kinematics::{r, r_alpha, r_alpha_alpha, r_alpha_beta, r_beta, r_beta_beta, r_dot, r_inverse};
+use vehicle::kinematics::{
+    r, r_alpha, r_alpha_alpha, r_alpha_beta, r_beta, r_beta_beta, r_dot, r_inverse,
+};
 
 fn attitude() -> impl Strategy<Value = Vector3<f64>> {
-    (-3.0..3.0, -1.4..1.4, -3.0..3.0).prop_map(|(alpha, beta, sigma)| Vector3::new(alpha, beta, sigma))
+    (-3.0..3.0, -1.4..1.4, -3.0..3.0)
+        .prop_map(|(alpha, beta, sigma)| Vector3::new(alpha, beta, sigma))
 }
 
 type Of = fn(&Vector3<f64>) -> Matrix3<f64>;
@@ -110,7 +113,11 @@ fn published_r_dot_is_wrong_in_two_entries() {
 
 /// Rotation from body axes to north, east, down at the meridian θ = 0, as a product of rotations.
 /// The bank angle grows against the right-hand rule about the velocity, as the signs of R require.
-fn attitude_in_space(trajectory: &Trajectory, longitude: f64, angles: &Vector3<f64>) -> Rotation3<f64> {
+fn attitude_in_space(
+    trajectory: &Trajectory,
+    longitude: f64,
+    angles: &Vector3<f64>,
+) -> Rotation3<f64> {
     let [x, y, z] = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
     let about = Rotation3::from_axis_angle;
     // Inertial axes: z to the north pole, x to the meridian θ = 0 on the equator.
@@ -290,7 +297,12 @@ proptest! {
 /// Earth that does not turn.
 #[test]
 fn a_trajectory_that_does_not_turn_leaves_r_alone() {
-    let still = Trajectory { flight_path_angle: -0.1, heading: 0.7, latitude: 0.5, ..Trajectory::default() };
+    let still = Trajectory {
+        flight_path_angle: -0.1,
+        heading: 0.7,
+        latitude: 0.5,
+        ..Trajectory::default()
+    };
     assert_eq!(still.turn_rate(0.0), Vector3::zeros());
     assert_ne!(still.turn_rate(7.2921e-5), Vector3::zeros());
 }

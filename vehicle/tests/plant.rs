@@ -6,7 +6,9 @@ use vehicle::actuators::{self, Command, JetMode};
 use vehicle::disturbance::{Disturbance, Kind, MomentWave, SineMoment};
 use vehicle::effectors::Effectors;
 use vehicle::kinematics::{Kinematics, Trajectory};
-use vehicle::plant::{Config, Input, Load, Partials, Plant, State, derivative, partial_derivatives};
+use vehicle::plant::{
+    Config, Input, Load, Partials, Plant, State, derivative, partial_derivatives,
+};
 use vehicle::{Error, Scenario};
 
 fn config() -> Config {
@@ -23,10 +25,20 @@ const TUMBLING: [f64; 6] = [0.2, 0.1, -0.5, 0.08, -0.05, 0.06];
 fn kinds() -> impl Iterator<Item = Config> {
     use Kind::{AgainstMoment, AlongRate, Constant, None, Sine, Square, White};
     [None, White, Constant, Sine, Square, AlongRate, AgainstMoment].into_iter().map(|kind| {
-        let wave = |frequency| MomentWave { amplitude: Vector3::new(1e4, 2e4, -1e4), frequency, phase: 0.2 };
+        let wave = |frequency| MomentWave {
+            amplitude: Vector3::new(1e4, 2e4, -1e4),
+            frequency,
+            phase: 0.2,
+        };
         let sine = SineMoment { offset: Vector3::repeat(5e3), waves: vec![wave(1.0), wave(0.1)] };
-        let disturbance =
-            Disturbance { kind, sine, square_period: 0.7, start: 0.5, end: 3.3, ..config().disturbance };
+        let disturbance = Disturbance {
+            kind,
+            sine,
+            square_period: 0.7,
+            start: 0.5,
+            end: 3.3,
+            ..config().disturbance
+        };
         Config { disturbance, ..config() }
     })
 }
@@ -75,7 +87,8 @@ fn oracle_integration_has_order_four() {
 fn oracle_constant_moment_about_a_principal_axis() {
     // Motion about the pitch axis at beta = 0, sigma free: q = M t / Iyy, alpha = alpha_0 + M t² /
     // 2 Iyy.
-    let mut plant = Plant::new(&undisturbed(Vector6::new(0.1, 0.0, 0.3, 0.0, 0.0, 0.0), 0.01), 0.0).unwrap();
+    let mut plant =
+        Plant::new(&undisturbed(Vector6::new(0.1, 0.0, 0.3, 0.0, 0.0, 0.0), 0.01), 0.0).unwrap();
     let inertia = plant.body().inertia[(1, 1)];
     assert_eq!(inertia, 1303212.0 * 1.05);
     plant.advance(0.0, 3.0, Vector3::new(0.0, 1e5, 0.0)).unwrap();
@@ -92,9 +105,11 @@ fn oracle_delta_is_an_acceleration_of_x_omega() {
         // Differences along the motion give d(Rω)/dt, with and without Δ.
         let x_omega_rate = |delta: Vector3<f64>| {
             let h = 1e-5;
-            let f = derivative(&body, kinematics, &state, &Load { moment, delta, ..Load::default() });
-            let x_omega =
-                |state: State| kinematics.r(&vehicle::plant::angles(&state)) * vehicle::plant::rates(&state);
+            let f =
+                derivative(&body, kinematics, &state, &Load { moment, delta, ..Load::default() });
+            let x_omega = |state: State| {
+                kinematics.r(&vehicle::plant::angles(&state)) * vehicle::plant::rates(&state)
+            };
             (x_omega(state + f * h) - x_omega(state - f * h)) / (2.0 * h)
         };
         assert!((x_omega_rate(delta) - x_omega_rate(Vector3::zeros()) - delta).amax() < 1e-9);
@@ -126,7 +141,12 @@ fn one_long_step_equals_five_short_ones_bit_for_bit() {
 fn one_long_step_equals_five_short_ones_if_the_disturbance_cuts_elsewhere() {
     for config in kinds() {
         for (long, short) in long_and_short_steps(&config) {
-            assert!((long - short).amax() < 1e-11, "{:?}: {}", config.disturbance.kind, long - short);
+            assert!(
+                (long - short).amax() < 1e-11,
+                "{:?}: {}",
+                config.disturbance.kind,
+                long - short
+            );
         }
     }
 }
@@ -216,7 +236,8 @@ fn singular_attitude_and_wrong_input_stop_the_plant_with_a_reason() {
     let error = plant.advance(0.0, 2.0, Vector3::zeros()).unwrap_err();
     assert!(matches!(error, Error::Singular { .. }), "{error}");
     assert!(
-        plant.state.iter().all(|value| value.is_finite()) && plant.angles().y < std::f64::consts::FRAC_PI_2
+        plant.state.iter().all(|value| value.is_finite())
+            && plant.angles().y < std::f64::consts::FRAC_PI_2
     );
 
     let mut plant = Plant::new(&config(), 0.0).unwrap();
@@ -311,23 +332,39 @@ proptest! {
 fn oracle_a_steady_climb_over_a_still_earth_shows_in_alpha_alone() {
     // In level flight to the north without bank and sideslip, α̇ = q − γ̇, so a positive γ̇ lowers
     // the angle of attack.
-    let mut plant = Plant::new(&undisturbed(State::new(0.3, 0.0, 0.0, 0.0, 0.0, 0.0), 0.01), 0.0).unwrap();
+    let mut plant =
+        Plant::new(&undisturbed(State::new(0.3, 0.0, 0.0, 0.0, 0.0, 0.0), 0.01), 0.0).unwrap();
     let climb = Trajectory { flight_path_angle_rate: 0.02, ..Trajectory::default() };
     plant
-        .advance_with(0.0, 5.0, &Command::default(), |_| Input { trajectory: climb, ..Input::default() })
+        .advance_with(0.0, 5.0, &Command::default(), |_| Input {
+            trajectory: climb,
+            ..Input::default()
+        })
         .unwrap();
-    assert!((plant.state - State::new(0.2, 0.0, 0.0, 0.0, 0.0, 0.0)).amax() < 1e-14, "{}", plant.state);
+    assert!(
+        (plant.state - State::new(0.2, 0.0, 0.0, 0.0, 0.0, 0.0)).amax() < 1e-14,
+        "{}",
+        plant.state
+    );
 }
 
 #[test]
 fn a_trajectory_at_rest_changes_no_bit() {
-    let still = Trajectory { flight_path_angle: -0.1, heading: 0.7, latitude: 0.5, ..Trajectory::default() };
+    let still = Trajectory {
+        flight_path_angle: -0.1,
+        heading: 0.7,
+        latitude: 0.5,
+        ..Trajectory::default()
+    };
     let [mut plain, mut along] = [0, 1].map(|_| Plant::new(&config(), 0.0).unwrap());
     for k in 0..20 {
         let (from, to) = (0.2 * f64::from(k), 0.2 * f64::from(k + 1));
         plain.advance(from, to, moment(k)).unwrap();
         along
-            .advance_with(from, to, &Command::default(), |_| Input { trajectory: still, ..moment(k).into() })
+            .advance_with(from, to, &Command::default(), |_| Input {
+                trajectory: still,
+                ..moment(k).into()
+            })
             .unwrap();
     }
     assert_eq!(plain, along);
@@ -336,7 +373,8 @@ fn a_trajectory_at_rest_changes_no_bit() {
 #[test]
 fn oracle_the_bank_angles_differ_by_the_integral_of_alpha_rate_times_sin_beta() {
     let end = |kinematics| {
-        let config = Config { kinematics, ..undisturbed(State::new(0.1, 0.2, 0.3, 0.0, 0.02, 0.0), 0.01) };
+        let config =
+            Config { kinematics, ..undisturbed(State::new(0.1, 0.2, 0.3, 0.0, 0.02, 0.0), 0.01) };
         let mut plant = Plant::new(&config, 0.0).unwrap();
         plant.advance(0.0, 1.0, Vector3::zeros()).unwrap();
         plant.angles()
@@ -414,17 +452,25 @@ fn one_long_step_equals_short_ones_with_actuators() {
         let [mut long, mut short] = [0, 1].map(|_| Plant::new(&config, 0.0).unwrap());
         long.advance_with(0.0, 2.0, &command, |_| input).unwrap();
         for k in 0..50 {
-            short.advance_with(0.04 * f64::from(k), 0.04 * f64::from(k + 1), &command, |_| input).unwrap();
+            short
+                .advance_with(0.04 * f64::from(k), 0.04 * f64::from(k + 1), &command, |_| input)
+                .unwrap();
         }
-        assert!((long.state - short.state).amax() < 1e-13, "{jet_mode:?}: {}", long.state - short.state);
+        assert!(
+            (long.state - short.state).amax() < 1e-13,
+            "{jet_mode:?}: {}",
+            long.state - short.state
+        );
     }
 }
 
 #[test]
 fn a_command_that_is_no_number_is_an_error() {
     let mut plant = Plant::new(&actuated(State::zeros(), JetMode::OnOff), 0.0).unwrap();
-    let refusal =
-        plant.advance_with(0.0, 1.0, &flaps(f64::NAN), |_| Input::default()).unwrap_err().to_string();
+    let refusal = plant
+        .advance_with(0.0, 1.0, &flaps(f64::NAN), |_| Input::default())
+        .unwrap_err()
+        .to_string();
     assert!(refusal.contains("command"), "{refusal}");
     assert_eq!(plant.state, State::zeros());
 }
@@ -433,7 +479,8 @@ fn a_command_that_is_no_number_is_an_error() {
 fn noise_does_not_depend_on_actuators() {
     let disturbance = config().disturbance;
     let [with, without] = [true, false].map(|with| {
-        let config = Config { disturbance: disturbance.clone(), ..actuated(State::zeros(), JetMode::OnOff) };
+        let config =
+            Config { disturbance: disturbance.clone(), ..actuated(State::zeros(), JetMode::OnOff) };
         let config = if with { config } else { Config { actuators: None, ..config } };
         let mut plant = Plant::new(&config, 0.0).unwrap();
         plant.advance_with(0.0, 0.1, &flaps(0.15), |_| Input::default()).unwrap();
@@ -449,10 +496,12 @@ fn oracle_a_delayed_moment_acts_that_much_later() {
     // arrive.
     for delay in [1e-3, 0.04, 0.1, 0.117, 0.12, 1.0] {
         for config in kinds() {
-            let mut delayed = Plant::new(&Config { moment_delay: delay, ..config.clone() }, 0.0).unwrap();
+            let mut delayed =
+                Plant::new(&Config { moment_delay: delay, ..config.clone() }, 0.0).unwrap();
             let mut direct = Plant::new(&config, 0.0).unwrap();
             let (mut reached, mut arrived) = (0.0, 0);
-            let acting = |arrived: u32| if arrived == 0 { Vector3::zeros() } else { moment(arrived - 1) };
+            let acting =
+                |arrived: u32| if arrived == 0 { Vector3::zeros() } else { moment(arrived - 1) };
             for k in 0..100 {
                 let to = 0.04 * f64::from(k + 1);
                 delayed.advance(0.04 * f64::from(k), to, moment(k)).unwrap();
@@ -504,7 +553,8 @@ fn a_delay_that_cannot_work_is_refused_by_name() {
     let courses: [fn(f64) -> f64; 2] = [|t| t, |t| t * (t - 0.04)];
     for course in courses {
         let input = |time: f64| Vector3::new(0.0, 1e4 * course(time), 0.0).into();
-        let text = plant.advance_with(0.0, 0.04, &Command::default(), input).unwrap_err().to_string();
+        let text =
+            plant.advance_with(0.0, 0.04, &Command::default(), input).unwrap_err().to_string();
         assert!(text.contains("moment_delay") && text.contains("derivatives"), "{text}");
     }
     let error = plant.advance(0.0, 0.04, Vector3::repeat(f64::NAN)).unwrap_err();

@@ -63,14 +63,15 @@ fn oracle_heading_and_climb_turn_what_is_felt() {
 }
 
 fn attitude() -> impl Strategy<Value = Vector3<f64>> {
-    (-3.0..3.0, -1.4..1.4, -3.0..3.0).prop_map(|(alpha, beta, sigma)| Vector3::new(alpha, beta, sigma))
+    (-3.0..3.0, -1.4..1.4, -3.0..3.0)
+        .prop_map(|(alpha, beta, sigma)| Vector3::new(alpha, beta, sigma))
 }
 
 /// Body rates ω from the rotation C and its derivative Ċ: Ċ Cᵀ = −ω^×.
 fn rate_of(rotation: impl Fn(f64) -> Matrix3<f64>) -> Vector3<f64> {
     let h = 1e-3;
-    let slope =
-        (rotation(-2.0 * h) - rotation(-h) * 8.0 + rotation(h) * 8.0 - rotation(2.0 * h)) / (12.0 * h);
+    let slope = (rotation(-2.0 * h) - rotation(-h) * 8.0 + rotation(h) * 8.0 - rotation(2.0 * h))
+        / (12.0 * h);
     let turning = -slope * rotation(0.0).transpose();
     Vector3::new(turning[(2, 1)], turning[(0, 2)], turning[(1, 0)])
 }
@@ -141,8 +142,9 @@ fn oracle_along_the_calibration_sequence_the_gyroscope_is_the_change_of_orientat
             let time = time + 0.3;
             let [angles, ..] = sequence.angles_and_derivatives(&initial, time);
             assert!((plant.angles() - angles).amax() < 1e-10, "{}", plant.angles() - angles);
-            let expected =
-                rate_of(|t| body_from_velocity(&sequence.angles_and_derivatives(&initial, time + t)[0]));
+            let expected = rate_of(|t| {
+                body_from_velocity(&sequence.angles_and_derivatives(&initial, time + t)[0])
+            });
             let [found, ..] = plant.felt(time, &Input::default());
             assert!((found - expected).amax() < 1e-9, "{kinematics:?}: {}", found - expected);
         }
@@ -165,7 +167,8 @@ fn in_two_minutes_the_calibration_sequence_sees_every_direction_within_13_degree
     for fixed in [data.surroundings.field.normalize(), Vector3::z()] {
         let seen: Vec<_> = (0..1200)
             .map(|k| {
-                let [angles, ..] = data.calibration.angles_and_derivatives(&initial, 0.1 * f64::from(k));
+                let [angles, ..] =
+                    data.calibration.angles_and_derivatives(&initial, 0.1 * f64::from(k));
                 body_from_velocity(&angles) * fixed
             })
             .collect();
@@ -180,9 +183,13 @@ fn in_two_minutes_the_calibration_sequence_sees_every_direction_within_13_degree
 fn a_calibration_sequence_that_comes_to_the_singular_sideslip_is_refused_by_name() {
     let mut config = Scenario::crmpc2022().config(0.01);
     let sequence = SensorData::embedded().calibration;
-    config.calibration = Some(Sequence { beta_amplitude: BETA_LIMIT - config.initial[1], ..sequence });
+    config.calibration =
+        Some(Sequence { beta_amplitude: BETA_LIMIT - config.initial[1], ..sequence });
     let message = Plant::new(&config, 0.0).unwrap_err().to_string();
-    assert!(message.contains("calibration.beta_amplitude") && message.contains("90 deg"), "{message}");
+    assert!(
+        message.contains("calibration.beta_amplitude") && message.contains("90 deg"),
+        "{message}"
+    );
     config.calibration = Some(Sequence { alpha_rate: f64::NAN, ..sequence });
     assert!(Plant::new(&config, 0.0).unwrap_err().to_string().contains("calibration"));
     config.calibration = None;

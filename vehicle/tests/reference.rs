@@ -75,24 +75,32 @@ fn oracle_sine_has_its_phase_and_amplitude() {
 fn oracle_waves_add_up_whichever_of_them_share_a_frequency() {
     let wave = |frequency| Wave { frequency, sine: 0.1 * frequency, cosine: 0.3 };
     let frequencies = [vec![0.5, 0.25], vec![0.25, 0.0, 0.5], vec![0.5]];
-    let angles =
-        frequencies.clone().map(|axis| Course { constant: 0.2, waves: axis.into_iter().map(wave).collect() });
+    let angles = frequencies
+        .clone()
+        .map(|axis| Course { constant: 0.2, waves: axis.into_iter().map(wave).collect() });
     let profile = Profile::Piecewise(vec![Segment { until: f64::INFINITY, angles }]);
     let at = profile.at(3.0);
     for (i, axis) in frequencies.iter().enumerate() {
-        let angle: f64 = axis.iter().map(|w| 0.1 * w * (w * 3.0).sin() + 0.3 * (w * 3.0).cos()).sum();
-        let rate: f64 = axis.iter().map(|w| w * (0.1 * w * (w * 3.0).cos() - 0.3 * (w * 3.0).sin())).sum();
-        assert!((at.angles[i] - 0.2 - angle).abs() < 1e-15 && (at.rates[i] - rate).abs() < 1e-15, "{i}");
+        let angle: f64 =
+            axis.iter().map(|w| 0.1 * w * (w * 3.0).sin() + 0.3 * (w * 3.0).cos()).sum();
+        let rate: f64 =
+            axis.iter().map(|w| w * (0.1 * w * (w * 3.0).cos() - 0.3 * (w * 3.0).sin())).sum();
+        assert!(
+            (at.angles[i] - 0.2 - angle).abs() < 1e-15 && (at.rates[i] - rate).abs() < 1e-15,
+            "{i}"
+        );
     }
 }
 
 #[test]
 fn oracle_spline_reproduces_polynomials_of_its_degree() {
     for (points, degree) in [(2, 1), (3, 2), (4, 3), (5, 3), (9, 3)] {
-        let times: Vec<f64> = (0..points).map(|k| f64::from(k) * (1.0 + 0.1 * f64::from(k))).collect();
+        let times: Vec<f64> =
+            (0..points).map(|k| f64::from(k) * (1.0 + 0.1 * f64::from(k))).collect();
         let polynomial =
             |t: f64| Vector3::new(1.0 + t, 2.0 - t.powi(degree.min(2)), t.powi(degree) - 3.0 * t);
-        let table = LookupTable::new(times.clone(), times.iter().map(|&t| polynomial(t)).collect()).unwrap();
+        let table = LookupTable::new(times.clone(), times.iter().map(|&t| polynomial(t)).collect())
+            .unwrap();
         for k in 0..=100 {
             let t = times[times.len() - 1] * f64::from(k) / 100.0;
             let error = (table.at(t).angles - polynomial(t)).amax();
@@ -132,7 +140,10 @@ fn spline_is_continuous_to_the_second_derivative_and_meets_its_points() {
 fn table_is_held_beyond_its_ends() {
     let table = smooth_table(7);
     for (time, end) in [(-1.0, 0.0), (20.5, 20.0), (1e9, 20.0)] {
-        assert_eq!(table.at(time), Reference { angles: table.at(end).angles, ..Reference::default() });
+        assert_eq!(
+            table.at(time),
+            Reference { angles: table.at(end).angles, ..Reference::default() }
+        );
     }
     let one = LookupTable::new(vec![1.0], vec![Vector3::repeat(0.1)]).unwrap();
     assert_eq!(one.at(1.0).angles, Vector3::repeat(0.1));
@@ -144,8 +155,10 @@ fn read(text: &str) -> Result<LookupTable, vehicle::Error> {
 
 #[test]
 fn csv_is_read_in_the_stated_units_and_any_order_of_columns() {
-    let table =
-        read("# turn\nsigma_deg, time_s, alpha_rad, beta_deg\n-30, 0, 0.1, 0\n\n-20, 2.5, 0.2, 9\n").unwrap();
+    let table = read(
+        "# turn\nsigma_deg, time_s, alpha_rad, beta_deg\n-30, 0, 0.1, 0\n\n-20, 2.5, 0.2, 9\n",
+    )
+    .unwrap();
     let end = table.at(2.5).angles;
     assert!((end - Vector3::new(0.2, 9f64.to_radians(), -20f64.to_radians())).amax() < 1e-15);
 }
@@ -168,7 +181,10 @@ fn csv_faults_are_named_with_file_line_and_column() {
         (String::new(), "column time: is missing; head it time_s"),
     ] {
         let message = read(&text).unwrap_err().to_string();
-        assert!(message.contains(named) && message.contains("turn.csv"), "{message}\nshould hold {named}");
+        assert!(
+            message.contains(named) && message.contains("turn.csv"),
+            "{message}\nshould hold {named}"
+        );
     }
     let missing = LookupTable::from_csv_file("no/such.csv".as_ref()).unwrap_err().to_string();
     assert!(missing.contains("no/such.csv"), "{missing}");
@@ -176,7 +192,9 @@ fn csv_faults_are_named_with_file_line_and_column() {
 
 #[test]
 fn a_table_of_more_points_than_anybody_needs_is_refused() {
-    let of = |n: u32| LookupTable::new((0..n).map(f64::from).collect(), vec![Vector3::zeros(); n as usize]);
+    let of = |n: u32| {
+        LookupTable::new((0..n).map(f64::from).collect(), vec![Vector3::zeros(); n as usize])
+    };
     assert!(of(100_000).is_ok());
     let text = of(100_001).unwrap_err().to_string();
     assert!(text.contains("more than 100000 points"), "{text}");

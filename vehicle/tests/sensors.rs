@@ -59,8 +59,9 @@ fn published_data_sheet_values_of_the_mems_set() {
     // InvenSense DS-000189 1.3, sections 3.1 to 3.3
     let data = SensorData::embedded();
     let [gyroscope, accelerometer, magnetometer] = data.mems;
-    let near =
-        |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 5e-3, "{found} {expected}");
+    let near = |found: f64, expected: f64| {
+        assert!((found / expected - 1.0).abs() < 5e-3, "{found} {expected}")
+    };
     near(gyroscope.noise.to_degrees(), 0.015 * 73.3f64.sqrt());
     near(1f64.to_radians() / gyroscope.resolution, 131.0);
     near(gyroscope.range.to_degrees(), 250.0);
@@ -77,7 +78,9 @@ fn published_data_sheet_values_of_the_mems_set() {
         (&magnetometer, 0.1, 300e-6),
     ] {
         let off = triad.matrix - Matrix3::identity();
-        assert!(off.diagonal().amax() <= scale && triad.bias.amax() <= bias && triad.bias.amax() > 0.0);
+        assert!(
+            off.diagonal().amax() <= scale && triad.bias.amax() <= bias && triad.bias.amax() > 0.0
+        );
     }
     // MathWorks, wrldmagm: F = 5.0940e4 nT, DEC = -13.6891, DIP = 65.9899
     let field = data.surroundings.field;
@@ -125,7 +128,8 @@ fn oracle_noise_has_the_standard_deviation_that_is_set_and_no_memory() {
         let variance = mean(&|k| values(&samples[k])[i].powi(2));
         assert!((variance - 1.0).abs() < 5.0 * (2.0 / n).sqrt(), "{i}: {variance}");
         for j in 0..9 {
-            let next = mean(&|k| values(&samples[k])[i] * values(&samples[(k + 1) % samples.len()])[j]);
+            let next =
+                mean(&|k| values(&samples[k])[i] * values(&samples[(k + 1) % samples.len()])[j]);
             assert!(next.abs() < 5.0 / n.sqrt(), "{i} {j}: {next}");
             if i != j {
                 let across = mean(&|k| values(&samples[k])[i] * values(&samples[k])[j]);
@@ -219,7 +223,11 @@ fn oracle_samples_arrive_late_by_any_delay() {
                 assert_eq!((found.number, found.readings), (0, all(0.0)), "{ticks} {quarter}");
             } else {
                 let taken = newest * PERIOD;
-                assert_eq!((f64::from(found.number), found.time), (newest + 1.0, taken), "{ticks} {quarter}");
+                assert_eq!(
+                    (f64::from(found.number), found.time),
+                    (newest + 1.0, taken),
+                    "{ticks} {quarter}"
+                );
                 assert_eq!(found.readings, all(1.0 + taken));
             }
         }
@@ -272,7 +280,8 @@ fn a_dropped_sample_leaves_a_gap_in_the_numbers_and_the_one_before_in_place() {
 fn oracle_samples_are_dropped_as_often_as_set() {
     const COUNT: u32 = 20_000;
     let mut sensors = with(|config| config.line.drop_probability = 0.3);
-    let mut numbers: Vec<i32> = run(&mut sensors, COUNT, all).iter().map(|sample| sample.number).collect();
+    let mut numbers: Vec<i32> =
+        run(&mut sensors, COUNT, all).iter().map(|sample| sample.number).collect();
     numbers.retain(|&number| number > 0);
     numbers.dedup();
     let n = f64::from(COUNT);

@@ -111,7 +111,8 @@ impl Allocator {
         let ratio = settings.ratio()?;
         let limits = settings.limits();
         let range = limits.1 - limits.0;
-        let weight = |range: f64| if range > 0.0 { settings.weight_surface / (range * range) } else { 0.0 };
+        let weight =
+            |range: f64| if range > 0.0 { settings.weight_surface / (range * range) } else { 0.0 };
         let weights = Weights {
             moment: settings.weight_moment,
             jet: Jets::repeat(settings.weight_jet),
@@ -119,10 +120,12 @@ impl Allocator {
         };
         let jets = &settings.effectors.jet_moments;
         let problem = |weights, jets: &JetMatrix| {
-            OptimalAllocation::new(weights, jets, settings.max_iterations).map_err(DesignError::Solver)
+            OptimalAllocation::new(weights, jets, settings.max_iterations)
+                .map_err(DesignError::Solver)
         };
         let alone = Weights { moment: weights.moment.component_mul(&scarcity(jets)), ..weights };
-        let (problem, without_jets) = (problem(weights, jets)?, problem(alone, &JetMatrix::zeros())?);
+        let (problem, without_jets) =
+            (problem(weights, jets)?, problem(alone, &JetMatrix::zeros())?);
         Ok(Self { settings, limits, ratio, problem, without_jets })
     }
 
@@ -162,7 +165,8 @@ impl Allocator {
         } else {
             memory.duty
         };
-        memory.modulated = memory.by_surfaces + self.settings.effectors.moment_of_jets(&memory.jets);
+        memory.modulated =
+            memory.by_surfaces + self.settings.effectors.moment_of_jets(&memory.jets);
     }
 
     fn allocate(&mut self, memory: &mut Memory, command: &Command) {
@@ -220,8 +224,10 @@ impl Allocator {
 /// jets all values are 1.
 fn scarcity(jets: &JetMatrix) -> Vector3<f64> {
     let authority = Vector3::from_fn(|i, _| {
-        let (up, down) =
-            jets.row(i).iter().fold((0.0, 0.0), |(up, down), &m: &f64| (up + m.max(0.0), down - m.min(0.0)));
+        let (up, down) = jets
+            .row(i)
+            .iter()
+            .fold((0.0, 0.0), |(up, down), &m: &f64| (up + m.max(0.0), down - m.min(0.0)));
         f64::min(up, down)
     });
     authority.map(|own| if own > 0.0 { authority.max() / own } else { 1.0 })

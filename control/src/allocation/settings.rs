@@ -102,7 +102,8 @@ impl Settings {
     /// Returns the smallest and largest deflections, rad: (63) and (65).
     pub(super) fn limits(&self) -> (Surfaces, Surfaces) {
         let Effectors { min, max, allowed, .. } = &self.effectors;
-        let within = |limits: &Surfaces| Surfaces::from_fn(|i, _| if allowed[i] { limits[i] } else { 0.0 });
+        let within =
+            |limits: &Surfaces| Surfaces::from_fn(|i, _| if allowed[i] { limits[i] } else { 0.0 });
         (within(min), within(max))
     }
 
@@ -134,7 +135,9 @@ impl Settings {
             }
         }
         let Effectors { effectiveness, jet_moments, min, max, rate, .. } = &self.effectors;
-        if let Some(&value) = effectiveness.iter().chain(jet_moments).find(|value| !value.is_finite()) {
+        if let Some(&value) =
+            effectiveness.iter().chain(jet_moments).find(|value| !value.is_finite())
+        {
             let (name, low, high) = ("effectors.effectiveness", f64::NEG_INFINITY, f64::INFINITY);
             return Err(DesignError::OutOfRange { name, value, low, high });
         }
@@ -161,7 +164,8 @@ impl Settings {
 fn embedded() -> &'static File {
     // This cannot fail: every test that uses the published settings reads the file.
     static READ: LazyLock<File> = LazyLock::new(|| {
-        toml::from_str(include_str!("../../data/allocation.toml")).unwrap_or_else(|error| panic!("{error}"))
+        toml::from_str(include_str!("../../data/allocation.toml"))
+            .unwrap_or_else(|error| panic!("{error}"))
     });
     &READ
 }

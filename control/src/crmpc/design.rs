@@ -54,8 +54,14 @@ pub fn terminal_weight(gain: Gain, p: Vector2<f64>, q: f64) -> Matrix2<f64> {
 
 /// Returns G of (15) for a terminal law that is held over h, with equality:
 /// ΦᵀG Φ − G + h (P + K̃ᵀQ K̃) = 0. With it (11c) holds for the sampled cost.
-pub fn held_terminal_weight(held: &SampledError, gain: Gain, p: Vector2<f64>, q: f64) -> Matrix2<f64> {
-    let mut load = (Matrix2::from_diagonal(&p) + gain.row().transpose() * gain.row() * q) * held.period();
+pub fn held_terminal_weight(
+    held: &SampledError,
+    gain: Gain,
+    p: Vector2<f64>,
+    q: f64,
+) -> Matrix2<f64> {
+    let mut load =
+        (Matrix2::from_diagonal(&p) + gain.row().transpose() * gain.row() * q) * held.period();
     let mut power = *held.transition();
     let mut sum = Matrix2::zeros();
     // The sum Σ (Φᵀ)ⁱ L Φⁱ is doubled until Φ has vanished.
@@ -148,7 +154,12 @@ impl Design {
         if held.settling().is_none() {
             let Gain { k1, k2 } = s.terminal;
             let radius = held.spectral_radius();
-            return Err(DesignError::UnstableTerminal { k1, k2, period: s.period_optimisation, radius });
+            return Err(DesignError::UnstableTerminal {
+                k1,
+                k2,
+                period: s.period_optimisation,
+                radius,
+            });
         }
         let eigenvalues = s.body.inertia.symmetric_eigenvalues();
         let (smallest_inertia, largest_inertia) = (eigenvalues.min(), eigenvalues.max());
@@ -235,7 +246,8 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
         }
     }
     let ratio = (s.period_optimisation / s.period_feedback).round();
-    if ratio < 1.0 || (ratio * s.period_feedback - s.period_optimisation).abs() > 1e-9 * s.period_optimisation
+    if ratio < 1.0
+        || (ratio * s.period_feedback - s.period_optimisation).abs() > 1e-9 * s.period_optimisation
     {
         return Err(DesignError::Periods {
             optimisation: s.period_optimisation,
@@ -247,7 +259,8 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
 
 fn paper_constants(s: &Settings, smallest: f64, largest: f64) -> Option<PaperConstants> {
     let weight = |i: usize| terminal_weight(s.terminal, Vector2::new(s.p[i], s.p[i + 3]), s.q[i]);
-    let terminal_scale = (0..3).map(|i| smallest_eigenvalue(&weight(i))).fold(f64::INFINITY, f64::min).sqrt();
+    let terminal_scale =
+        (0..3).map(|i| smallest_eigenvalue(&weight(i))).fold(f64::INFINITY, f64::min).sqrt();
     let root3 = 3.0_f64.sqrt();
     let r0 = (1.0 + s.sideslip_bound.tan()).sqrt();
     let r1 = s.limit_rate;
@@ -266,8 +279,9 @@ fn paper_constants(s: &Settings, smallest: f64, largest: f64) -> Option<PaperCon
     // Terminal radii (13), with "− r̄₁" as printed; the triangle inequality would give "+ r̄₁".
     let terminal_gain = s.terminal.k1.hypot(s.terminal.k2);
     let epsilon1 = terminal_scale * (x_tube - s.reference_rate);
-    let epsilon2 =
-        terminal_scale * (u_tube - (gyroscopic - r1) * x_tube - s.reference_acceleration) / terminal_gain;
+    let epsilon2 = terminal_scale
+        * (u_tube - (gyroscopic - r1) * x_tube - s.reference_acceleration)
+        / terminal_gain;
     Some(PaperConstants {
         r0,
         r1,

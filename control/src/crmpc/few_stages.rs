@@ -60,15 +60,24 @@ impl Robust {
     /// Returns bounds that are at most those of [`Self::interval`], and norms that are at least
     /// those. Along the way from `anchor` to `here` and on to `next`, every change is bounded by
     /// the largest derivatives there.
-    pub(super) fn estimate(&self, k: usize, here: &Point, next: &Point, anchor: &Anchor) -> Interval {
-        let (largest_inertia, inertia_ratio) = (self.design.largest_inertia, self.design.inertia_ratio);
+    pub(super) fn estimate(
+        &self,
+        k: usize,
+        here: &Point,
+        next: &Point,
+        anchor: &Anchor,
+    ) -> Interval {
+        let (largest_inertia, inertia_ratio) =
+            (self.design.largest_inertia, self.design.inertia_ratio);
         let a = &here.acceleration;
         let size = next.size.max(here.size).max(anchor.size);
         let slopes = MomentSlopeBounds::new(size, here.pull, inertia_ratio);
-        let (by_angles, by_rates) = (largest_inertia * slopes.by_angles, largest_inertia * slopes.by_rates);
+        let (by_angles, by_rates) =
+            (largest_inertia * slopes.by_angles, largest_inertia * slopes.by_rates);
         let turn = (here.angles - anchor.angles).xy().norm();
-        let moment =
-            anchor.motion.moment(a).norm() + by_angles * turn + by_rates * (here.rates - anchor.rates).norm();
+        let moment = anchor.motion.moment(a).norm()
+            + by_angles * turn
+            + by_rates * (here.rates - anchor.rates).norm();
         let turn_within = (next.angles - here.angles).xy().norm();
         let after = moment + by_angles * turn_within + by_rates * (next.rates - here.rates).norm();
         let feedback = anchor.feedback + anchor.feedback_by_angles * turn;
@@ -76,7 +85,14 @@ impl Robust {
             rate: next.size,
             rate_bound: self.rate_bound(k + 1, TURN_BY_ANGLES * next.size, next, here),
             moment,
-            moment_bound: self.moment_bound(k, moment, after, feedback, (by_angles, by_rates), here),
+            moment_bound: self.moment_bound(
+                k,
+                moment,
+                after,
+                feedback,
+                (by_angles, by_rates),
+                here,
+            ),
         }
     }
 }

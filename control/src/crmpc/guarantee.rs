@@ -235,8 +235,10 @@ impl Dynamics {
         let elapsed = s.delay + tau;
         let growth = self.growth(elapsed);
         let off_rate = (drive * (elapsed - 0.5 * tau) + rate_error) * growth;
-        let off_angle = (0.5 * drive * elapsed * elapsed + angle_error + rate_error * elapsed) * growth;
-        let mean = self.by_rates * off_rate + self.by_angles * off_angle + self.jerk * tau * tau / 24.0;
+        let off_angle =
+            (0.5 * drive * elapsed * elapsed + angle_error + rate_error * elapsed) * growth;
+        let mean =
+            self.by_rates * off_rate + self.by_angles * off_angle + self.jerk * tau * tau / 24.0;
         (mean, self.by_rates * drive * tau * growth + self.jerk * tau * tau / 8.0)
     }
 
@@ -316,16 +318,22 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     let at: Vec<Deviation> = match s.initial_state {
         InitialState::Measured | InitialState::Nominal => {
             let [of_angles, of_rates] = error.errors(steps);
-            let all =
-                error.reach(steps).into_iter().zip(of_angles.iter().zip(&of_rates)).zip(error.shifts(steps));
-            all.map(|((reach, errors), shifts)| parts.deviation(s, &reach, errors, &shifts)).collect()
+            let all = error
+                .reach(steps)
+                .into_iter()
+                .zip(of_angles.iter().zip(&of_rates))
+                .zip(error.shifts(steps));
+            all.map(|((reach, errors), shifts)| parts.deviation(s, &reach, errors, &shifts))
+                .collect()
         }
         InitialState::Tube => {
             // The deviation is fully grown from the start, because the plan may begin anywhere in
             // the set that Δ cannot drive the deviation out of.
             let last = |all: Vec<Reach>| all.last().copied().unwrap_or_default();
-            let set =
-                error.invariant_set(lateral(s)).ok_or(DesignError::NotReal { name: "feedback" })?.reach();
+            let set = error
+                .invariant_set(lateral(s))
+                .ok_or(DesignError::NotReal { name: "feedback" })?
+                .reach();
             let reach = last(error.reach(steps)).or(&set);
             let [of_angles, of_rates] = error.errors(steps).map(last);
             vec![parts.deviation(s, &reach, (&of_angles, &of_rates), &last(error.shifts(steps)))]
@@ -334,7 +342,8 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     let last = at.len() - 1;
     let bearing = bearing(s);
     let moment = (0..at.len()).map(|n| {
-        let within = (n..n + ratio).fold(Deviation::default(), |largest, n| largest.or(&at[n.min(last)]));
+        let within =
+            (n..n + ratio).fold(Deviation::default(), |largest, n| largest.or(&at[n.min(last)]));
         MomentLoss::new(&dynamics, &within, bearing)
     });
     // Between the ends of an optimisation period the deviation can exceed the straight line between
@@ -355,12 +364,20 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     let (moment, rate) = (moment.collect(), rate.collect());
     // The observer uses predicted rates, and each prediction has its own error. The first-order
     // filter amplifies the differences of these errors by no more than this.
-    let predicted = 3.0_f64.sqrt() * s.rate_error + dynamics.by_angles * s.delay * SQRT_2 * s.angle_error;
+    let predicted =
+        3.0_f64.sqrt() * s.rate_error + dynamics.by_angles * s.delay * SQRT_2 * s.angle_error;
     let observable = (s.disturbance_bound + parts.norm - 3.0_f64.sqrt() * s.disturbance_bound
         + 2.0 * predicted / s.observer.time_constant)
         * dynamics.growth(s.delay + s.period_feedback);
-    let tightening =
-        Tightening { moment, rate, bearing, norm: parts.norm, mismatch: parts.mismatch, observable, at };
+    let tightening = Tightening {
+        moment,
+        rate,
+        bearing,
+        norm: parts.norm,
+        mismatch: parts.mismatch,
+        observable,
+        at,
+    };
     let assessment = assess(s, &dynamics, &tightening);
     Ok((tightening, assessment))
 }
@@ -404,7 +421,8 @@ impl Parts {
         let of_inertia = inertia * s.limit_moment * geometry.r / smallest;
         let root3 = 3.0_f64.sqrt();
         let drive = root3 * s.disturbance_bound + of_inertia;
-        let (mismatch, varying) = dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error);
+        let (mismatch, varying) =
+            dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error);
         // |∫ g (e − ē)| ≤ ¼ τ ½ (range of g) (range of e) for the response g to a
         // pulse, which is linear within a period.
         let swing = dynamics.swing(s) + 0.125 * s.period_feedback * varying;
@@ -422,17 +440,26 @@ impl Parts {
 
     /// Returns the deviation. `reach` is per unit of disturbance, `errors` per unit of the errors
     /// of angle and rate, and `shifts` per unit of the rate at which angles are shifted.
-    fn deviation(&self, s: &Settings, reach: &Reach, errors: (&Reach, &Reach), shifts: &Reach) -> Deviation {
+    fn deviation(
+        &self,
+        s: &Settings,
+        reach: &Reach,
+        errors: (&Reach, &Reach),
+        shifts: &Reach,
+    ) -> Deviation {
         let root3 = 3.0_f64.sqrt();
         let errors = errors.0.times(s.angle_error).plus(&errors.1.times(s.rate_error));
         let swing = shifts.times(self.swing);
         let tau = s.period_feedback;
         // Between two ticks an angle departs from the straight line by no more than this.
-        let between = tau * tau / 8.0 * (self.norm * (1.0 + reach.feedback) + root3 * errors.feedback);
+        let between =
+            tau * tau / 8.0 * (self.norm * (1.0 + reach.feedback) + root3 * errors.feedback);
         Deviation {
             angle: reach.angle * self.norm_of_two + SQRT_2 * errors.angle + swing.angle + between,
             rate: reach.rate * self.norm + root3 * errors.rate + swing.rate,
-            seen_angle: reach.seen_angle * self.norm_of_two + SQRT_2 * errors.seen_angle + swing.seen_angle,
+            seen_angle: reach.seen_angle * self.norm_of_two
+                + SQRT_2 * errors.seen_angle
+                + swing.seen_angle,
             seen_rate: reach.seen_rate * self.norm + root3 * errors.seen_rate + swing.seen_rate,
             feedback: reach.feedback * s.disturbance_bound + errors.feedback,
             feedback_norm: reach.feedback * self.mismatch + swing.feedback,
@@ -448,8 +475,11 @@ impl Parts {
 fn left(s: &Settings, dynamics: &Dynamics, tightening: &Tightening, x: f64, a: f64) -> (f64, f64) {
     let Deviation { angle, rate, .. } = *tightening.forever();
     let of_rates = s.limit_rate - RateLoss::new(angle, rate).at(TURN_OF_RATES * x, x);
-    let loss =
-        tightening.moment_loss(usize::MAX).at((tightening.bearing, 0.0), dynamics.slopes(x, a), (x, a));
+    let loss = tightening.moment_loss(usize::MAX).at(
+        (tightening.bearing, 0.0),
+        dynamics.slopes(x, a),
+        (x, a),
+    );
     (of_rates - x, s.limit_moment - loss - dynamics.nominal_moment(x, a))
 }
 
@@ -488,7 +518,11 @@ fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessm
             if rate > 0.0 && moment > 0.0 { low = middle } else { high = middle }
         }
     }
-    Assessment { rate_left: rate / s.limit_rate, moment_left: moment / s.limit_moment, terminal_rate: low }
+    Assessment {
+        rate_left: rate / s.limit_rate,
+        moment_left: moment / s.limit_moment,
+        terminal_rate: low,
+    }
 }
 
 use crate::linearise::TURN_BY_ANGLES as TURN_OF_RATES;
@@ -549,7 +583,12 @@ impl MomentLoss {
     /// Computes the loss of a deviation; `bearing` is [`Tightening::bearing`].
     fn new(dynamics: &Dynamics, deviation: &Deviation, bearing: f64) -> Self {
         let Deviation {
-            seen_angle: angle, seen_rate: rate, feedback, feedback_norm, feedback_moment, ..
+            seen_angle: angle,
+            seen_rate: rate,
+            feedback,
+            feedback_norm,
+            feedback_moment,
+            ..
         } = *deviation;
         let largest = dynamics.largest;
         let spread = largest - dynamics.smallest;
@@ -564,7 +603,10 @@ impl MomentLoss {
             constant: feedback_norm * largest + feedback_moment + by_rates_twice,
             by_acceleration: 0.5 * largest * CURVATURE * angle * angle,
             by_size: (largest * DRIFT_MIXED + 4.0 * spread) * angle * rate,
-            by_size_squared: 0.5 * (largest * DRIFT_BY_ANGLES_TWICE + 12.0 * spread) * angle * angle,
+            by_size_squared: 0.5
+                * (largest * DRIFT_BY_ANGLES_TWICE + 12.0 * spread)
+                * angle
+                * angle,
         }
     }
 
@@ -648,8 +690,13 @@ pub(super) fn refusal(s: &Settings, assessment: &Assessment) -> DesignError {
         rate_left: assessment.rate_left,
         limit_moment: s.limit_moment,
         limit_rate: s.limit_rate,
-        disturbance: largest(s.disturbance_bound, |disturbance_bound| Settings { disturbance_bound, ..*s }),
-        delay: (s.delay > 0.0).then(|| largest(s.delay, |delay| Settings { delay, ..*s })).flatten(),
+        disturbance: largest(s.disturbance_bound, |disturbance_bound| Settings {
+            disturbance_bound,
+            ..*s
+        }),
+        delay: (s.delay > 0.0)
+            .then(|| largest(s.delay, |delay| Settings { delay, ..*s }))
+            .flatten(),
         errors: errors.map(|share| (share * s.angle_error, share * s.rate_error)),
     }
 }

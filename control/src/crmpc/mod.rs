@@ -16,7 +16,9 @@ mod sets;
 mod settings;
 
 pub use crate::report::{Report, Status};
-pub use design::{Design, PaperConstants, held_terminal_weight, step_response_peak, terminal_weight};
+pub use design::{
+    Design, PaperConstants, held_terminal_weight, step_response_peak, terminal_weight,
+};
 #[doc(hidden)]
 pub use guarantee::Lemmas;
 pub use guarantee::{Assessment, Deviation, Geometry, Tightening};
@@ -102,8 +104,18 @@ impl Clone for Memory {
 
     // The derived version would allocate memory for a plan at every tick.
     fn clone_from(&mut self, source: &Self) {
-        let Self { plan, started, report, nominal, standing, margins, age, pending, ended, observed } =
-            source;
+        let Self {
+            plan,
+            started,
+            report,
+            nominal,
+            standing,
+            margins,
+            age,
+            pending,
+            ended,
+            observed,
+        } = source;
         self.plan.clone_from(plan);
         self.started = *started;
         self.report = *report;
@@ -220,11 +232,18 @@ impl Crmpc {
 
     /// Runs one optimisation at `time` from the measured state (Θ, x_ω). The plan and the report
     /// are left in `memory`.
-    fn optimise(&mut self, memory: &mut Memory, time: f64, measured: Vector6<f64>, reference: ReferenceAt) {
+    fn optimise(
+        &mut self,
+        memory: &mut Memory,
+        time: f64,
+        measured: Vector6<f64>,
+        reference: ReferenceAt,
+    ) {
         let clock = Instant::now();
         self.optimiser.begin();
         // Without guarantee the command compensates for the disturbance instead.
-        let shift = if memory.assured() { memory.observed.shift(&self.settings) } else { Vector3::zeros() };
+        let shift =
+            if memory.assured() { memory.observed.shift(&self.settings) } else { Vector3::zeros() };
         self.preview(time, reference, shift);
         let first = !memory.started;
         let anew = if first {
@@ -259,7 +278,12 @@ impl Crmpc {
     }
 
     /// Plans by the optimum within the paper's sets, or by the shifted previous plan (31).
-    fn plan_as_printed(&mut self, memory: &mut Memory, measured: &Vector6<f64>, first: bool) -> mpc::Report {
+    fn plan_as_printed(
+        &mut self,
+        memory: &mut Memory,
+        measured: &Vector6<f64>,
+        first: bool,
+    ) -> mpc::Report {
         let start = match self.settings.initial_state {
             InitialState::Nominal if !first => memory.plan.states[0],
             _ => *measured,
@@ -280,7 +304,12 @@ impl Crmpc {
     /// the previous plan predicted. The last is the previous plan itself, which satisfies the
     /// conditions if it did before and the vehicle is no further from it than the assumptions
     /// explain. Without such a plan the limits are violated as little as possible.
-    fn plan_robustly(&mut self, memory: &mut Memory, measured: &Vector6<f64>, anew: bool) -> mpc::Report {
+    fn plan_robustly(
+        &mut self,
+        memory: &mut Memory,
+        measured: &Vector6<f64>,
+        anew: bool,
+    ) -> mpc::Report {
         let assured = memory.assured();
         if !self.credible(memory) {
             return self.violate_least(memory, measured, 0);
@@ -364,7 +393,12 @@ impl Crmpc {
 
     /// Plans by the optimum with less tightening, or by the terminal law from the measured state
     /// within the available moment.
-    fn violate_least(&mut self, memory: &mut Memory, measured: &Vector6<f64>, tried: u32) -> mpc::Report {
+    fn violate_least(
+        &mut self,
+        memory: &mut Memory,
+        measured: &Vector6<f64>,
+        tried: u32,
+    ) -> mpc::Report {
         memory.standing = self.without_guarantee(memory);
         memory.age = 0;
         let mut iterations = tried;
@@ -440,7 +474,8 @@ impl Crmpc {
             slot.angles += shift;
         }
         for (d, pair) in self.affine.iter_mut().zip(self.sets.references.windows(2)) {
-            let moved = self.chain.advance(&[pair[0].angles, pair[0].rates], &pair[0].accelerations);
+            let moved =
+                self.chain.advance(&[pair[0].angles, pair[0].rates], &pair[0].accelerations);
             *d = [moved[0] - pair[1].angles, moved[1] - pair[1].rates];
         }
     }
@@ -505,7 +540,8 @@ impl Crmpc {
         // ‖m‖² is a parabola in the share; its larger root is the result.
         let (slope, rest) = (motion.moment_by_acceleration * acceleration, motion.moment_at_rest);
         let (square, mixed) = (slope.norm_squared(), slope.dot(&rest));
-        let discriminant = mixed * mixed - square * (rest.norm_squared() - limit_moment * limit_moment);
+        let discriminant =
+            mixed * mixed - square * (rest.norm_squared() - limit_moment * limit_moment);
         acceleration * ((discriminant.max(0.0).sqrt() - mixed) / square).max(0.0)
     }
 
@@ -517,8 +553,11 @@ impl Crmpc {
                 Constraints::Robust => self.terminal_acceleration_within_limits(&state, reference),
                 Constraints::Paper => self.terminal_acceleration(&state, reference),
             };
-            plan.states[k + 1] =
-                plan::advance(&plan.states[k], &plan.accelerations[k], self.settings.period_optimisation);
+            plan.states[k + 1] = plan::advance(
+                &plan.states[k],
+                &plan.accelerations[k],
+                self.settings.period_optimisation,
+            );
         }
     }
 }
@@ -531,7 +570,8 @@ impl Controller for Crmpc {
     }
 
     fn fits(&self, memory: &Memory) -> bool {
-        let (n, Plan { states, accelerations, multipliers, .. }) = (self.settings.horizon, &memory.plan);
+        let (n, Plan { states, accelerations, multipliers, .. }) =
+            (self.settings.horizon, &memory.plan);
         states.len() == n + 1 && accelerations.len() == n && multipliers.len() == n
     }
 
@@ -552,11 +592,15 @@ impl Controller for Crmpc {
             self.optimise(memory, time, join(&measured.angles, &angle_rates), reference);
         }
         let a = memory.plan.accelerations[0];
-        memory.nominal =
-            plan::advance(&memory.plan.states[0], &a, within as f64 * self.settings.period_feedback);
+        memory.nominal = plan::advance(
+            &memory.plan.states[0],
+            &a,
+            within as f64 * self.settings.period_feedback,
+        );
         // Feedback law (20): with ũ* = a − f(x̃*), u = K O_e − f(x) + a, and m = I R⁻¹ u.
         let (nominal_angles, nominal_rates) = split(&memory.nominal);
-        let (off_angles, off_rates) = (measured.angles - nominal_angles, angle_rates - nominal_rates);
+        let (off_angles, off_rates) =
+            (measured.angles - nominal_angles, angle_rates - nominal_rates);
         let gain = self.settings.feedback;
         let robust = self.settings.constraints == Constraints::Robust;
         // Without guarantee the command compensates for the disturbance at once, because no plan
@@ -641,7 +685,8 @@ impl Crmpc {
     fn rate_shown(&self) -> f64 {
         let Settings { limit_rate, rate_error, angle_error, .. } = self.settings;
         let of_rates = 3.0_f64.sqrt() * rate_error;
-        (limit_rate + of_rates + linearise::TURN_BY_ANGLES * 1.5 * limit_rate * angle_error) * (1.0 + 1e-9)
+        (limit_rate + of_rates + linearise::TURN_BY_ANGLES * 1.5 * limit_rate * angle_error)
+            * (1.0 + 1e-9)
     }
 }
 

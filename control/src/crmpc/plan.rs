@@ -57,10 +57,13 @@ impl Plan {
 
     /// Computes the errors E = x̃ − x_r and v = a − Θ̈_r of the plan.
     pub(super) fn errors(&self, references: &[Reference], motion: &mut Motion<2>) {
-        for ((error, state), reference) in motion.states.iter_mut().zip(&self.states).zip(references) {
+        for ((error, state), reference) in
+            motion.states.iter_mut().zip(&self.states).zip(references)
+        {
             *error = super::error(state, reference);
         }
-        for ((v, a), reference) in motion.inputs.iter_mut().zip(&self.accelerations).zip(references) {
+        for ((v, a), reference) in motion.inputs.iter_mut().zip(&self.accelerations).zip(references)
+        {
             *v = a - reference.accelerations;
         }
     }

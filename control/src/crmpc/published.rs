@@ -91,7 +91,8 @@ pub struct Published {
 fn embedded() -> &'static File {
     // This cannot fail: every test that uses the published settings reads the file.
     static READ: LazyLock<File> = LazyLock::new(|| {
-        toml::from_str(include_str!("../../data/crmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
+        toml::from_str(include_str!("../../data/crmpc-2022.toml"))
+            .unwrap_or_else(|error| panic!("{error}"))
     });
     &READ
 }

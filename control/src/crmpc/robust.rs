@@ -75,14 +75,19 @@ pub(super) struct Point {
 }
 
 impl Point {
-    pub(super) fn new(angles: Vector3<f64>, rates: Vector3<f64>, acceleration: Vector3<f64>) -> Self {
+    pub(super) fn new(
+        angles: Vector3<f64>,
+        rates: Vector3<f64>,
+        acceleration: Vector3<f64>,
+    ) -> Self {
         let (size, pull) = (rates.norm(), acceleration.norm());
         Self { angles, rates, size, acceleration, pull, turned: OnceCell::new() }
     }
 
     pub(super) fn at(references: &[Reference], motion: &Motion<2>, k: usize) -> Self {
         let Reference { angles, rates, accelerations } = &references[k];
-        let acceleration = motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input);
+        let acceleration =
+            motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input);
         Self::new(angles + motion.states[k][0], rates + motion.states[k][1], acceleration)
     }
 
@@ -165,7 +170,8 @@ impl Robust {
     /// the intervals before and after, whatever the error dynamics do. `by_angles` is the norm of
     /// ∂ω/∂(α, β), and `before` is the point before.
     pub(super) fn rate_bound(&self, k: usize, by_angles: f64, here: &Point, before: &Point) -> f64 {
-        let Settings { limit_rate, limit_moment, period_optimisation: h, horizon, .. } = self.settings;
+        let Settings { limit_rate, limit_moment, period_optimisation: h, horizon, .. } =
+            self.settings;
         let reserve = self.reserves().0;
         // Between two steps ‖ω̃‖ may exceed both values by h²/8 times its second derivative. The
         // optimisation does not know the point before, so both accelerations are replaced by one
@@ -204,7 +210,8 @@ impl Robust {
         let by_angles = self.design.largest_inertia * guarantee::TURN * 3.0_f64.sqrt();
         let loss = self.design.tightening.moment_loss(self.tick(k));
         let loss = loss.at((feedback, by_angles), slopes, (size, a));
-        let within = (after - value).max(0.0) + 0.125 * h * h * self.dynamics.moment_curvature(size, a);
+        let within =
+            (after - value).max(0.0) + 0.125 * h * h * self.dynamics.moment_curvature(size, a);
         limit_moment - self.reserves().1 - self.share * loss - within
     }
 
@@ -213,7 +220,10 @@ impl Robust {
         let Interval { rate, rate_bound, moment, moment_bound } = self.interval(0, first, second);
         let Settings { limit_rate, limit_moment, .. } = self.settings;
         let left = |bound: f64, value: f64, limit: f64| (bound - value) / limit + RESERVE;
-        Margins { rate: left(rate_bound, rate, limit_rate), moment: left(moment_bound, moment, limit_moment) }
+        Margins {
+            rate: left(rate_bound, rate, limit_rate),
+            moment: left(moment_bound, moment, limit_moment),
+        }
     }
 }
 

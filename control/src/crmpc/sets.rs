@@ -64,7 +64,8 @@ impl Sets {
                 let paper = design.paper.ok_or(DesignError::NotReal { name: "feedback" })?;
                 let (x_tube, u_tube, epsilon) =
                     (paper.x_tube, paper.u_tube, paper.epsilon1.min(paper.epsilon2));
-                for (name, value) in [("x_tube", x_tube), ("u_tube", u_tube), ("epsilon", epsilon)] {
+                for (name, value) in [("x_tube", x_tube), ("u_tube", u_tube), ("epsilon", epsilon)]
+                {
                     if value.is_nan() || value <= 0.0 {
                         return Err(DesignError::EmptySet { name, value });
                     }
@@ -126,7 +127,8 @@ impl Sets {
             return None;
         }
         let Robust { settings, dynamics, design, .. } = &**robust;
-        let braking = guarantee::braking(settings, dynamics, &design.tightening, last.angles.y, &last.rates)?;
+        let braking =
+            guarantee::braking(settings, dynamics, &design.tightening, last.angles.y, &last.rates)?;
         Some(Certified { margins: robust.margins(&first, &second), braking })
     }
 
@@ -178,7 +180,8 @@ impl Sets {
                     let estimate = linearise::input_bound(angles.y, *size, *pull, *inertia_ratio);
                     let input = || here.turned().input(&self.body, rates, acceleration).norm();
                     let exceeds = |value: f64, bound: f64| value > bound * (1.0 + ROUNDING);
-                    exceeds(next.size, *x_tube) || exceeds(estimate, *u_tube) && exceeds(input(), *u_tube)
+                    exceeds(next.size, *x_tube)
+                        || exceeds(estimate, *u_tube) && exceeds(input(), *u_tube)
                 }
             }
         };
@@ -235,13 +238,22 @@ impl Bounded<2> for Sets {
         }
     }
 
-    fn squares(&self, k: usize, state: &State<2>, input: &Vector3<f64>, bounds: (f64, f64)) -> (f64, f64) {
+    fn squares(
+        &self,
+        k: usize,
+        state: &State<2>,
+        input: &Vector3<f64>,
+        bounds: (f64, f64),
+    ) -> (f64, f64) {
         let [angles, rates, a] = self.nominal(k, state, input);
         let kinematics = InverseKinematics::at(&angles);
         let (state, input) = match &self.kind {
             Kind::Robust(robust) => {
                 let (rate, moment) = robust.nonempty(bounds);
-                (kinematics.body_rates(&rates).0 / rate, kinematics.moment(&self.body, &rates, &a) / moment)
+                (
+                    kinematics.body_rates(&rates).0 / rate,
+                    kinematics.moment(&self.body, &rates, &a) / moment,
+                )
             }
             Kind::Paper { x_tube, u_tube, .. } => {
                 (rates / *x_tube, kinematics.input(&self.body, &rates, &a) / *u_tube)

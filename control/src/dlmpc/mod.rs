@@ -63,7 +63,9 @@ impl Plan {
 
     /// Computes the errors Θ − Θ_r and v − Θ̇_r of the plan.
     fn errors(&self, references: &[Reference], motion: &mut Motion<1>) {
-        for ((error, angles), reference) in motion.states.iter_mut().zip(&self.angles).zip(references) {
+        for ((error, angles), reference) in
+            motion.states.iter_mut().zip(&self.angles).zip(references)
+        {
             *error = [angles - reference.angles];
         }
         for ((w, v), reference) in motion.inputs.iter_mut().zip(&self.commands).zip(references) {
@@ -73,7 +75,13 @@ impl Plan {
 
     /// Sets the plan from a motion of the errors, rolled out from `start` so that it is an exact
     /// motion of the model.
-    fn follow(&mut self, motion: &Motion<1>, start: Vector3<f64>, references: &[Reference], h: f64) {
+    fn follow(
+        &mut self,
+        motion: &Motion<1>,
+        start: Vector3<f64>,
+        references: &[Reference],
+        h: f64,
+    ) {
         self.angles[0] = start;
         for (k, (w, reference)) in motion.inputs.iter().zip(references).enumerate() {
             self.commands[k] = w + reference.rates;
@@ -167,7 +175,8 @@ impl RateLimit {
     /// Returns ‖R⁻¹(Θ) v‖², relative to the limit.
     fn square(&self, k: usize, state: &State<1>, input: &Vector3<f64>) -> f64 {
         let reference = &self.references[k];
-        let rates = linearise::body_rates(&(reference.angles + state[0]), &(reference.rates + input));
+        let rates =
+            linearise::body_rates(&(reference.angles + state[0]), &(reference.rates + input));
         rates.norm_squared() / (self.limit * self.limit)
     }
 }
@@ -177,7 +186,13 @@ impl Bounded<1> for RateLimit {
         false
     }
 
-    fn balls(&self, k: usize, state: &State<1>, input: &Vector3<f64>, _: Option<(f64, f64)>) -> Balls<1> {
+    fn balls(
+        &self,
+        k: usize,
+        state: &State<1>,
+        input: &Vector3<f64>,
+        _: Option<(f64, f64)>,
+    ) -> Balls<1> {
         let reference = &self.references[k];
         let command = reference.rates + input;
         let kinematics = InverseKinematics::at(&(reference.angles + state[0]));
@@ -191,7 +206,13 @@ impl Bounded<1> for RateLimit {
         Balls { state: Ball::default(), input }
     }
 
-    fn squares(&self, k: usize, state: &State<1>, input: &Vector3<f64>, _: (f64, f64)) -> (f64, f64) {
+    fn squares(
+        &self,
+        k: usize,
+        state: &State<1>,
+        input: &Vector3<f64>,
+        _: (f64, f64),
+    ) -> (f64, f64) {
         (0.0, self.square(k, state, input))
     }
 
@@ -233,7 +254,10 @@ impl Dlmpc {
         Ok(Self {
             ratio,
             gains: -optimiser.feedback()[0],
-            rates: RateLimit { limit: settings.limit_rate, references: vec![Reference::default(); n + 1] },
+            rates: RateLimit {
+                limit: settings.limit_rate,
+                references: vec![Reference::default(); n + 1],
+            },
             optimiser,
             affine: vec![[Vector3::zeros()]; n],
             previous: Motion::new(n),
@@ -248,7 +272,13 @@ impl Dlmpc {
 
     /// Runs one optimisation at `time` from the measured angles. The plan and the report are left
     /// in `memory`.
-    fn optimise(&mut self, memory: &mut Memory, time: f64, measured: Vector3<f64>, reference: ReferenceAt) {
+    fn optimise(
+        &mut self,
+        memory: &mut Memory,
+        time: f64,
+        measured: Vector3<f64>,
+        reference: ReferenceAt,
+    ) {
         let clock = Instant::now();
         self.optimiser.begin();
         self.preview(time, reference);
@@ -268,11 +298,21 @@ impl Dlmpc {
             self.track(&mut memory.plan, measured);
             memory.plan.errors(&self.rates.references, &mut self.previous);
             let Self { optimiser, rates, affine, previous, .. } = self;
-            report =
-                optimiser.fall_back(rates, &start, affine, previous, (Status::Fallback, report.iterations));
+            report = optimiser.fall_back(
+                rates,
+                &start,
+                affine,
+                previous,
+                (Status::Fallback, report.iterations),
+            );
         } else {
             let motion = self.optimiser.motion();
-            memory.plan.follow(motion, measured, &self.rates.references, self.settings.period_optimisation);
+            memory.plan.follow(
+                motion,
+                measured,
+                &self.rates.references,
+                self.settings.period_optimisation,
+            );
             memory.plan.multipliers.clear();
             memory.plan.multipliers.extend(self.optimiser.multipliers());
         }
@@ -297,8 +337,9 @@ impl Dlmpc {
         plan.multipliers.clear();
         plan.multipliers.resize(self.settings.horizon, [0.0; 2]);
         plan.commands.clear();
-        plan.commands
-            .extend(self.rates.references[..self.settings.horizon].iter().map(|reference| reference.rates));
+        plan.commands.extend(
+            self.rates.references[..self.settings.horizon].iter().map(|reference| reference.rates),
+        );
     }
 
     /// Drops the first interval of the plan and appends one under the terminal law, within the

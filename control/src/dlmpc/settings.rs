@@ -156,7 +156,8 @@ impl Settings {
 fn embedded() -> &'static File {
     // This cannot fail: every test that uses the published settings reads the file.
     static READ: LazyLock<File> = LazyLock::new(|| {
-        toml::from_str(include_str!("../../data/dlmpc-2022.toml")).unwrap_or_else(|error| panic!("{error}"))
+        toml::from_str(include_str!("../../data/dlmpc-2022.toml"))
+            .unwrap_or_else(|error| panic!("{error}"))
     });
     &READ
 }

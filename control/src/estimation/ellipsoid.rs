@@ -180,7 +180,11 @@ fn quadric(s: &SMatrix<f64, 10, 10>) -> Option<Row> {
 }
 
 /// Returns the scatter of W (m − b) from that of m.
-fn seen_from(matrix: &Matrix3<f64>, bias: &Vector3<f64>, s: &SMatrix<f64, 10, 10>) -> SMatrix<f64, 10, 10> {
+fn seen_from(
+    matrix: &Matrix3<f64>,
+    bias: &Vector3<f64>,
+    s: &SMatrix<f64, 10, 10>,
+) -> SMatrix<f64, 10, 10> {
     let mut affine = Matrix3x4::zeros();
     affine.fixed_view_mut::<3, 3>(0, 0).copy_from(matrix);
     affine.set_column(3, &-(matrix * bias));
@@ -250,7 +254,9 @@ mod tests {
     }
 
     fn error(fit: &Fit) -> f64 {
-        (fit.correction.matrix * FIELD * errors().matrix - Matrix3::identity()).singular_values().max()
+        (fit.correction.matrix * FIELD * errors().matrix - Matrix3::identity())
+            .singular_values()
+            .max()
     }
 
     #[test]

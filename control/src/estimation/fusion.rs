@@ -47,7 +47,11 @@ fn horizontal(force: &Vector3<f64>, field: &Vector3<f64>) -> Option<Vector3<f64>
 pub fn triad(force: &Vector3<f64>, field: &Vector3<f64>) -> Option<Rotation3<f64>> {
     let north = horizontal(force, field)?.try_normalize(1e-9 * field.norm())?;
     let down = -force.normalize();
-    Some(Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[north, down.cross(&north), down])))
+    Some(Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[
+        north,
+        down.cross(&north),
+        down,
+    ])))
 }
 
 impl Fusion {
@@ -55,7 +59,11 @@ impl Fusion {
     /// the mean of `count` samples.
     pub fn new(attitude: &Rotation3<f64>, count: f64) -> Self {
         let to_up = Rotation3::from_matrix_unchecked(flip() * attitude.matrix().transpose());
-        Self { attitude: UnitQuaternion::from_rotation_matrix(&to_up), bias: Vector3::zeros(), count }
+        Self {
+            attitude: UnitQuaternion::from_rotation_matrix(&to_up),
+            bias: Vector3::zeros(),
+            count,
+        }
     }
 
     /// Returns the rotation to body axes from magnetic north, east, down.

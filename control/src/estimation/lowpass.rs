@@ -48,7 +48,11 @@ impl LowPass {
     }
 
     /// Processes one sample and returns the output.
-    pub fn step<const N: usize>(&self, state: &mut State<N>, input: &SVector<f64, N>) -> SVector<f64, N> {
+    pub fn step<const N: usize>(
+        &self,
+        state: &mut State<N>,
+        input: &SVector<f64, N>,
+    ) -> SVector<f64, N> {
         let output = input * self.b[0] + state.first;
         state.first = input * self.b[1] - output * self.a[0] + state.second;
         state.second = input * self.b[2] - output * self.a[1];
@@ -70,7 +74,8 @@ mod tests {
             let phase = 2.0 * PI * frequency * PERIOD * f64::from(k);
             filter.step(state, &Vector1::new(phase.sin())).x
         };
-        let power: f64 = (0..20_000).map(|k| output(&mut state, k)).skip(10_000).map(|y| y * y).sum();
+        let power: f64 =
+            (0..20_000).map(|k| output(&mut state, k)).skip(10_000).map(|y| y * y).sum();
         (power / 5000.0).sqrt()
     }
 
@@ -93,7 +98,11 @@ mod tests {
                 output = filter.step(&mut state, &Vector1::new(f64::from(k) * PERIOD)).x;
             }
             let lag = 1999.0 * PERIOD - output;
-            assert!((lag - filter.delay()).abs() < 1e-10, "{cutoff} Hz: {lag} s, {} s", filter.delay());
+            assert!(
+                (lag - filter.delay()).abs() < 1e-10,
+                "{cutoff} Hz: {lag} s, {} s",
+                filter.delay()
+            );
         }
         let slow = LowPass::new(0.1, PERIOD).delay() * 2.0 * PI * 0.1;
         assert!((slow - SQRT_2).abs() < 1e-5, "√2/(2π cutoff) in the limit");

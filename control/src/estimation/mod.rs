@@ -138,7 +138,8 @@ impl Default for Settings {
     /// Returns the settings of `data/estimator.toml`, for the start of Chai 2022 and sensors
     /// without errors in the field of the vehicle's data.
     fn default() -> Self {
-        static READ: LazyLock<File> = LazyLock::new(|| embedded(include_str!("../../data/estimator.toml")));
+        static READ: LazyLock<File> =
+            LazyLock::new(|| embedded(include_str!("../../data/estimator.toml")));
         let file = &*READ;
         let SensorData { surroundings, mems, .. } = SensorData::embedded();
         let field = surroundings.field;
@@ -461,7 +462,9 @@ impl Estimator {
         let taken = line.time <= time + tick_tolerance(time, self.settings.period)
             && line.time >= oldest
             && line.time >= time - self.settings.lost_after;
-        let shown = || self.settings.gates.iter().zip(&line.readings).all(|(gate, value)| gate.shows(value));
+        let shown = || {
+            self.settings.gates.iter().zip(&line.readings).all(|(gate, value)| gate.shows(value))
+        };
         taken && (memory.running.is_some() || shown())
     }
 
@@ -507,8 +510,9 @@ impl Estimator {
         let fusion = match self.settings.alignment {
             Alignment::Measured => Fusion::new(&triad(&force, &field)?, 1.0),
             Alignment::Given => {
-                let attitude = Rotation3::from_matrix_unchecked(body_from_velocity(&self.settings.initial))
-                    * self.magnetic_to_north().inverse();
+                let attitude =
+                    Rotation3::from_matrix_unchecked(body_from_velocity(&self.settings.initial))
+                        * self.magnetic_to_north().inverse();
                 Fusion::new(&attitude, f64::INFINITY)
             }
         };
@@ -541,8 +545,9 @@ impl Estimator {
             let again = self.begin(memory, line);
             return again.map_or(*before, |again| Running { start: before.start, ..again });
         }
-        let readings =
-            std::array::from_fn(|i| if rejected[i] { before.last.readings[i] } else { line.readings[i] });
+        let readings = std::array::from_fn(|i| {
+            if rejected[i] { before.last.readings[i] } else { line.readings[i] }
+        });
         let mut running = Running {
             last: Line { readings, ..*line },
             raw: line.readings,
@@ -553,10 +558,12 @@ impl Estimator {
         for (i, equal) in running.equal.iter_mut().enumerate() {
             *equal = if line.readings[i] == before.raw[i] { equal.saturating_add(1) } else { 0 };
         }
-        let elapsed = if line.time > before.last.time { line.time - before.last.time } else { s.period };
+        let elapsed =
+            if line.time > before.last.time { line.time - before.last.time } else { s.period };
         let steps = (elapsed / s.period).round().clamp(1.0, MOST_STEPS);
         let missing = line.sample.saturating_sub(before.last.sample).saturating_sub(1);
-        memory.estimate.dropped = memory.estimate.dropped.saturating_add(missing.clamp(0, steps as i32));
+        memory.estimate.dropped =
+            memory.estimate.dropped.saturating_add(missing.clamp(0, steps as i32));
         let frozen = [0, 1, 2].map(|i| self.is_frozen(&running, i));
         let alive = !left_out && !frozen.contains(&true);
         if line.time - before.alive > s.lost_after && alive {
@@ -591,7 +598,8 @@ impl Estimator {
         Running {
             filter: self.filter.settled(&filtered),
             filtered,
-            fusion: aligned.map_or(running.fusion, |fusion| fusion.with_bias(running.fusion.bias())),
+            fusion: aligned
+                .map_or(running.fusion, |fusion| fusion.with_bias(running.fusion.bias())),
             alive: running.last.time,
             ..*running
         }
@@ -632,11 +640,14 @@ impl Estimator {
         let age = time - running.last.time;
         let ahead = if s.prediction { age + self.filter_delay() } else { time - running.arrived };
         // A field at rest turns against the body.
-        let attitude = Rotation3::new(rate * -ahead) * running.fusion.attitude() * self.magnetic_to_north();
+        let attitude =
+            Rotation3::new(rate * -ahead) * running.fusion.attitude() * self.magnetic_to_north();
         let angles = angles(&attitude);
         let rates = match s.kinematics {
             Kinematics::Exact => rate,
-            Kinematics::Printed => kinematics::r_inverse(&angles) * (Kinematics::Exact.r(&angles) * rate),
+            Kinematics::Printed => {
+                kinematics::r_inverse(&angles) * (Kinematics::Exact.r(&angles) * rate)
+            }
         };
         memory.estimate = Estimate {
             angles,
@@ -650,7 +661,14 @@ impl Estimator {
         };
     }
 
-    fn health(&self, memory: &Memory, running: &Running, time: f64, arrived: bool, rejected: bool) -> Health {
+    fn health(
+        &self,
+        memory: &Memory,
+        running: &Running,
+        time: f64,
+        arrived: bool,
+        rejected: bool,
+    ) -> Health {
         if time - running.alive > self.settings.lost_after {
             Health::Lost
         } else if (0..3).any(|i| self.is_frozen(running, i)) {

@@ -16,7 +16,11 @@ pub struct Ball<const O: usize> {
 
 impl<const O: usize> Default for Ball<O> {
     fn default() -> Self {
-        Self { value: Vector3::zeros(), by_state: [Matrix3::zeros(); O], by_input: Matrix3::zeros() }
+        Self {
+            value: Vector3::zeros(),
+            by_state: [Matrix3::zeros(); O],
+            by_input: Matrix3::zeros(),
+        }
     }
 }
 
@@ -107,6 +111,9 @@ impl<const O: usize> Constraints<O> for Frozen<O> {
 
     fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> (f64, f64) {
         let Balls { state: of_state, input: of_input } = &self.balls[k];
-        (of_state.at(state, &Vector3::zeros()).norm_squared(), of_input.at(state, input).norm_squared())
+        (
+            of_state.at(state, &Vector3::zeros()).norm_squared(),
+            of_input.at(state, input).norm_squared(),
+        )
     }
 }

@@ -49,11 +49,22 @@ pub trait Bounded<const O: usize> {
 
     /// Returns the balls of stage `k` at (E_k, v_k) with their derivatives. The bounds on state and
     /// input are the given ones, or those about (E_k, v_k) itself (`None`).
-    fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>, bounds: Option<(f64, f64)>)
-    -> Balls<O>;
+    fn balls(
+        &self,
+        k: usize,
+        state: &State<O>,
+        input: &Vector3<f64>,
+        bounds: Option<(f64, f64)>,
+    ) -> Balls<O>;
 
     /// Returns only the two values ‖y‖², of the state ball and of the input ball.
-    fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>, bounds: (f64, f64)) -> (f64, f64);
+    fn squares(
+        &self,
+        k: usize,
+        state: &State<O>,
+        input: &Vector3<f64>,
+        bounds: (f64, f64),
+    ) -> (f64, f64);
 
     /// Returns the range from the first to the last of the intervals `of` that `motion` violates
     /// with the bounds about itself: by its input, or by its state at the interval's end.
@@ -61,7 +72,12 @@ pub trait Bounded<const O: usize> {
     /// If the bounds depend on the motion, those of the satisfied intervals are written to
     /// `bounds`. They may be smaller than those of [`Self::bounds_about`], where a smaller bound is
     /// cheaper and suffices. Intervals between the first and the last violated one may be left out.
-    fn violated(&self, motion: &Motion<O>, of: Range<usize>, bounds: &mut Bounds) -> Option<Range<usize>>;
+    fn violated(
+        &self,
+        motion: &Motion<O>,
+        of: Range<usize>,
+        bounds: &mut Bounds,
+    ) -> Option<Range<usize>>;
 
     /// Computes the bounds of the intervals `of` about `motion`: for the input of each, and for the
     /// state at its end. Bounds that do not depend on the motion need no implementation.

@@ -82,7 +82,9 @@ impl Certificate {
                     add(&mut p, |i| balls.input.by_state[i].tr_mul(&balls.input.value) * by_input);
                 }
                 slope = slope.max((own + by_ball + by_future).amax());
-                scale = [own, by_ball, by_future].iter().fold(scale, |scale, part| scale.max(part.amax()));
+                scale = [own, by_ball, by_future]
+                    .iter()
+                    .fold(scale, |scale, part| scale.max(part.amax()));
                 count(squares.1, by_input);
             }
             if k > 0 && state_balls {

@@ -56,7 +56,8 @@ impl<const O: usize> ConicSolver<O> {
                     a.push(row, column(k + 1, i, axis), 1.0);
                     a.push(row, column(k + 1, top, axis), -by_input * scale[top] / scale[i]);
                     for j in i..O {
-                        let own = if j == top { chain.a[(i, j)] - by_input } else { chain.a[(i, j)] };
+                        let own =
+                            if j == top { chain.a[(i, j)] - by_input } else { chain.a[(i, j)] };
                         a.push(row, column(k, j, axis), -own * scale[j] / scale[i]);
                     }
                     row += 1;
@@ -78,7 +79,9 @@ impl<const O: usize> ConicSolver<O> {
             Some(normals) => {
                 // Faces of the initial set: ±nᵀ(E_given − E_0) ≤ 1.
                 for (axis, normals) in normals.iter().enumerate() {
-                    for (normal, sign) in normals.iter().flat_map(|normal| [(normal, 1.0), (normal, -1.0)]) {
+                    for (normal, sign) in
+                        normals.iter().flat_map(|normal| [(normal, 1.0), (normal, -1.0)])
+                    {
                         for i in 0..O {
                             a.push(row, column(0, i, axis), -sign * normal[i] * scale[i]);
                         }
@@ -92,7 +95,8 @@ impl<const O: usize> ConicSolver<O> {
             let mut block = |k: usize, i: usize, component: usize| {
                 std::array::from_fn(|axis| a.push(row + 1 + component, column(k, i, axis), 0.0))
             };
-            let here = std::array::from_fn(|component| std::array::from_fn(|i| block(k, i, component)));
+            let here =
+                std::array::from_fn(|component| std::array::from_fn(|i| block(k, i, component)));
             let next = next.then(|| std::array::from_fn(|component| block(k + 1, top, component)));
             let slots = Slots { row, here, next };
             row += 4;
@@ -135,7 +139,15 @@ impl<const O: usize> ConicSolver<O> {
         }
         let cost = cost_matrix(&layout);
         let program = ConicProgram::new(cost, matrix, right_side, &cones, max_iterations)?;
-        Ok(Self { layout, max_iterations, program, state_slots, input_slots, start_row, terminal_row })
+        Ok(Self {
+            layout,
+            max_iterations,
+            program,
+            state_slots,
+            input_slots,
+            start_row,
+            terminal_row,
+        })
     }
 
     /// Solves `problem` within the given number of iterations and time (s). The motion in
@@ -153,14 +165,16 @@ impl<const O: usize> ConicSolver<O> {
         let Some(Optimum { x, duals }) = found else { return Outcome::Failed(iterations) };
         let Solution { motion, multipliers } = solution;
         for (k, x) in x.chunks_exact(3 * O).enumerate() {
-            motion.states[k] =
-                std::array::from_fn(|i| Vector3::new(x[3 * i], x[3 * i + 1], x[3 * i + 2]) * scale[i]);
+            motion.states[k] = std::array::from_fn(|i| {
+                Vector3::new(x[3 * i], x[3 * i + 1], x[3 * i + 2]) * scale[i]
+            });
         }
         if let Start::Fixed(given) = problem.start {
             motion.states[0] = given;
         }
         for k in 0..*n {
-            let moved = motion.states[k + 1][O - 1] - motion.states[k][O - 1] - problem.affine[k][O - 1];
+            let moved =
+                motion.states[k + 1][O - 1] - motion.states[k][O - 1] - problem.affine[k][O - 1];
             motion.inputs[k] = moved / chain.step;
         }
         motion.roll_out(chain, problem.affine);
@@ -181,13 +195,15 @@ impl<const O: usize> ConicSolver<O> {
             for (axis, normals) in normals.iter().enumerate() {
                 for normal in normals {
                     let force = 0.5 * (duals[row] - duals[row + 1]);
-                    let deviation: f64 =
-                        (0..O).map(|i| normal[i] * (given[i][axis] - motion.states[0][i][axis])).sum();
+                    let deviation: f64 = (0..O)
+                        .map(|i| normal[i] * (given[i][axis] - motion.states[0][i][axis]))
+                        .sum();
                     for i in 0..O {
                         multipliers.start[i][axis] -= normal[i] * force;
                     }
                     multipliers.start_gap += 0.5
-                        * (duals[row] * (deviation - 1.0).abs() + duals[row + 1] * (deviation + 1.0).abs());
+                        * (duals[row] * (deviation - 1.0).abs()
+                            + duals[row + 1] * (deviation + 1.0).abs());
                     row += 2;
                 }
             }
@@ -215,7 +231,8 @@ impl<const O: usize> ConicSolver<O> {
         match &problem.start {
             Start::Fixed(given) => {
                 for i in 0..3 * O {
-                    self.program.right_side[self.start_row + i] = given[i / 3][i % 3] / scale[i / 3];
+                    self.program.right_side[self.start_row + i] =
+                        given[i / 3][i % 3] / scale[i / 3];
                 }
             }
             Start::Arrival(..) => {}
@@ -308,7 +325,11 @@ fn cost_matrix<const O: usize>(layout: &Layout<O>) -> CscMatrix<f64> {
                 for j in i..O {
                     let moved = if i == top { intervals * cost.input[axis] / h2 } else { 0.0 };
                     let sum = weight(i, j)[axis] + moved;
-                    triplets.push(column(i, axis), column(j, axis), 2.0 * sum * scale[i] * scale[j]);
+                    triplets.push(
+                        column(i, axis),
+                        column(j, axis),
+                        2.0 * sum * scale[i] * scale[j],
+                    );
                 }
             }
             if k > 0 {

@@ -39,7 +39,11 @@ impl<const O: usize> Layout<O> {
 
     /// Returns the violated intervals with a margin; with `terminal`, the range extends to the last
     /// interval.
-    pub(super) fn window(&self, violated: Option<Range<usize>>, terminal: bool) -> Option<Range<usize>> {
+    pub(super) fn window(
+        &self,
+        violated: Option<Range<usize>>,
+        terminal: bool,
+    ) -> Option<Range<usize>> {
         let n = self.horizon;
         let violated = match (violated, terminal) {
             (Some(violated), true) => violated.start..n,

@@ -102,7 +102,8 @@ impl<const O: usize> Unconstrained<O> {
             // The first nonzero Π has rank one, but then the state before it is known anyway.
             let next_weight =
                 each_axis(|axis| of_axis(&next, axis).try_inverse().unwrap_or_else(SMatrix::zeros));
-            let smoother = each_axis(|axis| counted(axis) * a.transpose() * of_axis(&next_weight, axis));
+            let smoother =
+                each_axis(|axis| counted(axis) * a.transpose() * of_axis(&next_weight, axis));
             arrivals.push(Arrival { discount, smoother, next_weight });
             spread = next;
         }
@@ -143,7 +144,12 @@ impl<const O: usize> Unconstrained<O> {
 
     /// Returns the optimal input at `state` of stage `k` and the next state, for the affine terms
     /// of the last [`Self::solve`].
-    pub fn go_on(&self, k: usize, state: &State<O>, affine: &[State<O>]) -> (Vector3<f64>, State<O>) {
+    pub fn go_on(
+        &self,
+        k: usize,
+        state: &State<O>,
+        affine: &[State<O>],
+    ) -> (Vector3<f64>, State<O>) {
         self.advance(&self.gains[k], &self.slopes[k + 1], state, &affine[k])
     }
 
@@ -158,7 +164,8 @@ impl<const O: usize> Unconstrained<O> {
     ) -> (Vector3<f64>, State<O>) {
         let costate = costate(gain, slope, affine);
         let v = (0..O).fold(Vector3::zeros(), |sum, i| {
-            sum + gain.feedback[i].component_mul(&state[i]) - gain.feedforward[i].component_mul(&costate[i])
+            sum + gain.feedback[i].component_mul(&state[i])
+                - gain.feedforward[i].component_mul(&costate[i])
         });
         let next = self.chain.advance(state, &v);
         (v, std::array::from_fn(|i| next[i] + affine[i]))
@@ -212,7 +219,8 @@ impl<const O: usize> Unconstrained<O> {
     pub fn trace_back(&self, k: usize, affine: &[State<O>], motion: &mut Motion<O>) {
         for (j, Arrival { discount, smoother, .. }) in self.arrivals[..k].iter().enumerate().rev() {
             let (counted, after) = (apply(discount, &self.means[j]), motion.states[j + 1]);
-            let deviation = apply(smoother, &std::array::from_fn(|i| after[i] - self.means[j + 1][i]));
+            let deviation =
+                apply(smoother, &std::array::from_fn(|i| after[i] - self.means[j + 1][i]));
             motion.states[j] = std::array::from_fn(|i| counted[i] + deviation[i]);
         }
         motion.states[0] = self.means[0];
@@ -241,7 +249,9 @@ pub(super) mod tests {
     }
 
     pub(in crate::mpc) fn cost<const O: usize>() -> Cost<O> {
-        let end = SMatrix::<f64, O, O>::from_fn(|i, j| if i == j { 80.0 - 40.0 * i as f64 } else { 30.0 });
+        let end = SMatrix::<f64, O, O>::from_fn(
+            |i, j| if i == j { 80.0 - 40.0 * i as f64 } else { 30.0 },
+        );
         Cost {
             state: std::array::from_fn(|i| Vector3::new(10.0, 7.0, 3.0) / (1.0 + i as f64)),
             input: Vector3::new(2.0, 1.0, 0.5),
@@ -257,7 +267,9 @@ pub(super) mod tests {
     pub(in crate::mpc) fn affine<const O: usize>() -> Vec<State<O>> {
         let d = |k: usize| if k == 13 { 0.08 } else { 1e-3 * k as f64 };
         (0..N)
-            .map(|k| std::array::from_fn(|i| Vector3::new(d(k), -d(k), 0.5 * d(k)) / (1.0 + i as f64)))
+            .map(|k| {
+                std::array::from_fn(|i| Vector3::new(d(k), -d(k), 0.5 * d(k)) / (1.0 + i as f64))
+            })
             .collect()
     }
 
@@ -270,7 +282,10 @@ pub(super) mod tests {
 
     /// Slope of the cost in every input, by differences of the cost of the resulting motion. They
     /// are exact for a quadratic.
-    pub(in crate::mpc) fn slopes<const O: usize>(motion: &Motion<O>, terminal: f64) -> DVector<f64> {
+    pub(in crate::mpc) fn slopes<const O: usize>(
+        motion: &Motion<O>,
+        terminal: f64,
+    ) -> DVector<f64> {
         let (chain, affine) = (chain(), affine());
         let mut cost = cost::<O>();
         let value = |cost: &Cost<O>, motion: &Motion<O>, i: usize, change: f64| {
@@ -280,7 +295,9 @@ pub(super) mod tests {
             cost.of(&changed)
         };
         cost.end = cost.end.map(|row| row.map(|block| block * (1.0 + terminal)));
-        DVector::from_fn(3 * N, |i, _| (value(&cost, motion, i, 0.5) - value(&cost, motion, i, -0.5)) / 1.0)
+        DVector::from_fn(3 * N, |i, _| {
+            (value(&cost, motion, i, 0.5) - value(&cost, motion, i, -0.5)) / 1.0
+        })
     }
 
     fn assert_stationary<const O: usize>() {
@@ -318,9 +335,11 @@ pub(super) mod tests {
             // both directions lead back to that motion.
             let ((weight, mean), (to_go, slope)) = (lq.arrival(k), lq.to_go(k));
             for axis in 0..3 {
-                let (weight, to_go): (SMatrix<f64, O, O>, _) = (of_axis(weight, axis), of_axis(to_go, axis));
+                let (weight, to_go): (SMatrix<f64, O, O>, _) =
+                    (of_axis(weight, axis), of_axis(to_go, axis));
                 let of = |state: &State<O>| SVector::<f64, O>::from_fn(|i, _| state[i][axis]);
-                let joint = (weight + to_go).try_inverse().unwrap() * (weight * of(&mean) - of(&slope));
+                let joint =
+                    (weight + to_go).try_inverse().unwrap() * (weight * of(&mean) - of(&slope));
                 assert!((joint - of(&motion.states[k])).amax() < 1e-10, "stage {k}");
             }
             let mut again = Motion::new(N);

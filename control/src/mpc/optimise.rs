@@ -32,12 +32,17 @@ impl<const O: usize> Optimiser<O> {
             .unwrap_or_else(|| self.over_whole_horizon(&sample, &mut search));
         // The laws follow another plan in a fallback.
         let found = status != Status::Fallback;
-        let certificate = if found { self.certificate(&sample, true) } else { Certificate::default() };
+        let certificate =
+            if found { self.certificate(&sample, true) } else { Certificate::default() };
         Report { status, iterations: search.iterations, certificate, settled: search.settled }
     }
 
     /// Finds the optimum by the solvers for the whole horizon.
-    fn over_whole_horizon<B: Bounded<O>>(&mut self, sample: &Sample<O, B>, search: &mut Search) -> Status {
+    fn over_whole_horizon<B: Bounded<O>>(
+        &mut self,
+        sample: &Sample<O, B>,
+        search: &mut Search,
+    ) -> Status {
         self.prepare(sample, search);
         if sample.previous.is_none() && self.settings.is_exact_riccati() {
             if let Some(status) = self.settle(sample, search, Self::by_riccati) {

@@ -8,7 +8,9 @@ use super::certificate::Certificate;
 use super::conic::ConicSolver;
 use super::layout::Layout;
 use super::lq::Unconstrained;
-use super::problem::{End, Motion, Multipliers, Outcome, Problem, Solution, Start, State, zero_state};
+use super::problem::{
+    End, Motion, Multipliers, Outcome, Problem, Solution, Start, State, zero_state,
+};
 use super::riccati::{Rest, Riccati};
 use super::search::Search;
 use super::settings::{Method, Nonlinearity, SolverSettings};
@@ -172,7 +174,9 @@ impl<const O: usize> Optimiser<O> {
         search: &mut Search,
         range: Range<usize>,
     ) -> Outcome {
-        let Self { layout, budget, unconstrained, riccati, frozen, about, bounds, solution, .. } = self;
+        let Self {
+            layout, budget, unconstrained, riccati, frozen, about, bounds, solution, ..
+        } = self;
         let (bounded, first) = (sample.bounded, range.start);
         bounded.bounds_about(about, range.clone(), bounds);
         let within = Within { bounded, bounds, about: search.about, first };
@@ -254,7 +258,11 @@ impl<const O: usize> Optimiser<O> {
 
     /// Returns the residuals of the present motion. `is_checked` says that the intervals without
     /// multipliers are known to satisfy their constraints.
-    pub(super) fn certificate<B: Bounded<O>>(&self, sample: &Sample<O, B>, is_checked: bool) -> Certificate {
+    pub(super) fn certificate<B: Bounded<O>>(
+        &self,
+        sample: &Sample<O, B>,
+        is_checked: bool,
+    ) -> Certificate {
         let within = within(sample, &self.bounds);
         Certificate::of(&problem(&self.layout, sample, &within), &self.solution, is_checked)
     }

@@ -57,7 +57,9 @@ impl<const O: usize> Optimiser<O> {
         }
         let largest = active.iter().flatten().copied().fold(0.0, f64::max);
         let is_active = more_than(ACTIVE * largest);
-        while let Some(last) = active[range.end..(range.end + MARGIN).min(n)].iter().rposition(is_active) {
+        while let Some(last) =
+            active[range.end..(range.end + MARGIN).min(n)].iter().rposition(is_active)
+        {
             range.end += last + 1;
         }
         if let Some(window) = &mut search.window {
@@ -70,7 +72,8 @@ impl<const O: usize> Optimiser<O> {
         }
         let Self { unconstrained, about, solution, .. } = self;
         let Solution { motion, multipliers } = solution;
-        motion.states[range.start] = if range.start == 0 { *sample.start } else { about.states[range.start] };
+        motion.states[range.start] =
+            if range.start == 0 { *sample.start } else { about.states[range.start] };
         unconstrained.track(range.start, range.end, about, sample.affine, motion);
         for k in range {
             [multipliers.state[k], multipliers.input[k]] = active[k];
@@ -113,8 +116,8 @@ impl<const O: usize> Optimiser<O> {
         }
         // The intervals outside a window have already been checked.
         let solved = search.window.clone().unwrap_or(0..layout.horizon);
-        search.settled =
-            !sample.bounded.depends_on_motion() || sample.bounded.violated(motion, solved, own).is_none();
+        search.settled = !sample.bounded.depends_on_motion()
+            || sample.bounded.violated(motion, solved, own).is_none();
         if search.pass == 1 {
             about.clone_from(motion);
         } else {

@@ -71,7 +71,9 @@ pub type PerAxis<const O: usize> = [[Vector3<f64>; O]; O];
 
 /// Returns the product M E of a matrix and a state.
 pub(super) fn apply<const O: usize>(m: &PerAxis<O>, state: &State<O>) -> State<O> {
-    m.map(|row| row.iter().zip(state).fold(Vector3::zeros(), |sum, (m, e)| sum + m.component_mul(e)))
+    m.map(|row| {
+        row.iter().zip(state).fold(Vector3::zeros(), |sum, (m, e)| sum + m.component_mul(e))
+    })
 }
 
 /// Combines the matrices of the three axes into blocks.
@@ -281,7 +283,9 @@ impl Outcome {
     /// Returns the number of iterations done.
     pub fn iterations(self) -> u32 {
         match self {
-            Self::Solved(iterations) | Self::Failed(iterations) | Self::Hopeless(iterations) => iterations,
+            Self::Solved(iterations) | Self::Failed(iterations) | Self::Hopeless(iterations) => {
+                iterations
+            }
         }
     }
 

@@ -107,7 +107,10 @@ mod tests {
         assert!((value - LAYER.value(&(edge * (1.0 + 1e-12)))).amax() < 1e-11);
         assert_eq!(LAYER.value(&-edge), -value);
         for i in 0..3 {
-            assert!((value[i] - LAYER.rho[i] * 2f64.powf(-f64::midpoint(LAYER.b[i], 1.0))).abs() < 1e-15);
+            assert!(
+                (value[i] - LAYER.rho[i] * 2f64.powf(-f64::midpoint(LAYER.b[i], 1.0))).abs()
+                    < 1e-15
+            );
         }
     }
 

@@ -76,8 +76,13 @@ impl Commanded {
 
     /// Returns v_achieved − v = K (M_achieved − M_wanted), rad/s², with the moment that was
     /// measured at the next tick, or with the commanded one.
-    pub(crate) fn shortfall(&self, body: &RigidBody, achieved: Option<Vector3<f64>>) -> Vector3<f64> {
-        self.cut + achieved.map_or_else(Vector3::zeros, |m| gain(body, &self.angles, m - self.moment))
+    pub(crate) fn shortfall(
+        &self,
+        body: &RigidBody,
+        achieved: Option<Vector3<f64>>,
+    ) -> Vector3<f64> {
+        self.cut
+            + achieved.map_or_else(Vector3::zeros, |m| gain(body, &self.angles, m - self.moment))
     }
 }
 
@@ -207,10 +212,15 @@ impl<R: Reaching> Controller for Tvsmc<R> {
 }
 
 /// Returns e = Θ − Θ_r (rad) and ė (rad/s), and Θ̇ (rad/s).
-pub(crate) fn tracking_error(measured: &Measurement, reference: &Reference) -> (TrackingError, Vector3<f64>) {
+pub(crate) fn tracking_error(
+    measured: &Measurement,
+    reference: &Reference,
+) -> (TrackingError, Vector3<f64>) {
     let angle_rates = kinematics::r(&measured.angles) * measured.rates;
-    let error =
-        TrackingError { angles: measured.angles - reference.angles, rates: angle_rates - reference.rates };
+    let error = TrackingError {
+        angles: measured.angles - reference.angles,
+        rates: angle_rates - reference.rates,
+    };
     (error, angle_rates)
 }
 
@@ -236,5 +246,9 @@ pub(crate) fn all_positive(name: &str, values: &[f64]) -> Result<(), DesignError
 /// 1 − rate·period must exceed −1.
 pub(crate) fn sampled_decay(name: &'static str, rate: f64, period: f64) -> Result<(), DesignError> {
     let high = 2.0 / period;
-    if rate < high { Ok(()) } else { Err(DesignError::OutOfRange { name, value: rate, low: 0.0, high }) }
+    if rate < high {
+        Ok(())
+    } else {
+        Err(DesignError::OutOfRange { name, value: rate, low: 0.0, high })
+    }
 }

@@ -47,7 +47,8 @@ impl Observer {
         let [l0, l1, l2] = self.lambda;
         let mut next = *estimate;
         for i in 0..3 {
-            let (z0, z1, z2) = (estimate.sliding[i], estimate.disturbance[i], estimate.disturbance_rate[i]);
+            let (z0, z1, z2) =
+                (estimate.sliding[i], estimate.disturbance[i], estimate.disturbance_rate[i]);
             let l = self.l[i];
             let nu0 = z1 - l0 * l.cbrt() * super::power(z0 - sliding[i], 2.0 / 3.0);
             let nu1 = z2 - l1 * l.sqrt() * super::power(z1 - nu0, 0.5);

@@ -28,7 +28,8 @@ impl SecondOrder {
     pub fn condition_46(&self, axis: usize) -> f64 {
         let Self { k1, k2, k3, k4, m } = self;
         let (k1, k2, k3, k4) = (k1[axis], k2[axis], k3[axis], k4[axis]);
-        m * m * k3 * k4 - (m.powi(3) / (m - 1.0) * k3 + (4.0 * m * m - 4.0 * m + 1.0) * k1 * k1) * k2 * k2
+        m * m * k3 * k4
+            - (m.powi(3) / (m - 1.0) * k3 + (4.0 * m * m - 4.0 * m + 1.0) * k1 * k1) * k2 * k2
     }
 }
 
@@ -56,7 +57,9 @@ impl Reaching for SecondOrder {
 
     fn sliding_rate(&self, tau: &Vector3<f64>, s: &Vector3<f64>) -> Vector3<f64> {
         let exponent = (self.m - 1.0) / self.m;
-        Vector3::from_fn(|i, _| tau[i] - self.k1[i] * super::power(s[i], exponent) - self.k2[i] * s[i])
+        Vector3::from_fn(|i, _| {
+            tau[i] - self.k1[i] * super::power(s[i], exponent) - self.k2[i] * s[i]
+        })
     }
 
     fn advance(&self, tau: &mut Vector3<f64>, s: &Vector3<f64>, period: f64) {
@@ -71,7 +74,8 @@ impl Reaching for SecondOrder {
 mod tests {
     use super::*;
 
-    const LAW: SecondOrder = SecondOrder { k1: [0.1; 3], k2: [0.2; 3], k3: [0.1; 3], k4: [0.1; 3], m: 3.0 };
+    const LAW: SecondOrder =
+        SecondOrder { k1: [0.1; 3], k2: [0.2; 3], k3: [0.1; 3], k4: [0.1; 3], m: 3.0 };
 
     /// Returns |s| after 60 s of ds/dt = `rate`, from 0.1 rad/s.
     fn left(law: &SecondOrder, rate: impl Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>) -> f64 {
@@ -106,7 +110,8 @@ mod tests {
         // The printed form has + k₃ and a second sgn, which makes the powers of |s| even functions.
         let period = 0.001;
         for twice in [false, true] {
-            let power = |s: f64, a: f64| if twice { s.abs().powf(a) } else { crate::sliding::power(s, a) };
+            let power =
+                |s: f64, a: f64| if twice { s.abs().powf(a) } else { crate::sliding::power(s, a) };
             let (mut s, mut tau, mut largest) = (0.1_f64, 0.0, 0.0_f64);
             for k in 0..60_000 {
                 let rate = -0.1 * power(s, 2.0 / 3.0) - 0.2 * s + tau;

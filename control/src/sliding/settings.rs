@@ -54,7 +54,8 @@ struct AntiWindup {
 // Neither of the two can fail, as the tests that use them show: the files are embedded.
 fn embedded() -> &'static File {
     static READ: LazyLock<File> = LazyLock::new(|| {
-        toml::from_str(include_str!("../../data/tvsmc-2015.toml")).unwrap_or_else(|error| panic!("{error}"))
+        toml::from_str(include_str!("../../data/tvsmc-2015.toml"))
+            .unwrap_or_else(|error| panic!("{error}"))
     });
     &READ
 }
@@ -66,7 +67,8 @@ fn body() -> RigidBody {
 impl FblSettings {
     /// Returns the settings of Wu 2015, section 6, with its vehicle at the nominal inertia.
     pub fn published() -> Self {
-        let &File { period, feedback_linearisation: FeedbackLinearisation { kp, kd }, .. } = embedded();
+        let &File { period, feedback_linearisation: FeedbackLinearisation { kp, kd }, .. } =
+            embedded();
         Self { body: body(), period, kp, kd }
     }
 }

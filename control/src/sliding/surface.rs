@@ -91,7 +91,9 @@ mod tests {
             assert!(surface.sliding(&anchor, t, &error).norm() < 1e-15, "t = {t}");
             // The second derivative ë along (21) equals b.
             let second = start * ((8.0 * t - 4.0) * decay);
-            assert!((surface.equivalent(&anchor, t, &error, &Vector3::zeros()) - second).norm() < 1e-14);
+            assert!(
+                (surface.equivalent(&anchor, t, &error, &Vector3::zeros()) - second).norm() < 1e-14
+            );
         }
     }
 }

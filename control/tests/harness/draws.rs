@@ -42,11 +42,14 @@ impl Case {
                 let amplitude = three(5).component_mul(&degrees([3.0, 1.0, 6.0]));
                 Profile::sine(mean, amplitude, 0.45 + 0.35 * at(8), 3.15 * at(9))
             }
-            _ => Profile::step(mean, mean + three(5).component_mul(&degrees([5.0, 3.0, 16.0])), 25.0),
+            _ => {
+                Profile::step(mean, mean + three(5).component_mul(&degrees([5.0, 3.0, 16.0])), 25.0)
+            }
         };
         // The vector is limited to the ball of this length.
-        let vector =
-            |i: usize, length: f64| three(i) * (size * length.to_radians() / three(i).norm().max(1.0));
+        let vector = |i: usize, length: f64| {
+            three(i) * (size * length.to_radians() / three(i).norm().max(1.0))
+        };
         let states = [10, 16].map(|i| (vector(i, ERRORS.0), vector(i + 3, ERRORS.1)));
         Self { time: 25.0 + 25.0 * at(0), reference, states }
     }

@@ -118,7 +118,12 @@ struct Progress {
 
 impl Progress {
     fn new(course: &Course, seed: u64) -> Self {
-        Self { course: course.clone(), random: Random::new(seed), now: Vector3::zeros(), until: 0.0 }
+        Self {
+            course: course.clone(),
+            random: Random::new(seed),
+            now: Vector3::zeros(),
+            until: 0.0,
+        }
     }
 
     /// Returns the value at `time` (s), which must not decrease.
@@ -139,7 +144,9 @@ impl Progress {
                 self.now
             }
             Course::AlongRate(sign) => signs(&(r * vehicle.rates())) * *sign,
-            Course::AlongMoment(sign) => signs(&(r * vehicle.body.inverse * vehicle.moment(time))) * *sign,
+            Course::AlongMoment(sign) => {
+                signs(&(r * vehicle.body.inverse * vehicle.moment(time))) * *sign
+            }
             Course::Segments(segments) => {
                 let current = segments.iter().find(|(until, _)| time < *until).or(segments.last());
                 current.map_or_else(Vector3::zeros, |(_, value)| *value)
@@ -271,9 +278,11 @@ impl Flight {
             1 => flight.reference = Self::random_sine(random),
             _ => {
                 let steady = |random: &mut Random| {
-                    degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([5.0, 3.0, 8.0]))
+                    degrees([10.0, 0.0, -30.0])
+                        + random.vector().component_mul(&degrees([5.0, 3.0, 8.0]))
                 };
-                flight.reference = Profile::step(steady(random), steady(random), random.between(1.0, 20.0));
+                flight.reference =
+                    Profile::step(steady(random), steady(random), random.between(1.0, 20.0));
             }
         }
         if random.below(4) > 0 {
@@ -289,7 +298,8 @@ impl Flight {
     }
 
     fn random_sine(random: &mut Random) -> Profile {
-        let mean = degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([5.0, 2.0, 20.0]));
+        let mean =
+            degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([5.0, 2.0, 20.0]));
         // A moving sideslip needs many optimisations.
         let sideslip = if random.below(12) == 0 { 3.0 } else { 0.0 };
         let amplitude = random.vector().component_mul(&degrees([3.0, sideslip, 6.0]));
@@ -303,7 +313,10 @@ impl Flight {
 
     /// Runs the flight; `observe` receives memory, tick, measurement and reference after each
     /// update.
-    pub fn fly_seen(&self, mut observe: impl FnMut(&Memory, u64, &Measurement, &Reference)) -> Shown {
+    pub fn fly_seen(
+        &self,
+        mut observe: impl FnMut(&Memory, u64, &Measurement, &Reference),
+    ) -> Shown {
         let s = &self.settings;
         let law = Crmpc::new(*s).unwrap();
         let latency = Latency { measurement: self.age, action: s.delay - self.age };
@@ -314,7 +327,8 @@ impl Flight {
         let mut disturbance = Progress::new(&self.disturbance, self.seed);
         let mut eyes = Eyes::new(self);
         let reference = |time: f64| self.reference.at(self.reference_start + time);
-        let (ticks, checks) = ((self.duration / period).round() as u64, (period / CHECK).round() as u64);
+        let (ticks, checks) =
+            ((self.duration / period).round() as u64, (period / CHECK).round() as u64);
         let holds = (self.hold / CHECK).round() as u64;
         let (mut shown, mut error, mut in_force, mut before) = (Shown::default(), 0.0, 0, false);
         let mut delta = Vector3::zeros();
@@ -409,11 +423,14 @@ impl Vehicle {
     fn advance(&mut self, from: f64, to: f64, delta: &Vector3<f64>) {
         let mut time = from;
         while time < to {
-            let arrival = self.transport.as_ref().and_then(|transport| transport.next_arrival(time));
-            let end = arrival.filter(|&arrival| arrival > time && arrival < to - 1e-9).unwrap_or(to);
+            let arrival =
+                self.transport.as_ref().and_then(|transport| transport.next_arrival(time));
+            let end =
+                arrival.filter(|&arrival| arrival > time && arrival < to - 1e-9).unwrap_or(to);
             let load = Load { moment: self.moment(time), delta: *delta, ..Load::default() };
-            let mut f =
-                |_: f64, state: &State| plant::derivative(&self.body, Kinematics::Printed, state, &load);
+            let mut f = |_: f64, state: &State| {
+                plant::derivative(&self.body, Kinematics::Printed, state, &load)
+            };
             self.state = rk4(&mut f, time, &self.state, end - time);
             time = end;
         }
@@ -484,8 +501,11 @@ impl Eyes {
             let truth = platform::Truth { time, angles: vehicle.angles(), rates: vehicle.rates() };
             sensors.take(time, &platform::felt(&truth));
             let sample = sensors.arrived();
-            let line =
-                estimation::Line { sample: sample.number, time: sample.time, readings: sample.readings };
+            let line = estimation::Line {
+                sample: sample.number,
+                time: sample.time,
+                readings: sample.readings,
+            };
             estimator.update(memory, time, &line);
         }
     }
@@ -499,7 +519,8 @@ impl Eyes {
         if let Some(errors) = &mut self.errors {
             let error = errors.at(time, vehicle);
             measured.angles = angles + error * angle_bound;
-            measured.rates = kinematics::r_inverse(&measured.angles) * (angle_rates + error * rate_bound);
+            measured.rates =
+                kinematics::r_inverse(&measured.angles) * (angle_rates + error * rate_bound);
         }
         if let Some((_, _, memory)) = &self.estimation {
             measured.angles = memory.estimate.angles;
@@ -514,7 +535,15 @@ impl Eyes {
             let a = angle_rates;
             println!(
                 "E {time:.2} {} {} {} {} {} {} {} {} {}",
-                of_angles.x, of_angles.y, of_angles.z, of_rates.x, of_rates.y, of_rates.z, a.x, a.y, a.z
+                of_angles.x,
+                of_angles.y,
+                of_angles.z,
+                of_rates.x,
+                of_rates.y,
+                of_rates.z,
+                a.x,
+                a.y,
+                a.z
             );
         }
         measured
@@ -563,7 +592,8 @@ pub fn random_settings(seed: u64) -> Settings {
         horizon: 20 + random.below(81),
         period_feedback,
         // The period is at most 0.3 s, so that the terminal law is stable.
-        period_optimisation: period_feedback * (1 + random.below((0.3 / period_feedback) as usize)) as f64,
+        period_optimisation: period_feedback
+            * (1 + random.below((0.3 / period_feedback) as usize)) as f64,
         limit_rate: published.limit_rate * random.between(0.5, 2.0),
         limit_moment: published.limit_moment * random.between(0.5, 3.0),
         initial_state: initial_states[random.below(3)],
@@ -594,6 +624,7 @@ pub fn tried(settings: &Settings, seed: u64) -> Tried {
     ];
     let named: Vec<Settings> = with.into_iter().flatten().collect();
     let refusal = |settings: &Settings| Crmpc::new(*settings).err();
-    let not_accepted = named.iter().filter_map(refusal).map(|refusal| format!("{error}; then {refusal}"));
+    let not_accepted =
+        named.iter().filter_map(refusal).map(|refusal| format!("{error}; then {refusal}"));
     Tried::Refused { bounds: named.len(), not_accepted: not_accepted.collect() }
 }

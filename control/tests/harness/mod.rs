@@ -119,15 +119,20 @@ pub fn run(settings: &Settings, inertia_scale: f64, disturbance: Disturbance) ->
     let mut memory = Memory::default();
     let mut controller = Crmpc::new(*settings).unwrap();
     let (mut ticks, mut in_force, mut broken, mut before) = (0u32, 0u32, false, false);
-    let outcome =
-        simulate(&mut controller, &mut memory, inertia_scale, disturbance, |memory, _, measured| {
+    let outcome = simulate(
+        &mut controller,
+        &mut memory,
+        inertia_scale,
+        disturbance,
+        |memory, _, measured| {
             assert_ne!(memory.report.status, Status::None);
             let now = memory.standing == Standing::InForce;
             ticks += 1;
             in_force += u32::from(now);
             broken |= before && measured.rates.norm() > settings.limit_rate;
             before = now;
-        });
+        },
+    );
     let in_force = f64::from(in_force) / f64::from(ticks);
     (outcome, Kept { fallbacks: memory.report.fallbacks, in_force, broken })
 }
@@ -180,7 +185,9 @@ pub fn constant() -> Vec<Case> {
 /// periods.
 pub fn square(periods: &[f64]) -> Vec<Case> {
     let directions = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
-    let all = periods.iter().flat_map(|&period| directions.map(|(y, z)| (period, Vector3::new(1.0, y, z))));
+    let all = periods
+        .iter()
+        .flat_map(|&period| directions.map(|(y, z)| (period, Vector3::new(1.0, y, z))));
     cases(all.map(|(square_period, direction)| {
         let name = format!("square wave of {square_period} s along {:?}", direction.as_slice());
         (name, Disturbance { square_period, direction, ..disturbance(Kind::Square) })
@@ -190,14 +197,15 @@ pub fn square(periods: &[f64]) -> Vec<Case> {
 /// Returns the cases of disturbances that depend on the motion and are chosen again every `period`.
 pub fn adversaries(period: f64) -> Vec<Case> {
     let kinds = [Kind::AlongRate, Kind::AgainstMoment];
-    cases(
-        kinds.map(|kind| (format!("{kind:?} every {period} s"), Disturbance { period, ..disturbance(kind) })),
-    )
+    cases(kinds.map(|kind| {
+        (format!("{kind:?} every {period} s"), Disturbance { period, ..disturbance(kind) })
+    }))
 }
 
 /// Applies `work` to all items on all processors and returns the results in the order of the items.
 pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(items.len().max(1));
+    let threads =
+        std::thread::available_parallelism().map_or(1, usize::from).min(items.len().max(1));
     let chunk = items.len().div_ceil(threads).max(1);
     std::thread::scope(|scope| {
         let handles: Vec<_> = items

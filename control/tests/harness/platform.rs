@@ -6,7 +6,9 @@ use control::Measurement;
 use control::controller::Controller;
 use control::crmpc::{Constraints, Crmpc, Memory};
 use control::estimation::ellipsoid::Correction;
-use control::estimation::{self, CalibrationMode, CalibrationStatus, Estimate, Estimator, Settings};
+use control::estimation::{
+    self, CalibrationMode, CalibrationStatus, Estimate, Estimator, Settings,
+};
 use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3};
 use vehicle::kinematics::{self, Kinematics};
 use vehicle::plant::{Plant, angles, rates};
@@ -161,13 +163,18 @@ pub fn calibrated(config: &Config, duration: f64) -> Settings {
 
     let arrived: Vec<_> = lines.iter().filter(|line| line.sample > 0).collect();
     let corrections = [0, 1].map(|i| {
-        let felt: Vec<_> =
-            arrived.iter().map(|line| felt(&motion[usize::try_from(line.sample - 1).unwrap()])[i]).collect();
+        let felt: Vec<_> = arrived
+            .iter()
+            .map(|line| felt(&motion[usize::try_from(line.sample - 1).unwrap()])[i])
+            .collect();
         let readings: Vec<_> = arrived.iter().map(|line| line.readings[i]).collect();
         regression(&felt, &readings)
     });
     let [gyroscope, accelerometer] = corrections;
-    Settings { corrections: [gyroscope, accelerometer, memory.calibration.correction], ..Settings::default() }
+    Settings {
+        corrections: [gyroscope, accelerometer, memory.calibration.correction],
+        ..Settings::default()
+    }
 }
 
 /// Returns the root mean square of each component (deg or deg/s) from `from` (s) on.

@@ -19,7 +19,10 @@ enum Shape {
 static SHAPES: Enumeration<Shape> = Enumeration {
     name: "Shape",
     description: "What is done to the output",
-    items: &[(Shape::Linear, "linear", "Nothing"), (Shape::Saturated, "saturated", "Kept between -1 and 1")],
+    items: &[
+        (Shape::Linear, "linear", "Nothing"),
+        (Shape::Saturated, "saturated", "Kept between -1 and 1"),
+    ],
 };
 
 /// Model of the lag: its parameters, input, state and outputs.
@@ -81,7 +84,11 @@ impl Model for Lag {
     fn description() -> Description<Self> {
         let table = Table::new()
             .real(
-                parameter("timeConstant", "Time constant T").real().unit(unit::time()).min(1e-3).max(1e3),
+                parameter("timeConstant", "Time constant T")
+                    .real()
+                    .unit(unit::time())
+                    .min(1e-3)
+                    .max(1e3),
                 |m: &mut Self| &mut m.time_constant,
             )
             .real(parameter("gain.early", "Gain k before the switch").real(), |m| &mut m.gain)
@@ -89,16 +96,25 @@ impl Model for Lag {
             .real(parameter("switchTime", "When the gain changes").real().unit(unit::time()), |m| {
                 &mut m.switch_time
             })
-            .real(parameter("initial.x", "Initial state").real().unit(unit::angle()), |m| &mut m.initial)
-            .integer(parameter("order", "Order of the lag; only 1 is there"), (Some(1), Some(2)), |m| {
-                &mut m.order
+            .real(parameter("initial.x", "Initial state").real().unit(unit::angle()), |m| {
+                &mut m.initial
             })
-            .boolean(parameter("inverted", "Whether the gain changes its sign"), |m| &mut m.inverted)
+            .integer(
+                parameter("order", "Order of the lag; only 1 is there"),
+                (Some(1), Some(2)),
+                |m| &mut m.order,
+            )
+            .boolean(parameter("inverted", "Whether the gain changes its sign"), |m| {
+                &mut m.inverted
+            })
             .enumeration(parameter("shape", SHAPES.description), &SHAPES, |m| &mut m.shape)
-            .string(parameter("label", "Text that is passed on; \"boom\" makes the unit panic"), |m| {
-                &mut m.label
+            .string(
+                parameter("label", "Text that is passed on; \"boom\" makes the unit panic"),
+                |m| &mut m.label,
+            )
+            .real(input("u", "Input").real().unit(unit::angle()).min(-100.0).max(100.0), |m| {
+                &mut m.u
             })
-            .real(input("u", "Input").real().unit(unit::angle()).min(-100.0).max(100.0), |m| &mut m.u)
             .real(output("x", "State").real().unit(unit::angle()).nominal(2.0), |m| &mut m.x)
             .real(
                 local("der(x)", "Derivative of the state")
@@ -116,11 +132,14 @@ impl Model for Lag {
                 |m| &mut m.y,
             )
             .real(discrete_output("gain.now", "Gain in force").real(), |m| &mut m.gain_now)
-            .boolean(discrete_output("switched", "Whether the switch is behind"), |m| &mut m.switched)
+            .boolean(discrete_output("switched", "Whether the switch is behind"), |m| {
+                &mut m.switched
+            })
             .string(discrete_output("text", "The label"), |m| &mut m.description)
-            .real(discrete_input("offset", "Added to the output").real().unit(unit::angle()), |m| {
-                &mut m.offset
-            });
+            .real(
+                discrete_input("offset", "Added to the output").real().unit(unit::angle()),
+                |m| &mut m.offset,
+            );
         Description {
             name: "Lag",
             description: "First-order lag with a gain that changes at a time event",
@@ -128,7 +147,12 @@ impl Model for Lag {
             version: env!("CARGO_PKG_VERSION"),
             model_exchange: true,
             event_indicators: 1,
-            default_experiment: DefaultExperiment { start: 0.0, stop: 2.0, tolerance: 1e-6, step: 0.1 },
+            default_experiment: DefaultExperiment {
+                start: 0.0,
+                stop: 2.0,
+                tolerance: 1e-6,
+                step: 0.1,
+            },
             table,
         }
     }
@@ -218,7 +242,12 @@ impl Model for Lag {
         indicators[0] = self.x - 1.0;
     }
 
-    fn partial_derivative(&mut self, time: f64, unknown: usize, known: usize) -> Result<f64, Failure> {
+    fn partial_derivative(
+        &mut self,
+        time: f64,
+        unknown: usize,
+        known: usize,
+    ) -> Result<f64, Failure> {
         let gain = self.gain(time);
         match (unknown, known) {
             (11, 9) => Ok(gain / self.time_constant),

@@ -99,9 +99,19 @@ const FUNCTIONS: &[(&str, Caller, &str, &str)] = &[
         "NECTX",
     ),
     ("fmi2EnterEventMode", |c| c!(fmi2EnterEventMode(c)), "", "EC"),
-    ("fmi2NewDiscreteStates", |c| c!(fmi2NewDiscreteStates(c, &mut CEventInfo::default())), "", "E"),
+    (
+        "fmi2NewDiscreteStates",
+        |c| c!(fmi2NewDiscreteStates(c, &mut CEventInfo::default())),
+        "",
+        "E",
+    ),
     ("fmi2EnterContinuousTimeMode", |c| c!(fmi2EnterContinuousTimeMode(c)), "", "E"),
-    ("fmi2CompletedIntegratorStep", |c| c!(fmi2CompletedIntegratorStep(c, 1, &mut 0, &mut 0)), "", "C"),
+    (
+        "fmi2CompletedIntegratorStep",
+        |c| c!(fmi2CompletedIntegratorStep(c, 1, &mut 0, &mut 0)),
+        "",
+        "C",
+    ),
     ("fmi2SetTime", |c| c!(fmi2SetTime(c, 0.0)), "", "EC"),
     ("fmi2SetContinuousStates", |c| c!(fmi2SetContinuousStates(c, &UNIT, 1)), "", "C"),
     ("fmi2GetDerivatives", |c| c!(fmi2GetDerivatives(c, &mut 0.0, 1)), "", "NECTX"),
@@ -113,7 +123,12 @@ const FUNCTIONS: &[(&str, Caller, &str, &str)] = &[
         "",
         "IECTX",
     ),
-    ("fmi2SetRealInputDerivatives", |c| c!(fmi2SetRealInputDerivatives(c, &U, 1, &ONE, &UNIT)), "INS", ""),
+    (
+        "fmi2SetRealInputDerivatives",
+        |c| c!(fmi2SetRealInputDerivatives(c, &U, 1, &ONE, &UNIT)),
+        "INS",
+        "",
+    ),
     (
         "fmi2GetRealOutputDerivatives",
         |c| c!(fmi2GetRealOutputDerivatives(c, null(), 0, null(), null_mut())),
@@ -142,7 +157,12 @@ fn check(
             let before = instance.messages().len();
             let status = caller(instance.component);
             if allowed(function).contains(letter) {
-                assert_eq!(status, Status::Ok, "{name} in {letter}: {:?}", instance.messages().last());
+                assert_eq!(
+                    status,
+                    Status::Ok,
+                    "{name} in {letter}: {:?}",
+                    instance.messages().last()
+                );
                 continue;
             }
             assert_eq!(status, Status::Error, "{name} in {letter} must be refused");
@@ -150,7 +170,10 @@ fn check(
             assert_eq!(messages.len(), before + 1, "{name} in {letter} says so once");
             let text = &messages[before].text;
             assert!(text.starts_with(name), "{text}");
-            assert!(text.contains("not allowed in state") || text.contains("not available"), "{text}");
+            assert!(
+                text.contains("not allowed in state") || text.contains("not available"),
+                "{text}"
+            );
             // After that call the instance is usable again.
             assert_eq!(c!(fmi2Reset(instance.component)), Status::Ok);
             instance.initialize();
@@ -202,7 +225,9 @@ fn null_arguments_are_named() {
         ("'FMUstate'", |c| c!(fmi2DeSerializeFMUstate(c, null(), 0, null_mut()))),
         ("'serializedState'", |c| c!(fmi2DeSerializeFMUstate(c, null(), 9, &mut null_mut()))),
         ("'order'", |c| c!(fmi2SetRealInputDerivatives(c, &U, 1, null(), &UNIT))),
-        ("'dvUnknown'", |c| c!(fmi2GetDirectionalDerivative(c, &X, 1, null(), 0, null(), null_mut()))),
+        ("'dvUnknown'", |c| {
+            c!(fmi2GetDirectionalDerivative(c, &X, 1, null(), 0, null(), null_mut()))
+        }),
         ("elements", |c| c!(fmi2GetReal(c, &X, usize::MAX, &mut 0.0))),
     ];
     for (part, caller) in in_init {

@@ -14,8 +14,11 @@ enum Parity {
     Odd,
 }
 
-static PARITIES: Enumeration<Parity> =
-    Enumeration { name: "Parity", description: "Parity of the count", items: &[(Parity::Even, "even", "")] };
+static PARITIES: Enumeration<Parity> = Enumeration {
+    name: "Parity",
+    description: "Parity of the count",
+    items: &[(Parity::Even, "even", "")],
+};
 
 /// Model that counts its steps.
 #[derive(Serialize, Deserialize)]
@@ -43,13 +46,20 @@ impl Model for Counter {
             version: "1",
             model_exchange: false,
             event_indicators: 0,
-            default_experiment: DefaultExperiment { start: 0.0, stop: 1.0, tolerance: 1e-6, step: 0.1 },
+            default_experiment: DefaultExperiment {
+                start: 0.0,
+                stop: 1.0,
+                tolerance: 1e-6,
+                step: 0.1,
+            },
             table: Table::new()
                 .string(parameter("defect", "Where to panic"), |m: &mut Self| &mut m.defect)
                 .real(input("increment", "What a step adds").real(), |m| &mut m.increment)
                 .real(discrete_output("count", "Sum of the increments").real(), |m| &mut m.seen)
                 .string(discrete_output("resources", "The resource folder"), |m| &mut m.resources)
-                .enumeration(discrete_output("parity", PARITIES.description), &PARITIES, |m| &mut m.parity),
+                .enumeration(discrete_output("parity", PARITIES.description), &PARITIES, |m| {
+                    &mut m.parity
+                }),
         }
     }
 
@@ -69,8 +79,10 @@ impl Model for Counter {
         if self.defect == "parameter" {
             return Err(Failure::Error("defect = parameter is not allowed".into()));
         }
-        self.resources =
-            context.resources.map_or("none", |path: &Path| path.to_str().unwrap_or_default()).into();
+        self.resources = context
+            .resources
+            .map_or("none", |path: &Path| path.to_str().unwrap_or_default())
+            .into();
         self.count = context.start_time;
         Ok(())
     }

@@ -145,7 +145,8 @@ fn directional_derivatives_by_or_of_the_wrong_variables_are_refused() {
         let instance = Instance::in_event_mode();
         let (seed, mut value) = (1.0, 0.0);
         let component = instance.component;
-        let status = c!(fmi2GetDirectionalDerivative(component, &unknown, 1, &known, 1, &seed, &mut value,));
+        let status =
+            c!(fmi2GetDirectionalDerivative(component, &unknown, 1, &known, 1, &seed, &mut value,));
         assert_eq!(status, Status::Error);
         instance.said(&["fmi2GetDirectionalDerivative", part]);
     }

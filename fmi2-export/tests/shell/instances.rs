@@ -43,7 +43,8 @@ fn no_callbacks_and_no_logger_are_fine() {
     let mut silent = callbacks(null());
     silent.logger = None;
     for callbacks in [null(), &raw const silent] {
-        let component = c!(fmi2Instantiate(c"it".as_ptr(), 1, own.as_ptr(), null(), callbacks, 0, 1));
+        let component =
+            c!(fmi2Instantiate(c"it".as_ptr(), 1, own.as_ptr(), null(), callbacks, 0, 1));
         assert!(!component.is_null());
         assert_eq!(c!(fmi2DoStep(component, 0.0, 0.1, 1)), Status::Error);
         c!(fmi2FreeInstance(component));
@@ -83,7 +84,8 @@ fn interleaved_instances_and_units_do_not_see_each_other() {
         instance.real(X).to_bits()
     };
     let (one, two) = (alone(2.0), alone(-3.0));
-    let expected: Vec<_> = (0..20).map(|k| steps(&one, k)).zip((0..20).map(|k| steps(&two, k))).collect();
+    let expected: Vec<_> =
+        (0..20).map(|k| steps(&one, k)).zip((0..20).map(|k| steps(&two, k))).collect();
     let (one, two, counter) = (alone(2.0), alone(-3.0), Instance::of("Counter", CO_SIMULATION));
     counter.initialize();
     for k in 0..20 {

@@ -139,7 +139,10 @@ fn a_buffer_that_is_too_small_is_refused() {
     let state = instance.save();
     let mut buffer = [0u8; 8];
     let component = instance.component;
-    assert_eq!(c!(fmi2SerializeFMUstate(component, state, buffer.as_mut_ptr().cast(), 8)), Status::Error);
+    assert_eq!(
+        c!(fmi2SerializeFMUstate(component, state, buffer.as_mut_ptr().cast(), 8)),
+        Status::Error
+    );
     instance.said(&["room for 8 bytes"]);
     assert_eq!(buffer, [0; 8]);
 }

@@ -68,10 +68,16 @@ fn the_stop_time_holds_if_it_is_defined() {
 #[test]
 fn a_senseless_experiment_is_refused() {
     let instance = || Instance::lag(CO_SIMULATION);
-    assert_eq!(c!(fmi2SetupExperiment(instance().component, 0, 0.0, f64::NAN, 0, 0.0)), Status::Error);
+    assert_eq!(
+        c!(fmi2SetupExperiment(instance().component, 0, 0.0, f64::NAN, 0, 0.0)),
+        Status::Error
+    );
     assert_eq!(c!(fmi2SetupExperiment(instance().component, 0, 0.0, 1.0, 1, 0.5)), Status::Error);
     assert_eq!(c!(fmi2SetupExperiment(instance().component, 1, -1.0, 0.0, 0, 0.0)), Status::Error);
-    assert_eq!(c!(fmi2SetupExperiment(instance().component, 0, f64::NAN, 0.0, 0, f64::NAN)), Status::Ok);
+    assert_eq!(
+        c!(fmi2SetupExperiment(instance().component, 0, f64::NAN, 0.0, 0, f64::NAN)),
+        Status::Ok
+    );
 }
 
 fn set_derivative(instance: &Instance, reference: u32, order: i32, value: f64) -> Status {
@@ -91,8 +97,8 @@ fn oracle_input_derivatives_make_a_ramp() {
     }
     // The ramp u = a t gives x(t) = k a (t − T) + (x₀ + k a T) e^(−t/T).
     let (k, a, time_constant) = (2.0, 3.0, 0.5);
-    let exact =
-        k * a * (1.0 - time_constant) + (0.5 + k * a * time_constant) * (-1.0f64 / time_constant).exp();
+    let exact = k * a * (1.0 - time_constant)
+        + (0.5 + k * a * time_constant) * (-1.0f64 / time_constant).exp();
     assert!((instance.real(X) - exact).abs() < 1e-9, "{} {exact}", instance.real(X));
     assert!((instance.real(U) - 3.0).abs() < 1e-12, "the input ends where it was extrapolated to");
 }

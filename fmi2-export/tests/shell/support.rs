@@ -47,8 +47,8 @@ extern "C" fn log(
     // SAFETY: the environment is the log that `Instance` keeps alive, and the shell passes
     // NUL-terminated texts that live during the call.
     let (log, [instance, category, text]) = unsafe {
-        let texts =
-            [instance, category, message].map(|text| CStr::from_ptr(text).to_str().unwrap().to_owned());
+        let texts = [instance, category, message]
+            .map(|text| CStr::from_ptr(text).to_str().unwrap().to_owned());
         (&*environment.cast::<Log>(), texts)
     };
     log.lock().unwrap().push(Message { status, category, text, instance });
@@ -157,7 +157,12 @@ impl Instance {
 
     pub(crate) fn initialize(&self) {
         self.enter_initialization();
-        assert_eq!(c!(fmi2ExitInitializationMode(self.component)), Status::Ok, "{:?}", self.messages());
+        assert_eq!(
+            c!(fmi2ExitInitializationMode(self.component)),
+            Status::Ok,
+            "{:?}",
+            self.messages()
+        );
     }
 
     pub(crate) fn enter_initialization(&self) {
@@ -240,7 +245,12 @@ impl Instance {
 
     pub(crate) fn save(&self) -> *mut c_void {
         let mut state = null_mut();
-        assert_eq!(c!(fmi2GetFMUstate(self.component, &mut state)), Status::Ok, "{:?}", self.messages());
+        assert_eq!(
+            c!(fmi2GetFMUstate(self.component, &mut state)),
+            Status::Ok,
+            "{:?}",
+            self.messages()
+        );
         assert!(!state.is_null());
         state
     }
@@ -260,8 +270,12 @@ impl Instance {
 
     pub(crate) fn deserialize(&self, bytes: &[u8]) -> (Status, *mut c_void) {
         let mut state = null_mut();
-        let status =
-            c!(fmi2DeSerializeFMUstate(self.component, bytes.as_ptr().cast(), bytes.len(), &mut state));
+        let status = c!(fmi2DeSerializeFMUstate(
+            self.component,
+            bytes.as_ptr().cast(),
+            bytes.len(),
+            &mut state
+        ));
         (status, state)
     }
 }

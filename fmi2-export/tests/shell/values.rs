@@ -38,7 +38,10 @@ fn one_refused_value_refuses_all_of_the_call() {
     let instance = initializing();
     let references = [GAIN, TIME_CONSTANT];
     let values = [7.0, -1.0];
-    assert_eq!(c!(fmi2SetReal(instance.component, references.as_ptr(), 2, values.as_ptr())), Status::Error);
+    assert_eq!(
+        c!(fmi2SetReal(instance.component, references.as_ptr(), 2, values.as_ptr())),
+        Status::Error
+    );
     assert_eq!(instance.real(GAIN), 2.0);
 }
 

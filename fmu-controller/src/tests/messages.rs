@@ -2,7 +2,8 @@
 
 use super::refusal;
 use crate::{
-    AttitudeEstimator, Btvsmc, BtvsmcDo, ControlAllocator, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo, TwoLoopSmc,
+    AttitudeEstimator, Btvsmc, BtvsmcDo, ControlAllocator, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo,
+    TwoLoopSmc,
 };
 use control::crmpc::{Constraints, InitialState};
 use control::error_dynamics::Gain;
@@ -83,7 +84,10 @@ fn all() -> Vec<String> {
             |unit| unit.law.settings.reaching.eta[0] = 0.0,
             |unit| unit.law.settings.reaching.h[0] = 0.0,
         ]),
-        of::<BtvsmcDo>(&[|unit| unit.law.observer.lambda[0] = 0.0, |unit| unit.law.observer.l[0] = 0.0]),
+        of::<BtvsmcDo>(&[
+            |unit| unit.law.observer.lambda[0] = 0.0,
+            |unit| unit.law.observer.l[0] = 0.0,
+        ]),
         of::<SotvsmcDo>(&[
             |unit| unit.law.settings.reaching.k3[0] = 0.0,
             |unit| unit.law.settings.reaching.m = 2.0,

@@ -46,7 +46,8 @@ const SENSORS: [Sensor; 3] = [
 
 pub(super) fn all(table: Plant) -> Plant {
     let table = line(measured(table));
-    let table = SENSORS.iter().enumerate().fold(table, |table, (i, sensor)| errors(table, i, sensor));
+    let table =
+        SENSORS.iter().enumerate().fold(table, |table, (i, sensor)| errors(table, i, sensor));
     calibration(surroundings(table))
 }
 
@@ -54,8 +55,9 @@ fn measured(mut table: Plant) -> Plant {
     for (i, sensor) in SENSORS.iter().enumerate() {
         let declare = |axis: &str, meaning: &str| {
             let text = format!("The {}'s {meaning} {}", sensor.name, sensor.quantity);
-            let common = output(&format!("measured.{}.{axis}", sensor.name), &super::sentence(&text))
-                .depends_on(["attitude.alpha", "attitude.beta", "attitude.sigma"]);
+            let common =
+                output(&format!("measured.{}.{axis}", sensor.name), &super::sentence(&text))
+                    .depends_on(["attitude.alpha", "attitude.beta", "attitude.sigma"]);
             let common = if i == 0 {
                 let rates = RATES.map(|(axis, _)| format!("rate.{axis}"));
                 common
@@ -66,13 +68,16 @@ fn measured(mut table: Plant) -> Plant {
             };
             common.real().unit((sensor.unit)()).nominal(sensor.nominal)
         };
-        let axes = if i == 0 { AXES } else { [("x", "forward"), ("y", "right"), ("z", "downward")] };
+        let axes =
+            if i == 0 { AXES } else { [("x", "forward"), ("y", "right"), ("z", "downward")] };
         let role = |axis| Unknown::Measured(3 * i + axis).into();
         table = vector(table, axes, declare, role, move |m| &mut m.output.measured.readings[i]);
     }
     let time = output("measured.time", "Time at which the newest sample was taken");
-    let number =
-        discrete_output("measured.sample", "Number of the newest sample, from 1; 0 before the first");
+    let number = discrete_output(
+        "measured.sample",
+        "Number of the newest sample, from 1; 0 before the first",
+    );
     table.real(seconds(time), |m| &mut m.output.measured.time).role(Unknown::MeasuredTime).integer(
         number,
         (Some(0), None),
@@ -91,15 +96,19 @@ fn line(table: Plant) -> Plant {
     );
     let period = parameter("sensor.period", "Time between samples");
     let delay = parameter("sensor.delay", "Time from taking a sample to its arrival");
-    let probability = parameter("sensor.drop.probability", "Probability that a sample is dropped on its way");
+    let probability =
+        parameter("sensor.drop.probability", "Probability that a sample is dropped on its way");
     let start = parameter("sensor.drop.start", "Time from which samples can be dropped");
     let end = parameter("sensor.drop.end", "Time at which no more samples are dropped");
-    let seed = parameter("sensor.seed", "Seed of noise and drops: the same seed gives the same samples");
+    let seed =
+        parameter("sensor.seed", "Seed of noise and drops: the same seed gives the same samples");
     table
         .integer(set, (Some(NO_SENSORS), Some(MEMS_SENSORS)), |m| &mut m.parameters.sensor_set)
         .real(seconds(period).min(1e-4).nominal(0.01), |m| &mut m.parameters.line.period)
         .real(seconds(delay).min(0.0).max(10.0).nominal(0.01), |m| &mut m.parameters.line.delay)
-        .real(probability.real().min(0.0).max(1.0).nominal(1.0), |m| &mut m.parameters.line.drop_probability)
+        .real(probability.real().min(0.0).max(1.0).nominal(1.0), |m| {
+            &mut m.parameters.line.drop_probability
+        })
         .real(seconds(start), |m| &mut m.parameters.line.drop_window.start)
         .real(seconds(end), |m| &mut m.parameters.line.drop_window.end)
         .integer(seed, (Some(0), None), |m| &mut m.parameters.sensor_seed)
@@ -107,17 +116,22 @@ fn line(table: Plant) -> Plant {
 
 fn errors(mut table: Plant, i: usize, sensor: &Sensor) -> Plant {
     let name = |part: &str| format!("sensor.{}.{part}", sensor.name);
-    let declare = |part: &str, text: &str| parameter(&name(part), &format!("The {}'s {text}", sensor.name));
-    let own =
-        |part: &str, text: &str| declare(part, text).real().unit((sensor.unit)()).nominal(sensor.nominal);
+    let declare =
+        |part: &str, text: &str| parameter(&name(part), &format!("The {}'s {text}", sensor.name));
+    let own = |part: &str, text: &str| {
+        declare(part, text).real().unit((sensor.unit)()).nominal(sensor.nominal)
+    };
     for (row, (axis, _)) in AXES.into_iter().enumerate() {
         for (column, (from, _)) in AXES.into_iter().enumerate() {
             let text = format!("{}: {axis} by {from}", sensor.matrix);
-            let real = declare(&format!("matrix[{},{}]", row + 1, column + 1), &text).real().nominal(1.0);
+            let real =
+                declare(&format!("matrix[{},{}]", row + 1, column + 1), &text).real().nominal(1.0);
             table = table.real(real, move |m| &mut m.parameters.triads[i].matrix[(row, column)]);
         }
     }
-    let bias = |axis: &str, _: &str| own(&format!("bias.{axis}"), &format!("{} along {axis}", sensor.bias));
+    let bias = |axis: &str, _: &str| {
+        own(&format!("bias.{axis}"), &format!("{} along {axis}", sensor.bias))
+    };
     let noise = own("noise", "standard deviation of white noise on a sample");
     let bandwidth = declare("bandwidth", "bandwidth of first order, 3 dB; 0 for none").real();
     let range = own("range", "range either way; 0 for no limit");
@@ -138,8 +152,12 @@ fn errors(mut table: Plant, i: usize, sensor: &Sensor) -> Plant {
 fn surroundings(table: Plant) -> Plant {
     let gravity = parameter("sensor.gravity", "Gravity that the accelerometer feels, down");
     let field = |axis: &str, _: &str| {
-        let text = format!("The Earth's magnetic field that the magnetometer feels, component {axis}");
-        parameter(&format!("sensor.field.{axis}"), &text).real().unit(unit::flux_density()).nominal(5e-5)
+        let text =
+            format!("The Earth's magnetic field that the magnetometer feels, component {axis}");
+        parameter(&format!("sensor.field.{axis}"), &text)
+            .real()
+            .unit(unit::flux_density())
+            .nominal(5e-5)
     };
     let axes = [("north", ""), ("east", ""), ("down", "")];
     let gravity = gravity.real().unit(unit::acceleration()).min(0.0).nominal(10.0);
@@ -148,10 +166,15 @@ fn surroundings(table: Plant) -> Plant {
 }
 
 fn calibration(table: Plant) -> Plant {
-    let rate = |name: &str, text: &str| parameter(name, text).real().unit(unit::angular_rate()).nominal(0.1);
-    let active =
-        parameter("calibration.active", "The platform flies a sequence of rotations, not its dynamics");
-    let amplitude = parameter("calibration.beta.amplitude", "Amplitude of the sideslip in the sequence");
+    let rate = |name: &str, text: &str| {
+        parameter(name, text).real().unit(unit::angular_rate()).nominal(0.1)
+    };
+    let active = parameter(
+        "calibration.active",
+        "The platform flies a sequence of rotations, not its dynamics",
+    );
+    let amplitude =
+        parameter("calibration.beta.amplitude", "Amplitude of the sideslip in the sequence");
     table
         .boolean(active, |m| &mut m.parameters.calibrates)
         .real(rate("calibration.rate.alpha", "Rate of the angle of attack in the sequence"), |m| {
@@ -163,7 +186,8 @@ fn calibration(table: Plant) -> Plant {
         .real(amplitude.real().unit(unit::angle()).min(0.0).nominal(0.5), |m| {
             &mut m.parameters.sequence.beta_amplitude
         })
-        .real(rate("calibration.beta.frequency", "Angular frequency of the sideslip in the sequence"), |m| {
-            &mut m.parameters.sequence.beta_frequency
-        })
+        .real(
+            rate("calibration.beta.frequency", "Angular frequency of the sideslip in the sequence"),
+            |m| &mut m.parameters.sequence.beta_frequency,
+        )
 }

@@ -52,8 +52,8 @@ fn without_sensors_what_they_would_feel_is_shown_at_all_times() {
     let [rate, force, field] = output.measured.readings;
     assert_eq!((output.measured.number, output.measured.time), (0, 0.37));
     // The gyroscope shows ω less α̇ sin β about the bank axis, which is the R⁻¹ column of σ.
-    let expected =
-        output.rates - r_inverse(&output.angles).column(2) * (output.angle_rates.x * output.angles.y.sin());
+    let expected = output.rates
+        - r_inverse(&output.angles).column(2) * (output.angle_rates.x * output.angles.y.sin());
     assert!((rate - expected).amax() < 1e-16 && (rate - output.rates).amax() > 1e-4);
     assert!((force.norm() - 9.80665).abs() < 1e-14 && (field.norm() - 5.094e-5).abs() < 1e-9);
     let mut exact = started(|unit| unit.parameters.kinematics = Kinematics::Exact);
@@ -146,7 +146,11 @@ fn oracle_model_exchange_takes_the_samples_of_co_simulation_at_time_events() {
         me.new_discrete_states(to).unwrap();
         let [cs, me] = [&mut cs, &mut me].map(|unit| outputs(unit, to));
         assert_same_motion(&cs, &me, &format!("{to}"));
-        assert_eq!((cs.measured.number, cs.measured.time), (me.measured.number, me.measured.time), "{to}");
+        assert_eq!(
+            (cs.measured.number, cs.measured.time),
+            (me.measured.number, me.measured.time),
+            "{to}"
+        );
         for (i, step) in [1.4e-4, 1.2e-3, 1.6e-7].into_iter().enumerate() {
             let difference = cs.measured.readings[i] - me.measured.readings[i];
             assert!(difference.amax() < step, "{to}: at most a step of the converter");
@@ -157,7 +161,11 @@ fn oracle_model_exchange_takes_the_samples_of_co_simulation_at_time_events() {
     events.sort_by(f64::total_cmp);
     events.dedup();
     let on_ticks = events.iter().filter(|&&time| (64.0 * time).fract() == 0.0).count();
-    assert_eq!((on_ticks, events.len() - on_ticks), (128, 126), "the first two have nothing to arrive");
+    assert_eq!(
+        (on_ticks, events.len() - on_ticks),
+        (128, 126),
+        "the first two have nothing to arrive"
+    );
 }
 
 #[test]
@@ -225,7 +233,8 @@ fn the_calibration_sequence_is_flown_in_both_interfaces_whatever_the_moment() {
     // 7.5 + 37·10, 10 + 40 sin 113 deg, -30 + 60·10
     let expected = [377.5, 10.0 + 40.0 * 113f64.to_radians().sin(), 570.0].map(f64::to_radians);
     assert!((cs.angles - Vector3::from(expected)).amax() < 1e-10, "{}", cs.angles);
-    let rates = [37.0, 40.0 * 11.3f64.to_radians() * 113f64.to_radians().cos(), 60.0].map(f64::to_radians);
+    let rates =
+        [37.0, 40.0 * 11.3f64.to_radians() * 113f64.to_radians().cos(), 60.0].map(f64::to_radians);
     assert!((cs.angle_rates - Vector3::from(rates)).amax() < 1e-15);
     assert!((cs.rates - r_inverse(&cs.angles) * cs.angle_rates).amax() < 1e-10);
 }
@@ -236,7 +245,11 @@ fn oracle_in_the_calibration_sequence_nothing_but_what_is_felt_depends_on_the_st
     step(&mut unit, 0.0, 1.0).unwrap();
     for unknown in 6..12 {
         for known in (0..6).chain(21..24).chain(62..69) {
-            assert_eq!(unit.partial_derivative(1.0, unknown, known).unwrap(), 0.0, "{unknown} {known}");
+            assert_eq!(
+                unit.partial_derivative(1.0, unknown, known).unwrap(),
+                0.0,
+                "{unknown} {known}"
+            );
         }
     }
     for known in 0..6 {
@@ -279,7 +292,9 @@ fn impossible_sensors_and_sequences_are_refused_by_name() {
         let mut unit = ReentryPlant::new();
         unit.parameters.sensor_set = 2;
         set(&mut unit);
-        let Err(Failure::Error(message)) = unit.initialize(&super::CONTEXT) else { panic!("{name}") };
+        let Err(Failure::Error(message)) = unit.initialize(&super::CONTEXT) else {
+            panic!("{name}")
+        };
         assert!(message.starts_with(name), "{message}");
     }
 }

@@ -55,7 +55,8 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         return Err(Error::SameName(twice.name.clone()));
     }
     let Arguments { resources, licenses, icons, .. } = arguments;
-    let extras = Extras { resources: resources.clone(), licenses: licenses.clone(), icons: icons.clone() };
+    let extras =
+        Extras { resources: resources.clone(), licenses: licenses.clone(), icons: icons.clone() };
     make_folder(&arguments.output)?;
     for (library, unit) in &units {
         let archive = pack(unit, library, &arguments.output, &extras)?;

@@ -1,5 +1,5 @@
-//! Checks an experiment in one pass: everything it names is looked up, and everything that cannot
-//! be run is refused. Only the units themselves can fail after that.
+//! Checks an experiment in one pass: every name in it is looked up, and everything that cannot be
+//! run is refused. After that only the units themselves can fail.
 
 use crate::clock::Clock;
 use crate::delay;
@@ -17,12 +17,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-/// Checks an experiment against what its archives say. Archives that are already in `opened` are
-/// not opened again.
+/// Checks an experiment against the model descriptions of its FMUs. Archives that are already in
+/// `opened` are not opened again.
 ///
 /// # Errors
-/// If anything is wrong with the experiment or with the archive of an FMU.
-pub fn check(experiment: Experiment, fmu_dirs: &[PathBuf], opened: &mut Opened) -> Result<System, Error> {
+/// Returns an error if anything is wrong with the experiment or with the archive of an FMU.
+pub fn check(
+    experiment: Experiment,
+    fmu_dirs: &[PathBuf],
+    opened: &mut Opened,
+) -> Result<System, Error> {
     let simulation = &experiment.simulation;
     let clock = Clock::new(simulation.start, simulation.stop, simulation.step)
         .map_err(|message| experiment.source.error(&(0..0), format!("[simulation] {message}")))?;
@@ -132,14 +136,20 @@ fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<
 }
 
 /// Checks that an FMU that can be instantiated only once per process is used by one component only.
-fn check_single_instances(experiment: &Experiment, order: &[String], fmus: &[Rc<Fmu>]) -> Result<(), Error> {
+fn check_single_instances(
+    experiment: &Experiment,
+    order: &[String],
+    fmus: &[Rc<Fmu>],
+) -> Result<(), Error> {
     for (index, fmu) in fmus.iter().enumerate() {
         let only_once = fmu
             .description
             .co_simulation
             .as_ref()
             .is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"));
-        if only_once && let Some(other) = fmus[..index].iter().position(|other| Rc::ptr_eq(other, fmu)) {
+        if only_once
+            && let Some(other) = fmus[..index].iter().position(|other| Rc::ptr_eq(other, fmu))
+        {
             let message = format!(
                 "\"{}\" and \"{}\" both use {}, which can be instantiated only once per process",
                 order[other],
@@ -152,14 +162,16 @@ fn check_single_instances(experiment: &Experiment, order: &[String], fmus: &[Rc<
     Ok(())
 }
 
-/// Names of the components, in the order in which their inputs are set.
+/// Returns the names of the components, in the order in which their inputs are set.
 fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
     let refuse = |message: String| Err(experiment.source.error(&(0..0), message));
     let names: Vec<&str> = experiment.components.keys().map(String::as_str).collect();
     if let Some(name) = names.iter().find(|name| name.is_empty() || name.contains('.')) {
         return refuse(format!("the component name \"{name}\" must not be empty or hold a dot"));
     }
-    if let Some((name, _)) = experiment.components.iter().find(|(_, component)| component.every == 0) {
+    if let Some((name, _)) =
+        experiment.components.iter().find(|(_, component)| component.every == 0)
+    {
         return refuse(format!("[components.{name}] every = 0: must be at least 1"));
     }
     if experiment.record.every == 0 {
@@ -175,7 +187,8 @@ fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
             return refuse(format!("[simulation] order names \"{name}\" twice"));
         }
     }
-    if order.is_empty() && (names.len() == 1 || experiment.simulation.coupling == Coupling::Jacobi) {
+    if order.is_empty() && (names.len() == 1 || experiment.simulation.coupling == Coupling::Jacobi)
+    {
         return Ok(names.iter().map(ToString::to_string).collect());
     }
     if order.is_empty() {

@@ -2,7 +2,8 @@
 
 use fmu_import::quantity::rounded;
 
-/// Communication points `start + k · step`, never accumulated; the last one is `stop` itself.
+/// A clock with the communication points `start + k · step`, which are never accumulated; the last
+/// one is `stop` itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
     start: f64,
@@ -12,10 +13,10 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// From `start` to `stop` in steps of `step`, all s.
+    /// Creates a clock from `start` to `stop` with steps of `step`, all in s.
     ///
     /// # Errors
-    /// If `stop` is not a whole, positive number of steps after `start`.
+    /// Returns an error if `stop` is not a whole, positive number of steps after `start`.
     pub fn new(start: f64, stop: f64, step: f64) -> Result<Self, String> {
         if !(step > 0.0 && step.is_finite() && start.is_finite() && stop.is_finite()) {
             return Err(format!(
@@ -30,7 +31,8 @@ impl Clock {
             ));
         }
         if (exact - ticks).abs() > 1e-9 * ticks.max(1.0) {
-            // Ten digits after the point tell it from a whole number, and hide the rounding.
+            // Ten digits after the point tell the number apart from a whole one, and hide the
+            // rounding.
             let shown = format!("{exact:.10}");
             let shown = shown.trim_end_matches('0');
             let (below, above) =
@@ -43,27 +45,27 @@ impl Clock {
         Ok(Self { start, step, stop, ticks: ticks as u64 })
     }
 
-    /// Number of steps from start to stop.
+    /// Returns the number of steps from start to stop.
     pub fn ticks(&self) -> u64 {
         self.ticks
     }
 
-    /// Time at a tick, s.
+    /// Returns the time at a tick, s.
     pub fn time(&self, tick: u64) -> f64 {
         if tick == self.ticks { self.stop } else { self.start + tick as f64 * self.step }
     }
 
-    /// Length of one communication step, s.
+    /// Returns the length of one communication step, s.
     pub fn step(&self) -> f64 {
         self.step
     }
 
-    /// Start time of the simulation, s.
+    /// Returns the start time of the simulation, s.
     pub fn start(&self) -> f64 {
         self.start
     }
 
-    /// Stop time of the simulation, s.
+    /// Returns the stop time of the simulation, s.
     pub fn stop(&self) -> f64 {
         self.stop
     }
@@ -79,7 +81,8 @@ mod tests {
         assert_eq!(clock.ticks(), 1_000_000);
         assert_eq!(clock.time(1_000_000), 40_000.0);
         for tick in [1_u64, 3, 333_333, 999_999] {
-            // The nearest double of the exact rational number tick/25, to the last bit or its neighbour.
+            // The time is the double nearest to the exact rational number tick/25, or a neighbour
+            // of it.
             let exact = tick as f64 / 25.0;
             assert!((clock.time(tick) - exact).abs() <= exact * f64::EPSILON);
         }

@@ -1,11 +1,11 @@
 //! Effective delay of each feedback loop, derived from the connections, the coupling and the
 //! dependencies that the FMUs declare for their outputs.
+//!
 //! An output that depends on its unit's inputs at the same instant is *direct*. If such an output
 //! is read before its unit's inputs are set (always with Jacobi coupling; with Gauss–Seidel if the
 //! unit comes later in the order), the reader gets the value of the previous communication point,
 //! which delays it by one of its steps. An output that depends on states alone is never late. A
 //! loop in which every output is direct is algebraic: no order of calls solves it.
-//! which every output is direct is algebraic: no order of calls solves it.
 
 use crate::experiment::Coupling;
 use crate::settings::{Setting, SettingValue};
@@ -26,7 +26,7 @@ pub struct FeedbackLoop {
     pub undeclared: Vec<usize>,
 }
 
-/// How an output depends on an input of its unit.
+/// Way in which an output depends on an input of its unit.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Passage {
     /// The output depends on the input through states only.
@@ -91,11 +91,15 @@ fn measure(
     let mut undeclared = Vec::new();
     for (place, &component) in components.iter().enumerate() {
         let (before, after) = (components[(place + n - 1) % n], components[(place + 1) % n]);
-        let entering = wires.iter().filter(|w| w.from.component == before && w.to.component == component);
-        let leaving = wires.iter().filter(|w| w.from.component == component && w.to.component == after);
+        let entering =
+            wires.iter().filter(|w| w.from.component == before && w.to.component == component);
+        let leaving =
+            wires.iter().filter(|w| w.from.component == component && w.to.component == after);
         let passages: Vec<Passage> = entering
             .flat_map(|i| {
-                leaving.clone().map(move |o| passage(parts, component, i.to.variable, o.from.variable))
+                leaving
+                    .clone()
+                    .map(move |o| passage(parts, component, i.to.variable, o.from.variable))
             })
             .collect();
         let read_too_early = match coupling {
@@ -112,16 +116,16 @@ fn measure(
     FeedbackLoop { components: components.to_vec(), ticks, undeclared }
 }
 
-/// An order of the components in which Gauss–Seidel coupling has no delay, as far as there is one:
-/// a component whose outputs depend on its inputs at the same instant comes before those that read
+/// Finds an order of the components in which Gauss–Seidel coupling has no delay, if there is one: a
+/// component whose outputs depend on its inputs at the same instant comes before those that read
 /// them. Otherwise the order of `parts` is kept.
 pub fn order(parts: &[Part], wires: &[Wire]) -> Vec<usize> {
     let is_direct = |wire: &Wire| {
         let component = wire.from.component;
         let inputs = wires.iter().filter(|w| w.to.component == component);
-        inputs
-            .into_iter()
-            .any(|w| passage(parts, component, w.to.variable, wire.from.variable) != Passage::Delayed)
+        inputs.into_iter().any(|w| {
+            passage(parts, component, w.to.variable, wire.from.variable) != Passage::Delayed
+        })
     };
     let direct: Vec<&Wire> = wires.iter().filter(|wire| is_direct(wire)).collect();
     let mut left: Vec<usize> = (0..parts.len()).collect();
@@ -129,7 +133,9 @@ pub fn order(parts: &[Part], wires: &[Wire]) -> Vec<usize> {
     while !left.is_empty() {
         let waits = |index: usize| {
             direct.iter().any(|w| {
-                w.to.component == index && w.from.component != index && left.contains(&w.from.component)
+                w.to.component == index
+                    && w.from.component != index
+                    && left.contains(&w.from.component)
             })
         };
         let place = left.iter().position(|&index| !waits(index)).unwrap_or(0);
@@ -196,18 +202,28 @@ const TRANSPORT: &str = "actuation.delay";
 /// Returns one warning for each component whose law is designed for another delay than its feedback
 /// loop has. The loop's delay is its ticks times `step` (s), plus the transport delays of the other
 /// components on it. If there are several loops, the one with the longest delay counts.
-pub fn warnings(parts: &[Part], settings: &[Vec<Setting>], loops: &[FeedbackLoop], step: f64) -> Vec<String> {
+pub fn warnings(
+    parts: &[Part],
+    settings: &[Vec<Setting>],
+    loops: &[FeedbackLoop],
+    step: f64,
+) -> Vec<String> {
     let mut warnings = Vec::new();
     for (component, part) in parts.iter().enumerate() {
-        let Some(counted_on) = duration(COUNTED_ON, parts[component], &settings[component]) else { continue };
+        let Some(counted_on) = duration(COUNTED_ON, parts[component], &settings[component]) else {
+            continue;
+        };
         let own = loops.iter().filter(|feedback| feedback.components.contains(&component));
         let delays = own.map(|feedback| {
             let others = feedback.components.iter().filter(|other| **other != component);
-            let transport: f64 =
-                others.filter_map(|&other| duration(TRANSPORT, parts[other], &settings[other])).sum();
+            let transport: f64 = others
+                .filter_map(|&other| duration(TRANSPORT, parts[other], &settings[other]))
+                .sum();
             (feedback.ticks as f64 * step + transport, feedback)
         });
-        let Some((delay, longest)) = delays.max_by(|(a, _), (b, _)| a.total_cmp(b)) else { continue };
+        let Some((delay, longest)) = delays.max_by(|(a, _), (b, _)| a.total_cmp(b)) else {
+            continue;
+        };
         if (delay - counted_on).abs() <= 1e-9 * delay.abs().max(counted_on.abs()) {
             continue;
         }
@@ -226,8 +242,8 @@ pub fn warnings(parts: &[Part], settings: &[Vec<Setting>], loops: &[FeedbackLoop
     warnings
 }
 
-/// Value of a real parameter in s, from the experiment or otherwise its start value; `None` if
-/// there is no such parameter.
+/// Returns the value of a real parameter in s, from the experiment or otherwise its start value;
+/// `None` if there is no such parameter.
 fn duration(name: &str, part: Part, settings: &[Setting]) -> Option<f64> {
     let (_, variable) = part.description.find(name)?;
     let is_duration = matches!(&variable.kind, Kind::Real { unit: Some(unit), .. } if unit == "s");

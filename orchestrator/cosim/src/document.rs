@@ -1,12 +1,14 @@
-//! A TOML file together with the files that it extends, read as one table in which every place still knows its file and line.
+//! A TOML file together with the files that it extends, read as one table. Every place in this
+//! table still refers to its own file and line.
 //!
 //! ```toml
-//! extends = "base.toml"               # beside this file; or several, of which a later one has precedence: ["a.toml", "b.toml"]
+//! extends = "base.toml"               # a file beside this one, or ["a.toml", "b.toml"]
 //! unset = ["controller.gain.p"]       # parameters that a base sets, left at the unit's own value
 //! ```
 //!
-//! Tables are merged key by key; a list or a single value replaces that of the base. A base may extend others in its turn. A file
-//! that is extended in several ways counts once, where it is named first.
+//! Of several extended files, a later one has precedence. Tables are merged key by key; a list or a
+//! single value replaces that of the base. A base may extend other files in turn. A file that is
+//! extended in several ways counts once, where it is named first.
 
 use crate::error::Error;
 use fmu_import::names;
@@ -17,33 +19,35 @@ use std::{fs, iter};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
-/// A TOML file with the files that it extends.
+/// A TOML file together with the files that it extends.
 ///
-/// A place in it is a range of bytes: in the file itself, or behind that in the texts of the others, one after the other.
+/// A place in the document is a range of bytes. It lies in the text of the file itself, or behind
+/// that in the texts of the other files, one after the other.
 #[derive(Clone, Debug, Default)]
 pub struct Source {
     /// Path of the file.
     pub path: PathBuf,
     /// Text of the file itself.
     pub text: String,
-    /// The files that it extends with their texts, the one that has precedence first.
+    /// Files that are extended, with their texts; the first one has precedence.
     bases: Vec<(PathBuf, String)>,
-    /// The text of all of them merged, if there are any.
+    /// Text of all files merged, if the file extends others.
     merged: Option<String>,
 }
 
 impl Source {
-    /// Reads a file and all that it extends.
+    /// Reads a file and all files that it extends.
     ///
     /// # Errors
-    /// If one of them cannot be read or is no TOML, or if they extend each other in a circle.
+    /// Returns an error if a file cannot be read or is not TOML, or if files extend each other in a
+    /// circle.
     pub fn load(path: &Path) -> Result<Self, Error> {
         let text = fs::read_to_string(path)
             .map_err(|error| Error::experiment(format!("{}: {error}", path.display())))?;
         Self::new(path, text)
     }
 
-    /// Reads a file whose text is known already, and all that it extends.
+    /// Reads a file whose text is already known, and all files that it extends.
     ///
     /// # Errors
     /// The errors are those of [`Self::load`].
@@ -60,20 +64,23 @@ impl Source {
         Ok(source)
     }
 
-    /// A text that is no file and extends nothing; `path` is for messages.
+    /// Creates a document from a text that is not read from a file and extends nothing. The `path`
+    /// is for messages.
     pub fn plain(path: &Path, text: String) -> Self {
         Self { path: path.to_path_buf(), text, ..Self::default() }
     }
 
-    /// The whole as one text: that of the file or, if it extends others, of all of them merged, without comments.
+    /// Returns the whole document as one text: that of the file itself or, if it extends others,
+    /// that of all files merged, without comments.
     pub fn whole(&self) -> &str {
         self.merged.as_deref().unwrap_or(&self.text)
     }
 
-    /// The folders of the file and of those that it extends.
+    /// Returns the folders of the file and of the files that it extends.
     pub fn folders(&self) -> impl Iterator<Item = &Path> {
-        self.files()
-            .map(|(path, _)| path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")))
+        self.files().map(|(path, _)| {
+            path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+        })
     }
 
     fn files(&self) -> impl Iterator<Item = (&Path, &str)> {
@@ -81,7 +88,7 @@ impl Source {
         iter::once((self.path.as_path(), self.text.as_str())).chain(bases)
     }
 
-    /// An error at a place; `0..0` is no place, only the file.
+    /// Creates an error at a place. The place `0..0` stands for the file as a whole.
     pub fn error(&self, span: &Range<usize>, message: impl Into<String>) -> Error {
         let mut at = format!("{}: ", self.path.display());
         let mut start = 0;
@@ -94,15 +101,15 @@ impl Source {
         Error::Experiment { at, message: message.into() }
     }
 
-    /// A file beside this one.
+    /// Returns the path of a file beside this one.
     pub fn beside(&self, file: &Path) -> PathBuf {
         self.path.parent().unwrap_or_else(|| Path::new(".")).join(file)
     }
 
-    /// Refuses a name that is not among `there`; `what` they are.
+    /// Checks that all names are among `there`. The message calls such a name a `what`.
     ///
     /// # Errors
-    /// The first name that is not.
+    /// Returns an error that names the first unknown name.
     pub fn known<'a>(
         &self,
         names: impl IntoIterator<Item = &'a Spanned<String>>,
@@ -113,7 +120,10 @@ impl Source {
             None => Ok(()),
             Some(name) => {
                 let hint = names::hint(name.get_ref(), there);
-                Err(self.error(&name.span(), format!("there is no {what} \"{}\"{hint}", name.get_ref())))
+                Err(self.error(
+                    &name.span(),
+                    format!("there is no {what} \"{}\"{hint}", name.get_ref()),
+                ))
             }
         }
     }
@@ -121,17 +131,21 @@ impl Source {
     /// Reads the whole document as a `T`.
     ///
     /// # Errors
-    /// If it is no TOML, or holds an unknown key.
+    /// Returns an error if the document is not TOML, or holds an unknown key.
     pub fn read<T: DeserializeOwned>(&self) -> Result<T, Error> {
         self.read_with(|table| self.take(table))
     }
 
-    /// Reads the whole, of which `take` makes a value.
+    /// Reads the whole document and converts its table with `take`.
     ///
     /// # Errors
-    /// If it is no TOML; what `take` finds.
-    pub fn read_with<T>(&self, take: impl FnOnce(Spanned<DeTable>) -> Result<T, Error>) -> Result<T, Error> {
-        // A text that is set in by the length of those before it has its places behind theirs.
+    /// Returns an error if the document is not TOML, or if `take` fails.
+    pub fn read_with<T>(
+        &self,
+        take: impl FnOnce(Spanned<DeTable>) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        // Each text is indented by the length of the texts before it, so that its places lie behind
+        // theirs.
         let mut start = 0;
         let texts: Vec<String> = self
             .files()
@@ -157,10 +171,11 @@ impl Source {
         take(whole.unwrap_or_else(|| Spanned::new(0..0, DeTable::new())))
     }
 
-    /// Reads a table of this document.
+    /// Converts a table of this document to a `T`.
     ///
     /// # Errors
-    /// If it holds an unknown key or a value of the wrong type, or lacks one.
+    /// Returns an error if the table holds an unknown key or a value of the wrong type, or if a
+    /// value is missing.
     pub fn take<T: DeserializeOwned>(&self, table: Spanned<DeTable>) -> Result<T, Error> {
         T::deserialize(Deserializer::from(table)).map_err(|error| self.refusal(&error))
     }
@@ -170,7 +185,7 @@ impl Source {
         self.error(&error.span().map_or(0..0, |s| s.start..s.end.max(s.start + 1)), message)
     }
 
-    /// Takes out the parameters that `unset` names.
+    /// Removes the parameters that `unset` names from the table.
     fn unset(&self, table: &mut DeTable, unset: Option<Spanned<DeValue>>) -> Result<(), Error> {
         let Some(unset) = unset else { return Ok(()) };
         for (target, place) in texts(&unset).map_err(|place| {
@@ -193,18 +208,22 @@ impl Source {
                 .collect();
             if parameters.and_then(|table| table.remove(parameter)).is_none() {
                 let hint = names::hint(parameter, known.iter().map(String::as_str));
-                return Err(refuse(format!("what this file extends does not set \"{target}\"{hint}")));
+                return Err(refuse(format!(
+                    "what this file extends does not set \"{target}\"{hint}"
+                )));
             }
         }
         Ok(())
     }
 }
 
-/// A text or a list of texts, each with its place.
+/// Reads a text or a list of texts, each with its place.
 ///
 /// # Errors
-/// The place of what is something else.
-pub fn texts<'a>(value: &'a Spanned<DeValue>) -> Result<Vec<(&'a str, Range<usize>)>, Range<usize>> {
+/// The error is the place of an item that is not a text.
+pub fn texts<'a>(
+    value: &'a Spanned<DeValue>,
+) -> Result<Vec<(&'a str, Range<usize>)>, Range<usize>> {
     let items = match value.get_ref() {
         DeValue::Array(items) => &items[..],
         _ => std::slice::from_ref(value),
@@ -215,7 +234,7 @@ pub fn texts<'a>(value: &'a Spanned<DeValue>) -> Result<Vec<(&'a str, Range<usiz
         .collect()
 }
 
-/// Adds what is in `below` and not in `table`, table by table.
+/// Adds everything from `below` that is missing in `table`, table by table.
 pub fn overlay<'i>(table: &mut DeTable<'i>, below: &DeTable<'i>) {
     for (key, value) in below {
         match (table.get_mut(key.get_ref().as_ref()).map(Spanned::get_mut), value.get_ref()) {
@@ -226,7 +245,8 @@ pub fn overlay<'i>(table: &mut DeTable<'i>, below: &DeTable<'i>) {
     }
 }
 
-/// Adds the files that this one extends, and then this one, to `files`; `chain` are those that led here.
+/// Adds the files that this one extends, and then this one, to `files`. The `chain` holds the files
+/// that led here.
 fn collect(
     path: &Path,
     text: String,
@@ -236,11 +256,15 @@ fn collect(
     let source = Source::plain(path, text);
     let table = DeTable::parse(&source.text).map_err(|error| source.refusal(&error))?;
     let bases = table.get_ref().get("extends").map_or(Ok(Vec::new()), texts).map_err(|place| {
-        source.error(&place, "extends: wants the name of a file or a list of such, for example \"base.toml\"")
+        source.error(
+            &place,
+            "extends: wants the name of a file or a list of such, for example \"base.toml\"",
+        )
     })?;
     chain.push(identity(path));
     for (name, place) in bases {
-        let refuse = |message: String| source.error(&place, format!("extends = \"{name}\": {message}"));
+        let refuse =
+            |message: String| source.error(&place, format!("extends = \"{name}\": {message}"));
         let base = path.parent().unwrap_or(Path::new("")).join(name);
         let own = identity(&base);
         if chain.contains(&own) {
@@ -249,8 +273,8 @@ fn collect(
         if files.iter().any(|(known, _)| identity(known) == own) {
             continue;
         }
-        let text =
-            fs::read_to_string(&base).map_err(|error| refuse(format!("{}: {error}", base.display())))?;
+        let text = fs::read_to_string(&base)
+            .map_err(|error| refuse(format!("{}: {error}", base.display())))?;
         collect(&base, text, chain, files)?;
     }
     chain.pop();

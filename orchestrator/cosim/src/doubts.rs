@@ -13,20 +13,22 @@ use tracing::subscriber::{NoSubscriber, with_default};
 /// Finds what is doubtful about a system, one line for each.
 ///
 /// # Errors
-/// If the run was asked to end.
+/// Returns an error if the run was asked to end.
 pub fn doubts(system: &System, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
-    let mut doubts = delay::warnings(&system.parts(), &system.settings, &system.loops, system.clock.step());
+    let mut doubts =
+        delay::warnings(&system.parts(), &system.settings, &system.loops, system.clock.step());
     for seed in without_effect(system, interrupt)? {
         doubts.push(format!("--set {seed}: changes nothing, another seed comes to the same"));
     }
     Ok(doubts)
 }
 
-/// The seeds from the command line that change nothing, as that of a disturbance that is constant: `component.parameter`. Two runs with
-/// different seeds are compared tick by tick until they differ, which is soon where the seed is of any effect.
+/// Finds the seeds, as `component.parameter`, that the command line sets and that change nothing,
+/// for example the seed of a constant disturbance. Two runs with different seeds are compared tick
+/// by tick until they differ, which is soon if the seed has an effect.
 ///
 /// # Errors
-/// If the comparison was ended from outside.
+/// Returns an error if the comparison was ended from outside.
 fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
     let mut idle = Vec::new();
     for (component, settings) in system.settings.iter().enumerate() {
@@ -37,8 +39,9 @@ fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>,
                 continue;
             }
             let mut other = system.settings.clone();
-            other[component][index].value = SettingValue::Integer(if seed > 0 { seed - 1 } else { seed + 1 });
-            // What the units say comes again in the run itself.
+            other[component][index].value =
+                SettingValue::Integer(if seed > 0 { seed - 1 } else { seed + 1 });
+            // Messages of the units are hidden here, because they appear again in the run itself.
             let same = with_default(NoSubscriber::default(), || {
                 let _warnings = warnings::collect();
                 are_same(system, &other, interrupt)
@@ -46,7 +49,7 @@ fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>,
             match same {
                 Ok(true) => idle.push(path),
                 Err(error @ Error::Interrupted { .. }) => return Err(error),
-                // So does a failure.
+                // A run that fails is taken as one that differs.
                 Ok(false) | Err(_) => {}
             }
         }
@@ -54,8 +57,13 @@ fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>,
     Ok(idle)
 }
 
-/// Whether all that is looked at but computing times stays the same with `others` as settings.
-fn are_same(system: &System, others: &[Vec<Setting>], interrupt: &Interrupt) -> Result<bool, Error> {
+/// Returns whether all observed values except computing times stay the same if the settings are
+/// replaced by `others`.
+fn are_same(
+    system: &System,
+    others: &[Vec<Setting>],
+    interrupt: &Interrupt,
+) -> Result<bool, Error> {
     let timings = system.timings();
     let bits = |values: &[f64]| {
         let mut bits: Vec<u64> = values.iter().map(|value| value.to_bits()).collect();

@@ -1,4 +1,5 @@
-//! Errors of checking and running an experiment. A message names the culprit and what to do about it.
+//! Errors of checking and running an experiment. A message names the culprit and what to do about
+//! it.
 
 use crate::interrupt::Request;
 use fmu_import::error::Error as Import;
@@ -6,13 +7,13 @@ use fmu_import::quantity::rounded;
 use fmu_import::unit::UnitFailure;
 use std::path::PathBuf;
 
-/// What can go wrong from reading an experiment to writing its results.
+/// An error that occurs between reading an experiment and writing its results.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The experiment or the command line asks for something that cannot be done.
     #[error("{at}{message}")]
     Experiment {
-        /// File and line, `lqr.toml:12: `, or empty where there is none.
+        /// File and line, such as `lqr.toml:12: `, or an empty text if there is none.
         at: String,
         /// Description of the problem and its remedy.
         message: String,
@@ -30,17 +31,17 @@ pub enum Error {
         /// The call that failed, with the unit's own message.
         failure: UnitFailure,
     },
-    /// A unit ended the simulation, which FMI lets it do.
+    /// A unit ended the simulation, which FMI allows.
     #[error("{component} ended the simulation at t = {} s: {message}", rounded(*time))]
     EndedByUnit {
         /// Name of the component in the experiment.
         component: String,
-        /// The last communication point, s.
+        /// Time of the last communication point, s.
         time: f64,
         /// Message of the unit, in its own words.
         message: String,
     },
-    /// A deadline was missed in a run that was to end then.
+    /// A deadline was missed in a run that was to end in this case.
     #[error(
         "{component} missed its deadline at t = {} s by {late_ms:.3} ms, which was to end the run (--on-miss stop)",
         rounded(*time)
@@ -53,20 +54,20 @@ pub enum Error {
         /// Time from the deadline until the values were ready, ms.
         late_ms: f64,
     },
-    /// Signals left the bounds beyond which the experiment gives a run up.
+    /// Signals exceeded the bound beyond which the experiment counts a run as lost.
     #[error("{what} lost at t = {} s: {reason}", rounded(*time))]
     Lost {
-        /// What was lost.
+        /// Name of what was lost.
         what: String,
-        /// First communication point at which it was lost, s.
+        /// Time of the first communication point at which it was lost, s.
         time: f64,
-        /// The bound that was left.
+        /// Description of the bound that was exceeded.
         reason: String,
     },
     /// A run was asked to end before its stop time.
     #[error("ended by {request} before t = {} s", rounded(*time))]
     Interrupted {
-        /// The first communication point that was not reached, s.
+        /// Time of the first communication point that was not reached, s.
         time: f64,
         /// The request that ended the run.
         request: Request,
@@ -96,8 +97,9 @@ impl Error {
         move |source| Self::File { path, source }
     }
 
-    /// The exit code of a process that ends with this error: 1 for a run that failed, 2 for bad usage or a bad experiment,
-    /// 3 for a run that was lost, 130 or 143 for one that a signal ended.
+    /// Returns the exit code of a process that ends with this error: 0 for a run that a unit or the
+    /// user ended, 1 for a run that failed, 2 for bad usage or a bad experiment, 3 for a run that
+    /// was lost, and 130 or 143 for a run that a signal ended.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Experiment { .. } | Self::Import(Import::Fmu { .. }) => 2,

@@ -1,15 +1,17 @@
-//! A request from outside to end what goes on: the results are kept, and what is temporary goes.
+//! Requests from outside to end the work. The results so far are kept, and temporary files are
+//! removed.
 
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Shared by whoever asks and by whoever is to end: the master looks at every communication point.
+/// A flag that is shared by those who request an end and by the work that is to end. The master
+/// checks it at every communication point.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
     /// Number of the signal that arrived, or 0.
     signal: Arc<AtomicUsize>,
-    /// Whether one has come, for the second one.
+    /// Whether a signal has arrived already, so that a second one ends the process at once.
     again: Arc<AtomicBool>,
     quit: Arc<AtomicBool>,
 }
@@ -17,9 +19,9 @@ pub struct Interrupt {
 /// Origin of a request to end the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// The user, by a key of the live view.
+    /// The user pressed a key of the live view.
     Quit,
-    /// The system, by the signal with this number.
+    /// The system sent the signal with this number.
     Signal(i32),
 }
 
@@ -27,7 +29,8 @@ impl Request {
     /// Request that Ctrl-C makes, which is the signal SIGINT.
     pub const INTERRUPT: Self = Self::Signal(signal_hook::consts::SIGINT);
 
-    /// The exit code of a process that was ended so: 128 and the signal's number, as shells count.
+    /// Returns the exit code of a process that this request ended: 128 plus the signal's number, as
+    /// shells count, or 0 for the user.
     pub fn exit_code(self) -> u8 {
         match self {
             Self::Quit => 0,
@@ -48,13 +51,17 @@ impl std::fmt::Display for Request {
 }
 
 impl Interrupt {
-    /// From now on SIGINT and SIGTERM are requests; the second one ends the process.
+    /// Treats SIGINT and SIGTERM as requests from now on. A second signal ends the process at once.
     ///
     /// # Errors
-    /// If the system does not let itself be told so.
+    /// Returns an error if the system does not accept the signal handlers.
     pub fn listen(&self) -> io::Result<()> {
         for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-            signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&self.again))?;
+            signal_hook::flag::register_conditional_shutdown(
+                signal,
+                128 + signal,
+                Arc::clone(&self.again),
+            )?;
             signal_hook::flag::register(signal, Arc::clone(&self.again))?;
             let number = usize::try_from(signal).unwrap_or_default();
             signal_hook::flag::register_usize(signal, Arc::clone(&self.signal), number)?;
@@ -72,7 +79,7 @@ impl Interrupt {
         }
     }
 
-    /// The request that was made, if any.
+    /// Returns the request that was made, if any.
     pub fn asked(&self) -> Option<Request> {
         match self.signal.load(Ordering::Relaxed) {
             0 => self.quit.load(Ordering::Relaxed).then_some(Request::Quit),

@@ -48,7 +48,7 @@ pub trait Observer {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error>;
 }
 
-/// The units with their connections, ready to run.
+/// The units with their connections, which are ready to run.
 pub struct Master {
     clock: Clock,
     coupling: Coupling,
@@ -86,12 +86,13 @@ impl Master {
     pub fn pace(&mut self, settings: Settings, timer: Rc<dyn Timer>) -> &Pacer {
         self.measure(&timer);
         let spent = self.members.iter().zip(&self.spent);
-        let components = spent.map(|(member, spent)| (member.name.clone(), member.every, Rc::clone(spent)));
+        let components =
+            spent.map(|(member, spent)| (member.name.clone(), member.every, Rc::clone(spent)));
         let pacer = Pacer::new(settings, self.clock, timer, self.interrupt.clone(), components);
         self.pacer.insert(pacer)
     }
 
-    /// Takes out the pacer that kept the run in step; `None` if the run was not paced.
+    /// Removes the pacer that kept the run in step and returns it; `None` if the run was not paced.
     pub fn take_pacer(&mut self) -> Option<Pacer> {
         self.pacer.take()
     }
@@ -112,7 +113,8 @@ impl Master {
             .unzip();
     }
 
-    /// Mean wall-clock time (s) that each unit took per step, by name; empty if it is not measured.
+    /// Returns the mean wall-clock time that each unit took per step, s, by name. There are no
+    /// entries if it was not measured.
     pub fn step_seconds(&self) -> impl Iterator<Item = (&str, f64)> {
         let spent = self.members.iter().zip(&self.spent);
         spent.filter_map(|(member, spent)| Some((member.name.as_str(), spent.seconds_per_step()?)))
@@ -122,7 +124,7 @@ impl Master {
     /// order.
     ///
     /// # Errors
-    /// If a call of a unit fails.
+    /// Returns an error if a call of a unit fails.
     pub fn initialize(&mut self) -> Result<(), Error> {
         let start = self.clock.start();
         for index in 0..self.members.len() {
@@ -144,7 +146,7 @@ impl Master {
     /// Reads variables of a unit once, for example parameters after initialization.
     ///
     /// # Errors
-    /// If a call of the unit fails.
+    /// Returns an error if a call of the unit fails.
     pub fn read(&mut self, ports: &[Port]) -> Result<Vec<f64>, Error> {
         let mut probe = Probe::new(ports);
         probe.read(&mut self.members).map_err(|culprit| self.error(self.clock.start(), culprit))?;
@@ -154,8 +156,8 @@ impl Master {
     /// Runs from the start time to the stop time.
     ///
     /// # Errors
-    /// If a unit or an observer fails, if a missed deadline is to end the run, or if the run was
-    /// asked to end. The observers have seen all communication points up to then.
+    /// Returns an error if a unit or an observer fails, if a missed deadline is to end the run, or
+    /// if the run was asked to end. The observers have seen all communication points up to then.
     pub fn run(&mut self, observers: &mut [&mut dyn Observer]) -> Result<(), Error> {
         let outcome = self.pass_through(observers);
         if let Some(pacer) = &mut self.pacer {
@@ -172,7 +174,8 @@ impl Master {
             self.advance(tick)?;
             let time = self.clock.time(tick);
             let deadlines = self.pacer.as_mut().map_or(Ok(()), |pacer| pacer.check(tick));
-            let sample = Sample { tick, time, last: tick == self.clock.ticks(), values: &self.probe.values };
+            let sample =
+                Sample { tick, time, last: tick == self.clock.ticks(), values: &self.probe.values };
             for observer in observers.iter_mut() {
                 observer.observe(&sample)?;
             }
@@ -189,7 +192,7 @@ impl Master {
     /// Returns the probed values at this tick, in the order in which the probes were requested.
     ///
     /// # Errors
-    /// If a unit fails, or if the run was ended from outside.
+    /// Returns an error if a unit fails, or if the run was ended from outside.
     pub fn advance(&mut self, tick: u64) -> Result<&[f64], Error> {
         let time = self.clock.time(tick);
         warnings::at(time);
@@ -235,7 +238,9 @@ impl Master {
                         self.inputs[index].gather(&mut self.members)?;
                     }
                 }
-                for (index, (member, inputs)) in self.members.iter_mut().zip(&self.inputs).enumerate() {
+                for (index, (member, inputs)) in
+                    self.members.iter_mut().zip(&self.inputs).enumerate()
+                {
                     if due(member) {
                         inputs.scatter(member.unit.as_mut()).map_err(|failure| (index, failure))?;
                     }

@@ -1,4 +1,5 @@
-//! `results.json`: everything that is needed to know, years later, what `results.csv` came from.
+//! Content of `results.json`: everything that is needed to know, years later, how `results.csv` was
+//! made.
 
 use crate::error::Error;
 use crate::pacing;
@@ -9,7 +10,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// The content of the file. `failure` is why the run ended early, if it did.
+/// Returns the content of `results.json`. If the run ended early, `failure` is the reason.
 pub fn metadata(
     system: &System,
     parameters: &Parameters,
@@ -43,11 +44,16 @@ pub fn metadata(
         .columns
         .iter()
         .map(|column| {
-            let variable = &parts[column.port.component].description.variables[column.port.variable];
-            let unit = if let Kind::Real { unit, .. } = &variable.kind { unit.clone() } else { None };
+            let variable =
+                &parts[column.port.component].description.variables[column.port.variable];
+            let unit =
+                if let Kind::Real { unit, .. } = &variable.kind { unit.clone() } else { None };
             let items = match &variable.kind {
                 Kind::Enumeration { items } => Some(
-                    items.iter().map(|(name, item)| (item.to_string(), name)).collect::<BTreeMap<_, _>>(),
+                    items
+                        .iter()
+                        .map(|(name, item)| (item.to_string(), name))
+                        .collect::<BTreeMap<_, _>>(),
                 ),
                 _ => None,
             };
@@ -93,8 +99,7 @@ pub fn metadata(
     })
 }
 
-/// Whether a parameter is the seed of random numbers: by its name, which FMI leaves as the only
-/// sign.
+/// Returns whether a parameter is a seed. Its name decides, because FMI offers no other sign.
 pub(crate) fn is_seed(name: &str) -> bool {
     name.rsplit('.').next() == Some("seed")
 }
@@ -102,9 +107,9 @@ pub(crate) fn is_seed(name: &str) -> bool {
 fn status(failure: Option<&Error>) -> String {
     match failure {
         None => "completed".into(),
-        Some(error @ (Error::Interrupted { .. } | Error::EndedByUnit { .. } | Error::Lost { .. })) => {
-            error.to_string()
-        }
+        Some(
+            error @ (Error::Interrupted { .. } | Error::EndedByUnit { .. } | Error::Lost { .. }),
+        ) => error.to_string(),
         Some(error) => format!("failed: {error}"),
     }
 }

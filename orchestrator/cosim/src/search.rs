@@ -1,4 +1,5 @@
-//! Where experiments, studies and units are found from any folder: here, by an environment variable, and beside this program.
+//! Folders in which experiments, studies and units are found from any folder: those of the project,
+//! those of an environment variable, and those beside this program.
 
 use crate::error::Error;
 use fmu_import::names;
@@ -8,10 +9,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
-/// The environment variable with further folders, separated as those of PATH are.
+/// Environment variable that names further folders, separated as in PATH.
 pub const VARIABLE: &str = "ORCHESTRATOR_PATH";
 
-/// Where the project keeps its experiments.
+/// Folder in which the project keeps its experiments.
 const EXPERIMENTS: &str = "orchestrator/experiments";
 
 fn by_variable() -> Vec<PathBuf> {
@@ -24,7 +25,7 @@ fn beside_program(places: &[&str]) -> Vec<PathBuf> {
     folder.into_iter().flat_map(|folder| places.iter().map(|place| folder.join(place))).collect()
 }
 
-/// The folders that are there, each once, without roundabout ways.
+/// Keeps the folders that exist, each once, with absolute paths made canonical.
 fn there(folders: Vec<PathBuf>) -> Vec<PathBuf> {
     let mut known = BTreeSet::new();
     let is_new = |folder: &PathBuf| fs::canonicalize(folder).is_ok_and(|path| known.insert(path));
@@ -50,30 +51,35 @@ pub fn units() -> Vec<PathBuf> {
     there(folders)
 }
 
-/// Files with this extension below a folder. Hidden folders and build folders are passed over.
+/// Lists the files with this extension below a folder. Hidden folders and build folders are
+/// skipped.
 pub fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     WalkDir::new(folder)
         .sort_by_file_name()
         .into_iter()
-        .filter_entry(|entry| entry.depth() == 0 || !is_passed_over(&entry.file_name().to_string_lossy()))
+        .filter_entry(|entry| {
+            entry.depth() == 0 || !is_passed_over(&entry.file_name().to_string_lossy())
+        })
         .flatten()
         .map(walkdir::DirEntry::into_path)
         .filter(|path| path.is_file() && path.extension().is_some_and(|e| e == extension))
         .collect()
 }
 
-/// Hidden folders and build folders are large and hold nothing to be run, but for `target/fmu`, which is asked for by name.
+/// Returns whether a folder or file is skipped. Hidden folders and build folders are large and hold
+/// nothing to run, except `target/fmu`, which is searched by its own name.
 fn is_passed_over(name: &str) -> bool {
     name.starts_with('.') || name == "target"
 }
 
-/// Whether the text of a TOML file is that of an experiment, with or without faults. A file without a title is there to be extended,
-/// and one of a paper is a study.
+/// Returns whether the text of a TOML file is that of an experiment, with or without faults. A file
+/// without a title only serves to be extended, and a file that names a paper is a study.
 pub fn is_experiment(text: &str) -> bool {
     let mut lines = text.lines().map(str::trim_start);
     let sets = |key: &str| {
-        let is_it =
-            |line: &str| line.strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='));
+        let is_it = |line: &str| {
+            line.strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='))
+        };
         text.lines().any(|line| is_it(line.trim_start()))
     };
     let has_components = lines.any(|line| line.starts_with("[components."));
@@ -87,10 +93,12 @@ fn experiments_below(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The experiment of this name: a file, or one that `list` shows, by its name or by the end of its path.
+/// Finds the experiment with this name: a file, or an experiment that `list` shows, by its name or
+/// the end of its path.
 ///
 /// # Errors
-/// If there is none, if there are several, or if it is something else.
+/// Returns an error if there is no such experiment, if there are several, or if the name is that of
+/// something else.
 pub fn experiment(name: &Path) -> Result<PathBuf, Error> {
     let shown = name.display();
     let extension = name.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
@@ -120,7 +128,8 @@ pub fn experiment(name: &Path) -> Result<PathBuf, Error> {
             [] => all.extend(here),
             [path] => return Ok(path.clone()),
             [..] => {
-                let paths: Vec<String> = fitting.iter().map(|path| path.display().to_string()).collect();
+                let paths: Vec<String> =
+                    fitting.iter().map(|path| path.display().to_string()).collect();
                 return Err(Error::experiment(format!(
                     "several experiments are called {shown}: {}",
                     paths.join(", ")

@@ -1,4 +1,4 @@
-//! Parameter values of an experiment, as the FMU's variables want them.
+//! Parameter values of an experiment, converted to the types and units of the FMU's variables.
 
 use crate::error::Error;
 use crate::experiment::Experiment;
@@ -36,7 +36,7 @@ pub enum SettingValue {
 }
 
 impl SettingValue {
-    /// The plain value; of an enumeration, the item's name.
+    /// Returns the plain value as JSON; for an enumeration this is the name of the item.
     pub fn to_json(&self) -> serde_json::Value {
         match self {
             Self::Real(value) => (*value).into(),
@@ -47,10 +47,11 @@ impl SettingValue {
     }
 }
 
-/// Resolves a component's settings.
+/// Resolves the settings of a component.
 ///
 /// # Errors
-/// Names that do not exist or cannot be set, values of the wrong type, out of limits, or in an unfit unit.
+/// Returns an error if a name does not exist or cannot be set, or if a value is of the wrong type,
+/// outside its limits, or in a unit that does not fit.
 pub(crate) fn resolve(
     experiment: &Experiment,
     parts: &[Part],
@@ -72,21 +73,29 @@ pub(crate) fn resolve(
             }
         };
         if component.is_exchanged && !is_assigned && part.description.find(name).is_none() {
-            tracing::warn!("{path}: {} has no such parameter, it is left out", part.description.model_name);
+            tracing::warn!(
+                "{path}: {} has no such parameter, it is left out",
+                part.description.model_name
+            );
             continue;
         }
         let (position, variable) = part.description.find(name).ok_or_else(|| {
-            let known: Vec<&str> =
-                part.description.names("parameter").chain(part.description.names("input")).collect();
+            let known: Vec<&str> = part
+                .description
+                .names("parameter")
+                .chain(part.description.names("input"))
+                .collect();
             let hint = match names::nearest(name, known.iter().copied()) {
-                // As it has to be written there.
+                // The hint names the parameter as it must be written on the command line.
                 Some(near) if is_assigned => format!("; did you mean \"{}.{near}\"?", part.name),
                 _ => names::hint(name, known.iter().copied()),
             };
             refuse(format!("there is no such parameter{hint}"))
         })?;
         match variable.causality.as_str() {
-            "input" if wires.iter().any(|w| w.to.component == index && w.to.variable == position) => {
+            "input"
+                if wires.iter().any(|w| w.to.component == index && w.to.variable == position) =>
+            {
                 return Err(refuse(
                     "is an input with a connection, so it cannot have a value of its own".into(),
                 ));
@@ -111,7 +120,9 @@ fn value(written: &Value, variable: &Variable, part: Part) -> Result<SettingValu
             let value = match written {
                 Value::Float(value) => *value,
                 Value::Integer(value) => *value as f64,
-                Value::String(text) => quantity::convert(text, unit.as_deref(), &part.description.units)?,
+                Value::String(text) => {
+                    quantity::convert(text, unit.as_deref(), &part.description.units)?
+                }
                 _ => return mismatch("a number, or text with a number and a unit"),
             };
             let unit = unit.as_deref().unwrap_or_default();
@@ -156,10 +167,10 @@ fn value(written: &Value, variable: &Variable, part: Part) -> Result<SettingValu
     }
 }
 
-/// Sets the values, all reals in one call and so on.
+/// Sets the values, with one call for all values of a type. Texts take one call each.
 ///
 /// # Errors
-/// If the unit reports a failure.
+/// Returns an error if the unit reports a failure.
 pub(crate) fn apply(settings: &[Setting], unit: &mut dyn CoSimulationUnit) -> Outcome {
     let mut reals = (Vec::new(), Vec::new());
     let mut integers = (Vec::new(), Vec::new());

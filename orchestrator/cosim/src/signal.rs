@@ -1,5 +1,5 @@
-//! What is looked at in a run: a variable, the difference of two, or the norm of several, and any of
-//! them as a multiple of another variable.
+//! Signals that are observed in a run: a variable, the difference of two, or the norm of several.
+//! Each of them may be divided by another variable.
 //!
 //! ```text
 //! plant.rate.p
@@ -13,23 +13,23 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::iter;
 
-/// A signal as it is written.
+/// A signal as an experiment or a study describes it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
 #[serde(try_from = "String", into = "String")]
 #[schemars(with = "String")]
 pub struct Signal {
     pub(crate) terms: Vec<Term<String>>,
     pub(crate) norm: bool,
-    /// The variable that the whole is divided by.
+    /// Variable that the whole signal is divided by.
     pub(crate) over: Option<String>,
 }
 
-/// `component.variable`, with what is subtracted from it.
+/// A variable, and the variable that is subtracted from it, if any.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Term<Variable> {
-    /// The variable.
+    /// Variable that the term starts from.
     pub value: Variable,
-    /// What is subtracted from it.
+    /// Variable that is subtracted.
     pub minus: Option<Variable>,
 }
 
@@ -43,13 +43,16 @@ impl TryFrom<String> for Signal {
         };
         let inside = whole.strip_prefix("norm(").and_then(|rest| rest.strip_suffix(')'));
         let term = |text: &str| match text.split_once(" - ") {
-            Some((from, minus)) => Term { value: from.trim().into(), minus: Some(minus.trim().into()) },
+            Some((from, minus)) => {
+                Term { value: from.trim().into(), minus: Some(minus.trim().into()) }
+            }
             None => Term { value: text.trim().to_string(), minus: None },
         };
         let terms: Vec<_> = inside.unwrap_or(whole).split(',').map(term).collect();
         let signal = Self { terms, norm: inside.is_some(), over };
-        let broken =
-            |path: &&str| !path.contains('.') || path.contains(|c: char| c.is_whitespace() || c == '(');
+        let broken = |path: &&str| {
+            !path.contains('.') || path.contains(|c: char| c.is_whitespace() || c == '(')
+        };
         if let Some(path) = signal.all().find(broken) {
             return Err(format!("\"{path}\" in \"{text}\" is no component.variable"));
         }
@@ -84,36 +87,36 @@ impl Signal {
         terms.chain(&self.over).map(String::as_str)
     }
 
-    /// The variables it is made of.
+    /// Returns the names of all variables in the signal.
     pub fn paths(&self) -> BTreeSet<&str> {
         self.all().collect()
     }
 }
 
-/// A signal with its variables found: places among a sample's values.
+/// A signal whose variables have been found among the values of a sample.
 #[derive(Clone, Debug)]
 pub struct Resolved {
-    /// The terms that are added, or whose norm is taken.
+    /// Terms of the signal: a single one, or those whose norm is taken.
     pub terms: Vec<Term<usize>>,
     /// Whether the norm is taken.
     pub norm: bool,
-    /// What the whole is divided by.
+    /// Index of the value that the whole signal is divided by.
     pub over: Option<usize>,
-    /// Factor from the unit of its variables to its own.
+    /// Factor from the unit of the variables to the unit of the signal.
     pub factor: f64,
-    /// The unit that [`Self::value`] is in.
+    /// Unit of [`Self::value`].
     pub unit: String,
-    /// Whether it is a single variable that is no real number.
+    /// Whether the signal is a single variable that is not a real number.
     pub is_integer: bool,
 }
 
 impl Resolved {
-    /// The variable at a place of a sample's values, as it is.
+    /// Creates a signal that is the variable at an index of a sample's values.
     pub fn variable(place: usize) -> Self {
         Self::of(Term { value: place, minus: None })
     }
 
-    /// The difference of two variables at places of a sample's values.
+    /// Creates a signal that is the difference of two variables at indices of a sample's values.
     pub fn difference(place: usize, minus: usize) -> Self {
         Self::of(Term { value: place, minus: Some(minus) })
     }
@@ -123,9 +126,10 @@ impl Resolved {
         Self { terms, norm: false, over: None, factor: 1.0, unit: String::new(), is_integer: false }
     }
 
-    /// The signal in a sample, in its unit.
+    /// Computes the value of the signal in a sample, in the signal's unit.
     pub fn value(&self, values: &[f64]) -> f64 {
-        let term = |term: &Term<usize>| values[term.value] - term.minus.map_or(0.0, |minus| values[minus]);
+        let term =
+            |term: &Term<usize>| values[term.value] - term.minus.map_or(0.0, |minus| values[minus]);
         let value = if self.norm {
             self.terms.iter().map(|t| term(t).powi(2)).sum::<f64>().sqrt()
         } else {
@@ -148,7 +152,9 @@ mod tests {
 
     #[test]
     fn what_is_no_signal_is_refused_by_name() {
-        for (text, culprit) in [("ab", "\"ab\""), ("a.b, c.d", "norm"), ("a.b - c", "\"c\""), ("", "\"\"")] {
+        for (text, culprit) in
+            [("ab", "\"ab\""), ("a.b, c.d", "norm"), ("a.b - c", "\"c\""), ("", "\"\"")]
+        {
             let message = Signal::try_from(text.to_string()).unwrap_err();
             assert!(message.contains(culprit), "{text}: {message}");
         }

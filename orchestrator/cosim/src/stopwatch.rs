@@ -1,4 +1,5 @@
-//! A unit whose calls are timed. All of them count, as a unit may do the work of a step when its outputs are asked for.
+//! A unit whose calls are timed. All calls count, because a unit may do the work of a step only
+//! when its outputs are read.
 
 use crate::pacing::timer::Timer;
 use fmu_import::unit::{CoSimulationUnit, Outcome};
@@ -15,7 +16,7 @@ pub struct Spent {
 }
 
 impl Spent {
-    /// Total time spent in the unit's calls.
+    /// Returns the total time spent in the unit's calls.
     pub fn time(&self) -> Duration {
         self.time.get()
     }
@@ -26,12 +27,12 @@ impl Spent {
         self.ended.set(end);
     }
 
-    /// Instant on the timer at which the last call ended.
+    /// Returns the instant on the timer at which the last call ended.
     pub fn ended(&self) -> Duration {
         self.ended.get()
     }
 
-    /// Mean time per step, s; `None` before the first step.
+    /// Returns the mean time per step, s; `None` before the first step.
     pub fn seconds_per_step(&self) -> Option<f64> {
         let steps = self.steps.get();
         (steps > 0).then(|| self.time.get().as_secs_f64() / f64::from(steps))

@@ -1,5 +1,5 @@
-//! An experiment that has been checked, ready to be run: observers say which signals they want to
-//! see, then the units are initialized and stepped.
+//! A checked experiment that is ready to run: observers request the signals that they want to see,
+//! and then the units are initialized and stepped.
 
 use crate::clock::Clock;
 use crate::delay::FeedbackLoop;
@@ -21,14 +21,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-/// The FMUs that have been opened, by path. Systems that share this map unpack each archive only
-/// once.
+/// Opened FMUs, by path. Systems that share this map unpack each archive only once.
 pub type Opened = BTreeMap<PathBuf, Rc<Fmu>>;
 
 /// Values of all parameters, by component and name.
 pub type Parameters = BTreeMap<String, BTreeMap<String, Value>>;
 
-/// The units of an experiment with their wiring; [`crate::check::check`] makes it.
+/// The units of an experiment with their connections, as [`crate::check::check`] creates them.
 pub struct System {
     /// The experiment that the system was made from.
     pub experiment: Experiment,
@@ -62,7 +61,7 @@ pub struct Probed {
 }
 
 impl System {
-    /// Names and model descriptions of the components.
+    /// Returns the names and model descriptions of the components.
     pub(crate) fn parts(&self) -> Vec<Part<'_>> {
         parts(&self.order, &self.fmus)
     }
@@ -78,40 +77,43 @@ impl System {
         })
     }
 
-    /// The largest delay of a feedback loop in addition to the units' own, s, if there is a loop.
+    /// Returns the largest delay of a feedback loop in addition to the units' own, s; `None` if
+    /// there is no loop.
     pub fn loop_delay(&self) -> Option<f64> {
         let ticks = self.loops.iter().map(|found| found.ticks).max()?;
         Some(ticks as f64 * self.clock.step())
     }
 
-    /// Full names of the recorded variables.
+    /// Returns the full names of the recorded variables.
     pub fn recorded(&self) -> Vec<String> {
         self.columns.iter().map(|column| column.name.clone()).collect()
     }
 
-    /// Whether there is a variable `component.variable` that is no text.
+    /// Returns whether there is a variable `component.variable` that is not a text.
     pub fn has(&self, path: &str) -> bool {
         self.find(path).is_some()
     }
 
-    /// Whether one of the variables belongs to a unit that the command line exchanged, so that it
-    /// may be missing.
+    /// Returns whether one of the variables belongs to a unit that the command line replaced, so
+    /// that it may be missing.
     pub fn is_exchanged<'a>(&self, paths: impl IntoIterator<Item = &'a str>) -> bool {
         paths.into_iter().any(|path| {
-            let component = names::split(path).and_then(|(name, _)| self.experiment.components.get(name));
+            let component =
+                names::split(path).and_then(|(name, _)| self.experiment.components.get(name));
             component.is_some_and(|component| component.is_exchanged)
         })
     }
 
-    /// Has a variable seen at every communication point.
+    /// Requests that a variable is seen at every communication point.
     ///
     /// # Errors
-    /// If there is no such variable, or if it is a text.
+    /// Returns an error if there is no such variable, or if it is a text.
     pub fn probe(&mut self, path: &str) -> Result<Probed, String> {
         let port = self.find(path).ok_or_else(|| {
             let parts = self.parts();
             let of = |part: &Part| {
-                let names = part.description.variables.iter().map(|v| format!("{}.{}", part.name, v.name));
+                let names =
+                    part.description.variables.iter().map(|v| format!("{}.{}", part.name, v.name));
                 names.collect::<Vec<_>>()
             };
             let known: Vec<String> = parts.iter().flat_map(of).collect();
@@ -126,10 +128,11 @@ impl System {
         Ok(Probed { name: path.into(), place, unit, items: self.items(port) })
     }
 
-    /// Has a signal's variables seen at every communication point.
+    /// Requests that the variables of a signal are seen at every communication point.
     ///
     /// # Errors
-    /// If a variable is not there, or if those that are added are not all in the same unit.
+    /// Returns an error if a variable does not exist, or if variables that are combined are not all
+    /// in the same unit.
     pub fn resolve(&mut self, signal: &Signal) -> Result<Resolved, String> {
         let mut shown: Option<(f64, String)> = None;
         let terms = signal.terms.iter().map(|term| {
@@ -144,11 +147,15 @@ impl System {
                 }
                 Ok(probed.place)
             };
-            Ok(Term { value: place(&term.value)?, minus: term.minus.as_deref().map(place).transpose()? })
+            Ok(Term {
+                value: place(&term.value)?,
+                minus: term.minus.as_deref().map(place).transpose()?,
+            })
         });
         let terms = terms.collect::<Result<Vec<_>, String>>()?;
         let (mut factor, mut unit) = shown.unwrap_or((1.0, String::new()));
-        let over = signal.over.as_deref().map(|path| self.probe(path)).transpose()?.map(|own| own.place);
+        let over =
+            signal.over.as_deref().map(|path| self.probe(path)).transpose()?.map(|own| own.place);
         if let Some(over) = over {
             let (own, name) = self.display(self.probes[over]);
             if name != unit {
@@ -161,7 +168,8 @@ impl System {
         Ok(Resolved { terms, norm: signal.norm, over, factor, unit, is_integer })
     }
 
-    /// Places of computing times, which differ from run to run, among a sample's values.
+    /// Returns the indices, among a sample's values, of the computing times, which differ from run
+    /// to run.
     pub(crate) fn timings(&self) -> Vec<usize> {
         let observe = &self.experiment.observe;
         let timed = observe.metrics.values().filter(|measure| measure.timing);
@@ -185,8 +193,8 @@ impl System {
         }
     }
 
-    /// Factor to the unit in which a variable wants to be shown, and that unit. Units with an
-    /// offset stay as they are.
+    /// Returns the unit in which a variable is to be displayed, with the factor to that unit. Units
+    /// with an offset stay as they are.
     fn display(&self, port: Port) -> (f64, String) {
         let Kind::Real { unit: Some(unit), display_unit, .. } = self.kind(port) else {
             return (1.0, String::new());
@@ -197,7 +205,8 @@ impl System {
             .find(|defined| defined.name == *unit)
             .and_then(|defined| {
                 let wanted = display_unit.as_deref()?;
-                let (_, factor, _) = defined.displays.iter().find(|d| d.0 == wanted && d.2 == 0.0)?;
+                let (_, factor, _) =
+                    defined.displays.iter().find(|d| d.0 == wanted && d.2 == 0.0)?;
                 Some((*factor, wanted.to_string()))
             })
             .unwrap_or((1.0, unit.clone()))
@@ -206,21 +215,25 @@ impl System {
     /// Runs the experiment from its start to its stop time.
     ///
     /// # Errors
-    /// If a unit or an observer fails, or if the run was asked to end. The observers have seen all
-    /// communication points up to then.
-    pub fn run(&self, observers: &mut [&mut dyn Observer], interrupt: &Interrupt) -> Result<(), Error> {
+    /// Returns an error if a unit or an observer fails, or if the run was asked to end. The
+    /// observers have seen all communication points up to then.
+    pub fn run(
+        &self,
+        observers: &mut [&mut dyn Observer],
+        interrupt: &Interrupt,
+    ) -> Result<(), Error> {
         self.start(interrupt)?.run(observers)
     }
 
-    /// Returns the initialized units.
+    /// Creates the units, sets their parameters, and initializes them.
     ///
     /// # Errors
-    /// If a unit cannot be instantiated or initialized.
+    /// Returns an error if a unit cannot be instantiated or initialized.
     pub fn start(&self, interrupt: &Interrupt) -> Result<Master, Error> {
         self.start_with(&self.settings, interrupt)
     }
 
-    /// Returns the units initialized with `settings` in place of the system's own.
+    /// Creates and initializes the units with `settings` in place of the system's own.
     pub(crate) fn start_with(
         &self,
         settings: &[Vec<Setting>],
@@ -250,14 +263,16 @@ impl System {
     /// Reads the values of all parameters after initialization, except those of type String.
     ///
     /// # Errors
-    /// If a unit cannot be read.
+    /// Returns an error if a unit cannot be read.
     pub fn parameters(&self, master: &mut Master) -> Result<Parameters, Error> {
         let parts = self.parts();
         let mut all = Parameters::new();
         for part in &parts {
             let mut own = BTreeMap::new();
             for name in part.description.names("parameter") {
-                let Some(port) = wiring::find(&format!("{}.{name}", part.name), &parts) else { continue };
+                let Some(port) = wiring::find(&format!("{}.{name}", part.name), &parts) else {
+                    continue;
+                };
                 let value = master.read(&[port])?[0];
                 own.insert(name.to_string(), plain_value(part.description, port, value));
             }
@@ -269,7 +284,7 @@ impl System {
     /// Creates the recorder, which writes the file of the recorded variables into a folder.
     ///
     /// # Errors
-    /// If the file cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn recorder(&self, folder: &Path, format: Format, labels: bool) -> Result<Recorder, Error> {
         let column = |column: &Column| {
             let port = column.port;

@@ -1,5 +1,5 @@
-//! Watches what a unit gives: a value that is no number, no item of its enumeration, or neither true nor false would spread through the loop and
-//! pass for a result.
+//! Watches the values that a unit gives. A value that is not finite, no item of its enumeration, or
+//! neither true nor false would otherwise spread through the loop and pass for a result.
 
 use fmu_import::description::Carrier;
 use fmu_import::description::{Kind, Variable};
@@ -11,32 +11,35 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
-/// What is done about an invalid value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum)]
+/// Action taken if a unit gives an invalid value.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnInvalid {
-    /// It ends the run.
+    /// The value ends the run with an error.
     #[default]
     Error,
-    /// It is told once for each variable.
+    /// A warning is printed once for each variable.
     Warn,
-    /// Nothing.
+    /// The value is passed on without a check.
     Allow,
 }
 
-/// A unit whose values are watched.
+/// A unit whose output values are watched.
 pub(crate) struct Watched {
     unit: Box<dyn CoSimulationUnit>,
     name: String,
-    /// Knows the names of the variables.
+    /// FMU of the unit, which knows the names of the variables.
     fmu: Rc<Fmu>,
-    /// References of the enumerations, sorted, with the values of their items.
+    /// Value references of the enumerations, sorted, with the values of their items.
     items: Vec<(u32, Vec<i32>)>,
     warns: bool,
 }
 
 impl Watched {
-    /// Watches `unit`, which is called `name`. With [`OnInvalid::Allow`] it is given back as it is.
+    /// Watches `unit`, which is called `name`. With [`OnInvalid::Allow`] the unit is returned
+    /// unchanged.
     pub(crate) fn around(
         unit: Box<dyn CoSimulationUnit>,
         name: &str,
@@ -52,7 +55,8 @@ impl Watched {
             }
             _ => None,
         };
-        let mut items: Vec<(u32, Vec<i32>)> = fmu.description.variables.iter().filter_map(of_items).collect();
+        let mut items: Vec<(u32, Vec<i32>)> =
+            fmu.description.variables.iter().filter_map(of_items).collect();
         items.sort();
         Box::new(Self {
             unit,
@@ -72,11 +76,12 @@ impl Watched {
         value: &str,
         what: &str,
     ) -> Outcome {
-        let is_meant =
-            |known: &&Variable| (Carrier::of(&known.kind), known.reference) == (Some(carrier), reference);
+        let is_meant = |known: &&Variable| {
+            (Carrier::of(&known.kind), known.reference) == (Some(carrier), reference)
+        };
         let known = self.fmu.description.variables.iter().find(is_meant);
-        let variable =
-            known.map_or_else(|| format!("variable {reference}"), |known| format!("\"{}\"", known.name));
+        let variable = known
+            .map_or_else(|| format!("variable {reference}"), |known| format!("\"{}\"", known.name));
         if !self.warns {
             let remedy = "--on-invalid warn lets the run go on";
             return Err(UnitFailure::new(call, format!("{variable} is {value}, {what}; {remedy}")));
@@ -91,7 +96,13 @@ impl CoSimulationUnit for Watched {
         self.unit.get_real(references, values)?;
         for (value, &reference) in values.iter().zip(references) {
             if !value.is_finite() {
-                self.invalid("getReal", Carrier::Real, reference, &value.to_string(), "not finite")?;
+                self.invalid(
+                    "getReal",
+                    Carrier::Real,
+                    reference,
+                    &value.to_string(),
+                    "not finite",
+                )?;
             }
         }
         Ok(())

@@ -1,5 +1,6 @@
-//! Resolves the names of an experiment, once, into value references: connections and recorded variables. What does not
-//! fit is refused with its place in the file and the nearest right name.
+//! Resolves the names of an experiment into value references, once: the connections and the
+//! recorded variables. A name that does not fit is refused with its place in the file and the
+//! nearest right name.
 
 use crate::document::Source;
 use crate::error::Error;
@@ -12,7 +13,8 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use toml::Spanned;
 
-/// A component's name and its FMU's description. Everywhere, a component's position here is its index.
+/// A component's name and its FMU's description. The position of a component in a list of parts is
+/// its index everywhere.
 #[derive(Clone, Copy)]
 pub struct Part<'a> {
     /// Name of the component in the experiment.
@@ -26,11 +28,11 @@ pub struct Part<'a> {
 pub struct Port {
     /// Index of the component.
     pub component: usize,
-    /// Position in the description's variables.
+    /// Position of the variable in the model description.
     pub variable: usize,
     /// Value reference of the variable.
     pub reference: u32,
-    /// Type in which its value is transferred.
+    /// Type in which the value of the variable is transferred.
     pub carrier: Carrier,
 }
 
@@ -45,7 +47,7 @@ pub struct Wire {
     pub scaling: Scaling,
 }
 
-/// A variable in the results.
+/// A column of the results, which records one variable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Column {
     /// Full name of the variable, `component.variable`.
@@ -54,7 +56,7 @@ pub(crate) struct Column {
     pub port: Port,
 }
 
-/// One side of a connection, or a recorded variable, with the component found.
+/// One side of a connection, or a recorded variable, whose component has been found.
 struct Reference<'a> {
     source: &'a Source,
     span: Range<usize>,
@@ -65,15 +67,23 @@ struct Reference<'a> {
 }
 
 impl<'a> Reference<'a> {
-    fn new(text: &'a Spanned<String>, parts: &[Part<'a>], source: &'a Source) -> Result<Self, Error> {
+    fn new(
+        text: &'a Spanned<String>,
+        parts: &[Part<'a>],
+        source: &'a Source,
+    ) -> Result<Self, Error> {
         let span = text.span();
         let text = text.get_ref().as_str();
         let refuse = |message: String| source.error(&span, message);
-        let (name, rest) = names::split(text)
-            .ok_or_else(|| refuse(format!("\"{text}\" names no variable: write component.variable")))?;
+        let (name, rest) = names::split(text).ok_or_else(|| {
+            refuse(format!("\"{text}\" names no variable: write component.variable"))
+        })?;
         let component = parts.iter().position(|part| part.name == name).ok_or_else(|| {
             let known: Vec<&str> = parts.iter().map(|part| part.name).collect();
-            refuse(format!("there is no component \"{name}\"{}", names::hint(name, known.iter().copied())))
+            refuse(format!(
+                "there is no component \"{name}\"{}",
+                names::hint(name, known.iter().copied())
+            ))
         })?;
         Ok(Self { source, span: span.clone(), text, component, part: parts[component], rest })
     }
@@ -91,9 +101,10 @@ impl<'a> Reference<'a> {
         self.refuse(format!("\"{}\" has no {causality} \"{}\"{hint}", self.part.name, self.rest))
     }
 
-    /// The variable called `name`, which must have this causality.
+    /// Finds the variable called `name`, which must have this causality.
     fn port(&self, name: &str, causality: &'a str) -> Result<Port, Error> {
-        let (position, variable) = self.part.description.find(name).ok_or_else(|| self.unknown(causality))?;
+        let (position, variable) =
+            self.part.description.find(name).ok_or_else(|| self.unknown(causality))?;
         if variable.causality != causality {
             let hint = names::nearest(name, self.part.description.names(causality))
                 .map_or(String::new(), |near| format!("; did you mean \"{near}\"?"));
@@ -103,7 +114,10 @@ impl<'a> Reference<'a> {
             )));
         }
         port(self.component, position, variable).ok_or_else(|| {
-            self.refuse(format!("\"{}.{name}\" is a text, which cannot be connected", self.part.name))
+            self.refuse(format!(
+                "\"{}.{name}\" is a text, which cannot be connected",
+                self.part.name
+            ))
         })
     }
 }
@@ -116,8 +130,9 @@ fn port(component: usize, position: usize, variable: &Variable) -> Option<Port> 
 /// Resolves the connections of an experiment.
 ///
 /// # Errors
-/// Names that do not exist, wrong causalities, types or units that do not match, inputs connected twice, and inputs that
-/// are neither connected, nor given a value, nor declared to stay unconnected.
+/// Returns an error if a name does not exist, a causality is wrong, types or units do not match, or
+/// an input is connected twice. It also returns one if an input is neither connected, nor given a
+/// value, nor declared to stay unconnected.
 pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>, Error> {
     let source = &experiment.source;
     let mut wires: Vec<Wire> = Vec::new();
@@ -128,9 +143,10 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
             (None, None) => vec![(from.rest.to_string(), to.rest.to_string())],
             (Some(from_prefix), Some(to_prefix)) => expand(&from, from_prefix, &to, to_prefix)?,
             _ => {
-                return Err(
-                    to.refuse(format!("\"{}\" and \"{}\" must both end in * or neither", from.text, to.text))
-                );
+                return Err(to.refuse(format!(
+                    "\"{}\" and \"{}\" must both end in * or neither",
+                    from.text, to.text
+                )));
             }
         };
         for (output, input) in pairs {
@@ -145,12 +161,15 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
             }
             let wire = Wire { from: start, to: end, scaling: conversion.then(connection.scaling) };
             if wire.scaling != Scaling::default() && start.carrier != Carrier::Real {
-                return Err(
-                    to.refuse(format!("\"{}.{input}\" is no real number: it cannot be scaled", to.part.name))
-                );
+                return Err(to.refuse(format!(
+                    "\"{}.{input}\" is no real number: it cannot be scaled",
+                    to.part.name
+                )));
             }
             if wires.iter().any(|other| other.to == wire.to) {
-                return Err(to.refuse(format!("the input \"{}.{input}\" is connected twice", to.part.name)));
+                return Err(
+                    to.refuse(format!("the input \"{}.{input}\" is connected twice", to.part.name))
+                );
             }
             wires.push(wire);
         }
@@ -161,15 +180,20 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
     Ok(wires)
 }
 
-/// The pairs of names that two patterns stand for: every rest that is an output there and a variable here.
+/// Lists the pairs of names that two patterns stand for: each output that begins with the first
+/// prefix is paired with the variable of the same rest behind the second prefix, if there is one.
 fn expand(
     from: &Reference,
     from_prefix: &str,
     to: &Reference,
     to_prefix: &str,
 ) -> Result<Vec<(String, String)>, Error> {
-    let outputs: Vec<&str> =
-        from.part.description.names("output").filter_map(|name| name.strip_prefix(from_prefix)).collect();
+    let outputs: Vec<&str> = from
+        .part
+        .description
+        .names("output")
+        .filter_map(|name| name.strip_prefix(from_prefix))
+        .collect();
     if outputs.is_empty() {
         return Err(from.unknown("output"));
     }
@@ -179,16 +203,18 @@ fn expand(
         .filter(|(_, input)| to.part.description.find(input).is_some())
         .collect();
     if pairs.is_empty() {
-        return Err(if to.part.description.names("input").any(|name| name.starts_with(to_prefix)) {
-            to.refuse(format!("\"{}\" and \"{}\" have no name in common", from.text, to.text))
-        } else {
-            to.unknown("input")
-        });
+        return Err(
+            if to.part.description.names("input").any(|name| name.starts_with(to_prefix)) {
+                to.refuse(format!("\"{}\" and \"{}\" have no name in common", from.text, to.text))
+            } else {
+                to.unknown("input")
+            },
+        );
     }
     Ok(pairs)
 }
 
-/// How values of the output become values of the input, by their units.
+/// Determines how values of the output are converted to values of the input, by their units.
 fn check_match(
     start: Port,
     end: Port,
@@ -209,20 +235,29 @@ fn check_match(
             b.as_deref(),
             &to.part.description.units,
         )
-        .map_err(|difference| to.refuse(format!("the units of {names} do not match: {difference}"))),
+        .map_err(|difference| {
+            to.refuse(format!("the units of {names} do not match: {difference}"))
+        }),
         (Kind::Enumeration { items: a }, Kind::Enumeration { items: b }) if a != b => {
             Err(to.refuse(format!("{names} are enumerations of different items")))
         }
         _ if a.name() == b.name() => Ok(Scaling::default()),
-        _ => Err(to.refuse(format!("the types of {names} do not match: {} against {}", a.name(), b.name()))),
+        _ => Err(to.refuse(format!(
+            "the types of {names} do not match: {} against {}",
+            a.name(),
+            b.name()
+        ))),
     }
 }
 
 fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) -> Result<(), Error> {
     for (index, part) in parts.iter().enumerate() {
         let component = &experiment.components[part.name];
-        let connected: BTreeSet<usize> =
-            wires.iter().filter(|wire| wire.to.component == index).map(|wire| wire.to.variable).collect();
+        let connected: BTreeSet<usize> = wires
+            .iter()
+            .filter(|wire| wire.to.component == index)
+            .map(|wire| wire.to.variable)
+            .collect();
         let inputs: Vec<(usize, &str)> = part
             .description
             .variables
@@ -236,7 +271,7 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
             let text = pattern.get_ref();
             let refuse = |message| Err(experiment.source.error(&pattern.span(), message));
             let mut meant = inputs.iter().filter(|(_, name)| names::matches(text, name)).peekable();
-            // All inputs may be none.
+            // The pattern "*" may stand for no input at all.
             if meant.peek().is_none() && text != "*" && !component.is_exchanged {
                 let hint = names::hint(text, inputs.iter().map(|(_, name)| *name));
                 return refuse(format!("\"{}\" has no input \"{text}\"{hint}", part.name));
@@ -252,11 +287,18 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
         let open = |(position, name): &&(usize, &str)| {
             !connected.contains(position)
                 && !component.parameters.contains_key(*name)
-                && !component.unconnected.iter().any(|pattern| names::matches(pattern.get_ref(), name))
+                && !component
+                    .unconnected
+                    .iter()
+                    .any(|pattern| names::matches(pattern.get_ref(), name))
         };
         let open: Vec<&str> = inputs.iter().filter(open).map(|(_, name)| *name).collect();
         if component.is_exchanged && !open.is_empty() {
-            tracing::warn!("inputs of \"{}\" stay at their start value: {}", part.name, open.join(", "));
+            tracing::warn!(
+                "inputs of \"{}\" stay at their start value: {}",
+                part.name,
+                open.join(", ")
+            );
             continue;
         }
         if !open.is_empty() {
@@ -276,13 +318,16 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
     Ok(())
 }
 
-/// Patterns that mean exactly `open` among `all`: a group is named by its prefix where all of it is open.
+/// Finds patterns that stand for exactly `open` among `all`: a group is named by its prefix if all
+/// of its inputs are open.
 fn shortest_patterns<'a>(open: &[&str], all: &(impl Iterator<Item = &'a str> + Clone)) -> String {
     let mut patterns: Vec<String> = Vec::new();
     for name in open {
         let group = name.rsplit_once('.').map(|(prefix, _)| format!("{prefix}.*"));
         let whole = |pattern: &String| {
-            all.clone().filter(|name| names::matches(pattern, name)).all(|name| open.contains(&name))
+            all.clone()
+                .filter(|name| names::matches(pattern, name))
+                .all(|name| open.contains(&name))
         };
         let pattern = group.filter(whole).unwrap_or_else(|| (*name).to_string());
         if !patterns.contains(&pattern) {
@@ -292,11 +337,12 @@ fn shortest_patterns<'a>(open: &[&str], all: &(impl Iterator<Item = &'a str> + C
     patterns.iter().map(|pattern| format!("\"{pattern}\"")).collect::<Vec<_>>().join(", ")
 }
 
-/// Resolves the recorded variables. A pattern stands for inputs, outputs and local variables; a parameter or a text is
-/// recorded neither by it nor, for a text, at all.
+/// Resolves the recorded variables. A pattern stands for inputs, outputs and local variables; a
+/// parameter is recorded only if it is named in full, and a text never is.
 ///
 /// # Errors
-/// Names that do not exist, patterns that mean nothing, texts.
+/// Returns an error if a name does not exist, a pattern stands for nothing, or a variable is a
+/// text.
 pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Column>, Error> {
     let mut columns: Vec<Column> = Vec::new();
     for text in &experiment.record.variables {
@@ -307,7 +353,8 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
         let mut meant = 0;
         for (position, variable) in part.description.variables.iter().enumerate() {
             if !names::matches(reference.rest, &variable.name)
-                || (is_pattern && !matches!(variable.causality.as_str(), "input" | "output" | "local"))
+                || (is_pattern
+                    && !matches!(variable.causality.as_str(), "input" | "output" | "local"))
             {
                 continue;
             }
@@ -317,9 +364,10 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
                     columns.push(Column { name: format!("{}.{}", part.name, variable.name), port });
                 }
             } else if !is_pattern {
-                return Err(
-                    reference.refuse(format!("\"{}\" is a text, which cannot be recorded", reference.text))
-                );
+                return Err(reference.refuse(format!(
+                    "\"{}\" is a text, which cannot be recorded",
+                    reference.text
+                )));
             }
         }
         if meant == 0 && columns.len() == before {
@@ -331,17 +379,19 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
                 );
                 continue;
             }
-            let known: Vec<&str> = part.description.variables.iter().map(|v| v.name.as_str()).collect();
+            let known: Vec<&str> =
+                part.description.variables.iter().map(|v| v.name.as_str()).collect();
             let hint = names::hint(reference.rest.trim_end_matches(".*"), known.iter().copied());
-            return Err(
-                reference.refuse(format!("\"{}\" has no variable \"{}\"{hint}", part.name, reference.rest))
-            );
+            return Err(reference.refuse(format!(
+                "\"{}\" has no variable \"{}\"{hint}",
+                part.name, reference.rest
+            )));
         }
     }
     Ok(columns)
 }
 
-/// Finds one variable by its full name, if there is such a one.
+/// Finds one variable by its full name, if it exists.
 pub(crate) fn find(path: &str, parts: &[Part]) -> Option<Port> {
     let (name, rest) = names::split(path)?;
     let component = parts.iter().position(|part| part.name == name)?;

@@ -7,16 +7,18 @@ use std::path::Path;
 use tempfile::TempDir;
 use zip::ZipArchive;
 
-/// An archive may hold this much when unpacked, bytes.
+/// Largest size of an archive's content when unpacked, bytes.
 const SIZE_LIMIT: u64 = 1 << 30;
-/// An archive may hold this many entries.
+/// Largest number of entries in an archive.
 const ENTRY_LIMIT: usize = 20_000;
 
-/// Unpacks into a new temporary folder, which vanishes with the value returned.
+/// Unpacks an archive into a new temporary folder, which is removed when the returned value is
+/// dropped.
 ///
 /// # Errors
-/// If the file is no archive, or one with absolute paths, paths that lead out of the folder, duplicate names, links,
-/// encrypted entries, or more content than any FMU has.
+/// Returns an error if the file is not an archive, or if the archive has absolute paths, paths that
+/// lead out of the folder, duplicate names, links, encrypted entries, or more content than any FMU
+/// has.
 pub fn unpack(path: &Path) -> Result<TempDir, Error> {
     unpack_limited(path, SIZE_LIMIT, ENTRY_LIMIT)
 }
@@ -24,17 +26,22 @@ pub fn unpack(path: &Path) -> Result<TempDir, Error> {
 fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<TempDir, Error> {
     let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
     let file = File::open(path).map_err(|source| refuse(format!("cannot be opened: {source}")))?;
-    let mut archive =
-        ZipArchive::new(file).map_err(|source| refuse(format!("is not a zip archive: {source}")))?;
+    let mut archive = ZipArchive::new(file)
+        .map_err(|source| refuse(format!("is not a zip archive: {source}")))?;
     if archive.has_duplicate_names() {
         return Err(refuse("refused: two entries of the archive have the same name".into()));
     }
     if archive.len() > entry_limit {
-        return Err(refuse(format!("refused: {} entries, at most {entry_limit} allowed", archive.len())));
+        return Err(refuse(format!(
+            "refused: {} entries, at most {entry_limit} allowed",
+            archive.len()
+        )));
     }
 
-    let folder =
-        tempfile::Builder::new().prefix("fmu-").tempdir().map_err(Error::file(std::env::temp_dir()))?;
+    let folder = tempfile::Builder::new()
+        .prefix("fmu-")
+        .tempdir()
+        .map_err(Error::file(std::env::temp_dir()))?;
     let mut left = size_limit;
     for index in 0..archive.len() {
         let mut entry =
@@ -47,8 +54,10 @@ fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<Te
         if entry.is_symlink() {
             return Err(refuse(format!("refused: entry \"{name}\" is a symbolic link")));
         }
-        // Of the temporary folder nobody knows: a fault is told by archive and entry.
-        let fault = |source: io::Error| refuse(format!("entry \"{name}\" cannot be unpacked: {source}"));
+        // A fault names the archive and the entry, because a reader does not know the temporary
+        // folder.
+        let fault =
+            |source: io::Error| refuse(format!("entry \"{name}\" cannot be unpacked: {source}"));
         let target = folder.path().join(&name);
         if name.ends_with('/') {
             fs::create_dir_all(&target).map_err(fault)?;
@@ -58,7 +67,8 @@ fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<Te
             fs::create_dir_all(parent).map_err(fault)?;
         }
         let mut out = File::create_new(&target).map_err(fault)?;
-        // The sizes an archive declares are claims: count what really comes out.
+        // The sizes that an archive declares may be wrong, so the bytes that are unpacked are
+        // counted.
         let written = io::copy(&mut (&mut entry).take(left + 1), &mut out).map_err(fault)?;
         left = left.checked_sub(written).ok_or_else(|| {
             refuse(format!("refused: unpacks to more than {} MiB", size_limit.div_ceil(1 << 20)))
@@ -67,7 +77,7 @@ fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<Te
     Ok(folder)
 }
 
-/// Why an entry of this name must not be written, if so.
+/// Returns the reason why an entry of this name must not be written; `None` if it may be.
 pub fn unsafe_name(name: &str) -> Option<&'static str> {
     if name.is_empty() {
         Some("has no name")
@@ -117,7 +127,8 @@ mod tests {
 
     #[test]
     fn folders_and_files_may_begin_with_the_folder_itself() {
-        let file = archive(&[("./", b""), ("./modelDescription.xml", b"<x/>"), ("./binaries/./x", b"1")]);
+        let file =
+            archive(&[("./", b""), ("./modelDescription.xml", b"<x/>"), ("./binaries/./x", b"1")]);
         let folder = unpack(file.path()).unwrap();
         assert_eq!(fs::read(folder.path().join("modelDescription.xml")).unwrap(), b"<x/>");
         assert_eq!(fs::read(folder.path().join("binaries/x")).unwrap(), b"1");
@@ -136,9 +147,13 @@ mod tests {
 
     #[test]
     fn bombs_are_refused_by_what_comes_out() {
-        assert!(refusal(&archive(&[("a", &[0; 600]), ("b", &[0; 600])])).contains("unpacks to more than"));
+        assert!(
+            refusal(&archive(&[("a", &[0; 600]), ("b", &[0; 600])]))
+                .contains("unpacks to more than")
+        );
         let many: Vec<String> = (0..11).map(|i| format!("f{i}")).collect();
-        let entries: Vec<(&str, &[u8])> = many.iter().map(|name| (name.as_str(), &b""[..])).collect();
+        let entries: Vec<(&str, &[u8])> =
+            many.iter().map(|name| (name.as_str(), &b""[..])).collect();
         assert!(refusal(&archive(&entries)).contains("11 entries"));
     }
 
@@ -163,6 +178,11 @@ mod tests {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(b"no zip at all").unwrap();
         assert!(refusal(&file).contains("is not a zip archive"));
-        assert!(unpack(Path::new("/nowhere/x.fmu")).unwrap_err().to_string().contains("cannot be opened"));
+        assert!(
+            unpack(Path::new("/nowhere/x.fmu"))
+                .unwrap_err()
+                .to_string()
+                .contains("cannot be opened")
+        );
     }
 }

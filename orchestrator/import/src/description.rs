@@ -43,12 +43,12 @@ pub struct ModelDescription {
 pub struct Interface {
     /// Name of the library in the archive, without file extension.
     pub model_identifier: String,
-    /// Attributes that are set to `true`, as `name`, and those with a number, as `name=value`.
+    /// Attributes that are set to `true`, as `name`, and attributes with a number, as `name=value`.
     pub capabilities: Vec<String>,
 }
 
 impl Interface {
-    /// Whether a capability flag is set.
+    /// Returns whether a capability flag is set.
     pub fn has(&self, capability: &str) -> bool {
         self.capabilities.iter().any(|name| name == capability)
     }
@@ -119,7 +119,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Name of the type in FMI.
+    /// Returns the name of the type in FMI.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Real { .. } => "Real",
@@ -135,7 +135,7 @@ impl ModelDescription {
     /// Parses the text of `modelDescription.xml`.
     ///
     /// # Errors
-    /// A line that says what is wrong with the text, and where.
+    /// Returns a line that says what is wrong with the text, and where.
     pub fn parse(text: &str) -> Result<Self, String> {
         read::description(&Element::parse(text)?)
     }
@@ -145,7 +145,7 @@ impl ModelDescription {
         self.variables.iter().enumerate().find(|(_, variable)| variable.name == name)
     }
 
-    /// Names of the variables with this causality.
+    /// Returns the names of the variables with this causality.
     pub fn names<'a>(&'a self, causality: &'a str) -> impl Iterator<Item = &'a str> + Clone {
         self.variables.iter().filter(move |v| v.causality == causality).map(|v| v.name.as_str())
     }
@@ -221,11 +221,15 @@ mod read {
                 capabilities.push(name.to_string());
             }
         }
-        let order: Option<u32> = element.parsed("maxOutputDerivativeOrder", "a whole number from 0 on")?;
+        let order: Option<u32> =
+            element.parsed("maxOutputDerivativeOrder", "a whole number from 0 on")?;
         if let Some(order) = order.filter(|&order| order > 0) {
             capabilities.push(format!("maxOutputDerivativeOrder={order}"));
         }
-        Ok(Interface { model_identifier: element.required("modelIdentifier")?.to_string(), capabilities })
+        Ok(Interface {
+            model_identifier: element.required("modelIdentifier")?.to_string(),
+            capabilities,
+        })
     }
 
     fn unit(element: &Element) -> Result<UnitDefinition, String> {
@@ -241,10 +245,11 @@ mod read {
             }
             Ok(exponents)
         };
-        let displays = element.children.iter().filter(|child| child.name == "DisplayUnit").map(|display| {
-            let (factor, offset) = scale(display)?;
-            Ok((display.required("name")?.to_string(), factor, offset))
-        });
+        let displays =
+            element.children.iter().filter(|child| child.name == "DisplayUnit").map(|display| {
+                let (factor, offset) = scale(display)?;
+                Ok((display.required("name")?.to_string(), factor, offset))
+            });
         Ok(UnitDefinition {
             name: element.required("name")?.to_string(),
             exponents: base.map(exponents).transpose()?,
@@ -259,9 +264,11 @@ mod read {
         let own = own.iter().find_map(|kind| element.child(kind));
         let own = own.ok_or_else(|| format!("{} has no type", element.title()))?;
         // An attribute of the variable itself takes precedence over that of its declared type.
-        let declared = own.attribute("declaredType").and_then(|name| types.get(name)?.child(&own.name));
-        let text =
-            |name: &str| own.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string);
+        let declared =
+            own.attribute("declaredType").and_then(|name| types.get(name)?.child(&own.name));
+        let text = |name: &str| {
+            own.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string)
+        };
         let kind = match own.name.as_str() {
             "Real" => {
                 let bound = |name: &str| match own.number(name)? {
@@ -273,7 +280,8 @@ mod read {
             }
             "Integer" => {
                 let bound = |name: &str| match own.parsed(name, "a whole number")? {
-                    None => declared.map_or(Ok(None), |declared| declared.parsed(name, "a whole number")),
+                    None => declared
+                        .map_or(Ok(None), |declared| declared.parsed(name, "a whole number")),
                     own => Ok::<_, String>(own),
                 };
                 Kind::Integer { min: bound("min")?, max: bound("max")? }
@@ -281,11 +289,12 @@ mod read {
             "Boolean" => Kind::Boolean,
             "String" => Kind::String,
             _ => {
-                let declared =
-                    declared.ok_or_else(|| format!("{} has no type definition", element.title()))?;
+                let declared = declared
+                    .ok_or_else(|| format!("{} has no type definition", element.title()))?;
                 let item = |item: &Element| {
                     let value = item.parsed("value", "a whole number")?;
-                    let value = value.ok_or_else(|| format!("{} has no attribute value", item.title()))?;
+                    let value =
+                        value.ok_or_else(|| format!("{} has no attribute value", item.title()))?;
                     Ok((item.required("name")?.to_string(), value))
                 };
                 let items = declared.children.iter().filter(|child| child.name == "Item");
@@ -306,30 +315,41 @@ mod read {
         })
     }
 
-    /// Positions of the inputs that each output depends on, by the position of the output; only for
-    /// outputs that declare them.
-    fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<usize>>, String> {
-        let unknowns = root.child("ModelStructure").into_iter().flat_map(|of| of.list("Outputs", "Unknown"));
+    /// Returns the positions of the inputs that each output depends on, by the position of the
+    /// output. Only outputs that declare their dependencies have an entry.
+    fn dependencies(
+        root: &Element,
+        variables: usize,
+    ) -> Result<BTreeMap<usize, Vec<usize>>, String> {
+        let unknowns =
+            root.child("ModelStructure").into_iter().flat_map(|of| of.list("Outputs", "Unknown"));
         let mut dependencies = BTreeMap::new();
         for unknown in unknowns {
             // Indices in the file count from 1.
             let position = |index: usize| {
                 let position = index.checked_sub(1).filter(|&position| position < variables);
                 position.ok_or_else(|| {
-                    format!("{} names variable {index} of {variables} of ModelStructure", unknown.title())
+                    format!(
+                        "{} names variable {index} of {variables} of ModelStructure",
+                        unknown.title()
+                    )
                 })
             };
             let index = unknown.parsed("index", "a whole number from 1 on")?;
-            let output =
-                position(index.ok_or_else(|| format!("{} has no attribute index", unknown.title()))?)?;
+            let output = position(
+                index.ok_or_else(|| format!("{} has no attribute index", unknown.title()))?,
+            )?;
             if let Some(text) = unknown.attribute("dependencies") {
                 let parse = |text: &str| {
-                    let fault =
-                        || format!("\"{}\" in {} is no index", text.escape_default(), unknown.title());
+                    let fault = || {
+                        format!("\"{}\" in {} is no index", text.escape_default(), unknown.title())
+                    };
                     text.parse().map_err(|_| fault()).and_then(position)
                 };
-                dependencies
-                    .insert(output, text.split_whitespace().map(parse).collect::<Result<Vec<_>, _>>()?);
+                dependencies.insert(
+                    output,
+                    text.split_whitespace().map(parse).collect::<Result<Vec<_>, _>>()?,
+                );
             }
         }
         Ok(dependencies)
@@ -348,7 +368,8 @@ pub enum Carrier {
 }
 
 impl Carrier {
-    /// Carrier of a type; `None` for texts, which are not transferred.
+    /// Returns the type in which values of a kind are transferred; `None` for texts, which are not
+    /// transferred.
     pub fn of(kind: &Kind) -> Option<Self> {
         match kind {
             Kind::Real { .. } => Some(Self::Real),

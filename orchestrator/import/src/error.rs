@@ -1,4 +1,4 @@
-//! Errors of opening an archive. A message names the culprit and what to do about it.
+//! Errors of opening an archive. Each message names the culprit and says what to do about it.
 
 use std::path::PathBuf;
 

@@ -10,13 +10,17 @@ pub const CAUSALITIES: [&str; 6] =
 /// Values of `variability` that the same section of FMI 2.0 allows.
 const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
 
-/// Finds the faults of a description: one line for each, in the order of the file.
+/// Lists the faults of a description, one line for each, in the order of the file.
 pub fn faults(description: &ModelDescription) -> Vec<String> {
     let mut faults = Vec::new();
     if description.co_simulation.is_none() && description.model_exchange.is_none() {
         faults.push("offers neither co-simulation nor model exchange".to_string());
     }
-    if description.co_simulation.as_ref().is_some_and(|interface| interface.has("needsExecutionTool")) {
+    if description
+        .co_simulation
+        .as_ref()
+        .is_some_and(|interface| interface.has("needsExecutionTool"))
+    {
         faults.push("needs the tool that made it on this machine (needsExecutionTool)".to_string());
     }
     if !description.has_structure {
@@ -34,7 +38,10 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
         if matches!(variable.causality.as_str(), "input" | "parameter") {
             let handle = (variable.reference, Carrier::of(&variable.kind));
             if let Some(other) = handles.insert(handle, name) {
-                faults.push(format!("\"{other}\" and \"{name}\" have the same value reference {}", handle.0));
+                faults.push(format!(
+                    "\"{other}\" and \"{name}\" have the same value reference {}",
+                    handle.0
+                ));
             }
         }
         of_variable(variable, &units, &mut faults);
@@ -45,11 +52,16 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
 fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<String>) {
     let Variable { name, causality, variability, kind, .. } = variable;
     if !CAUSALITIES.contains(&causality.as_str()) {
-        faults.push(format!("the causality \"{}\" of \"{name}\" is not known", causality.escape_default()));
+        faults.push(format!(
+            "the causality \"{}\" of \"{name}\" is not known",
+            causality.escape_default()
+        ));
     }
     if !VARIABILITIES.contains(&variability.as_str()) {
-        faults
-            .push(format!("the variability \"{}\" of \"{name}\" is not known", variability.escape_default()));
+        faults.push(format!(
+            "the variability \"{}\" of \"{name}\" is not known",
+            variability.escape_default()
+        ));
     }
     if let Kind::Real { unit: Some(unit), .. } = kind
         && !units.contains(unit.as_str())
@@ -58,14 +70,19 @@ fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<Str
     }
     match kind {
         Kind::Real { min: Some(min), max: Some(max), .. } if min > max => {
-            faults.push(format!("the smallest value of \"{name}\", {min}, is above its largest, {max}"));
+            faults.push(format!(
+                "the smallest value of \"{name}\", {min}, is above its largest, {max}"
+            ));
         }
         Kind::Integer { min: Some(min), max: Some(max) } if min > max => {
-            faults.push(format!("the smallest value of \"{name}\", {min}, is above its largest, {max}"));
+            faults.push(format!(
+                "the smallest value of \"{name}\", {min}, is above its largest, {max}"
+            ));
         }
         _ => {}
     }
-    if let Some(fault) = variable.start.as_deref().and_then(|start| start_fault(start.trim(), kind)) {
+    if let Some(fault) = variable.start.as_deref().and_then(|start| start_fault(start.trim(), kind))
+    {
         let start = variable.start.as_deref().unwrap_or_default().escape_default();
         faults.push(format!("the start value \"{start}\" of \"{name}\" {fault}"));
     }
@@ -73,23 +90,28 @@ fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<Str
 
 /// Describes the fault of a start value, if it has one.
 fn start_fault(start: &str, kind: &Kind) -> Option<String> {
-    let outside =
-        |below: bool, above: bool| (below || above).then(|| "is outside its min and max".to_string());
+    let outside = |below: bool, above: bool| {
+        (below || above).then(|| "is outside its min and max".to_string())
+    };
     match kind {
         Kind::Real { min, max, .. } => match start.parse::<f64>() {
             Ok(value) if value.is_nan() => Some("is not a number".into()),
-            Ok(value) => outside(min.is_some_and(|min| value < min), max.is_some_and(|max| value > max)),
+            Ok(value) => {
+                outside(min.is_some_and(|min| value < min), max.is_some_and(|max| value > max))
+            }
             Err(_) => Some("is not a number".into()),
         },
         Kind::Integer { min, max } => match start.parse::<i32>() {
-            Ok(value) => outside(min.is_some_and(|min| value < min), max.is_some_and(|max| value > max)),
+            Ok(value) => {
+                outside(min.is_some_and(|min| value < min), max.is_some_and(|max| value > max))
+            }
             Err(_) => Some("is not a whole number of 32 bits".into()),
         },
-        Kind::Boolean => {
-            (!matches!(start, "true" | "false" | "1" | "0")).then(|| "is neither true nor false".into())
-        }
+        Kind::Boolean => (!matches!(start, "true" | "false" | "1" | "0"))
+            .then(|| "is neither true nor false".into()),
         Kind::Enumeration { items } => {
-            let known = start.parse::<i32>().is_ok_and(|value| items.iter().any(|item| item.1 == value));
+            let known =
+                start.parse::<i32>().is_ok_and(|value| items.iter().any(|item| item.1 == value));
             (!known).then(|| "is no item of its type".into())
         }
         Kind::String => None,
@@ -154,7 +176,11 @@ mod tests {
                 "\"n\" and \"k\" have the same value reference 0",
             ),
             ("unit=\"m\" min", "unit=\"ell\" min", "the unit \"ell\" of \"x\" is not defined"),
-            ("causality=\"input\"", "causality=\"inptu\"", "the causality \"inptu\" of \"x\" is not known"),
+            (
+                "causality=\"input\"",
+                "causality=\"inptu\"",
+                "the causality \"inptu\" of \"x\" is not known",
+            ),
             ("<ModelStructure/>", "", "has no ModelStructure"),
             (
                 "modelIdentifier=\"a\"",

@@ -1,5 +1,6 @@
-//! The types of FMI 2.0's C interface as the master meets them. What a unit gives back is taken as the integer that C passes: a unit may return
-//! anything, and a Rust enumeration must not hold what it has no item for.
+//! The types of FMI 2.0's C interface as the master uses them. Values that a unit returns are taken
+//! as the integers that C passes: a unit may return anything, and a Rust enumeration must not hold
+//! a value that is none of its items.
 
 pub(crate) use fmi_rs::fmi2::types::{
     fmi2False as FALSE, fmi2Status as Status, fmi2StatusKind, fmi2True as TRUE, fmi2Type,
@@ -34,7 +35,8 @@ pub(crate) fn name_of(status: Result<Status, c_int>) -> String {
 pub(crate) type Component = *mut c_void;
 /// Pointer to a C string that ends with a zero byte.
 pub(crate) type Text = *const c_char;
-/// The logger, once the `printf` arguments are in the message.
+/// Type of the logger callback, which receives messages whose `printf` arguments are already
+/// expanded.
 pub(crate) type Logger = unsafe extern "C" fn(*mut c_void, Text, c_int, Text, Text);
 
 /// The callback structure of FMI 2.0, fmi2CallbackFunctions.
@@ -52,24 +54,30 @@ pub(crate) struct Callbacks {
     pub environment: *mut c_void,
 }
 
-/// fmi2GetVersion and fmi2GetTypesPlatform.
+/// Type of the functions fmi2GetVersion and fmi2GetTypesPlatform.
 pub(crate) type GetText = unsafe extern "C" fn() -> Text;
-/// fmi2Instantiate: name, type, GUID, resources, callbacks, visible, logging.
+/// Type of the function fmi2Instantiate. The arguments are name, type, GUID, resources, callbacks,
+/// visibility and logging.
 pub(crate) type Instantiate =
     unsafe extern "C" fn(Text, c_int, Text, Text, *const Callbacks, c_int, c_int) -> Component;
 /// Type of the function fmi2FreeInstance.
 pub(crate) type FreeInstance = unsafe extern "C" fn(Component);
-/// fmi2SetupExperiment: tolerance and start and stop time, each but the start with whether it is given.
-pub(crate) type SetupExperiment = unsafe extern "C" fn(Component, c_int, f64, f64, c_int, f64) -> c_int;
-/// fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2Terminate.
+/// Type of the function fmi2SetupExperiment. The arguments are whether there is a tolerance, the
+/// tolerance, the start time, whether there is a stop time, and the stop time.
+pub(crate) type SetupExperiment =
+    unsafe extern "C" fn(Component, c_int, f64, f64, c_int, f64) -> c_int;
+/// Type of the functions fmi2EnterInitializationMode, fmi2ExitInitializationMode and fmi2Terminate.
 pub(crate) type Plain = unsafe extern "C" fn(Component) -> c_int;
-/// fmi2GetReal, fmi2GetInteger, fmi2GetBoolean: value references, how many, values.
+/// Type of the functions fmi2GetReal, fmi2GetInteger and fmi2GetBoolean. The arguments are the
+/// value references, their number, and the values.
 pub(crate) type Get<T> = unsafe extern "C" fn(Component, *const c_uint, usize, *mut T) -> c_int;
-/// fmi2SetReal, fmi2SetInteger, fmi2SetBoolean, fmi2SetString.
+/// Type of the functions fmi2SetReal, fmi2SetInteger, fmi2SetBoolean and fmi2SetString.
 pub(crate) type Set<T> = unsafe extern "C" fn(Component, *const c_uint, usize, *const T) -> c_int;
-/// fmi2DoStep: time, step, whether the state before will not be set again.
+/// Type of the function fmi2DoStep. The arguments are the time, the step, and whether the state
+/// before the step will never be restored.
 pub(crate) type DoStep = unsafe extern "C" fn(Component, f64, f64, c_int) -> c_int;
-/// fmi2GetRealStatus, fmi2GetBooleanStatus: which, value.
+/// Type of the functions fmi2GetRealStatus and fmi2GetBooleanStatus. The arguments are the kind of
+/// the status and its value.
 pub(crate) type GetStatus<T> = unsafe extern "C" fn(Component, c_int, *mut T) -> c_int;
 
 #[cfg(test)]

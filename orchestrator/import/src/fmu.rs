@@ -31,12 +31,14 @@ impl Fmu {
     /// Unpacks an archive and reads its description.
     ///
     /// # Errors
-    /// If the archive is unsafe or damaged, or is not an FMI 2.0 FMU.
+    /// Returns an error if the archive is unsafe or damaged, or is not an FMI 2.0 FMU.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
         let folder = archive::unpack(path)?;
-        let bytes = std::fs::read(folder.path().join("modelDescription.xml"))
-            .map_err(|source| refuse(format!("is no FMU, modelDescription.xml cannot be read: {source}")))?;
+        let bytes =
+            std::fs::read(folder.path().join("modelDescription.xml")).map_err(|source| {
+                refuse(format!("is no FMU, modelDescription.xml cannot be read: {source}"))
+            })?;
         let description = xml::decode(&bytes)
             .and_then(|text| ModelDescription::parse(&text))
             .map_err(|reason| refuse(format!("modelDescription.xml: {reason}")))?;
@@ -48,14 +50,14 @@ impl Fmu {
         })
     }
 
-    /// Platforms for which the archive has binaries, by FMI's names.
+    /// Returns the platforms for which the archive has binaries, by FMI's names.
     pub fn platforms(&self) -> Vec<String> {
         let binaries = self.folder.path().join("binaries");
         names_in(&binaries).into_iter().filter(|name| binaries.join(name).is_dir()).collect()
     }
 
-    /// Faults of the archive that do not keep it from being opened: one line for each fault of the
-    /// description and of the library for this platform.
+    /// Lists the faults of the archive that do not keep it from being opened: one line for each
+    /// fault of the description and of the library for this platform.
     pub fn faults(&self) -> Vec<String> {
         let mut faults = faults::faults(&self.description);
         if self.description.co_simulation.is_some() {
@@ -70,8 +72,8 @@ impl Fmu {
     /// Loads the shared library of the FMU.
     ///
     /// # Errors
-    /// A line that says what is missing or why the library cannot be loaded, and names the entry of
-    /// the archive.
+    /// Returns a line that says what is missing or why the library cannot be loaded, and names the
+    /// entry of the archive.
     fn load(&self) -> Result<Functions, String> {
         let interface = self.description.co_simulation.as_ref().ok_or("offers no co-simulation")?;
         let platforms = self.platforms();
@@ -94,7 +96,9 @@ impl Fmu {
         if !file.is_file() {
             let there = names_in(&folder);
             let there = if there.is_empty() { "nothing".into() } else { there.join(", ") };
-            return Err(format!("has no {entry}, which its model identifier asks for; there is: {there}"));
+            return Err(format!(
+                "has no {entry}, which its model identifier asks for; there is: {there}"
+            ));
         }
         if !self.is_sound.get() {
             check_library(&file).map_err(|reason| format!("{entry} {reason}"))?;
@@ -104,11 +108,16 @@ impl Fmu {
             let text = with_causes(&error);
             let text = text.trim_start_matches("dlopen failed: ");
             match text.split_once(": cannot open shared object file") {
-                Some((missing, _)) => format!("{entry} needs {missing}, which is not on this system"),
+                Some((missing, _)) => {
+                    format!("{entry} needs {missing}, which is not on this system")
+                }
                 // The path of the temporary folder is removed, because it means nothing to a
                 // reader.
                 None => {
-                    format!("{entry}: {}", text.replace(&format!("{}/", self.folder.path().display()), ""))
+                    format!(
+                        "{entry}: {}",
+                        text.replace(&format!("{}/", self.folder.path().display()), "")
+                    )
                 }
             }
         })
@@ -117,8 +126,8 @@ impl Fmu {
     /// Loads the library and instantiates a co-simulation unit called `name`.
     ///
     /// # Errors
-    /// If the FMU has no binary for this platform or offers no co-simulation, if the library cannot be loaded, or if the
-    /// FMU refuses.
+    /// Returns an error if the FMU has no binary for this platform or offers no co-simulation, if
+    /// the library cannot be loaded, or if the FMU refuses.
     pub fn instantiate(&self, name: &str) -> Result<FmuUnit, Error> {
         let refuse = |message: String| Error::Fmu { path: self.path.clone(), message };
         let functions = self.load().map_err(refuse)?;
@@ -133,7 +142,8 @@ impl Fmu {
     }
 }
 
-/// Names of the entries of a folder, sorted; empty if the folder does not exist.
+/// Returns the names of the entries of a folder, sorted. There are none if the folder does not
+/// exist.
 fn names_in(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<String> =

@@ -82,7 +82,7 @@ impl Functions {
         }
     }
 
-    /// A line about the version that the library reports, if it is missing or not FMI 2.0.
+    /// Returns a line about the version that the library reports, if it is missing or not FMI 2.0.
     pub(crate) fn version_fault(&self) -> Option<String> {
         let Some(get_version) = self.get_version else {
             return Some("its library has no fmi2GetVersion".into());
@@ -90,7 +90,8 @@ impl Functions {
         // SAFETY: FMI 2.0 gives the function this type and allows the call at any time.
         let version = text_of(unsafe { get_version() });
         let is_known = version == "2.0" || version.starts_with("2.0.");
-        (!is_known).then(|| format!("its library says that it is of FMI \"{}\"", version.escape_default()))
+        (!is_known)
+            .then(|| format!("its library says that it is of FMI \"{}\"", version.escape_default()))
     }
 }
 
@@ -121,7 +122,9 @@ impl Log {
     fn message(&self, status: Result<Status, c_int>, category: &str, message: &str) {
         let (component, message) = (&self.component, message.trim_end().replace('\n', " "));
         match status {
-            Ok(Status::Ok | Status::Pending) => tracing::info!("{component}: [{category}] {message}"),
+            Ok(Status::Ok | Status::Pending) => {
+                tracing::info!("{component}: [{category}] {message}")
+            }
             Ok(Status::Warning) => warnings::warn(&format!("{component}: [{category}] {message}")),
             Ok(Status::Discard | Status::Error | Status::Fatal) | Err(_) => {
                 if !self.instantiates.load(Ordering::Relaxed) {
@@ -172,7 +175,8 @@ impl FmuUnit {
         resources: &str,
         folder: Rc<TempDir>,
     ) -> Result<Self, String> {
-        let text = |text: &str| CString::new(text).map_err(|_| format!("\"{text:?}\" holds a zero byte"));
+        let text =
+            |text: &str| CString::new(text).map_err(|_| format!("\"{text:?}\" holds a zero byte"));
         let (name_text, guid, resources) = (text(name)?, text(guid)?, text(resources)?);
 
         let log = Rc::new(Log {
@@ -304,11 +308,25 @@ impl CoSimulationUnit for FmuUnit {
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        call_with_values!(self, get_integer, "getInteger", references, values.as_mut_ptr(), values.len())
+        call_with_values!(
+            self,
+            get_integer,
+            "getInteger",
+            references,
+            values.as_mut_ptr(),
+            values.len()
+        )
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        call_with_values!(self, get_boolean, "getBoolean", references, values.as_mut_ptr(), values.len())
+        call_with_values!(
+            self,
+            get_boolean,
+            "getBoolean",
+            references,
+            values.as_mut_ptr(),
+            values.len()
+        )
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
@@ -316,16 +334,31 @@ impl CoSimulationUnit for FmuUnit {
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        call_with_values!(self, set_integer, "setInteger", references, values.as_ptr(), values.len())
+        call_with_values!(
+            self,
+            set_integer,
+            "setInteger",
+            references,
+            values.as_ptr(),
+            values.len()
+        )
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        call_with_values!(self, set_boolean, "setBoolean", references, values.as_ptr(), values.len())
+        call_with_values!(
+            self,
+            set_boolean,
+            "setBoolean",
+            references,
+            values.as_ptr(),
+            values.len()
+        )
     }
 
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
-        let text = CString::new(value)
-            .map_err(|_| UnitFailure::new("setString", format!("the text {value:?} holds a zero byte")))?;
+        let text = CString::new(value).map_err(|_| {
+            UnitFailure::new("setString", format!("the text {value:?} holds a zero byte"))
+        })?;
         let (references, values) = ([reference], [text.as_ptr()]);
         call_with_values!(self, set_string, "setString", references, values.as_ptr(), values.len())
     }
@@ -360,7 +393,8 @@ impl CoSimulationUnit for FmuUnit {
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
         // SAFETY: the instance is alive until the unit is dropped, and the function has the type
         // FMI gives it.
-        let status = unsafe { (self.instance.functions.do_step)(self.component, time, step, fmi::TRUE) };
+        let status =
+            unsafe { (self.instance.functions.do_step)(self.component, time, step, fmi::TRUE) };
         self.check("doStep", status)
     }
 

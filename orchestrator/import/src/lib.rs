@@ -1,6 +1,6 @@
-//! Imports FMI 2.0 units: an [`fmu::Fmu`] is unpacked ([`archive`]), its description read
-//! ([`description`], [`xml`], [`quantity`]) and looked through for [`faults`]. Units that are
-//! instantiated from it are called through the trait [`unit::CoSimulationUnit`].
+//! Imports FMI 2.0 units. An [`fmu::Fmu`] is unpacked ([`archive`]), its description is read
+//! ([`description`], [`xml`], [`quantity`]), and the description is searched for [`faults`]. Units
+//! that are instantiated from it are called through the trait [`unit::CoSimulationUnit`].
 
 pub mod archive;
 pub mod description;

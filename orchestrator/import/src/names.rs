@@ -1,6 +1,7 @@
-//! Names as people mistype them: the nearest right one, and patterns that end in `*`.
+//! Names that people mistype: the nearest known name, and patterns with a `*`.
 
-/// The known name nearest to `wrong`: a few letters away, or the same with a prefix that was left out.
+/// Returns the known name that is nearest to `wrong`: one that differs in a few letters, or one
+/// whose prefix was left out.
 pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let tolerance = (wrong.chars().count() / 3).clamp(1, 4);
     let lower = wrong.to_lowercase();
@@ -16,7 +17,8 @@ pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         .map(|(_, name)| name)
 }
 
-/// `; did you mean "x"?`, or the names there are, or nothing.
+/// Returns a hint for a message: `; did you mean "x"?` if a known name is near, and otherwise a
+/// list of the known names.
 pub fn hint<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str> + Clone) -> String {
     const LISTED: usize = 12;
     if let Some(name) = nearest(wrong, known.clone()) {
@@ -30,7 +32,8 @@ pub fn hint<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str> + Clone) -
     }
 }
 
-/// Whether `name` is meant by `pattern`: the same name, or everything that begins and ends as the pattern does before and after a `*`.
+/// Returns whether `pattern` stands for `name`: either they are the same, or the name begins and
+/// ends as the pattern does before and after its `*`.
 pub fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
@@ -40,14 +43,16 @@ pub fn matches(pattern: &str, name: &str) -> bool {
 
 /// Splits `component.variable` at the first dot.
 pub fn split(path: &str) -> Option<(&str, &str)> {
-    path.split_once('.').filter(|(component, variable)| !component.is_empty() && !variable.is_empty())
+    path.split_once('.')
+        .filter(|(component, variable)| !component.is_empty() && !variable.is_empty())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const NAMES: [&str; 4] = ["inertia.scale", "disturbance.kind", "disturbance.bound", "initial.p"];
+    const NAMES: [&str; 4] =
+        ["inertia.scale", "disturbance.kind", "disturbance.bound", "initial.p"];
 
     #[test]
     fn nearest_finds_swapped_missing_and_wrong_letters() {

@@ -1,26 +1,29 @@
-//! Physical units by an FMU's own definitions: conversion of `"2 deg/s2"`, and whether two variables may be connected.
+//! Physical units, as the FMU defines them: conversion of texts such as `"2 deg/s2"`, and the check
+//! whether two variables may be connected.
 
 use crate::names;
 
-/// A unit: `base = factor · value + offset` in SI base units, and what it can be shown in.
+/// A unit, defined by `base = factor · value + offset` in SI base units, with its display units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnitDefinition {
-    /// Name, for example `rad/s`.
+    /// Name of the unit, for example `rad/s`.
     pub name: String,
-    /// Exponents of kg, m, s, A, K, mol, cd, rad; `None` if the FMU does not say.
+    /// Exponents of kg, m, s, A, K, mol, cd and rad; `None` if the FMU does not state them.
     pub exponents: Option<[i32; 8]>,
-    /// Multiplier to SI base units.
+    /// Factor of the conversion to SI base units.
     pub factor: f64,
-    /// Summand to SI base units.
+    /// Offset of the conversion to SI base units.
     pub offset: f64,
     /// Display units as name, factor, offset: `display = factor · value + offset`.
     pub displays: Vec<(String, f64, f64)>,
 }
 
-/// Reads `"2 deg/s2"` as a value in the unit `wanted`; a bare `"2"` is in that unit already.
+/// Converts a text such as `"2 deg/s2"` to a value in the unit `wanted`. A bare `"2"` is already in
+/// that unit.
 ///
 /// # Errors
-/// If the text is not a number with a unit that the FMU defines and that measures the same as `wanted`.
+/// Returns an error if the text is not a number with a unit that the FMU defines and that measures
+/// the same quantity as `wanted`.
 pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Result<f64, String> {
     let text = text.trim();
     if let Ok(value) = text.parse::<f64>() {
@@ -29,18 +32,21 @@ pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Re
     let (number, name) = text
         .split_once(char::is_whitespace)
         .map(|(number, name)| (number, name.trim()))
-        .ok_or_else(|| format!("\"{text}\" is neither a number nor a number, a space and a unit"))?;
+        .ok_or_else(|| {
+            format!("\"{text}\" is neither a number nor a number, a space and a unit")
+        })?;
     let value: f64 = number.parse().map_err(|_| format!("\"{number}\" is not a number"))?;
-    let wanted = wanted.ok_or_else(|| format!("\"{text}\" has a unit, but the variable has none"))?;
+    let wanted =
+        wanted.ok_or_else(|| format!("\"{text}\" has a unit, but the variable has none"))?;
     if name == wanted {
         return Ok(value);
     }
 
-    let target = units
-        .iter()
-        .find(|unit| unit.name == wanted)
-        .ok_or_else(|| format!("the FMU does not define its unit \"{wanted}\": give a plain number"))?;
-    // A display unit of the variable's own unit is read first: another unit may have one of the same name.
+    let target = units.iter().find(|unit| unit.name == wanted).ok_or_else(|| {
+        format!("the FMU does not define its unit \"{wanted}\": give a plain number")
+    })?;
+    // A display unit of the variable's own unit takes precedence, because another unit may have a
+    // display unit of the same name.
     let own = target.displays.iter().find(|(display, ..)| display == name);
     if let Some((_, factor, offset)) = own {
         return Ok((value - offset) / factor);
@@ -58,21 +64,27 @@ pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Re
             let known: Vec<&str> = units
                 .iter()
                 .flat_map(|unit| {
-                    std::iter::once(unit.name.as_str()).chain(unit.displays.iter().map(|d| d.0.as_str()))
+                    std::iter::once(unit.name.as_str())
+                        .chain(unit.displays.iter().map(|d| d.0.as_str()))
                 })
                 .collect();
-            format!("the FMU defines no unit \"{name}\"{}", names::hint(name, known.iter().copied()))
+            format!(
+                "the FMU defines no unit \"{name}\"{}",
+                names::hint(name, known.iter().copied())
+            )
         })?;
     if unit.exponents.is_none() || unit.exponents != target.exponents {
-        return Err(format!("\"{text}\" cannot be converted to {wanted}: they measure different things"));
+        return Err(format!(
+            "\"{text}\" cannot be converted to {wanted}: they measure different things"
+        ));
     }
     Ok((unit.factor * in_unit + unit.offset - target.offset) / target.factor)
 }
 
-/// How values in the one unit become values in the other.
+/// Returns the scaling that converts values in one unit to values in another.
 ///
 /// # Errors
-/// Says how the units differ, if they do not measure the same thing.
+/// Returns an error that says how the units differ, if they do not measure the same quantity.
 pub fn conversion(
     from: Option<&str>,
     from_units: &[UnitDefinition],
@@ -81,15 +93,17 @@ pub fn conversion(
 ) -> Result<Scaling, String> {
     let unchanged = Ok(Scaling::default());
     let (Some(from), Some(to)) = (from, to) else {
-        // An FMU that knows no units at all cannot be held to them.
+        // An FMU that defines no units at all cannot be held to them.
         let known = [(from, from_units), (to, to_units)];
-        return if from == to || known.iter().any(|(unit, units)| unit.is_none() && units.is_empty()) {
+        return if from == to || known.iter().any(|(unit, units)| unit.is_none() && units.is_empty())
+        {
             unchanged
         } else {
             Err(format!("{} against {}", from.unwrap_or("no unit"), to.unwrap_or("no unit")))
         };
     };
-    let find = |name: &str, units: &[UnitDefinition]| units.iter().find(|unit| unit.name == name).cloned();
+    let find =
+        |name: &str, units: &[UnitDefinition]| units.iter().find(|unit| unit.name == name).cloned();
     match (find(from, from_units), find(to, to_units)) {
         (Some(a), Some(b)) if a.exponents.is_some() && b.exponents.is_some() => {
             if a.exponents != b.exponents {
@@ -97,7 +111,10 @@ pub fn conversion(
             } else if a.factor == b.factor && a.offset == b.offset {
                 unchanged
             } else {
-                Ok(Scaling { factor: a.factor / b.factor, offset: (a.offset - b.offset) / b.factor })
+                Ok(Scaling {
+                    factor: a.factor / b.factor,
+                    offset: (a.offset - b.offset) / b.factor,
+                })
             }
         }
         _ if from == to => unchanged,
@@ -105,38 +122,38 @@ pub fn conversion(
     }
 }
 
-/// value ↦ factor · value + offset
+/// A linear conversion, value ↦ factor · value + offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scaling {
-    /// The factor.
+    /// Factor by which values are multiplied.
     pub factor: f64,
-    /// The offset.
+    /// Offset that is added after the multiplication.
     pub offset: f64,
 }
 
 impl Default for Scaling {
-    /// Leaves every value as it is.
+    /// Returns the scaling that leaves every value as it is.
     fn default() -> Self {
         Self { factor: 1.0, offset: 0.0 }
     }
 }
 
 impl Scaling {
-    /// The scaled value.
+    /// Returns the scaled value.
     pub fn of(self, value: f64) -> f64 {
         self.factor * value + self.offset
     }
 
-    /// This one, and then `next`.
+    /// Returns the scaling that applies this one first, and `next` afterwards.
     #[must_use]
     pub fn then(self, next: Self) -> Self {
         Self { factor: next.factor * self.factor, offset: next.of(self.offset) }
     }
 }
 
-/// A number for a text, without what rounding left in its last digits.
+/// Rounds a number for a text, so that its last digits show no rounding errors.
 pub fn rounded(time: f64) -> f64 {
-    // Of a large time fewer digits after the point are known.
+    // A large time has fewer reliable digits after the point.
     let digits = if time.abs() < 1e5 { 1e9 } else { 1e4 };
     (time * digits).round() / digits
 }
@@ -146,15 +163,22 @@ mod tests {
     use super::*;
 
     fn units() -> Vec<UnitDefinition> {
-        let unit = |name: &str, exponents, factor, offset, displays: &[(&str, f64, f64)]| UnitDefinition {
-            name: name.into(),
-            exponents: Some(exponents),
-            factor,
-            offset,
-            displays: displays.iter().map(|(n, f, o)| ((*n).to_string(), *f, *o)).collect(),
-        };
+        let unit =
+            |name: &str, exponents, factor, offset, displays: &[(&str, f64, f64)]| UnitDefinition {
+                name: name.into(),
+                exponents: Some(exponents),
+                factor,
+                offset,
+                displays: displays.iter().map(|(n, f, o)| ((*n).to_string(), *f, *o)).collect(),
+            };
         vec![
-            unit("rad", [0, 0, 0, 0, 0, 0, 0, 1], 1.0, 0.0, &[("deg", 180.0 / std::f64::consts::PI, 0.0)]),
+            unit(
+                "rad",
+                [0, 0, 0, 0, 0, 0, 0, 1],
+                1.0,
+                0.0,
+                &[("deg", 180.0 / std::f64::consts::PI, 0.0)],
+            ),
             unit(
                 "rad/s",
                 [0, 0, -1, 0, 0, 0, 0, 1],
@@ -183,8 +207,14 @@ mod tests {
     #[test]
     fn wrong_units_are_refused() {
         let units = units();
-        assert!(convert("2 deg/s", Some("rad"), &units).unwrap_err().contains("measure different things"));
-        assert!(convert("2 degs", Some("rad"), &units).unwrap_err().contains("did you mean \"deg\""));
+        assert!(
+            convert("2 deg/s", Some("rad"), &units)
+                .unwrap_err()
+                .contains("measure different things")
+        );
+        assert!(
+            convert("2 degs", Some("rad"), &units).unwrap_err().contains("did you mean \"deg\"")
+        );
         assert!(convert("2 deg", None, &units).unwrap_err().contains("has none"));
         assert!(convert("two deg", Some("rad"), &units).unwrap_err().contains("not a number"));
         assert!(convert("2deg", Some("rad"), &units).unwrap_err().contains("a space and a unit"));
@@ -200,10 +230,14 @@ mod tests {
         assert!(scaling(Some("rad"), Some("rad/s")).is_err());
         assert_eq!(scaling(Some("min"), Some("s")).unwrap().of(2.0), 120.0);
         assert_eq!(scaling(Some("s"), Some("min")).unwrap().of(30.0), 0.5);
-        // Another name for the same unit is no mismatch, and what knows no units fits all.
+        // Another name for the same unit is no mismatch, and a description without units fits every
+        // unit.
         let mut renamed = units.clone();
         renamed[0].name = "radian".into();
-        assert_eq!(conversion(Some("rad"), &units, Some("radian"), &renamed), Ok(Scaling::default()));
+        assert_eq!(
+            conversion(Some("rad"), &units, Some("radian"), &renamed),
+            Ok(Scaling::default())
+        );
         assert_eq!(conversion(None, &[], Some("rad"), &units), Ok(Scaling::default()));
     }
 
@@ -216,8 +250,11 @@ mod tests {
             offset,
             displays: Vec::new(),
         };
-        let units =
-            [unit("K", 1.0, 0.0), unit("degC", 1.0, 273.15), unit("degF", 5.0 / 9.0, 273.15 - 160.0 / 9.0)];
+        let units = [
+            unit("K", 1.0, 0.0),
+            unit("degC", 1.0, 273.15),
+            unit("degF", 5.0 / 9.0, 273.15 - 160.0 / 9.0),
+        ];
         let celsius = conversion(Some("degF"), &units, Some("degC"), &units).unwrap();
         assert!((celsius.of(212.0) - 100.0).abs() < 1e-12 && celsius.of(32.0).abs() < 1e-12);
         let doubled = celsius.then(Scaling { factor: 2.0, offset: 1.0 });

@@ -4,9 +4,9 @@
 /// A call to a unit that did not succeed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnitFailure {
-    /// Whether the unit ended the simulation by this call, which is no fault.
+    /// Whether the unit ended the simulation by this call, which is not a fault.
     pub ends: bool,
-    /// The call, for example `doStep`.
+    /// Name of the call, for example `doStep`.
     pub call: &'static str,
     /// Message of the unit, or its status if it gave none.
     pub message: String,
@@ -22,62 +22,63 @@ impl UnitFailure {
 /// Outcome of a call to a unit.
 pub type Outcome = Result<(), UnitFailure>;
 
-/// A unit that is set, stepped and read by value references, in the order FMI 2.0 prescribes. Booleans travel as 0 and 1,
-/// enumerations as the value of their item. All slices of one call have the same length.
+/// A unit that is set, stepped and read by value references, in the order that FMI 2.0 prescribes.
+/// Booleans are transferred as 0 and 1, and enumerations as the values of their items. All slices
+/// of one call have the same length.
 pub trait CoSimulationUnit {
     /// Reads real variables.
     ///
     /// # Errors
-    /// If the unit reports a failure, as for every call of this trait.
+    /// Returns an error if the unit reports a failure, as for every call of this trait.
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome;
     /// Reads integer and enumeration variables.
     ///
     /// # Errors
-    /// If the unit reports a failure.
+    /// Returns an error if the unit reports a failure.
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome;
     /// Reads boolean variables.
     ///
     /// # Errors
-    /// If the unit reports a failure.
+    /// Returns an error if the unit reports a failure.
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome;
     /// Sets real variables.
     ///
     /// # Errors
-    /// If the unit reports a failure.
+    /// Returns an error if the unit reports a failure.
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome;
     /// Sets integer and enumeration variables.
     ///
     /// # Errors
-    /// If the unit reports a failure.
+    /// Returns an error if the unit reports a failure.
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome;
     /// Sets boolean variables.
     ///
     /// # Errors
-    /// If the unit reports a failure.
+    /// Returns an error if the unit reports a failure.
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome;
     /// Sets a text variable.
     ///
     /// # Errors
-    /// If the unit reports a failure.
+    /// Returns an error if the unit reports a failure.
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome;
-    /// Announces the experiment (times in s) and enters initialization mode.
+    /// Announces the start and stop time of the experiment, s, and enters initialization mode.
     ///
     /// # Errors
-    /// If the unit reports a failure.
+    /// Returns an error if the unit reports a failure.
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome;
-    /// Leaves initialization mode: the unit can be stepped.
+    /// Leaves initialization mode, after which the unit can be stepped.
     ///
     /// # Errors
-    /// If the unit reports a failure.
+    /// Returns an error if the unit reports a failure.
     fn exit_initialization(&mut self) -> Outcome;
-    /// Steps from communication point `time` by `step` (both s).
+    /// Steps the unit from the communication point `time` by `step`, both in s.
     ///
     /// # Errors
-    /// If the unit reports a failure.
+    /// Returns an error if the unit reports a failure.
     fn do_step(&mut self, time: f64, step: f64) -> Outcome;
     /// Ends the simulation.
     ///
     /// # Errors
-    /// If the unit reports a failure.
+    /// Returns an error if the unit reports a failure.
     fn terminate(&mut self) -> Outcome;
 }

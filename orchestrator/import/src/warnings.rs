@@ -1,11 +1,12 @@
-//! Warnings of units during a run: each is printed once, at the end, with its first time and the
-//! number of times it came.
+//! Collects the warnings of units during a run: each is printed once, at the end, with the time at
+//! which it first came and the number of times it came.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
 
-/// A unit that never says the same twice is collected up to so many warnings.
+/// Largest number of different warnings that are collected, in case a unit never says the same
+/// twice.
 const MOST: usize = 100;
 
 /// A warning of a unit, in its own words.
@@ -15,7 +16,7 @@ struct Warning {
     count: u64,
 }
 
-/// The present time, s, and what was heard.
+/// Current simulated time, s, and the warnings collected so far.
 #[derive(Default)]
 struct Heard {
     now: f64,
@@ -26,10 +27,10 @@ thread_local! {
     static HEARD: RefCell<Option<Heard>> = const { RefCell::new(None) };
 }
 
-/// Warnings of this thread's units are collected for as long as this lives.
+/// A guard: warnings of this thread's units are collected as long as this value lives.
 pub struct Collection(());
 
-/// Begins to collect. Where nothing is collected, warnings are told as they come.
+/// Begins to collect warnings. If no collection is active, warnings are printed as they come.
 pub fn collect() -> Collection {
     HEARD.with_borrow_mut(|heard| *heard = Some(Heard::default()));
     Collection(())
@@ -103,8 +104,9 @@ mod tests {
             at(time);
             warn(text);
         }
-        let told: Vec<String> = HEARD
-            .with_borrow(|heard| heard.iter().flat_map(|heard| &heard.warnings).map(Warning::told).collect());
+        let told: Vec<String> = HEARD.with_borrow(|heard| {
+            heard.iter().flat_map(|heard| &heard.warnings).map(Warning::told).collect()
+        });
         assert_eq!(told, ["late (at t = 0 s)", "lost (first at t = 0.3 s, 3 times)"]);
         drop(collection);
         assert!(HEARD.with_borrow(Option::is_none));

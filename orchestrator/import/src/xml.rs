@@ -1,4 +1,4 @@
-//! XML of other makers: text in any declared encoding, elements whatever their namespace prefix.
+//! Reads XML of other tools: text in any declared encoding, and elements with any namespace prefix.
 
 use encoding_rs::{Encoding, UTF_8};
 use quick_xml::events::{BytesStart, Event};
@@ -6,28 +6,33 @@ use quick_xml::{Reader, XmlVersion};
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
-/// The text of a file: in the encoding of its byte order mark, or else of its XML declaration, or else UTF-8.
+/// Decodes the text of a file. The encoding is that of its byte order mark, or otherwise that of
+/// its XML declaration, or otherwise UTF-8.
 ///
 /// # Errors
-/// If the encoding is not known, or the bytes are not of it.
+/// Returns an error if the encoding is unknown, or if the bytes are not valid in it.
 pub fn decode(bytes: &[u8]) -> Result<String, String> {
     let encoding = match Encoding::for_bom(bytes) {
         Some((encoding, _)) => encoding,
         None => match declared_encoding(bytes) {
-            Some(label) => Encoding::for_label(label.as_bytes())
-                .ok_or_else(|| format!("the encoding \"{}\" is not known", label.escape_default()))?,
+            Some(label) => Encoding::for_label(label.as_bytes()).ok_or_else(|| {
+                format!("the encoding \"{}\" is not known", label.escape_default())
+            })?,
             None => UTF_8,
         },
     };
-    // With the byte order mark, if there is one, removed.
+    // Decoding removes the byte order mark, if there is one.
     let (text, encoding, faulty) = encoding.decode(bytes);
     if faulty { Err(format!("is not {} text", encoding.name())) } else { Ok(text.into_owned()) }
 }
 
-/// `latin1` of `<?xml version="1.0" encoding="latin1"?>`. Of all encodings that can be told this way it is ASCII.
+/// Returns the encoding that an XML declaration names, such as `latin1` in `<?xml version="1.0"
+/// encoding="latin1"?>`. The declaration can be read as ASCII in all encodings for which this is
+/// needed.
 fn declared_encoding(bytes: &[u8]) -> Option<String> {
     let end = bytes.iter().take(200).position(|&byte| byte == b'>')?;
-    let declaration = std::str::from_utf8(&bytes[..end]).ok()?.trim_start().strip_prefix("<?xml")?;
+    let declaration =
+        std::str::from_utf8(&bytes[..end]).ok()?.trim_start().strip_prefix("<?xml")?;
     let (_, rest) = declaration.split_once("encoding")?;
     let quoted = rest.trim_start().strip_prefix('=')?.trim_start();
     let quote = quoted.chars().next().filter(|quote| matches!(quote, '"' | '\''))?;
@@ -47,23 +52,25 @@ pub struct Element {
     pub children: Vec<Element>,
 }
 
-/// Elements that stand deeper in each other are not kept: annotations of some tools do, and nothing that is read.
+/// Depth below which nested elements are not kept. The annotations of some tools are nested so
+/// deeply, but no element that is read is.
 const DEPTH: usize = 100;
 
 impl Element {
     /// Reads an XML document from its text.
     ///
     /// # Errors
-    /// One line: what is wrong with the text.
+    /// Returns one line that says what is wrong with the text.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut reader = Reader::from_str(text);
-        // What is open, the document itself first.
+        // Stack of the elements that are open; the first one stands for the document itself.
         let mut open = vec![Self::default()];
         let (mut line, mut counted) = (1, 0);
-        // How many are open that are not kept.
+        // Number of open elements that are too deep to be kept.
         let mut deeper = 0_usize;
         loop {
-            let at = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX).min(text.len());
+            let at =
+                usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX).min(text.len());
             line += text.get(counted..at).unwrap_or_default().matches('\n').count();
             counted = at;
             let fault = |what: &str| format!("{what} in line {line}");
@@ -88,8 +95,10 @@ impl Element {
                         parent.children.push(closed);
                     }
                 }
-                // It could define entities that unfold without end.
-                Event::DocType(_) => return Err(fault("a document type definition, which is refused")),
+                // A document type definition could define entities that expand without end.
+                Event::DocType(_) => {
+                    return Err(fault("a document type definition, which is refused"));
+                }
                 Event::Eof => break,
                 _ => {}
             }
@@ -107,44 +116,51 @@ impl Element {
         let mut attributes = BTreeMap::new();
         for attribute in start.attributes() {
             let attribute = attribute.map_err(|error| error.to_string())?;
-            let value =
-                attribute.normalized_value(XmlVersion::Implicit1_0).map_err(|error| error.to_string())?;
+            let value = attribute
+                .normalized_value(XmlVersion::Implicit1_0)
+                .map_err(|error| error.to_string())?;
             attributes.insert(attribute.key.as_ref().to_string(), value.into_owned());
         }
-        Ok(Self { name: start.local_name().as_ref().to_string(), line, attributes, children: Vec::new() })
+        Ok(Self {
+            name: start.local_name().as_ref().to_string(),
+            line,
+            attributes,
+            children: Vec::new(),
+        })
     }
 
-    /// Title of the element in messages: its kind, its name if it has one, and its line.
+    /// Returns the title of the element for messages: its kind, its name if it has one, and its
+    /// line.
     pub fn title(&self) -> String {
         let own = self.attribute("name").map(|name| format!(" \"{}\"", shortened(name)));
         format!("the element {}{} in line {}", self.name, own.unwrap_or_default(), self.line)
     }
 
-    /// Value of the attribute with this name, if present.
+    /// Returns the value of the attribute with this name, if it is present.
     pub fn attribute(&self, name: &str) -> Option<&str> {
         self.attributes.get(name).map(String::as_str)
     }
 
-    /// The attribute of this name, which must be there.
+    /// Returns the attribute with this name, which must be present.
     ///
     /// # Errors
-    /// Names element and attribute.
+    /// Returns an error that names the element and the attribute if it is missing.
     pub fn required(&self, name: &str) -> Result<&str, String> {
         self.attribute(name).ok_or_else(|| format!("{} has no attribute {name}", self.title()))
     }
 
-    /// The attribute of this name as a number, if it is there.
+    /// Returns the attribute with this name as a number, if it is present.
     ///
     /// # Errors
-    /// If the value of the attribute is not a number.
+    /// Returns an error if the value of the attribute is not a number.
     pub fn number(&self, name: &str) -> Result<Option<f64>, String> {
         self.parsed(name, "a number")
     }
 
-    /// The attribute of this name as a truth value, if it is there.
+    /// Returns the attribute with this name as a truth value, if it is present.
     ///
     /// # Errors
-    /// If the value of the attribute is not a truth value.
+    /// Returns an error if the value of the attribute is not a truth value.
     pub fn truth(&self, name: &str) -> Result<Option<bool>, String> {
         match self.attribute(name).map(str::trim) {
             None => Ok(None),
@@ -154,10 +170,11 @@ impl Element {
         }
     }
 
-    /// The attribute of this name as a `T`, which messages call `kind`, if it is there.
+    /// Returns the attribute with this name as a `T`, if it is present. Messages call a `T` a
+    /// `kind`.
     ///
     /// # Errors
-    /// If the value of the attribute is not a `T`.
+    /// Returns an error if the value of the attribute is not a `T`.
     pub fn parsed<T: FromStr>(&self, name: &str, kind: &str) -> Result<Option<T>, String> {
         let parse = |text: &str| text.trim().parse().map_err(|_| self.refusal(name, kind));
         self.attribute(name).map(parse).transpose()
@@ -168,19 +185,19 @@ impl Element {
         format!("{name} = \"{text}\" of {} is not {kind}", self.title())
     }
 
-    /// The first element of this name in it.
+    /// Returns the first child element with this name.
     pub fn child(&self, name: &str) -> Option<&Self> {
         self.children.iter().find(|child| child.name == name)
     }
 
-    /// All elements called `name` in the element called `list` in it.
+    /// Returns all elements called `name` in the child element called `list`.
     pub fn list<'a>(&'a self, list: &str, name: &'a str) -> impl Iterator<Item = &'a Self> {
         let children = self.child(list).map(|list| list.children.as_slice()).unwrap_or_default();
         children.iter().filter(move |child| child.name == name)
     }
 }
 
-/// A text as messages show it.
+/// Shortens a text for messages.
 fn shortened(text: &str) -> String {
     const LONGEST: usize = 60;
     match text.char_indices().nth(LONGEST) {
@@ -201,11 +218,15 @@ mod tests {
             Some('ü')
         );
         assert_eq!(
-            of("<?xml version=\"1.0\" encoding = \"utf-8\"?>", "ü".as_bytes()).unwrap().chars().last(),
+            of("<?xml version=\"1.0\" encoding = \"utf-8\"?>", "ü".as_bytes())
+                .unwrap()
+                .chars()
+                .last(),
             Some('ü')
         );
         assert_eq!(of("\u{feff}<a/>", b"").unwrap(), "<a/>");
-        let wide: Vec<u8> = "\u{feff}<a b='ü'/>".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let wide: Vec<u8> =
+            "\u{feff}<a b='ü'/>".encode_utf16().flat_map(u16::to_le_bytes).collect();
         assert_eq!(decode(&wide).unwrap(), "<a b='ü'/>");
         assert!(of("<a>", b"\xfc").unwrap_err().contains("UTF-8"));
         assert!(of("<?xml encoding='klingon'?>", b"").unwrap_err().contains("klingon"));
@@ -222,7 +243,10 @@ mod tests {
         let lines = Element::parse("<a>\n<b name='x'\n n='-1'/>\n\n<c>\n</c></a>").unwrap();
         assert_eq!((lines.children[0].line, lines.children[1].line), (2, 5));
         let fault = lines.children[0].parsed::<u32>("n", "a whole number from 0 on").unwrap_err();
-        assert_eq!(fault, "n = \"-1\" of the element b \"x\" in line 2 is not a whole number from 0 on");
+        assert_eq!(
+            fault,
+            "n = \"-1\" of the element b \"x\" in line 2 is not a whole number from 0 on"
+        );
         assert!(Element::parse("<a>\n<b></a>").unwrap_err().contains("line 2"));
     }
 
@@ -230,7 +254,10 @@ mod tests {
     fn what_is_deep_within_others_is_passed_over() {
         let deep = "<a>".repeat(100_000) + "<b/>" + &"</a>".repeat(100_000);
         let root = Element::parse(&format!("<r>{deep}<c/></r>")).unwrap();
-        assert_eq!(root.children.iter().map(|child| child.name.as_str()).collect::<Vec<_>>(), ["a", "c"]);
+        assert_eq!(
+            root.children.iter().map(|child| child.name.as_str()).collect::<Vec<_>>(),
+            ["a", "c"]
+        );
         assert!(Element::parse(&"<a>".repeat(200)).unwrap_err().contains("not closed"));
     }
 

@@ -1,4 +1,4 @@
-//! `render FOLDER`: draws every `.svg` of a folder as a `.png` beside it.
+//! Draws every `.svg` of a folder as a `.png` beside it: `render FOLDER`.
 
 use cosim_report::figure::png;
 use std::path::Path;

@@ -1,10 +1,10 @@
-//! Errors of a study.
+//! Errors of a study, and their exit codes.
 
 use cosim::error::Error as Single;
 use cosim::interrupt::Request;
 use std::path::PathBuf;
 
-/// What can go wrong from reading a study to writing its report.
+/// An error that occurs between reading a study and writing its report.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// Something outside any run failed, or the study is faulty.
@@ -36,10 +36,11 @@ pub enum Error {
 }
 
 impl Error {
-    /// The exit code of a process that ends with this error.
+    /// Returns the exit code of a process that ends with this error.
     pub fn exit_code(&self) -> u8 {
         match self {
-            // A case that ends early has no result to compare.
+            // A run that ends early has no result to compare, so that this is a failure of the
+            // study.
             Self::Run { source: Single::EndedByUnit { .. }, .. } => 1,
             Self::Single(source) | Self::Run { source, .. } => source.exit_code(),
             Self::Unfinished { request, .. } => request.exit_code(),

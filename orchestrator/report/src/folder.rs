@@ -1,4 +1,5 @@
-//! The folder of a run's results: taken by one process at a time, never with results of two runs side by side.
+//! The folder of a run's results. Only one process uses it at a time, and it never holds the
+//! results of two runs side by side.
 
 use cosim::error::Error;
 use std::fs::{self, File, TryLockError};
@@ -8,17 +9,18 @@ use std::path::{Path, PathBuf};
 pub const RESULTS: [&str; 6] =
     ["results.csv", "results.parquet", "results.json", "metrics.json", "plot.svg", "realtime.svg"];
 
-/// A folder that belongs to this process for as long as this lives.
+/// A folder that belongs to this process as long as this value lives.
 pub struct Folder {
     path: PathBuf,
     _lock: File,
 }
 
 impl Folder {
-    /// Whether the results of a run may go there.
+    /// Checks that the results of a run may be written to this path.
     ///
     /// # Errors
-    /// If it is no folder, or holds results that may not be replaced.
+    /// Returns an error if the path is not a folder, or if the folder holds results that may not be
+    /// replaced.
     pub fn check(path: &Path, replaces: bool) -> Result<(), Error> {
         if path.exists() && !path.is_dir() {
             return Err(Error::experiment(format!(
@@ -35,16 +37,18 @@ impl Folder {
         }
     }
 
-    /// Makes the folder and takes it. What it holds is left alone.
+    /// Creates the folder and locks it. Files that it already holds are left alone.
     ///
     /// # Errors
-    /// If another process has it, or it cannot be made.
+    /// Returns an error if another process has locked the folder, or if it cannot be created.
     pub fn take(path: &Path) -> Result<Self, Error> {
         fs::create_dir_all(path).map_err(Error::file(path))?;
         let lock = open(path).map_err(Error::file(path))?;
         match lock.try_lock() {
-            // Where there are no locks, as on some network drives, it goes without.
-            Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { path: path.to_path_buf(), _lock: lock }),
+            // Some network drives have no locks; the folder is used without one then.
+            Ok(()) | Err(TryLockError::Error(_)) => {
+                Ok(Self { path: path.to_path_buf(), _lock: lock })
+            }
             Err(TryLockError::WouldBlock) => Err(Error::experiment(format!(
                 "another process is writing its results to {}: wait for it, or take another folder by --out",
                 path.display()
@@ -55,7 +59,7 @@ impl Folder {
     /// Removes the results of an earlier run.
     ///
     /// # Errors
-    /// If one cannot be removed.
+    /// Returns an error if a file cannot be removed.
     pub fn clear(&self) -> Result<(), Error> {
         for path in RESULTS.map(|name| self.path.join(name)) {
             if path.exists() {
@@ -66,7 +70,7 @@ impl Folder {
     }
 }
 
-/// The folder itself carries the lock, so that nothing is left in it.
+/// Opens the folder itself to lock it, so that no lock file is left in it.
 #[cfg(unix)]
 fn open(path: &Path) -> std::io::Result<File> {
     File::open(path)
@@ -93,7 +97,9 @@ mod tests {
         let folder = Folder::take(&path).unwrap();
         fs::write(path.join("plot.svg"), "").unwrap();
         fs::write(path.join("notes.txt"), "").unwrap();
-        assert!(refusal(Folder::check(&path, false)).contains("results of an earlier run (plot.svg)"));
+        assert!(
+            refusal(Folder::check(&path, false)).contains("results of an earlier run (plot.svg)")
+        );
         Folder::check(&path, true).unwrap();
         folder.clear().unwrap();
         assert!(!path.join("plot.svg").exists() && path.join("notes.txt").exists());

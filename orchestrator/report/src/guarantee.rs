@@ -1,5 +1,5 @@
-//! The guarantee that a unit gives that limits are kept: when it is in force, and whether it is
-//! kept.
+//! A unit's guarantee that limits are kept: when it is in force, and whether the limits are kept
+//! then.
 
 use crate::measure::larger;
 use cosim::error::Error;
@@ -8,16 +8,19 @@ use cosim::master::{Observer, Sample};
 use cosim::signal::Resolved;
 use cosim::system::{Probed, System};
 
-/// The variables in which a unit says whether its guarantee is in force.
+/// Variables in which a unit reports whether its guarantee is in force.
 #[derive(Clone, Debug, Default)]
 pub struct Signals {
-    /// Place of the variable that says whether the limits are guaranteed to be kept.
+    /// Index, among a sample's values, of the variable that tells whether the guarantee is in
+    /// force.
     pub in_force: usize,
-    /// Why it is in force or not, as an item of an enumeration.
+    /// Variable that tells why the guarantee is or is not in force, of an enumeration type.
     pub status: Option<Probed>,
-    /// Names and places of the shares of the limits that are left beyond what is reserved.
+    /// Names of the limits, with the indices of the variables that hold the share left beyond what
+    /// is reserved.
     pub margins: Vec<(String, usize)>,
-    /// Signals as multiples of their limits.
+    /// Signals as multiples of their limits, which must not exceed 1 while the guarantee is in
+    /// force.
     pub keeps: Vec<Resolved>,
 }
 
@@ -33,32 +36,33 @@ pub struct Loss {
 /// Course of the guarantee up to a tick.
 #[derive(Clone, Debug, Default)]
 pub struct Course {
-    /// What it is made of.
+    /// Variables that the course is computed from.
     pub signals: Signals,
     ticks: u64,
     ticks_in_force: u64,
     status: Option<f64>,
     /// Tick at which the guarantee was first lost, if it was.
     pub lost: Option<Loss>,
-    /// Smallest margins while it was in force.
+    /// Smallest margins seen while the guarantee was in force; `None` if it never was.
     pub margins: Vec<Option<f64>>,
-    /// Whether a limit was exceeded at a tick at which it was in force.
+    /// Whether a limit was exceeded at a tick at which the guarantee was in force.
     pub broken: bool,
 }
 
 /// Tolerance with which limits count as met, because of rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// The smaller value. Unlike `f64::min` it does not hide a value that is not a number.
+/// Returns the smaller value. Unlike `f64::min` it does not hide a value that is not a number.
 fn smaller(a: f64, b: f64) -> f64 {
     if b < a || b.is_nan() { b } else { a }
 }
 
 impl Signals {
-    /// Finds the variables; `None` if they are optional and the units lack one that is needed.
+    /// Finds the variables of a guarantee; `None` if they may be missing and the units lack one
+    /// that is needed.
     ///
     /// # Errors
-    /// If a variable is not there.
+    /// Returns an error if a required variable does not exist.
     pub fn find(asked: &Guarantee, system: &mut System) -> Result<Option<Self>, String> {
         let may_lack = asked.optional || system.is_exchanged([asked.in_force.as_str()]);
         if may_lack && !system.has(&asked.in_force) {
@@ -87,37 +91,39 @@ impl Signals {
 }
 
 impl Course {
-    /// Creates a course without samples.
+    /// Creates a course that has seen no samples.
     pub fn new(signals: Signals) -> Self {
         Self { margins: vec![None; signals.margins.len()], signals, ..Self::default() }
     }
 
-    /// Share of the ticks at which it was in force; `None` before the first.
+    /// Returns the share of the ticks at which the guarantee was in force; `None` before the first
+    /// tick.
     pub fn share(&self) -> Option<f64> {
         (self.ticks > 0).then(|| self.ticks_in_force as f64 / self.ticks as f64)
     }
 
-    /// Whether these values say that the guarantee is in force.
+    /// Returns whether these values say that the guarantee is in force.
     pub fn is_in_force(&self, values: &[f64]) -> bool {
         values[self.signals.in_force] != 0.0
     }
 
-    /// Margins by these values.
+    /// Returns the margins in these values.
     pub fn margins_at(&self, values: &[f64]) -> Vec<Option<f64>> {
         self.signals.margins.iter().map(|(_, place)| Some(values[*place])).collect()
     }
 
-    /// Status of the guarantee at the last tick seen.
+    /// Returns the status of the guarantee at the last tick seen.
     pub fn status_now(&self) -> Option<f64> {
         self.status
     }
 
-    /// Status when it was first lost; if it never was, the present one.
+    /// Returns the status at which the guarantee was first lost, or the present status if it never
+    /// was.
     pub fn status(&self) -> Option<f64> {
         self.lost.map_or(self.status, |loss| loss.status)
     }
 
-    /// A status by the name of its item.
+    /// Returns the name of the enumeration item that a status stands for.
     pub fn name_of(&self, status: f64) -> String {
         let mut items = self.signals.status.iter().flat_map(|status| &status.items);
         let item = items.find(|(_, item)| f64::from(*item) == status);
@@ -126,7 +132,9 @@ impl Course {
 
     /// Formats margins as part of a sentence.
     pub fn told(&self, margins: &[Option<f64>]) -> String {
-        told(margins.iter().copied().zip(self.signals.margins.iter().map(|(name, _)| name.as_str())))
+        told(
+            margins.iter().copied().zip(self.signals.margins.iter().map(|(name, _)| name.as_str())),
+        )
     }
 }
 
@@ -149,7 +157,8 @@ impl Observer for Course {
                 *smallest = smallest.iter().copied().chain([values[*place]]).reduce(smaller);
             }
             // A value that is not a number is not within its limit.
-            let largest = self.signals.keeps.iter().map(|signal| signal.value(values)).fold(0.0, larger);
+            let largest =
+                self.signals.keeps.iter().map(|signal| signal.value(values)).fold(0.0, larger);
             self.broken |= largest.is_nan() || largest > 1.0 + ROUNDING;
         } else if self.ticks_in_force > 0 && self.lost.is_none() {
             self.lost = Some(Loss { time: sample.time, status: self.status });
@@ -162,8 +171,8 @@ impl Observer for Course {
 mod tests {
     use super::*;
 
-    /// Values: in force, status, margins of rate and moment, rate and moment as multiples of their
-    /// limits 0.1 and 10.
+    /// Creates a course from rows of values: in force, status, margins of rate and moment, and rate
+    /// and moment, whose limits are 0.1 and 10.
     fn course(rows: &[[f64; 6]]) -> Course {
         let keeps = |place| Resolved::variable(place);
         let mut course = Course::new(Signals {
@@ -185,12 +194,13 @@ mod tests {
     #[test]
     fn oracle_share_loss_and_margins_by_hand() {
         let course = course(&[
-            // Not in force yet: no loss, and its margins and limits do not count.
+            // The guarantee is not in force yet: this is no loss, and margins and limits do not
+            // count.
             [0.0, 2.0, -1.0, -1.0, 9.0, 99.0],
             [1.0, 1.0, 0.3, 0.1, 0.05, 5.0],
             [1.0, 1.0, 0.2, 0.4, 0.1, 10.0],
             [0.0, 5.0, -1.0, -1.0, 0.2, 5.0],
-            // A second loss is not the first.
+            // This second loss does not replace the first.
             [1.0, 1.0, 0.5, 0.5, 0.0, 0.0],
             [0.0, 4.0, 0.0, 0.0, 0.0, 0.0],
         ]);

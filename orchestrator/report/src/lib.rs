@@ -1,5 +1,5 @@
-//! What co-simulated runs came to: [`metrics`] and a [`plot`] of each, as its experiment asks for
-//! them, and a [`study`] of many runs with its figures, tables and verdicts as one page.
+//! Evaluates co-simulated runs: the [`metrics`] and the [`plot`] of each run that its experiment
+//! asks for, and a [`study`] of many runs with its figures, tables and verdicts on one page.
 
 pub mod error;
 pub mod figure;

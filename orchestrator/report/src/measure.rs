@@ -1,4 +1,4 @@
-//! Numbers that are taken of a run's signals while it goes on.
+//! Numbers that are computed from a run's signals during the run.
 
 use cosim::error::Error;
 use cosim::experiment::{Kind, Measure, Observe};
@@ -11,13 +11,13 @@ pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }
 
-/// A measure of a run in the making.
+/// A measure of a run whose value is still being computed.
 pub(crate) struct Gauge {
     measure: Measure,
     signals: Vec<Resolved>,
-    /// Place of the variable that counts, and its last value.
+    /// Index of the variable that counts events, and its last value.
     each: Option<(usize, f64)>,
-    /// Of each signal: the value now, the one before, and the first one.
+    /// Values of each signal: the present one, the one before, and the first one.
     now: Vec<f64>,
     before: Vec<f64>,
     first: Vec<f64>,
@@ -25,7 +25,7 @@ pub(crate) struct Gauge {
     count: u64,
     largest: f64,
     pulses: u64,
-    /// Values of the first signal, if they are kept.
+    /// Values of the first signal, which are kept only for a percentile.
     samples: Vec<f64>,
     /// Time of the first sample after which all signals have stayed within the band.
     settled: Option<f64>,
@@ -39,12 +39,17 @@ impl Gauge {
     /// Creates a gauge that has measured nothing yet.
     ///
     /// # Errors
-    /// If a variable is not there, or if the measure is faulty.
-    pub(crate) fn new(measure: &Measure, signals: &[Signal], system: &mut System) -> Result<Self, String> {
+    /// Returns an error if a variable does not exist, or if the measure is faulty.
+    pub(crate) fn new(
+        measure: &Measure,
+        signals: &[Signal],
+        system: &mut System,
+    ) -> Result<Self, String> {
         if let Some(fault) = measure.fault() {
             return Err(fault);
         }
-        let signals = signals.iter().map(|signal| system.resolve(signal)).collect::<Result<_, _>>()?;
+        let signals =
+            signals.iter().map(|signal| system.resolve(signal)).collect::<Result<_, _>>()?;
         let each = measure.each.as_ref().map(|path| system.probe(path)).transpose()?;
         let mut gauge = Self::of(measure, signals);
         gauge.each = each.map(|probed| (probed.place, 0.0));
@@ -74,7 +79,7 @@ impl Gauge {
         }
     }
 
-    /// The number, if there is one.
+    /// Returns the number, or `None` if there is none.
     pub(crate) fn value(&self) -> Option<f64> {
         let factor = self.measure.unit.as_ref().map_or(1.0, |unit| unit.factor);
         (self.count > 0).then_some(())?;
@@ -90,13 +95,15 @@ impl Gauge {
             }
             Kind::Largest => Some(factor * self.largest),
             Kind::Last => self.before.first().map(|value| factor * value),
-            Kind::Settling => self.settled.filter(|settled| self.last - settled >= self.measure.hold),
+            Kind::Settling => {
+                self.settled.filter(|settled| self.last - settled >= self.measure.hold)
+            }
             Kind::Pulses => Some(self.pulses as f64),
             Kind::Leaving => self.left,
         }
     }
 
-    /// Unit of [`Self::value`]; empty if it has none.
+    /// Returns the unit of [`Self::value`], or an empty text if it has none.
     pub(crate) fn unit(&self) -> &str {
         match (self.measure.kind, &self.measure.unit) {
             (Kind::Settling | Kind::Leaving, _) => "s",
@@ -105,13 +112,13 @@ impl Gauge {
         }
     }
 
-    /// Whether the number is a whole one.
+    /// Returns whether the number is always whole.
     pub(crate) fn counts(&self) -> bool {
         let is_integer = self.signals.first().is_some_and(|signal| signal.is_integer);
         self.measure.kind == Kind::Pulses || self.measure.kind == Kind::Last && is_integer
     }
 
-    /// The single values of a percentile, in the order of time.
+    /// Returns the single values of a percentile, in the order of time.
     pub(crate) fn samples(&self) -> Vec<f64> {
         let factor = self.measure.unit.as_ref().map_or(1.0, |unit| unit.factor);
         self.samples.iter().map(|sample| factor * sample).collect()
@@ -136,18 +143,21 @@ impl Gauge {
         }
         self.largest = values.iter().map(|value| value.abs()).fold(self.largest, larger);
         let band = self.measure.band.unwrap_or(0.0);
-        let inside = values.iter().zip(&self.first).all(|(value, first)| value.abs() <= band * first.abs());
+        let inside =
+            values.iter().zip(&self.first).all(|(value, first)| value.abs() <= band * first.abs());
         self.settled = if inside { self.settled.or(Some(time)) } else { None };
         if self.measure.bound.is_some_and(|bound| values.iter().any(|value| value.abs() > bound)) {
             self.left = self.left.or(Some(time));
         }
-        let rises =
-            values.iter().zip(&self.before).filter(|(value, before)| **value > 0.5 && **before <= 0.5);
+        let rises = values
+            .iter()
+            .zip(&self.before)
+            .filter(|(value, before)| **value > 0.5 && **before <= 0.5);
         self.pulses += rises.count() as u64;
         self.before.copy_from_slice(values);
     }
 
-    /// Whether a sample is one of those that are taken.
+    /// Returns whether a sample is one of those that the measure uses.
     fn takes(&mut self, sample: &Sample) -> bool {
         let grown = self.each.as_mut().is_none_or(|(place, last)| {
             let now = sample.values[*place];
@@ -174,11 +184,11 @@ impl Observer for Gauge {
     }
 }
 
-/// The number's gauge as an experiment asks for it; `None` if it is optional and the units lack
-/// what it needs.
+/// Creates the gauge that an experiment asks for; `None` if the measure is optional and the units
+/// lack what it needs.
 ///
 /// # Errors
-/// If a list or a variable is not there.
+/// Returns an error if a list or a variable does not exist.
 pub(crate) fn asked(
     measure: &Measure,
     observe: &Observe,
@@ -198,11 +208,16 @@ mod tests {
     use super::*;
     use toml::Spanned;
 
-    fn measured(kind: Kind, over: Option<[f64; 2]>, size: Option<f64>, rows: &[[f64; 2]]) -> Option<f64> {
+    fn measured(
+        kind: Kind,
+        over: Option<[f64; 2]>,
+        size: Option<f64>,
+        rows: &[[f64; 2]],
+    ) -> Option<f64> {
         held(kind, over, size, 0.0, rows)
     }
 
-    /// A measure as it is written.
+    /// Parses a measure from its TOML text.
     fn measure(text: &str) -> Measure {
         toml::from_str(&format!("signals = \"x\"\n{text}")).unwrap()
     }
@@ -216,7 +231,8 @@ mod tests {
     ) -> Option<f64> {
         let signals = Spanned::new(0..0, "x".to_string());
         let (band, bound) = if kind == Kind::Leaving { (None, size) } else { (size, None) };
-        let measure = Measure { kind, signals, over, band, hold, bound, ..measure("kind = \"rms\"") };
+        let measure =
+            Measure { kind, signals, over, band, hold, bound, ..measure("kind = \"rms\"") };
         let mut gauge = Gauge::of(&measure, Vec::new());
         for (time, row) in rows.iter().enumerate() {
             gauge.see(time as f64, row);
@@ -234,7 +250,7 @@ mod tests {
         // The first signal is within 0.2 from 4 s on, the second within 0.02 from 3 s on.
         assert_eq!(measured(Kind::Settling, None, Some(0.02), &rows), Some(4.0));
         assert_eq!(measured(Kind::Settling, None, Some(0.001), &rows), None);
-        // Seen for 1 s, until 5 s.
+        // The signals are seen within the band for 1 s, until 5 s.
         assert_eq!(held(Kind::Settling, None, Some(0.02), 1.0, &rows), Some(4.0));
         assert_eq!(held(Kind::Settling, None, Some(0.02), 1.1, &rows), None);
         assert_eq!(measured(Kind::Rms, Some([7.0, 8.0]), None, &rows), None);
@@ -255,7 +271,7 @@ mod tests {
         assert_eq!(fault("kind = \"leaving\"\nbound = 1.0"), None);
     }
 
-    /// What a measure of the first of two variables makes of rows of both.
+    /// Computes a measure of the first of two variables from rows of both.
     fn taken(text: &str, rows: &[[f64; 2]]) -> Option<f64> {
         let measure = measure(text);
         let mut gauge = Gauge::of(&measure, vec![Resolved::variable(0)]);
@@ -272,7 +288,7 @@ mod tests {
         let rows = [[3.0, 1.0], [100.0, 1.0], [4.0, 2.0], [50.0, 2.0]];
         assert_eq!(taken("kind = \"rms\"\nevery = 2", &rows), Some(12.5_f64.sqrt()));
         assert_eq!(taken("kind = \"mean\"\nsteps = true", &rows), Some(107.0 / 3.0));
-        // A count that has not grown is no new value.
+        // A sample at which the count has not grown is not used.
         let each = "each = \"a.count\"";
         assert_eq!(taken(&format!("kind = \"mean\"\n{each}"), &rows), Some(3.5));
         let unit = "unit = { name = \"ms\", factor = 1e3 }";

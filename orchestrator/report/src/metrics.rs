@@ -1,5 +1,5 @@
-//! The metrics that an experiment asks for, taken while the run goes on, as `metrics.json` holds
-//! them.
+//! The metrics that an experiment asks for. They are computed during the run, and written to
+//! `metrics.json`.
 
 use crate::guarantee::{Course, Signals};
 use crate::measure::{self, Gauge};
@@ -16,20 +16,20 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Value {
-    /// A count.
+    /// An integer number, such as a count.
     Count(u64),
-    /// A number.
+    /// A real number in the unit of the metric.
     Number(f64),
-    /// Yes or no.
+    /// A truth value, for yes or no.
     Flag(bool),
     /// A text, such as the item of an enumeration.
     Text(String),
 }
 
-/// The metrics of a run. One is `None` (null) if the units lack what it is taken of.
+/// The metrics of a run. A metric is `None` (null) if the units lack a variable that it needs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
-    /// The metrics that the experiment asks for, by name, with those of the guarantee.
+    /// Metrics that the experiment asks for, and those of the guarantee, by name.
     #[serde(flatten)]
     pub asked: BTreeMap<String, Option<Value>>,
     /// Simulated time divided by elapsed time.
@@ -40,7 +40,8 @@ pub struct Metrics {
     pub loop_delay_s: Option<f64>,
     /// Number of communication points that the run reached.
     pub samples: u64,
-    /// Whether the run reached its stop time. A loss ends a single run, but not the runs of a study.
+    /// Whether the run reached its stop time. A loss ends a single run, but not the runs of a
+    /// study.
     pub completed: bool,
     /// First time at which the run was lost, s; null if it never was, or if the experiment does not
     /// say when it is.
@@ -52,22 +53,29 @@ pub struct Metrics {
     /// Timing of the run against the wall clock, if it was paced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub real_time: Option<RealTime>,
-    /// Units of the metrics that have one.
+    /// Units of those metrics that have one, by name.
     #[serde(skip)]
     pub units: BTreeMap<String, String>,
 }
 
-/// Metrics that every run has.
-const ALWAYS: [&str; 6] = ["real_time_factor", "wall_s", "loop_delay_s", "samples", "completed", "lost_at"];
+/// Names of the metrics that every run has.
+const ALWAYS: [&str; 6] =
+    ["real_time_factor", "wall_s", "loop_delay_s", "samples", "completed", "lost_at"];
 
 impl Metrics {
-    /// Names of the metrics that runs of an experiment have.
+    /// Returns the names of the metrics that runs of an experiment have.
     pub fn names(observe: &Observe) -> Vec<String> {
         let guarantee = observe.guarantee.iter().flat_map(of_guarantee);
-        ALWAYS.map(String::from).into_iter().chain(observe.metrics.keys().cloned()).chain(guarantee).collect()
+        ALWAYS
+            .map(String::from)
+            .into_iter()
+            .chain(observe.metrics.keys().cloned())
+            .chain(guarantee)
+            .collect()
     }
 
-    /// A metric as a number, with 1 and 0 for yes and no; `None` if it has no value or is a text.
+    /// Returns a metric as a number, with 1 and 0 for yes and no; `None` if it has no value or is a
+    /// text.
     pub fn number(&self, name: &str) -> Option<f64> {
         let flag = |is: bool| Some(f64::from(u8::from(is)));
         match name {
@@ -86,7 +94,7 @@ impl Metrics {
         }
     }
 
-    /// A metric as a text.
+    /// Returns a metric as a text; `None` if it is not a text.
     pub fn text(&self, name: &str) -> Option<&str> {
         match self.asked.get(name)?.as_ref()? {
             Value::Text(text) => Some(text),
@@ -95,11 +103,12 @@ impl Metrics {
     }
 }
 
-/// Names of the metrics of a guarantee.
+/// Returns the names of the metrics of a guarantee.
 fn of_guarantee(asked: &Guarantee) -> Vec<String> {
     let margins = asked.margins.keys().map(|name| margin(name));
     let kept = asked.keeps.iter().map(|_| "broken".into());
-    let names = ["share", "lost_at", "status"].map(String::from).into_iter().chain(margins).chain(kept);
+    let names =
+        ["share", "lost_at", "status"].map(String::from).into_iter().chain(margins).chain(kept);
     names.map(|name| format!("guarantee_{name}")).collect()
 }
 
@@ -107,17 +116,18 @@ fn margin(name: &str) -> String {
     format!("{name}_margin_min")
 }
 
-/// Takes the metrics of a run.
+/// An observer that computes the metrics of a run.
 pub struct Meters {
     gauges: BTreeMap<String, Option<Gauge>>,
-    /// The experiment's guarantee, if it names one, and its course, if the units have it.
+    /// Guarantee that the experiment names, if any, and its course, if the units have its
+    /// variables.
     guarantee: (Option<Guarantee>, Option<Course>),
     loss: Option<Loss>,
     samples: u64,
     completed: bool,
 }
 
-/// Bound beyond which a run is lost.
+/// Bound beyond which a run counts as lost.
 struct Loss {
     what: String,
     signals: Vec<Resolved>,
@@ -131,7 +141,7 @@ impl Meters {
     /// Creates the meters that the experiment of a system asks for.
     ///
     /// # Errors
-    /// If the experiment names a variable that is not there.
+    /// Returns an error if the experiment names a variable that does not exist.
     pub fn new(system: &mut System) -> Result<Self, Error> {
         let observe = system.experiment.observe.clone();
         let mut gauges = BTreeMap::new();
@@ -162,7 +172,7 @@ impl Meters {
         Ok(Self { gauges, guarantee: (guarantee, course), loss, samples: 0, completed: false })
     }
 
-    /// Makes a loss end the run.
+    /// Makes the run end when it is lost.
     #[must_use]
     pub fn ending_when_lost(mut self) -> Self {
         if let Some(loss) = &mut self.loss {
@@ -171,19 +181,23 @@ impl Meters {
         self
     }
 
-    /// The single values of the metrics that keep them, by name, in the order of time.
+    /// Returns the single values of the metrics that keep them, by name, in the order of time.
     pub fn samples(&self) -> BTreeMap<String, Vec<f64>> {
-        let gauges = self.gauges.iter().filter_map(|(name, gauge)| Some((name, gauge.as_ref()?.samples())));
-        gauges.filter(|(_, samples)| !samples.is_empty()).map(|(name, s)| (name.clone(), s)).collect()
+        let gauges =
+            self.gauges.iter().filter_map(|(name, gauge)| Some((name, gauge.as_ref()?.samples())));
+        gauges
+            .filter(|(_, samples)| !samples.is_empty())
+            .map(|(name, s)| (name.clone(), s))
+            .collect()
     }
 
-    /// Number of communication points seen.
+    /// Returns the number of communication points seen.
     pub fn seen(&self) -> u64 {
         self.samples
     }
 
-    /// Metrics of the communication points seen so far; what the observer does not know is left
-    /// out.
+    /// Returns the metrics of the communication points seen so far. Metrics that the observer
+    /// cannot know are left out.
     pub fn metrics(&self) -> Metrics {
         let value = |gauge: &Gauge| {
             let value = gauge.value()?;
@@ -213,7 +227,8 @@ impl Meters {
                 }
             }
         }
-        let units = self.gauges.iter().filter_map(|(name, gauge)| Some((name, gauge.as_ref()?.unit())));
+        let units =
+            self.gauges.iter().filter_map(|(name, gauge)| Some((name, gauge.as_ref()?.unit())));
         Metrics {
             asked,
             samples: self.samples,
@@ -238,13 +253,15 @@ impl Observer for Meters {
         if let Some(loss) = self.loss.as_mut().filter(|loss| loss.at.is_none()) {
             let squares = loss.signals.iter().map(|signal| signal.value(sample.values).powi(2));
             let norm = squares.sum::<f64>().sqrt();
-            // A norm that is not a number counts as lost, too.
+            // A norm that is not a number also counts as lost.
             if norm.is_nan() || norm > loss.beyond {
                 loss.at = Some(sample.time);
                 if loss.ends_run {
                     let unit = loss.signals.first().map_or("", |signal| &signal.unit);
-                    let reason =
-                        format!("further than {} {unit} from its reference ([observe.loss])", loss.beyond);
+                    let reason = format!(
+                        "further than {} {unit} from its reference ([observe.loss])",
+                        loss.beyond
+                    );
                     return Err(Error::Lost { what: loss.what.clone(), time: sample.time, reason });
                 }
             }

@@ -18,7 +18,7 @@ const COLORS: [Color; 6] = [
 /// Draws the figure and writes it to a file.
 ///
 /// # Errors
-/// If the file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn draw(
     path: &Path,
     title: &str,
@@ -56,10 +56,15 @@ pub fn draw(
         curves,
     };
     let names: Vec<String> = steps.iter().map(|(name, _)| name.clone()).collect();
-    let courses =
-        steps.into_iter().enumerate().map(|(index, (name, series))| line(&name, color(index), series));
+    let courses = steps
+        .into_iter()
+        .enumerate()
+        .map(|(index, (name, series))| line(&name, color(index), series));
     let counts = names.iter().enumerate().filter_map(|(index, name)| {
-        report.components.get(name).map(|component| columns(name, color(index), &component.step_ms.histogram))
+        report
+            .components
+            .get(name)
+            .map(|component| columns(name, color(index), &component.step_ms.histogram))
     });
     let mut panels = vec![
         panel("step time, ms", "time, s", false, courses.collect()),

@@ -1,50 +1,51 @@
-//! The panels of an experiment with their signals found, for the figure of a run and for the live
-//! view.
+//! The panels of an experiment whose signals have been found, for the figure of a run and for the
+//! live view.
 
 use cosim::error::Error;
 use cosim::experiment;
 use cosim::signal::{Resolved, Signal};
 use cosim::system::System;
 
-/// A panel with its signals found.
+/// A panel whose signals have been found.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
-    /// Short name.
+    /// Short name of the panel.
     pub name: String,
     /// Label of the vertical axis without the unit.
     pub label: String,
-    /// Unit of all values.
+    /// Unit of all values in the panel.
     pub unit: String,
-    /// Factor from the unit of the signals to that unit.
+    /// Factor from the unit of the signals to the unit of the panel.
     pub factor: f64,
-    /// The curves.
+    /// Curves of the panel, with their names and signals.
     pub curves: Vec<Curve>,
-    /// The limit of the norm of all curves.
+    /// Limit of the norm of all curves.
     pub limit: Option<Resolved>,
 }
 
 /// A curve of a panel.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Name in the legend.
+    /// Name of the curve in the legend.
     pub name: String,
-    /// What is drawn.
+    /// Signal that is drawn as the curve.
     pub of: Resolved,
-    /// What it is to follow.
+    /// Signal that the curve is to follow, if any.
     pub reference: Option<Resolved>,
 }
 
 impl Panel {
-    /// Finds the signals of all panels of an experiment. What a unit lacks that the command line
-    /// exchanged is left out.
+    /// Finds the signals of all panels of an experiment. Signals that are missing because the
+    /// command line replaced their unit are left out.
     ///
     /// # Errors
-    /// If a variable is not there.
+    /// Returns an error if a variable does not exist.
     pub fn all(system: &mut System) -> Result<Vec<Self>, Error> {
         let panels = system.experiment.observe.panels.clone();
         let found = panels.iter().map(|panel| {
-            let fault =
-                |problem| Error::experiment(format!("[[observe.panels]] \"{}\": {problem}", panel.name));
+            let fault = |problem| {
+                Error::experiment(format!("[[observe.panels]] \"{}\": {problem}", panel.name))
+            };
             Self::find(panel, system).map_err(fault)
         });
         let found = found.collect::<Result<Vec<_>, _>>()?;
@@ -53,7 +54,9 @@ impl Panel {
 
     fn find(asked: &experiment::Panel, system: &mut System) -> Result<Self, String> {
         let mut found = |signal: &Signal| {
-            if system.is_exchanged(signal.paths()) && signal.paths().iter().any(|path| !system.has(path)) {
+            if system.is_exchanged(signal.paths())
+                && signal.paths().iter().any(|path| !system.has(path))
+            {
                 return Ok(None);
             }
             system.resolve(signal).map(Some)
@@ -65,28 +68,30 @@ impl Panel {
         }
         let limit = asked.limit.as_ref().map(&mut found).transpose()?.flatten();
         let own = curves.first().map_or(String::new(), |curve| curve.of.unit.clone());
-        let (unit, factor) = asked.unit.as_ref().map_or((own, 1.0), |unit| (unit.name.clone(), unit.factor));
+        let (unit, factor) =
+            asked.unit.as_ref().map_or((own, 1.0), |unit| (unit.name.clone(), unit.factor));
         let label = if asked.label.is_empty() { &asked.name } else { &asked.label };
         Ok(Self { name: asked.name.clone(), label: label.clone(), unit, factor, curves, limit })
     }
 
-    /// Values of the curves in a sample.
+    /// Returns the values of the curves in a sample.
     pub fn values<'a>(&'a self, sample: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         self.curves.iter().map(|curve| self.factor * curve.of.value(sample))
     }
 
-    /// Whether there is anything that the curves are to follow.
+    /// Returns whether any of the curves has a reference.
     pub fn has_references(&self) -> bool {
         self.curves.iter().any(|curve| curve.reference.is_some())
     }
 
-    /// Values of what the curves are to follow in a sample; not a number where there is nothing.
+    /// Returns the references of the curves in a sample. A value is not a number if a curve has no
+    /// reference.
     pub fn references<'a>(&'a self, sample: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         let of = |signal: &Resolved| self.factor * signal.value(sample);
         self.curves.iter().map(move |curve| curve.reference.as_ref().map_or(f64::NAN, of))
     }
 
-    /// The limit of the norm of all curves in a sample, if there is one.
+    /// Returns the limit of the norm of all curves in a sample, if there is one.
     pub fn limit_in(&self, sample: &[f64]) -> Option<f64> {
         self.limit.as_ref().map(|limit| self.factor * limit.value(sample))
     }

@@ -1,4 +1,4 @@
-//! The figure of one run: a panel for each that the experiment asks for.
+//! The figure of one run, with one panel for each that the experiment asks for.
 
 use crate::figure::{self, Color, Figure, Legend, Shape, svg};
 use crate::panels::Panel;
@@ -6,7 +6,7 @@ use cosim::error::Error;
 use cosim::master::{Observer, Sample};
 use std::path::Path;
 
-/// A figure holds at most about this many points per curve.
+/// Approximate largest number of points of a curve.
 const POINTS: u64 = 5000;
 
 /// Colours of the curves, assigned in their order.
@@ -26,7 +26,7 @@ pub struct Curves {
     time: Vec<f64>,
 }
 
-/// The courses of a panel's curves.
+/// Values of a panel's curves over time.
 struct Track {
     panel: Panel,
     values: Vec<Vec<f64>>,
@@ -35,7 +35,7 @@ struct Track {
 }
 
 impl Curves {
-    /// Creates empty curves for a run of so many ticks.
+    /// Creates empty curves for a run of this number of ticks.
     pub fn new(panels: Vec<Panel>, ticks: u64) -> Self {
         let stride = ticks.div_ceil(POINTS).max(1);
         let capacity = (ticks / stride + 2) as usize;
@@ -49,16 +49,19 @@ impl Curves {
         Self { panels, stride, time: Vec::with_capacity(capacity) }
     }
 
-    /// Draws the figure, if there is anything to draw. Returns whether there was.
+    /// Draws the figure if it has any content, and returns whether it has.
     ///
     /// # Errors
-    /// If the file cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn draw(&self, path: &Path, title: &str) -> Result<bool, Error> {
         if self.panels.is_empty() || self.time.len() < 2 {
             return Ok(false);
         }
         let panels = self.panels.iter().map(|track| self.panel(track)).collect();
-        svg::write(&Figure { title: title.into(), columns: 1, legend: Legend::Beside, panels }, path)?;
+        svg::write(
+            &Figure { title: title.into(), columns: 1, legend: Legend::Beside, panels },
+            path,
+        )?;
         Ok(true)
     }
 
@@ -66,10 +69,13 @@ impl Curves {
         let Track { panel, values, references, limit } = track;
         let colors = || COLORS.iter().copied().cycle();
         let pale = references.iter().zip(colors());
-        let mut curves: Vec<_> =
-            pale.map(|(y, color)| self.curve("thin: reference", color, Shape::Pale, y.clone())).collect();
+        let mut curves: Vec<_> = pale
+            .map(|(y, color)| self.curve("thin: reference", color, Shape::Pale, y.clone()))
+            .collect();
         let own = panel.curves.iter().zip(values).zip(colors());
-        curves.extend(own.map(|((curve, y), color)| self.curve(&curve.name, color, Shape::Line, y.clone())));
+        curves.extend(
+            own.map(|((curve, y), color)| self.curve(&curve.name, color, Shape::Line, y.clone())),
+        );
         if let Some(limit) = *limit {
             let norm = |k: usize| values.iter().map(|y| y[k] * y[k]).sum::<f64>().sqrt();
             let norms = (0..self.time.len()).map(norm).collect();

@@ -1,4 +1,4 @@
-//! Shows how far a run has got: a bar on a terminal, nothing that moves otherwise.
+//! Shows the progress of a run: a moving bar on a terminal, and a plain line otherwise.
 
 use cosim::error::Error;
 use cosim::master::{Observer, Sample};
@@ -8,15 +8,16 @@ use std::io::{IsTerminal, Write, stderr};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// A plain line. If standard error cannot be written, there is no one to tell.
+/// Writes a plain line to standard error. If this fails, there is nobody left to tell.
 fn tell(line: Arguments) {
     let _ = writeln!(stderr(), "{line}");
 }
 
-/// A hidden bar unless standard error is a terminal and something is to be shown.
+/// Creates a bar, which is hidden if standard error is no terminal or if `quiet` is set.
 fn bar(length: u64, quiet: bool, template: &str) -> ProgressBar {
     let shown = stderr().is_terminal() && !quiet;
-    let target = if shown { ProgressDrawTarget::stderr_with_hz(10) } else { ProgressDrawTarget::hidden() };
+    let target =
+        if shown { ProgressDrawTarget::stderr_with_hz(10) } else { ProgressDrawTarget::hidden() };
     let bar = ProgressBar::with_draw_target(Some(length), target);
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style.progress_chars("=> "));
@@ -24,15 +25,16 @@ fn bar(length: u64, quiet: bool, template: &str) -> ProgressBar {
     bar
 }
 
-/// A bar that is redrawn a few times a second.
+/// A progress bar of a run, which is redrawn a few times a second.
 pub struct Progress {
     bar: ProgressBar,
     stride: u64,
 }
 
 impl Progress {
-    /// A bar for `ticks` steps, drawn to standard error if that is a terminal and `quiet` is not asked for; otherwise one
-    /// plain line. `apart` draws it by a thread of its own, so that the run never waits for the terminal.
+    /// Creates a bar for `ticks` steps. It is drawn on standard error if that is a terminal;
+    /// otherwise one plain line is written. With `quiet` nothing is shown. With `apart` a thread of
+    /// its own draws the bar, so that the run never waits for the terminal.
     pub fn new(title: &str, ticks: u64, quiet: bool, apart: bool) -> Self {
         if !stderr().is_terminal() && !quiet {
             tell(format_args!("running {title}: {ticks} steps"));
@@ -64,7 +66,8 @@ impl Drop for Progress {
     }
 }
 
-/// Progress of work in parts, shared by the threads that do it: a bar on a terminal, otherwise a line every few seconds.
+/// Progress of work in parts, shared by the threads that do it: a bar on a terminal, and a line
+/// every few seconds otherwise.
 pub struct Parts {
     bar: ProgressBar,
     quiet: bool,
@@ -72,7 +75,7 @@ pub struct Parts {
     last_line: Mutex<Instant>,
 }
 
-/// Time between two lines where there is no terminal.
+/// Time between two lines if there is no terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
 impl Parts {

@@ -1,4 +1,4 @@
-//! Prints the outcome of a run to standard output.
+//! Prints the outcome of a run or of a study to standard output.
 
 use crate::guarantee::told;
 use crate::metrics::{Metrics, Value};
@@ -10,7 +10,7 @@ use fmu_import::quantity::rounded;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// What came of a run.
+/// Outcome of a run.
 #[derive(Debug)]
 pub struct Report {
     /// Metrics of the run.
@@ -27,7 +27,7 @@ pub struct Report {
 /// Prints the summary of a run.
 ///
 /// # Errors
-/// If the text cannot be written.
+/// Returns an error if the text cannot be written.
 pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Result<()> {
     let (System { clock, experiment, order, loops, .. }, metrics) = (system, &report.metrics);
     let coupling = match experiment.simulation.coupling {
@@ -73,11 +73,15 @@ pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Re
                 ", from the order: an output is read before its unit's inputs are set"
             }
         };
-        let undeclared: Vec<&str> = feedback.undeclared.iter().map(|&index| order[index].as_str()).collect();
+        let undeclared: Vec<&str> =
+            feedback.undeclared.iter().map(|&index| order[index].as_str()).collect();
         let assumed = if undeclared.is_empty() {
             String::new()
         } else {
-            format!(" (the worst case; not declared what outputs depend on: {})", undeclared.join(", "))
+            format!(
+                " (the worst case; not declared what outputs depend on: {})",
+                undeclared.join(", ")
+            )
         };
         line("loop delay", format!("{steps} ({}){reason}{assumed}", names.join(" -> ")))?;
     }
@@ -97,7 +101,7 @@ pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Re
 /// Prints the outcome of a reproduction.
 ///
 /// # Errors
-/// If the text cannot be written.
+/// Returns an error if the text cannot be written.
 pub fn reproduction(report: &reproduce::Report, out: &mut impl Write) -> io::Result<()> {
     let (run, kept) = report.parts;
     writeln!(out, "{}", report.title)?;
@@ -129,7 +133,8 @@ fn against(ratio: f64, limit: &str) -> String {
 fn guarantee(metrics: &Metrics) -> Option<String> {
     let number = |name: &str| metrics.number(&format!("guarantee_{name}"));
     let share = number("share")?;
-    let status = metrics.text("guarantee_status").map_or(String::new(), |status| format!(" ({status})"));
+    let status =
+        metrics.text("guarantee_status").map_or(String::new(), |status| format!(" ({status})"));
     let margins = metrics.asked.keys().filter_map(|name| {
         let margin = name.strip_prefix("guarantee_")?.strip_suffix("_margin_min")?;
         Some((metrics.number(name), margin))
@@ -149,11 +154,13 @@ fn guarantee(metrics: &Metrics) -> Option<String> {
     Some(course + if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" })
 }
 
-/// The lines of the metrics that the experiment wants in the summary.
+/// Returns the lines for the metrics that the experiment wants in the summary, as headings and
+/// texts.
 fn asked(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
     let mut lines: Vec<(String, String)> = Vec::new();
     for name in &observe.summary {
-        let (Some(measure), Some(value)) = (observe.metrics.get(name), metrics.asked.get(name)) else {
+        let (Some(measure), Some(value)) = (observe.metrics.get(name), metrics.asked.get(name))
+        else {
             continue;
         };
         let unit = metrics.units.get(name).filter(|unit| !unit.is_empty());
@@ -167,10 +174,13 @@ fn asked(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
         };
         let number = |name: &String| metrics.number(name);
         let compared = match (number(name), measure.limit.as_ref().and_then(number)) {
-            (Some(value), Some(limit)) => against(value / limit, &format!("{}{unit}", shown(limit))),
+            (Some(value), Some(limit)) => {
+                against(value / limit, &format!("{}{unit}", shown(limit)))
+            }
             _ => String::new(),
         };
-        let part = if measure.part.is_empty() { String::new() } else { format!("{} ", measure.part) };
+        let part =
+            if measure.part.is_empty() { String::new() } else { format!("{} ", measure.part) };
         let text = format!("{part}{text}{unit}{compared}");
         match lines.last_mut().filter(|(label, _)| *label == measure.label) {
             Some((_, line)) => line.extend([", ", &text]),
@@ -203,12 +213,15 @@ mod tests {
     fn a_guarantee_is_told_in_one_line() {
         assert_eq!(guarantee(&Metrics::default()), None);
         let metrics = |asked: &[(&str, Value)]| {
-            let asked = asked.iter().map(|(name, value)| (format!("guarantee_{name}"), Some(value.clone())));
+            let asked = asked
+                .iter()
+                .map(|(name, value)| (format!("guarantee_{name}"), Some(value.clone())));
             Metrics { asked: asked.collect(), ..Metrics::default() }
         };
         let (number, text) = (Value::Number, |text: &str| Value::Text(text.into()));
         let margins = [("moment_margin_min", number(0.012)), ("rate_margin_min", number(0.031))];
-        let told = |asked: &[(&str, Value)]| guarantee(&metrics(&[asked, &margins].concat())).unwrap();
+        let told =
+            |asked: &[(&str, Value)]| guarantee(&metrics(&[asked, &margins].concat())).unwrap();
         let throughout = [("share", number(1.0)), ("status", text("inForce"))];
         assert_eq!(told(&throughout), "in force throughout, margins 1.2 % (moment), 3.1 % (rate)");
         let broken = [("share", number(1.0)), ("broken", Value::Flag(true))];

@@ -1,11 +1,12 @@
-//! Messages while the view has the terminal: they are kept, and written when it is gone.
+//! Log messages while the live view occupies the terminal: they are kept in memory, and written to
+//! standard error when the view has closed.
 
 use std::io::{self, IsTerminal, Write, stderr};
 use std::sync::{Mutex, PoisonError};
 
 static KEPT: Mutex<Option<Vec<u8>>> = Mutex::new(None);
 
-/// Standard error, or what is kept for it.
+/// A writer to standard error that keeps messages in memory while the view is shown.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Messages;
 
@@ -14,7 +15,7 @@ impl Write for Messages {
         if let Some(kept) = KEPT.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
             return kept.write(bytes);
         }
-        // A message that cannot be written is lost; the run is not.
+        // A message that cannot be written is lost, but the run continues.
         let _ = stderr().write_all(bytes);
         Ok(bytes.len())
     }
@@ -25,17 +26,17 @@ impl Write for Messages {
     }
 }
 
-/// Keeps messages from now on, if they would disturb the view.
+/// Keeps messages from now on, if standard error is a terminal, where they would disturb the view.
 pub(super) fn hold() {
     if stderr().is_terminal() {
         KEPT.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_default();
     }
 }
 
-/// Writes what was kept, and keeps no more.
+/// Writes the messages that were kept, and keeps no more.
 pub(super) fn release() {
     if let Some(kept) = KEPT.lock().unwrap_or_else(PoisonError::into_inner).take() {
-        // There is no one left to tell.
+        // If standard error cannot be written, there is nobody left to tell.
         let _ = stderr().write_all(&kept);
     }
 }

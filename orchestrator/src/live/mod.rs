@@ -1,7 +1,8 @@
-//! A view of the run on the terminal while it goes on, drawn by a thread of its own.
+//! A view of the run on the terminal while it is in progress, drawn by a thread of its own.
 //!
-//! At every communication point the master leaves a copy of what it sees, if the copy is not just being read; it never waits
-//! for the view. [`scene`] is what there is to show, [`view`] how it looks, [`log`] where messages go meanwhile.
+//! At every communication point the master leaves a copy of what it sees, unless the view is just
+//! reading the last one; it never waits for the view. [`scene`] holds what is shown, [`view`] draws
+//! it, and [`log`] keeps messages meanwhile.
 
 pub(crate) mod log;
 pub(crate) mod scene;
@@ -29,20 +30,22 @@ use view::State;
 /// Time between two pictures of the view.
 const BETWEEN_PICTURES: Duration = Duration::from_millis(66);
 
-/// The view, for as long as this lives. The terminal is as before when it is dropped, also by a panic.
+/// A live view that is open as long as this value lives. Dropping it restores the terminal, also
+/// after a panic.
 pub(crate) struct Live {
     snapshot: Arc<Mutex<Snapshot>>,
     tally: Option<Rc<Cell<Tally>>>,
-    /// Followed at every communication point, as the view does not see them all.
+    /// Course of the guarantee. It is followed at every communication point, because the view does
+    /// not see them all.
     guarantee: Option<Course>,
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<io::Result<()>>>,
 }
 
-/// Checks that there is a terminal to draw on.
+/// Checks that standard output is a terminal to draw on.
 ///
 /// # Errors
-/// If there is none.
+/// Returns an error if standard output is no terminal.
 pub(crate) fn check_terminal() -> Result<(), Error> {
     if stdout().is_terminal() {
         return Ok(());
@@ -53,10 +56,10 @@ pub(crate) fn check_terminal() -> Result<(), Error> {
 }
 
 impl Live {
-    /// Takes the terminal and begins to draw. The keys q and Ctrl-C ask to end the run.
+    /// Takes over the terminal and begins to draw. The keys q and Ctrl-C ask the run to end.
     ///
     /// # Errors
-    /// If there is no terminal that can be drawn on.
+    /// Returns an error if there is no terminal to draw on, or if it cannot be prepared.
     pub(crate) fn start(
         scene: Scene,
         tally: Option<Rc<Cell<Tally>>>,
@@ -84,7 +87,8 @@ impl Observer for Live {
         if let Some(course) = &mut self.guarantee {
             course.observe(sample)?;
         }
-        // The run does not wait for the view: what cannot be left now is left at the next communication point.
+        // The run does not wait for the view. If the view is reading, the copy is left at the next
+        // communication point.
         if let Ok(mut snapshot) = self.snapshot.try_lock() {
             snapshot.time = Some(sample.time);
             snapshot.values.clear();
@@ -101,7 +105,7 @@ impl Drop for Live {
         self.over.store(true, Ordering::Relaxed);
         let outcome = self.thread.take().map(JoinHandle::join);
         if outcome.is_none() {
-            // It could not be started.
+            // The thread could not be started, so the terminal is restored here.
             ratatui::restore();
         }
         log::release();
@@ -113,7 +117,7 @@ impl Drop for Live {
     }
 }
 
-/// Draws until the run is over.
+/// Draws the view until the run is over.
 fn show(
     mut terminal: DefaultTerminal,
     scene: Scene,
@@ -132,7 +136,7 @@ fn show(
             && let Some(request) = request(key)
         {
             if interrupt.asked().is_some() {
-                // Asked twice: a unit does not come back from a call.
+                // The user asked twice, because a unit does not return from a call.
                 ratatui::restore();
                 log::release();
                 process::exit(130);
@@ -144,7 +148,7 @@ fn show(
     Ok(())
 }
 
-/// Translates a key into a request. In the view Ctrl-C is a key, not a signal.
+/// Translates a key into a request. While the view is shown, Ctrl-C is a key and not a signal.
 fn request(key: KeyEvent) -> Option<Request> {
     if key.kind != KeyEventKind::Press {
         return None;
@@ -167,7 +171,8 @@ mod tests {
         assert_eq!(key(KeyCode::Char('q'), KeyModifiers::NONE), Some(Request::Quit));
         assert_eq!(key(KeyCode::Char('c'), KeyModifiers::CONTROL), Some(Request::INTERRUPT));
         assert_eq!(key(KeyCode::Char('c'), KeyModifiers::NONE), None);
-        let release = KeyEvent::new_with_kind(KeyCode::Char('q'), KeyModifiers::NONE, KeyEventKind::Release);
+        let release =
+            KeyEvent::new_with_kind(KeyCode::Char('q'), KeyModifiers::NONE, KeyEventKind::Release);
         assert_eq!(request(release), None);
     }
 
@@ -190,9 +195,9 @@ mod tests {
         live.observe(&sample(2.0, &[7.0])).unwrap();
         let left = snapshot.lock().unwrap().clone();
         assert_eq!((left.time, left.values[0]), (Some(2.0), 7.0));
-        // A loss is remembered that the view did not see.
+        // The view did not see the loss, but it is remembered.
         assert_eq!(left.guarantee.unwrap().lost.unwrap().time, 1.5);
-        // Without a view there is no terminal to give back.
+        // This test opened no terminal, so there is none to restore.
         std::mem::forget(live);
     }
 }

@@ -1,4 +1,4 @@
-//! What the view shows: the panels and readings that the experiment names.
+//! Content of the live view: the panels and readings that the experiment names.
 
 use crate::failure::Failure;
 use cosim::error::Error;
@@ -7,7 +7,7 @@ use cosim::system::{Probed, System};
 use cosim_report::guarantee::{Course, Signals};
 use cosim_report::panels::Panel;
 
-/// Everything that does not change while the run goes on.
+/// Everything in the view that stays the same during the run.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scene {
     /// Title of the experiment.
@@ -16,24 +16,24 @@ pub(crate) struct Scene {
     pub(crate) span: [f64; 2],
     /// Requested real-time factor, if the run is paced.
     pub(crate) factor: Option<f64>,
-    /// Names of the components, in their order.
+    /// Names of the components, in the order in which their inputs are set.
     pub(crate) components: Vec<String>,
-    /// The panels; the first two are drawn as charts.
+    /// Panels of the experiment; the first two are drawn as charts.
     pub(crate) panels: Vec<Panel>,
-    /// Lines of variables with their headings.
+    /// Further lines of variables, each with its heading.
     pub(crate) readings: Vec<(String, Vec<Probed>)>,
     /// Variables of the guarantee, if a unit gives one.
     pub(crate) guarantee: Option<Signals>,
-    /// The variables that are recorded, for an experiment that names no panels.
+    /// Recorded variables, which are shown if the experiment names no panels.
     pub(crate) recorded: Vec<Probed>,
 }
 
-/// The values that the master copies for the view.
+/// Values that the master copies for the view at a communication point.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Snapshot {
-    /// Simulated time of the communication point, s; `None` before the first.
+    /// Simulated time of the communication point, s; `None` before the first one.
     pub(crate) time: Option<f64>,
-    /// The probed values at this communication point.
+    /// Probed values at this communication point.
     pub(crate) values: Vec<f64>,
     /// State of the pacing, if the run is paced.
     pub(crate) tally: Option<Tally>,
@@ -41,7 +41,7 @@ pub(crate) struct Snapshot {
     pub(crate) guarantee: Option<Course>,
 }
 
-/// Formats a variable's value with its unit, or as the name of its item.
+/// Formats a variable's value with its unit, or as the name of its enumeration item.
 pub(crate) fn text(variable: &Probed, values: &[f64]) -> String {
     let value = values.get(variable.place).copied().unwrap_or(f64::NAN);
     let unit = &variable.unit;
@@ -54,11 +54,16 @@ pub(crate) fn text(variable: &Probed, values: &[f64]) -> String {
 }
 
 impl Scene {
-    /// Finds what there is, and has it seen at every communication point.
-    pub(crate) fn new(system: &mut System, panels: Vec<Panel>, factor: Option<f64>) -> Result<Self, Failure> {
+    /// Finds everything that the view shows, and requests that these variables are probed at every
+    /// communication point.
+    pub(crate) fn new(
+        system: &mut System,
+        panels: Vec<Panel>,
+        factor: Option<f64>,
+    ) -> Result<Self, Failure> {
         let observe = system.experiment.observe.clone();
         let mut found = |path: &String| system.has(path).then(|| system.probe(path).ok()).flatten();
-        // A reading that a unit lacks is left out, as a metric is that is optional.
+        // A reading that the units lack is left out, like an optional metric.
         let readings = observe.readings.iter().map(|(heading, paths)| {
             (heading.clone(), paths.iter().filter_map(&mut found).collect::<Vec<_>>())
         });

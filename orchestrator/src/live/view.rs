@@ -29,7 +29,7 @@ const POINTS: usize = 2000;
 /// A curve, as pairs of time and value.
 type Points = Vec<(f64, f64)>;
 
-/// The courses of a chart.
+/// Points of a chart's curves and of the references that they follow.
 #[derive(Debug, Default)]
 struct Chart {
     values: Vec<Points>,
@@ -70,12 +70,18 @@ impl State {
         self.now.clone_from(snapshot);
         self.elapsed = elapsed;
         let Some(time) = snapshot.time.filter(|_| news) else { return };
-        for (panel, Chart { values, references }) in self.scene.panels.iter().zip(&mut self.charts) {
+        for (panel, Chart { values, references }) in self.scene.panels.iter().zip(&mut self.charts)
+        {
             let seen = &snapshot.values;
-            values.iter_mut().zip(panel.values(seen)).for_each(|(course, y)| course.push((time, y)));
+            values
+                .iter_mut()
+                .zip(panel.values(seen))
+                .for_each(|(course, y)| course.push((time, y)));
             let followed = panel.references(seen);
             references.iter_mut().zip(followed).for_each(|(course, y)| course.push((time, y)));
-            for course in values.iter_mut().chain(references).filter(|course| course.len() >= POINTS) {
+            for course in
+                values.iter_mut().chain(references).filter(|course| course.len() >= POINTS)
+            {
                 let mut keep = false;
                 course.retain(|_| {
                     keep = !keep;
@@ -120,7 +126,8 @@ pub(crate) fn draw(frame: &mut Frame, state: &State) {
         frame.render_widget(bar, row);
     }
     frame.render_widget(Paragraph::new(lines), line_area);
-    let foot_text = if state.ending { "ending the run …" } else { "q: end the run, keep the results" };
+    let foot_text =
+        if state.ending { "ending the run …" } else { "q: end the run, keep the results" };
     frame.render_widget(Paragraph::new(foot_text.dark_gray()), foot);
 }
 
@@ -163,12 +170,18 @@ fn chart(frame: &mut Frame, state: &State, title: Line, drawn: &Chart, area: Rec
     let pale = drawn.references.iter().map(|course| (course, Color::DarkGray));
     let courses: Vec<(&Points, Color)> = pale.chain(drawn.values.iter().zip(colors())).collect();
     let datasets = courses.iter().map(|(course, color)| {
-        Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line).style(*color).data(course)
+        Dataset::default()
+            .marker(Marker::Braille)
+            .graph_type(GraphType::Line)
+            .style(*color)
+            .data(course)
     });
     let values = courses.iter().flat_map(|(course, _)| course.iter()).map(|(_, value)| *value);
     let (low, high) = values
         .filter(|value| value.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        });
     let (low, high) = if low < high { (low, high) } else { (-1.0, 1.0) };
     let axis = |[low, high]: [f64; 2], decimals: usize| {
         let labels = [low, high].map(|end| format!("{end:.decimals$}"));
@@ -183,7 +196,8 @@ fn chart(frame: &mut Frame, state: &State, title: Line, drawn: &Chart, area: Rec
 }
 
 fn recorded(frame: &mut Frame, state: &State, area: Rect) {
-    let width = state.scene.recorded.iter().map(|shown| shown.name.chars().count()).max().unwrap_or(0);
+    let width =
+        state.scene.recorded.iter().map(|shown| shown.name.chars().count()).max().unwrap_or(0);
     let values = state.values().unwrap_or_default();
     let lines: Vec<Line> = state
         .scene
@@ -195,7 +209,7 @@ fn recorded(frame: &mut Frame, state: &State, area: Rect) {
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
 
-/// A row of numbers for each panel, and one for what its curves are to follow.
+/// Returns a row of numbers for each panel, followed by a row for the references if there are any.
 fn numbers(state: &State) -> Vec<Line<'static>> {
     let Some(values) = state.values() else { return Vec::new() };
     let row = |label: &str, panel: &Panel, values: Vec<f64>| {
@@ -210,13 +224,14 @@ fn numbers(state: &State) -> Vec<Line<'static>> {
     let rows = state.scene.panels.iter().flat_map(|panel| {
         let own = row(&panel.name, panel, panel.values(values).collect());
         let followed = panel.has_references();
-        let followed = followed.then(|| row("reference", panel, panel.references(values).collect()));
+        let followed =
+            followed.then(|| row("reference", panel, panel.references(values).collect()));
         [Some(own), followed].into_iter().flatten()
     });
     rows.collect()
 }
 
-/// Norms of panels against their limits.
+/// Returns a bar for each panel with a limit, which compares the norm of its values with the limit.
 fn bars(state: &State) -> Vec<LineGauge<'static>> {
     let values = state.values();
     let limited = state.scene.panels.iter().filter_map(|panel| {
@@ -240,15 +255,18 @@ fn bars(state: &State) -> Vec<LineGauge<'static>> {
                 panel.unit,
                 ratio * 100.0
             );
-            // What is not a number is not within a limit.
+            // A value that is not a number is not within a limit, so the bar is drawn full.
             let filled = if ratio.is_nan() { 1.0 } else { ratio.clamp(0.0, 1.0) };
-            let gauge = LineGauge::default().filled_symbol(line::THICK_HORIZONTAL).ratio(filled).label(label);
+            let gauge = LineGauge::default()
+                .filled_symbol(line::THICK_HORIZONTAL)
+                .ratio(filled)
+                .label(label);
             gauge.filled_style(color).unfilled_style(Color::DarkGray)
         })
         .collect()
 }
 
-/// The lines of variables that the experiment names.
+/// Returns the lines of variables that the experiment names.
 fn readings(state: &State) -> Vec<Line<'static>> {
     let Some(values) = state.values() else { return Vec::new() };
     let line = |(heading, variables): &(String, Vec<Probed>)| {
@@ -265,7 +283,8 @@ fn readings(state: &State) -> Vec<Line<'static>> {
     state.scene.readings.iter().map(line).collect()
 }
 
-/// Whether the limits are guaranteed at present; red once that was lost or broken.
+/// Returns a line that says whether the guarantee is in force. It turns red once the guarantee was
+/// lost or broken.
 fn guarantee(state: &State) -> Option<Line<'static>> {
     let course = state.now.guarantee.as_ref()?;
     let status = |value: f64| format!(" ({})", course.name_of(value));
@@ -293,7 +312,10 @@ fn deadlines(state: &State, tally: &Tally) -> Vec<Line<'static>> {
         Span::raw(format!(", this step began {:.3} ms late", milliseconds(tally.lag))),
     ];
     if !tally.slipped.is_zero() {
-        spans.push(Span::raw(format!(", time base shifted by {:.1} ms", milliseconds(tally.slipped))));
+        spans.push(Span::raw(format!(
+            ", time base shifted by {:.1} ms",
+            milliseconds(tally.slipped)
+        )));
     }
     let last = tally.last.map(|miss| {
         let name = |index: usize| state.scene.components.get(index).map_or("", String::as_str);

@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
-/// Two of the unit in a loop.
+/// Experiment in which two instances of the unit form a loop.
 pub(crate) const LOOP: &str = r#"
 title = "gain and integrator"
 [simulation]
@@ -28,29 +28,35 @@ to = "plant.input"
 variables = ["gain.output.direct", "plant.output.integral", "plant.steps"]
 "#;
 
-/// How the unit in C is made.
+/// Instructions to make the unit in C.
 pub(crate) struct Recipe<'a> {
-    /// What the compiler is told besides, `-DENDS` for instance.
+    /// Further arguments of the compiler, for instance `-DENDS`.
     pub(crate) flags: &'a [&'a str],
-    /// What becomes of the text of its description.
+    /// Change to the text of the model description.
     pub(crate) description: &'a dyn Fn(String) -> String,
-    /// What becomes of its library.
+    /// Change to the bytes of the library.
     pub(crate) library: &'a dyn Fn(Vec<u8>) -> Vec<u8>,
-    /// What comes before the name of an entry.
+    /// Prefix of the names of the archive's entries.
     pub(crate) prefix: &'a str,
-    /// Name of the library.
+    /// Name of the library in the archive.
     pub(crate) name: &'a str,
 }
 
 impl Default for Recipe<'_> {
     fn default() -> Self {
-        Self { flags: &[], description: &|text| text, library: &|bytes| bytes, prefix: "", name: "unit.so" }
+        Self {
+            flags: &[],
+            description: &|text| text,
+            library: &|bytes| bytes,
+            prefix: "",
+            name: "unit.so",
+        }
     }
 }
 
-/// A folder with `Unit.fmu` and `loop.toml`.
+/// A folder that holds `Unit.fmu` and `loop.toml`.
 pub(crate) struct Bench {
-    /// Vanishes with it.
+    /// Temporary folder, which is removed when the bench is dropped.
     pub(crate) folder: TempDir,
 }
 
@@ -76,9 +82,11 @@ impl Bench {
             .status()
             .expect("a C compiler");
         assert!(status.success());
-        let mut zip = zip::ZipWriter::new(fs::File::create(folder.path().join("Unit.fmu")).unwrap());
+        let mut zip =
+            zip::ZipWriter::new(fs::File::create(folder.path().join("Unit.fmu")).unwrap());
         let mut add = |name: &str, content: &[u8]| {
-            zip.start_file(format!("{}{name}", recipe.prefix), SimpleFileOptions::default()).unwrap();
+            zip.start_file(format!("{}{name}", recipe.prefix), SimpleFileOptions::default())
+                .unwrap();
             zip.write_all(content).unwrap();
         };
         let description = fs::read_to_string(source.join("modelDescription.xml")).unwrap();
@@ -106,12 +114,12 @@ impl Bench {
         (status.code().expect("no signal"), text(stdout), text(stderr))
     }
 
-    /// Runs the experiment, as often as one likes.
+    /// Runs the experiment, and replaces results of an earlier run.
     pub(crate) fn run(&self, arguments: &[&str]) -> (i32, String, String) {
         self.call(&[&["run", "loop.toml", "--force"], arguments].concat())
     }
 
-    /// Refusal of an experiment: exit code 2, and one line.
+    /// Runs an experiment that must be refused with exit code 2 and one line on standard error.
     pub(crate) fn refusal(&self, arguments: &[&str]) -> String {
         let (code, _, errors) = self.run(arguments);
         assert_eq!(code, 2, "{errors}");

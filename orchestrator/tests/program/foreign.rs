@@ -1,10 +1,11 @@
-//! Units of other makers, imitated by a unit in C: what they do differently runs, and what is wrong with them is told.
+//! Units of other makers, imitated by a unit in C. What they do differently must run, and their
+//! faults must be reported.
 
 use crate::bench::{Bench, LOOP, Recipe};
 use std::fs;
 use std::process::Command;
 
-/// One line on standard error, which names the archive and nothing of the temporary folder.
+/// Checks that standard error holds one line, which names the archive and not the temporary folder.
 fn told(errors: &str) -> &str {
     assert_eq!(errors.lines().count(), 1, "{errors}");
     assert!(errors.starts_with("error: Unit.fmu: ") || errors.contains("/Unit.fmu: "), "{errors}");
@@ -63,7 +64,8 @@ fn a_unit_may_end_the_simulation() {
     assert_eq!(code, 0);
     assert!(errors.contains("plant ended the simulation at t = 2 s"), "{errors}");
 
-    // Without fmi2Terminated it is a failure, and says how far the unit got.
+    // Without fmi2Terminated the discarded step is a failure, whose message says how far the unit
+    // got.
     let (code, _, errors) = Bench::new().run(&fails);
     assert_eq!(code, 1);
     let last = "error: plant failed at t = 2 s in doStep: out of propellant at 2; it got as far as t = 3 s (fmi2Discard)";
@@ -72,12 +74,13 @@ fn a_unit_may_end_the_simulation() {
 
 #[test]
 fn a_status_that_does_not_exist_is_a_failure_of_that_call() {
-    // The logger is given it as well.
+    // The logger receives the same status.
     let description = changed(" min=\"2\" max=\"4\" start=\"3\"", " start=\"3\"");
     let bench = Bench::made(LOOP, &Recipe { description: &description, ..Recipe::default() });
     for status in ["-7", "42", "99"] {
         let value = format!("plant.fail.status={status}");
-        let (code, _, errors) = bench.run(&["--quiet", "--set", "plant.fail.time=2", "--set", &value]);
+        let (code, _, errors) =
+            bench.run(&["--quiet", "--set", "plant.fail.time=2", "--set", &value]);
         assert_eq!(code, 1, "{errors}");
         let last = format!(
             "error: plant failed at t = 2 s in doStep: out of propellant at 2 (status {status}, which FMI 2.0 does not have)"
@@ -104,27 +107,38 @@ fn what_is_wrong_with_a_library_is_told_by_its_entry() {
         ),
         "{misnamed}"
     );
-    // e_machine of ELF: 183 is AArch64.
+    // The field e_machine of an ELF file is 183 for AArch64.
     let for_arm = |mut bytes: Vec<u8>| {
         bytes[18..20].copy_from_slice(&[183, 0]);
         bytes
     };
     let other = of(&Recipe { library: &for_arm, ..Recipe::default() });
-    assert!(other.contains("binaries/linux64/unit.so is for Aarch64 (Elf), this program needs"), "{other}");
+    assert!(
+        other.contains("binaries/linux64/unit.so is for Aarch64 (Elf), this program needs"),
+        "{other}"
+    );
     let torn = of(&Recipe { library: &|bytes| bytes[..200].to_vec(), ..Recipe::default() });
     assert!(torn.contains("binaries/linux64/unit.so is no sound library"), "{torn}");
     let without = of(&Recipe { flags: &["-Dfmi2DoStep=step"], ..Recipe::default() });
-    assert!(without.contains("binaries/linux64/unit.so: undefined symbol: fmi2DoStep"), "{without}");
+    assert!(
+        without.contains("binaries/linux64/unit.so: undefined symbol: fmi2DoStep"),
+        "{without}"
+    );
 
     let folder = tempfile::tempdir().unwrap();
     let missing = folder.path().join("libnowhere.so");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
-    let made = Command::new(compiler).args(["-shared", "-x", "c", "/dev/null", "-o"]).arg(&missing).status();
+    let made = Command::new(compiler)
+        .args(["-shared", "-x", "c", "/dev/null", "-o"])
+        .arg(&missing)
+        .status();
     assert!(made.unwrap().success());
     let path = format!("-L{}", folder.path().display());
-    let needing = of(&Recipe { flags: &["-Wl,--no-as-needed", &path, "-lnowhere"], ..Recipe::default() });
+    let needing =
+        of(&Recipe { flags: &["-Wl,--no-as-needed", &path, "-lnowhere"], ..Recipe::default() });
     assert!(
-        needing.ends_with("binaries/linux64/unit.so needs libnowhere.so, which is not on this system"),
+        needing
+            .ends_with("binaries/linux64/unit.so needs libnowhere.so, which is not on this system"),
         "{needing}"
     );
 }
@@ -137,7 +151,11 @@ fn what_is_wrong_with_a_description_is_told_by_element_and_line() {
             "valueReference=\"-1\"",
             "valueReference = \"-1\" of the element ScalarVariable \"text\" in line 23 is not a whole number",
         ),
-        ("fmiVersion=\"2.0\"", "", "the element fmiModelDescription in line 2 has no attribute fmiVersion"),
+        (
+            "fmiVersion=\"2.0\"",
+            "",
+            "the element fmiModelDescription in line 2 has no attribute fmiVersion",
+        ),
         ("</ModelVariables>", "", "in line"),
     ] {
         let description = changed(from, to);
@@ -155,10 +173,14 @@ fn doubtful_units_are_warned_of_and_checked() {
             "\"flag\" valueReference=\"6\"",
             "\"flag\" valueReference=\"6\" causality=\"paramter\"",
         )(text);
-        let text = changed("causality=\"paramter\" causality=\"parameter\"", "causality=\"paramter\"")(text);
+        let text = changed(
+            "causality=\"paramter\" causality=\"parameter\"",
+            "causality=\"paramter\"",
+        )(text);
         changed("<Real unit=\"m/s\"/>", "<Real unit=\"knots\" start=\"fast\"/>")(text)
     };
-    let recipe = Recipe { description: &description, flags: &["-DVERSION=\"1.0\""], ..Recipe::default() };
+    let recipe =
+        Recipe { description: &description, flags: &["-DVERSION=\"1.0\""], ..Recipe::default() };
     let bench = Bench::made(LOOP, &recipe);
     let (code, text, errors) = bench.call(&["inspect", "--check", "Unit.fmu"]);
     let expected = "Unit.fmu: the causality \"paramter\" of \"flag\" is not known\n\
@@ -169,7 +191,10 @@ fn doubtful_units_are_warned_of_and_checked() {
     assert_eq!(errors, "error: Unit.fmu: 4 faults\n");
     let (code, _, errors) = bench.run(&["--quiet"]);
     assert_eq!(code, 0, "{errors}");
-    assert!(errors.contains("\"flag\" is not known (2 more: orchestrator inspect --check)"), "{errors}");
+    assert!(
+        errors.contains("\"flag\" is not known (2 more: orchestrator inspect --check)"),
+        "{errors}"
+    );
     assert_eq!(errors.matches("its library says that it is of FMI \"1.0\"").count(), 1, "{errors}");
     let (_, text, _) = bench.call(&["inspect", "Unit.fmu"]);
     assert!(text.contains("\nparamter (1)\n"), "{text}");
@@ -204,7 +229,12 @@ fn values_that_are_none_end_the_run() {
             "inf",
             "not finite",
         ),
-        ("-DITEM(value)=7", "plant failed at t = 2 s in getInteger: \"guarantee.status\"", "7", "no item"),
+        (
+            "-DITEM(value)=7",
+            "plant failed at t = 2 s in getInteger: \"guarantee.status\"",
+            "7",
+            "no item",
+        ),
         (
             "-DTRUTH(value)=3",
             "plant failed at t = 2 s in getBoolean: \"guarantee.inForce\"",
@@ -216,11 +246,18 @@ fn values_that_are_none_end_the_run() {
         let (code, _, errors) = bench.run(&["--quiet"]);
         assert_eq!(code, 1, "{flag}: {errors}");
         assert!(errors.contains(&format!("{place} is {value}, {what}")), "{flag}: {errors}");
-        assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(), 3);
+        assert_eq!(
+            fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(),
+            3
+        );
         let (code, _, errors) = bench.run(&["--quiet", "--on-invalid", "warn"]);
         assert_eq!(code, 0, "{flag}: {errors}");
         let text = format!("{} is {what}", place.split_once(": ").unwrap().1);
-        assert_eq!(errors.lines().filter(|line| line.contains(&text)).count(), 1, "{flag}: {errors}");
+        assert_eq!(
+            errors.lines().filter(|line| line.contains(&text)).count(),
+            1,
+            "{flag}: {errors}"
+        );
         assert!(errors.contains("first at t = 2 s, "), "{flag}: {errors}");
         let (code, _, errors) = bench.run(&["--quiet", "--on-invalid", "allow"]);
         assert_eq!((code, errors.contains(what)), (0, false), "{flag}");

@@ -1,4 +1,4 @@
-//! What a run measures, writes and says.
+//! Tests of what a run measures, writes and prints.
 
 use crate::bench::{Bench, LOOP};
 use std::fs;
@@ -6,10 +6,11 @@ use std::fs;
 #[test]
 fn oracle_a_run_writes_its_results() {
     let bench = Bench::new();
-    let (code, summary, errors) = bench.run(&["--set", "gain.gain=500 mm", "--set", "gain.kind=rough"]);
+    let (code, summary, errors) =
+        bench.run(&["--set", "gain.gain=500 mm", "--set", "gain.kind=rough"]);
     assert_eq!(code, 0, "{errors}");
     assert!(summary.contains("loop delay        none (gain -> plant -> gain)"), "{summary}");
-    // x⁺ = x + x/2.
+    // The state follows x⁺ = x + x/2.
     let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
     let expected = "time,gain.output.direct,plant.output.integral,plant.steps\n\
                     0.0,0.5,1.0,0\n1.0,0.75,1.5,1\n2.0,1.125,2.25,2\n3.0,1.6875,3.375,3\n";
@@ -29,7 +30,7 @@ fn oracle_a_run_writes_its_results() {
     }
 }
 
-/// The loop with what is to be measured, watched and drawn of it.
+/// Creates a bench whose loop has a section that says what is measured, watched and drawn.
 fn observed(section: &str) -> Bench {
     Bench::with(&format!("{LOOP}{section}"))
 }
@@ -68,8 +69,16 @@ none = { kind = "mean", signals = "none", optional = true }
     assert!(std::fs::read_to_string(bench.path("out/loop/plot.svg")).unwrap().contains("signals"));
 
     for (from, to, said) in [
-        (", optional = true", "", "[observe.metrics.none] there is no variable \"gain.output.none\""),
-        ("signals = \"ratio\"", "signals = \"ratoi\"", "[signals] has no \"ratoi\"; did you mean \"ratio\"?"),
+        (
+            ", optional = true",
+            "",
+            "[observe.metrics.none] there is no variable \"gain.output.none\"",
+        ),
+        (
+            "signals = \"ratio\"",
+            "signals = \"ratoi\"",
+            "[signals] has no \"ratoi\"; did you mean \"ratio\"?",
+        ),
         ("steps = true", "every = 0", "[observe.metrics.mean_square] every = 0: at least 1"),
         (
             "reference = \"plant.",
@@ -100,7 +109,10 @@ fn the_same_run_gives_the_same_bytes() {
 fn couplings_and_orders_that_delay_the_loop_say_so() {
     let bench = Bench::new();
     let (_, summary, _) = bench.run(&["--coupling", "jacobi"]);
-    assert!(summary.contains("1 s, 1 step (gain -> plant -> gain), from the Jacobi coupling"), "{summary}");
+    assert!(
+        summary.contains("1 s, 1 step (gain -> plant -> gain), from the Jacobi coupling"),
+        "{summary}"
+    );
     let bench = Bench::with(&LOOP.replace("[\"gain\", \"plant\"]", "[\"plant\", \"gain\"]"));
     let (_, summary, _) = bench.run(&[]);
     assert!(summary.contains("1 s, 1 step (plant -> gain -> plant), from the order"), "{summary}");
@@ -115,18 +127,19 @@ fn a_law_that_counts_on_another_delay_is_warned_of_in_one_line() {
         assert_eq!(code, 0, "{errors}");
         errors
     };
-    let jacobi = ["--coupling", "jacobi", "--set", "gain.delay=1.25", "--set", "plant.actuation.delay=0.25"];
+    let jacobi =
+        ["--coupling", "jacobi", "--set", "gain.delay=1.25", "--set", "plant.actuation.delay=0.25"];
     let errors = warnings(&jacobi);
-    // The plant has a parameter of this name, too, and counts on nothing.
+    // The plant also has a parameter of this name, which stays at 0.
     assert_eq!(errors.lines().count(), 1, "{errors}");
-    let told =
-        "plant.delay = 0 s, but the loop gain -> plant -> gain has a delay of 1 s: set plant.delay = 1";
+    let told = "plant.delay = 0 s, but the loop gain -> plant -> gain has a delay of 1 s: set plant.delay = 1";
     assert!(errors.contains(told), "{errors}");
     assert_eq!(warnings(&[&jacobi[..], &["--set", "plant.delay=1"]].concat()), "");
     assert_eq!(warnings(&[]), "");
     let errors = warnings(&["--set", "gain.delay=0.5"]);
     assert!(
-        errors.contains("gain.delay = 0.5 s, but the loop gain -> plant -> gain has a delay of 0 s"),
+        errors
+            .contains("gain.delay = 0.5 s, but the loop gain -> plant -> gain has a delay of 0 s"),
         "{errors}"
     );
 }
@@ -148,34 +161,50 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
         let (code, summary, errors) =
             bench.run(&["--set", "gain.gain=0.5", "--set", &format!("gain.largest={largest}")]);
         assert_eq!(code, 0, "{errors}");
-        let line = summary.lines().find(|line| line.starts_with("  guarantee ")).unwrap().to_string();
+        let line =
+            summary.lines().find(|line| line.starts_with("  guarantee ")).unwrap().to_string();
         (line, bench.json("out/loop/metrics.json"))
     };
-    // Its input is 1, 1.5, 2.25, 3.375; margins of 1 - input/largest, and half of that.
+    // The input is 1, 1.5, 2.25, 3.375; the margins are 1 - input/largest, and half of that.
     let (line, metrics) = guarantee("2");
-    assert_eq!(line, "  guarantee         in force at 50.0 % of the ticks, lost at t = 2 s (exceeded)");
-    assert_eq!((&metrics["guarantee_share"], &metrics["guarantee_lost_at"]), (&0.5.into(), &2.0.into()));
+    assert_eq!(
+        line,
+        "  guarantee         in force at 50.0 % of the ticks, lost at t = 2 s (exceeded)"
+    );
+    assert_eq!(
+        (&metrics["guarantee_share"], &metrics["guarantee_lost_at"]),
+        (&0.5.into(), &2.0.into())
+    );
     assert_eq!(metrics["guarantee_rate_margin_min"], 0.25);
     assert_eq!(metrics["guarantee_moment_margin_min"], 0.125);
-    // No limits are known.
+    // The experiment names no limits.
     assert!(metrics["guarantee_broken"].is_null());
     let (line, metrics) = guarantee("3.75");
-    assert_eq!(line, "  guarantee         in force throughout, margins 5.0 % (moment), 10.0 % (rate)");
+    assert_eq!(
+        line,
+        "  guarantee         in force throughout, margins 5.0 % (moment), 10.0 % (rate)"
+    );
     assert!(metrics["guarantee_lost_at"].is_null());
     assert_eq!(guarantee("0.5").0, "  guarantee         never in force (exceeded)");
     let (_, summary, _) = Bench::new().run(&[]);
     assert!(!summary.contains("guarantee"), "{summary}");
     let message = observed(&section("gain.fail")).refusal(&[]);
-    assert!(message.contains("[observe.guarantee] there is no variable \"gain.fail.inForce\""), "{message}");
+    assert!(
+        message.contains("[observe.guarantee] there is no variable \"gain.fail.inForce\""),
+        "{message}"
+    );
     let may_lack = observed(&format!("{}optional = true\n", section("gain.fail")));
     assert_eq!(may_lack.run(&[]).0, 0);
-    assert!(may_lack.json("out/loop/metrics.json").as_object().unwrap()["guarantee_share"].is_null());
+    assert!(
+        may_lack.json("out/loop/metrics.json").as_object().unwrap()["guarantee_share"].is_null()
+    );
 }
 
 #[test]
 fn a_failing_unit_ends_the_run_with_its_own_words_and_keeps_the_results() {
     let bench = Bench::new();
-    // fmi2Discard, fmi2Error, and fmi2Fatal, after which not even fmi2FreeInstance may be called.
+    // The statuses are fmi2Discard, fmi2Error, and fmi2Fatal, after which not even fmi2FreeInstance
+    // may be called.
     for (status, name) in [("2", "fmi2Discard"), ("3", "fmi2Error"), ("4", "fmi2Fatal")] {
         let status = format!("plant.fail.status={status}");
         let (code, _, errors) = bench.run(&["--set", "plant.fail.time=2", "--set", &status]);
@@ -186,7 +215,10 @@ fn a_failing_unit_ends_the_run_with_its_own_words_and_keeps_the_results() {
             "{last}"
         );
         assert!(last.contains(name), "{last}");
-        assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(), 4);
+        assert_eq!(
+            fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(),
+            4
+        );
         assert_eq!(bench.json("out/loop/metrics.json")["completed"], false);
         let status = bench.json("out/loop/results.json")["status"].as_str().unwrap().to_string();
         assert!(status.contains("out of propellant"), "{status}");
@@ -205,12 +237,16 @@ fn a_warning_is_told_once_with_first_time_and_count() {
     let (code, _, errors) = bench.run(&["--quiet", "--set", "plant.flag=true"]);
     assert_eq!(code, 0);
     assert_eq!(errors.lines().count(), 1, "{errors}");
-    assert!(errors.contains("plant: [trouble] runs hot at 7 (first at t = 1 s, 3 times)"), "{errors}");
+    assert!(
+        errors.contains("plant: [trouble] runs hot at 7 (first at t = 1 s, 3 times)"),
+        "{errors}"
+    );
 }
 
 #[test]
 fn results_can_be_left_out_or_labelled() {
-    let bench = Bench::with(&LOOP.replace("\"plant.steps\"", "\"plant.steps\", \"gain.guarantee.status\""));
+    let bench =
+        Bench::with(&LOOP.replace("\"plant.steps\"", "\"plant.steps\", \"gain.guarantee.status\""));
     let (code, summary, errors) = bench.run(&["--no-csv", "--no-plot", "--out", "few"]);
     assert_eq!(code, 0, "{errors}");
     assert!(summary.contains("few: results.json, metrics.json\n"), "{summary}");
@@ -218,9 +254,15 @@ fn results_can_be_left_out_or_labelled() {
     let (code, summary, errors) = bench.run(&["--format", "parquet", "--out", "columnar"]);
     assert_eq!(code, 0, "{errors}");
     assert!(summary.contains("columnar: results.parquet, results.json"), "{summary}");
-    assert!(bench.path("columnar/results.parquet").exists() && !bench.path("columnar/results.csv").exists());
+    assert!(
+        bench.path("columnar/results.parquet").exists()
+            && !bench.path("columnar/results.csv").exists()
+    );
     let (code, _, errors) = bench.run(&["--format", "parquet", "--labels", "--out", "neither"]);
-    assert!(code == 2 && errors.contains("--labels") && !bench.path("neither").exists(), "{code} {errors}");
+    assert!(
+        code == 2 && errors.contains("--labels") && !bench.path("neither").exists(),
+        "{code} {errors}"
+    );
     let head = |arguments: &[&str]| {
         assert_eq!(bench.run(arguments).0, 0);
         let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
@@ -237,7 +279,7 @@ fn results_can_be_left_out_or_labelled() {
     let names = "time [s],gain.output.direct [m],plant.output.integral [m],plant.steps,gain.guarantee.status";
     assert_eq!(labelled[0], names);
     let item = labelled[1].rsplit(',').next().unwrap();
-    // Whichever way, the numbers have their names beside them.
+    // The metadata name the items of enumerations in any case.
     let columns = &bench.json("out/loop/results.json")["columns"];
     assert_eq!(columns[3]["items"]["1"], item, "{columns}");
     assert!(columns[0]["items"].is_null() && columns[0]["unit"] == "m");

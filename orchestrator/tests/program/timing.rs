@@ -1,4 +1,5 @@
-//! Runs with the wall clock, runs that are ended, and what they leave behind.
+//! Tests of runs with the wall clock, of runs that are ended early, and of the files that they
+//! leave.
 
 use crate::bench::Bench;
 use std::fs;
@@ -22,10 +23,14 @@ fn a_run_in_real_time_takes_its_time() {
     // The first communication point is not waited for.
     assert_eq!(real_time["components"]["plant"]["wake_up_ms"]["count"], 1);
     assert_eq!(bench.json("out/loop/results.json")["real_time"]["on_miss"], "catch-up");
-    assert!(fs::read_to_string(bench.path("out/loop/realtime.svg")).unwrap().contains("wake-up jitter, ms"));
+    assert!(
+        fs::read_to_string(bench.path("out/loop/realtime.svg"))
+            .unwrap()
+            .contains("wake-up jitter, ms")
+    );
 }
 
-/// No machine steps units in a nanosecond.
+/// A real-time factor that leaves a nanosecond for each step, which no machine can keep.
 const IMPOSSIBLE: &str = "1e9";
 
 #[test]
@@ -37,15 +42,20 @@ fn every_missed_deadline_is_counted_and_what_was_done_is_said() {
     {
         let (code, summary, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--on-miss", policy]);
         assert_eq!(code, 0, "{errors}");
-        assert!(summary.contains(": 8 of 8 deadlines missed") && summary.contains(said), "{summary}");
         assert!(
-            summary.contains("first miss        gain at t = 0 s, ") && summary.contains("worst miss"),
+            summary.contains(": 8 of 8 deadlines missed") && summary.contains(said),
+            "{summary}"
+        );
+        assert!(
+            summary.contains("first miss        gain at t = 0 s, ")
+                && summary.contains("worst miss"),
             "{summary}"
         );
         // The results are those of a run without pacing.
         let rows = |out: &str| fs::read(bench.path(out).join("results.csv")).unwrap();
         assert_eq!(rows("out/loop"), rows("usual"));
-        let (_, _, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--on-miss", policy, "--quiet"]);
+        let (_, _, errors) =
+            bench.run(&["--real-time", IMPOSSIBLE, "--on-miss", policy, "--quiet"]);
         assert!(errors.contains("8 of 8 deadlines missed") && errors.contains(said), "{errors}");
     }
     let (code, summary, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--on-miss", "stop"]);
@@ -61,7 +71,7 @@ fn every_missed_deadline_is_counted_and_what_was_done_is_said() {
 #[test]
 fn a_slow_unit_is_named() {
     let bench = Bench::new();
-    // 20 ms from tick to tick, and a step of the plant takes 50 ms.
+    // There are 20 ms from tick to tick, but a step of the plant takes 50 ms.
     let (code, summary, errors) = bench.run(&["--real-time", "50", "--set", "plant.pause=0.05"]);
     assert_eq!(code, 0, "{errors}");
     let worst = summary.lines().find(|line| line.contains("worst miss")).unwrap();
@@ -86,7 +96,9 @@ fn factors_and_priorities_that_make_no_sense_are_refused() {
     let (code, _, errors) = bench.call(&["run", "--real-time", "loop.toml"]);
     assert_eq!(code, 2);
     assert!(errors.contains("write the experiment before --real-time"), "{errors}");
-    for arguments in [&["--on-miss", "stop"][..], &["--priority"], &["--real-time", "--priority", "100"]] {
+    for arguments in
+        [&["--on-miss", "stop"][..], &["--priority"], &["--real-time", "--priority", "100"]]
+    {
         assert_eq!(bench.run(arguments).0, 2, "{arguments:?}");
     }
 }
@@ -97,18 +109,24 @@ fn a_priority_is_had_or_refused_in_words() {
     let (code, summary, errors) = bench.run(&["--real-time", "1000", "--priority", "1"]);
     assert_eq!(code, 0, "{errors}");
     let line = summary.lines().find(|line| line.starts_with("  priority ")).unwrap();
-    assert!(line.contains("SCHED_FIFO 1") || line.contains("REFUSED, ran with usual scheduling: "), "{line}");
+    assert!(
+        line.contains("SCHED_FIFO 1") || line.contains("REFUSED, ran with usual scheduling: "),
+        "{line}"
+    );
 }
 
 #[test]
 fn the_live_view_wants_a_terminal() {
     let bench = Bench::new();
     let message = bench.refusal(&["--live"]);
-    assert!(message.contains("--live draws on a terminal, and standard output is none"), "{message}");
+    assert!(
+        message.contains("--live draws on a terminal, and standard output is none"),
+        "{message}"
+    );
     assert!(!bench.path("out").exists());
 }
 
-/// Starts the program, sends it a signal once `awaited` is there, and gives back its exit code.
+/// Starts the program, sends it a signal once the file `awaited` exists, and returns its exit code.
 #[cfg(unix)]
 fn signalled(bench: &Bench, arguments: &[&str], signal: &str, awaited: &str) -> Option<i32> {
     let mut child = bench
@@ -131,12 +149,15 @@ fn signalled(bench: &Bench, arguments: &[&str], signal: &str, awaited: &str) -> 
 fn a_signal_ends_any_run_and_keeps_its_results() {
     let bench = Bench::new();
     fs::create_dir(bench.path("tmp")).unwrap();
-    // A step takes ten hours, or as long as the unit does.
+    // A step takes ten hours in the paced run, and as long as the unit takes in the usual one.
     let paced = ["run", "loop.toml", "--force", "--real-time", "2.7e-5"];
     let usual = ["run", "loop.toml", "--force", "--stop", "1000", "--set", "plant.pause=0.02"];
-    for (arguments, signal, code) in
-        [(&paced[..], "-INT", 130), (&paced, "-TERM", 143), (&usual, "-INT", 130), (&usual, "-TERM", 143)]
-    {
+    for (arguments, signal, code) in [
+        (&paced[..], "-INT", 130),
+        (&paced, "-TERM", 143),
+        (&usual, "-INT", 130),
+        (&usual, "-TERM", 143),
+    ] {
         fs::create_dir_all(bench.path("out/loop")).unwrap();
         for old in ["metrics.json", "plot.svg", "realtime.svg"] {
             fs::write(bench.path("out/loop").join(old), "of an earlier run").unwrap();
@@ -159,7 +180,8 @@ fn a_signal_ends_any_run_and_keeps_its_results() {
 #[test]
 fn results_of_an_earlier_run_are_replaced_only_if_that_is_asked_for() {
     let bench = Bench::new();
-    let run = |arguments: &[&str]| bench.call(&[&["run", "loop.toml", "--quiet"], arguments].concat());
+    let run =
+        |arguments: &[&str]| bench.call(&[&["run", "loop.toml", "--quiet"], arguments].concat());
     assert_eq!(run(&[]), (0, String::new(), String::new()));
     let before = fs::read(bench.path("out/loop/results.csv")).unwrap();
     let (code, _, errors) = run(&["--stop", "1"]);
@@ -172,10 +194,14 @@ fn results_of_an_earlier_run_are_replaced_only_if_that_is_asked_for() {
     let (code, _, errors) = run(&["--out", "loop.toml"]);
     assert!(code == 2 && errors.contains("--out loop.toml is a file"), "{errors}");
 
-    let pack = |arguments: &[&str]| bench.call(&[&["pack", "loop.toml", "--ssp"], arguments].concat());
+    let pack =
+        |arguments: &[&str]| bench.call(&[&["pack", "loop.toml", "--ssp"], arguments].concat());
     assert_eq!(pack(&[]).0, 0);
     let (code, _, errors) = pack(&[]);
-    assert!(code == 2 && errors.contains("loop.ssp is there already: --force replaces it"), "{errors}");
+    assert!(
+        code == 2 && errors.contains("loop.ssp is there already: --force replaces it"),
+        "{errors}"
+    );
     assert_eq!(pack(&["--force"]).0, 0);
 }
 
@@ -252,7 +278,7 @@ fn standard_error_that_cannot_be_written_ends_no_run() {
         command.stdout(Stdio::null()).stderr(full).status().unwrap().code()
     };
     assert_eq!(run(&[]), Some(0));
-    // With a warning.
+    // This run prints a warning.
     assert_eq!(run(&["--set", "gain.delay=0.5"]), Some(0));
     assert_eq!(run(&["--set", "gain.gian=0.5"]), Some(2));
     assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(), 5);
@@ -278,7 +304,8 @@ fn nothing_is_left_in_the_temporary_folder() {
     let bench = Bench::new();
     let temporary = bench.path("tmp with space");
     fs::create_dir(&temporary).unwrap();
-    let status = bench.command(&["run", "loop.toml", "--quiet"]).env("TMPDIR", &temporary).status().unwrap();
+    let status =
+        bench.command(&["run", "loop.toml", "--quiet"]).env("TMPDIR", &temporary).status().unwrap();
     assert!(status.success());
     assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);
 }

@@ -1,4 +1,4 @@
-//! What the command line and the files are refused for, and what is found.
+//! Tests of what the program refuses, in the command line and in files, and of what it finds.
 
 use crate::bench::{Bench, LOOP};
 use std::fs;
@@ -6,7 +6,8 @@ use std::io::Write;
 use std::path::Path;
 use zip::write::SimpleFileOptions;
 
-/// Whether a line of the list shows this file with this title, among those of the project if the program was built there.
+/// Returns whether a line of the list shows this file with this title. If the program was built in
+/// the project, the list also shows the project's files.
 fn lists(text: &str, file: &str, title: &str) -> bool {
     text.lines().any(|line| line.contains(file) && line.ends_with(title))
 }
@@ -42,22 +43,30 @@ fn experiments_and_units_are_found_from_any_folder() {
     assert!(code == Some(2) && errors.contains("there is no experiment \"lop\""), "{errors}");
     assert!(errors.contains("did you mean \"loop\"?"), "{errors}");
     let (code, _, errors) = run(&["run", "some/Unit.fmu"]);
-    assert!(code == Some(2) && errors.contains("is a unit, and units are run by an experiment"), "{errors}");
+    assert!(
+        code == Some(2) && errors.contains("is a unit, and units are run by an experiment"),
+        "{errors}"
+    );
     fs::create_dir(bench.path("more")).unwrap();
     fs::copy(bench.path("loop.toml"), bench.path("more/loop.toml")).unwrap();
     let (code, _, errors) = run(&["run", "loop"]);
-    assert!(code == Some(2) && errors.contains("several experiments are called loop: "), "{errors}");
+    assert!(
+        code == Some(2) && errors.contains("several experiments are called loop: "),
+        "{errors}"
+    );
 }
 
 #[test]
 fn usage_that_is_nearly_right_is_told_what_it_lacks() {
     let bench = Bench::new();
-    assert!(bench.refusal(&["--stop", "-1"]).contains("stop = -1 s must be at least one step of 1 s"));
+    assert!(
+        bench.refusal(&["--stop", "-1"]).contains("stop = -1 s must be at least one step of 1 s")
+    );
     let (code, _, errors) = bench.call(&["pack", "loop.toml"]);
     assert!(code == 2 && errors.contains("--ssp"), "{errors}");
     let (code, _, errors) = bench.call(&["reproduce", "loop", "--members", "0"]);
     assert!(code == 2 && errors.contains("--members"), "{errors}");
-    // A unit without inputs that are left: all of none stay unconnected.
+    // The pattern leaves all inputs of this component unconnected, however many there are.
     let lonely = LOOP.replace(
         "[components.plant]",
         "[components.other]\nfmu = \"Unit.fmu\"\nunconnected = [\"*\"]\n[components.plant]",
@@ -65,16 +74,18 @@ fn usage_that_is_nearly_right_is_told_what_it_lacks() {
     let bench = Bench::with(&lonely);
     let (code, summary, errors) = bench.run(&[]);
     assert_eq!(code, 0, "{errors}");
-    // What the order leaves out comes last.
+    // A component that the order leaves out comes last.
     assert!(summary.contains("gain, plant, other"), "{summary}");
 }
 
 #[test]
 fn a_unit_is_exchanged_from_the_command_line() {
-    let experiment =
-        LOOP.replace("[components.plant]", "[components.gain.parameters]\ngain = 3.0\n[components.plant]");
+    let experiment = LOOP.replace(
+        "[components.plant]",
+        "[components.gain.parameters]\ngain = 3.0\n[components.plant]",
+    );
     let bench = Bench::with(&experiment);
-    // Another unit, that lacks what is set of the first.
+    // The new unit lacks a parameter that the experiment sets.
     let mut old = zip::ZipArchive::new(fs::File::open(bench.path("Unit.fmu")).unwrap()).unwrap();
     fs::create_dir(bench.path("mine")).unwrap();
     let mut zip = zip::ZipWriter::new(fs::File::create(bench.path("mine/My.fmu")).unwrap());
@@ -159,11 +170,20 @@ fn wrong_names_are_refused_with_place_and_remedy() {
         "{message}"
     );
     let message = refusal_of("to = \"gain.input\"", "to = \"gian.input\"");
-    assert!(message.contains("loop.toml:13: ") && message.contains("did you mean \"gain\""), "{message}");
+    assert!(
+        message.contains("loop.toml:13: ") && message.contains("did you mean \"gain\""),
+        "{message}"
+    );
     let message = refusal_of("\"plant.steps\"", "\"plant.step\"");
-    assert!(message.contains("loop.toml:18: ") && message.contains("did you mean \"steps\""), "{message}");
+    assert!(
+        message.contains("loop.toml:18: ") && message.contains("did you mean \"steps\""),
+        "{message}"
+    );
     let message = refusal_of("Unit.fmu\"\n[components.plant]", "Unti.fmu\"\n[components.plant]");
-    assert!(message.contains("loop.toml:8: ") && message.contains("did you mean \"Unit.fmu\""), "{message}");
+    assert!(
+        message.contains("loop.toml:8: ") && message.contains("did you mean \"Unit.fmu\""),
+        "{message}"
+    );
     let message = refusal_of("[\"gain\", \"plant\"]", "[\"gain\", \"palnt\"]");
     assert!(message.contains("did you mean \"plant\""), "{message}");
     let message = refusal_of("[\"gain\", \"plant\"]", "[]");
@@ -195,12 +215,18 @@ fn wrong_settings_are_refused() {
     ] {
         let message = bench.refusal(&["--set", setting]);
         assert!(message.contains(remedy), "{setting}: {message}");
-        assert!(message.starts_with("error: --set ") && !message.contains("loop.toml"), "{message}");
+        assert!(
+            message.starts_with("error: --set ") && !message.contains("loop.toml"),
+            "{message}"
+        );
     }
     assert!(bench.refusal(&["--stop", "2.5"]).contains("2 s or 3 s"));
     let (code, _, errors) = bench.run(&["--set", "gain.text=hello", "--set", "gain.flag=true"]);
     assert_eq!(code, 0, "{errors}");
-    assert_eq!(bench.json("out/loop/results.json")["components"]["gain"]["parameters"]["flag"], true);
+    assert_eq!(
+        bench.json("out/loop/results.json")["components"]["gain"]["parameters"]["flag"],
+        true
+    );
 }
 
 #[test]
@@ -226,20 +252,26 @@ fn wrong_wiring_is_refused() {
 
 #[test]
 fn inputs_without_connection_must_be_meant() {
-    let open = LOOP.replace("[[connections]]\nfrom = \"gain.output.direct\"\nto = \"plant.input\"\n", "");
+    let open =
+        LOOP.replace("[[connections]]\nfrom = \"gain.output.direct\"\nto = \"plant.input\"\n", "");
     let message = Bench::with(&open).refusal(&[]);
     assert!(message.contains("inputs of \"plant\" are not connected: input"), "{message}");
-    // The line that the message proposes is the remedy.
+    // The line that the message proposes solves the problem.
     let (_, line) = message.split_once("[components.plant]: ").unwrap();
     let meant = open.replace("[components.plant]\n", &format!("[components.plant]\n{line}"));
     assert_eq!(Bench::with(&meant).run(&[]).0, 0);
-    // A value will do as well.
+    // A value for the input solves it as well.
     let bench = Bench::with(&open);
     assert_eq!(bench.run(&["--set", "plant.input=3"]).0, 0);
-    assert!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().contains("\n3.0,20.0,10.0,3\n"));
-    let message =
-        Bench::with(&LOOP.replace("[components.plant]\n", "[components.plant]\nunconnected = [\"input\"]\n"))
-            .refusal(&[]);
+    assert!(
+        fs::read_to_string(bench.path("out/loop/results.csv"))
+            .unwrap()
+            .contains("\n3.0,20.0,10.0,3\n")
+    );
+    let message = Bench::with(
+        &LOOP.replace("[components.plant]\n", "[components.plant]\nunconnected = [\"input\"]\n"),
+    )
+    .refusal(&[]);
     assert!(message.contains("is said to be unconnected, but is connected"), "{message}");
 }
 
@@ -248,14 +280,21 @@ fn inspect_and_list_show_what_there_is() {
     let bench = Bench::new();
     let (code, text, _) = bench.call(&["inspect", "Unit.fmu"]);
     assert_eq!(code, 0);
-    for part in
-        ["{u-1}", "linux64", "canHandleVariableCommunicationStepSize", "output.integral", "{calm, rough}"]
-    {
+    for part in [
+        "{u-1}",
+        "linux64",
+        "canHandleVariableCommunicationStepSize",
+        "output.integral",
+        "{calm, rough}",
+    ] {
         assert!(text.contains(part), "{part}: {text}");
     }
     let (code, text, _) = bench.call(&["list"]);
     assert_eq!(code, 0);
-    assert!(lists(&text, "loop.toml", "gain and integrator") && text.contains("Unit.fmu"), "{text}");
+    assert!(
+        lists(&text, "loop.toml", "gain and integrator") && text.contains("Unit.fmu"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -263,30 +302,42 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     let bench = Bench::new();
     let (code, _, errors) = bench.call(&["run", "loop.toml", "--quiet"]);
     assert_eq!(code, 0, "{errors}");
-    let results = |name: &str| fs::read_to_string(bench.path(&format!("out/{name}/results.csv"))).unwrap();
+    let results =
+        |name: &str| fs::read_to_string(bench.path(&format!("out/{name}/results.csv"))).unwrap();
     let own = "extends = \"../loop.toml\"\ntitle = \"longer\"\n[simulation]\nstop = 4.0\n";
     fs::create_dir(bench.path("more")).unwrap();
     fs::write(bench.path("more/longer.toml"), own).unwrap();
     // The unit stands beside the file that is extended.
     let (code, _, errors) = bench.call(&["run", "longer", "--quiet"]);
     assert_eq!(code, 0, "{errors}");
-    assert!(results("longer").starts_with(&results("loop")) && results("longer") != results("loop"));
-    // What is kept of the run, what is shown and what is packed is the whole.
+    assert!(
+        results("longer").starts_with(&results("loop")) && results("longer") != results("loop")
+    );
+    // The kept, the shown and the packed experiment are the merged whole.
     let kept = bench.json("out/longer/results.json");
     let (code, shown, _) = bench.call(&["show", "longer"]);
-    assert!(code == 0 && kept["experiment"]["text"] == shown && !shown.contains("extends"), "{shown}");
+    assert!(
+        code == 0 && kept["experiment"]["text"] == shown && !shown.contains("extends"),
+        "{shown}"
+    );
     fs::write(bench.path("whole.toml"), shown).unwrap();
     let (code, _, errors) = bench.call(&["run", "whole.toml", "--quiet"]);
     assert!(code == 0 && results("whole") == results("longer"), "{errors}");
-    let (code, _, errors) = bench.call(&["pack", "more/longer.toml", "--ssp", "--out", "longer.ssp"]);
+    let (code, _, errors) =
+        bench.call(&["pack", "more/longer.toml", "--ssp", "--out", "longer.ssp"]);
     assert_eq!(code, 0, "{errors}");
     let (code, _, errors) = bench.call(&["run", "longer.ssp", "--quiet", "--out", "out/packed"]);
     assert_eq!(code, 0, "{errors}");
-    // A fault is told with the file that has it; without a title a file is no experiment of its own.
+    // A fault is reported with the file that contains it. A file without a title is no experiment
+    // of its own.
     fs::write(bench.path("loop.toml"), LOOP.replace("plant.steps", "plant.stepz")).unwrap();
     let (code, _, errors) = bench.call(&["run", "more/longer.toml", "--force"]);
-    assert!(code == 2 && errors.contains("loop.toml:18: ") && errors.contains("\"steps\""), "{errors}");
-    fs::write(bench.path("loop.toml"), LOOP.replace("title = \"gain and integrator\"\n", "")).unwrap();
+    assert!(
+        code == 2 && errors.contains("loop.toml:18: ") && errors.contains("\"steps\""),
+        "{errors}"
+    );
+    fs::write(bench.path("loop.toml"), LOOP.replace("title = \"gain and integrator\"\n", ""))
+        .unwrap();
     let (_, text, _) = bench.call(&["list"]);
     assert!(lists(&text, "longer.toml", "longer") && !text.contains("./loop.toml"), "{text}");
 }

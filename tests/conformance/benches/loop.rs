@@ -44,7 +44,8 @@ impl Loop {
             [alpha, beta, sigma, p, q, r]
         });
         let moment = [plant, controller].map(|unit| vector(unit, "moment", ["x", "y", "z"]));
-        let (plant, controller) = (plant.instance(CO_SIMULATION), controller.instance(CO_SIMULATION));
+        let (plant, controller) =
+            (plant.instance(CO_SIMULATION), controller.instance(CO_SIMULATION));
         plant.choose("disturbance.kind", "white");
         plant.ok(plant.set_real(plant.unit.reference("inertia.scale"), 1.05));
         if let Some(constraints) = constraints {

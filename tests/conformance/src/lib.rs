@@ -6,11 +6,16 @@
 #![allow(unsafe_code)]
 #![allow(clippy::borrow_as_ptr, reason = "calls read better as in C")]
 #![allow(clippy::missing_panics_doc, reason = "a test fails by panicking")]
-#![allow(clippy::not_unsafe_ptr_arg_deref, reason = "handles are the library's: they are not followed here")]
+#![allow(
+    clippy::not_unsafe_ptr_arg_deref,
+    reason = "handles are the library's: they are not followed here"
+)]
 
 pub mod interface;
 
-use interface::{CO_SIMULATION, Callbacks, Component, EventInfo, FATAL, Interface, Logger, OK, Status, Text};
+use interface::{
+    CO_SIMULATION, Callbacks, Component, EventInfo, FATAL, Interface, Logger, OK, Status, Text,
+};
 use model_description::ModelDescription;
 use model_description::variable::{Causality, Kind, Variability, Variable};
 use std::ffi::{CStr, CString, c_int, c_void};
@@ -38,8 +43,11 @@ pub fn library(krate: &str) -> PathBuf {
     let file = format!("{}{krate}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let program = std::env::current_exe().expect("the path of this program");
     let folders = program.ancestors().skip(1).take(2);
-    let mut places = folders.flat_map(|folder| [folder.join("deps").join(&file), folder.join(&file)]);
-    places.find(|path| path.is_file()).unwrap_or_else(|| panic!("{file} is not near {}", program.display()))
+    let mut places =
+        folders.flat_map(|folder| [folder.join("deps").join(&file), folder.join(&file)]);
+    places
+        .find(|path| path.is_file())
+        .unwrap_or_else(|| panic!("{file} is not near {}", program.display()))
 }
 
 /// One unit of a library.
@@ -57,8 +65,8 @@ pub fn units() -> Vec<Unit> {
     let open = |krate| {
         let path = library(krate);
         let interface = Arc::new(Interface::open(&path).unwrap_or_else(|error| panic!("{error}")));
-        let descriptions =
-            model_description::library::descriptions(&path).unwrap_or_else(|error| panic!("{error}"));
+        let descriptions = model_description::library::descriptions(&path)
+            .unwrap_or_else(|error| panic!("{error}"));
         descriptions.into_iter().map(move |description| Unit {
             interface: interface.clone(),
             guid: CString::new(description.guid()).expect("hexadecimal digits"),
@@ -101,13 +109,17 @@ impl Unit {
 
     /// Value reference of the variable with that name.
     pub fn reference(&self, name: &str) -> u32 {
-        *self.references(|variable| variable.name == name).first().unwrap_or_else(|| panic!("no {name}"))
+        *self
+            .references(|variable| variable.name == name)
+            .first()
+            .unwrap_or_else(|| panic!("no {name}"))
     }
 
     /// Value reference of a continuous input whose change affects every unit.
     pub fn input(&self) -> u32 {
-        let is_input =
-            |name: &&str| !self.references(|v| v.name == *name && v.causality == Causality::Input).is_empty();
+        let is_input = |name: &&str| {
+            !self.references(|v| v.name == *name && v.causality == Causality::Input).is_empty()
+        };
         let name = ["moment.y", "rate.q", "measured.gyroscope.y"].into_iter().find(is_input);
         self.reference(name.expect("an input that is known here"))
     }
@@ -121,7 +133,8 @@ impl Unit {
 
     /// Makes an instance whose folder of resources does not exist.
     pub fn instance(&self, fmu_type: c_int) -> Instance {
-        let instance = self.instantiate(Some(c"it"), fmu_type, Some(&self.guid), Some(c"file:///nowhere"));
+        let instance =
+            self.instantiate(Some(c"it"), fmu_type, Some(&self.guid), Some(c"file:///nowhere"));
         assert!(!instance.component.is_null(), "{}: {:?}", self.name(), instance.messages());
         instance
     }
@@ -168,11 +181,18 @@ pub struct Message {
 /// List in which messages are collected.
 pub type Log = Mutex<Vec<Message>>;
 
-extern "C" fn log(environment: *mut c_void, _instance: Text, status: Status, category: Text, message: Text) {
+extern "C" fn log(
+    environment: *mut c_void,
+    _instance: Text,
+    status: Status,
+    category: Text,
+    message: Text,
+) {
     // SAFETY: the environment is the log that `Instance` keeps alive, and the library passes
     // NUL-terminated texts that live during the call.
     let (log, [category, text]) = unsafe {
-        let texts = [category, message].map(|text| CStr::from_ptr(text).to_string_lossy().into_owned());
+        let texts =
+            [category, message].map(|text| CStr::from_ptr(text).to_string_lossy().into_owned());
         (&*environment.cast::<Log>(), texts)
     };
     log.lock().expect("no other thread panicked").push(Message { status, category, text });
@@ -276,7 +296,9 @@ impl Instance {
     /// Sets an enumeration to the item with that name.
     pub fn choose(&self, name: &str, item: &str) {
         let reference = self.unit.reference(name);
-        let Kind::Enumeration { of, .. } = &self.unit.description.variables[reference as usize].kind else {
+        let Kind::Enumeration { of, .. } =
+            &self.unit.description.variables[reference as usize].kind
+        else {
             panic!("{name} is not an enumeration");
         };
         let numbered = of.items.iter().zip(1..);
@@ -306,25 +328,38 @@ impl Instance {
         };
         let (places, list) = of(|kind| matches!(kind, Kind::Real { .. }));
         let mut reals = vec![0.0; list.len()];
-        self.ok(c!(self, fmi2GetReal(self.component, list.as_ptr(), list.len(), reals.as_mut_ptr())));
+        self.ok(c!(
+            self,
+            fmi2GetReal(self.component, list.as_ptr(), list.len(), reals.as_mut_ptr())
+        ));
         for (&place, value) in places.iter().zip(reals) {
             bits[place] = value.to_bits();
         }
-        let (places, list) = of(|kind| matches!(kind, Kind::Integer { .. } | Kind::Enumeration { .. }));
+        let (places, list) =
+            of(|kind| matches!(kind, Kind::Integer { .. } | Kind::Enumeration { .. }));
         let mut integers = vec![0; list.len()];
-        self.ok(c!(self, fmi2GetInteger(self.component, list.as_ptr(), list.len(), integers.as_mut_ptr())));
+        self.ok(c!(
+            self,
+            fmi2GetInteger(self.component, list.as_ptr(), list.len(), integers.as_mut_ptr())
+        ));
         for (&place, value) in places.iter().zip(integers) {
             bits[place] = value as u64;
         }
         let (places, list) = of(|kind| matches!(kind, Kind::Boolean { .. }));
         let mut booleans = vec![0; list.len()];
-        self.ok(c!(self, fmi2GetBoolean(self.component, list.as_ptr(), list.len(), booleans.as_mut_ptr())));
+        self.ok(c!(
+            self,
+            fmi2GetBoolean(self.component, list.as_ptr(), list.len(), booleans.as_mut_ptr())
+        ));
         for (&place, value) in places.iter().zip(booleans) {
             bits[place] = value as u64;
         }
         let (places, list) = of(|kind| matches!(kind, Kind::String { .. }));
         let mut texts = vec![null(); list.len()];
-        self.ok(c!(self, fmi2GetString(self.component, list.as_ptr(), list.len(), texts.as_mut_ptr())));
+        self.ok(c!(
+            self,
+            fmi2GetString(self.component, list.as_ptr(), list.len(), texts.as_mut_ptr())
+        ));
         for (&place, text) in places.iter().zip(texts) {
             // SAFETY: the call succeeded, so the text is NUL-terminated and lives until the next
             // fmi2GetString.
@@ -379,7 +414,10 @@ impl Instance {
             }
             self.ok(c!(self, fmi2SetTime(component, f64::from(tick + 1) * h)));
             self.ok(c!(self, fmi2SetContinuousStates(component, x.as_ptr(), n)));
-            self.ok(c!(self, fmi2GetEventIndicators(component, indicators.as_mut_ptr(), indicators.len())));
+            self.ok(c!(
+                self,
+                fmi2GetEventIndicators(component, indicators.as_mut_ptr(), indicators.len())
+            ));
             let (mut event, mut end) = (-1, -1);
             self.ok(c!(self, fmi2CompletedIntegratorStep(component, 1, &mut event, &mut end)));
             self.ok(c!(self, fmi2EnterEventMode(component)));
@@ -410,7 +448,10 @@ impl Instance {
         let mut size = 0;
         self.ok(c!(self, fmi2SerializedFMUstateSize(self.component, state, &mut size)));
         let mut bytes = vec![0u8; size];
-        self.ok(c!(self, fmi2SerializeFMUstate(self.component, state, bytes.as_mut_ptr().cast(), size)));
+        self.ok(c!(
+            self,
+            fmi2SerializeFMUstate(self.component, state, bytes.as_mut_ptr().cast(), size)
+        ));
         self.ok(c!(self, fmi2FreeFMUstate(self.component, &mut state)));
         bytes
     }

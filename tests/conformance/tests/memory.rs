@@ -37,7 +37,10 @@ fn live(instance: Instance) {
 }
 
 fn kinds(units: &[Unit]) -> Vec<(&Unit, i32)> {
-    units.iter().flat_map(|unit| unit.interfaces().iter().map(move |&fmu_type| (unit, fmu_type))).collect()
+    units
+        .iter()
+        .flat_map(|unit| unit.interfaces().iter().map(move |&fmu_type| (unit, fmu_type)))
+        .collect()
 }
 
 #[test]
@@ -57,7 +60,9 @@ fn three_thousand_instances_and_three_hundred_libraries_leave_nothing_behind() {
     let libraries = growth(60, 300, |i| {
         let name = names[i % names.len()].clone();
         // The thread ends after the libraries are closed, and releases what it kept for them.
-        std::thread::spawn(move || live(conformance::unit(&name).instance(CO_SIMULATION))).join().unwrap();
+        std::thread::spawn(move || live(conformance::unit(&name).instance(CO_SIMULATION)))
+            .join()
+            .unwrap();
     });
     assert!(libraries < ALLOWED, "300 libraries have left {libraries} bytes");
 }

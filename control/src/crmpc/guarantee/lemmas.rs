@@ -2,8 +2,8 @@
 
 use super::super::settings::Settings;
 use super::{
-    BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Dynamics, Parts, TURN, TURN_OF_RATES, bearing,
-    gyroscopic,
+    BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Dynamics, Parts, TURN, TURN_OF_RATES,
+    bearing, gyroscopic,
 };
 use std::f64::consts::SQRT_2;
 
@@ -47,8 +47,17 @@ impl Lemmas {
     pub fn new(s: &Settings) -> Self {
         let dynamics = Dynamics::new(s);
         let parts = Parts::new(s, &dynamics);
-        let Dynamics { geometry, largest, smallest, rate, acceleration, by_rates, by_angles, jerk, .. } =
-            dynamics;
+        let Dynamics {
+            geometry,
+            largest,
+            smallest,
+            rate,
+            acceleration,
+            by_rates,
+            by_angles,
+            jerk,
+            ..
+        } = dynamics;
         let root3 = 3.0_f64.sqrt();
         let drive = parts.norm - parts.mismatch;
         let varying = dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error).1;

@@ -14,22 +14,25 @@ fn robust() -> Sets {
 fn wave() -> impl Strategy<Value = Motion<2>> {
     let component = || (-1.0..1.0, -1.0..1.0, 0.0..0.3, 0.0..6.3);
     let sizes = ((-2.0..0.0), (-3.0..-0.8), (-3.0..-0.8));
-    (sizes, prop::collection::vec(component(), 9)).prop_map(|((angle, rate, acceleration), components)| {
-        let mut motion = Motion::new(100);
-        let at = |k: usize, first: usize, decade: f64| {
-            Vector3::from_fn(|i, _| {
-                let (mean, amplitude, frequency, phase) = components[first + i];
-                10.0_f64.powf(decade) * (mean + amplitude * f64::sin(phase + frequency * k as f64))
-            })
-        };
-        for (k, state) in motion.states.iter_mut().enumerate() {
-            *state = [at(k, 0, angle), at(k, 3, rate)];
-        }
-        for (k, input) in motion.inputs.iter_mut().enumerate() {
-            *input = at(k, 6, acceleration);
-        }
-        motion
-    })
+    (sizes, prop::collection::vec(component(), 9)).prop_map(
+        |((angle, rate, acceleration), components)| {
+            let mut motion = Motion::new(100);
+            let at = |k: usize, first: usize, decade: f64| {
+                Vector3::from_fn(|i, _| {
+                    let (mean, amplitude, frequency, phase) = components[first + i];
+                    10.0_f64.powf(decade)
+                        * (mean + amplitude * f64::sin(phase + frequency * k as f64))
+                })
+            };
+            for (k, state) in motion.states.iter_mut().enumerate() {
+                *state = [at(k, 0, angle), at(k, 3, rate)];
+            }
+            for (k, input) in motion.inputs.iter_mut().enumerate() {
+                *input = at(k, 6, acceleration);
+            }
+            motion
+        },
+    )
 }
 
 fn run(cases: u32, property: impl Fn(Motion<2>) -> Result<(), TestCaseError>) {

@@ -84,7 +84,8 @@ impl<const O: usize> Riccati<O> {
         let mut p = self.end_slope(problem, &Pair::effective);
         for stage in self.stages[..last].iter_mut().rev() {
             let (q, r) = stage.slope(problem, &Pair::effective);
-            let (feedforward, through) = stage.gain.feedforward(&(r + problem.chain.input_adjoint(&p)));
+            let (feedforward, through) =
+                stage.gain.feedforward(&(r + problem.chain.input_adjoint(&p)));
             stage.feedforward = feedforward;
             p = add(&add(&problem.chain.adjoint(&p), &q), &through);
         }
@@ -101,7 +102,11 @@ impl<const O: usize> Riccati<O> {
             stage.d_state = change;
             if stage.state_pair.watched {
                 let ball = &stage.balls.state;
-                let y = ball.by_state.iter().zip(&change).fold(Vector3::zeros(), |sum, (by, e)| sum + by * e);
+                let y = ball
+                    .by_state
+                    .iter()
+                    .zip(&change)
+                    .fold(Vector3::zeros(), |sum, (by, e)| sum + by * e);
                 stage.state_pair.set_direction(ball.value.dot(&y), 0.5 * y.norm_squared());
             }
             if k < last {

@@ -71,7 +71,12 @@ impl<const O: usize> Riccati<O> {
     }
 
     /// Writes the optimum into `solution`.
-    fn write<C: Constraints<O>>(&self, problem: &Problem<O, C>, solution: &mut Solution<O>, first: usize) {
+    fn write<C: Constraints<O>>(
+        &self,
+        problem: &Problem<O, C>,
+        solution: &mut Solution<O>,
+        first: usize,
+    ) {
         let Solution { motion, multipliers } = solution;
         let state_balls = problem.constraints.has_state_balls();
         for (k, stage) in self.stages[..=self.horizon].iter().enumerate() {

@@ -66,12 +66,14 @@ impl Pair {
     pub(super) fn set_direction(&mut self, change: f64, curvature: f64) {
         self.curvature = curvature;
         self.d_slack = -self.infeasibility - change;
-        self.d_multiplier = (self.target - self.multiplier * self.d_slack) / self.slack - self.multiplier;
+        self.d_multiplier =
+            (self.target - self.multiplier * self.d_slack) / self.slack - self.multiplier;
     }
 
     /// Returns the longest step that keeps s and λ positive.
     pub(super) fn longest(&self) -> f64 {
-        let until = |value: f64, change: f64| if change < 0.0 { -value / change } else { f64::INFINITY };
+        let until =
+            |value: f64, change: f64| if change < 0.0 { -value / change } else { f64::INFINITY };
         until(self.slack, self.d_slack).min(until(self.multiplier, self.d_multiplier))
     }
 }

@@ -45,8 +45,11 @@ pub(super) struct Progress {
 
 impl Progress {
     pub(super) fn new(follows: bool, warm: bool) -> Self {
-        let (feasibility, patience) =
-            if follows { (FEASIBILITY_FOLLOWING, PATIENCE_FOLLOWING) } else { (FEASIBILITY, PATIENCE) };
+        let (feasibility, patience) = if follows {
+            (FEASIBILITY_FOLLOWING, PATIENCE_FOLLOWING)
+        } else {
+            (FEASIBILITY, PATIENCE)
+        };
         let best = (f64::INFINITY, 0);
         Self { feasibility, patience, warm, short_steps: 0, best, least_outside: f64::INFINITY }
     }
@@ -66,7 +69,8 @@ impl Progress {
             self.best = (residual, iteration);
         }
         let since = iteration - self.best.1;
-        if self.short_steps == STALLED_STEPS || residuals.feasibility > self.feasibility && since >= patience
+        if self.short_steps == STALLED_STEPS
+            || residuals.feasibility > self.feasibility && since >= patience
         {
             return Err(give_up(iteration, residuals));
         }

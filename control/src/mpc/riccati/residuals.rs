@@ -28,7 +28,9 @@ pub(super) struct Residuals {
 
 impl Residuals {
     pub(super) fn converged(&self, feasibility: f64) -> bool {
-        self.stationarity <= STATIONARITY && self.feasibility <= feasibility && self.gap <= GAP * self.cost
+        self.stationarity <= STATIONARITY
+            && self.feasibility <= feasibility
+            && self.gap <= GAP * self.cost
     }
 
     /// Returns the mean μ of sλ.
@@ -114,7 +116,8 @@ impl<const O: usize> Riccati<O> {
             weight += multiplier(&self.terminal) / (radius * radius);
         }
         let weighted = problem.end.weighted(&stage.state);
-        let mut slope: State<O> = std::array::from_fn(|i| weighted[i] * weight + problem.end.slope[i]);
+        let mut slope: State<O> =
+            std::array::from_fn(|i| weighted[i] * weight + problem.end.slope[i]);
         if stage.state_pair.watched {
             let multiplier = multiplier(&stage.state_pair);
             slope = std::array::from_fn(|i| slope[i] + stage.slopes.state[i] * multiplier);

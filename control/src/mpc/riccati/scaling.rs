@@ -12,7 +12,12 @@ impl<const O: usize> Stage<O> {
     fn add_balls(&self, quadratic: &mut Quadratic<O>) {
         let Stage { balls, slopes, state_pair, input_pair, .. } = self;
         if input_pair.watched {
-            quadratic.add_ball(&balls.input, &slopes.input, input_pair.multiplier, input_pair.scaling());
+            quadratic.add_ball(
+                &balls.input,
+                &slopes.input,
+                input_pair.multiplier,
+                input_pair.scaling(),
+            );
         }
         if state_pair.watched {
             let (multiplier, scaling) = (state_pair.multiplier, state_pair.scaling());
@@ -70,7 +75,8 @@ impl<const O: usize> Riccati<O> {
         for face in &self.faces {
             for i in 0..O {
                 for j in i..O {
-                    p[i][j][(face.axis, face.axis)] += face.pair.scaling() * face.normal[i] * face.normal[j];
+                    p[i][j][(face.axis, face.axis)] +=
+                        face.pair.scaling() * face.normal[i] * face.normal[j];
                 }
             }
         }

@@ -64,7 +64,10 @@ impl<const O: usize> Stage<O> {
         let Balls { state, input } = &self.balls;
         self.slopes = Slopes {
             state: state.by_state.map(|by| by.tr_mul(&state.value)),
-            input: (input.by_state.map(|by| by.tr_mul(&input.value)), input.by_input.tr_mul(&input.value)),
+            input: (
+                input.by_state.map(|by| by.tr_mul(&input.value)),
+                input.by_input.tr_mul(&input.value),
+            ),
         };
         self.state_pair.evaluate(&state.value);
         self.input_pair.evaluate(&input.value);

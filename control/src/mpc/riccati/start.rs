@@ -69,8 +69,9 @@ impl<const O: usize> Riccati<O> {
             let known = [before.and_then(|k| state.get(k)), input.get(first + k)];
             known.map(|known| known.copied().filter(|_| warm).unwrap_or_default())
         });
-        let pairs =
-            self.stages[..=self.horizon].iter().flat_map(|stage| [&stage.state_pair, &stage.input_pair]);
+        let pairs = self.stages[..=self.horizon]
+            .iter()
+            .flat_map(|stage| [&stage.state_pair, &stage.input_pair]);
         if pairs.filter(|pair| pair.watched).any(|pair| pair.c > FAR_OUTSIDE) {
             self.each_pair(problem, |pair| pair.begin(FAR.0, FAR.1 * share, 0.0));
         }
@@ -131,12 +132,14 @@ impl<const O: usize> Riccati<O> {
         }
         if let Some(radius) = problem.end.radius {
             let end = &self.stages[end].state;
-            self.terminal.c = 0.5 * (dot(end, &problem.end.weighted(end)) / (radius * radius) - 1.0);
+            self.terminal.c =
+                0.5 * (dot(end, &problem.end.weighted(end)) / (radius * radius) - 1.0);
         }
         if let Start::Within(given, _) = &problem.start {
             let first = self.stages[0].state;
             for Face { axis, normal, pair } in &mut self.faces {
-                let deviation: f64 = (0..O).map(|i| normal[i] * (given[i][*axis] - first[i][*axis])).sum();
+                let deviation: f64 =
+                    (0..O).map(|i| normal[i] * (given[i][*axis] - first[i][*axis])).sum();
                 pair.c = deviation - 1.0;
             }
         }

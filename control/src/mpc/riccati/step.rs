@@ -27,7 +27,8 @@ impl<const O: usize> Riccati<O> {
     ) -> f64 {
         let mut gap = 0.0;
         self.each_pair(problem, |pair| {
-            gap += (pair.slack + alpha * pair.d_slack) * (pair.multiplier + alpha * pair.d_multiplier);
+            gap +=
+                (pair.slack + alpha * pair.d_slack) * (pair.multiplier + alpha * pair.d_multiplier);
         });
         gap / count
     }
@@ -63,7 +64,8 @@ impl<const O: usize> Riccati<O> {
                 let state = self.stages[k].state;
                 let (input, next) = rest.unconstrained.go_on(first + k, &state, rest.affine);
                 let (of_state, of_input) = problem.constraints.squares(k, &state, &input);
-                is_near |= of_input > NEARLY_OUTSIDE || state_balls && k > end && of_state > NEARLY_OUTSIDE;
+                is_near |= of_input > NEARLY_OUTSIDE
+                    || state_balls && k > end && of_state > NEARLY_OUTSIDE;
                 self.stages[k].input = input;
                 let stage = &mut self.stages[k + 1];
                 stage.state = next;

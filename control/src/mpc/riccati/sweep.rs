@@ -45,7 +45,13 @@ impl<const O: usize> Quadratic<O> {
     }
 
     /// Adds the part of a ball that does not depend on the input.
-    pub(super) fn add_state_ball(&mut self, ball: &Ball<O>, slope: &State<O>, multiplier: f64, scaling: f64) {
+    pub(super) fn add_state_ball(
+        &mut self,
+        ball: &Ball<O>,
+        slope: &State<O>,
+        multiplier: f64,
+        scaling: f64,
+    ) {
         for i in 0..O {
             let by_state = ball.by_state[i].transpose() * multiplier;
             let weighted = slope[i] * scaling;
@@ -72,17 +78,26 @@ impl<const O: usize> Default for Gain<O> {
 impl<const O: usize> Gain<O> {
     /// Computes the gain of a stage with the given cost, and P ← Q + AᵀPA − FᵀM⁻¹F. Returns `None`
     /// if M is not positive definite.
-    pub(super) fn factor(stage: &Quadratic<O>, chain: &Chain<O>, p: &mut Blocks<O>) -> Option<Self> {
+    pub(super) fn factor(
+        stage: &Quadratic<O>,
+        chain: &Chain<O>,
+        p: &mut Blocks<O>,
+    ) -> Option<Self> {
         // The products P B and P A use that P is symmetric and that A has ones on its diagonal.
         let block = |i: usize, j: usize| if i <= j { p[i][j] } else { p[j][i].transpose() };
-        let pb: [Matrix3<f64>; O] =
-            std::array::from_fn(|i| (0..O).fold(Matrix3::zeros(), |sum, j| sum + block(i, j) * chain.b[j]));
+        let pb: [Matrix3<f64>; O] = std::array::from_fn(|i| {
+            (0..O).fold(Matrix3::zeros(), |sum, j| sum + block(i, j) * chain.b[j])
+        });
         let pa: Blocks<O> = std::array::from_fn(|i| {
-            std::array::from_fn(|j| (0..j).fold(block(i, j), |sum, l| sum + block(i, l) * chain.a[(l, j)]))
+            std::array::from_fn(|j| {
+                (0..j).fold(block(i, j), |sum, l| sum + block(i, l) * chain.a[(l, j)])
+            })
         });
         let m = (0..O).fold(stage.r, |sum, i| sum + pb[i] * chain.b[i]);
         let f: [Matrix3<f64>; O] = std::array::from_fn(|j| {
-            (0..j).fold(stage.s[j] + pb[j].transpose(), |sum, l| sum + pb[l].transpose() * chain.a[(l, j)])
+            (0..j).fold(stage.s[j] + pb[j].transpose(), |sum, l| {
+                sum + pb[l].transpose() * chain.a[(l, j)]
+            })
         });
         let m = Ldl::new(&m)?;
         let k = f.map(|f| -m.solve_columns(&f));
@@ -149,7 +164,12 @@ impl Ldl {
         let u32 = m.m32 - l31 * m.m21;
         let l32 = u32 * r2;
         let d3 = m.m33 - l31 * m.m31 - l32 * u32;
-        (d1 > 0.0 && d2 > 0.0 && d3 > 0.0).then_some(Self { l21, l31, l32, inverse: [r1, r2, 1.0 / d3] })
+        (d1 > 0.0 && d2 > 0.0 && d3 > 0.0).then_some(Self {
+            l21,
+            l31,
+            l32,
+            inverse: [r1, r2, 1.0 / d3],
+        })
     }
 
     fn solve(&self, b: &Vector3<f64>) -> Vector3<f64> {

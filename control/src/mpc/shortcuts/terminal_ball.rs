@@ -25,8 +25,14 @@ impl<const O: usize, B: Bounded<O>> Shortcut<O, B> for TerminalBallAlone {
         let radius = search.outside?;
         optimiser.arrive(sample, search);
         let Optimiser { layout, unconstrained, solution, .. } = optimiser;
-        let multiplier =
-            solve(unconstrained, &layout.chain, &layout.cost, sample.affine, radius, &mut solution.motion);
+        let multiplier = solve(
+            unconstrained,
+            &layout.chain,
+            &layout.cost,
+            sample.affine,
+            radius,
+            &mut solution.motion,
+        );
         let violated = optimiser.violated(sample, &(0..0));
         search.settled = multiplier.is_some() && violated.is_none();
         if search.settled {
@@ -61,7 +67,8 @@ fn solve<const O: usize>(
     let end_of = |lambda: f64| -> Option<(State<O>, f64)> {
         let mut end = zero_state();
         for axis in 0..3 {
-            let sum: SMatrix<f64, O, O> = of_axis(weight, axis) + of_axis(&cost.end, axis) * (1.0 + lambda);
+            let sum: SMatrix<f64, O, O> =
+                of_axis(weight, axis) + of_axis(&cost.end, axis) * (1.0 + lambda);
             let solution = sum.try_inverse()? * SVector::<f64, O>::from_fn(|i, _| pull[i][axis]);
             for (i, slot) in end.iter_mut().enumerate() {
                 slot[axis] = solution[i];

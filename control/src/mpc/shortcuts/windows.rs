@@ -34,7 +34,8 @@ fn in_windows<const O: usize, B: Bounded<O>>(
     }
     optimiser.arrive(sample, search);
     for _ in 0..WINDOWS {
-        let mut window = search.window.clone().filter(|window| optimiser.layout.is_worth_a_window(window))?;
+        let mut window =
+            search.window.clone().filter(|window| optimiser.layout.is_worth_a_window(window))?;
         let is_held = window.end == optimiser.layout.horizon;
         let outcome = optimiser.interior_point(sample, search, window.clone());
         if !outcome.solved() {

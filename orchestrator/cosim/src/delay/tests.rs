@@ -39,8 +39,14 @@ fn wire((from, output): (usize, usize), to: usize) -> Wire {
     Wire { from: port(from, output), to: port(to, 0), scaling: Scaling::default() }
 }
 
-fn ticks(units: &[ModelDescription], every: &[u32], wires: &[Wire], coupling: Coupling) -> Vec<u64> {
-    let parts: Vec<Part> = units.iter().map(|description| Part { name: "c", description }).collect();
+fn ticks(
+    units: &[ModelDescription],
+    every: &[u32],
+    wires: &[Wire],
+    coupling: Coupling,
+) -> Vec<u64> {
+    let parts: Vec<Part> =
+        units.iter().map(|description| Part { name: "c", description }).collect();
     feedback_loops(&parts, every, wires, coupling).iter().map(|l| l.ticks).collect()
 }
 
@@ -72,22 +78,28 @@ fn oracle_three_in_a_ring_and_a_loop_within() {
 
 /// Adds a real parameter in s to the unit's description.
 fn with_duration(mut unit: ModelDescription, name: &str, unit_name: &str) -> ModelDescription {
-    let kind = Kind::Real { unit: Some(unit_name.into()), display_unit: None, min: Some(0.0), max: None };
+    let kind =
+        Kind::Real { unit: Some(unit_name.into()), display_unit: None, min: Some(0.0), max: None };
     let start = Some("0".to_string());
     let causality = "parameter".to_string();
-    let variable = Variable { name: name.into(), causality, kind, start, ..unit.variables[0].clone() };
+    let variable =
+        Variable { name: name.into(), causality, kind, start, ..unit.variables[0].clone() };
     unit.variables.push(variable);
     unit
 }
 
-/// Warnings of controller and plant with these values of `delay` and `actuation.delay`, steps of 0.04 s.
+/// Returns the warnings for a controller and a plant with these values of `delay` and
+/// `actuation.delay`, at a step of 0.04 s.
 fn warned(counted_on: Option<f64>, transport: Option<f64>, coupling: Coupling) -> Vec<String> {
     let controller = with_duration(unit(&[Some(true)]), "delay", "s");
     let plant = with_duration(unit(&[Some(false)]), "actuation.delay", "s");
-    let parts =
-        [Part { name: "controller", description: &controller }, Part { name: "plant", description: &plant }];
+    let parts = [
+        Part { name: "controller", description: &controller },
+        Part { name: "plant", description: &plant },
+    ];
     let setting = |name: &str, value: Option<f64>| {
-        let real = |value| Setting { name: name.into(), reference: 0, value: SettingValue::Real(value) };
+        let real =
+            |value| Setting { name: name.into(), reference: 0, value: SettingValue::Real(value) };
         value.map(real).into_iter().collect::<Vec<_>>()
     };
     let settings = [setting("delay", counted_on), setting("actuation.delay", transport)];
@@ -125,19 +137,25 @@ fn the_longest_loop_counts_and_what_is_on_no_loop_does_not() {
     let law = with_duration(unit(&[Some(true)]), "delay", "s");
     let (direct, state) = (unit(&[Some(true)]), unit(&[Some(false)]));
     let units = [law.clone(), direct, state, law];
-    let parts: Vec<Part> = units.iter().map(|description| Part { name: "c", description }).collect();
-    let wires = [wire((0, 1), 1), wire((1, 1), 0), wire((0, 1), 2), wire((2, 1), 0), wire((2, 1), 3)];
+    let parts: Vec<Part> =
+        units.iter().map(|description| Part { name: "c", description }).collect();
+    let wires =
+        [wire((0, 1), 1), wire((1, 1), 0), wire((0, 1), 2), wire((2, 1), 0), wire((2, 1), 3)];
     let loops = feedback_loops(&parts, &[1; 4], &wires, Coupling::GaussSeidel);
     let none = [const { Vec::new() }; 4];
     let warnings = warnings(&parts, &none, &loops, 0.5);
-    assert_eq!(warnings, ["c.delay = 0 s, but the loop c -> c -> c has a delay of 0.5 s: set c.delay = 0.5"]);
+    assert_eq!(
+        warnings,
+        ["c.delay = 0 s, but the loop c -> c -> c has a delay of 0.5 s: set c.delay = 0.5"]
+    );
 }
 
 #[test]
 fn a_parameter_that_is_no_duration_means_something_else() {
     let law = with_duration(unit(&[Some(true)]), "delay", "1");
     let parts = ["a", "b"].map(|name| Part { name, description: &law });
-    let loops = feedback_loops(&parts, &[1, 1], &[wire((0, 1), 1), wire((1, 1), 0)], Coupling::Jacobi);
+    let loops =
+        feedback_loops(&parts, &[1, 1], &[wire((0, 1), 1), wire((1, 1), 0)], Coupling::Jacobi);
     assert_eq!(loops.len(), 1);
     assert!(warnings(&parts, &[Vec::new(), Vec::new()], &loops, 0.04).is_empty());
 }
@@ -145,7 +163,8 @@ fn a_parameter_that_is_no_duration_means_something_else() {
 #[test]
 fn what_is_not_declared_counts_as_direct_and_is_named() {
     let units = [unit(&[None]), unit(&[Some(false)])];
-    let parts: Vec<Part> = units.iter().map(|description| Part { name: "c", description }).collect();
+    let parts: Vec<Part> =
+        units.iter().map(|description| Part { name: "c", description }).collect();
     let wires = [wire((0, 1), 1), wire((1, 1), 0)];
     let loops = feedback_loops(&parts, &[1, 1], &wires, Coupling::Jacobi);
     assert_eq!(loops, [FeedbackLoop { components: vec![0, 1], ticks: 1, undeclared: vec![0] }]);
@@ -156,7 +175,8 @@ fn what_is_not_declared_counts_as_direct_and_is_named() {
 fn algebraic_loops_are_found_through_any_number_of_units() {
     let direct = unit(&[Some(true)]);
     let units = [direct.clone(), direct.clone(), direct];
-    let parts: Vec<Part> = units.iter().map(|description| Part { name: "c", description }).collect();
+    let parts: Vec<Part> =
+        units.iter().map(|description| Part { name: "c", description }).collect();
     let ring = [wire((0, 1), 1), wire((1, 1), 2), wire((2, 1), 0)];
     assert_eq!(algebraic_loop(&parts, &ring).unwrap().len(), 3);
     assert_eq!(algebraic_loop(&parts, &ring[..2]), None);

@@ -7,7 +7,8 @@ fn source(files: &[(&str, &str)]) -> Result<Source, String> {
         fs::write(folder.path().join(name), text).unwrap();
     }
     let here = format!("{}/", folder.path().display());
-    Source::load(&folder.path().join(files[0].0)).map_err(|error| error.to_string().replace(&here, ""))
+    Source::load(&folder.path().join(files[0].0))
+        .map_err(|error| error.to_string().replace(&here, ""))
 }
 
 fn whole(files: &[(&str, &str)]) -> toml::Table {
@@ -46,7 +47,10 @@ fn a_parameter_of_a_base_can_be_unset_and_set_again() {
     assert_eq!(merged["components"]["c"]["parameters"]["p.q"].as_integer(), Some(3));
     let own = "extends = \"base.toml\"\n\nunset = [\"c.p.s\"]";
     let message = source(&[("own.toml", own), ("base.toml", base)]).unwrap_err();
-    assert!(message.starts_with("own.toml:3: unset: ") && message.contains("did you mean"), "{message}");
+    assert!(
+        message.starts_with("own.toml:3: unset: ") && message.contains("did you mean"),
+        "{message}"
+    );
 }
 
 #[test]

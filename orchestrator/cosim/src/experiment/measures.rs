@@ -1,4 +1,4 @@
-//! What an experiment asks of its runs: which signals are measured, watched and drawn.
+//! The signals of a run that an experiment measures, watches and draws.
 
 use crate::signal::Signal;
 use schemars::JsonSchema;
@@ -6,132 +6,137 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use toml::Spanned;
 
-/// The section `[observe]` of an experiment: what is measured, watched and drawn of a run.
+/// The section `[observe]` of an experiment, which says what is measured, watched and drawn of a
+/// run.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Observe {
-    /// Lists of signals, by name.
+    /// Lists of signals that the other keys refer to, by name.
     #[serde(default)]
     pub signals: BTreeMap<String, Vec<Signal>>,
-    /// Numbers that are taken of a run, by their name in `metrics.json`.
+    /// Metrics that are computed from the signals of a run, by their names in `metrics.json`.
     #[serde(default)]
     pub metrics: BTreeMap<String, Measure>,
-    /// Metrics that the summary prints, in this order.
+    /// Names of the metrics that the summary prints, in this order.
     #[serde(default)]
     pub summary: Vec<String>,
-    /// Variables by which a unit says whether it guarantees that limits are kept.
+    /// Variables in which a unit reports whether it guarantees that limits are kept.
     #[serde(default)]
     pub guarantee: Option<Guarantee>,
-    /// When a run is lost.
+    /// Condition under which a run counts as lost.
     #[serde(default)]
     pub loss: Option<Loss>,
     /// Panels of the figure of a run and of the live view.
     #[serde(default)]
     pub panels: Vec<Panel>,
-    /// Lines of the live view: variables by the heading of the line.
+    /// Further lines of the live view: lists of variables, by the heading of the line.
     #[serde(default)]
     pub readings: BTreeMap<String, Vec<String>>,
 }
 
-/// A number that is taken of signals.
+/// A number that is computed from signals of a run.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measure {
-    /// Its name where measures are listed; in an experiment it is the key.
+    /// Name of the measure in a list of measures. In an experiment the key is the name.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub id: String,
-    /// What is done with the signals.
+    /// Quantity that is computed from the signals.
     pub kind: Kind,
-    /// A list of signals.
+    /// Name of the list of signals that the number is computed from.
     #[schemars(with = "String")]
     pub signals: Spanned<String>,
-    /// From and to, s; the whole run if it is left out.
+    /// Start and end of the part of the run that counts, s. Without this the whole run counts.
     #[serde(default)]
     pub over: Option<[f64; 2]>,
-    /// A variable that counts: a communication point is taken where it has grown.
+    /// Name of a variable that counts events. Only those communication points are used at which it
+    /// has grown.
     #[serde(default)]
     pub each: Option<String>,
-    /// Every n-th communication point is taken, from the first on.
+    /// Use of every n-th communication point only, counted from the start.
     #[serde(default = "super::one")]
     pub every: u32,
-    /// Whether only those communication points are taken that begin a step: all but the last.
+    /// Whether only those communication points are used at which a step begins, which are all but
+    /// the last.
     #[serde(default)]
     pub steps: bool,
-    /// Instead of the display unit of the signals.
+    /// Unit of the number, in place of the display unit of the signals.
     #[serde(default)]
     pub unit: Option<Scaled>,
-    /// Heading of its line in the summary; metrics of one heading share a line.
+    /// Heading of the number's line in the summary. Metrics with the same heading share a line.
     #[serde(default)]
     pub label: String,
-    /// What tells it from others in the same line of the summary.
+    /// Label that tells the number apart from others in the same line of the summary.
     #[serde(default)]
     pub part: String,
-    /// The metric that is its limit.
+    /// Name of the metric that is the limit of this one.
     #[serde(default)]
     pub limit: Option<String>,
-    /// Whether it may be null because the units lack a variable.
+    /// Whether the number may be null because the units lack a variable.
     #[serde(default)]
     pub optional: bool,
-    /// Whether it is a computing time, which differs from run to run.
+    /// Whether the number is a computing time, which differs from run to run.
     #[serde(default)]
     pub timing: bool,
-    /// For `settling`: fraction of a signal's first magnitude.
+    /// For `settling`, the width of the band as a fraction of a signal's first magnitude.
     #[serde(default)]
     pub band: Option<f64>,
-    /// For `settling`: for how long (s) the signals must have been seen within the band.
+    /// For `settling`, the least time for which the signals must have been seen within the band, s.
     #[serde(default)]
     pub hold: f64,
-    /// For `leaving`: a magnitude.
+    /// For `leaving`, the magnitude that a signal must exceed.
     #[serde(default)]
     pub bound: Option<f64>,
 }
 
-/// What is done with the signals of a measure.
+/// Quantity that a measure computes from its signals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// √(mean of the sum of squares).
+    /// Square root of the mean of the sum of the signals' squares.
     Rms,
-    /// Mean of the first signal.
+    /// Arithmetic mean of the first signal.
     Mean,
     /// 99th percentile of the first signal, by nearest rank.
     P99,
     /// Largest magnitude of any signal.
     Largest,
-    /// The last value of the first signal.
+    /// Last value of the first signal.
     Last,
-    /// Time, s, from which on every signal stays within `band` times its first magnitude; nothing
-    /// if one never does.
+    /// Time from which on every signal stays within `band` times its first magnitude, s. There is
+    /// no value if a signal never does.
     Settling,
-    /// How often any signal rises above one half.
+    /// Number of times that any signal rises above one half.
     Pulses,
-    /// Time, s, at which any signal first exceeds `bound`; nothing if none ever does.
+    /// Time at which any signal first exceeds `bound`, s. There is no value if none ever does.
     Leaving,
 }
 
-/// A unit made of another.
+/// A unit that is a multiple of another unit.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scaled {
-    /// Its name.
+    /// Name of the unit.
     pub name: String,
-    /// Its value for a value of 1.
+    /// Number of these units in one unit of the signals.
     pub factor: f64,
 }
 
-/// Variables by which a unit says whether it guarantees that limits are kept.
+/// Variables in which a unit reports whether it guarantees that limits are kept.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Guarantee {
-    /// Whether the guarantee is in force.
+    /// Variable that tells whether the guarantee is in force.
     pub in_force: String,
-    /// Why it is or is not, as an item of an enumeration.
+    /// Variable that tells why the guarantee is or is not in force, of an enumeration type.
     #[serde(default)]
     pub status: Option<String>,
-    /// Shares of the limits that are left beyond what is reserved, by the names of the limits.
+    /// Variables with the share of each limit that is left beyond what is reserved, by the names of
+    /// the limits.
     #[serde(default)]
     pub margins: BTreeMap<String, String>,
-    /// A list of signals that are at most 1 while the guarantee is in force, and else it is broken.
+    /// Name of a list of signals that must not exceed 1 while the guarantee is in force. If one
+    /// does, the guarantee is broken.
     #[serde(default)]
     pub keeps: Option<String>,
     /// Whether the units may lack these variables.
@@ -139,33 +144,33 @@ pub struct Guarantee {
     pub optional: bool,
 }
 
-/// When a run is lost, and ends.
+/// Condition under which a run is lost, and ends.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Loss {
-    /// What is lost, for the message.
+    /// Name of what is lost, for the message.
     pub what: String,
-    /// A list of signals: their norm decides.
+    /// Name of the list of signals whose norm decides.
     pub signals: String,
-    /// The largest norm with which the run goes on, in the display unit of the signals.
+    /// Largest norm with which the run continues, in the display unit of the signals.
     pub beyond: f64,
 }
 
-/// A panel of the figure of a run, and of the live view.
+/// A panel of the figure of a run and of the live view.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
-    /// Short name, for the live view.
+    /// Short name of the panel, for the live view.
     pub name: String,
-    /// Label of the vertical axis without the unit; the name if it is left out.
+    /// Label of the vertical axis without the unit. Without it the name is the label.
     #[serde(default)]
     pub label: String,
-    /// Instead of the display unit of the signals.
+    /// Unit of the vertical axis, in place of the display unit of the signals.
     #[serde(default)]
     pub unit: Option<Scaled>,
-    /// The curves.
+    /// Curves of the panel, with their names and signals.
     pub curves: Vec<Curve>,
-    /// The limit of the norm of all curves.
+    /// Limit of the norm of all curves.
     #[serde(default)]
     pub limit: Option<Signal>,
 }
@@ -174,20 +179,20 @@ pub struct Panel {
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Curve {
-    /// Name in the legend.
+    /// Name of the curve in the legend.
     pub name: String,
-    /// What is drawn.
+    /// Signal that is drawn as the curve.
     pub of: Signal,
-    /// What it is to follow, drawn as a pale line.
+    /// Signal that the curve is to follow, drawn as a pale line.
     #[serde(default)]
     pub reference: Option<Signal>,
 }
 
 impl Observe {
-    /// The list of signals of this name.
+    /// Returns the list of signals with this name.
     ///
     /// # Errors
-    /// If there is none.
+    /// Returns an error if there is no such list.
     pub fn list(&self, name: &str) -> Result<&[Signal], String> {
         self.signals.get(name).map(Vec::as_slice).ok_or_else(|| {
             let known = self.signals.keys().map(String::as_str);
@@ -197,7 +202,7 @@ impl Observe {
 }
 
 impl Measure {
-    /// What is wrong with it, if anything is.
+    /// Describes what is wrong with the measure, or returns `None` if nothing is.
     pub fn fault(&self) -> Option<String> {
         let is = |kind| self.kind == kind;
         let fault = if self.every == 0 {
@@ -208,7 +213,9 @@ impl Measure {
             "leaving wants a bound above 0"
         } else if !is(Kind::Leaving) && self.bound.is_some() {
             "bound is for leaving only"
-        } else if is(Kind::Settling) && !(self.band.is_some_and(|band| band > 0.0) && self.hold >= 0.0) {
+        } else if is(Kind::Settling)
+            && !(self.band.is_some_and(|band| band > 0.0) && self.hold >= 0.0)
+        {
             "settling wants a band above 0, and a hold not below"
         } else if !is(Kind::Settling) && self.band.is_some() {
             "band is for settling only"

@@ -1,6 +1,8 @@
-//! An experiment file: which FMUs, their parameters, their wiring, how they are stepped, what is recorded.
+//! An experiment file: it names the FMUs, sets their parameters, connects them, and says how they
+//! are stepped and what is recorded.
 //!
-//! All keys stand in docs/experiments.md, and in `orchestrator/schema/experiment.json` for editors.
+//! docs/experiments.md explains all keys; `orchestrator/schema/experiment.json` describes them for
+//! editors.
 
 mod measures;
 mod overrides;
@@ -19,157 +21,164 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use toml::{Spanned, Value};
 
-/// An experiment as it is written.
+/// An experiment as its file describes it.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
-    /// One line.
+    /// Title of the experiment, in one line.
     pub title: String,
-    /// Whatever there is to say.
+    /// Description of the experiment, of any length.
     #[serde(default)]
     pub description: String,
-    /// Time and coupling.
+    /// Simulated time span, communication step and coupling.
     pub simulation: Simulation,
-    /// The units, by name.
+    /// Components of the experiment, each an FMU with its settings, by name.
     pub components: BTreeMap<String, Component>,
-    /// The wiring.
+    /// Connections from outputs to inputs.
     #[serde(default)]
     pub connections: Vec<Connection>,
-    /// What goes into the results.
+    /// Variables that are written to the results.
     pub record: Record,
-    /// What is measured, watched and drawn.
+    /// Signals that are measured, watched and drawn.
     #[serde(default)]
     pub observe: Observe,
-    /// Whether inputs may stay unconnected without being named; no key of an experiment file.
+    /// Whether inputs may stay unconnected without being named. This is no key of an experiment
+    /// file.
     #[serde(skip)]
     pub leaves_inputs_open: bool,
-    /// Parameters `component.parameter` that the command line sets.
+    /// Parameters that the command line sets, as `component.parameter`.
     #[serde(skip)]
     pub assigned: BTreeSet<String>,
-    /// What the command line sets of no component.
+    /// Settings of the command line that name no component of the experiment.
     #[serde(skip)]
     pub unplaced: Vec<String>,
-    /// The file, with those that it extends.
+    /// The experiment file, together with the files that it extends.
     #[serde(skip)]
     pub source: Source,
 }
 
-/// Time and coupling.
+/// Simulated time span, communication step and coupling.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Simulation {
-    /// Start time, s.
+    /// Start time of the simulation, s.
     #[serde(default)]
     pub start: f64,
-    /// Stop time, s.
+    /// Stop time of the simulation, s.
     pub stop: f64,
-    /// Communication step, s.
+    /// Length of the communication step, s.
     pub step: f64,
-    /// How values are passed on at a communication point.
+    /// Way in which values are passed on at a communication point.
     #[serde(default)]
     pub coupling: Coupling,
-    /// Order of the components.
+    /// Names of components, in the order in which their inputs are set at each communication point.
     #[serde(default)]
     pub order: Vec<String>,
-    /// What is done about values of a unit that are no numbers, or outside their type.
+    /// Action taken if a unit gives a value that is not finite, or not valid for its type.
     #[serde(default)]
     pub on_invalid: OnInvalid,
 }
 
-/// How values are passed on at a communication point.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum)]
+/// Way in which values are passed on at a communication point.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coupling {
-    /// One component after the other: each gets what those before it make of their new inputs.
+    /// The components are served one after the other: each receives what those before it have
+    /// computed from their new inputs.
     #[default]
     GaussSeidel,
-    /// All at once: each gets what the others had before this point's inputs were set.
+    /// All components are served at once: each receives what the others had computed before the
+    /// inputs of this communication point were set.
     Jacobi,
 }
 
-/// A unit and its settings.
+/// A component of the experiment: an FMU with its settings.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Component {
-    /// File name of the archive.
+    /// File name of the FMU.
     #[schemars(with = "String")]
     pub fmu: Spanned<String>,
-    /// Steps at every n-th communication point.
+    /// Period of the component: it steps at every n-th communication point.
     #[serde(default = "one")]
     pub every: u32,
-    /// Inputs that stay at their start value.
+    /// Inputs that stay at their start values.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub unconnected: Vec<Spanned<String>>,
-    /// Values for parameters and for inputs without connection.
+    /// Values of parameters, and of inputs without a connection, by name.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, Scalar>")]
     pub parameters: BTreeMap<String, Spanned<Value>>,
-    /// Whether the command line exchanged the unit; no key of an experiment file.
+    /// Whether the command line replaced the FMU. This is no key of an experiment file.
     #[serde(skip)]
     pub is_exchanged: bool,
 }
 
-/// A number, a text or a truth value: what a parameter is set to, for the JSON Schema.
+/// The value of a parameter as the JSON Schema describes it: a number, a text or a truth value.
 #[derive(JsonSchema)]
 #[serde(untagged)]
 pub enum Scalar {
-    /// A number.
+    /// The value is a number.
     Number(f64),
-    /// A text.
+    /// The value is a text.
     Text(String),
-    /// A truth value.
+    /// The value is true or false.
     Truth(bool),
 }
 
-/// One line of wiring.
+/// A connection, or several that are written as one with a pattern.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Connection {
-    /// `component.output`, or `component.prefix.*`.
+    /// Output that the values come from, as `component.output` or `component.prefix.*`.
     #[schemars(with = "String")]
     pub from: Spanned<String>,
-    /// `component.input`, or `component.prefix.*`.
+    /// Input that the values go to, as `component.input` or `component.prefix.*`.
     #[schemars(with = "String")]
     pub to: Spanned<String>,
-    /// Whether values are converted if the units differ in scale only; else that is refused.
+    /// Whether values are converted if the units differ only in scale. Without this such a
+    /// connection is refused.
     #[serde(default)]
     pub convert_units: bool,
-    /// Applied to the values after that; no key of an experiment file.
+    /// Scaling that is applied after the conversion of units. This is no key of an experiment file.
     #[serde(skip)]
     pub scaling: Scaling,
 }
 
-/// What goes into the results.
+/// Variables that are written to the results.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
-    /// `component.variable`, or `component.prefix.*`.
+    /// Names of the variables, as `component.variable` or `component.prefix.*`.
     #[schemars(with = "Vec<String>")]
     pub variables: Vec<Spanned<String>>,
-    /// A row at every n-th communication point.
+    /// Period of the rows: one is written at every n-th communication point.
     #[serde(default = "one")]
     pub every: u32,
 }
 
-/// The period of what is done at every communication point.
+/// Returns the default period, which means every communication point.
 pub(crate) fn one() -> u32 {
     1
 }
 
 impl Experiment {
-    /// Reads an experiment file with all that it extends.
+    /// Reads an experiment file and all files that it extends.
     ///
     /// # Errors
-    /// If one cannot be read, is no TOML, or holds an unknown key.
+    /// Returns an error if a file cannot be read, is not TOML, or holds an unknown key.
     pub fn load(path: &Path) -> Result<Self, Error> {
         Self::of(Source::load(path)?)
     }
 
-    /// Reads the text of an experiment file; `path` is for messages, and for finding FMUs and what it extends beside it.
+    /// Reads the text of an experiment file. The `path` appears in messages, and FMUs and extended
+    /// files are looked for beside it.
     ///
     /// # Errors
-    /// If it is no TOML, or holds an unknown key.
+    /// Returns an error if the text is not TOML, or holds an unknown key.
     pub fn parse(path: &Path, text: String) -> Result<Self, Error> {
         Self::of(Source::new(path, text)?)
     }
@@ -180,20 +189,20 @@ impl Experiment {
         Ok(experiment)
     }
 
-    /// Sets `component.parameter`.
+    /// Sets the parameter `component.parameter` to a value.
     ///
     /// # Errors
-    /// If there is no such component.
+    /// Returns an error if the experiment has no such component.
     pub fn set(&mut self, target: &str, value: Value) -> Result<(), String> {
         let (component, parameter) = self.target(target)?;
         component.parameters.insert(parameter.to_string(), Spanned::new(0..0, value));
         Ok(())
     }
 
-    /// Leaves `component.parameter` at the FMU's own value.
+    /// Leaves the parameter `component.parameter` at the FMU's own value.
     ///
     /// # Errors
-    /// If there is no such component, or the experiment does not set it.
+    /// Returns an error if the experiment has no such component, or does not set the parameter.
     pub fn unset(&mut self, target: &str) -> Result<(), String> {
         let (component, parameter) = self.target(target)?;
         let hint = names::hint(parameter, component.parameters.keys().map(String::as_str));
@@ -203,19 +212,23 @@ impl Experiment {
         }
     }
 
-    /// Whether it sets the parameter `component.parameter`.
+    /// Returns whether the experiment sets the parameter `component.parameter`.
     pub fn sets(&self, target: &str) -> bool {
         names::split(target).is_some_and(|(name, parameter)| {
-            self.components.get(name).is_some_and(|component| component.parameters.contains_key(parameter))
+            self.components
+                .get(name)
+                .is_some_and(|component| component.parameters.contains_key(parameter))
         })
     }
 
     fn target<'a>(&mut self, target: &'a str) -> Result<(&mut Component, &'a str), String> {
-        let (name, parameter) =
-            names::split(target).ok_or_else(|| format!("\"{target}\" is no component.parameter"))?;
+        let (name, parameter) = names::split(target)
+            .ok_or_else(|| format!("\"{target}\" is no component.parameter"))?;
         let hint = names::hint(name, self.components.keys().map(String::as_str));
-        let component =
-            self.components.get_mut(name).ok_or_else(|| format!("there is no component \"{name}\"{hint}"))?;
+        let component = self
+            .components
+            .get_mut(name)
+            .ok_or_else(|| format!("there is no component \"{name}\"{hint}"))?;
         Ok((component, parameter))
     }
 }

@@ -1,4 +1,4 @@
-//! What the command line changes in an experiment.
+//! Changes that the command line makes to an experiment.
 
 use super::{Coupling, Experiment};
 use crate::error::Error;
@@ -8,53 +8,57 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use toml::{Spanned, Value};
 
-/// Settings that the command line may change.
+/// Settings of an experiment that the command line may change.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct Overrides {
-    /// Set a parameter: `plant.disturbance.seed=7`, `controller.constraints=paper`, `plant.disturbance.bound="1 deg/s2"`.
+    /// Set a parameter: `plant.disturbance.seed=7`, `controller.constraints=paper`,
+    /// `plant.disturbance.bound="1 deg/s2"`.
     #[arg(long = "set", value_name = "COMPONENT.PARAMETER=VALUE")]
     pub set: Vec<String>,
-    /// Exchange a component's unit: `controller=MyLaw.fmu`, a file or one that is found by its name. What the experiment sets,
-    /// records or leaves open of the former unit and the new one does not have is left out.
+    /// Replace the FMU of a component: `controller=MyLaw.fmu`, which is a file, or is found by its
+    /// name. Settings, recorded variables and unconnected inputs of the experiment that the new FMU
+    /// does not have are left out.
     #[arg(long = "fmu", value_name = "COMPONENT=FMU")]
     pub fmu: Vec<String>,
-    /// Stop time, s.
+    /// Stop time of the simulation, s.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub stop: Option<f64>,
-    /// Communication step, s.
+    /// Length of the communication step, s.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Coupling at communication points.
+    /// Choose how values are passed on at a communication point.
     #[arg(long, value_enum)]
     pub coupling: Option<Coupling>,
-    /// What is done about a value that is no number or outside its type.
+    /// Choose what happens if a unit gives a value that is not finite, or not valid for its type.
     #[arg(long, value_enum)]
     pub on_invalid: Option<OnInvalid>,
 }
 
 impl Experiment {
-    /// Applies what the command line says.
+    /// Applies the settings of the command line.
     ///
     /// # Errors
-    /// If an assignment is malformed.
+    /// Returns an error if an assignment is malformed.
     pub fn apply(&mut self, overrides: &Overrides) -> Result<(), Error> {
         self.simulation.stop = overrides.stop.unwrap_or(self.simulation.stop);
         self.simulation.step = overrides.step.unwrap_or(self.simulation.step);
         self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
         self.simulation.on_invalid = overrides.on_invalid.unwrap_or(self.simulation.on_invalid);
         for assignment in &overrides.fmu {
-            let refuse = |message: String| Error::experiment(format!("--fmu {assignment}: {message}"));
-            let (name, fmu) = assignment
-                .split_once('=')
-                .ok_or_else(|| refuse("wants component=file, for example controller=MyLaw.fmu".into()))?;
+            let refuse =
+                |message: String| Error::experiment(format!("--fmu {assignment}: {message}"));
+            let (name, fmu) = assignment.split_once('=').ok_or_else(|| {
+                refuse("wants component=file, for example controller=MyLaw.fmu".into())
+            })?;
             let hint = names::hint(name, self.components.keys().map(String::as_str));
             let component = self
                 .components
                 .get_mut(name)
                 .ok_or_else(|| refuse(format!("there is no component \"{name}\"{hint}")))?;
-            // A file is meant as seen from here, not from the experiment.
+            // A path is relative to the current folder, not to the experiment.
             let file = Path::new(fmu).is_file().then(|| std::path::absolute(fmu).ok()).flatten();
-            let file = file.map_or_else(|| fmu.to_string(), |file| file.to_string_lossy().into_owned());
+            let file =
+                file.map_or_else(|| fmu.to_string(), |file| file.to_string_lossy().into_owned());
             (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
         }
         for assignment in &overrides.set {
@@ -68,7 +72,8 @@ impl Experiment {
             if target.is_empty() {
                 return Err(malformed());
             }
-            // What is no TOML value is text: an enumeration's item needs no quotes within quotes.
+            // A value that is not TOML is taken as text, so that an enumeration's item needs no
+            // quotes within quotes.
             let value = value.trim();
             let value = toml::from_str::<BTreeMap<String, Value>>(&format!("x = {value}"))
                 .ok()
@@ -78,7 +83,7 @@ impl Experiment {
             if self.set(target, value).is_ok() {
                 self.assigned.insert(target.to_string());
             } else {
-                // The units know what is meant.
+                // The target is resolved later, when the units are known.
                 self.unplaced.push(target.to_string());
             }
         }

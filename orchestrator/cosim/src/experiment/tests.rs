@@ -31,7 +31,9 @@ fn defaults_are_filled_in() {
 fn unknown_keys_are_refused_with_their_line() {
     let message = parse(&TEXT.replace("step = 0.1", "stepp = 0.1")).unwrap_err().to_string();
     assert!(
-        message.starts_with("x.toml:5: ") && message.contains("`stepp`") && message.contains("`step`"),
+        message.starts_with("x.toml:5: ")
+            && message.contains("`stepp`")
+            && message.contains("`step`"),
         "{message}"
     );
     let message = parse(&TEXT.replace("fmu =", "fum =")).unwrap_err().to_string();

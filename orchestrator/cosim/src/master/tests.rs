@@ -113,7 +113,8 @@ fn run(
         .map(|(&name, every)| {
             let direct = name == "gain";
             let state = if direct { 0.0 } else { 1.0 };
-            let mock = Mock { name, direct, input: 0.0, state, fails_after, journal: Rc::clone(&journal) };
+            let mock =
+                Mock { name, direct, input: 0.0, state, fails_after, journal: Rc::clone(&journal) };
             Member { name: name.into(), every, unit: Box::new(mock) }
         })
         .collect();
@@ -131,23 +132,33 @@ fn run(
 
 #[test]
 fn oracle_gauss_seidel_in_the_order_of_the_loop_has_no_delay() {
-    let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 3.0], 1e9);
+    let (outcome, rows, _) =
+        run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 3.0], 1e9);
     outcome.unwrap();
     // The state follows x⁺ = x + 2x, and the moment recorded in each row belongs to the state
     // of that row.
-    let expected =
-        [[0.0, 2.0, 2.0, 1.0], [1.0, 6.0, 6.0, 3.0], [2.0, 18.0, 18.0, 9.0], [3.0, 54.0, 54.0, 27.0]];
+    let expected = [
+        [0.0, 2.0, 2.0, 1.0],
+        [1.0, 6.0, 6.0, 3.0],
+        [2.0, 18.0, 18.0, 9.0],
+        [3.0, 54.0, 54.0, 27.0],
+    ];
     assert_eq!(rows, expected);
 }
 
 #[test]
 fn oracle_the_other_order_delays_by_one_step() {
-    let (outcome, rows, _) = run(Coupling::GaussSeidel, ["integrator", "gain"], [1, 1], [1.0, 3.0], 1e9);
+    let (outcome, rows, _) =
+        run(Coupling::GaussSeidel, ["integrator", "gain"], [1, 1], [1.0, 3.0], 1e9);
     outcome.unwrap();
     // The integrator receives 2·x of the tick before. In initialization mode it received the
     // gain's 0, at tick 0 its 2·x₀.
-    let expected =
-        [[0.0, 2.0, 2.0, 1.0], [1.0, 6.0, 2.0, 3.0], [2.0, 10.0, 6.0, 5.0], [3.0, 22.0, 10.0, 11.0]];
+    let expected = [
+        [0.0, 2.0, 2.0, 1.0],
+        [1.0, 6.0, 2.0, 3.0],
+        [2.0, 10.0, 6.0, 5.0],
+        [3.0, 22.0, 10.0, 11.0],
+    ];
     assert_eq!(rows, expected);
 }
 
@@ -157,15 +168,20 @@ fn oracle_jacobi_delays_by_one_step_in_either_order() {
         let (outcome, rows, _) = run(Coupling::Jacobi, order, [1, 1], [1.0, 3.0], 1e9);
         outcome.unwrap();
         // After initialization the gain's output is 2·x₀ in either order.
-        let expected =
-            [[0.0, 2.0, 2.0, 1.0], [1.0, 6.0, 2.0, 3.0], [2.0, 10.0, 6.0, 5.0], [3.0, 22.0, 10.0, 11.0]];
+        let expected = [
+            [0.0, 2.0, 2.0, 1.0],
+            [1.0, 6.0, 2.0, 3.0],
+            [2.0, 10.0, 6.0, 5.0],
+            [3.0, 22.0, 10.0, 11.0],
+        ];
         assert_eq!(rows, expected, "{order:?}");
     }
 }
 
 #[test]
 fn units_are_set_before_they_are_stepped() {
-    let (_, _, journal) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 1.0], 1e9);
+    let (_, _, journal) =
+        run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 1.0], 1e9);
     let expected = [
         "gain enter 0..1",
         "integrator enter 0..1",
@@ -193,10 +209,12 @@ fn oracle_a_slow_unit_holds_its_outputs_and_shows_nothing_early() {
     // The integrator has communication points at 0, 2 and 4 only, where x⁺ = x + 2·2x.
     let states: Vec<f64> = rows.iter().map(|row| row[3]).collect();
     assert_eq!(states, [1.0, 1.0, 5.0, 5.0, 25.0, 25.0]);
-    let steps: Vec<&String> = journal.iter().filter(|line| line.starts_with("integrator step")).collect();
+    let steps: Vec<&String> =
+        journal.iter().filter(|line| line.starts_with("integrator step")).collect();
     assert_eq!(steps, ["integrator step 0+2", "integrator step 2+2"]);
 
-    let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [2, 1], [1.0, 4.0], 1e9);
+    let (outcome, rows, _) =
+        run(Coupling::GaussSeidel, ["gain", "integrator"], [2, 1], [1.0, 4.0], 1e9);
     outcome.unwrap();
     // The gain is sampled at 0, 2 and 4, and its output is held between.
     let held: Vec<f64> = rows.iter().map(|row| row[1]).collect();
@@ -205,7 +223,8 @@ fn oracle_a_slow_unit_holds_its_outputs_and_shows_nothing_early() {
 
 #[test]
 fn a_failing_unit_is_named_with_time_and_words_and_the_rows_stay() {
-    let (outcome, rows, _) = run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 5.0], 2.0);
+    let (outcome, rows, _) =
+        run(Coupling::GaussSeidel, ["gain", "integrator"], [1, 1], [1.0, 5.0], 2.0);
     let error = outcome.unwrap_err();
     assert_eq!(error.to_string(), "gain failed at t = 2 s in doStep: out of propellant");
     assert_eq!(error.exit_code(), 1);

@@ -37,7 +37,9 @@ impl<T: Copy + Default> Bundle<T> {
                     references.push(wire.from.reference);
                     range.end = place + 1;
                 }
-                _ => sources.push((wire.from.component, vec![wire.from.reference], place..place + 1)),
+                _ => {
+                    sources.push((wire.from.component, vec![wire.from.reference], place..place + 1))
+                }
             }
         }
         Self {
@@ -62,7 +64,11 @@ impl Inputs {
         let real: Bundle<f64> = Bundle::new(wires, target, Carrier::Real);
         let scaling = |reference: u32| {
             let is_it = |w: &&Wire| w.to.component == target && w.to.reference == reference;
-            wires.iter().filter(|w| w.to.carrier == Carrier::Real).find(is_it).map(|wire| wire.scaling)
+            wires
+                .iter()
+                .filter(|w| w.to.carrier == Carrier::Real)
+                .find(is_it)
+                .map(|wire| wire.scaling)
         };
         let scaled = real.references.iter().enumerate();
         let scaled = scaled.filter_map(|(place, &reference)| Some((place, scaling(reference)?)));
@@ -78,18 +84,27 @@ impl Inputs {
     pub(super) fn gather(&mut self, members: &mut [Member]) -> Result<(), (usize, UnitFailure)> {
         for (source, references, range) in &self.real.sources {
             let values = &mut self.real.values[range.clone()];
-            members[*source].unit.get_real(references, values).map_err(|failure| (*source, failure))?;
+            members[*source]
+                .unit
+                .get_real(references, values)
+                .map_err(|failure| (*source, failure))?;
         }
         for (place, scaling) in &self.scaled {
             self.real.values[*place] = scaling.of(self.real.values[*place]);
         }
         for (source, references, range) in &self.integer.sources {
             let values = &mut self.integer.values[range.clone()];
-            members[*source].unit.get_integer(references, values).map_err(|failure| (*source, failure))?;
+            members[*source]
+                .unit
+                .get_integer(references, values)
+                .map_err(|failure| (*source, failure))?;
         }
         for (source, references, range) in &self.boolean.sources {
             let values = &mut self.boolean.values[range.clone()];
-            members[*source].unit.get_boolean(references, values).map_err(|failure| (*source, failure))?;
+            members[*source]
+                .unit
+                .get_boolean(references, values)
+                .map_err(|failure| (*source, failure))?;
         }
         Ok(())
     }
@@ -128,7 +143,9 @@ impl Probe {
     pub(super) fn new(ports: &[Port]) -> Self {
         let mut reads: Vec<Read> = Vec::new();
         for (place, port) in ports.iter().enumerate() {
-            let known = reads.iter_mut().find(|r| r.component == port.component && r.carrier == port.carrier);
+            let known = reads
+                .iter_mut()
+                .find(|r| r.component == port.component && r.carrier == port.carrier);
             if let Some(read) = known {
                 read.references.push(port.reference);
                 read.places.push(place);

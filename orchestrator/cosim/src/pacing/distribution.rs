@@ -4,7 +4,7 @@ use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// Upper end of the range of durations that are told apart: an hour.
+/// Upper end of the range in which durations are told apart, which is an hour.
 const LONGEST: Duration = Duration::from_secs(3600);
 /// Width of the first column of the written histogram; each further column ends at a constant
 /// multiple of the one before.
@@ -59,7 +59,9 @@ impl Distribution {
             median: ms(self.0.value_at_quantile(0.5)),
             p99: ms(self.0.value_at_quantile(0.99)),
             max: ms(self.0.max()),
-            histogram: columns.map(|c| (ms(c.value_iterated_to()), c.count_since_last_iteration())).collect(),
+            histogram: columns
+                .map(|c| (ms(c.value_iterated_to()), c.count_since_last_iteration()))
+                .collect(),
         }
     }
 }
@@ -76,8 +78,9 @@ mod tests {
             distribution.record(Duration::from_millis(milliseconds));
         }
         let summary = distribution.summary();
-        let near =
-            |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+        let near = |found: f64, expected: f64| {
+            assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}")
+        };
         near(summary.min, 1.0);
         near(summary.median, 50.0);
         near(summary.p99, 99.0);

@@ -49,21 +49,23 @@ impl FromStr for Factor {
         if factor > 0.0 && factor.is_finite() {
             Ok(Self(factor))
         } else {
-            Err("the factor must be finite and above 0: 1 is real time, 20 is twenty times as fast".into())
+            Err("the factor must be finite and above 0: 1 is real time, 20 is twenty times as fast"
+                .into())
         }
     }
 }
 
-/// What is done about a missed deadline. It is counted and reported whatever is done.
+/// Action taken on a missed deadline, which is counted and reported in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnMiss {
-    /// Go on at once, without waiting, until the run is back in step with the original time base.
+    /// Continue at once, without waiting, until the run is back in step with the original time
+    /// base.
     #[default]
     CatchUp,
-    /// Shift the time base by the delay: the run goes on at its pace, and ends that much later.
+    /// Shift the time base by the delay: the run continues at its pace, and ends that much later.
     Slip,
-    /// End the run with an error; the results until then are kept.
+    /// End the run with an error. The results so far are kept.
     Stop,
 }
 

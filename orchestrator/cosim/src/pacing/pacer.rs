@@ -204,7 +204,7 @@ impl Pacer {
     /// deadlines.
     ///
     /// # Errors
-    /// If a deadline was missed and the settings say that this ends the run.
+    /// Returns an error if a deadline was missed and the settings say that this ends the run.
     pub fn check(&mut self, tick: u64) -> Result<(), Error> {
         let time = self.clock.time(tick);
         if let Some(woken) = self.woken {
@@ -237,7 +237,13 @@ impl Pacer {
             let late = task.spent.ended().saturating_sub(self.release(tick + task.every));
             self.update(|tally| tally.deadlines += 1);
             if !late.is_zero() {
-                let miss = Miss { component, time, late, lag: self.tally.get().lag, longest: self.longest };
+                let miss = Miss {
+                    component,
+                    time,
+                    late,
+                    lag: self.tally.get().lag,
+                    longest: self.longest,
+                };
                 self.note(miss);
                 if self.settings.on_miss == OnMiss::Stop && outcome.is_ok() {
                     let Late { component, time, late_ms, .. } = self.late(miss);
@@ -268,16 +274,16 @@ impl Pacer {
         self.elapsed = now.saturating_sub(self.began);
     }
 
-    /// Instant of a communication point on the timer. Ticks continue beyond the stop time, because
-    /// deadlines may lie there.
+    /// Returns the instant of a communication point on the timer. Ticks continue beyond the stop
+    /// time, because deadlines may lie there.
     fn release(&self, tick: u64) -> Duration {
         let simulated = if tick <= self.clock.ticks() {
             self.clock.time(tick) - self.clock.start()
         } else {
             tick as f64 * self.clock.step()
         };
-        let after =
-            Duration::try_from_secs_f64(simulated / self.settings.factor.get()).unwrap_or(Duration::MAX);
+        let after = Duration::try_from_secs_f64(simulated / self.settings.factor.get())
+            .unwrap_or(Duration::MAX);
         self.base.saturating_add(after)
     }
 
@@ -312,7 +318,8 @@ impl Pacer {
     /// Returns the timing report of the run, the time series of the wake-up jitter, and the time
     /// series of each component's step time.
     pub fn report(self) -> (RealTime, Series, Vec<(String, Series)>) {
-        let (first_miss, worst_miss) = (self.first.map(|m| self.late(m)), self.worst.map(|m| self.late(m)));
+        let (first_miss, worst_miss) =
+            (self.first.map(|m| self.late(m)), self.worst.map(|m| self.late(m)));
         let tally = self.tally.get();
         let milliseconds = |duration: Duration| duration.as_secs_f64() * 1e3;
         let period = self.clock.step() / self.settings.factor.get() * 1e3;

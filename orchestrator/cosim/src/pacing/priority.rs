@@ -48,15 +48,16 @@ mod system {
     use super::Priority;
     use rustix::mm::{MlockAllFlags, mlockall, munlockall};
     use thread_priority::{
-        NormalThreadSchedulePolicy, RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy,
-        set_thread_priority_and_policy, thread_native_id,
+        NormalThreadSchedulePolicy, RealtimeThreadSchedulePolicy, ThreadPriority,
+        ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
     };
 
     pub(super) fn request(priority: u8) -> Priority {
         let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-        let outcome = ThreadPriority::try_from(priority).map_err(ToString::to_string).and_then(|value| {
-            set_thread_priority_and_policy(thread_native_id(), value, policy).map_err(reason)
-        });
+        let outcome =
+            ThreadPriority::try_from(priority).map_err(ToString::to_string).and_then(|value| {
+                set_thread_priority_and_policy(thread_native_id(), value, policy).map_err(reason)
+            });
         if let Err(reason) = outcome {
             return Priority::Refused(format!(
                 "{reason}; SCHED_FIFO wants the capability CAP_SYS_NICE or a limit (ulimit -r) of at least {priority}"
@@ -71,7 +72,9 @@ mod system {
 
     pub(super) fn release() {
         let policy = ThreadSchedulePolicy::Normal(NormalThreadSchedulePolicy::Other);
-        if let Err(error) = set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Min, policy) {
+        if let Err(error) =
+            set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Min, policy)
+        {
             tracing::debug!("the thread keeps its priority: {error}");
         }
         if let Err(error) = munlockall() {

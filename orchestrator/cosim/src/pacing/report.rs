@@ -131,7 +131,7 @@ impl RealTime {
     /// Prints the timing report, below the summary of the run.
     ///
     /// # Errors
-    /// If the text cannot be written.
+    /// Returns an error if the text cannot be written.
     pub fn print(&self, order: &[String], out: &mut impl Write) -> io::Result<()> {
         let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
         line(
@@ -176,11 +176,15 @@ impl RealTime {
         row(
             "ms",
             "",
-            texts(["period", "min", "median", "p99", "max", "p99", "max", "median", "p99", "max", "missed"]),
+            texts([
+                "period", "min", "median", "p99", "max", "p99", "max", "median", "p99", "max",
+                "missed",
+            ]),
         )?;
         for name in order {
             let Some(component) = self.components.get(name) else { continue };
-            let Component { step_ms: step, response_ms: response, wake_up_ms: woken, .. } = component;
+            let Component { step_ms: step, response_ms: response, wake_up_ms: woken, .. } =
+                component;
             let woken = [woken.median, woken.p99, woken.max]
                 .map(|ms| if woken.count > 0 { plain(ms) } else { "-".into() });
             let [woken_median, woken_p99, woken_max] = woken;
@@ -244,7 +248,9 @@ impl RealTime {
             Priority::Fifo { priority, unlocked: Some(reason) } => {
                 Some(format!("SCHED_FIFO {priority}; memory NOT locked: {reason}"))
             }
-            Priority::Refused(reason) => Some(format!("REFUSED, ran with usual scheduling: {reason}")),
+            Priority::Refused(reason) => {
+                Some(format!("REFUSED, ran with usual scheduling: {reason}"))
+            }
         }
     }
 }

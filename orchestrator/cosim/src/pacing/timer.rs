@@ -5,10 +5,11 @@ use std::time::Duration;
 /// A clock and a way to sleep until it reaches an instant. Instants are counted from the clock's
 /// own origin.
 pub trait Timer {
-    /// The current instant on the clock.
+    /// Returns the current instant on the clock.
     fn now(&self) -> Duration;
 
-    /// Sleeps until the instant: never returns before it, and as soon after it as the system can.
+    /// Sleeps until the instant. It never returns before it, and returns as soon after it as the
+    /// system can.
     fn sleep_until(&self, instant: Duration);
 }
 
@@ -31,7 +32,9 @@ mod system {
         fn sleep_until(&self, instant: Duration) {
             let Ok(until) = Timespec::try_from(instant) else { return };
             // The loop is needed because a signal ends the sleep early.
-            while clock_nanosleep_absolute(ClockId::Monotonic, &until) == Err(rustix::io::Errno::INTR) {}
+            while clock_nanosleep_absolute(ClockId::Monotonic, &until)
+                == Err(rustix::io::Errno::INTR)
+            {}
         }
     }
 

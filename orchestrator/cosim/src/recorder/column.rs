@@ -1,4 +1,4 @@
-//! What a recorded variable is.
+//! Description of a recorded variable.
 
 use fmu_import::description::Carrier;
 

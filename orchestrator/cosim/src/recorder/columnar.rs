@@ -16,7 +16,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Rows that are held in memory and written at once.
+/// Number of rows that are held in memory before they are written as a group.
 pub(super) const GROUP: usize = 8192;
 
 /// Values of a column that are not yet written.
@@ -75,11 +75,11 @@ impl Values {
     }
 }
 
-/// A Parquet file that is being written. Without [`Self::finish`] it cannot be read.
+/// A Parquet file that is being written. It cannot be read before [`Self::finish`] is called.
 pub(super) struct Columnar {
     path: PathBuf,
     writer: SerializedFileWriter<File>,
-    /// Values of the time, then those of each column.
+    /// Values of the time that are held in memory, followed by those of each column.
     values: Vec<Values>,
     places: Vec<usize>,
     rows: usize,
@@ -90,12 +90,15 @@ impl Columnar {
         let file = File::create(path).map_err(Error::file(path))?;
         let places = columns.iter().map(|column| column.place).collect();
         let carriers = columns.iter().map(|column| column.carrier);
-        let values: Vec<Values> = std::iter::once(Carrier::Real).chain(carriers).map(Values::new).collect();
-        let names = std::iter::once("time").chain(columns.iter().map(|column| column.name.as_str()));
+        let values: Vec<Values> =
+            std::iter::once(Carrier::Real).chain(carriers).map(Values::new).collect();
+        let names =
+            std::iter::once("time").chain(columns.iter().map(|column| column.name.as_str()));
         let metadata = [("units", units(columns)), ("items", items(columns))];
-        let metadata =
-            metadata.map(|(key, value)| KeyValue::new(key.to_owned(), Value::Object(value).to_string()));
-        // Numbers of a simulation hardly repeat: neither dictionaries nor statistics pay.
+        let metadata = metadata
+            .map(|(key, value)| KeyValue::new(key.to_owned(), Value::Object(value).to_string()));
+        // Numbers of a simulation hardly repeat, so that neither dictionaries nor statistics save
+        // space.
         let properties = WriterProperties::builder()
             .set_dictionary_enabled(false)
             .set_statistics_enabled(EnabledStatistics::None)
@@ -139,7 +142,9 @@ impl Columnar {
     }
 }
 
-fn schema<'a>(columns: impl Iterator<Item = (&'a str, &'a Values)>) -> Result<TypePtr, ParquetError> {
+fn schema<'a>(
+    columns: impl Iterator<Item = (&'a str, &'a Values)>,
+) -> Result<TypePtr, ParquetError> {
     let fields: Result<Vec<TypePtr>, ParquetError> = columns
         .map(|(name, values)| {
             let column = Type::primitive_type_builder(name, values.physical());
@@ -149,13 +154,15 @@ fn schema<'a>(columns: impl Iterator<Item = (&'a str, &'a Values)>) -> Result<Ty
     Ok(Arc::new(Type::group_type_builder("results").with_fields(fields?).build()?))
 }
 
-/// The unit of each column that has one.
+/// Collects the units of the columns that have one.
 fn units(columns: &[Column]) -> Map<String, Value> {
-    let own = columns.iter().filter_map(|column| Some((column.name.clone(), json!(column.unit.as_ref()?))));
+    let own = columns
+        .iter()
+        .filter_map(|column| Some((column.name.clone(), json!(column.unit.as_ref()?))));
     std::iter::once(("time".to_owned(), json!("s"))).chain(own).collect()
 }
 
-/// The names of the items of each enumeration, by their numbers.
+/// Collects the names of the items of each enumeration, by their numbers.
 fn items(columns: &[Column]) -> Map<String, Value> {
     let own = columns.iter().filter(|column| !column.items.is_empty());
     own.map(|column| {

@@ -1,4 +1,5 @@
-//! Writes the recorded variables to a file, a row per communication point, with the bits that they have.
+//! Writes the recorded variables to a file, one row for each communication point, without loss of
+//! precision.
 
 mod column;
 mod columnar;
@@ -11,13 +12,14 @@ use columnar::Columnar;
 use std::path::Path;
 use text::Text;
 
-/// What the file is.
+/// Format of the file of recorded variables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
-    /// results.csv: comma-separated text, digits enough to read back the same bits.
+    /// Write results.csv: comma-separated text with enough digits to read back the same bits.
     #[default]
     Csv,
-    /// results.parquet: Apache Parquet, for long runs. Units and names of items stand in its metadata.
+    /// Write results.parquet: Apache Parquet, for long runs. Its metadata holds the units and the
+    /// names of items.
     Parquet,
 }
 
@@ -43,10 +45,11 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates the file. `every` is the number of ticks from row to row. With `labels` a text's header has units, and its cells the names of items.
+    /// Creates the file. A row is written at every `every`-th tick. With `labels`, the header of a
+    /// text file holds the units, and its cells the names of items.
     ///
     /// # Errors
-    /// If the file cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn create(
         path: &Path,
         format: Format,
@@ -64,7 +67,7 @@ impl Recorder {
     /// Writes the rows that are still in memory.
     ///
     /// # Errors
-    /// If the file cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn finish(&mut self) -> Result<(), Error> {
         match &mut self.table {
             Table::Text(text) => text.finish(),

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::path::PathBuf;
 
 const VALUES: [f64; 5] = [0.1 + 0.2, 1e-300, f64::MAX, -0.0, 5e-324];
-/// Every second tick, and the last.
+/// Rows that are expected: every second tick, and the last one.
 const ROWS: [usize; 4] = [0, 2, 3, 4];
 
 fn column(name: &str, place: usize, carrier: Carrier) -> Column {
@@ -24,7 +24,9 @@ fn record(folder: &Path, format: Format, labels: bool) -> PathBuf {
     for (tick, value) in VALUES.iter().enumerate() {
         let time = tick as f64 * 0.04;
         let values = [7.0, *value, f64::from(tick as u32 % 2)];
-        recorder.observe(&Sample { tick: tick as u64, time, last: tick == 3, values: &values }).unwrap();
+        recorder
+            .observe(&Sample { tick: tick as u64, time, last: tick == 3, values: &values })
+            .unwrap();
     }
     recorder.finish().unwrap();
     path
@@ -66,7 +68,8 @@ fn columnar_reads_back_to_the_same_bits_with_units_and_items() {
         said,
         [("units", r#"{"a.x":"rad/s","time":"s"}"#), ("items", r#"{"a.n":{"7":"warm, \"red\""}}"#)]
     );
-    let rows: Vec<Vec<(String, Field)>> = reader.into_iter().map(|row| row.unwrap().into_columns()).collect();
+    let rows: Vec<Vec<(String, Field)>> =
+        reader.into_iter().map(|row| row.unwrap().into_columns()).collect();
     let names: Vec<&str> = rows[0].iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["time", "a.x", "a.n", "a.on"]);
     assert_eq!(rows.len(), ROWS.len());
@@ -87,7 +90,9 @@ fn columnar_takes_more_rows_than_it_holds() {
     let count = 2 * columnar::GROUP + 3;
     for tick in 0..count {
         let time = tick as f64;
-        recorder.observe(&Sample { tick: tick as u64, time, last: false, values: &[-time] }).unwrap();
+        recorder
+            .observe(&Sample { tick: tick as u64, time, last: false, values: &[-time] })
+            .unwrap();
     }
     recorder.finish().unwrap();
     let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();

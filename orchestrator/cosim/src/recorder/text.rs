@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Bytes that are held in memory and written at once.
+/// Number of bytes that are held in memory before they are written.
 const HELD: usize = 1 << 16;
 
 /// A CSV file that is being written.
@@ -23,12 +23,12 @@ pub(super) struct Text {
 struct Shown {
     place: usize,
     carrier: Carrier,
-    /// Items that are told by their names, as fields.
+    /// Items that are written by their names, which are already formatted as CSV fields.
     items: Vec<(String, i32)>,
 }
 
 impl Text {
-    /// The file with its header.
+    /// Creates the file, and prepares its header.
     pub(super) fn create(path: &Path, columns: &[Column], labels: bool) -> Result<Self, Error> {
         let file = File::create(path).map_err(Error::file(path))?;
         let head = |name: &str, unit: Option<&str>| match unit {
@@ -43,7 +43,8 @@ impl Text {
         }
         held.push(b'\n');
         let shown = |column: &Column| {
-            let items = column.items.iter().filter(|_| labels).map(|(name, item)| (field(name), *item));
+            let items =
+                column.items.iter().filter(|_| labels).map(|(name, item)| (field(name), *item));
             Shown { place: column.place, carrier: column.carrier, items: items.collect() }
         };
         let columns = columns.iter().map(shown).collect();
@@ -70,7 +71,7 @@ impl Text {
         if self.held.len() < HELD { Ok(()) } else { self.finish() }
     }
 
-    /// Writes what is held.
+    /// Writes the rows that are held in memory.
     pub(super) fn finish(&mut self) -> Result<(), Error> {
         let outcome = self.file.write_all(&self.held);
         self.held.clear();
@@ -79,13 +80,14 @@ impl Text {
 }
 
 impl Drop for Text {
-    /// Keeps what is held where a panic ends the run; there is nobody to tell of failure.
+    /// Writes the rows that are still held if a panic ends the run. There is nobody to tell if this
+    /// fails.
     fn drop(&mut self) {
         let _ = self.finish();
     }
 }
 
-/// A text as a field, in quotation marks where it needs them.
+/// Formats a text as a CSV field, in quotation marks if it needs them.
 fn field(text: &str) -> String {
     let mut writer =
         csv::WriterBuilder::new().terminator(csv::Terminator::Any(b'\n')).from_writer(Vec::new());

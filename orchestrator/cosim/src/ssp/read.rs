@@ -20,7 +20,8 @@ use toml::Spanned;
 
 /// An experiment that was read from an archive.
 pub struct Loaded {
-    /// The experiment; components of subsystems are called `subsystem/component`.
+    /// Experiment that the archive describes. Components of subsystems are called
+    /// `subsystem/component`.
     pub experiment: Experiment,
     /// The opened FMUs of the archive.
     pub opened: Opened,
@@ -28,20 +29,21 @@ pub struct Loaded {
     pub entries: Entries,
 }
 
-/// The entries of an archive, unpacked until this goes.
+/// Entries of an archive, which stay unpacked as long as this value lives.
 pub struct Entries {
     path: PathBuf,
     folder: TempDir,
 }
 
 impl Entries {
-    /// An error of one of its FMUs, with the names of the archive and of the entry.
+    /// Rewrites an error of one of the FMUs so that it names the archive and the entry.
     pub fn named(&self, error: Error) -> Error {
         of_entry(error, &self.path, self.folder.path())
     }
 }
 
-/// An FMU in an archive is called by the names of both, not by where it was unpacked.
+/// Rewrites an error of an FMU so that it names the archive and the entry, and not the temporary
+/// folder.
 fn of_entry(error: Error, archive: &Path, folder: &Path) -> Error {
     match error {
         Error::Import(Import::Fmu { path, message }) => {
@@ -61,7 +63,7 @@ struct Own {
     description: String,
     step: f64,
     coupling: Coupling,
-    /// Components with their periods, in their order.
+    /// Names of the components with their periods, in the order in which their inputs are set.
     order: Vec<(String, u32)>,
     recorded: Vec<String>,
     record_every: u32,
@@ -79,11 +81,11 @@ impl Own {
             "jacobi" => Coupling::Jacobi,
             other => return Err(format!("the coupling \"{other}\" is not known")),
         };
-        let those = |name: &'static str| element.children.iter().filter(move |child| child.name == name);
+        let those =
+            |name: &'static str| element.children.iter().filter(move |child| child.name == name);
         let observe = match element.child("Observe") {
-            Some(stated) => {
-                toml::from_str(stated.required("toml")?).map_err(|error| error.message().to_string())?
-            }
+            Some(stated) => toml::from_str(stated.required("toml")?)
+                .map_err(|error| error.message().to_string())?,
             None => Observe::default(),
         };
         Ok(Self {
@@ -108,7 +110,9 @@ impl Own {
         for (name, every) in &self.order {
             let component = experiment.components.get_mut(name);
             component
-                .ok_or_else(|| format!("the annotation of the run: there is no component \"{name}\""))?
+                .ok_or_else(|| {
+                    format!("the annotation of the run: there is no component \"{name}\"")
+                })?
                 .every = *every;
         }
         experiment.simulation.order = self.order.into_iter().map(|(name, _)| name).collect();
@@ -119,17 +123,19 @@ impl Own {
     }
 }
 
-/// Reads an archive. The stop time and the step come from `overrides`, or else from the archive and from what its FMUs propose
-/// (the smallest step). The order of the components is the one without delay, where there is one.
+/// Reads an archive. The stop time and the step come from `overrides`, or otherwise from the
+/// archive; without a step there, the smallest one that an FMU proposes is taken. The components
+/// are ordered so that there is no delay, if this is possible.
 ///
 /// # Errors
-/// If the archive is faulty, or needs what this program does not support: components other than
-/// FMUs for co-simulation, mappings of parameters, or signal dictionaries.
+/// Returns an error if the archive is faulty, or needs what this program does not support:
+/// components other than FMUs for co-simulation, mappings of parameters, or signal dictionaries.
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let folder = archive::unpack(path)?;
     let refuse = |message: String| Error::from(Import::Fmu { path: path.to_path_buf(), message });
-    let bytes = std::fs::read(folder.path().join(STRUCTURE))
-        .map_err(|error| refuse(format!("is no SSP archive, {STRUCTURE} cannot be read: {error}")))?;
+    let bytes = std::fs::read(folder.path().join(STRUCTURE)).map_err(|error| {
+        refuse(format!("is no SSP archive, {STRUCTURE} cannot be read: {error}"))
+    })?;
     let in_structure = |message: String| refuse(format!("{STRUCTURE}: {message}"));
     let text = xml::decode(&bytes).map_err(in_structure)?;
     let root = Element::parse(&text).map_err(in_structure)?;
@@ -139,7 +145,8 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     for component in &structure.components {
         let fmu = structure.folder.join(&component.source);
         if !opened.contains_key(&fmu) {
-            let unit = Fmu::open(&fmu).map_err(|error| of_entry(error.into(), path, folder.path()))?;
+            let unit =
+                Fmu::open(&fmu).map_err(|error| of_entry(error.into(), path, folder.path()))?;
             opened.insert(fmu.clone(), Rc::new(unit));
         }
     }
@@ -147,7 +154,8 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
 
     let system = root.child("System");
     let annotation = |kind: &str| {
-        let mut all = system.into_iter().flat_map(|system| system.list("Annotations", "Annotation"));
+        let mut all =
+            system.into_iter().flat_map(|system| system.list("Annotations", "Annotation"));
         all.find(|annotation| annotation.attribute("type") == Some(kind))
     };
     let own = annotation(OWN).and_then(|annotation| annotation.child("Experiment"));
@@ -156,12 +164,14 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         .and_then(|annotation| annotation.child("Annotations"))
         .and_then(|all| all.child("SimulationInformation"))
         .and_then(|information| information.child("FixedStepMaster"));
-    let common = master.map_or(Ok(None), |master| master.number("stepSize")).map_err(in_structure)?;
+    let common =
+        master.map_or(Ok(None), |master| master.number("stepSize")).map_err(in_structure)?;
 
     let experiment = root.child("DefaultExperiment");
     let time = |name| experiment.map_or(Ok(None), |e| e.number(name)).map_err(in_structure);
     let stop = overrides.stop.map_or_else(|| time("stopTime"), |stop| Ok(Some(stop)))?;
-    let proposed = structure.components.iter().filter_map(|component| of(component).default_experiment.step);
+    let proposed =
+        structure.components.iter().filter_map(|component| of(component).default_experiment.step);
     let stated = own.as_ref().map(|own| own.step).or(common);
     let step = overrides.step.or(stated).or(proposed.reduce(f64::min));
     let simulation = Simulation {
@@ -174,12 +184,13 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     };
     let text_of = |text: String| Spanned::new(0..0, text);
     let recorded = structure.components.iter().flat_map(|component| {
-        let seen =
-            |causality| of(component).names(causality).map(|name| format!("{}.{name}", component.name));
+        let seen = |causality| {
+            of(component).names(causality).map(|name| format!("{}.{name}", component.name))
+        };
         seen("input").chain(seen("output")).collect::<Vec<_>>()
     });
     let texts = |name: &String| {
-        // A text can be neither recorded nor shown.
+        // Texts can be neither recorded nor shown.
         wiring::find(name, &parts(&structure.components, &opened, &structure.folder)).is_some()
     };
     let mut experiment = Experiment {
@@ -201,8 +212,10 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     };
     let parts = parts(&structure.components, &opened, &structure.folder);
     let wires = wiring::wires(&experiment, &parts)?;
-    experiment.simulation.order =
-        delay::order(&parts, &wires).into_iter().map(|index| parts[index].name.to_string()).collect();
+    experiment.simulation.order = delay::order(&parts, &wires)
+        .into_iter()
+        .map(|index| parts[index].name.to_string())
+        .collect();
     if let Some(own) = own {
         own.apply(&mut experiment).map_err(in_structure)?;
     }

@@ -1,5 +1,5 @@
-//! The system of an SSP archive: its components, connections and values, with those of its
-//! subsystems.
+//! The system of an SSP archive: its components, connections and parameter values, including those
+//! of its subsystems.
 
 use super::FMU;
 use crate::experiment::{Component, Connection};
@@ -21,7 +21,8 @@ pub(super) struct Found {
 
 impl Found {
     pub(super) fn component(&self, folder: &Path) -> Component {
-        let value = |(name, value): (&String, &Value)| (name.clone(), Spanned::new(0..0, value.clone()));
+        let value =
+            |(name, value): (&String, &Value)| (name.clone(), Spanned::new(0..0, value.clone()));
         Component {
             fmu: Spanned::new(0..0, folder.join(&self.source).to_string_lossy().into_owned()),
             every: 1,
@@ -32,10 +33,11 @@ impl Found {
     }
 }
 
-/// A connector: name of the component or of the subsystem, and its own.
+/// A connector, given by the name of its component or subsystem and its own name. The name of the
+/// outermost system is empty.
 type Node = (String, String);
 
-/// A connection that ends at a connector.
+/// A connection, without the connector that it ends at.
 #[derive(Clone)]
 struct Edge {
     start: Node,
@@ -43,7 +45,7 @@ struct Edge {
     scaling: Scaling,
 }
 
-/// A system with its subsystems in one.
+/// A system into which its subsystems have been merged.
 pub(super) struct Structure {
     pub(super) folder: PathBuf,
     pub(super) components: Vec<Found>,
@@ -55,7 +57,7 @@ pub(super) struct Structure {
 struct Walk {
     components: Vec<Found>,
     edges: BTreeMap<Node, Edge>,
-    /// Values of systems, by the full name of what they are for.
+    /// Parameter values that belong to systems, by the full name of the variable.
     parameters: Vec<(String, Value)>,
 }
 
@@ -69,12 +71,15 @@ impl Structure {
         walk.system(system, "", folder)?;
         for (name, value) in std::mem::take(&mut walk.parameters) {
             let owner = walk.components.iter_mut().find_map(|component| {
-                let rest =
-                    name.strip_prefix(&component.name.replace('/', "."))?.strip_prefix('.')?.to_string();
+                let rest = name
+                    .strip_prefix(&component.name.replace('/', "."))?
+                    .strip_prefix('.')?
+                    .to_string();
                 Some((component, rest))
             });
-            let (component, variable) = owner
-                .ok_or_else(|| format!("the parameter \"{name}\" of a system belongs to no component"))?;
+            let (component, variable) = owner.ok_or_else(|| {
+                format!("the parameter \"{name}\" of a system belongs to no component")
+            })?;
             component.parameters.insert(variable, value);
         }
         let connections = walk.connections()?;
@@ -83,9 +88,11 @@ impl Structure {
 }
 
 impl Walk {
-    /// `path` is the name of the system, empty for the outermost.
+    /// Adds a system and its subsystems. The `path` is the name of the system, which is empty for
+    /// the outermost one.
     fn system(&mut self, system: &Element, path: &str, folder: &Path) -> Result<(), String> {
-        let inside = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}/{name}") };
+        let inside =
+            |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}/{name}") };
         for (name, value) in parameters(system, folder)? {
             self.parameters.push((inside(&name).replace('/', "."), value));
         }
@@ -94,20 +101,28 @@ impl Walk {
             match element.name.as_str() {
                 "System" => self.system(element, &name, folder)?,
                 "Component" => self.component(element, name, folder)?,
-                other => return Err(format!("the element \"{name}\" is a {other}, which is not supported")),
+                other => {
+                    return Err(format!(
+                        "the element \"{name}\" is a {other}, which is not supported"
+                    ));
+                }
             }
         }
         for connection in system.list("Connections", "Connection") {
             let node = |element: &str, connector: &str| {
-                let owner = connection.attribute(element).map(|name| inside(&name.replace('.', "/")));
+                let owner =
+                    connection.attribute(element).map(|name| inside(&name.replace('.', "/")));
                 Ok::<_, String>((
                     owner.unwrap_or_else(|| path.to_string()),
                     connection.required(connector)?.to_string(),
                 ))
             };
-            let (start, end) = (node("startElement", "startConnector")?, node("endElement", "endConnector")?);
-            if let Some(mapping) =
-                connection.children.iter().find(|child| child.name.ends_with("MappingTransformation"))
+            let (start, end) =
+                (node("startElement", "startConnector")?, node("endElement", "endConnector")?);
+            if let Some(mapping) = connection
+                .children
+                .iter()
+                .find(|child| child.name.ends_with("MappingTransformation"))
             {
                 return Err(format!(
                     "the connection to {}.{} has a {}, which is not supported",
@@ -119,7 +134,8 @@ impl Walk {
                 scaling.factor = linear.number("factor")?.unwrap_or(1.0);
                 scaling.offset = linear.number("offset")?.unwrap_or(0.0);
             }
-            let converts = !matches!(connection.attribute("suppressUnitConversion"), Some("true" | "1"));
+            let converts =
+                !matches!(connection.attribute("suppressUnitConversion"), Some("true" | "1"));
             if self.edges.contains_key(&end) {
                 return Err(format!("{}.{} is connected twice", end.0, end.1));
             }
@@ -146,13 +162,16 @@ impl Walk {
         Ok(())
     }
 
-    /// The connections of components, straight through the connectors of systems.
+    /// Returns the connections between components, in which the connectors of systems have been
+    /// passed over.
     fn connections(&self) -> Result<Vec<Connection>, String> {
-        let is_component = |node: &Node| self.components.iter().any(|component| component.name == node.0);
+        let is_component =
+            |node: &Node| self.components.iter().any(|component| component.name == node.0);
         let mut connections = Vec::new();
         for (end, edge) in self.edges.iter().filter(|(end, _)| is_component(end)) {
             let (mut edge, mut steps) = (edge.clone(), 0);
-            // From the end back to the component that everything comes from; none, if it comes from outside.
+            // The connection is followed from its end back to the component that the value comes
+            // from. There is none if the value comes from outside.
             while !is_component(&edge.start) {
                 let Some(before) = self.edges.get(&edge.start) else { break };
                 edge = Edge {
@@ -179,7 +198,7 @@ impl Walk {
     }
 }
 
-/// The parameter values bound to a component or a system, in their order.
+/// Returns the parameter values that are bound to a component or a system, in their order.
 fn parameters(element: &Element, folder: &Path) -> Result<Vec<(String, Value)>, String> {
     let mut values = Vec::new();
     for binding in element.list("ParameterBindings", "ParameterBinding") {
@@ -192,12 +211,16 @@ fn parameters(element: &Element, folder: &Path) -> Result<Vec<(String, Value)>, 
         let prefix = binding.attribute("prefix").unwrap_or_default();
         let loaded;
         let set = match binding.attribute("source") {
-            None => binding.child("ParameterValues").and_then(|values| values.child("ParameterSet")),
+            None => {
+                binding.child("ParameterValues").and_then(|values| values.child("ParameterSet"))
+            }
             Some(source) => {
                 let source = file(source)?;
                 let fault = |message: String| format!("{source}: {message}");
-                let bytes = std::fs::read(folder.join(&source)).map_err(|error| fault(error.to_string()))?;
-                loaded = xml::decode(&bytes).and_then(|text| Element::parse(&text)).map_err(fault)?;
+                let bytes = std::fs::read(folder.join(&source))
+                    .map_err(|error| fault(error.to_string()))?;
+                loaded =
+                    xml::decode(&bytes).and_then(|text| Element::parse(&text)).map_err(fault)?;
                 Some(&loaded)
             }
         };
@@ -219,7 +242,7 @@ fn value(parameter: &Element) -> Result<Value, String> {
         "Real" => {
             let number: f64 = text.trim().parse().map_err(|_| fault("real number"))?;
             match typed.attribute("unit") {
-                // Converted like the text of an experiment, by the units of the FMU.
+                // The value is converted by the units of the FMU, like a text in an experiment.
                 Some(unit) => Value::String(format!("{number:?} {unit}")),
                 None => Value::Float(number),
             }
@@ -231,13 +254,18 @@ fn value(parameter: &Element) -> Result<Value, String> {
             _ => return Err(fault("boolean")),
         },
         "String" | "Enumeration" => Value::String(text.to_string()),
-        other => return Err(format!("the parameter \"{name}\" is of type {other}, which is not supported")),
+        other => {
+            return Err(format!(
+                "the parameter \"{name}\" is of type {other}, which is not supported"
+            ));
+        }
     })
 }
 
-/// A file of the archive by its URI.
+/// Converts the URI of a file to its path in the archive.
 fn file(uri: &str) -> Result<String, String> {
-    let path = percent_decode_str(uri).decode_utf8().map_err(|_| format!("\"{uri}\" is not UTF-8"))?;
+    let path =
+        percent_decode_str(uri).decode_utf8().map_err(|_| format!("\"{uri}\" is not UTF-8"))?;
     match archive::unsafe_name(&path) {
         Some(reason) => Err(format!("the file \"{}\" {reason}", path.escape_default())),
         None => Ok(path.into_owned()),

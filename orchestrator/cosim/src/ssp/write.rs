@@ -29,7 +29,7 @@ type Xml = Writer<Vec<u8>>;
 /// The experiment that is written to an archive.
 struct Source<'a> {
     system: &'a System,
-    /// Whether outputs that are enumerations have connectors.
+    /// Whether outputs that are enumerations become connectors.
     enumerations: bool,
 }
 
@@ -41,12 +41,20 @@ impl Deref for Source<'_> {
     }
 }
 
-/// Writes an experiment as an archive. What the standard has no place for, the step above all, stands in annotations; a value that
-/// is the FMU's own is left out. Outputs that are enumerations are connectors if `enumerations` says so. The same experiment gives the same bytes.
+/// Writes an experiment as an archive. Settings for which the standard has no place, above all the
+/// step, are stored in annotations; values that equal the FMU's own are left out. Outputs that are
+/// enumerations become connectors if `enumerations` is true. The same experiment always gives the
+/// same bytes.
 ///
 /// # Errors
-/// If a file cannot be read or written, or if it is asked to end; then nothing is left behind.
-pub fn pack(system: &System, enumerations: bool, path: &Path, interrupt: &Interrupt) -> Result<(), Error> {
+/// Returns an error if a file cannot be read or written, or if the work was asked to end. Nothing
+/// is left behind then.
+pub fn pack(
+    system: &System,
+    enumerations: bool,
+    path: &Path,
+    interrupt: &Interrupt,
+) -> Result<(), Error> {
     let goes_on = || interrupt.asked().map_or(Ok(()), |request| Err(Error::Ended(request)));
     let mut entries: BTreeMap<String, Vec<u8>> = BTreeMap::new();
     for fmu in &system.fmus {
@@ -56,9 +64,10 @@ pub fn pack(system: &System, enumerations: bool, path: &Path, interrupt: &Interr
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default());
-    // Made in memory: what cannot be written in the end needs no archive that is half one.
+    // The archive is made in memory, so that a failure leaves no incomplete file.
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    let all = [(STRUCTURE, &structure)].into_iter().chain(entries.iter().map(|(n, c)| (n.as_str(), c)));
+    let all =
+        [(STRUCTURE, &structure)].into_iter().chain(entries.iter().map(|(n, c)| (n.as_str(), c)));
     for (name, content) in all {
         goes_on()?;
         archive.start_file(name, options).map_err(|error| Error::file(path)(error.into()))?;
@@ -66,12 +75,12 @@ pub fn pack(system: &System, enumerations: bool, path: &Path, interrupt: &Interr
     }
     let bytes = archive.finish().map_err(|error| Error::file(path)(error.into()))?.into_inner();
     goes_on()?;
-    // Under another name first: nobody ever opens half an archive.
+    // The archive is first written under another name, so that nobody ever opens an incomplete one.
     let mut partial = path.as_os_str().to_owned();
     partial.push(format!(".{}.part", std::process::id()));
     let partial = PathBuf::from(partial);
     fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path)).map_err(|error| {
-        // What is there of it is of no use, and may be what fills the disk.
+        // The incomplete file is of no use, and it may be what fills the disk.
         let _ = fs::remove_file(&partial);
         Error::file(path)(error)
     })
@@ -116,7 +125,7 @@ fn structure(system: &Source) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// A text as an identifier, which some tools want every name to be.
+/// Converts a text to an identifier, because some tools require every name to be one.
 fn identifier(text: &str) -> String {
     let mut name: String =
         text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();
@@ -126,7 +135,7 @@ fn identifier(text: &str) -> String {
     name
 }
 
-/// The step as OMSimulator writes it, and others read it.
+/// Writes the step in the way of OMSimulator, which other tools read as well.
 fn open_modelica(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let schema = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd";
     element(xml, "oms:Annotations", &[("xmlns:oms", schema.into())], |xml| {
@@ -142,8 +151,8 @@ fn open_modelica(xml: &mut Xml, system: &Source) -> io::Result<()> {
     })
 }
 
-/// Writes the settings that an archive needs to repeat the same run: step, coupling, order,
-/// periods, recorded variables and roles of the figures of merit.
+/// Writes the settings that are needed to repeat the same run: step, coupling, order, periods,
+/// recorded variables, and what is measured, watched and drawn.
 fn own(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let experiment = &system.experiment;
     let coupling = match experiment.simulation.coupling {
@@ -186,23 +195,28 @@ fn component(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
     })
 }
 
-/// Inputs that are connected, and all outputs that a connector can have the type of.
+/// Returns the variables that become connectors: the connected inputs, and all outputs of a type
+/// that a connector can have.
 fn connectors<'a>(system: &'a Source, index: usize) -> impl Iterator<Item = &'a Variable> {
     let variables = &system.fmus[index].description.variables;
-    let is_connected =
-        move |position| system.wires.iter().any(|w| w.to.component == index && w.to.variable == position);
-    variables.iter().enumerate().filter_map(move |(position, variable)| match variable.causality.as_str() {
-        "input" if is_connected(position) => Some(variable),
-        "output" => match variable.kind {
-            Kind::String => None,
-            Kind::Enumeration { .. } => system.enumerations.then_some(variable),
-            _ => Some(variable),
-        },
-        _ => None,
+    let is_connected = move |position| {
+        system.wires.iter().any(|w| w.to.component == index && w.to.variable == position)
+    };
+    variables.iter().enumerate().filter_map(move |(position, variable)| {
+        match variable.causality.as_str() {
+            "input" if is_connected(position) => Some(variable),
+            "output" => match variable.kind {
+                Kind::String => None,
+                Kind::Enumeration { .. } => system.enumerations.then_some(variable),
+                _ => Some(variable),
+            },
+            _ => None,
+        }
     })
 }
 
-/// Enumerations of the connectors, each once, by the name it is given here: that of the first variable that is of it.
+/// Collects the enumerations of the connectors, each once. Each is named after the first variable
+/// of that type.
 fn kinds<'a>(system: &'a Source) -> Vec<(String, &'a [(String, i32)])> {
     let mut kinds: Vec<(String, &'a [(String, i32)])> = Vec::new();
     for (index, fmu) in system.fmus.iter().enumerate() {
@@ -252,7 +266,8 @@ fn connector(xml: &mut Xml, system: &Source, variable: &Variable) -> io::Result<
 
 fn parameters(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
     let description = &system.fmus[index].description;
-    let own = |name: &str| description.find(name).and_then(|(_, variable)| variable.start.as_deref());
+    let own =
+        |name: &str| description.find(name).and_then(|(_, variable)| variable.start.as_deref());
     let differs = |name: &str, value: &SettingValue| match value {
         SettingValue::Real(value) => own(name).and_then(|start| start.parse().ok()) != Some(*value),
         SettingValue::Integer(value) | SettingValue::Item(_, value) => {
@@ -261,7 +276,8 @@ fn parameters(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
         SettingValue::Boolean(value) => own(name) != Some(if *value { "true" } else { "false" }),
         SettingValue::Text(value) => own(name) != Some(value),
     };
-    let set: Vec<_> = system.settings[index].iter().filter(|s| differs(&s.name, &s.value)).collect();
+    let set: Vec<_> =
+        system.settings[index].iter().filter(|s| differs(&s.name, &s.value)).collect();
     if set.is_empty() {
         return Ok(());
     }
@@ -269,16 +285,26 @@ fn parameters(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
         element(xml, "ssd:ParameterBinding", &[], |xml| {
             element(xml, "ssd:ParameterValues", &[], |xml| {
                 let name = identifier(&format!("{}_values", system.order[index]));
-                element(xml, "ssv:ParameterSet", &[("version", "1.0".into()), ("name", name)], |xml| {
-                    element(xml, "ssv:Parameters", &[], |xml| {
-                        set.iter().try_for_each(|setting| {
-                            element(xml, "ssv:Parameter", &[("name", setting.name.clone())], |xml| {
-                                let (kind, value) = typed(&setting.value);
-                                leaf(xml, kind, &[("value", value)])
+                element(
+                    xml,
+                    "ssv:ParameterSet",
+                    &[("version", "1.0".into()), ("name", name)],
+                    |xml| {
+                        element(xml, "ssv:Parameters", &[], |xml| {
+                            set.iter().try_for_each(|setting| {
+                                element(
+                                    xml,
+                                    "ssv:Parameter",
+                                    &[("name", setting.name.clone())],
+                                    |xml| {
+                                        let (kind, value) = typed(&setting.value);
+                                        leaf(xml, kind, &[("value", value)])
+                                    },
+                                )
                             })
                         })
-                    })
-                })
+                    },
+                )
             })
         })
     })
@@ -308,22 +334,25 @@ fn connections(xml: &mut Xml, system: &Source) -> io::Result<()> {
         if wire.scaling == Scaling::default() {
             return leaf(xml, "ssd:Connection", &attributes);
         }
-        // The conversion stands here, once and for all tools alike.
+        // The conversion is written here, so that all tools convert in the same way.
         attributes.push(("suppressUnitConversion", "true".into()));
         element(xml, "ssd:Connection", &attributes, |xml| {
-            let linear = [("factor", real(wire.scaling.factor)), ("offset", real(wire.scaling.offset))];
+            let linear =
+                [("factor", real(wire.scaling.factor)), ("offset", real(wire.scaling.offset))];
             leaf(xml, "ssc:LinearTransformation", &linear)
         })
     })
 }
 
-/// The units that connectors have.
+/// Writes the definitions of the units that connectors have.
 fn units(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let mut units = BTreeMap::new();
     for (index, fmu) in system.fmus.iter().enumerate() {
         for variable in connectors(system, index) {
             let Kind::Real { unit: Some(unit), .. } = &variable.kind else { continue };
-            if let Some(defined) = fmu.description.units.iter().find(|defined| defined.name == *unit) {
+            if let Some(defined) =
+                fmu.description.units.iter().find(|defined| defined.name == *unit)
+            {
                 units.entry(unit.as_str()).or_insert(defined);
             }
         }
@@ -355,18 +384,18 @@ fn units(xml: &mut Xml, system: &Source) -> io::Result<()> {
     })
 }
 
-/// The shortest text that reads back as the same number.
+/// Formats a number as the shortest text that reads back as the same number.
 fn real(value: f64) -> String {
     format!("{value:?}")
 }
 
-/// An element with nothing in it.
+/// Writes an element without content.
 fn leaf(xml: &mut Xml, name: &str, attributes: &[(&str, String)]) -> io::Result<()> {
     let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
     xml.create_element(name).with_attributes(attributes).write_empty().map(drop)
 }
 
-/// An element with what `content` puts into it.
+/// Writes an element with the content that `content` writes.
 fn element(
     xml: &mut Xml,
     name: &str,

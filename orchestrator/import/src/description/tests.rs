@@ -26,18 +26,24 @@ const TEXT: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 
 #[test]
 fn later_revisions_of_the_standard_are_read_too() {
-    assert!(ModelDescription::parse(&TEXT.replace("fmiVersion=\"2.0\"", "fmiVersion=\"2.0.1\"")).is_ok());
+    assert!(
+        ModelDescription::parse(&TEXT.replace("fmiVersion=\"2.0\"", "fmiVersion=\"2.0.1\""))
+            .is_ok()
+    );
 }
 
 #[test]
 fn everything_needed_is_read() {
     let description = ModelDescription::parse(TEXT).unwrap();
-    assert!(description.co_simulation.as_ref().unwrap().has("canHandleVariableCommunicationStepSize"));
+    assert!(
+        description.co_simulation.as_ref().unwrap().has("canHandleVariableCommunicationStepSize")
+    );
     assert!(description.co_simulation.as_ref().unwrap().has("maxOutputDerivativeOrder=1"));
     assert_eq!(description.default_experiment.stop, Some(50.0));
     assert_eq!(description.units[0].displays[0].0, "deg");
     let (_, u) = description.find("u").unwrap();
-    let real = Kind::Real { unit: Some("rad".into()), display_unit: None, min: None, max: Some(2.0) };
+    let real =
+        Kind::Real { unit: Some("rad".into()), display_unit: None, min: None, max: Some(2.0) };
     assert_eq!((u.reference, &u.kind, u.start.as_deref()), (7, &real, Some("0.5")));
     let items = vec![("none".to_string(), 1), ("white".to_string(), 2)];
     assert_eq!(description.find("kind").unwrap().1.kind, Kind::Enumeration { items });
@@ -52,14 +58,15 @@ fn what_cannot_be_used_is_refused() {
     let index = TEXT.replace("index=\"4\"", "index=\"5\"");
     assert!(ModelDescription::parse(&index).unwrap_err().contains("variable 5 of 4"));
     let reference = TEXT.replace("valueReference=\"9\"", "valueReference=\"-1\"");
-    let fault =
-        "valueReference = \"-1\" of the element ScalarVariable \"kind\" in line 19 is not a whole number";
+    let fault = "valueReference = \"-1\" of the element ScalarVariable \"kind\" in line 19 is not a whole number";
     assert!(ModelDescription::parse(&reference).unwrap_err().starts_with(fault));
     let page = "<html><head/><body/></html>";
     assert!(ModelDescription::parse(page).unwrap_err().contains("begins with the element html"));
     let version = TEXT.replace("fmiVersion=\"2.0\"", "");
     assert!(ModelDescription::parse(&version).unwrap_err().contains("no attribute fmiVersion"));
     let untyped = TEXT.replace("<Real/>", "");
-    assert!(ModelDescription::parse(&untyped).unwrap_err().contains("\"z\" in line 20 has no type"));
+    assert!(
+        ModelDescription::parse(&untyped).unwrap_err().contains("\"z\" in line 20 has no type")
+    );
     assert!(ModelDescription::parse("<fmiModelDescription").is_err());
 }

@@ -1,21 +1,23 @@
-//! A figure for plotly.js, to zoom and to hide curves in: <https://plotly.com/javascript>.
+//! A figure for plotly.js, in which the reader can zoom and hide curves:
+//! <https://plotly.com/javascript>.
 
 use super::{Curve, Figure, Panel, Shape};
 use serde_json::{Value, json};
 
-/// Height of a row of panels, and of what stands above and below them all, px.
+/// Height of a row of panels, and of the space above and below all of them, px.
 const ROW: usize = 270;
 const ABOVE: usize = 70;
 const BELOW: usize = 44;
-/// Share of the width, and of a row's height, that is left between panels.
+/// Share of the width that is left between panels, and the height that is left between rows, px.
 const GAP: f64 = 0.075;
 const ROW_GAP: f64 = 60.0;
-/// Significant digits of a coordinate: more than a screen has pixels.
+/// Number of significant digits of a coordinate, which is more than a screen can resolve.
 const DIGITS: usize = 6;
 
-/// The library's own text. Goes into a `script` element of the page once.
+/// Returns the source text of the library, which goes into a `script` element of the page once.
 pub fn library() -> String {
-    // The crate hands out script elements: plotly.js, and one for typesetting formulas, which is not needed.
+    // The crate provides two script elements: plotly.js, and a library for formulas, which is not
+    // needed.
     let scripts = plotly::Plot::offline_js_sources();
     let inside = scripts.split_once('>').map_or("", |(_, rest)| rest);
     inside.split_once("</script>").map_or(inside, |(first, _)| first).to_string()
@@ -25,18 +27,18 @@ fn rows(figure: &Figure) -> usize {
     figure.panels.len().div_ceil(figure.columns.max(1)).max(1)
 }
 
-/// Height of a figure, px.
+/// Returns the height of a figure, px.
 pub fn height(figure: &Figure) -> usize {
     ABOVE + ROW * rows(figure)
 }
 
-/// Arguments `data` and `layout` of `Plotly.newPlot`.
+/// Returns the arguments `data` and `layout` of `Plotly.newPlot`.
 pub fn plot(figure: &Figure) -> (Value, Value) {
     let (rows, columns, height) = (rows(figure), figure.columns.max(1), height(figure));
     let mut layout = json!({
         "height": height,
         "margin": { "l": 64, "r": 16, "t": ABOVE, "b": BELOW },
-        // Above the panels and their headings.
+        // The legend stands above the panels and their headings.
         "legend": {
             "orientation": "h", "x": 0, "y": 1.0 + 26.0 / (height - ABOVE - BELOW) as f64, "yanchor": "bottom",
             "groupclick": "togglegroup",
@@ -102,8 +104,12 @@ fn axis_x(panel: &Panel, number: &str, domain: [f64; 2], lowest: bool) -> Value 
     if lowest {
         axis["title"] = json!({ "text": panel.x_label });
     }
-    // Panels over the same stretch of the same quantity are zoomed together.
-    if !number.is_empty() && !panel.log_x && panel.x_label.starts_with("time") && panel.x_range.is_none() {
+    // Panels over the same range of the same quantity are zoomed together.
+    if !number.is_empty()
+        && !panel.log_x
+        && panel.x_label.starts_with("time")
+        && panel.x_range.is_none()
+    {
         axis["matches"] = "x".into();
     }
     axis
@@ -168,10 +174,11 @@ fn trace(curve: &Curve, panel: &Panel, number: &str, first: bool, data: &mut Vec
     data.push(trace);
 }
 
-/// Values in as many digits as can be seen; what is not finite is a gap.
+/// Rounds values to as many digits as can be seen. A value that is not finite becomes a gap.
 fn numbers(values: &[f64]) -> Value {
-    let short =
-        |value: &f64| format!("{value:.*e}", DIGITS - 1).parse::<f64>().ok().filter(|v| v.is_finite());
+    let short = |value: &f64| {
+        format!("{value:.*e}", DIGITS - 1).parse::<f64>().ok().filter(|v| v.is_finite())
+    };
     values.iter().map(short).collect()
 }
 
@@ -185,7 +192,13 @@ mod tests {
     use crate::figure::{Color, Legend};
 
     fn curve(name: &str, shape: Shape) -> Curve {
-        Curve { name: name.into(), color: Color::GREY, shape, x: vec![0.0, 1.0], y: vec![2.0, f64::NAN] }
+        Curve {
+            name: name.into(),
+            color: Color::GREY,
+            shape,
+            x: vec![0.0, 1.0],
+            y: vec![2.0, f64::NAN],
+        }
     }
 
     fn figure(curves: Vec<Curve>) -> Figure {
@@ -197,7 +210,12 @@ mod tests {
             x_range: None,
             curves,
         };
-        Figure { title: "f".into(), columns: 1, legend: Legend::Above, panels: vec![panel.clone(), panel] }
+        Figure {
+            title: "f".into(),
+            columns: 1,
+            legend: Legend::Above,
+            panels: vec![panel.clone(), panel],
+        }
     }
 
     #[test]

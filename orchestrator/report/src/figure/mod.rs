@@ -1,4 +1,5 @@
-//! A figure: panels of curves. Drawn as SVG ([`svg`]) and PNG ([`png`]) for papers, and to look around in ([`interactive`]).
+//! A figure of panels with curves. It is drawn as SVG ([`svg`]) and PNG ([`png`]) for papers, and
+//! as an [`interactive`] plot for the page.
 
 pub mod interactive;
 pub mod png;
@@ -7,13 +8,13 @@ pub mod svg;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Red, green, blue; written `#rrggbb`.
+/// A colour as red, green and blue, which a file writes as `#rrggbb`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(try_from = "String")]
 pub struct Color(pub u8, pub u8, pub u8);
 
 impl Color {
-    /// Colour of references, norms and the like.
+    /// Colour of references and norms, a grey.
     pub const GREY: Self = Self(110, 110, 110);
     /// Colour of limits, a dark red.
     pub const LIMIT: Self = Self(200, 0, 0);
@@ -24,7 +25,8 @@ impl TryFrom<String> for Color {
 
     fn try_from(text: String) -> Result<Self, String> {
         let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.is_ascii());
-        let part = |at: usize| digits.and_then(|digits| u8::from_str_radix(&digits[at..at + 2], 16).ok());
+        let part =
+            |at: usize| digits.and_then(|digits| u8::from_str_radix(&digits[at..at + 2], 16).ok());
         match (part(0), part(2), part(4)) {
             (Some(r), Some(g), Some(b)) => Ok(Self(r, g, b)),
             _ => Err(format!("\"{text}\" is no colour: write it as #rrggbb")),
@@ -52,7 +54,7 @@ pub enum Legend {
 pub struct Figure {
     /// Heading above the whole figure, one line.
     pub title: String,
-    /// Number of panels side by side.
+    /// Number of panels in a row, side by side.
     pub columns: usize,
     /// Position of the legend.
     pub legend: Legend,
@@ -77,12 +79,12 @@ pub struct Panel {
     pub curves: Vec<Curve>,
 }
 
-/// Points with the way they are drawn. Points that are not finite are gaps.
+/// A sequence of points, and the way in which they are drawn. Points that are not finite are gaps.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Name in the legend. Curves of one name are shown and hidden together.
+    /// Name of the curve in the legend. Curves with the same name are shown and hidden together.
     pub name: String,
-    /// Colour in which it is drawn.
+    /// Colour in which the curve is drawn.
     pub color: Color,
     /// Shape in which the points are drawn.
     pub shape: Shape,
@@ -92,18 +94,18 @@ pub struct Curve {
     pub y: Vec<f64>,
 }
 
-/// How points are drawn.
+/// Shape in which the points of a curve are drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// A line through the points.
+    /// A solid line through the points.
     Line,
-    /// A thin, pale line.
+    /// A thin, pale line through the points.
     Pale,
-    /// A dashed line.
+    /// A dashed line through the points.
     Dashed,
-    /// The area down to these values.
+    /// A filled area between the points and these values.
     Band(Vec<f64>),
-    /// Columns: the value at x holds up to the next x.
+    /// Columns of a histogram: the value at an x holds up to the next x.
     Steps,
     /// A dot at each point.
     Dots,
@@ -116,16 +118,19 @@ pub enum Shape {
 }
 
 impl Panel {
-    /// Smallest and largest value along one axis, lines across the panel included; `None` without any finite value.
+    /// Returns the smallest and the largest value along one axis, including lines across the panel;
+    /// `None` if no value is finite.
     fn extent(&self, along_x: bool) -> Option<(f64, f64)> {
         let across = if along_x { Shape::Horizontal } else { Shape::Vertical };
-        let within = |x: f64| self.x_range.is_none_or(|[low, high]| along_x || (low..=high).contains(&x));
+        let within =
+            |x: f64| self.x_range.is_none_or(|[low, high]| along_x || (low..=high).contains(&x));
         let mut values = self
             .curves
             .iter()
             .filter(|curve| curve.shape != across)
             .flat_map(|curve| {
-                let lower = if let Shape::Band(lower) = &curve.shape { lower.as_slice() } else { &[] };
+                let lower =
+                    if let Shape::Band(lower) = &curve.shape { lower.as_slice() } else { &[] };
                 let inside = move |(x, v): (&f64, &f64)| {
                     (curve.shape == Shape::Horizontal || within(*x)).then_some(*v)
                 };
@@ -139,7 +144,7 @@ impl Panel {
         Some(values.fold((first, first), |(low, high), value| (low.min(value), high.max(value))))
     }
 
-    /// Range of values along one axis with a margin, for drawing.
+    /// Returns the range of values along one axis, with a margin for drawing.
     pub fn range(&self, along_x: bool) -> (f64, f64) {
         if along_x && let Some([low, high]) = self.x_range {
             return (low, high);
@@ -150,9 +155,11 @@ impl Panel {
         if along_x && self.log_x {
             return (low / 1.3, high * 1.3);
         }
-        // Time needs none.
-        let is_time = along_x && self.curves.iter().any(|c| matches!(c.shape, Shape::Line | Shape::Band(_)));
-        let margin = if is_time { 0.0 } else { 0.06 * (high - low).max(1e-9 * high.abs()).max(1e-12) };
+        // An axis of time needs no margin.
+        let is_time =
+            along_x && self.curves.iter().any(|c| matches!(c.shape, Shape::Line | Shape::Band(_)));
+        let margin =
+            if is_time { 0.0 } else { 0.06 * (high - low).max(1e-9 * high.abs()).max(1e-12) };
         let is_count = !along_x && self.curves.iter().any(|curve| curve.shape == Shape::Steps);
         (if is_count { 0.0 } else { low - margin }, high + margin)
     }
@@ -202,7 +209,7 @@ mod tests {
     fn a_panel_without_values_has_a_range_all_the_same() {
         let empty = panel(Vec::new());
         assert_eq!((empty.range(false), empty.range(true)), ((0.0, 1.0), (0.0, 1.0)));
-        // The logarithm of its ends is to be finite.
+        // The range must have ends whose logarithm is finite.
         assert_eq!(Panel { log_x: true, ..empty }.range(true), (1.0, 10.0));
     }
 }

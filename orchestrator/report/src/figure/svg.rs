@@ -11,14 +11,14 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type DrawError = Box<dyn std::error::Error>;
 
 const FONT: &str = "sans-serif";
-/// Width of a figure, of a legend beside a panel, height of a panel with one and with several columns, px.
+/// Width of a figure, width of a legend beside a panel, and height of a panel, px.
 const WIDTH: u32 = 1000;
 const LEGEND_WIDTH: u32 = 120;
 const HEIGHT: u32 = 260;
-/// Height of title and of a row of the legend above the panels, px.
+/// Height of the title, and of a row of the legend above the panels, px.
 const TITLE_HEIGHT: u32 = 40;
 const LEGEND_HEIGHT: u32 = 20;
-/// Width of a letter in the legend, px, at most.
+/// Largest width of a letter in the legend, px.
 const LETTER: u32 = 7;
 
 impl From<Color> for RGBColor {
@@ -30,15 +30,16 @@ impl From<Color> for RGBColor {
 /// Writes a figure to a file.
 ///
 /// # Errors
-/// If the file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn write(figure: &Figure, path: &Path) -> Result<(), Error> {
-    std::fs::write(path, text(figure).map_err(|error| Error::file(path)(error))?).map_err(Error::file(path))
+    std::fs::write(path, text(figure).map_err(|error| Error::file(path)(error))?)
+        .map_err(Error::file(path))
 }
 
-/// The figure as the text of an SVG file.
+/// Draws a figure as the text of an SVG file.
 ///
 /// # Errors
-/// If something cannot be drawn.
+/// Returns an error if a part of the figure cannot be drawn.
 pub fn text(figure: &Figure) -> std::io::Result<String> {
     let mut text = String::new();
     draw(figure, &mut text).map_err(|error| std::io::Error::other(error.to_string()))?;
@@ -83,7 +84,7 @@ fn draw(figure: &Figure, text: &mut String) -> Result<(), DrawError> {
     Ok(())
 }
 
-/// The first curve of each name.
+/// Returns the first curve of each name, for the legend.
 fn legend<'a>(curves: impl Iterator<Item = &'a Curve>) -> Vec<&'a Curve> {
     let mut entries: Vec<&Curve> = Vec::new();
     for curve in curves {
@@ -94,7 +95,7 @@ fn legend<'a>(curves: impl Iterator<Item = &'a Curve>) -> Vec<&'a Curve> {
     entries
 }
 
-/// Legend entries in lines that fit the figure.
+/// Arranges the entries of a legend in lines that fit the width of the figure.
 fn arrange<'a>(entries: &[&'a Curve]) -> Vec<Vec<&'a Curve>> {
     let mut lines: Vec<Vec<&Curve>> = Vec::new();
     let mut used = 0;
@@ -112,7 +113,7 @@ fn arrange<'a>(entries: &[&'a Curve]) -> Vec<Vec<&'a Curve>> {
     lines
 }
 
-/// Draws an entry of a legend; returns where the next may begin.
+/// Draws an entry of a legend and returns the horizontal position at which the next one may begin.
 fn draw_entry(curve: &Curve, area: &Area, (x, y): (i32, i32)) -> Result<i32, DrawError> {
     let color = RGBColor::from(curve.color);
     let middle = y + 7;
@@ -136,7 +137,7 @@ fn draw_entry(curve: &Curve, area: &Area, (x, y): (i32, i32)) -> Result<i32, Dra
     Ok(x + entry_width(curve).cast_signed())
 }
 
-/// Room for an entry of a legend, px.
+/// Returns the width that an entry of a legend takes, px.
 fn entry_width(curve: &Curve) -> u32 {
     50 + LETTER * curve.name.chars().count() as u32
 }
@@ -145,7 +146,7 @@ fn is_dashed(shape: &Shape) -> bool {
     matches!(shape, Shape::Dashed | Shape::Horizontal | Shape::Vertical)
 }
 
-/// How opaque an area is.
+/// Returns the opacity of an area.
 fn fill(shape: &Shape) -> f64 {
     if *shape == Shape::Steps { 0.45 } else { 0.25 }
 }
@@ -160,13 +161,17 @@ fn style(curve: &Curve) -> ShapeStyle {
 }
 
 fn draw_panel(panel: &Panel, area: &Area, lowest: bool) -> Result<(), DrawError> {
-    // A logarithmic axis is a linear one for the logarithm, with other labels.
+    // A logarithmic axis is drawn as a linear axis of the logarithm, with other labels.
     let place = |x: f64| if panel.log_x { x.log10() } else { x };
     let (left, right) = panel.range(true);
     let (left, right) = (place(left), place(right));
     let (bottom, top) = panel.range(false);
     let mut builder = ChartBuilder::on(area);
-    builder.margin(6).margin_right(16).x_label_area_size(if lowest { 36 } else { 20 }).y_label_area_size(66);
+    builder
+        .margin(6)
+        .margin_right(16)
+        .x_label_area_size(if lowest { 36 } else { 20 })
+        .y_label_area_size(66);
     if !panel.title.is_empty() {
         builder.caption(&panel.title, (FONT, 15));
     }
@@ -209,11 +214,21 @@ fn draw_panel(panel: &Panel, area: &Area, lowest: bool) -> Result<(), DrawError>
             }
             Shape::Horizontal => {
                 let at = curve.y.first().copied().unwrap_or(f64::NAN);
-                chart.draw_series(DashedLineSeries::new([(left, at), (right, at)], 6, 4, style(curve)))?;
+                chart.draw_series(DashedLineSeries::new(
+                    [(left, at), (right, at)],
+                    6,
+                    4,
+                    style(curve),
+                ))?;
             }
             Shape::Vertical => {
                 let at = place(curve.x.first().copied().unwrap_or(f64::NAN));
-                chart.draw_series(DashedLineSeries::new([(at, bottom), (at, top)], 6, 4, style(curve)))?;
+                chart.draw_series(DashedLineSeries::new(
+                    [(at, bottom), (at, top)],
+                    6,
+                    4,
+                    style(curve),
+                ))?;
             }
             Shape::Band(lower) => {
                 let lower = curve.x.iter().zip(lower).rev().map(|(&x, &y)| (place(x), y));
@@ -223,32 +238,38 @@ fn draw_panel(panel: &Panel, area: &Area, lowest: bool) -> Result<(), DrawError>
             }
             Shape::Steps => {
                 let corners = points.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
-                let base = [points.last(), points.first()].into_iter().flatten().map(|(x, _)| (*x, 0.0));
+                let base =
+                    [points.last(), points.first()].into_iter().flatten().map(|(x, _)| (*x, 0.0));
                 let outline: Vec<(f64, f64)> = corners.chain(base).collect();
                 chart.draw_series([Polygon::new(outline, color.mix(fill(&curve.shape)))])?;
             }
             Shape::Dots => {
-                chart
-                    .draw_series(points.into_iter().map(|at| Circle::new(at, 3, color.mix(0.8).filled())))?;
+                chart.draw_series(
+                    points.into_iter().map(|at| Circle::new(at, 3, color.mix(0.8).filled())),
+                )?;
             }
             Shape::Crosses => {
-                chart.draw_series(points.into_iter().map(|at| Cross::new(at, 7, color.stroke_width(2))))?;
+                chart.draw_series(
+                    points.into_iter().map(|at| Cross::new(at, 7, color.stroke_width(2))),
+                )?;
             }
         }
     }
     Ok(())
 }
 
-/// Digits after the point that tell the labels of an axis apart.
+/// Returns the number of digits after the point that is needed to tell the labels of an axis apart.
 fn decimals(range: f64) -> usize {
     // An axis has about six labels.
     (-(range / 6.0).log10().floor()).clamp(0.0, 12.0) as usize
 }
 
-/// A number with at most so many digits after the point, and neither `-0` nor trailing zeros.
+/// Formats a number with at most this many digits after the point, without `-0` and without
+/// trailing zeros.
 fn plain(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    let text =
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text == "-0" { "0".into() } else { text.into() }
 }
 
@@ -259,7 +280,8 @@ mod tests {
     #[test]
     fn labels_are_as_short_as_they_can_be() {
         assert_eq!((decimals(50.0), decimals(6.0), decimals(0.4)), (0, 0, 2));
-        let labels = [(10.0, 0), (0.5, 1), (-0.0, 2), (1e-9, 2), (2.50, 2)].map(|(v, d)| plain(v, d));
+        let labels =
+            [(10.0, 0), (0.5, 1), (-0.0, 2), (1e-9, 2), (2.50, 2)].map(|(v, d)| plain(v, d));
         assert_eq!(labels, ["10", "0.5", "0", "0", "2.5"]);
     }
 
@@ -279,9 +301,13 @@ mod tests {
                 y: vec![0.0, 1.0, 0.5],
             }],
         };
-        let figure = Figure { title: String::new(), columns: 1, legend: Legend::Above, panels: vec![panel] };
+        let figure =
+            Figure { title: String::new(), columns: 1, legend: Legend::Above, panels: vec![panel] };
         let text = text(&figure).unwrap();
-        let curve = text.lines().find(|line| line.contains("polyline") && line.contains("#010203")).unwrap();
+        let curve = text
+            .lines()
+            .find(|line| line.contains("polyline") && line.contains("#010203"))
+            .unwrap();
         let points = curve.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
         assert_eq!(points.split_whitespace().count(), 2, "{curve}");
     }

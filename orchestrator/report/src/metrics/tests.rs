@@ -1,8 +1,8 @@
 use super::*;
 use cosim::experiment::Measure;
 
-/// Angles and their references (rad), moment as a multiple of its limit, time and number of the
-/// solver's solutions.
+/// Creates meters for angles and their references (rad), the moment as a multiple of its limit, and
+/// the number of the solver's solutions.
 fn meters() -> Meters {
     let difference = |axis: usize| Resolved {
         factor: 1_f64.to_degrees(),
@@ -54,7 +54,7 @@ fn oracle_metrics_by_hand() {
             [3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0],
             // The error is (0, 0, 1), with square 1.
             [1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0],
-            // The stop begins no step, and does not count for the means.
+            // No step begins at the stop time, so this row does not count for the means.
             [2.0, 2.0, 2.0, 0.0, 0.0, 0.0, 1.2, 2.0],
         ],
     );
@@ -89,7 +89,10 @@ fn a_run_is_lost_beyond_its_bound_or_where_the_signal_is_no_number() {
     let sample = Sample { tick: 3, time: 0.1 + 0.2, last: false, values: &row(6.0) };
     let error = ending.observe(&sample).unwrap_err();
     assert_eq!(error.exit_code(), 3);
-    assert!(error.to_string().starts_with("attitude lost at t = 0.3 s: further than 315.1"), "{error}");
+    assert!(
+        error.to_string().starts_with("attitude lost at t = 0.3 s: further than 315.1"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -111,9 +114,10 @@ fn the_guarantee_is_among_the_metrics() {
         items: vec![("inForce".to_string(), 1), ("exceeded".to_string(), 5)],
         ..Default::default()
     };
-    let asked: Guarantee =
-        toml::from_str("in_force = \"a.b\"\nkeeps = \"x\"\nmargins = { moment = \"a.m\", rate = \"a.r\" }")
-            .unwrap();
+    let asked: Guarantee = toml::from_str(
+        "in_force = \"a.b\"\nkeeps = \"x\"\nmargins = { moment = \"a.m\", rate = \"a.r\" }",
+    )
+    .unwrap();
     let signals = Signals {
         in_force: 0,
         status: Some(status),

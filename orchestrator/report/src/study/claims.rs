@@ -1,4 +1,4 @@
-//! Whether a paper's claims hold in our runs.
+//! Verdicts on whether the claims of a paper hold in our runs.
 
 use super::comparisons::{Check, Claim, Relation};
 use super::definition::Study;
@@ -10,18 +10,18 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Every check holds for every member.
+    /// Every check holds for every pair of members.
     Holds,
-    /// Some checks hold for some members.
+    /// Some checks hold, or a check holds for some pairs of members.
     HoldsPartly,
-    /// No check holds for any member.
+    /// No check holds for any pair of members.
     DoesNotHold,
-    /// There is no run that could tell.
+    /// There are no runs with which the claim can be judged.
     NotJudged,
 }
 
 impl Verdict {
-    /// The verdict in words, for a reader.
+    /// Returns the verdict in words, for a reader.
     pub fn text(self) -> &'static str {
         match self {
             Self::Holds => "holds",
@@ -48,18 +48,19 @@ pub struct Checked {
     pub left: Numbers,
     /// Numbers on the right side of the relation.
     pub right: Numbers,
-    /// (left − right)/right for each pair.
+    /// Relative difference (left − right)/right for each pair.
     pub difference: Numbers,
     /// Margin that the paper claims, as a fraction.
     pub by: Option<f64>,
-    /// Pairs of members that were compared. Where one of the two has no number, the relation does not hold.
+    /// Number of pairs of members that were compared. If one of a pair has no number, the relation
+    /// does not hold for it.
     pub pairs: usize,
-    /// Pairs for which the relation holds.
+    /// Number of pairs for which the relation holds.
     pub held: usize,
 }
 
 impl Checked {
-    /// The verdict of this check alone.
+    /// Returns the verdict of this check alone.
     pub fn verdict(&self) -> Verdict {
         Verdict::of(self.held, self.pairs)
     }
@@ -77,7 +78,7 @@ pub struct Judged {
 /// Rejects checks that refer to missing items, or compare runs that cannot be paired.
 ///
 /// # Errors
-/// An error that describes the first faulty check.
+/// Returns an error that describes the first faulty check.
 pub fn check(study: &Study) -> Result<(), String> {
     for check in study.claims.iter().flat_map(|claim| &claim.checks) {
         let members = |place: usize| study.runs[place].vary.as_ref().map_or(1, |vary| vary.count);
@@ -108,9 +109,10 @@ pub fn check(study: &Study) -> Result<(), String> {
 /// Judges a claim by its checks.
 ///
 /// # Errors
-/// If a check refers to a missing item, or a run has no such quantity.
+/// Returns an error if a check refers to a missing item, or a run has no such quantity.
 pub fn judge(claim: &Claim, results: &Results) -> Result<Judged, String> {
-    let checks = claim.checks.iter().map(|check| compare(check, results)).collect::<Result<Vec<_>, _>>()?;
+    let checks =
+        claim.checks.iter().map(|check| compare(check, results)).collect::<Result<Vec<_>, _>>()?;
     let any_left_open = checks.iter().any(|check| check.verdict() == Verdict::NotJudged);
     let all = |verdict| checks.iter().all(|check| check.verdict() == verdict);
     let verdict = if any_left_open || checks.is_empty() {
@@ -177,7 +179,8 @@ mod tests {
 
     #[test]
     fn a_claim_without_runs_is_not_judged() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments/two-loop-smc/study.toml");
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments/two-loop-smc/study.toml");
         let study = Study::load(&path).unwrap();
         let runs = vec![RunResult::default(); study.runs.len()];
         let results = Results { study: &study, runs };
@@ -191,13 +194,14 @@ mod tests {
 
     #[test]
     fn a_member_without_the_number_does_not_hold_and_is_not_left_out() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments/two-loop-smc/study.toml");
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments/two-loop-smc/study.toml");
         let study = Study::load(&path).unwrap();
         let check = study.claims.iter().flat_map(|claim| &claim.checks);
         let check = check.clone().find(|check| check.left == "direct.measure.settling-02").unwrap();
         let mut runs = vec![RunResult::default(); study.runs.len()];
         let (place, _) = resolve(&study, &check.left).unwrap();
-        // The second member does not settle.
+        // The motion of the second member does not settle.
         runs[place].members = [Some(5.0), None, Some(6.0)]
             .map(|settling| Member {
                 value: None,

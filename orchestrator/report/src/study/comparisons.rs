@@ -1,4 +1,4 @@
-//! What a study says about its tables and claims.
+//! The part of a study that describes its tables, its overviews and its claims.
 
 use super::values::Quantity;
 use schemars::JsonSchema;
@@ -13,59 +13,59 @@ fn ours() -> String {
     "Ours".into()
 }
 
-/// Paper against ours.
+/// A table that compares numbers of the paper with ours.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
-    /// One line.
+    /// Title of the table, in one line.
     pub title: String,
-    /// What there is to know.
+    /// Note that is shown with the table.
     #[serde(default)]
     pub note: String,
-    /// Heading of what is compared with.
+    /// Heading of the column of numbers to compare with.
     #[serde(default = "paper")]
     pub against: String,
-    /// Heading of ours.
+    /// Heading of the column of our numbers.
     #[serde(default = "ours")]
     pub ours: String,
-    /// Heading of a further column of ours; none if it is empty.
+    /// Heading of a further column of our numbers. Without it there is no such column.
     #[serde(default)]
     pub beside: String,
-    /// The rows.
+    /// Rows of the table, each with one quantity.
     #[serde(rename = "row")]
     pub rows: Vec<Row>,
 }
 
-/// One quantity.
+/// A row of a table, which compares one quantity.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    /// What it is, with unit.
+    /// Name of the quantity, with its unit.
     pub label: String,
-    /// The value to compare with.
+    /// Value of the paper, or another value to compare with.
     pub paper: Option<Quantity>,
-    /// `run.metric`.
+    /// Our number, as `run.metric`.
     pub ours: String,
-    /// `run.metric` of the further column.
+    /// Our number in the further column, as `run.metric`.
     pub beside: Option<String>,
-    /// Beside the numbers.
+    /// Note that is shown beside the numbers.
     #[serde(default)]
     pub note: String,
 }
 
-/// Runs against metrics.
+/// A table that shows metrics of several runs.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Overview {
-    /// One line.
+    /// Title of the table, in one line.
     pub title: String,
-    /// What there is to know.
+    /// Note that is shown with the table.
     #[serde(default)]
     pub note: String,
-    /// The rows.
+    /// Ids of the runs, one for each row.
     #[schemars(with = "Vec<String>")]
     pub runs: Vec<Spanned<String>>,
-    /// The columns.
+    /// Columns of the table, each with one metric.
     pub metrics: Vec<Column>,
 }
 
@@ -73,11 +73,12 @@ pub struct Overview {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
-    /// The metric.
+    /// Name of the metric, which is shown for each run.
     pub of: String,
-    /// Its heading, with unit.
+    /// Heading of the column, with the unit.
     pub label: String,
-    /// The heading's unit for a value of 1: parameters are in the units of the FMU's variables.
+    /// Factor by which the metric is multiplied to get the unit of the heading. Parameters are in
+    /// the units of the FMU's variables.
     #[serde(default = "super::values::unscaled")]
     pub factor: f64,
 }
@@ -86,42 +87,42 @@ pub struct Column {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Claim {
-    /// What the paper claims, in our words.
+    /// Claim of the paper, in our words.
     pub says: String,
-    /// Where it does.
+    /// Place in the paper where the claim is made.
     pub source: String,
-    /// Why it comes out as it does.
+    /// Explanation of why the claim holds or does not hold.
     #[serde(default)]
     pub remark: String,
-    /// What decides.
+    /// Checks that decide whether the claim holds.
     #[serde(rename = "check")]
     pub checks: Vec<Check>,
 }
 
-/// A comparison of two numbers, for each value of `vary`.
+/// A comparison of two numbers, which is made for each value of `vary`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Check {
-    /// Under which circumstances.
+    /// Description of the circumstances under which the numbers are compared.
     pub label: String,
-    /// `run.metric`.
+    /// Number on the left side of the relation, as `run.metric`.
     pub left: String,
-    /// How the left stands to the right.
+    /// Relation in which the left number must stand to the right one.
     #[serde(default)]
     pub relation: Relation,
-    /// `run.metric`, a value, or a number.
+    /// Number on the right side of the relation: `run.metric`, the id of a value, or a number.
     pub right: Quantity,
-    /// By at least this fraction of the right.
+    /// Margin by which the numbers must differ at least, as a fraction of the right one.
     pub by: Option<Quantity>,
 }
 
-/// How the left of a check stands to its right.
+/// Relation in which the left number of a check must stand to the right one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Relation {
-    /// Not above it.
+    /// The left number is below the right one, or equal to it.
     #[default]
     Below,
-    /// Not below it.
+    /// The left number is above the right one, or equal to it.
     Above,
 }

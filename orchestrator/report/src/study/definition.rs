@@ -1,4 +1,4 @@
-//! A study as its file describes it.
+//! A study as its file describes it, with all of its parts.
 
 use super::comparisons::{Claim, Overview, Table};
 use super::drawings::{Figure, Panel};
@@ -16,68 +16,72 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::Spanned;
 
-/// A study as it is written.
+/// A study as its file describes it.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Study {
-    /// One line.
+    /// Title of the study, in one line.
     pub title: String,
-    /// How to cite the paper.
+    /// Reference to the paper, as it is to be cited.
     pub paper: String,
-    /// Paragraphs, separated by an empty line.
+    /// Summary of the study, in paragraphs that are separated by empty lines.
     pub summary: String,
-    /// Files of published and computed values, beside the study.
+    /// Files of published and computed values, with paths relative to the study.
     #[serde(rename = "values")]
     pub value_files: Vec<PathBuf>,
-    /// The scenario.
+    /// Lines of the table that describes the scenario.
     #[serde(default, rename = "scenario")]
     pub scenario: Vec<Fact>,
-    /// What the paper leaves open.
+    /// Gaps in the paper, each with the assumption that fills it here.
     #[serde(default, rename = "assumption")]
     pub assumptions: Vec<Assumption>,
-    /// What is run.
+    /// Runs of the study.
     #[serde(default, rename = "run")]
     pub runs: Vec<Run>,
-    /// Further runs, added to `runs` when the study is read.
+    /// Grids of candidates and scenarios, whose runs are added to `runs` when the study is read.
     #[serde(default, rename = "grid")]
     pub(super) grids: Vec<Grid>,
-    /// Lists of signals, by name.
+    /// Lists of signals that the other keys refer to, by name.
     #[serde(default)]
     pub signals: BTreeMap<String, Vec<Signal>>,
-    /// Bounds that runs are held against.
+    /// Bounds on signals, which runs are compared with.
     #[serde(default)]
     pub within: Vec<Within>,
-    /// Numbers that are taken of runs.
+    /// Numbers that are computed from the signals of runs.
     #[serde(default, rename = "measure")]
     pub measures: Vec<Measure>,
-    /// What is drawn.
+    /// Figures of the report.
     #[serde(default, rename = "figure")]
     pub figures: Vec<Figure>,
-    /// Paper against ours.
+    /// Tables that compare numbers of the paper with ours.
     #[serde(default, rename = "table")]
     pub tables: Vec<Table>,
-    /// Runs against metrics.
+    /// Tables that show metrics of several runs.
     #[serde(default, rename = "overview")]
     pub overviews: Vec<Overview>,
-    /// What the paper claims.
+    /// Claims of the paper, with the checks that decide on them.
     #[serde(default, rename = "claim")]
     pub claims: Vec<Claim>,
-    /// The values of the files.
+    /// Values that were read from the files. This is no key of a study file.
     #[serde(skip)]
     pub values: Values,
-    /// The file, with those that it extends.
+    /// The study file, together with the files that it extends. This is no key of a study file.
     #[serde(skip)]
     pub source: Source,
 }
 
 impl Study {
-    /// The run with this id.
+    /// Returns the run with this id.
     pub fn run(&self, id: &str) -> Option<&Run> {
         self.runs.iter().find(|run| run.id.get_ref() == id)
     }
 
-    /// The runs whose curves a panel shows.
-    pub fn runs_of<'a>(&'a self, figure: &'a Figure, panel: &'a Panel) -> impl Iterator<Item = &'a Run> {
+    /// Returns the runs whose curves a panel shows.
+    pub fn runs_of<'a>(
+        &'a self,
+        figure: &'a Figure,
+        panel: &'a Panel,
+    ) -> impl Iterator<Item = &'a Run> {
         let ids = panel.runs.as_ref().unwrap_or(&figure.runs);
         ids.iter().filter_map(|id| self.run(id.get_ref()))
     }
@@ -86,30 +90,39 @@ impl Study {
         self.signals.get(name.get_ref()).map(Vec::as_slice).unwrap_or_default()
     }
 
-    /// The bounds that a run is held against, each with its signals.
-    pub fn bounds_of<'a>(&'a self, run: &'a Run) -> impl Iterator<Item = (&'a Within, &'a [Signal])> {
-        let named = |id: &Spanned<String>| self.within.iter().find(|within| within.id == *id.get_ref());
+    /// Returns the bounds that a run is compared with, each with its signals.
+    pub fn bounds_of<'a>(
+        &'a self,
+        run: &'a Run,
+    ) -> impl Iterator<Item = (&'a Within, &'a [Signal])> {
+        let named =
+            |id: &Spanned<String>| self.within.iter().find(|within| within.id == *id.get_ref());
         run.within.iter().filter_map(named).map(|within| (within, self.list(&within.signals)))
     }
 
-    /// The numbers that are taken of a run, each with its signals.
-    pub fn measures_of<'a>(&'a self, run: &'a Run) -> impl Iterator<Item = (&'a Measure, &'a [Signal])> {
-        let named = |id: &Spanned<String>| self.measures.iter().find(|measure| measure.id == *id.get_ref());
+    /// Returns the measures that a run has, each with its signals.
+    pub fn measures_of<'a>(
+        &'a self,
+        run: &'a Run,
+    ) -> impl Iterator<Item = (&'a Measure, &'a [Signal])> {
+        let named =
+            |id: &Spanned<String>| self.measures.iter().find(|measure| measure.id == *id.get_ref());
         run.measures.iter().filter_map(named).map(|measure| (measure, self.list(&measure.signals)))
     }
 
-    /// A number as it is written, or the value it names.
+    /// Returns a number as it is written, or the value with this name.
     ///
     /// # Errors
-    /// If there is no such value.
+    /// Returns an error if there is no such value.
     pub fn number(&self, quantity: &Quantity) -> Result<f64, Error> {
         self.values.number(quantity).map_err(|message| self.source.error(&(0..0), message))
     }
 
-    /// The experiment of a run, with what the run sets, recording nothing.
+    /// Returns the experiment of a run with the changes that the run makes to it. It records
+    /// nothing.
     ///
     /// # Errors
-    /// If it cannot be read.
+    /// Returns an error if the experiment cannot be read, or lacks what the run changes in it.
     pub fn experiment(&self, run: &Run) -> Result<Experiment, Error> {
         let mut experiment = Experiment::load(&self.source.beside(&run.experiment))?;
         let fault = |message: String| {

@@ -1,4 +1,4 @@
-//! What a study says about its figures.
+//! The part of a study that describes its figures.
 
 use super::values::Quantity;
 use crate::figure::Color;
@@ -12,21 +12,21 @@ use toml::Spanned;
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Figure {
-    /// Name of its files.
+    /// Id of the figure, which is also the name of its files.
     pub id: String,
-    /// One line.
+    /// Title of the figure, in one line.
     pub title: String,
-    /// What there is to see.
+    /// Caption, which tells what the figure shows.
     #[serde(default)]
     pub caption: String,
-    /// Panels side by side.
+    /// Number of panels in a row, side by side.
     #[serde(default = "one")]
     pub columns: usize,
-    /// Whose curves are drawn.
+    /// Ids of the runs whose curves are drawn.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub runs: Vec<Spanned<String>>,
-    /// The panels, row by row.
+    /// Panels of the figure, row by row.
     #[serde(rename = "panel")]
     pub panels: Vec<Panel>,
 }
@@ -35,7 +35,8 @@ fn one() -> usize {
     1
 }
 
-/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `scatter` and `across` says what is drawn, or `points` alone.
+/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `scatter` and `across`
+/// says what is drawn; a panel may also have `points` alone.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
@@ -43,56 +44,57 @@ pub struct Panel {
     pub label: String,
     /// Label of the horizontal axis, if it is not time.
     pub x_label: Option<String>,
-    /// A heading above it.
+    /// Heading above the panel.
     #[serde(default)]
     pub title: String,
-    /// Instead of the figure's.
+    /// Ids of the runs whose curves are drawn, in place of those of the figure.
     #[schemars(with = "Option<Vec<String>>")]
     pub runs: Option<Vec<Spanned<String>>>,
-    /// One curve for each run.
+    /// Signal that is drawn as one curve for each run.
     pub signal: Option<Signal>,
-    /// Several curves for each run.
+    /// Signals that are drawn as several curves for each run.
     #[serde(default)]
     pub signals: Vec<Curve>,
-    /// Drawn once, of the first run.
+    /// Signal that the curves are to follow. It is drawn once, for the first run.
     pub reference: Option<Signal>,
-    /// Whether the band of all values of `vary` is drawn.
+    /// Whether a band shows the range of the signal over all values of `vary`.
     #[serde(default)]
     pub spread: bool,
-    /// The metric of kind `p99` whose single values are counted, over a logarithmic axis.
+    /// Metric of kind `p99` whose single values are shown as a histogram, with a logarithmic
+    /// horizontal axis.
     pub histogram: Option<String>,
-    /// One dot for each value of `vary`.
+    /// Two metrics that are drawn against each other, as one dot for each value of `vary`.
     pub scatter: Option<Scatter>,
-    /// Lines through the metrics of several runs.
+    /// Two metrics that are drawn against each other, as lines through several runs.
     pub across: Option<Across>,
-    /// Horizontal lines.
+    /// Horizontal lines across the panel.
     #[serde(default)]
     pub bounds: Vec<Line>,
-    /// Vertical lines.
+    /// Vertical lines across the panel.
     #[serde(default)]
     pub marks: Vec<Line>,
-    /// Single points.
+    /// Single points that are drawn in the panel.
     #[serde(default)]
     pub points: Vec<Point>,
-    /// Instead of the FMU's display unit.
+    /// Unit of the values, in place of the display unit of the FMU.
     pub unit: Option<Scaled>,
-    /// Part of the horizontal axis to show.
+    /// Range of the horizontal axis to show, from and to.
     pub x_range: Option<[f64; 2]>,
 }
 
-/// A curve of its own name and colour.
+/// A curve with a name and a colour of its own.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Curve {
-    /// What is drawn.
+    /// Signal that is drawn as the curve.
     pub of: Signal,
-    /// Name in the legend.
+    /// Name of the curve in the legend.
     pub label: String,
-    /// Its colour.
+    /// Colour of the curve.
     pub color: Color,
 }
 
-/// Metrics against each other.
+/// Two metrics of a run that are drawn against each other.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scatter {
@@ -102,41 +104,41 @@ pub struct Scatter {
     pub y: String,
 }
 
-/// Metrics of several runs against each other.
+/// Two metrics that are drawn against each other, as lines through several runs.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Across {
-    /// Along the horizontal axis.
+    /// Metric along the horizontal axis, with its factor.
     pub x: Axis,
-    /// Along the vertical axis.
+    /// Metric along the vertical axis, with its factor.
     pub y: Axis,
-    /// One line for each of these.
+    /// Lines that are drawn, each through runs of its own.
     pub lines: Vec<Through>,
 }
 
-/// A metric along an axis.
+/// A metric along an axis, with its factor.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
-    /// The metric.
+    /// Name of the metric along the axis.
     pub of: String,
-    /// The axis's unit for a value of 1.
+    /// Factor by which the metric is multiplied to get the unit of the axis.
     #[serde(default = "super::values::unscaled")]
     pub factor: f64,
 }
 
-/// A line through several runs: the mean of each run's metric.
+/// A line through several runs. Each of its points is the mean of a run's metrics.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Through {
-    /// Name in the legend.
+    /// Name of the line in the legend.
     pub label: String,
-    /// Its colour.
+    /// Colour of the line.
     pub color: Color,
-    /// The runs, in their order.
+    /// Ids of the runs that the line connects, in this order.
     #[schemars(with = "Vec<String>")]
     pub runs: Vec<Spanned<String>>,
-    /// Whether it is dashed.
+    /// Whether the line is dashed.
     #[serde(default)]
     pub dashed: bool,
 }
@@ -145,28 +147,28 @@ pub struct Through {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
-    /// Where.
+    /// Position of the line: a number, or the id of a value.
     pub at: Quantity,
-    /// Name in the legend.
+    /// Name of the line in the legend.
     pub label: String,
-    /// Its colour.
+    /// Colour of the line, which is red if it is left out.
     #[serde(default)]
     pub color: Option<Color>,
-    /// Whether it is drawn at the negative value too.
+    /// Whether a second line is drawn at the negative position.
     #[serde(default)]
     pub symmetric: bool,
 }
 
-/// A single point.
+/// A single point that is drawn in a panel.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Point {
-    /// Along the horizontal axis.
+    /// Position along the horizontal axis: a number, or the id of a value.
     pub x: Quantity,
-    /// Along the vertical axis.
+    /// Position along the vertical axis: a number, or the id of a value.
     pub y: Quantity,
-    /// Name in the legend.
+    /// Name of the point in the legend.
     pub label: String,
-    /// Its colour.
+    /// Colour of the point.
     pub color: Color,
 }

@@ -1,4 +1,4 @@
-//! Makes figures of a study's results.
+//! Draws the figures of a study from the results of its runs.
 
 use super::drawings::{Across, Axis, Figure, Panel, Through};
 use super::part::Series;
@@ -9,22 +9,30 @@ use cosim::experiment::Scaled;
 use cosim::signal::Signal;
 use toml::Spanned;
 
-/// Columns of a histogram per decade.
+/// Number of columns of a histogram for each decade.
 const COLUMNS_PER_DECADE: f64 = 12.0;
 
-/// Makes a figure from the results of a study.
+/// Draws a figure from the results of a study.
 ///
 /// # Errors
-/// If it names what is not there.
+/// Returns an error if the figure names an item that does not exist.
 pub(super) fn figure(figure: &Figure, results: &Results) -> Result<figure::Figure, String> {
-    let panels = figure.panels.iter().map(|p| panel(figure, p, results)).collect::<Result<_, _>>()?;
-    Ok(figure::Figure { title: figure.title.clone(), columns: figure.columns, legend: Legend::Above, panels })
+    let panels =
+        figure.panels.iter().map(|p| panel(figure, p, results)).collect::<Result<_, _>>()?;
+    Ok(figure::Figure {
+        title: figure.title.clone(),
+        columns: figure.columns,
+        legend: Legend::Above,
+        panels,
+    })
 }
 
 fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Panel, String> {
     let study = results.study;
-    let runs: Vec<(&Run, &RunResult)> =
-        study.runs_of(figure, panel).filter_map(|run| Some((run, results.run(run.id.get_ref())?))).collect();
+    let runs: Vec<(&Run, &RunResult)> = study
+        .runs_of(figure, panel)
+        .filter_map(|run| Some((run, results.run(run.id.get_ref())?)))
+        .collect();
     let mut curves = Vec::new();
     let mut x_label = "time, s".to_string();
     if let Some(metric) = &panel.histogram {
@@ -39,7 +47,13 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
             };
             let (x, y) = (numbers(&scatter.x)?.0, numbers(&scatter.y)?.0);
             debug_assert_eq!(x.len(), result.members.len());
-            curves.push(Curve { name: run.label.clone(), color: run.color, shape: Shape::Dots, x, y });
+            curves.push(Curve {
+                name: run.label.clone(),
+                color: run.color,
+                shape: Shape::Dots,
+                x,
+                y,
+            });
         }
     } else if let Some(across) = &panel.across {
         x_label.clone_from(&across.x.of);
@@ -65,12 +79,18 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
         if let (Some(reference), Some((_, result))) = (&panel.reference, runs.first()) {
             let y = values(&result.series, reference, panel);
             let (name, color) = ("reference".into(), Color(0, 0, 0));
-            curves.push(Curve { name, color, shape: Shape::Dashed, x: result.series.time.clone(), y });
+            curves.push(Curve {
+                name,
+                color,
+                shape: Shape::Dashed,
+                x: result.series.time.clone(),
+                y,
+            });
         }
         for (run, result) in &runs {
             for (signal, name, color) in drawn(panel, run) {
                 let y = values(&result.series, signal, panel);
-                // Within a band of the same colour a line stands for one run only.
+                // The line over a band of the same colour is pale, and shows the first run only.
                 let shape = if panel.spread { Shape::Pale } else { Shape::Line };
                 let name = if panel.spread { format!("{name}, first run") } else { name };
                 curves.push(Curve { name, color, shape, x: result.series.time.clone(), y });
@@ -80,7 +100,13 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
     for point in &panel.points {
         let at = |quantity| study.values.number(quantity).map(|number| vec![number]);
         let (x, y) = (at(&point.x)?, at(&point.y)?);
-        curves.push(Curve { name: point.label.clone(), color: point.color, shape: Shape::Crosses, x, y });
+        curves.push(Curve {
+            name: point.label.clone(),
+            color: point.color,
+            shape: Shape::Crosses,
+            x,
+            y,
+        });
     }
     for (lines, shape) in [(&panel.bounds, Shape::Horizontal), (&panel.marks, Shape::Vertical)] {
         for line in lines {
@@ -107,7 +133,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
     })
 }
 
-/// A line through the means of several runs.
+/// Returns a line through the means of several runs.
 fn through(across: &Across, line: &Through, results: &Results) -> Result<Curve, String> {
     let along = |axis: &Axis| {
         let mean = |run: &Spanned<String>| {
@@ -122,10 +148,11 @@ fn through(across: &Across, line: &Through, results: &Results) -> Result<Curve, 
     Ok(Curve { name: line.label.clone(), color: line.color, shape, x, y })
 }
 
-/// The curves that a panel draws of a run: signal, name and colour of each.
+/// Returns the curves that a panel draws for a run, each with its signal, name and colour.
 fn drawn<'a>(panel: &'a Panel, run: &'a Run) -> Vec<(&'a Signal, String, Color)> {
     let own = panel.signal.iter().map(|signal| (signal, run.label.clone(), run.color));
-    own.chain(panel.signals.iter().map(|curve| (&curve.of, curve.label.clone(), curve.color))).collect()
+    own.chain(panel.signals.iter().map(|curve| (&curve.of, curve.label.clone(), curve.color)))
+        .collect()
 }
 
 fn values(series: &Series, signal: &Signal, panel: &Panel) -> Vec<f64> {
@@ -136,7 +163,8 @@ fn scaled(values: &[f64], unit: Option<&Scaled>) -> Vec<f64> {
     values.iter().map(|value| value * unit.map_or(1.0, |unit| unit.factor)).collect()
 }
 
-/// Shares, in per cent, of durations in columns of equal width on a logarithmic axis.
+/// Returns a histogram of durations: shares, in per cent, in columns of equal width on a
+/// logarithmic axis.
 fn histogram(run: &Run, values: &[f64]) -> Curve {
     let column = |value: f64| (value.log10() * COLUMNS_PER_DECADE).floor();
     let timed: Vec<f64> = values.iter().copied().filter(|value| *value > 0.0).collect();
@@ -146,7 +174,7 @@ fn histogram(run: &Run, values: &[f64]) -> Curve {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), c| (low.min(c), high.max(c)));
     let (mut x, mut y) = (Vec::new(), Vec::new());
     let mut edge = first;
-    // One column more, which is empty, ends the last.
+    // A further, empty column ends the last one.
     while edge <= last + 1.0 {
         x.push(10_f64.powf(edge / COLUMNS_PER_DECADE));
         let inside = timed.iter().filter(|&&value| column(value) == edge).count();

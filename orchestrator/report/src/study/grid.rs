@@ -1,4 +1,5 @@
-//! Candidates on scenarios: a run for each pair, so that neither stands in the study more than once.
+//! Grids of candidates and scenarios. There is a run for each pair, so that a study describes each
+//! candidate and each scenario only once.
 
 use super::runs::Run;
 use crate::figure::Color;
@@ -12,19 +13,19 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::{Spanned, Value};
 
-/// Every candidate on every scenario: the runs `SCENARIO-CANDIDATE`.
+/// A grid of candidates and scenarios, which stands for the runs `SCENARIO-CANDIDATE`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Grid {
-    /// What is compared.
+    /// Candidates that are compared with each other.
     #[serde(rename = "candidate")]
     candidates: Vec<Candidate>,
-    /// Where.
+    /// Scenarios in which the candidates are compared.
     #[serde(rename = "scenario")]
     scenarios: Vec<Scenario>,
 }
 
-/// What it takes to put a candidate into any experiment.
+/// A candidate, with the changes that put it into any experiment.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Candidate {
@@ -36,25 +37,25 @@ struct Candidate {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, cosim::experiment::Scalar>")]
     set: BTreeMap<String, Value>,
-    /// Parameters that it has not: left out where an experiment sets them.
+    /// Parameters that the candidate does not have. They are left out if an experiment sets them.
     #[serde(default)]
     without: Vec<String>,
 }
 
-/// An experiment, and what is taken of its runs.
+/// An experiment in which all candidates are run, with what is computed for its runs.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Scenario {
     #[schemars(with = "String")]
     id: Spanned<String>,
-    /// Heading of its rows in an overview.
+    /// Heading of the scenario's rows in an overview.
     label: String,
     experiment: PathBuf,
-    /// Parameters that differ from the experiment's, for all candidates that have them.
+    /// Parameters that differ from those of the experiment, for all candidates that have them.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, cosim::experiment::Scalar>")]
     set: BTreeMap<String, Value>,
-    /// Parameters of single candidates, by their id.
+    /// Parameters of single candidates, by the id of the candidate.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, BTreeMap<String, cosim::experiment::Scalar>>")]
     set_for: BTreeMap<Spanned<String>, BTreeMap<String, Value>>,
@@ -69,10 +70,10 @@ struct Scenario {
 }
 
 impl Grid {
-    /// The runs, scenario by scenario.
+    /// Returns the runs of the grid, scenario by scenario.
     ///
     /// # Errors
-    /// If an experiment cannot be read, or a candidate is not there.
+    /// Returns an error if an experiment cannot be read, or a candidate does not exist.
     pub(super) fn runs(&self, source: &Source) -> Result<Vec<Run>, Error> {
         let mut runs = Vec::new();
         for scenario in &self.scenarios {
@@ -93,7 +94,12 @@ impl Grid {
                     experiment: scenario.experiment.clone(),
                     fmu: candidate.fmu.clone(),
                     set: common.chain(candidate.set.clone()).chain(own).collect(),
-                    unset: candidate.without.iter().filter(|name| experiment.sets(name)).cloned().collect(),
+                    unset: candidate
+                        .without
+                        .iter()
+                        .filter(|name| experiment.sets(name))
+                        .cloned()
+                        .collect(),
                     vary: None,
                     timed: scenario.timed,
                     within: scenario.within.clone(),
@@ -106,10 +112,11 @@ impl Grid {
     }
 }
 
-/// The ids that `names` stand for: themselves, or all that fit a `*`, in the order of `ids`.
+/// Replaces patterns by ids: a name with a `*` becomes all ids that fit it, in the order of `ids`,
+/// and another name stays as it is.
 ///
 /// # Errors
-/// The name that fits none.
+/// Returns the name that fits no id.
 pub(super) fn expand(
     names: &[Spanned<String>],
     ids: &[&str],
@@ -141,8 +148,11 @@ mod tests {
             names.iter().map(|name| Spanned::new(0..0, (*name).to_string())).collect()
         };
         let expanded = |of: &[&str]| expand(&names(of), &ids);
-        assert_eq!(expanded(&["storm-*", "calm-*"]).unwrap(), names(&["storm-lqr", "calm-lqr", "calm-fbl"]));
-        // What is no pattern is checked elsewhere.
+        assert_eq!(
+            expanded(&["storm-*", "calm-*"]).unwrap(),
+            names(&["storm-lqr", "calm-lqr", "calm-fbl"])
+        );
+        // A name without a `*` is checked elsewhere.
         assert_eq!(expanded(&["calm"]).unwrap(), names(&["calm"]));
         assert_eq!(expanded(&["calm-lqr", "gale-*"]).unwrap_err().into_inner(), "gale-*");
     }

@@ -1,4 +1,4 @@
-//! What a finished part of a study leaves in a file, so that it is not run again.
+//! Files in which the finished parts of a study are kept, so that they need not be run again.
 
 use super::part::{Outcome, Part};
 use cosim::error::Error as Single;
@@ -21,7 +21,7 @@ pub(super) fn hex(bytes: &[u8]) -> String {
 pub(super) struct Kept {
     key: String,
     members: std::ops::Range<u32>,
-    /// Of all the rest, so that no number is taken over that has changed since.
+    /// Hash of all other fields, so that no number is used that was changed later.
     digest: String,
     pub(super) outcome: Outcome,
 }
@@ -36,16 +36,21 @@ impl Kept {
         Ok(Self { key, members, digest, outcome })
     }
 
-    fn digest(key: &str, members: &std::ops::Range<u32>, outcome: &Outcome) -> serde_json::Result<String> {
+    fn digest(
+        key: &str,
+        members: &std::ops::Range<u32>,
+        outcome: &Outcome,
+    ) -> serde_json::Result<String> {
         Ok(hex(&Sha256::digest(serde_json::to_vec(&(key, members, outcome))?)))
     }
 
     fn is_whole(&self) -> bool {
-        Self::digest(&self.key, &self.members, &self.outcome).is_ok_and(|digest| digest == self.digest)
+        Self::digest(&self.key, &self.members, &self.outcome)
+            .is_ok_and(|digest| digest == self.digest)
     }
 }
 
-/// Reads the outcome that a part left earlier, if it is still valid.
+/// Reads the outcome that a part has kept earlier, if it is still valid.
 pub(super) fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
     let text = fs::read(path).ok()?;
     let kept = serde_json::from_slice::<Kept>(&text).ok().filter(Kept::is_whole);

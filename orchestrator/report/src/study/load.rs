@@ -1,4 +1,4 @@
-//! Reads a study and checks all that can be checked without running anything.
+//! Reads a study and checks everything that can be checked without running anything.
 
 use super::definition::Study;
 use super::runs::Run;
@@ -10,7 +10,7 @@ use fmu_import::names;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A text with the numbers of runs in the places that ask for them.
+/// Replaces each `{runs:ID}` in a text by the number of runs; `None` if there is none to replace.
 fn counted(text: &str, runs: &[Run], members: Option<u32>) -> Result<Option<String>, String> {
     let mut parts = text.split("{runs:");
     let mut counted = parts.next().unwrap_or_default().to_string();
@@ -30,16 +30,17 @@ impl Study {
     /// Reads a study and its files of values.
     ///
     /// # Errors
-    /// If a file cannot be read, is no TOML, or names what is not there.
+    /// Returns an error if a file cannot be read, is not TOML, or names an item that does not
+    /// exist.
     pub fn load(path: &Path) -> Result<Self, Error> {
         Self::load_with(path, None)
     }
 
-    /// Reads a study with at most so many members of each run, and its files of values. `{runs:ID}` in its texts becomes the
-    /// number of runs that there are of ID.
+    /// Reads a study with at most `members` members of each run, and its files of values. The text
+    /// `{runs:ID}` becomes the number of runs that are made of the run ID.
     ///
     /// # Errors
-    /// As [`Self::load`].
+    /// The errors are those of [`Self::load`].
     pub fn load_with(path: &Path, members: Option<u32>) -> Result<Self, Error> {
         let source = Source::load(path)?;
         let fault = |(span, message): template::Fault| source.error(&span, message);
@@ -68,7 +69,8 @@ impl Study {
         Ok(study)
     }
 
-    /// Notes what the experiments ask for. One that cannot be read is told of when it is to be run.
+    /// Notes what the experiments ask for. An experiment that cannot be read is reported later, when
+    /// it is to be run.
     fn learn_metrics(&mut self) {
         let mut known: BTreeMap<PathBuf, Observe> = BTreeMap::new();
         for run in &mut self.runs {
@@ -80,7 +82,7 @@ impl Study {
         }
     }
 
-    /// Puts the ids of runs in the place of patterns.
+    /// Replaces patterns by the ids of runs.
     fn expand(&mut self) -> Result<(), Error> {
         let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
         let panels = self.figures.iter_mut().flat_map(|figure| {
@@ -98,7 +100,7 @@ impl Study {
         Ok(())
     }
 
-    /// Everything that can be wrong without running anything.
+    /// Checks everything that can be wrong without running anything.
     fn check(&self) -> Result<(), Error> {
         let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
         for (place, run) in self.runs.iter().enumerate() {
@@ -142,8 +144,11 @@ impl Study {
         for figure in &self.figures {
             self.source.known(&figure.runs, "[[run]]", ids.iter().copied())?;
             for panel in &figure.panels {
-                let through =
-                    panel.across.iter().flat_map(|across| &across.lines).flat_map(|line| &line.runs);
+                let through = panel
+                    .across
+                    .iter()
+                    .flat_map(|across| &across.lines)
+                    .flat_map(|line| &line.runs);
                 let named = panel.runs.iter().flatten().chain(through);
                 self.source.known(named, "[[run]]", ids.iter().copied())?;
                 let drawn = [
@@ -173,7 +178,8 @@ impl Study {
         for overview in &self.overviews {
             self.source.known(&overview.runs, "[[run]]", ids.iter().copied())?;
         }
-        for quantity in self.tables.iter().flat_map(|table| &table.rows).filter_map(|row| row.paper.as_ref())
+        for quantity in
+            self.tables.iter().flat_map(|table| &table.rows).filter_map(|row| row.paper.as_ref())
         {
             self.number(quantity)?;
         }

@@ -1,7 +1,8 @@
-//! A paper's comparison as data: which experiments are run, over which seeds; what is drawn and tabulated of them; what the
-//! paper prints; and what it claims. `orchestrator reproduce` runs it and writes the report.
+//! A paper's comparison as data: which experiments are run and over which seeds, what is drawn and
+//! tabulated, which numbers the paper prints, and what it claims. `orchestrator reproduce` runs a
+//! study and writes its report.
 //!
-//! All keys stand in docs/studies.md, and in `orchestrator/schema/study.json` for editors.
+//! docs/studies.md explains all keys; `orchestrator/schema/study.json` describes them for editors.
 
 pub mod claims;
 pub mod comparisons;

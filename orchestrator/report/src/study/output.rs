@@ -1,4 +1,4 @@
-//! Writes what a study came to: figures, numbers and the page.
+//! Writes the figures, the numbers and the page of a study.
 
 use super::claims;
 use super::kept::write_whole;
@@ -9,10 +9,10 @@ use cosim::error::Error;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A claim, in our words, with its verdict.
+/// A claim in our words, with its verdict.
 pub(super) type Judgement = (String, claims::Verdict);
 
-/// Writes figures, numbers and page. Returns the verdicts and the files.
+/// Writes the figures, the numbers and the page. Returns the verdicts and the names of the files.
 pub(super) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Vec<String>), Error> {
     let study = results.study;
     let fault = |message: String| study.source.error(&(0..0), message);
@@ -36,11 +36,12 @@ pub(super) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Ve
     write_whole(&out.join("results.json"), numbers(results, &judged).as_bytes())?;
     let page = page::page(results, &judged, &drawn).map_err(fault)?;
     write_whole(&out.join("report.html"), page.as_bytes())?;
-    let verdicts = study.claims.iter().zip(&judged).map(|(c, j)| (c.says.clone(), j.verdict)).collect();
+    let verdicts =
+        study.claims.iter().zip(&judged).map(|(c, j)| (c.says.clone(), j.verdict)).collect();
     Ok((verdicts, files))
 }
 
-/// All numbers, for other programs.
+/// Returns all numbers as JSON, for other programs.
 fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
     let study = results.study;
     let runs: serde_json::Map<String, Value> = study
@@ -83,7 +84,8 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
             json!({ "says": claim.says, "verdict": judged.verdict, "checks": checks })
         })
         .collect();
-    let all = json!({ "title": study.title, "values": study.values.0, "runs": runs, "claims": claims });
+    let all =
+        json!({ "title": study.title, "values": study.values.0, "runs": runs, "claims": claims });
     let mut text = serde_json::to_string_pretty(&all).unwrap_or_default();
     text.push('\n');
     text

@@ -1,4 +1,4 @@
-//! The report as one HTML page that needs nothing but itself.
+//! The report as one HTML page, which needs no other file.
 
 use super::claims::{Checked, Judged, Verdict};
 use super::comparisons::{Check, Claim, Column, Overview, Relation, Row, Table};
@@ -12,11 +12,16 @@ use std::fmt::Write as _;
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// Writes the page. `judged` belongs to the study's claims, `drawn` to its figures.
+/// Returns the text of the page. `judged` belongs to the study's claims in order, and `drawn` to
+/// its figures.
 ///
 /// # Errors
-/// If the study names what is not there.
-pub(super) fn page(results: &Results, judged: &[Judged], drawn: &[figure::Figure]) -> Result<String, String> {
+/// Returns an error if the study names an item that does not exist.
+pub(super) fn page(
+    results: &Results,
+    judged: &[Judged],
+    drawn: &[figure::Figure],
+) -> Result<String, String> {
     let study = results.study;
     let runs: usize = results.runs.iter().map(|run| run.members.len()).sum();
     let claims = study.claims.iter().zip(judged).map(|(c, j)| claim(c, j)).collect::<Vec<_>>();
@@ -86,7 +91,7 @@ pub(super) fn page(results: &Results, judged: &[Judged], drawn: &[figure::Figure
     Ok(markup.into_string())
 }
 
-/// The figures' places on the page.
+/// Returns the section of the page that holds the figures.
 fn plots(results: &Results, drawn: &[figure::Figure]) -> Markup {
     html! {
         section id="figures" {
@@ -110,7 +115,7 @@ fn plots(results: &Results, drawn: &[figure::Figure]) -> Markup {
     }
 }
 
-/// The scenario, and what the paper leaves open.
+/// Returns the sections with the scenario and the assumptions.
 fn scenario(results: &Results) -> Markup {
     html! {
         @if !results.study.scenario.is_empty() { section id="scenario" {
@@ -138,7 +143,7 @@ fn scenario(results: &Results) -> Markup {
     }
 }
 
-/// Ids and names of the sections that there are.
+/// Returns the ids and the names of the sections that the page has.
 fn sections(results: &Results) -> impl Iterator<Item = (&'static str, &'static str)> {
     let study = results.study;
     let all = [
@@ -156,11 +161,12 @@ fn paragraphs(text: &str) -> impl Iterator<Item = &str> {
     text.split("\n\n").map(str::trim).filter(|paragraph| !paragraph.is_empty())
 }
 
-/// The data of a plot, for the page's script.
+/// Returns the data of a plot, which the page's script draws.
 fn plot(id: &str, picture: &figure::Figure) -> Markup {
     let (data, layout) = interactive::plot(picture);
-    // In JSON a slash may be escaped; so no text of a figure can end the element.
-    let text = serde_json::json!({ "data": data, "layout": layout }).to_string().replace("</", "<\\/");
+    // A slash may be escaped in JSON. With this no text of a figure can end the element.
+    let text =
+        serde_json::json!({ "data": data, "layout": layout }).to_string().replace("</", "<\\/");
     html! { script type="application/json" class="figure" data-plot=(format!("plot-{id}")) { (PreEscaped(text)) } }
 }
 
@@ -236,12 +242,14 @@ fn row(row: &Row, has_beside: bool, results: &Results) -> Result<Markup, String>
     let beside = row.beside.as_ref().map(|beside| results.numbers(beside)).transpose()?;
     let paper = row.paper.as_ref().map(|paper| results.study.values.number(paper)).transpose()?;
     let origin = match &row.paper {
-        Some(Quantity::Named(id)) => results.study.values.find(id).map(|value| value.source.as_str()),
+        Some(Quantity::Named(id)) => {
+            results.study.values.find(id).map(|value| value.source.as_str())
+        }
         _ => None,
     };
     let difference = paper.map(|paper| {
         let absolute = ours.mean() - paper;
-        // Rounding of a mean is no difference.
+        // A difference that stems from the rounding of a mean counts as none.
         if absolute.abs() <= 1e-12 * paper.abs() {
             return "0".to_string();
         }
@@ -265,7 +273,8 @@ fn overview(overview: &Overview, results: &Results) -> Markup {
         let Some(run) = results.study.run(id.get_ref()) else { continue };
         let number = |column: &Column| {
             let reference = format!("{}.{}", id.get_ref(), column.of);
-            let numbers = results.numbers(&reference).map_or_else(|_| Vec::new(), |numbers| numbers.0);
+            let numbers =
+                results.numbers(&reference).map_or_else(|_| Vec::new(), |numbers| numbers.0);
             Numbers(numbers.into_iter().map(|number| number * column.factor).collect())
         };
         let numbers: Vec<Numbers> = overview.metrics.iter().map(number).collect();

@@ -1,4 +1,5 @@
-//! One part of the work of a study: a run for some values of its parameter, from the experiment to what is kept of it.
+//! One part of the work of a study: a run for some values of its parameter, from reading the
+//! experiment to the results that are kept.
 
 use super::definition::Study;
 use super::runs::Run;
@@ -56,11 +57,13 @@ pub struct Member {
 }
 
 impl Member {
-    /// Whether this member had the same results as another one, apart from computing times.
+    /// Returns whether this member has the same results as another one, apart from computing times.
     pub fn moves_as(&self, other: &Self, asked: &Observe) -> bool {
         let timeless = |metrics: &Metrics| {
             let mut metrics = Metrics { step_us: BTreeMap::new(), ..metrics.clone() };
-            metrics.asked.retain(|name, _| asked.metrics.get(name).is_none_or(|measure| !measure.timing));
+            metrics
+                .asked
+                .retain(|name, _| asked.metrics.get(name).is_none_or(|measure| !measure.timing));
             metrics
         };
         timeless(&self.metrics) == timeless(&other.metrics)
@@ -107,7 +110,7 @@ pub struct Spread {
 /// Tolerance with which bounds count as met, because of rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// The signals that a study wants of a run: as time series, and as bands.
+/// Signals that the figures of a study need from a run.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Wanted {
     /// Signals that are drawn as lines.
@@ -138,7 +141,7 @@ impl Wanted {
     }
 }
 
-/// A run of a study, ready to be made for any value of its parameter.
+/// A run of a study that has been prepared, so that it can be made for any value of its parameter.
 pub(super) struct Preparation<'a> {
     study: &'a Study,
     run: &'a Run,
@@ -150,21 +153,27 @@ pub(super) struct Preparation<'a> {
 }
 
 impl<'a> Preparation<'a> {
-    /// Collects what is wanted of a run, and reads its experiment.
+    /// Collects the signals that are drawn of a run, and reads its experiment.
     ///
     /// # Errors
-    /// If the experiment cannot be read, or has not what the run changes in it.
-    pub(super) fn new(study: &'a Study, run: &'a Run, fmu_dirs: &'a [PathBuf]) -> Result<Self, Error> {
+    /// Returns an error if the experiment cannot be read, or lacks what the run changes in it.
+    pub(super) fn new(
+        study: &'a Study,
+        run: &'a Run,
+        fmu_dirs: &'a [PathBuf],
+    ) -> Result<Self, Error> {
         let wanted = Wanted::of(study, run);
-        let experiment =
-            study.experiment(run).map_err(|source| Error::Run { run: run.id.get_ref().clone(), source })?;
+        let experiment = study
+            .experiment(run)
+            .map_err(|source| Error::Run { run: run.id.get_ref().clone(), source })?;
         Ok(Self { study, run, wanted, experiment, fmu_dirs })
     }
 
-    /// The experiment with all names resolved, for the member with this number.
+    /// Checks the experiment for the member with this number, with all names resolved.
     ///
     /// # Errors
-    /// Everything that is wrong with the experiment, the FMUs, or the signals.
+    /// Returns an error if anything is wrong with the experiment, the FMUs, or the parameter that
+    /// is varied.
     pub(super) fn system(&self, member: u32, opened: &mut Opened) -> Result<System, Single> {
         let mut experiment = self.experiment.clone();
         if let Some(vary) = &self.run.vary {
@@ -185,10 +194,10 @@ impl<'a> Preparation<'a> {
         system.resolve(signal).map_err(|message| self.fault(&message))
     }
 
-    /// Checks that everything is there that will be asked for.
+    /// Checks that everything exists that the study asks of this run.
     ///
     /// # Errors
-    /// An error that names the missing item.
+    /// Returns an error that names the missing item.
     pub(super) fn check(&self, opened: &mut Opened) -> Result<(), Error> {
         let mut system = self.system(0, opened).map_err(|source| self.failed(source))?;
         let bounded = self.study.bounds_of(self.run).flat_map(|(_, signals)| signals);
@@ -205,7 +214,7 @@ impl<'a> Preparation<'a> {
     /// Runs the members with these numbers.
     ///
     /// # Errors
-    /// If a unit fails, or if the run was asked to end.
+    /// Returns an error if a unit fails, or if the run was asked to end.
     pub(super) fn execute(
         &self,
         range: Range<u32>,
@@ -221,7 +230,12 @@ impl<'a> Preparation<'a> {
                 let signals = signals.iter().map(|signal| self.resolve(signal, &mut system));
                 let signals = signals.collect::<Result<_, _>>()?;
                 let bound = self.study.number(&within.bound)?;
-                bounds.push(Bounded { id: &within.id, signals, bound, inside: Compared::default() });
+                bounds.push(Bounded {
+                    id: &within.id,
+                    signals,
+                    bound,
+                    inside: Compared::default(),
+                });
             }
             let mut gauges = Vec::new();
             for (measure, signals) in self.study.measures_of(self.run) {
@@ -233,7 +247,7 @@ impl<'a> Preparation<'a> {
             if number == 0 {
                 outcome.parameters = system.parameters(&mut master)?;
             }
-            // Computing times mean nothing if the run shares the machine.
+            // Computing times are only meaningful if the run has the machine for itself.
             if self.run.timed && number == 0 {
                 master.measure_time();
             }
@@ -243,9 +257,11 @@ impl<'a> Preparation<'a> {
             master.run(&mut observers)?;
 
             let value = self.run.vary.as_ref().map(|vary| vary.first + number.cast_signed());
-            let step_us = master.step_seconds().map(|(name, seconds)| (name.into(), seconds * 1e6)).collect();
+            let step_us =
+                master.step_seconds().map(|(name, seconds)| (name.into(), seconds * 1e6)).collect();
             let metrics = Metrics { step_us, ..meters.metrics() };
-            let within = bounds.into_iter().map(|bound| (bound.id.to_string(), bound.inside)).collect();
+            let within =
+                bounds.into_iter().map(|bound| (bound.id.to_string(), bound.inside)).collect();
             let measures = gauges.into_iter().map(|(id, gauge)| (id, gauge.value())).collect();
             outcome.members.push(Member { value, metrics, within, measures });
             for (signal, values) in &series.signals {
@@ -257,7 +273,11 @@ impl<'a> Preparation<'a> {
                 outcome.series = Some(Series {
                     time: series.time,
                     signals: series.signals,
-                    units: series.resolved.iter().map(|(s, r)| (s.clone(), r.unit.clone())).collect(),
+                    units: series
+                        .resolved
+                        .iter()
+                        .map(|(s, r)| (s.clone(), r.unit.clone()))
+                        .collect(),
                     samples: meters.samples(),
                 });
             }
@@ -294,7 +314,7 @@ impl Compared {
     }
 }
 
-/// Compares signals with a bound.
+/// A comparison of signals with a bound during the run.
 struct Bounded<'a> {
     id: &'a str,
     signals: Vec<Resolved>,
@@ -311,10 +331,10 @@ impl Observer for Bounded<'_> {
     }
 }
 
-/// A series holds about this many points at most.
+/// Approximate largest number of points of a time series.
 const POINTS: u64 = 4000;
 
-/// Records signals at every n-th communication point.
+/// An observer that records signals at every n-th communication point.
 struct Watch {
     stride: u64,
     resolved: Vec<(Signal, Resolved)>,
@@ -334,7 +354,8 @@ impl Watch {
             .collect::<Result<Vec<_>, Single>>()?;
         let stride = system.clock.ticks().div_ceil(POINTS).max(1);
         let room = (system.clock.ticks() / stride) as usize + 2;
-        let signals = signals.iter().map(|signal| (signal.clone(), Vec::with_capacity(room))).collect();
+        let signals =
+            signals.iter().map(|signal| (signal.clone(), Vec::with_capacity(room))).collect();
         Ok(Self { stride, resolved, time: Vec::with_capacity(room), signals })
     }
 }

@@ -1,8 +1,8 @@
-//! Runs a study on all cores, keeps what is finished, and writes the report.
+//! Runs a study on all cores, keeps the finished parts, and writes the report.
 //!
-//! The work is cut into parts. What a finished part leaves is written to a file at once, together with a hash of all that
-//! it depends on; a part whose file is there, with the same hash, is not run again. So an interruption costs the parts that
-//! were being worked on, and nothing else.
+//! The work is divided into parts. The results of a finished part are written to a file at once,
+//! together with a hash of everything that they depend on. A part whose file exists with the same
+//! hash is not run again. An interruption therefore costs only the parts that were being worked on.
 
 use super::claims;
 use super::definition::Study;
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Members of a run that make up one part.
+/// Number of members of a run that make up one part.
 const MEMBERS_PER_PART: u32 = 25;
 /// Version of the files of parts, which must be raised when their content changes.
 const FORMAT: u32 = 5;
@@ -34,9 +34,9 @@ const FORMAT: u32 = 5;
 /// Options for the reproduction of a study.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Folder for the results; `out/<folder of the study>` if there is none.
+    /// Folder for the results; `out/<folder of the study>` if it is not given.
     pub out: Option<PathBuf>,
-    /// Further folders with FMUs.
+    /// Further folders in which FMUs are looked for.
     pub fmu_dirs: Vec<PathBuf>,
     /// Number of threads; 0 means one for each core.
     pub jobs: usize,
@@ -57,26 +57,29 @@ pub struct Report {
     pub page: PathBuf,
     /// Number of parts that were run, and number of parts that were complete already.
     pub parts: (usize, usize),
-    /// Runs of an experiment among all parts.
+    /// Number of simulations in all parts.
     pub runs: usize,
     /// Elapsed time of the reproduction, s.
     pub elapsed: f64,
     /// Remarks on runs whose parameter has no effect or that lose the attitude.
     pub notes: Vec<String>,
-    /// Each claim with its verdict.
+    /// Claims of the study, each with its verdict.
     pub verdicts: Vec<Judgement>,
-    /// Names of all files, relative to the folder.
+    /// Names of all files that were written, relative to the folder.
     pub files: Vec<String>,
 }
 
-/// The study of this name: a file, a folder with a `study.toml`, or such a folder below `orchestrator/experiments`.
+/// Finds the study with this name: a file, a folder with a `study.toml`, or such a folder below
+/// `orchestrator/experiments`.
 ///
 /// # Errors
-/// If there is no study with this name.
+/// Returns an error if there is no study with this name.
 pub fn find(name: &Path) -> Result<PathBuf, Single> {
     let roots = search::experiments();
     let mut candidates = vec![name.to_path_buf(), name.join("study.toml")];
-    candidates.extend(roots.iter().flat_map(|root| [root.join(name), root.join(name).join("study.toml")]));
+    candidates.extend(
+        roots.iter().flat_map(|root| [root.join(name), root.join(name).join("study.toml")]),
+    );
     candidates.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {
         let there: Vec<String> = roots
             .iter()
@@ -92,11 +95,12 @@ pub fn find(name: &Path) -> Result<PathBuf, Single> {
     })
 }
 
-/// Runs what is not there yet of a study, and writes its report.
+/// Runs those parts of a study that are not finished yet, and writes its report.
 ///
 /// # Errors
-/// Everything that is wrong with the study, before anything is run; what a unit said; files that cannot be written. What is
-/// finished by then is kept.
+/// Returns an error before anything is run if the study is faulty. It also returns one if a unit
+/// fails, if a file cannot be written, or if the work was asked to end; the parts that are finished
+/// by then are kept.
 pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
     let begin = Instant::now();
     let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(name(study)));
@@ -109,14 +113,17 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
     check(study, &preparations, &mut opened)?;
     let keys = keys(study, &preparations, &mut opened)?;
     if out.join("metrics.json").exists() || (out.exists() && !out.is_dir()) {
-        let message = format!("{} holds other results: take another folder by --out", out.display());
+        let message =
+            format!("{} holds other results: take another folder by --out", out.display());
         return Err(Single::experiment(message).into());
     }
     let _folder = Folder::take(&out)?;
     let all = parts(study);
     let file = |part: &Part| {
         let id = study.runs[part.run].id.get_ref();
-        out.join("runs").join(id).join(format!("{:04}-{:04}.json", part.range.start, part.range.end))
+        out.join("runs")
+            .join(id)
+            .join(format!("{:04}-{:04}.json", part.range.start, part.range.end))
     };
     let mut done: BTreeMap<(usize, u32), Outcome> = BTreeMap::new();
     if !options.fresh {
@@ -126,12 +133,16 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
             }
         }
     }
-    let missing: Vec<Part> =
-        all.iter().filter(|part| !done.contains_key(&(part.run, part.range.start))).cloned().collect();
+    let missing: Vec<Part> = all
+        .iter()
+        .filter(|part| !done.contains_key(&(part.run, part.range.start)))
+        .cloned()
+        .collect();
     let progress = Parts::new(&study.title, all.len() as u64, done.len() as u64, options.quiet);
 
     if !missing.is_empty() {
-        // An earlier report is none of what comes now, should that be ended.
+        // An earlier report is removed, because it would not fit the new results if the work is
+        // ended early.
         for path in [out.join("report.html"), out.join("results.json")] {
             if path.exists() {
                 fs::remove_file(&path).map_err(Single::file(&path))?;
@@ -140,8 +151,14 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
     }
 
     let interrupt = &options.interrupt;
-    let work =
-        Work { study, preparations: &preparations, keys: &keys, file: &file, progress: &progress, interrupt };
+    let work = Work {
+        study,
+        preparations: &preparations,
+        keys: &keys,
+        file: &file,
+        progress: &progress,
+        interrupt,
+    };
     let is_timed = |part: &Part| study.runs[part.run].timed && part.range.start == 0;
     let (timed, others): (Vec<Part>, Vec<Part>) = missing.iter().cloned().partition(is_timed);
     let threads = match options.jobs {
@@ -149,7 +166,7 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
         jobs => jobs,
     };
     let computed = (timed.len() + others.len(), done.len());
-    // What is timed has the machine for itself.
+    // Timed parts have the machine for themselves.
     for (parts, threads) in [(timed, 1), (others, threads)] {
         done.extend(work.run(parts, threads)?);
         if let Some(request) = interrupt.asked() {
@@ -177,12 +194,14 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
     })
 }
 
-/// Says which runs lose the attitude, and which vary a parameter without any effect, as the seed of a disturbance that is constant.
+/// Describes the runs that lose the attitude, and the runs that vary a parameter without any
+/// effect, for example the seed of a constant disturbance.
 fn notes(results: &Results) -> Vec<String> {
     let mut notes = Vec::new();
     for (run, result) in results.study.runs.iter().zip(&results.runs) {
         let (id, all) = (run.id.get_ref(), result.members.len());
-        let lost: Vec<f64> = result.members.iter().filter_map(|member| member.metrics.lost_at).collect();
+        let lost: Vec<f64> =
+            result.members.iter().filter_map(|member| member.metrics.lost_at).collect();
         if let Some(first) = lost.iter().copied().reduce(f64::min) {
             let time = rounded(first);
             let what = run.observe.loss.as_ref().map_or("run", |loss| &loss.what);
@@ -202,14 +221,14 @@ fn notes(results: &Results) -> Vec<String> {
     notes
 }
 
-/// Name of a study: of its folder.
+/// Returns the name of a study, which is that of its folder.
 fn name(study: &Study) -> String {
     let path = &study.source.path;
     let folder = path.parent().and_then(Path::file_name);
     folder.or(path.file_stem()).map_or("study".into(), |name| name.to_string_lossy().into_owned())
 }
 
-/// Everything that can be checked before anything is run.
+/// Checks everything that can be checked before anything is run.
 fn check(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Result<(), Error> {
     let fault = |message: String| study.source.error(&(0..0), message);
     claims::check(study).map_err(fault)?;
@@ -220,18 +239,22 @@ fn check(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Re
     }
     for overview in &study.overviews {
         for column in &overview.metrics {
-            // It is enough if one run has it; the others show nothing.
+            // One run with this metric is enough; the other rows stay empty.
             let mut tried = overview
                 .runs
                 .iter()
                 .map(|run| resolve(study, &format!("{}.{}", run.get_ref(), column.of)).map(drop))
                 .collect::<Vec<_>>();
-            if let Some(Err(message)) = tried.iter().all(Result::is_err).then(|| tried.pop()).flatten() {
+            if let Some(Err(message)) =
+                tried.iter().all(Result::is_err).then(|| tried.pop()).flatten()
+            {
                 return Err(fault(message).into());
             }
         }
     }
-    for across in study.figures.iter().flat_map(|f| &f.panels).filter_map(|panel| panel.across.as_ref()) {
+    for across in
+        study.figures.iter().flat_map(|f| &f.panels).filter_map(|panel| panel.across.as_ref())
+    {
         for run in across.lines.iter().flat_map(|line| &line.runs) {
             for axis in [&across.x, &across.y] {
                 resolve(study, &format!("{}.{}", run.get_ref(), axis.of)).map_err(fault)?;
@@ -241,7 +264,7 @@ fn check(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Re
     preparations.iter().try_for_each(|preparation| preparation.check(opened))
 }
 
-/// The parts of all runs, in order. Where a run is timed, its first member is a part of its own.
+/// Returns the parts of all runs, in order. The first member of a timed run is a part of its own.
 fn parts(study: &Study) -> Vec<Part> {
     let mut parts = Vec::new();
     for (run, description) in study.runs.iter().enumerate() {
@@ -257,11 +280,16 @@ fn parts(study: &Study) -> Vec<Part> {
     parts
 }
 
-/// For each run, a hash of all that its parts depend on: the experiment, what the study changes in it and wants of it, the
-/// FMUs, and this program.
-fn keys(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Result<Vec<String>, Error> {
-    let digest =
-        |path: &Path| fs::read(path).map(|bytes| hex(&Sha256::digest(bytes))).map_err(Single::file(path));
+/// Returns a hash for each run of everything that its parts depend on: the experiment, the changes
+/// that the study makes to it, the signals that the study needs, the FMUs, and this program.
+fn keys(
+    study: &Study,
+    preparations: &[Preparation],
+    opened: &mut Opened,
+) -> Result<Vec<String>, Error> {
+    let digest = |path: &Path| {
+        fs::read(path).map(|bytes| hex(&Sha256::digest(bytes))).map_err(Single::file(path))
+    };
     let executable = std::env::current_exe().map_err(Single::file("the path of this program"))?;
     let program = digest(&executable)?;
     let mut archives: BTreeMap<PathBuf, String> = BTreeMap::new();
@@ -305,7 +333,7 @@ fn keys(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Res
     Ok(keys)
 }
 
-/// Parts being worked on by several threads.
+/// Parts of a study's work, shared by several threads.
 struct Work<'a> {
     study: &'a Study,
     preparations: &'a [Preparation<'a>],
@@ -315,10 +343,10 @@ struct Work<'a> {
     interrupt: &'a Interrupt,
 }
 
-/// Outcomes by run and first member.
+/// Outcomes of parts, by the position of the run and the number of the part's first member.
 type Done = BTreeMap<(usize, u32), Outcome>;
 
-/// A panic of another thread leaves a queue that is as good as before.
+/// Locks a mutex. A panic of another thread does not harm the data behind it.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -331,7 +359,8 @@ impl Work<'_> {
         std::thread::scope(|scope| {
             for _ in 0..threads.max(1) {
                 scope.spawn(|| {
-                    // Units stay in the thread that opened their archive.
+                    // An archive is opened by each thread for itself, because its units stay in
+                    // that thread.
                     let mut opened = Opened::default();
                     loop {
                         let Some(part) = lock(&queue).pop_front() else { break };
@@ -367,7 +396,8 @@ impl Work<'_> {
             })?;
         let path = (self.file)(part);
         let fault = |error: serde_json::Error| Single::file(&path)(error.into());
-        let kept = Kept::new(self.keys[part.run].clone(), part.range.clone(), outcome).map_err(fault)?;
+        let kept =
+            Kept::new(self.keys[part.run].clone(), part.range.clone(), outcome).map_err(fault)?;
         let text = serde_json::to_vec(&kept).map_err(fault)?;
         write_whole(&path, &text)?;
         self.progress.finished(&run.label);

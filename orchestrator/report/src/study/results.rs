@@ -1,4 +1,4 @@
-//! Results of a study's runs, and the references `run.metric` to them.
+//! Results of a study's runs, and the references of the form `run.metric` to them.
 
 use super::definition::Study;
 use super::part::{Member, Outcome, Series, Spread};
@@ -17,14 +17,14 @@ pub struct RunResult {
     pub members: Vec<Member>,
     /// Signals of the first member.
     pub series: Series,
-    /// Parameters of the components in the first member.
+    /// Parameters of all components in the first member.
     pub parameters: Parameters,
-    /// Bands over all members.
+    /// Bands of signals over all members, one for each signal that is drawn as a band.
     pub spread: BTreeMap<Signal, Spread>,
 }
 
 impl RunResult {
-    /// Adds the next part.
+    /// Adds the results of the next part.
     pub fn push(&mut self, part: Outcome) {
         self.members.extend(part.members);
         if let Some(series) = part.series {
@@ -42,41 +42,48 @@ impl RunResult {
     }
 }
 
-/// A number that every member of a run has.
+/// A metric, which is a number for each member of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Metric {
-    /// A metric by its name in `metrics.json`, 1 or 0 for yes or no.
+    /// A metric by its name in `metrics.json`, with 1 or 0 for yes or no.
     Merit {
-        /// Its name.
+        /// Name of the metric in `metrics.json`.
         name: String,
-        /// Whether it is a computing time.
+        /// Whether the metric is a computing time.
         timing: bool,
     },
-    /// Mean time spent in a component per step, µs: `step_us.COMPONENT`.
+    /// Mean time spent in a component per step, µs, written as `step_us.COMPONENT`.
     StepTime(String),
-    /// Parameters of a component, in SI units: `parameter.COMPONENT.NAME`; a final `*` stands for all that fit.
+    /// Parameters of a component, in SI units, written as `parameter.COMPONENT.NAME`; a `*` at the
+    /// end stands for several parameters.
     Parameter(String, String),
-    /// Share of samples within a bound: `within.ID.share`.
+    /// Share of samples within a bound, written as `within.ID.share`.
     Share(String),
-    /// Largest magnitude of a signal: `within.ID.largest`.
+    /// Largest magnitude of a signal, written as `within.ID.largest`.
     Largest(String),
-    /// Largest magnitude as a multiple of the bound: `within.ID.ratio`.
+    /// Largest magnitude as a multiple of the bound, written as `within.ID.ratio`.
     Ratio(String),
-    /// A number that the study defines: `measure.ID`.
+    /// A number that the study defines, written as `measure.ID`.
     Measure(String),
 }
 
 impl Metric {
-    /// Reads the name of a metric of a run.
+    /// Parses the name of a metric of a run.
     ///
     /// # Errors
-    /// If there is no such metric.
+    /// Returns an error if there is no such metric.
     pub(super) fn parse(text: &str, run: &Run) -> Result<Self, String> {
-        if let Some((id, what)) = text.strip_prefix("within.").and_then(|rest| rest.rsplit_once('.')) {
-            let ids: Vec<&str> = run.within.iter().map(|within| within.get_ref().as_str()).collect();
+        if let Some((id, what)) =
+            text.strip_prefix("within.").and_then(|rest| rest.rsplit_once('.'))
+        {
+            let ids: Vec<&str> =
+                run.within.iter().map(|within| within.get_ref().as_str()).collect();
             if !ids.contains(&id) {
                 let hint = names::hint(id, ids.iter().copied());
-                return Err(format!("the run \"{}\" has no within \"{id}\"{hint}", run.id.get_ref()));
+                return Err(format!(
+                    "the run \"{}\" has no within \"{id}\"{hint}",
+                    run.id.get_ref()
+                ));
             }
             return match what {
                 "share" => Ok(Self::Share(id.into())),
@@ -86,7 +93,8 @@ impl Metric {
             };
         }
         if let Some(id) = text.strip_prefix("measure.") {
-            let ids: Vec<&str> = run.measures.iter().map(|measure| measure.get_ref().as_str()).collect();
+            let ids: Vec<&str> =
+                run.measures.iter().map(|measure| measure.get_ref().as_str()).collect();
             if ids.contains(&id) {
                 return Ok(Self::Measure(id.into()));
             }
@@ -114,7 +122,8 @@ impl Metric {
         Err(format!("there is no metric \"{text}\"{}", names::hint(text, known.iter().copied())))
     }
 
-    /// Whether it is a duration, which differs from run to run and is measured with the first member only.
+    /// Returns whether the metric is a computing time, which differs from run to run and is taken
+    /// from the first member only.
     fn is_time(&self) -> bool {
         match self {
             Self::Merit { timing, .. } => *timing,
@@ -138,28 +147,30 @@ impl Metric {
     }
 }
 
-/// A number of each member of a run, or a single one.
+/// Numbers of the members of a run, or a single number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Numbers(pub Vec<f64>);
 
 impl Numbers {
-    /// Arithmetic mean; not a number if there is none.
+    /// Returns the arithmetic mean, which is not a number if there are no numbers.
     pub fn mean(&self) -> f64 {
         self.0.iter().sum::<f64>() / self.0.len() as f64
     }
 
-    /// The smallest and the largest of the numbers.
+    /// Returns the smallest and the largest of the numbers.
     pub fn extent(&self) -> (f64, f64) {
-        self.0.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+        self.0
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
     }
 
-    /// Whether there are several numbers that differ.
+    /// Returns whether there are several numbers that differ.
     pub fn vary(&self) -> bool {
         self.0.iter().any(|value| *value != self.0[0])
     }
 }
 
-/// The results of all runs, in the order of the study.
+/// Results of all runs, in the order of the study.
 pub struct Results<'a> {
     /// The study that was run.
     pub study: &'a Study,
@@ -170,9 +181,10 @@ pub struct Results<'a> {
 /// Finds the run and the metric that `run.metric` refers to.
 ///
 /// # Errors
-/// An error that names the missing run or metric.
+/// Returns an error that names the missing run or metric.
 pub(super) fn resolve(study: &Study, reference: &str) -> Result<(usize, Metric), String> {
-    let (id, metric) = names::split(reference).ok_or_else(|| format!("\"{reference}\" is no run.metric"))?;
+    let (id, metric) =
+        names::split(reference).ok_or_else(|| format!("\"{reference}\" is no run.metric"))?;
     let place = study.runs.iter().position(|run| run.id.get_ref() == id).ok_or_else(|| {
         let hint = names::hint(id, study.runs.iter().map(|run| run.id.get_ref().as_str()));
         format!("\"{reference}\": there is no run \"{id}\"{hint}")
@@ -180,7 +192,7 @@ pub(super) fn resolve(study: &Study, reference: &str) -> Result<(usize, Metric),
     Ok((place, Metric::parse(metric, &study.runs[place])?))
 }
 
-/// Whether a quantity refers to `run.metric` rather than to a value.
+/// Returns whether a quantity refers to `run.metric` rather than to a value.
 pub(super) fn is_reference(study: &Study, quantity: &Quantity) -> bool {
     match quantity {
         Quantity::Number(_) => false,
@@ -192,34 +204,40 @@ pub(super) fn is_reference(study: &Study, quantity: &Quantity) -> bool {
 }
 
 impl Results<'_> {
-    /// Results of the run with this id.
+    /// Returns the results of the run with this id.
     pub fn run(&self, id: &str) -> Option<&RunResult> {
         self.study.runs.iter().position(|run| run.id.get_ref() == id).map(|place| &self.runs[place])
     }
 
-    /// The numbers that `run.metric` refers to; empty if the run has no such quantity.
+    /// Returns the numbers that `run.metric` refers to. There are none if the run has no such
+    /// quantity.
     ///
     /// # Errors
-    /// If there is no such run or metric.
+    /// Returns an error if there is no such run or metric.
     pub fn numbers(&self, reference: &str) -> Result<Numbers, String> {
         Ok(Numbers(self.of_members(reference)?.into_iter().flatten().collect()))
     }
 
-    /// The number of each member that `run.metric` refers to; none where a member has no such quantity, such as a settling
-    /// time where the motion did not settle.
+    /// Returns the number of each member that `run.metric` refers to. It is `None` if a member has
+    /// no such quantity, for example a settling time if the motion did not settle.
     ///
     /// # Errors
-    /// If there is no such run or metric.
+    /// Returns an error if there is no such run or metric.
     pub fn of_members(&self, reference: &str) -> Result<Vec<Option<f64>>, String> {
         let (place, metric) = resolve(self.study, reference)?;
         let RunResult { members, parameters, .. } = &self.runs[place];
         if let Metric::Parameter(component, pattern) = &metric {
             let own = parameters.get(component).into_iter().flatten();
             let fitting = own.filter(|(name, _)| names::matches(pattern, name));
-            let numbers: Vec<_> = fitting.filter_map(|(_, value)| value.as_f64()).map(Some).collect();
-            let there = parameters.get(component).into_iter().flatten().map(|(name, _)| name.as_str());
+            let numbers: Vec<_> =
+                fitting.filter_map(|(_, value)| value.as_f64()).map(Some).collect();
+            let there =
+                parameters.get(component).into_iter().flatten().map(|(name, _)| name.as_str());
             return if numbers.is_empty() {
-                Err(format!("\"{reference}\": there is no such parameter{}", names::hint(pattern, there)))
+                Err(format!(
+                    "\"{reference}\": there is no such parameter{}",
+                    names::hint(pattern, there)
+                ))
             } else {
                 Ok(numbers)
             };
@@ -228,10 +246,11 @@ impl Results<'_> {
         Ok(counted.iter().map(|member| metric.of(member)).collect())
     }
 
-    /// The number of each member that a reference stands for, or the one of a value.
+    /// Returns the number of each member that a reference stands for, or the single number of a
+    /// value.
     ///
     /// # Errors
-    /// If the quantity refers to something that does not exist.
+    /// Returns an error if the quantity refers to something that does not exist.
     pub fn quantity(&self, quantity: &Quantity) -> Result<Vec<Option<f64>>, String> {
         match quantity {
             Quantity::Named(name) if is_reference(self.study, quantity) => self.of_members(name),

@@ -1,4 +1,4 @@
-//! What a study says about its scenario and its runs.
+//! The part of a study that describes its scenario and its runs.
 
 use super::values::Quantity;
 use crate::figure::Color;
@@ -9,104 +9,106 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::{Spanned, Value};
 
-/// One line of the scenario.
+/// A line of the table that describes the scenario.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fact {
-    /// What it is.
+    /// Label of this scenario line, which names the quantity.
     pub what: String,
-    /// Its value, with unit.
+    /// Value of the quantity, with its unit.
     pub value: String,
-    /// Where it comes from.
+    /// Source of the value, such as a page of the paper.
     #[serde(default)]
     pub source: String,
 }
 
-/// A gap in the paper, and what fills it here.
+/// A gap in the paper, and the assumption that fills it here.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Assumption {
-    /// What the paper does not say.
+    /// Question that the paper leaves open.
     pub silent: String,
-    /// What is taken instead.
+    /// Assumption that is made in its place.
     pub taken: String,
 }
 
-/// An experiment that is run, once or for several values of a parameter.
+/// An experiment that is run once, or for several values of a parameter.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Run {
-    /// Short name.
+    /// Id by which the run is referred to.
     #[schemars(with = "String")]
     pub id: Spanned<String>,
-    /// Name in legends and tables.
+    /// Name of the run in legends and tables.
     pub label: String,
-    /// Colour of its curves.
+    /// Colour of the run's curves.
     pub color: Color,
-    /// Heading of its rows in an overview; none if it is empty.
+    /// Heading of the run's rows in an overview. Without it there is no heading.
     #[serde(default)]
     pub group: String,
-    /// Experiment file, beside the study.
+    /// Path of the experiment file, relative to the study.
     pub experiment: PathBuf,
-    /// Components that are other FMUs than in the experiment.
+    /// FMUs that replace those of the experiment, by component.
     #[serde(default)]
     pub fmu: BTreeMap<String, String>,
-    /// Parameters that differ from the experiment's.
+    /// Parameters that differ from those of the experiment, with their values.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, cosim::experiment::Scalar>")]
     pub set: BTreeMap<String, Value>,
-    /// Parameters of the experiment that are left at the FMU's own value.
+    /// Parameters that the experiment sets, but that are left at the FMU's own value.
     #[serde(default)]
     pub unset: Vec<String>,
-    /// A parameter that takes several values.
+    /// Parameter that takes several values, with these values.
     pub vary: Option<Vary>,
-    /// Whether its first run has the machine for itself.
+    /// Whether the first of the runs has the machine for itself, so that its computing times are
+    /// meaningful.
     #[serde(default)]
     pub timed: bool,
-    /// Bounds that it is held against, by id.
+    /// Ids of the bounds that the run is compared with.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub within: Vec<Spanned<String>>,
-    /// Further numbers that are taken of it, by id.
+    /// Ids of the measures that are computed for the run.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub measures: Vec<Spanned<String>>,
-    /// What its experiment asks for; no key of a study file.
+    /// What the experiment of the run asks for. This is no key of a study file.
     #[serde(skip)]
     pub observe: Observe,
 }
 
-/// Values `first`, `first` + 1, … of a parameter.
+/// A parameter and the values `first`, `first` + 1, … that it takes.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Vary {
-    /// `component.parameter`, or several of them that take the same values.
+    /// Name of the parameter, `component.parameter`, or names of several parameters that take the
+    /// same values.
     pub parameter: Parameters,
-    /// The first value.
+    /// First value that the parameter takes.
     pub first: i32,
-    /// How many.
+    /// Number of values that the parameter takes.
     pub count: u32,
 }
 
 impl Vary {
-    /// How many values there are of at most so many, of which one is the least.
+    /// Returns the number of values if there may be at most this many, of which one always remains.
     pub(super) fn limited(&self, members: Option<u32>) -> u32 {
         members.map_or(self.count, |limit| self.count.min(limit.max(1)))
     }
 }
 
-/// One parameter or several.
+/// Name of one parameter, or names of several parameters.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(untagged)]
 pub enum Parameters {
-    /// One.
+    /// A single parameter is named.
     One(String),
-    /// Several.
+    /// Several parameters are named in a list.
     Several(Vec<String>),
 }
 
 impl Parameters {
-    /// All of them.
+    /// Returns the names of all parameters.
     pub fn all(&self) -> &[String] {
         match self {
             Self::One(parameter) => std::slice::from_ref(parameter),
@@ -119,11 +121,11 @@ impl Parameters {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Within {
-    /// Short name.
+    /// Id by which the bound is referred to.
     pub id: String,
-    /// A list of signals: all of them must be within the bound for a sample to count.
+    /// Name of a list of signals. A sample counts if all of them are within the bound.
     #[schemars(with = "String")]
     pub signals: Spanned<String>,
-    /// The bound.
+    /// Largest magnitude that counts as within the bound, in the unit of the signals.
     pub bound: Quantity,
 }

@@ -1,4 +1,4 @@
-//! What a study says once and uses often.
+//! Templates and lists, with which a study describes a repeated table only once.
 //!
 //! ```toml
 //! [lists]
@@ -12,10 +12,13 @@
 //! panel = [{ use = "error", each = "axes", x_range = [0.0, 5.0] }]    # two panels
 //! ```
 //!
-//! A table in a list may have `use`, the name of a template or several, and `each`, a list or the name of one. It then stands for one
-//! table for each row of the list and each template, in this order: the template, over which goes what the table says itself, with
-//! the row's values in the place of their names in braces. A text that is nothing but such a name becomes the value as it is, number
-//! or list. A template may use others; a row's values hold in all that is used and listed inside.
+//! A table in a list may have the keys `use`, which names one template or several, and `each`,
+//! which is a list of rows or the name of one. It then stands for several tables: one for each
+//! template and each row, with all templates of the first row first. Each of these is the template,
+//! in which the keys of the table itself take precedence. The names in braces are replaced by the
+//! row's values; a text that is only such a name becomes the value itself, be it a number or a
+//! list. A template may use other templates, and the values of a row apply in everything that is
+//! used and listed inside.
 
 use cosim::document::{overlay, texts};
 use fmu_import::names;
@@ -24,22 +27,24 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
-/// A place, and what is wrong there.
+/// The place of a fault, and a message that describes it.
 pub(super) type Fault = (Range<usize>, String);
 
-/// Templates may use each other so many deep; more must be a circle.
+/// Largest depth to which templates may use each other. A greater depth must be a circle.
 const DEPTH: usize = 8;
 
-/// Puts what is meant in the place of all that uses a template or stands for each row of a list.
+/// Replaces each table that uses a template, or that stands for the rows of a list, by the tables
+/// that it stands for.
 ///
 /// # Errors
-/// Names a template, a list or a value that is not there.
+/// Returns an error that names the template, the list or the value that does not exist.
 pub(super) fn expand(study: &mut DeTable) -> Result<(), Fault> {
-    let mut shared = |key: &str| match study.remove(key).map(|value| (value.span(), value.into_inner())) {
-        None => Ok(DeTable::new()),
-        Some((_, DeValue::Table(table))) => Ok(table),
-        Some((span, _)) => Err((span, format!("{key}: wants a table"))),
-    };
+    let mut shared =
+        |key: &str| match study.remove(key).map(|value| (value.span(), value.into_inner())) {
+            None => Ok(DeTable::new()),
+            Some((_, DeValue::Table(table))) => Ok(table),
+            Some((span, _)) => Err((span, format!("{key}: wants a table"))),
+        };
     let shared = Shared { templates: shared("templates")?, lists: shared("lists")? };
     for (_, value) in study {
         shared.inside(value, &DeTable::new(), 0)?;
@@ -52,10 +57,10 @@ pub(super) fn expand(study: &mut DeTable) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Puts other texts in the place of those of which `change` makes something.
+/// Replaces each text for which `change` returns another one.
 ///
 /// # Errors
-/// What `change` says, with its place.
+/// Returns the error of `change`, with the place of the text.
 pub(super) fn rewrite(
     value: &mut Spanned<DeValue>,
     change: &impl Fn(&str) -> Result<Option<String>, String>,
@@ -80,8 +85,13 @@ struct Shared<'i> {
 }
 
 impl<'i> Shared<'i> {
-    /// Expands the lists inside a value; `row` are the values that hold there.
-    fn inside(&self, value: &mut Spanned<DeValue<'i>>, row: &DeTable<'i>, depth: usize) -> Result<(), Fault> {
+    /// Expands the lists inside a value. The values of `row` apply there.
+    fn inside(
+        &self,
+        value: &mut Spanned<DeValue<'i>>,
+        row: &DeTable<'i>,
+        depth: usize,
+    ) -> Result<(), Fault> {
         match value.get_mut() {
             DeValue::Table(table) => {
                 table.iter_mut().try_for_each(|(_, value)| self.inside(value, row, depth))
@@ -98,7 +108,7 @@ impl<'i> Shared<'i> {
         }
     }
 
-    /// Adds what an item of a list stands for to `all`.
+    /// Adds the tables that an item of a list stands for to `all`.
     fn item(
         &self,
         mut item: Spanned<DeValue<'i>>,
@@ -134,7 +144,8 @@ impl<'i> Shared<'i> {
                 let mut template = find(&self.templates, "template", name, place)?.clone();
                 substitute(&mut template, &row);
                 let mut copy = own.clone();
-                if let (DeValue::Table(copy), DeValue::Table(template)) = (copy.get_mut(), template.get_ref())
+                if let (DeValue::Table(copy), DeValue::Table(template)) =
+                    (copy.get_mut(), template.get_ref())
                 {
                     overlay(copy, template);
                 }
@@ -144,7 +155,8 @@ impl<'i> Shared<'i> {
         Ok(())
     }
 
-    /// The rows of a list that is named or written out; without one a single row without values.
+    /// Returns the rows of a list that is named or written out. Without a list there is a single
+    /// row without values.
     fn rows(&self, each: Option<&Spanned<DeValue<'i>>>) -> Result<Vec<DeTable<'i>>, Fault> {
         let Some(each) = each else { return Ok(vec![DeTable::new()]) };
         let list = match each.get_ref() {
@@ -170,20 +182,24 @@ fn find<'a, 'i>(
 ) -> Result<&'a Spanned<DeValue<'i>>, Fault> {
     table.get(name).ok_or_else(|| {
         let known: Vec<&str> = table.keys().map(|key| key.get_ref().as_ref()).collect();
-        (place, format!("there is no {what} \"{name}\"{}", names::hint(name, known.iter().copied())))
+        (
+            place,
+            format!("there is no {what} \"{name}\"{}", names::hint(name, known.iter().copied())),
+        )
     })
 }
 
-/// The names in braces in a text, each with its place.
+/// Returns the names in braces in a text, each with its place.
 fn variables(text: &str) -> impl Iterator<Item = (&str, Range<usize>)> {
     text.match_indices('{').filter_map(|(start, _)| {
         let (name, _) = text[start + 1..].split_once('}')?;
-        let is_name = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+        let is_name =
+            !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
         is_name.then_some((name, start..start + name.len() + 2))
     })
 }
 
-/// Puts the row's values in the place of their names.
+/// Replaces the names in braces by the row's values.
 fn substitute<'i>(value: &mut Spanned<DeValue<'i>>, row: &DeTable<'i>) {
     match value.get_mut() {
         DeValue::String(text) => {

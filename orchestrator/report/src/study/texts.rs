@@ -1,8 +1,8 @@
-//! Numbers as a page shows them.
+//! Formats numbers for a page.
 
 use super::results::Numbers;
 
-/// A number in as many digits as papers print.
+/// Formats a number with as many digits as papers print.
 pub(super) fn shown(value: f64) -> String {
     let magnitude = value.abs();
     if value == 0.0 {
@@ -12,11 +12,17 @@ pub(super) fn shown(value: f64) -> String {
     } else if !(1e-3..1e5).contains(&magnitude) {
         format!("{value:.3e}")
     } else {
-        // Four places, as the paper's tables; more only to keep three significant digits.
-        let digits = (4 - magnitude.log10().floor() as i32).clamp(0, if magnitude < 0.1 { 6 } else { 4 });
+        // The tables of the papers have four places after the point; small numbers get more, to
+        // keep three significant digits.
+        let digits =
+            (4 - magnitude.log10().floor() as i32).clamp(0, if magnitude < 0.1 { 6 } else { 4 });
         let digits = if magnitude < 0.1 { digits - 2 } else { digits } as usize;
         let text = format!("{value:.digits$}");
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+        if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').into()
+        } else {
+            text
+        }
     }
 }
 
@@ -34,11 +40,11 @@ pub(super) fn several(numbers: &Numbers) -> String {
         return mean;
     }
     let (low, high) = numbers.extent();
-    // Wide tables break a line before the range, not within.
+    // With this space a wide table breaks a line before the range, not within it.
     format!("{mean} [{},\u{a0}{}]", shown(low), shown(high))
 }
 
-/// Fractions as differences in per cent.
+/// Formats fractions as differences in per cent.
 pub(super) fn percent(fractions: &Numbers) -> String {
     let one = |fraction: f64| {
         let percent = 100.0 * fraction;

@@ -1,4 +1,5 @@
-//! Numbers that a study compares with: what a paper prints, and yardsticks that were computed elsewhere.
+//! Values that a study compares with: numbers that a paper prints, and yardsticks that were
+//! computed elsewhere.
 //!
 //! ```toml
 //! [[value]]
@@ -16,34 +17,34 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// How a value came to be known.
+/// Kind of the origin of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ValueKind {
-    /// Printed in a table.
+    /// The value is printed in a table of the paper.
     Table,
-    /// Printed in the text.
+    /// The value is printed in the text of the paper.
     Text,
-    /// Read off a figure.
+    /// The value was read off a figure of the paper.
     Figure,
-    /// Not printed: computed.
+    /// The value is not printed, but was computed.
     Computed,
 }
 
-/// A number with its origin.
+/// A value with its unit and its origin.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
-    /// By which it is referred to.
+    /// Id by which the value is referred to.
     pub id: String,
-    /// The number.
+    /// The value as a number, in its unit.
     pub value: f64,
-    /// Its unit; empty if it has none.
+    /// Unit of the value; empty if it has none.
     #[serde(default)]
     pub unit: String,
-    /// How it came to be known.
+    /// Kind of the value's origin.
     pub kind: ValueKind,
-    /// Where it stands, or what computes it.
+    /// Place in the paper where the value is printed, or the program that computes it.
     pub source: String,
 }
 
@@ -53,51 +54,54 @@ struct File {
     value: Vec<Entry>,
 }
 
-/// A number as it is written, or the id of a value (or, where it says so, `run.metric`).
+/// A number as it is written, or the id of a value. Where a key says so, it may also be
+/// `run.metric`.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Quantity {
-    /// As it is written.
+    /// The number is written directly.
     Number(f64),
-    /// By its name.
+    /// The number is referred to by its name.
     Named(String),
 }
 
-/// All values of a study.
+/// All values of a study, from all of its files.
 #[derive(Clone, Debug, Default)]
 pub struct Values(pub Vec<Entry>);
 
-/// The factor of what is shown in its own unit.
+/// Returns the factor of a number that is shown in its own unit.
 pub(super) fn unscaled() -> f64 {
     1.0
 }
 
 impl Values {
-    /// Adds the values of a file.
+    /// Adds the values of a file to those of the study.
     ///
     /// # Errors
-    /// If it cannot be read, is no such file, or repeats an id.
+    /// Returns an error if the file cannot be read, is not a file of values, or repeats an id.
     pub fn load(&mut self, path: &Path) -> Result<(), Error> {
         let source = Source::load(path)?;
         let File { value } = source.read()?;
         for value in value {
             if self.find(&value.id).is_some() {
-                return Err(source.error(&(0..0), format!("there is another value \"{}\"", value.id)));
+                return Err(
+                    source.error(&(0..0), format!("there is another value \"{}\"", value.id))
+                );
             }
             self.0.push(value);
         }
         Ok(())
     }
 
-    /// The value of this id.
+    /// Returns the value with this id.
     pub fn find(&self, id: &str) -> Option<&Entry> {
         self.0.iter().find(|value| value.id == id)
     }
 
-    /// The number that is meant.
+    /// Returns the number that a quantity stands for.
     ///
     /// # Errors
-    /// Names the id that is not there.
+    /// Returns an error that names the id if there is no such value.
     pub fn number(&self, quantity: &Quantity) -> Result<f64, String> {
         match quantity {
             Quantity::Number(number) => Ok(*number),

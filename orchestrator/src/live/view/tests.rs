@@ -8,13 +8,15 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::buffer::Cell;
 
-/// The picture, line by line without trailing spaces.
+/// Returns the drawn view, line by line without trailing spaces.
 fn picture(state: &State, width: u16, height: u16) -> Vec<String> {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
     terminal.draw(|frame| draw(frame, state)).unwrap();
     let buffer = terminal.backend().buffer();
     let cells = buffer.content().chunks(usize::from(width));
-    cells.map(|row| row.iter().map(Cell::symbol).collect::<String>().trim_end().to_string()).collect()
+    cells
+        .map(|row| row.iter().map(Cell::symbol).collect::<String>().trim_end().to_string())
+        .collect()
 }
 
 fn panel(
@@ -35,7 +37,14 @@ fn panel(
         reference: minus.filter(|_| name == "attitude").map(|minus| signal(minus[axis])),
     };
     let curves = [0, 1, 2].map(curve).into();
-    Panel { name: name.into(), label: name.into(), unit: unit.into(), factor: 1.0, curves, limit: None }
+    Panel {
+        name: name.into(),
+        label: name.into(),
+        unit: unit.into(),
+        factor: 1.0,
+        curves,
+        limit: None,
+    }
 }
 
 fn probed(name: &str, place: usize, unit: &str, items: &[(&str, i32)]) -> Probed {
@@ -77,7 +86,8 @@ fn scene() -> Scene {
 }
 
 fn snapshot(time: f64) -> Snapshot {
-    let mut values: Vec<f64> = [3.0, 1.0, 0.0, 2.0, 0.0, 0.0, 3.0, 4.0, 0.0].map(f64::to_radians).to_vec();
+    let mut values: Vec<f64> =
+        [3.0, 1.0, 0.0, 2.0, 0.0, 0.0, 3.0, 4.0, 0.0].map(f64::to_radians).to_vec();
     values.extend([0.0, 6e4, -8e4, 0.0019, 7.0, 0.0, 1.0, 11.0, 5_f64.to_radians(), 1e5]);
     let miss = Miss {
         component: 1,
@@ -98,7 +108,11 @@ fn a_picture_shows_angles_limits_solver_and_deadlines() {
     state.see_after(&snapshot(10.0), Duration::from_secs(10));
     let picture = picture(&state, 100, 24);
     assert_eq!(picture[0], "CRMPC");
-    assert!(picture[1].starts_with("t = 10.00 s of 50 s, 1.00 of 1 times real time ━"), "{}", picture[1]);
+    assert!(
+        picture[1].starts_with("t = 10.00 s of 50 s, 1.00 of 1 times real time ━"),
+        "{}",
+        picture[1]
+    );
     assert!(picture[2].contains("attitude, deg: alpha beta sigma reference"), "{}", picture[2]);
     assert!(picture[2].contains("error, deg: alpha beta sigma"), "{}", picture[2]);
     let expected = [
@@ -109,9 +123,17 @@ fn a_picture_shows_angles_limits_solver_and_deadlines() {
         "moment          x     0.0000      y    60.0000      z   -80.0000 kN m",
     ];
     assert_eq!(picture[13..18], expected);
-    // ‖(3, 4, 0)‖ of 5 and ‖(0, 60, -80)‖ of 100: both at their limits.
-    assert!(picture[18].starts_with("rate           5.000 of 5.000 deg/s  100.0 % ━"), "{}", picture[18]);
-    assert!(picture[19].starts_with("moment       100.000 of 100.000 kN m   100.0 % ━"), "{}", picture[19]);
+    // Both norms are at their limits: ‖(3, 4, 0)‖ = 5 of 5, and ‖(0, 60, -80)‖ = 100 of 100.
+    assert!(
+        picture[18].starts_with("rate           5.000 of 5.000 deg/s  100.0 % ━"),
+        "{}",
+        picture[18]
+    );
+    assert!(
+        picture[19].starts_with("moment       100.000 of 100.000 kN m   100.0 % ━"),
+        "{}",
+        picture[19]
+    );
     assert_eq!(
         picture[20..],
         [
@@ -121,9 +143,10 @@ fn a_picture_shows_angles_limits_solver_and_deadlines() {
             "q: end the run, keep the results",
         ]
     );
-    // The curves are there: braille dots in both charts.
+    // Braille dots in both charts show that the curves are drawn.
     let dots = |columns: std::ops::Range<usize>| {
-        let rows = picture[3..12].iter().map(|row| row.chars().skip(columns.start).take(columns.len()));
+        let rows =
+            picture[3..12].iter().map(|row| row.chars().skip(columns.start).take(columns.len()));
         rows.flatten().any(|symbol| ('\u{2801}'..='\u{28ff}').contains(&symbol))
     };
     assert!(dots(1..49) && dots(51..99), "{picture:#?}");
@@ -158,7 +181,8 @@ fn the_guarantee_has_a_line_that_turns_red_when_it_is_lost() {
     assert_eq!(told(0.04, [1.0, 1.0, 0.031, 0.012]), (line.into(), false));
     let line = "guarantee  not in force (exceeded); lost at t = 0.12 s (exceeded)";
     assert_eq!(told(3.0 * 0.04, [0.0, 5.0, 0.0, 0.0]), (line.into(), true));
-    let line = "guarantee  in force, margins 1.0 % (moment), 2.0 % (rate); lost at t = 0.12 s (exceeded)";
+    let line =
+        "guarantee  in force, margins 1.0 % (moment), 2.0 % (rate); lost at t = 0.12 s (exceeded)";
     assert_eq!(told(0.16, [1.0, 1.0, 0.02, 0.01]), (line.into(), true));
 }
 

@@ -14,7 +14,9 @@ fn main() {
     for name in &names {
         assert!(known.iter().any(|unit| unit.name() == name), "no unit {name}");
     }
-    for unit in known.iter().filter(|unit| names.is_empty() || names.iter().any(|name| name == unit.name())) {
+    for unit in
+        known.iter().filter(|unit| names.is_empty() || names.iter().any(|name| name == unit.name()))
+    {
         simulate(unit);
         if unit.description.model_exchange {
             integrate(unit);

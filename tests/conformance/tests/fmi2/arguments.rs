@@ -124,9 +124,15 @@ fn null_arguments_are_errors_that_name_them() {
             let component = instance.component;
             if fmu_type == CO_SIMULATION {
                 check(&instance, NULLS_OF_SIMULATION);
-                instance.ok(c!(instance, fmi2SetRealInputDerivatives(component, null(), 0, null(), null())));
+                instance.ok(c!(
+                    instance,
+                    fmi2SetRealInputDerivatives(component, null(), 0, null(), null())
+                ));
                 let none = null_mut();
-                instance.ok(c!(instance, fmi2GetRealOutputDerivatives(component, null(), 0, null(), none)));
+                instance.ok(c!(
+                    instance,
+                    fmi2GetRealOutputDerivatives(component, null(), 0, null(), none)
+                ));
             } else {
                 check(&instance, NULLS_OF_EXCHANGE);
                 instance.ok(c!(instance, fmi2EnterContinuousTimeMode(component)));

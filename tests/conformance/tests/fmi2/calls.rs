@@ -23,7 +23,8 @@ enum State {
 }
 
 use State::{
-    ContinuousTimeMode, Error, EventMode, InitializationMode, Instantiated, StepComplete, Terminated,
+    ContinuousTimeMode, Error, EventMode, InitializationMode, Instantiated, StepComplete,
+    Terminated,
 };
 
 /// States with their letters in the table.
@@ -39,8 +40,11 @@ const STATES: [(State, char); 7] = [
 
 /// Returns the states of an interface.
 fn states(fmu_type: c_int) -> Vec<(State, char)> {
-    let foreign =
-        if fmu_type == MODEL_EXCHANGE { vec![StepComplete] } else { vec![EventMode, ContinuousTimeMode] };
+    let foreign = if fmu_type == MODEL_EXCHANGE {
+        vec![StepComplete]
+    } else {
+        vec![EventMode, ContinuousTimeMode]
+    };
     STATES.into_iter().filter(|(state, _)| !foreign.contains(state)).collect()
 }
 
@@ -173,7 +177,18 @@ fn directional_derivative(i: &Instance) -> Status {
     let (known, unknown): (Vec<_>, Vec<_>) =
         states.iter().take(1).map(|&(state, derivative)| (state as u32, derivative as u32)).unzip();
     let n = known.len();
-    c!(i, fmi2GetDirectionalDerivative(i.component, unknown.as_ptr(), n, known.as_ptr(), n, &1.0, &mut 0.0))
+    c!(
+        i,
+        fmi2GetDirectionalDerivative(
+            i.component,
+            unknown.as_ptr(),
+            n,
+            known.as_ptr(),
+            n,
+            &1.0,
+            &mut 0.0
+        )
+    )
 }
 
 fn with_states(i: &Instance, call: fn(&Instance, *mut f64, usize) -> Status) -> Status {
@@ -210,7 +225,8 @@ fn the_table_has_every_function_that_answers_for_an_instance() {
 }
 
 /// Functions whose arguments come from the instance itself.
-const OWN_ARGUMENTS: [&str; 3] = ["fmi2FreeFMUstate", "fmi2DeSerializeFMUstate", "fmi2SetContinuousStates"];
+const OWN_ARGUMENTS: [&str; 3] =
+    ["fmi2FreeFMUstate", "fmi2DeSerializeFMUstate", "fmi2SetContinuousStates"];
 
 #[test]
 fn without_an_instance_every_call_is_an_error() {
@@ -232,20 +248,25 @@ fn without_an_instance_every_call_is_an_error() {
 }
 
 fn check(fmu_type: c_int) {
-    let units: Vec<_> = units().into_iter().filter(|unit| unit.interfaces().contains(&fmu_type)).collect();
+    let units: Vec<_> =
+        units().into_iter().filter(|unit| unit.interfaces().contains(&fmu_type)).collect();
     for unit in &units {
         for (state, letter) in states(fmu_type) {
             let instance = instance_in(unit, fmu_type, state);
             let (here, before) = (instance.save(), instance.serialize());
             for &(name, call, exchange, simulation, answer) in TABLE {
                 let what = format!("{}: {name} in {state:?}", unit.name());
-                let allowed = if fmu_type == MODEL_EXCHANGE { exchange } else { simulation }.contains(letter);
+                let allowed =
+                    if fmu_type == MODEL_EXCHANGE { exchange } else { simulation }.contains(letter);
                 // This is the one function that not every unit offers.
-                let offered =
-                    name != "fmi2GetDirectionalDerivative" || unit.description.directional_derivatives();
+                let offered = name != "fmi2GetDirectionalDerivative"
+                    || unit.description.directional_derivatives();
                 instance.forget();
                 let status = call(&instance, here);
-                let text = instance.messages().last().map_or(String::new(), |message| message.text.clone());
+                let text = instance
+                    .messages()
+                    .last()
+                    .map_or(String::new(), |message| message.text.clone());
                 if allowed && offered {
                     assert_eq!(status, answer, "{what}: {text}");
                 } else {
@@ -253,7 +274,10 @@ fn check(fmu_type: c_int) {
                     assert!(text.starts_with(name), "{what}: {text}");
                     if offered {
                         let reasons = ["not allowed in state", "not available"];
-                        assert!(reasons.iter().any(|reason| text.contains(reason)), "{what}: {text}");
+                        assert!(
+                            reasons.iter().any(|reason| text.contains(reason)),
+                            "{what}: {text}"
+                        );
                     }
                 }
                 // The instance returns to its state before the call, bit for bit, whatever was
@@ -279,13 +303,18 @@ fn oracle_calls_of_model_exchange_are_allowed_where_the_standard_says() {
 fn after_a_refused_call_a_reset_makes_a_new_unit() {
     for unit in units() {
         for &fmu_type in unit.interfaces() {
-            let drive = if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive };
+            let drive =
+                if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive };
             let expected = drive(&unit.instance(fmu_type).initialized(), 0..3);
             for (state, _) in states(fmu_type) {
                 let instance = instance_in(&unit, fmu_type, state);
                 assert_eq!(c!(instance, fmi2CancelStep(instance.component)), ERROR);
                 instance.ok(c!(instance, fmi2Reset(instance.component)));
-                assert!(drive(&instance.initialized(), 0..3) == expected, "{} from {state:?}", unit.name());
+                assert!(
+                    drive(&instance.initialized(), 0..3) == expected,
+                    "{} from {state:?}",
+                    unit.name()
+                );
             }
         }
     }
@@ -328,7 +357,9 @@ fn settable(variable: &Variable, state: State) -> bool {
 fn set(instance: &Instance, reference: u32) -> (&'static str, Status) {
     let component = instance.component;
     match &instance.unit.description.variables[reference as usize].kind {
-        Kind::Real { start, .. } => ("fmi2SetReal", instance.set_real(reference, start.unwrap_or_default())),
+        Kind::Real { start, .. } => {
+            ("fmi2SetReal", instance.set_real(reference, start.unwrap_or_default()))
+        }
         Kind::Integer { start, .. } | Kind::Enumeration { start, .. } => {
             let value = start.unwrap_or(1);
             ("fmi2SetInteger", c!(instance, fmi2SetInteger(component, &reference, 1, &value)))
@@ -339,7 +370,10 @@ fn set(instance: &Instance, reference: u32) -> (&'static str, Status) {
         }
         Kind::String { start } => {
             let value = CString::new(start.clone().unwrap_or_default()).unwrap();
-            ("fmi2SetString", c!(instance, fmi2SetString(component, &reference, 1, &value.as_ptr())))
+            (
+                "fmi2SetString",
+                c!(instance, fmi2SetString(component, &reference, 1, &value.as_ptr())),
+            )
         }
     }
 }

@@ -25,7 +25,10 @@ fn derivatives_of_continuous_inputs_are_taken_and_no_others() {
                 instance.restore(here);
             };
             if !takes_derivatives(variable) {
-                refused(set(&instance, reference, 1, 0.5), &["fmi2SetRealInputDerivatives", &named]);
+                refused(
+                    set(&instance, reference, 1, 0.5),
+                    &["fmi2SetRealInputDerivatives", &named],
+                );
                 continue;
             }
             for order in 1..=3 {
@@ -51,11 +54,13 @@ fn oracle_inputs_follow_their_derivatives_for_one_step() {
             let name = &unit.description.variables[reference as usize].name;
             let start = instance.real(reference);
             // The derivatives are small and together do not move the value away from zero.
-            let [first, second, third] = [1e-4, 2e-4, -3e-4].map(|value: f64| -value * start.signum());
+            let [first, second, third] =
+                [1e-4, 2e-4, -3e-4].map(|value: f64| -value * start.signum());
             let (references, orders, values) = ([reference; 3], [3, 1, 2], [third, first, second]);
             let (component, list) = (instance.component, references.as_ptr());
             let (orders, values) = (orders.as_ptr(), values.as_ptr());
-            instance.ok(c!(instance, fmi2SetRealInputDerivatives(component, list, 3, orders, values)));
+            instance
+                .ok(c!(instance, fmi2SetRealInputDerivatives(component, list, 3, orders, values)));
             instance.ok(instance.step(0.0, h));
             // By section 4.2.1 the value is u + u' h + u'' h² / 2 + u''' h³ / 6.
             let expected = start + first * h + second * h * h / 2.0 + third * h * h * h / 6.0;
@@ -94,7 +99,8 @@ fn no_unit_offers_derivatives_of_outputs() {
         for reference in unit.references(|variable| variable.causality == Causality::Output) {
             let instance = unit.instance(CO_SIMULATION).initialized();
             let component = instance.component;
-            let status = c!(instance, fmi2GetRealOutputDerivatives(component, &reference, 1, &1, &mut 0.0));
+            let status =
+                c!(instance, fmi2GetRealOutputDerivatives(component, &reference, 1, &1, &mut 0.0));
             instance.refused(
                 status,
                 ERROR,
@@ -109,8 +115,10 @@ fn only_units_with_states_offer_directional_derivatives() {
     for unit in units() {
         let instance = unit.instance(CO_SIMULATION).initialized();
         let (output, input, component) = (unit.results()[0], unit.input(), instance.component);
-        let status =
-            c!(instance, fmi2GetDirectionalDerivative(component, &output, 1, &input, 1, &1.0, &mut 0.0));
+        let status = c!(
+            instance,
+            fmi2GetDirectionalDerivative(component, &output, 1, &input, 1, &1.0, &mut 0.0)
+        );
         if unit.description.directional_derivatives() {
             instance.ok(status);
         } else {

@@ -21,7 +21,12 @@ fn the_guid_picks_the_unit() {
     let units = units();
     assert_eq!(units.len(), 11);
     for unit in &units {
-        assert_eq!(units.iter().filter(|other| other.guid() == unit.guid()).count(), 1, "{}", unit.name());
+        assert_eq!(
+            units.iter().filter(|other| other.guid() == unit.guid()).count(),
+            1,
+            "{}",
+            unit.name()
+        );
         // A saved state tells to which unit it belongs.
         let state = unit.instance(CO_SIMULATION).serialize();
         let guid = unit.guid().to_bytes();

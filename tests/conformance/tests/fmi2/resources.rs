@@ -66,7 +66,11 @@ fn a_file_in_the_resources_is_found_whatever_the_form_of_the_location() {
             let instance = reading(&unit, Some(&uri), "course.csv");
             let status = c!(instance, fmi2ExitInitializationMode(instance.component));
             assert_eq!(status, 0, "{uri}: {:?}", instance.messages());
-            assert_eq!(instance.real(unit.reference("reference.alpha")), 40f64.to_radians(), "{uri}");
+            assert_eq!(
+                instance.real(unit.reference("reference.alpha")),
+                40f64.to_radians(),
+                "{uri}"
+            );
         }
     }
 }
@@ -107,7 +111,11 @@ fn every_unit_takes_every_form_and_refuses_what_it_cannot_read() {
                 }
                 Some(part) => {
                     assert!(instance.component.is_null(), "{uri:?}");
-                    instance.refused(instance.messages()[0].status, ERROR, &["fmi2Instantiate", part]);
+                    instance.refused(
+                        instance.messages()[0].status,
+                        ERROR,
+                        &["fmi2Instantiate", part],
+                    );
                 }
             }
         }

@@ -73,7 +73,8 @@ fn durations(unit: &Unit, fmu_type: i32) -> [f64; 2] {
         all.sort_by(f64::total_cmp);
         all[100]
     };
-    let get = median(&mut || instance.ok(c!(instance, fmi2GetFMUstate(instance.component, &mut last))));
+    let get =
+        median(&mut || instance.ok(c!(instance, fmi2GetFMUstate(instance.component, &mut last))));
     let mut turn = 0;
     let set = median(&mut || {
         turn += 1;
@@ -131,13 +132,17 @@ fn every_truncation_and_every_damaged_byte_is_refused() {
 #[test]
 fn states_of_other_units_and_interfaces_are_refused() {
     let units = units();
-    let kinds = units.iter().flat_map(|unit| unit.interfaces().iter().map(move |&kind| (unit, kind)));
+    let kinds =
+        units.iter().flat_map(|unit| unit.interfaces().iter().map(move |&kind| (unit, kind)));
     let all: Vec<_> = kinds.map(|(unit, kind)| running(unit, kind)).collect();
     for (i, instance) in all.iter().enumerate() {
         let (component, before) = (instance.component, instance.serialize());
         for (_, other) in all.iter().enumerate().filter(|&(j, _)| j != i) {
-            let part =
-                if instance.unit.guid() == other.unit.guid() { "other interface" } else { "with GUID" };
+            let part = if instance.unit.guid() == other.unit.guid() {
+                "other interface"
+            } else {
+                "with GUID"
+            };
             instance.refused(instance.deserialize(&other.serialize()).0, ERROR, &[part]);
             // A handle of another instance is refused too, whatever its unit.
             let mut foreign = other.save();
@@ -159,13 +164,19 @@ fn bytes_fill_the_room_that_was_asked_for_and_no_more() {
         let (state, component, bytes) = (instance.save(), instance.component, instance.serialize());
         let mut room = vec![0xaa_u8; bytes.len() + 16];
         let mut serialize = |size| {
-            let status =
-                c!(instance, fmi2SerializeFMUstate(component, state, room.as_mut_ptr().cast(), size));
+            let status = c!(
+                instance,
+                fmi2SerializeFMUstate(component, state, room.as_mut_ptr().cast(), size)
+            );
             (status, room.clone())
         };
         for size in [0, 1, bytes.len() - 1] {
             let (status, room) = serialize(size);
-            instance.refused(status, ERROR, &["fmi2SerializeFMUstate", &format!("room for {size} bytes")]);
+            instance.refused(
+                status,
+                ERROR,
+                &["fmi2SerializeFMUstate", &format!("room for {size} bytes")],
+            );
             assert!(room.iter().all(|&byte| byte == 0xaa));
         }
         let (status, room) = serialize(bytes.len() + 16);
@@ -177,8 +188,9 @@ fn bytes_fill_the_room_that_was_asked_for_and_no_more() {
 /// CRC-32 as used in zip files.
 fn checksum(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0, |crc, &byte| {
-        (0..8)
-            .fold(crc ^ u32::from(byte), |crc: u32, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
+        (0..8).fold(crc ^ u32::from(byte), |crc: u32, _| {
+            (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg())
+        })
     })
 }
 
@@ -187,7 +199,12 @@ const HEADER: usize = 61;
 
 /// Restores each forgery and, where the unit accepts it, steps on. `doing` holds a description of
 /// the last attempt. Returns the number of forgeries accepted.
-fn survive_forgeries(unit: &Unit, fmu_type: i32, prepare: fn(&Instance), doing: &Mutex<String>) -> usize {
+fn survive_forgeries(
+    unit: &Unit,
+    fmu_type: i32,
+    prepare: fn(&Instance),
+    doing: &Mutex<String>,
+) -> usize {
     let instance = unit.instance(fmu_type);
     prepare(&instance);
     let instance = instance.initialized();
@@ -224,7 +241,8 @@ fn survive_forgeries(unit: &Unit, fmu_type: i32, prepare: fn(&Instance), doing: 
             bytes
         });
         for (kind, mut bytes) in overwritten.chain(flipped).enumerate() {
-            *doing.lock().unwrap() = format!("{}: byte {offset} of {length}, forgery {kind}", unit.name());
+            *doing.lock().unwrap() =
+                format!("{}: byte {offset} of {length}, forgery {kind}", unit.name());
             let sum = checksum(&bytes[HEADER..]).to_le_bytes();
             bytes[HEADER - 4..HEADER].copy_from_slice(&sum);
             let (status, mut state) = instance.deserialize(&bytes);

@@ -63,7 +63,11 @@ fn an_experiment_without_sense_is_refused() {
                 ((Some(f64::INFINITY), 0.0, None), "tolerance inf"),
             ] {
                 let instance = unit.instance(fmu_type);
-                instance.refused(set_up(&instance, experiment), ERROR, &["fmi2SetupExperiment", part]);
+                instance.refused(
+                    set_up(&instance, experiment),
+                    ERROR,
+                    &["fmi2SetupExperiment", part],
+                );
                 instance.ok(c!(instance, fmi2Reset(instance.component)));
                 instance.ok(set_up(&instance, (None, 0.0, Some(0.0))));
             }
@@ -83,7 +87,11 @@ fn an_experiment_may_start_at_any_time_that_ticks_can_be_told_apart_at() {
             }
             let mut time = f64::NAN;
             instance.ok(c!(instance, fmi2GetRealStatus(instance.component, 2, &mut time)));
-            assert!((time - (start + 3.0 * h)).abs() < 1e-9 * start.abs().max(1.0), "{}", unit.name());
+            assert!(
+                (time - (start + 3.0 * h)).abs() < 1e-9 * start.abs().max(1.0),
+                "{}",
+                unit.name()
+            );
         }
     }
 }
@@ -109,7 +117,11 @@ fn a_last_step_that_is_short_by_rounding_ends_in_the_same_place() {
         for near in [10.0 * h - 9.0 * h, h.next_down(), h.next_up()] {
             for (&a, &b) in after(near).iter().zip(&exact) {
                 let (a, b) = (f64::from_bits(a), f64::from_bits(b));
-                assert!((a - b).abs() <= 1e-9 * a.abs().max(b.abs()).max(1e-9), "{}: {a} {b}", unit.name());
+                assert!(
+                    (a - b).abs() <= 1e-9 * a.abs().max(b.abs()).max(1e-9),
+                    "{}: {a} {b}",
+                    unit.name()
+                );
             }
         }
     }
@@ -169,7 +181,11 @@ fn steps_without_sense_are_refused() {
         ] {
             instance.refused(instance.step(point, size), ERROR, &["fmi2DoStep", part]);
             // The unit is in state error until its state is restored or it is reset.
-            instance.refused(instance.step(now, h), ERROR, &["fmi2DoStep", "not allowed in state error"]);
+            instance.refused(
+                instance.step(now, h),
+                ERROR,
+                &["fmi2DoStep", "not allowed in state error"],
+            );
             instance.restore(here);
             assert!(instance.serialize() == before, "{}: {point} {size}", unit.name());
         }
@@ -243,7 +259,8 @@ fn an_experiment_that_starts_at_unix_time_has_the_same_ticks() {
                 instance.ok(c!(instance, fmi2DoStep(instance.component, time, 0.04, 1)));
                 time += 0.04;
             }
-            instance.ok(c!(instance, fmi2GetInteger(instance.component, &reference, 1, &mut solves)));
+            instance
+                .ok(c!(instance, fmi2GetInteger(instance.component, &reference, 1, &mut solves)));
             assert_eq!(solves, 251, "{name} from {start} s on");
         }
     }
@@ -254,7 +271,10 @@ fn an_experiment_that_starts_at_unix_time_has_the_same_ticks() {
     for start in [1e6, 1.7e9] {
         let found = after_50_seconds(&plant, start, &names);
         for (found, expected) in found.iter().zip(&expected) {
-            assert!((found - expected).abs() < 1e-4 * expected.abs(), "{found} {expected} from {start} s on");
+            assert!(
+                (found - expected).abs() < 1e-4 * expected.abs(),
+                "{found} {expected} from {start} s on"
+            );
         }
     }
 }
@@ -267,7 +287,11 @@ fn a_start_at_which_ticks_cannot_be_told_apart_is_refused() {
             instance.ok(set_up(&instance, (None, start, None)));
             instance.ok(c!(instance, fmi2EnterInitializationMode(instance.component)));
             let status = c!(instance, fmi2ExitInitializationMode(instance.component));
-            instance.refused(status, ERROR, &[&format!("start time = {start} s"), "a period of 0.0"]);
+            instance.refused(
+                status,
+                ERROR,
+                &[&format!("start time = {start} s"), "a period of 0.0"],
+            );
         }
     }
 }

@@ -60,7 +60,9 @@ fn an_instance_may_move_from_thread_to_thread() {
         let moving = Moving(unit.instance(CO_SIMULATION).initialized());
         let mut rows = vec![];
         for tick in 0..TICKS {
-            rows.extend(std::thread::scope(|scope| scope.spawn(|| moving.drive(tick)).join().unwrap()));
+            rows.extend(std::thread::scope(|scope| {
+                scope.spawn(|| moving.drive(tick)).join().unwrap()
+            }));
         }
         assert!(rows == alone, "{}", unit.name());
     }

@@ -21,7 +21,8 @@ fn one_reference_per_call_gives_what_all_in_one_call_give() {
                 let all = instance.bits(&everything);
                 // The first request must update all variables, whichever it is for.
                 instance.restore(here);
-                let forwards: Vec<_> = everything.iter().flat_map(|&one| instance.bits(&[one])).collect();
+                let forwards: Vec<_> =
+                    everything.iter().flat_map(|&one| instance.bits(&[one])).collect();
                 instance.restore(here);
                 let backwards = everything.iter().rev().flat_map(|&one| instance.bits(&[one]));
                 let mut backwards: Vec<_> = backwards.collect();
@@ -84,15 +85,18 @@ fn references_that_do_not_exist_are_named() {
             if unit.description.directional_derivatives() {
                 let (state, derivative) = unit.description.states()[0];
                 for (of, by) in [(wrong, state as u32), (derivative as u32, wrong)] {
-                    let status =
-                        c!(instance, fmi2GetDirectionalDerivative(component, &of, 1, &by, 1, &1.0, &mut 0.0));
+                    let status = c!(
+                        instance,
+                        fmi2GetDirectionalDerivative(component, &of, 1, &by, 1, &1.0, &mut 0.0)
+                    );
                     refused(status, "fmi2GetDirectionalDerivative");
                 }
             }
             // The wrong reference stands behind a right one, which keeps its value.
             let (references, values) = ([unit.input(), wrong], [0.02, 0.02]);
             let before = instance.real(unit.input());
-            let status = c!(instance, fmi2SetReal(component, references.as_ptr(), 2, values.as_ptr()));
+            let status =
+                c!(instance, fmi2SetReal(component, references.as_ptr(), 2, values.as_ptr()));
             assert_eq!(instance.real(unit.input()), before);
             refused(status, "fmi2SetReal");
         }
@@ -141,8 +145,9 @@ fn values_up_to_the_declared_limits_are_taken_and_none_beyond() {
     for unit in units() {
         let instance = unit.instance(CO_SIMULATION);
         let (component, here) = (instance.component, instance.save());
-        let integer =
-            |reference: u32, value: c_int| c!(instance, fmi2SetInteger(component, &reference, 1, &value));
+        let integer = |reference: u32, value: c_int| {
+            c!(instance, fmi2SetInteger(component, &reference, 1, &value))
+        };
         for reference in unit.references(|variable| !variable.is_calculated()) {
             let variable = &unit.description.variables[reference as usize];
             let named = format!("'{}'", variable.name);
@@ -212,13 +217,21 @@ fn what_is_calculated_from_the_largest_inputs_is_a_number_or_an_error() {
                         }
                         let mut found = vec![0.0_f64; results.len()];
                         let (all, n) = (results.as_ptr(), results.len());
-                        let status = c!(instance, fmi2GetReal(component, all, n, found.as_mut_ptr()));
+                        let status =
+                            c!(instance, fmi2GetReal(component, all, n, found.as_mut_ptr()));
                         assert!(status == OK || status == ERROR, "{name}: status {status}");
-                        let wrong = found.iter().zip(&results).find(|(value, _)| !value.is_finite());
-                        let which = wrong.map(|(_, &i)| &unit.description.variables[i as usize].name);
-                        assert!(which.is_none(), "{name}: {which:?} is not finite for {reference} = {value}");
+                        let wrong =
+                            found.iter().zip(&results).find(|(value, _)| !value.is_finite());
+                        let which =
+                            wrong.map(|(_, &i)| &unit.description.variables[i as usize].name);
+                        assert!(
+                            which.is_none(),
+                            "{name}: {which:?} is not finite for {reference} = {value}"
+                        );
                     }
-                    if c!(instance, fmi2DoStep(instance.component, f64::from(tick) * 0.2, 0.2, 1)) != OK {
+                    if c!(instance, fmi2DoStep(instance.component, f64::from(tick) * 0.2, 0.2, 1))
+                        != OK
+                    {
                         break;
                     }
                 }

@@ -20,7 +20,8 @@ fn paced(
     let settings = Settings { factor: "100".parse().unwrap(), on_miss, priority: None };
     let spent: Vec<Rc<Spent>> = every.iter().map(|_| Rc::default()).collect();
     let components = ["controller", "plant"].into_iter().zip(every).zip(&spent);
-    let components = components.map(|((name, every), spent)| (name.to_string(), *every, Rc::clone(spent)));
+    let components =
+        components.map(|((name, every), spent)| (name.to_string(), *every, Rc::clone(spent)));
     let mut pacer = Pacer::new(settings, clock, timer.clone(), Interrupt::default(), components);
     let mut begins = Vec::new();
     let mut outcome = Ok(());
@@ -70,7 +71,8 @@ fn oracle_a_run_that_keeps_up_begins_every_tick_in_time() {
 fn oracle_wake_up_jitter_is_measured_where_there_was_a_wait_and_adds_up_to_nothing() {
     let (_, report, begins) = paced(OnMiss::CatchUp, &[1, 5], 2 * MS, |_, _| 1);
     assert_eq!(begins[10], 102);
-    let [controller, plant] = ["controller", "plant"].map(|name| report.components[name].wake_up_ms.clone());
+    let [controller, plant] =
+        ["controller", "plant"].map(|name| report.components[name].wake_up_ms.clone());
     assert_eq!((controller.count, plant.count), (10, 2));
     near(controller.min, 2.0);
     near(controller.max, 2.0);
@@ -113,14 +115,20 @@ fn oracle_slipping_shifts_the_time_base_and_says_by_how_much() {
     assert_eq!((report.misses, report.lag.slips, report.lag.late_starts), (1, 1, 0));
     near(report.lag.slipped_ms, 16.0);
     near(report.elapsed_s, 0.118);
-    assert_eq!(report.done_about_it().unwrap(), "shifted the time base 1 times, by 16.000 ms in all");
+    assert_eq!(
+        report.done_about_it().unwrap(),
+        "shifted the time base 1 times, by 16.000 ms in all"
+    );
 }
 
 #[test]
 fn oracle_stopping_names_component_time_and_delay() {
     let (outcome, report, begins) = paced(OnMiss::Stop, &[1], Duration::ZERO, one_long_step);
     let message = outcome.unwrap_err().to_string();
-    assert!(message.starts_with("controller missed its deadline at t = 8 s by 15.000 ms"), "{message}");
+    assert!(
+        message.starts_with("controller missed its deadline at t = 8 s by 15.000 ms"),
+        "{message}"
+    );
     assert_eq!((begins.len(), report.misses), (4, 1));
 }
 
@@ -147,7 +155,8 @@ fn oracle_a_slow_component_has_the_time_to_its_own_next_tick_and_is_blamed_for_w
 #[test]
 fn a_request_to_end_cuts_a_wait_short() {
     let timer = Rc::new(Fake::default());
-    let settings = Settings { factor: "1e-300".parse().unwrap(), on_miss: OnMiss::CatchUp, priority: None };
+    let settings =
+        Settings { factor: "1e-300".parse().unwrap(), on_miss: OnMiss::CatchUp, priority: None };
     let interrupt = Interrupt::default();
     let clock = Clock::new(0.0, 10.0, 1.0).unwrap();
     let mut pacer = Pacer::new(settings, clock, timer, interrupt.clone(), std::iter::empty());
