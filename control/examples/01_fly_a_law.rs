@@ -1,4 +1,5 @@
-//! Flies the linear-quadratic regulator through the scenario of Chai et al. (2022) and prints a line per second.
+//! Flies the linear-quadratic regulator through the scenario of Chai et al. (2022) and prints a
+//! line per second.
 //!
 //! ```text
 //! cargo run --release -p reentry-control --example 01_fly_a_law

@@ -1,4 +1,5 @@
-//! Asks the design of CRMPC whether its limits are guaranteed, for two settings, and flies the one for which they are.
+//! Asks the design of CRMPC whether its limits are guaranteed, for two settings, and flies the one
+//! for which they are.
 //!
 //! ```text
 //! cargo run --release -p reentry-control --example 02_the_guarantee
@@ -13,7 +14,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scenario = Scenario::crmpc2022();
     let settings = Settings::new(Constraints::Robust);
 
-    // Errors of the measured rates have to be made up for by moment that the disturbance needs as well.
+    // Errors of the measured rates have to be made up for by moment that the disturbance needs as
+    // well.
     let with_errors = Settings {
         angle_error: 0.25_f64.to_radians(),
         rate_error: 0.25_f64.to_radians(),

@@ -1,5 +1,5 @@
-//! Flies CRMPC with its command acting 0.117 s late, the computing time that Chai et al. (2022) print: once without knowing
-//! of it, and once with the state predicted over the delay.
+//! Flies CRMPC with its command acting 0.117 s late, the computing time that Chai et al. (2022)
+//! print: once without knowing of it, and once with the state predicted over the delay.
 //!
 //! ```text
 //! cargo run --release -p reentry-control --example 03_a_delay

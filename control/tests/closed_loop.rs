@@ -133,7 +133,8 @@ fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_se
     assert!(largest > 0.9, "the freedom is not used: {largest}");
 }
 
-/// Returns the nominal motion at every tick, bit for bit, and the deviation O_e = x − x̃ there, with
+/// Returns the nominal motion at every tick, bit for bit, and the deviation O_e = x − x̃ there,
+/// with
 /// `initialState = nominal`.
 fn around_the_nominal_motion(
     constraints: Constraints,

@@ -82,14 +82,8 @@ const CS: Option<Interface> = Some(Interface::CoSimulation);
 #[rustfmt::skip]
 pub(crate) mod table {
     use super::{CS, Call, ME, call};
-    //                                                                                                   Instantiated
-    //                                                                                                   | iNitialization mode
-    //                                                                                                   | | Event mode
-    //                                                                                                   | | | Continuous-time mode
-    //                                                                                                   | | | | Step complete
-    //                                                                                                   | | | | | step Failed
-    //                                                                                                   | | | | | | Terminated
-    //                                                                                                   INECSFTX  (X: error)
+    // Instantiated | iNitialization mode | | Event mode | | | Continuous-time mode | | | | Step
+    // complete | | | | | step Failed | | | | | | Terminated INECSFTX  (X: error)
     pub(crate) const SET_DEBUG_LOGGING:         Call = call("fmi2SetDebugLogging",                None, "INECSFTX").keeping_state();
     pub(crate) const SETUP_EXPERIMENT:          Call = call("fmi2SetupExperiment",                None, "I-------");
     pub(crate) const ENTER_INITIALIZATION_MODE: Call = call("fmi2EnterInitializationMode",        None, "I-------");

@@ -11,8 +11,9 @@ use guarantee_check::Report;
 use std::process::ExitCode;
 use vehicle::dynamics::Inertia;
 
-/// Checks every bound that the guarantee of CRMPC's robust set rests on, in interval arithmetic. Settings that are not given are the published ones.
-/// The exit code is 0 if all bounds are true, 1 if one is not certain to be, 2 if the settings are refused.
+/// Checks every bound that the guarantee of CRMPC's robust set rests on, in interval arithmetic.
+/// Settings that are not given are the published ones. The exit code is 0 if all bounds are true, 1
+/// if one is not certain to be, 2 if the settings are refused.
 #[derive(Parser)]
 #[command(version, allow_negative_numbers = true)]
 struct Arguments {

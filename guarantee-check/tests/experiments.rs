@@ -31,8 +31,8 @@ fn parameters(file: &Path) -> Table {
     };
     let beside = |base: &Value| file.parent().unwrap().join(base.as_str().unwrap());
     let mut all: Table = bases.iter().flat_map(|base| parameters(&beside(base))).collect();
-    let own =
-        table["components"].get("controller").and_then(|controller| controller.get("parameters"));
+    let controller = table.get("components").and_then(|components| components.get("controller"));
+    let own = controller.and_then(|controller| controller.get("parameters"));
     all.extend(own.and_then(Value::as_table).cloned().unwrap_or_default());
     all
 }

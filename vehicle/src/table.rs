@@ -45,8 +45,8 @@ impl LookupTable {
     /// be corrupt.
     ///
     /// # Errors
-    /// Reports the same errors as [`LookupTable::new`], and second derivatives that are missing or not
-    /// finite.
+    /// Reports the same errors as [`LookupTable::new`], and second derivatives that are missing or
+    /// not finite.
     pub fn check(&self) -> Result<(), Error> {
         check(&self.times, &self.angles)?;
         let finite = self.curvatures.iter().flatten().all(|value| value.is_finite());

@@ -1,9 +1,9 @@
 //! Centralised robust MPC of Chai et al. (2022): an optimisation plans a nominal motion, and a
 //! feedback law keeps the vehicle near it.
 //!
-//! The prediction is made in x̃ = (Θ̃, x̃_ω), where the nominal model (7) under ũ = a − f is an exact
-//! double integrator. The error E = x̃ − x_r is formed afterwards, so that a jump of the reference
-//! is seen in the preview and never enters the dynamics.
+//! The prediction is made in x̃ = (Θ̃, x̃_ω), where the nominal model (7) under ũ = a − f is an
+//! exact double integrator. The error E = x̃ − x_r is formed afterwards, so that a jump of the
+//! reference is seen in the preview and never enters the dynamics.
 
 mod design;
 mod few_stages;
@@ -138,14 +138,11 @@ impl Clone for Memory {
 /// use control::{Controller, Crmpc};
 /// use vehicle::Scenario;
 ///
-/// let scenario = Scenario { duration: 4.0, ..Scenario::crmpc2022() };
-/// let settings = Settings::new(Constraints::Robust);
-/// let mut law = Crmpc::new(settings)?;
-/// let mut memory = law.memory();
-/// fly(&mut law, &mut memory, settings.period_feedback, &scenario, |sample| {
-///     assert_eq!(sample.memory.standing, Standing::InForce, "the limits are guaranteed from the first tick on");
-/// })?;
-/// assert_eq!(memory.report.fallbacks, 0);
+/// let scenario = Scenario { duration: 4.0, ..Scenario::crmpc2022() }; let settings =
+/// Settings::new(Constraints::Robust); let mut law = Crmpc::new(settings)?; let mut memory =
+/// law.memory(); fly(&mut law, &mut memory, settings.period_feedback, &scenario, |sample| {
+/// assert_eq!(sample.memory.standing, Standing::InForce, "the limits are guaranteed from the first
+/// tick on"); })?; assert_eq!(memory.report.fallbacks, 0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Crmpc {

@@ -1,7 +1,7 @@
-//! A control law of one's own as an FMI unit: proportional and derivative action, nonlinear terms cancelled.
+//! A law of one's own as an FMI unit: proportional and derivative, nonlinear terms cancelled.
 
 use control::crmpc::{Constraints, Settings};
-use control::{Controller, DesignError, Measurement, controller::ReferenceAt, linearise::moment};
+use control::{Controller, DesignError, Measurement, controller::ReferenceAt as At};
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::{Table, table::parameter};
 use nalgebra::Vector3;
@@ -25,11 +25,11 @@ impl Default for Pd {
 impl Controller for Pd {
     type Memory = ();
 
-    fn command(&mut self, (): &mut (), _: u64, t: f64, x: &Measurement, at: ReferenceAt) -> Vector3<f64> {
+    fn command(&mut self, (): &mut (), _: u64, t: f64, x: &Measurement, at: At) -> Vector3<f64> {
         let (rates, wanted) = (r(&x.angles) * x.rates, at(t));
         let (error, error_rate) = (x.angles - wanted.angles, rates - wanted.rates);
         let a = wanted.accelerations - error * self.gains.0 - error_rate * self.gains.1;
-        moment(&self.body, &x.angles, &rates, &a)
+        control::linearise::moment(&self.body, &x.angles, &rates, &a)
     }
 }
 
@@ -45,7 +45,7 @@ impl Law for Pd {
 
     fn declare(own: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         own.real(parameter("gain.p", "Gain on the angles").real().min(0.0), |m| &mut m.law.gains.0)
-            .real(parameter("gain.d", "Gain on their rates").real().min(0.0), |m| &mut m.law.gains.1)
+            .real(parameter("gain.d", "Gain on rates").real().min(0.0), |m| &mut m.law.gains.1)
     }
 
     fn settings(&self, vehicle: &Vehicle) -> Self {

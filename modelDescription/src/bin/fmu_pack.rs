@@ -10,8 +10,9 @@ use std::{fs, io};
 
 /// Makes one NAME.fmu of every FMI 2.0 unit in the given libraries.
 ///
-/// Each library, built with fmi2-export, is opened and asked for the descriptions of its units. The same input gives the
-/// same bytes. Exit code 0: done; 1: a library or file is at fault; 2: the command line is.
+/// Each library, built with fmi2-export, is opened and asked for the descriptions of its units. The
+/// same input gives the same bytes. Exit code 0: done; 1: a library or file is at fault; 2: the
+/// command line is.
 #[derive(Parser)]
 #[command(version, name = "fmu-pack")]
 struct Arguments {

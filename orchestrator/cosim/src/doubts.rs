@@ -1,5 +1,5 @@
-//! What is doubtful about an experiment although it can be run: a delay that a law counts on and the
-//! loop does not have, and a seed that changes nothing.
+//! What is doubtful about an experiment although it can be run: a delay that a law counts on and
+//! the loop does not have, and a seed that changes nothing.
 
 use crate::delay;
 use crate::error::Error;

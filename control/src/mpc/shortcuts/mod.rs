@@ -2,9 +2,9 @@
 //! checks what it has left out. If the result satisfies that too, it is the optimum of the whole
 //! problem, so that no way loses accuracy.
 //!
-//! The gains in the files' heads are the times of `cargo bench -p reentry-control --bench optimisation`
-//! (250 samples of 50 s) without and with the shortcut, in the same run. The checks have a shortcut
-//! of their own, `few_stages` of CRMPC.
+//! The gains in the files' heads are the times of `cargo bench -p reentry-control --bench
+//! optimisation` (250 samples of 50 s) without and with the shortcut, in the same run. The checks
+//! have a shortcut of their own, `few_stages` of CRMPC.
 
 mod terminal_ball;
 mod windows;

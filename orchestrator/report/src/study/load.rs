@@ -69,8 +69,8 @@ impl Study {
         Ok(study)
     }
 
-    /// Notes what the experiments ask for. An experiment that cannot be read is reported later, when
-    /// it is to be run.
+    /// Notes what the experiments ask for. An experiment that cannot be read is reported later,
+    /// when it is to be run.
     fn learn_metrics(&mut self) {
         let mut known: BTreeMap<PathBuf, Observe> = BTreeMap::new();
         for run in &mut self.runs {
