@@ -118,6 +118,9 @@ impl<const O: usize> Optimiser<O> {
         let solved = search.window.clone().unwrap_or(0..layout.horizon);
         search.settled = !sample.bounded.depends_on_motion()
             || sample.bounded.violated(motion, solved, own).is_none();
+        if search.settled || search.pass == SETTLING_PASSES {
+            return true;
+        }
         if search.pass == 1 {
             about.clone_from(motion);
         } else {
@@ -125,6 +128,6 @@ impl<const O: usize> Optimiser<O> {
             // motions.
             about.halve_the_way_to(motion);
         }
-        search.settled || search.pass == SETTLING_PASSES
+        false
     }
 }

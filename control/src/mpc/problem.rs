@@ -175,12 +175,24 @@ impl<'a, const O: usize, C> Problem<'a, O, C> {
 }
 
 /// A motion of the tracking error over the horizon.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct Motion<const O: usize> {
     /// States E_0 … E_N at the stages.
     pub states: Vec<State<O>>,
     /// Inputs v_0 … v_{N−1}, each held over one interval.
     pub inputs: Vec<Vector3<f64>>,
+}
+
+impl<const O: usize> Clone for Motion<O> {
+    fn clone(&self) -> Self {
+        Self { states: self.states.clone(), inputs: self.inputs.clone() }
+    }
+
+    // This keeps the allocated memory.
+    fn clone_from(&mut self, source: &Self) {
+        self.states.clone_from(&source.states);
+        self.inputs.clone_from(&source.inputs);
+    }
 }
 
 impl<const O: usize> Motion<O> {
