@@ -231,7 +231,7 @@ fn no_guarantee(error: &DesignError) -> String {
     let mut accepted = Vec::new();
     match disturbance {
         Some(bound) => {
-            accepted.push(format!("`disturbance_bound` = {:.4} deg/s2", down(bound.to_degrees())))
+            accepted.push(format!("`disturbance_bound` = {:.4} deg/s2", down(bound.to_degrees())));
         }
         None => accepted.push("no `disturbance_bound`".into()),
     }

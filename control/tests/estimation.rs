@@ -338,7 +338,7 @@ fn five_seconds_after_any_single_bad_sample_the_attitude_is_known_to_a_degree() 
                     for direction in directions {
                         let bad = direction * (sign * value);
                         let error = error_after(&settings, &good, number, |line| {
-                            line.readings[sensor] = bad
+                            line.readings[sensor] = bad;
                         });
                         assert!(
                             error < 1.0,

@@ -643,8 +643,8 @@ pub unsafe fn fmi2SetContinuousStates(component: Component, x: *const f64, nx: u
 }
 
 pub unsafe fn fmi2GetDerivatives(component: Component, derivatives: *mut f64, nx: usize) -> Status {
-    // SAFETY: the importer vouches for the array, as `room` requires.
     let body = |instance: &mut Instance| {
+        // SAFETY: the importer vouches for the array, as `room` requires.
         instance.derivatives(unsafe { room("derivatives", derivatives, nx) }?)
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.

@@ -336,7 +336,7 @@ pub fn describe<M: Model>() -> ModelDescription {
         if !variable.is_calculated() {
             match (&mut variable.kind, &entry.access) {
                 (Kind::Real { start, .. }, Access::Real(field)) => {
-                    *start = Some(*field(&mut model))
+                    *start = Some(*field(&mut model));
                 }
                 (
                     Kind::Integer { start, .. } | Kind::Enumeration { start, .. },
@@ -345,10 +345,10 @@ pub fn describe<M: Model>() -> ModelDescription {
                     *start = Some((field.get)(&mut model));
                 }
                 (Kind::Boolean { start }, Access::Boolean(field)) => {
-                    *start = Some(*field(&mut model))
+                    *start = Some(*field(&mut model));
                 }
                 (Kind::String { start }, Access::String(field)) => {
-                    *start = Some(field(&mut model).clone())
+                    *start = Some(field(&mut model).clone());
                 }
                 _ => unreachable!(
                     "Table::push is called with a kind and a field of the same type only"

@@ -60,7 +60,7 @@ fn published_data_sheet_values_of_the_mems_set() {
     let data = SensorData::embedded();
     let [gyroscope, accelerometer, magnetometer] = data.mems;
     let near = |found: f64, expected: f64| {
-        assert!((found / expected - 1.0).abs() < 5e-3, "{found} {expected}")
+        assert!((found / expected - 1.0).abs() < 5e-3, "{found} {expected}");
     };
     near(gyroscope.noise.to_degrees(), 0.015 * 73.3f64.sqrt());
     near(1f64.to_radians() / gyroscope.resolution, 131.0);

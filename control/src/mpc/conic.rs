@@ -40,30 +40,13 @@ impl<const O: usize> ConicSolver<O> {
     /// Returns the solver's own message if it refuses the data, for example weights that are not
     /// positive semidefinite.
     pub fn new(layout: Layout<O>, max_iterations: u32) -> Result<Self, String> {
-        let Layout { chain, horizon: n, scale, .. } = &layout;
+        let Layout { horizon: n, scale, .. } = &layout;
         let n = *n;
-        let column = |k: usize, i: usize, axis: usize| 3 * (O * k + i) + axis;
         let top = O - 1;
 
         let mut a = Triplets::default();
         let mut cones: Vec<SupportedConeT<f64>> = Vec::new();
-        let mut row = 0;
-        // The chain below its last derivative with v eliminated, divided by the scale.
-        for k in 0..n {
-            for i in 0..top {
-                let by_input = chain.b[i] / chain.step;
-                for axis in 0..3 {
-                    a.push(row, column(k + 1, i, axis), 1.0);
-                    a.push(row, column(k + 1, top, axis), -by_input * scale[top] / scale[i]);
-                    for j in i..O {
-                        let own =
-                            if j == top { chain.a[(i, j)] - by_input } else { chain.a[(i, j)] };
-                        a.push(row, column(k, j, axis), -own * scale[j] / scale[i]);
-                    }
-                    row += 1;
-                }
-            }
-        }
+        let mut row = add_chain(&layout, &mut a);
         if row > 0 {
             cones.push(ZeroConeT(row));
         }
@@ -83,7 +66,7 @@ impl<const O: usize> ConicSolver<O> {
                         normals.iter().flat_map(|normal| [(normal, 1.0), (normal, -1.0)])
                     {
                         for i in 0..O {
-                            a.push(row, column(0, i, axis), -sign * normal[i] * scale[i]);
+                            a.push(row, column::<O>(0, i, axis), -sign * normal[i] * scale[i]);
                         }
                         row += 1;
                     }
@@ -93,7 +76,9 @@ impl<const O: usize> ConicSolver<O> {
         }
         let mut ball = |a: &mut Triplets, k: usize, next: bool| {
             let mut block = |k: usize, i: usize, component: usize| {
-                std::array::from_fn(|axis| a.push(row + 1 + component, column(k, i, axis), 0.0))
+                std::array::from_fn(|axis| {
+                    a.push(row + 1 + component, column::<O>(k, i, axis), 0.0)
+                })
             };
             let here =
                 std::array::from_fn(|component| std::array::from_fn(|i| block(k, i, component)));
@@ -114,7 +99,7 @@ impl<const O: usize> ConicSolver<O> {
                     for j in 0..O {
                         a.push(
                             row + 1 + O * axis + i,
-                            column(n, j, axis),
+                            column::<O>(n, j, axis),
                             -root[(i, j)] * scale[j] / scale[0],
                         );
                     }
@@ -305,6 +290,34 @@ fn square_root<const O: usize>(g: &SMatrix<f64, O, O>) -> SMatrix<f64, O, O> {
         }
     }
     l.transpose()
+}
+
+/// Column of the derivative `i` of an axis at the time k.
+fn column<const O: usize>(k: usize, i: usize, axis: usize) -> usize {
+    3 * (O * k + i) + axis
+}
+
+/// Adds the chain below its last derivative with v eliminated, divided by the scale. Returns the
+/// number of its rows.
+fn add_chain<const O: usize>(layout: &Layout<O>, a: &mut Triplets) -> usize {
+    let Layout { chain, horizon, scale, .. } = layout;
+    let (top, mut row) = (O - 1, 0);
+    for k in 0..*horizon {
+        for i in 0..top {
+            let by_input = chain.b[i] / chain.step;
+            for axis in 0..3 {
+                a.push(row, column::<O>(k + 1, i, axis), 1.0);
+                let by_end = -by_input * scale[top] / scale[i];
+                a.push(row, column::<O>(k + 1, top, axis), by_end);
+                for j in i..O {
+                    let own = if j == top { chain.a[(i, j)] - by_input } else { chain.a[(i, j)] };
+                    a.push(row, column::<O>(k, j, axis), -own * scale[j] / scale[i]);
+                }
+                row += 1;
+            }
+        }
+    }
+    row
 }
 
 /// Returns P of ½ xᵀP x for the cost Σ EᵀW E + V/h² (ΔE)² + E_NᵀG E_N: upper triangle, scaled.

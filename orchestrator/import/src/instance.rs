@@ -123,7 +123,7 @@ impl Log {
         let (component, message) = (&self.component, message.trim_end().replace('\n', " "));
         match status {
             Ok(Status::Ok | Status::Pending) => {
-                tracing::info!("{component}: [{category}] {message}")
+                tracing::info!("{component}: [{category}] {message}");
             }
             Ok(Status::Warning) => warnings::warn(&format!("{component}: [{category}] {message}")),
             Ok(Status::Discard | Status::Error | Status::Fatal) | Err(_) => {

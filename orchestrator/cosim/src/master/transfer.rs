@@ -38,7 +38,11 @@ impl<T: Copy + Default> Bundle<T> {
                     range.end = place + 1;
                 }
                 _ => {
-                    sources.push((wire.from.component, vec![wire.from.reference], place..place + 1))
+                    sources.push((
+                        wire.from.component,
+                        vec![wire.from.reference],
+                        place..place + 1,
+                    ));
                 }
             }
         }

@@ -79,7 +79,7 @@ mod tests {
         }
         let summary = distribution.summary();
         let near = |found: f64, expected: f64| {
-            assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}")
+            assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
         };
         near(summary.min, 1.0);
         near(summary.median, 50.0);
