@@ -54,7 +54,7 @@ enum Command {
         /// Experiment to run: a file, an SSP archive, or the name of an experiment that `list`
         /// shows.
         experiment: PathBuf,
-        /// Folder for the results [default: out/<name of the experiment>].
+        /// Folder for the results [default: out/EXPERIMENT].
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
         /// Look for FMUs in this folder, too, besides the experiment's own and target/fmu. The
@@ -100,7 +100,7 @@ enum Command {
         /// Study to run: a folder below orchestrator/experiments, a folder with a study.toml, or
         /// such a file.
         study: PathBuf,
-        /// Folder for the results [default: out/<folder of the study>].
+        /// Folder for the results [default: out/STUDY].
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
         /// Look for FMUs in this folder, too, besides the study's own and target/fmu. The option
@@ -128,7 +128,7 @@ enum Command {
         /// Write an SSP archive, which is the only form there is.
         #[arg(long)]
         ssp: bool,
-        /// Path of the archive [default: <name of the experiment>.ssp].
+        /// Path of the archive [default: EXPERIMENT.ssp].
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
         /// Look for FMUs in this folder, too, besides the experiment's own and target/fmu. The
@@ -238,17 +238,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             force,
         } => {
             let experiment = search::experiment(&experiment)?;
-            let (mut system, entries) =
-                if experiment.extension().is_some_and(|extension| extension == "ssp") {
-                    let ssp::Loaded { experiment, mut opened, entries } =
-                        ssp::load(&experiment, &overrides)?;
-                    let system = check(experiment, &fmu_dir, &mut opened);
-                    (system.map_err(|error| entries.named(error))?, Some(entries))
-                } else {
-                    let mut experiment = Experiment::load(&experiment)?;
-                    experiment.apply(&overrides)?;
-                    (check(experiment, &fmu_dir, &mut Opened::default())?, None)
-                };
+            let (mut system, entries) = system(&experiment, &overrides, &fmu_dir)?;
             let real_time = real_time.map(|factor| pacing::Settings { factor, on_miss, priority });
             let options = Options {
                 out: folder,
@@ -268,17 +258,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 summary::summary(&system, &report, out)?;
                 out.flush()?;
             }
-            match report.ended {
-                None | Some(Error::Interrupted { request: Request::Quit, .. }) => Ok(()),
-                Some(error @ Error::EndedByUnit { .. }) => {
-                    // The summary has already said so.
-                    if quiet {
-                        tracing::warn!("{error}");
-                    }
-                    Ok(())
-                }
-                Some(error) => Err(error.into()),
-            }
+            ended(report.ended, quiet)
         }
         Command::Reproduce { study, out: folder, fmu_dir, jobs, members, fresh, quiet } => {
             let study = Study::load_with(&reproduce::find(&study)?, members)?;
@@ -313,8 +293,6 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 .into());
             }
             let path = search::experiment(&path)?;
-            let mut experiment = Experiment::load(&path)?;
-            experiment.apply(&overrides)?;
             let archive = archive.unwrap_or_else(|| {
                 PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("ssp")
             });
@@ -325,7 +303,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 ))
                 .into());
             }
-            let system = check(experiment, &fmu_dir, &mut Opened::default())?;
+            let (system, _entries) = system(&path, &overrides, &fmu_dir)?;
             ssp::pack(&system, !no_enumerations, &archive, interrupt)?;
             Ok(packed(&system, &archive, out)?)
         }
@@ -340,6 +318,38 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             Ok(())
         }
         Command::List { folder } => list::list(folder.as_deref(), out),
+    }
+}
+
+/// Checks an experiment or the system of an SSP archive. The entries of an archive are needed for
+/// the names of its FMUs in errors.
+fn system(
+    path: &Path,
+    overrides: &Overrides,
+    fmu_dirs: &[PathBuf],
+) -> Result<(System, Option<ssp::Entries>), Failure> {
+    if path.extension().is_some_and(|extension| extension == "ssp") {
+        let ssp::Loaded { experiment, mut opened, entries } = ssp::load(path, overrides)?;
+        let system = check(experiment, fmu_dirs, &mut opened);
+        return Ok((system.map_err(|error| entries.named(error))?, Some(entries)));
+    }
+    let mut experiment = Experiment::load(path)?;
+    experiment.apply(overrides)?;
+    Ok((check(experiment, fmu_dirs, &mut Opened::default())?, None))
+}
+
+/// Returns an error if a run ended early for a reason that is a failure.
+fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
+    match reason {
+        None | Some(Error::Interrupted { request: Request::Quit, .. }) => Ok(()),
+        Some(error @ Error::EndedByUnit { .. }) => {
+            // The summary has already said so.
+            if quiet {
+                tracing::warn!("{error}");
+            }
+            Ok(())
+        }
+        Some(error) => Err(error.into()),
     }
 }
 

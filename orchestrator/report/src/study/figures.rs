@@ -108,9 +108,23 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
             y,
         });
     }
+    curves.extend(straight(panel, results)?);
+    Ok(figure::Panel {
+        title: panel.title.clone(),
+        x_label: panel.x_label.clone().unwrap_or(x_label),
+        y_label: panel.label.clone(),
+        log_x: panel.histogram.is_some(),
+        x_range: panel.x_range,
+        curves,
+    })
+}
+
+/// The straight lines of a panel: its bounds and its marks.
+fn straight(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String> {
+    let mut curves = Vec::new();
     for (lines, shape) in [(&panel.bounds, Shape::Horizontal), (&panel.marks, Shape::Vertical)] {
         for line in lines {
-            let at = study.values.number(&line.at)?;
+            let at = results.study.values.number(&line.at)?;
             let sides = if line.symmetric { vec![at, -at] } else { vec![at] };
             for side in sides {
                 let (x, y) = match shape {
@@ -123,14 +137,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
             }
         }
     }
-    Ok(figure::Panel {
-        title: panel.title.clone(),
-        x_label: panel.x_label.clone().unwrap_or(x_label),
-        y_label: panel.label.clone(),
-        log_x: panel.histogram.is_some(),
-        x_range: panel.x_range,
-        curves,
-    })
+    Ok(curves)
 }
 
 /// Returns a line through the means of several runs.
