@@ -2,7 +2,7 @@
 //! says what their variables stand for.
 //!
 //! An [`experiment`] is read ([`document`]) and [checked](mod@check) once, from the top down, into
-//! a [`system::System`] ([`wiring`], [`settings`], [`delay`]). After this no name is looked up. The
+//! a [`system::System`] (`wiring`, `settings`, [`delay`]). After this no name is looked up. The
 //! [`master`] steps the units on integer ticks ([`clock`]), paced by the wall clock if requested
 //! ([`pacing`]), and observers such as the [`recorder`] see the values. [`metadata`] describes a
 //! finished run, and [`ssp`] reads and writes systems as SSP archives.
