@@ -8,14 +8,14 @@
 #![allow(unsafe_code)]
 
 use crate::fmi::{self, Status};
+use crate::log::Log;
 use crate::unit::{CoSimulationUnit, Outcome, UnitFailure};
-use crate::warnings;
 use libloading::Library;
 use std::ffi::{CStr, CString, c_int, c_void};
 use std::path::Path;
 use std::rc::Rc;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
 use tempfile::TempDir;
 
 unsafe extern "C" {
@@ -103,37 +103,6 @@ fn text_of(text: fmi::Text) -> String {
     // SAFETY: FMI passes strings that end with a zero byte and stay valid during the call; the null
     // pointer was excluded above.
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
-}
-
-/// Forwards an FMU's log messages to `tracing`, and keeps the last one that reports a problem.
-struct Log {
-    component: String,
-    last: Mutex<Option<String>>,
-    /// Whether the unit is being instantiated. Messages about problems are then part of the error
-    /// that follows.
-    instantiates: AtomicBool,
-}
-
-impl Log {
-    fn take(&self) -> Option<String> {
-        self.last.lock().unwrap_or_else(PoisonError::into_inner).take()
-    }
-
-    fn message(&self, status: Result<Status, c_int>, category: &str, message: &str) {
-        let (component, message) = (&self.component, message.trim_end().replace('\n', " "));
-        match status {
-            Ok(Status::Ok | Status::Pending) => {
-                tracing::info!("{component}: [{category}] {message}");
-            }
-            Ok(Status::Warning) => warnings::warn(&format!("{component}: [{category}] {message}")),
-            Ok(Status::Discard | Status::Error | Status::Fatal) | Err(_) => {
-                if !self.instantiates.load(Ordering::Relaxed) {
-                    tracing::error!("{component}: [{category}] {message}");
-                }
-                *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
-            }
-        }
-    }
 }
 
 /// The logger callback, called by the C function that expands the arguments.

@@ -9,6 +9,7 @@ pub mod faults;
 mod fmi;
 pub mod fmu;
 mod instance;
+mod log;
 pub mod names;
 pub mod quantity;
 pub mod unit;

@@ -4,6 +4,7 @@
 mod read;
 mod structure;
 mod write;
+mod xml;
 
 pub use read::{Entries, Loaded, load};
 pub use write::pack;

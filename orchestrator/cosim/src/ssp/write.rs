@@ -1,5 +1,6 @@
 //! Writes an experiment to an SSP archive.
 
+use super::xml::{Xml, element, leaf, real};
 use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
 use crate::error::Error;
 use crate::experiment::Coupling;
@@ -23,8 +24,6 @@ const NAMESPACES: [(&str, &str); 3] = [
     ("xmlns:ssc", "http://ssp-standard.org/SSP1/SystemStructureCommon"),
     ("xmlns:ssv", "http://ssp-standard.org/SSP1/SystemStructureParameterValues"),
 ];
-
-type Xml = Writer<Vec<u8>>;
 
 /// The experiment that is written to an archive.
 struct Source<'a> {
@@ -382,27 +381,4 @@ fn units(xml: &mut Xml, system: &Source) -> io::Result<()> {
             })
         })
     })
-}
-
-/// Formats a number as the shortest text that reads back as the same number.
-fn real(value: f64) -> String {
-    format!("{value:?}")
-}
-
-/// Writes an element without content.
-fn leaf(xml: &mut Xml, name: &str, attributes: &[(&str, String)]) -> io::Result<()> {
-    let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
-    xml.create_element(name).with_attributes(attributes).write_empty().map(drop)
-}
-
-/// Writes an element with the content that `content` writes.
-fn element(
-    xml: &mut Xml,
-    name: &str,
-    attributes: &[(&str, String)],
-    content: impl FnOnce(&mut Xml) -> io::Result<()>,
-) -> io::Result<()> {
-    let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
-    let writer = xml.create_element(name).with_attributes(attributes);
-    writer.write_inner_content(content).map(drop)
 }

@@ -6,6 +6,7 @@ use super::results::Results;
 use super::{figures, page};
 use crate::figure::{png, svg};
 use cosim::error::Error;
+use fmu_import::quantity::rounded;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -89,4 +90,31 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
     let mut text = serde_json::to_string_pretty(&all).unwrap_or_default();
     text.push('\n');
     text
+}
+
+/// Describes the runs that lose the attitude, and the runs that vary a parameter without any
+/// effect, for example the seed of a constant disturbance.
+pub(super) fn notes(results: &Results) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (run, result) in results.study.runs.iter().zip(&results.runs) {
+        let (id, all) = (run.id.get_ref(), result.members.len());
+        let lost: Vec<f64> =
+            result.members.iter().filter_map(|member| member.metrics.lost_at).collect();
+        if let Some(first) = lost.iter().copied().reduce(f64::min) {
+            let time = rounded(first);
+            let what = run.observe.loss.as_ref().map_or("run", |loss| &loss.what);
+            notes.push(format!(
+                "{id}: the {what} is lost in {} of {all} runs, at t = {time} s or later",
+                lost.len()
+            ));
+        }
+        if let (Some(vary), Some((first, others))) = (&run.vary, result.members.split_first())
+            && !others.is_empty()
+            && others.iter().all(|other| other.moves_as(first, &run.observe))
+        {
+            let names = vary.parameter.all().join(" and ");
+            notes.push(format!("{id}: {names} changes nothing, all {all} runs are the same"));
+        }
+    }
+    notes
 }

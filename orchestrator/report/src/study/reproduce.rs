@@ -7,7 +7,7 @@
 use super::claims;
 use super::definition::Study;
 use super::kept::{Kept, hex, kept, write_whole};
-use super::output::{Judgement, write};
+use super::output::{Judgement, notes, write};
 use super::part::{Outcome, Part, Preparation};
 use super::results::{Results, RunResult, resolve};
 use crate::error::Error;
@@ -17,7 +17,6 @@ use cosim::error::Error as Single;
 use cosim::interrupt::Interrupt;
 use cosim::search;
 use cosim::system::Opened;
-use fmu_import::quantity::rounded;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, VecDeque};
@@ -192,33 +191,6 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
         verdicts,
         files,
     })
-}
-
-/// Describes the runs that lose the attitude, and the runs that vary a parameter without any
-/// effect, for example the seed of a constant disturbance.
-fn notes(results: &Results) -> Vec<String> {
-    let mut notes = Vec::new();
-    for (run, result) in results.study.runs.iter().zip(&results.runs) {
-        let (id, all) = (run.id.get_ref(), result.members.len());
-        let lost: Vec<f64> =
-            result.members.iter().filter_map(|member| member.metrics.lost_at).collect();
-        if let Some(first) = lost.iter().copied().reduce(f64::min) {
-            let time = rounded(first);
-            let what = run.observe.loss.as_ref().map_or("run", |loss| &loss.what);
-            notes.push(format!(
-                "{id}: the {what} is lost in {} of {all} runs, at t = {time} s or later",
-                lost.len()
-            ));
-        }
-        if let (Some(vary), Some((first, others))) = (&run.vary, result.members.split_first())
-            && !others.is_empty()
-            && others.iter().all(|other| other.moves_as(first, &run.observe))
-        {
-            let names = vary.parameter.all().join(" and ");
-            notes.push(format!("{id}: {names} changes nothing, all {all} runs are the same"));
-        }
-    }
-    notes
 }
 
 /// Returns the name of a study, which is that of its folder.

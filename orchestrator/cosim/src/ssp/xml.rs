@@ -1,0 +1,29 @@
+//! XML elements and numbers as an archive has them.
+
+use quick_xml::Writer;
+use std::io;
+
+pub(super) type Xml = Writer<Vec<u8>>;
+
+/// Formats a number as the shortest text that reads back as the same number.
+pub(super) fn real(value: f64) -> String {
+    format!("{value:?}")
+}
+
+/// Writes an element without content.
+pub(super) fn leaf(xml: &mut Xml, name: &str, attributes: &[(&str, String)]) -> io::Result<()> {
+    let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
+    xml.create_element(name).with_attributes(attributes).write_empty().map(drop)
+}
+
+/// Writes an element with the content that `content` writes.
+pub(super) fn element(
+    xml: &mut Xml,
+    name: &str,
+    attributes: &[(&str, String)],
+    content: impl FnOnce(&mut Xml) -> io::Result<()>,
+) -> io::Result<()> {
+    let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
+    let writer = xml.create_element(name).with_attributes(attributes);
+    writer.write_inner_content(content).map(drop)
+}
