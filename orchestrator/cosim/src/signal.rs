@@ -139,6 +139,19 @@ impl Resolved {
     }
 }
 
+/// Returns the unit that all of these signals are in; an empty text if there are none.
+///
+/// # Errors
+/// Returns an error if they are in different units, so that their values cannot be combined.
+pub fn common_unit<'a>(signals: impl IntoIterator<Item = &'a Resolved>) -> Result<&'a str, String> {
+    let mut units = signals.into_iter().map(|signal| signal.unit.as_str());
+    let first = units.next().unwrap_or("");
+    match units.find(|unit| *unit != first) {
+        Some(other) => Err(format!("mixes signals in \"{first}\" and in \"{other}\"")),
+        None => Ok(first),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,7 +3,7 @@
 use cosim::error::Error;
 use cosim::experiment::{Kind, Measure, Observe};
 use cosim::master::{Observer, Sample};
-use cosim::signal::{Resolved, Signal};
+use cosim::signal::{Resolved, Signal, common_unit};
 use cosim::system::System;
 
 /// Returns the larger value. Unlike `f64::max` it does not hide a value that is not a number.
@@ -50,6 +50,7 @@ impl Gauge {
         }
         let signals =
             signals.iter().map(|signal| system.resolve(signal)).collect::<Result<_, _>>()?;
+        common_unit(&signals)?;
         let each = measure.each.as_ref().map(|path| system.probe(path)).transpose()?;
         let mut gauge = Self::of(measure, signals);
         gauge.each = each.map(|probed| (probed.place, 0.0));

@@ -7,7 +7,7 @@ use cosim::error::Error;
 use cosim::experiment::{Guarantee, Observe};
 use cosim::master::{Observer, Sample};
 use cosim::pacing::report::RealTime;
-use cosim::signal::Resolved;
+use cosim::signal::{Resolved, common_unit};
 use cosim::system::System;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -144,6 +144,9 @@ impl Meters {
     /// Returns an error if the experiment names a variable that does not exist.
     pub fn new(system: &mut System) -> Result<Self, Error> {
         let observe = system.experiment.observe.clone();
+        if let Some(fault) = observe.fault() {
+            return Err(Error::experiment(fault));
+        }
         let mut gauges = BTreeMap::new();
         for (name, measure) in &observe.metrics {
             let fault = |problem| Error::experiment(format!("[observe.metrics.{name}] {problem}"));
@@ -165,7 +168,8 @@ impl Meters {
                 return Ok(None);
             }
             let signals = signals.iter().map(|signal| system.resolve(signal));
-            let signals = signals.collect::<Result<_, _>>().map_err(fault)?;
+            let signals: Vec<_> = signals.collect::<Result<_, _>>().map_err(fault)?;
+            common_unit(&signals).map_err(fault)?;
             Ok(Some(Loss { what, signals, beyond, ends_run: false, at: None }))
         });
         let loss = loss.transpose()?.flatten();

@@ -3,7 +3,7 @@
 
 use cosim::error::Error;
 use cosim::experiment;
-use cosim::signal::{Resolved, Signal};
+use cosim::signal::{Resolved, Signal, common_unit};
 use cosim::system::System;
 
 /// A panel whose signals have been found.
@@ -67,7 +67,9 @@ impl Panel {
             curves.extend(found(of)?.map(|of| Curve { name: name.clone(), of, reference }));
         }
         let limit = asked.limit.as_ref().map(&mut found).transpose()?.flatten();
-        let own = curves.first().map_or(String::new(), |curve| curve.of.unit.clone());
+        let followed = curves.iter().filter_map(|curve| curve.reference.as_ref());
+        let drawn = curves.iter().map(|curve| &curve.of).chain(followed).chain(&limit);
+        let own = common_unit(drawn)?.to_string();
         let (unit, factor) =
             asked.unit.as_ref().map_or((own, 1.0), |unit| (unit.name.clone(), unit.factor));
         let label = if asked.label.is_empty() { &asked.name } else { &asked.label };

@@ -48,6 +48,9 @@ pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Re
     for (label, text) in asked(&experiment.observe, metrics) {
         line(&label, text)?;
     }
+    if experiment.observe.metrics.is_empty() {
+        line("metrics", "none: the experiment asks for none ([observe.metrics])".into())?;
+    }
     if let Some(guarantee) = guarantee(metrics) {
         line("guarantee", guarantee)?;
     }

@@ -77,7 +77,23 @@ none = { kind = "mean", signals = "none", optional = true }
         (
             "signals = \"ratio\"",
             "signals = \"ratoi\"",
-            "[signals] has no \"ratoi\"; did you mean \"ratio\"?",
+            "[observe.signals] has no \"ratoi\"; did you mean \"ratio\"?",
+        ),
+        (
+            "summary = [\"mean_square\"",
+            "summary = [\"mean_sqare\"",
+            "[observe] summary: there is no metric \"mean_sqare\"; did you mean \"mean_square\"?",
+        ),
+        (
+            "limit = \"bound\"",
+            "limit = \"bond\"",
+            "[observe.metrics.largest] limit: there is no metric \"bond\"",
+        ),
+        ("out = [\"gain.output.direct\"]", "out = []", "[observe.signals] \"out\" is empty"),
+        (
+            "out = [\"gain.output.direct\"]",
+            "out = [\"gain.output.direct\", \"plant.steps\"]",
+            "mixes signals in",
         ),
         ("steps = true", "every = 0", "[observe.metrics.mean_square] every = 0: at least 1"),
         (

@@ -1,6 +1,7 @@
 //! The signals of a run that an experiment measures, watches and draws.
 
 use crate::signal::Signal;
+use fmu_import::names;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -188,16 +189,40 @@ pub struct Curve {
     pub reference: Option<Signal>,
 }
 
+fn hint<'a>(wrong: &str, known: impl Iterator<Item = &'a String> + Clone) -> String {
+    names::hint(wrong, known.map(String::as_str))
+}
+
 impl Observe {
     /// Returns the list of signals with this name.
     ///
     /// # Errors
-    /// Returns an error if there is no such list.
+    /// Returns an error if there is no such list, or if it is empty.
     pub fn list(&self, name: &str) -> Result<&[Signal], String> {
-        self.signals.get(name).map(Vec::as_slice).ok_or_else(|| {
-            let known = self.signals.keys().map(String::as_str);
-            format!("[signals] has no \"{name}\"{}", fmu_import::names::hint(name, known))
-        })
+        match self.signals.get(name) {
+            Some(signals) if signals.is_empty() => {
+                Err(format!("[observe.signals] \"{name}\" is empty"))
+            }
+            Some(signals) => Ok(signals),
+            None => {
+                let hint = hint(name, self.signals.keys());
+                Err(format!("[observe.signals] has no \"{name}\"{hint}"))
+            }
+        }
+    }
+
+    /// Describes a metric that the summary or another metric names and that is not there.
+    pub fn fault(&self) -> Option<String> {
+        let unknown = |place: &str, name: &String| {
+            let hint = hint(name, self.metrics.keys());
+            (!self.metrics.contains_key(name))
+                .then(|| format!("{place}: there is no metric \"{name}\"{hint}"))
+        };
+        let limit = |(name, measure): (&String, &Measure)| {
+            unknown(&format!("[observe.metrics.{name}] limit"), measure.limit.as_ref()?)
+        };
+        let mut summary = self.summary.iter().filter_map(|name| unknown("[observe] summary", name));
+        summary.next().or_else(|| self.metrics.iter().find_map(limit))
     }
 }
 
