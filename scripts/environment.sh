@@ -83,18 +83,23 @@ library() {
 # in their folders.
 unit_crates=(fmu-plant fmu-controller)
 
-# Packs every FMU of the libraries in the folder $1 into the folder $2. Further arguments go to
-# fmu-pack, which runs in the folder of each crate: paths among them are relative to that folder.
+# Packs every FMU of the libraries in the folder $1 into the folder $2, together with their builds for
+# other platforms in the folders $also, if that is set. Further arguments go to fmu-pack, which runs in
+# the folder of each crate: paths among them are relative to that folder.
 pack_fmus() {
     say "Packing the FMUs"
-    local crate library licence licences=()
+    local crate library licence folder others licences=()
     for licence in "$root"/LICENSE-*; do
         if [[ -f $licence ]]; then licences+=(--license "$licence"); fi
     done
     for crate in "${unit_crates[@]}"; do
         library="$(library "${crate//-/_}" "$1")"
-        (cd "$crate" && "$target/release/fmu-pack" "$library" --output "$2" --icons icons \
-            "${licences[@]+"${licences[@]}"}" "${@:3}")
+        others=()
+        for folder in "${also[@]+"${also[@]}"}"; do
+            others+=(--also "$(library "${crate//-/_}" "$folder")")
+        done
+        (cd "$crate" && "$target/release/fmu-pack" "$library" "${others[@]+"${others[@]}"}" \
+            --output "$2" --icons icons "${licences[@]+"${licences[@]}"}" "${@:3}")
     done
 }
 
@@ -110,17 +115,4 @@ build_fmus() {
     say "Building in release"
     build_release --lib --bin orchestrator --bin fmu-pack
     pack_fmus "$target/release" "$fmus" "$@"
-}
-
-# Builds the FMU libraries for Linux systems as old as glibc 2.17 (2012) and packs every FMU into $packaged.
-packaged="$target/package"
-package_fmus() {
-    need_rust
-    need_venv "$target/zig" scripts/package-requirements.txt
-    say "Building the FMU libraries against glibc 2.17"
-    local triple=x86_64-unknown-linux-gnu
-    PATH="$target/zig/bin:$PATH" cargo zigbuild --release --locked --target "$triple.2.17" \
-        --package reentry-fmu-plant --package reentry-fmu-controller
-    build_release --bin fmu-pack
-    pack_fmus "$target/$triple/release" "$packaged" "$@"
 }

@@ -1,11 +1,40 @@
 //! What the build script of a crate must say whose library is exported as FMI 2.0 units. Its `main`
 //! calls [`link`].
 
-/// Tells the linker to keep the library loaded once it is: thread-local destructors of a Rust
-/// library crash a host that unloads it before the thread ends.
+mod exports;
+mod sources;
+
+use std::env;
+use std::path::PathBuf;
+
+/// Tells the compiler and the linker what the library of an FMU needs:
+///
+/// - On Linux the library stays loaded once it is, because thread-local destructors of a Rust
+///   library crash a host that unloads it before the thread ends.
+/// - On Windows the linker gets the list of exported functions as a file of its own, because cross
+///   linkers lose that of rustc and then export everything.
+/// - The digest of all sources of the library goes into it, so that `fmu-pack` can tell whether
+///   libraries for several platforms belong together.
+///
+/// # Panics
+/// Panics if cargo does not run this, or if the export list cannot be written.
 pub fn link() {
     println!("cargo::rerun-if-changed=build.rs");
-    if std::env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("linux") {
-        println!("cargo::rustc-link-arg-cdylib=-Wl,-z,nodelete");
+    let target = |part| env::var(format!("CARGO_CFG_TARGET_{part}")).unwrap_or_default();
+    match (target("OS").as_str(), target("ENV").as_str()) {
+        ("linux", _) => println!("cargo::rustc-link-arg-cdylib=-Wl,-z,nodelete"),
+        ("windows", "gnu") => {
+            let folder = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+            let file = folder.join("fmi2.def");
+            exports::write(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+            println!("cargo::rustc-link-arg-cdylib={}", file.display());
+        }
+        _ => {}
+    }
+    match sources::digest() {
+        Ok(digest) => println!("cargo::rustc-env=FMI2_SOURCES={digest}"),
+        Err(problem) => {
+            println!("cargo::warning=the library gets no digest of its sources: {problem}")
+        }
     }
 }

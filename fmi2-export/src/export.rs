@@ -8,8 +8,8 @@
 /// - `fmu_free_model_descriptions(char*)`: frees that list; it accepts null.
 ///
 /// The GUID given to `fmi2Instantiate` selects the unit. The crate needs
-/// `crate-type = ["cdylib", …]` and a build script that calls `fmi2_build::link`, which keeps the
-/// library loaded once it is.
+/// `crate-type = ["cdylib", …]` and a build script that calls `fmi2_build::link`. The digest of the
+/// library's sources, which that build script makes, is put into a section of its own.
 ///
 /// ```ignore
 /// fmi2_export::export_fmus!(Plant);
@@ -30,8 +30,20 @@ macro_rules! export_fmus {
             const COUNT: usize = [$(stringify!($model)),+].len();
             static EXPORTS: [$crate::Export; COUNT] = [$($crate::Export::of::<$model>()),+];
 
+            // fmu-pack reads it from the file, for any platform. Elsewhere than on these systems the
+            // section's name is that of ELF.
+            #[cfg_attr(target_vendor = "apple", unsafe(link_section = "__DATA,__fmi2_sources"))]
+            #[cfg_attr(windows, unsafe(link_section = ".fmi2src"))]
+            #[cfg_attr(
+                not(any(windows, target_vendor = "apple")),
+                unsafe(link_section = ".fmi2_sources")
+            )]
+            static SOURCES: [u8; 64] = $crate::sources(::std::option_env!("FMI2_SOURCES"));
+
             #[unsafe(no_mangle)]
             pub extern "C" fn fmu_model_descriptions() -> *mut c_char {
+                // Without a use the linker would leave the digest out.
+                ::std::hint::black_box(&SOURCES);
                 shell::fmu_model_descriptions(&EXPORTS)
             }
             #[unsafe(no_mangle)]
@@ -116,4 +128,16 @@ macro_rules! forward {
             unsafe { shell::$name($($argument),*) }
         }
     )*};
+}
+
+/// Returns the digest that [`export_fmus!`](crate::export_fmus) puts into the library: 64
+/// hexadecimal digits of the build script, or zero bytes if it gave none.
+#[doc(hidden)]
+pub const fn sources(digest: Option<&str>) -> [u8; 64] {
+    let mut bytes = [0; 64];
+    if let Some(digest) = digest {
+        assert!(digest.len() == bytes.len(), "FMI2_SOURCES has 64 digits");
+        bytes.copy_from_slice(digest.as_bytes());
+    }
+    bytes
 }

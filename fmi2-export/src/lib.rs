@@ -32,6 +32,8 @@ pub mod table;
 pub mod types;
 mod unit;
 
+#[doc(hidden)]
+pub use export::sources;
 pub use model::{Context, EventInfo, Failure, Inputs, Model, Restoration};
 pub use table::{Description, Enumeration, Table};
 pub use unit::{Export, MAX_INPUT_DERIVATIVE_ORDER, describe};

@@ -1,13 +1,19 @@
 //! Description of an FMI 2.0 unit as data, the XML made from it, and the packing of `.fmu`
-//! archives. The crate knows no physics.
+//! archives (feature `pack`). The crate knows no physics.
 
+#[cfg(feature = "pack")]
+pub mod binary;
 pub mod check;
+#[cfg(feature = "pack")]
 pub mod html;
+#[cfg(feature = "pack")]
 pub mod library;
+#[cfg(feature = "pack")]
 pub mod pack;
 pub mod structure;
 pub mod unit;
 pub mod variable;
+#[cfg(feature = "pack")]
 pub mod xml;
 
 use serde::{Deserialize, Serialize};
@@ -46,6 +52,7 @@ pub enum Error {
         problem: String,
     },
     /// The file is not a library that can be opened.
+    #[cfg(feature = "pack")]
     #[error("cannot open library '{}': {source}", path.display())]
     Open {
         /// Path of the library file.
@@ -61,6 +68,14 @@ pub enum Error {
         /// Description of what the library lacks.
         problem: String,
     },
+    /// The file is no library that can be packed.
+    #[error("library '{}': {problem}", path.display())]
+    Binary {
+        /// Path of the library file.
+        path: PathBuf,
+        /// Description of what is wrong with it.
+        problem: String,
+    },
     /// Two libraries, or two units of one library, have the same name.
     #[error("two units are named '{0}': their archives would overwrite each other")]
     SameName(String),
@@ -73,6 +88,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// The archive could not be written.
+    #[cfg(feature = "pack")]
     #[error("archive '{}': {source}", path.display())]
     Archive {
         /// Path of the archive.

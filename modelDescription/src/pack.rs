@@ -1,6 +1,7 @@
 //! Packing of a unit's `.fmu` archive. The same input gives the same bytes, because entries are
 //! sorted and times and permissions are fixed.
 
+use crate::binary::Binary;
 use crate::{Error, LICENSE, ModelDescription};
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -24,35 +25,27 @@ pub struct Extras {
 const RESOURCES_README: &str =
     "Files that the unit reads while it initializes. This unit needs none.\n";
 
-/// Folder and file suffix of libraries on the platform for which this program was built.
-fn platform() -> (&'static str, &'static str) {
-    match (std::env::consts::OS, cfg!(target_pointer_width = "64")) {
-        ("windows", true) => ("win64", "dll"),
-        ("windows", false) => ("win32", "dll"),
-        ("macos", _) => ("darwin64", "dylib"),
-        (_, true) => ("linux64", "so"),
-        (_, false) => ("linux32", "so"),
-    }
-}
-
-/// Writes the archive `NAME.fmu` of one unit of `library` into the folder `output` and returns its
-/// path.
+/// Writes the archive `NAME.fmu` of one unit into the folder `output` and returns its path.
+/// `binaries` are the builds of the unit's library, one for each platform.
 ///
 /// # Errors
 /// Reports a description that contradicts itself, or a file that cannot be read or written.
 pub fn pack(
     description: &ModelDescription,
-    library: &Path,
+    binaries: &[Binary],
     output: &Path,
     extras: &Extras,
 ) -> Result<PathBuf, Error> {
-    let (folder, suffix) = platform();
     let name = &description.name;
     let mut entries = vec![
         ("modelDescription.xml".to_string(), description.to_xml()?.into_bytes()),
-        (format!("binaries/{folder}/{name}.{suffix}"), read(library)?),
         ("documentation/index.html".to_string(), description.to_html().into_bytes()),
     ];
+    for Binary { path, folders, suffix, .. } in binaries {
+        let library = read(path)?;
+        let file = |folder| (format!("binaries/{folder}/{name}.{suffix}"), library.clone());
+        entries.extend(folders.iter().map(file));
+    }
     if let Some(icons) = &extras.icons {
         entries.push(("model.png".into(), read(&icons.join(format!("{name}.png")))?));
     }

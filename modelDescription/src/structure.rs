@@ -45,7 +45,10 @@ impl ModelDescription {
     pub fn directional_derivatives(&self) -> bool {
         self.variables.iter().any(|variable| variable.derivative_of().is_some())
     }
+}
 
+#[cfg(feature = "pack")]
+impl ModelDescription {
     /// Value references, ascending, of the inputs and states on which the variable at `reference`
     /// depends at the same instant. A state depends on itself alone.
     pub(crate) fn dependencies(&self, reference: usize, states: &[(usize, usize)]) -> Vec<usize> {

@@ -1,5 +1,6 @@
 //! Tests with a small unit described by hand: its GUID, checks, XML, page and archive.
 
+use model_description::binary::Binary;
 use model_description::pack::{Extras, pack};
 use model_description::unit::{angle, angular_rate};
 use model_description::variable::{Causality, EnumerationType, Kind, Variability, Variable};
@@ -7,6 +8,12 @@ use model_description::{DefaultExperiment, Error, ModelDescription, library};
 use std::fs;
 use std::io::Read;
 use std::path::Path;
+
+/// A library for Linux of which nothing but its file matters.
+fn binary(path: &Path) -> Binary {
+    let path = path.to_owned();
+    Binary { path, folders: &["linux64"], suffix: "so", exports: [].into(), sources: None }
+}
 
 fn variable(name: &str, causality: Causality, variability: Variability, kind: Kind) -> Variable {
     let description = format!("What <{name}> & co. are");
@@ -257,7 +264,7 @@ fn the_archive_is_complete_and_the_same_every_time() {
         licenses: vec![at("LICENSE-A"), at("LICENSE-B")],
         icons: None,
     };
-    let path = pack(&unit(), &at("library"), folder.path(), &extras).unwrap();
+    let path = pack(&unit(), &[binary(&at("library"))], folder.path(), &extras).unwrap();
     assert_eq!(path, at("Small.fmu"));
     let first = fs::read(&path).unwrap();
     let content = entries(&path);
@@ -281,9 +288,22 @@ fn the_archive_is_complete_and_the_same_every_time() {
     // Another time and another order of the folder still give the same bytes.
     std::thread::sleep(std::time::Duration::from_millis(20));
     fs::write(at("data/z.csv"), "1").unwrap();
-    pack(&unit(), &at("library"), folder.path(), &extras).unwrap();
+    pack(&unit(), &[binary(&at("library"))], folder.path(), &extras).unwrap();
     assert_eq!(fs::read(&path).unwrap(), first);
     assert!(!at("Small.fmu.part").exists());
+}
+
+#[test]
+fn a_library_goes_into_every_folder_of_its_platform() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = folder.path().join("library");
+    fs::write(&library, "machine code").unwrap();
+    let aarch64 = Binary { folders: &["aarch64-linux", "linux64"], ..binary(&library) };
+    let path = pack(&unit(), &[aarch64], folder.path(), &Extras::default()).unwrap();
+    let names: Vec<_> = entries(&path).into_iter().map(|(name, _)| name).collect();
+    for folder in ["aarch64-linux", "linux64"] {
+        assert!(names.contains(&format!("binaries/{folder}/Small.so")), "{names:?}");
+    }
 }
 
 #[test]
@@ -291,7 +311,7 @@ fn an_archive_without_resources_has_the_folder_all_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let library = folder.path().join("library");
     fs::write(&library, "machine code").unwrap();
-    let path = pack(&unit(), &library, folder.path(), &Extras::default()).unwrap();
+    let path = pack(&unit(), &[binary(&library)], folder.path(), &Extras::default()).unwrap();
     assert!(entries(&path).iter().any(|(name, _)| name == "resources/README.txt"));
 }
 
@@ -304,7 +324,7 @@ fn files_that_are_no_unit_library_are_refused() {
     fs::write(&text, "not a library").unwrap();
     let error = library::descriptions(&text).unwrap_err();
     assert!(matches!(error, Error::Open { .. }), "{error}");
-    let missing = pack(&unit(), &folder.path().join("nothing"), folder.path(), &Extras::default())
-        .unwrap_err();
+    let nothing = binary(&folder.path().join("nothing"));
+    let missing = pack(&unit(), &[nothing], folder.path(), &Extras::default()).unwrap_err();
     assert!(missing.to_string().contains("nothing"));
 }

@@ -1,0 +1,80 @@
+//! A digest of everything that a library is made of.
+
+use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::{env, fs, io};
+
+/// What the compiler reads of a package that is a folder on this machine.
+const PARTS: [&str; 4] = ["Cargo.toml", "build.rs", "data", "src"];
+
+/// Returns the digest of the sources of the package that is being built, as 64 hexadecimal digits:
+/// of all its dependencies' names and versions, and of all files of those which are folders on this
+/// machine. The platform and the places of the folders do not enter it.
+pub(crate) fn digest() -> Result<String, String> {
+    let mut digest = Sha256::new();
+    for package in packages()? {
+        let (name, folder) = match package.split_once(" (") {
+            Some((name, folder)) => (name, Path::new(folder.trim_end_matches(')'))),
+            None => (package.as_str(), Path::new("")),
+        };
+        digest.update(name);
+        // Behind the name of a package from a registry or repository stands its address.
+        if !folder.is_dir() {
+            continue;
+        }
+        for part in PARTS.map(|part| folder.join(part)) {
+            println!("cargo::rerun-if-changed={}", part.display());
+            for file in files(&part).map_err(|error| format!("{}: {error}", part.display()))? {
+                let content = fs::read(&file).map_err(|e| format!("{}: {e}", file.display()))?;
+                let within = file.strip_prefix(folder).unwrap_or(&file);
+                digest.update(within.to_string_lossy().replace('\\', "/"));
+                digest.update(content.len().to_le_bytes());
+                digest.update(content);
+            }
+        }
+    }
+    let mut digits = String::with_capacity(64);
+    for byte in digest.finalize() {
+        write!(digits, "{byte:02x}").expect("writing to a string");
+    }
+    Ok(digits)
+}
+
+/// Returns the package that is being built and all that it depends on, as cargo prints them.
+fn packages() -> Result<BTreeSet<String>, String> {
+    let variable = |name| env::var_os(name).ok_or_else(|| format!("cargo did not set {name}"));
+    let manifest = PathBuf::from(variable("CARGO_MANIFEST_DIR")?).join("Cargo.toml");
+    let tree = Command::new(variable("CARGO")?)
+        .args(["tree", "--frozen", "--prefix=none", "--edges=normal,build", "--target=all"])
+        .arg("--manifest-path")
+        .arg(manifest)
+        .output()
+        .map_err(|error| format!("cargo tree: {error}"))?;
+    if !tree.status.success() {
+        let words = String::from_utf8_lossy(&tree.stderr).replace('\n', " ");
+        return Err(format!("cargo tree: {words}"));
+    }
+    let lines = String::from_utf8_lossy(&tree.stdout);
+    // A package that stands in the tree once more is marked.
+    Ok(lines.lines().map(|line| line.trim_end_matches(" (*)").to_string()).collect())
+}
+
+/// Returns all files at or below a path, sorted; none if it does not exist.
+fn files(path: &Path) -> io::Result<Vec<PathBuf>> {
+    if path.is_file() {
+        return Ok(vec![path.to_owned()]);
+    }
+    if !path.is_dir() {
+        return Ok(vec![]);
+    }
+    let entries = fs::read_dir(path)?.collect::<io::Result<Vec<_>>>()?;
+    let mut all = vec![];
+    for entry in entries {
+        all.extend(files(&entry.path())?);
+    }
+    all.sort();
+    Ok(all)
+}

@@ -1,0 +1,145 @@
+# Cross building of the units and the orchestrator on Linux x86-64. Sourced after environment.sh.
+
+# The platforms, by the names of their folders below $dist.
+platforms=(linux-x86_64 linux-aarch64 windows-x86_64 macos-universal)
+dist="$target/dist"
+
+# The oldest systems that the binaries run on: CentOS 7, manylinux2014 and macOS 11 of 2020.
+glibc=2.17
+macos=11.0
+
+# The triples of rustc for the platform $1.
+triples() {
+    case "$1" in
+    linux-x86_64) echo x86_64-unknown-linux-gnu ;;
+    linux-aarch64) echo aarch64-unknown-linux-gnu ;;
+    windows-x86_64) echo x86_64-pc-windows-gnu ;;
+    macos-universal) echo x86_64-apple-darwin aarch64-apple-darwin ;;
+    *) fail "there is no platform $1; there are ${platforms[*]}" ;;
+    esac
+}
+
+# Gets the standard library for the triple $1 unless it is there.
+need_target() {
+    [[ -d $(rustc --print target-libdir --target "$1") ]] && return
+    say "Installing Rust's standard library for $1"
+    command -v rustup >/dev/null && rustup target add "$1" ||
+        fail "rustup target add $1 failed: the standard library for this platform is needed"
+}
+
+# Paths of this machine must not get into the binaries, so that builds in other folders give the same
+# bytes. Arguments: further flags of rustc. Sets $flags, separated as CARGO_ENCODED_RUSTFLAGS wants.
+set_flags() {
+    local flag
+    flags="--remap-path-prefix=$root=/source"$'\x1f'"--remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=/cargo"
+    for flag in "$@"; do flags+=$'\x1f'"$flag"; done
+}
+
+# The stubs of macOS's libraries that ziglang brings, laid out as Apple's linker expects them. Its
+# linker exports every symbol of a Rust library, hence rust-lld, which comes with Rust.
+need_macos_sdk() {
+    macos_sdk="$target/zig/macos-sdk"
+    local zig lib="$macos_sdk/usr/lib"
+    zig="$("$python" -c 'import os, ziglang; print(os.path.dirname(ziglang.__file__))')"
+    mkdir -p "$lib"
+    # What is there for arm64e is there for arm64.
+    sed 's/arm64e\(\.x1\)\?-/arm64-/g' "$zig/lib/libc/darwin/libSystem.tbd" >"$lib/libSystem.tbd"
+    cp "$zig/lib/libc/darwin/SDKSettings.json" "$macos_sdk/"
+    cp "$lib/libSystem.tbd" "$lib/libc.tbd"
+    cp "$lib/libSystem.tbd" "$lib/libm.tbd"
+    # The standard library names it and does not use it: -dead_strip_dylibs takes it out again.
+    cat >"$lib/libiconv.tbd" <<'END'
+--- !tapi-tbd
+tbd-version: 4
+targets: [ x86_64-macos, arm64-macos ]
+install-name: '/usr/lib/libiconv.2.dylib'
+...
+END
+    apple_linker="$(rustc --print sysroot)/lib/rustlib/$(rustc -vV | sed -n 's/host: //p')/bin/rust-lld"
+}
+
+# cargo build for the triple $1 with the further arguments.
+cross_build() {
+    local triple="$1"
+    need_target "$triple"
+    case "$triple" in
+    *-apple-darwin)
+        need_macos_sdk
+        set_flags -Clinker="$apple_linker" -Clinker-flavor=ld64.lld -Clink-arg=-dead_strip_dylibs
+        SDKROOT="$macos_sdk" MACOSX_DEPLOYMENT_TARGET="$macos" CARGO_ENCODED_RUSTFLAGS="$flags" \
+            cargo build --locked --target "$triple" "${@:2}"
+        ;;
+    *)
+        local versioned="$triple"
+        case "$triple" in
+        *-linux-gnu) set_flags; versioned="$triple.$glibc" ;;
+        # Zig's linker keeps unused code unless it is told to strip the file.
+        *-windows-gnu) set_flags -Clink-arg=-s ;;
+        esac
+        PATH="$target/zig/bin:$PATH" CARGO_ENCODED_RUSTFLAGS="$flags" \
+            cargo zigbuild --locked --target "$versioned" "${@:2}"
+        ;;
+    esac
+}
+
+# What every build for another platform needs.
+need_cross() {
+    need_rust
+    need_venv "$target/zig" scripts/package-requirements.txt
+}
+
+# The folder with the built libraries of the platform $1.
+built() {
+    local all
+    read -ra all <<<"$(triples "$1")"
+    if [[ ${#all[@]} -gt 1 ]]; then echo "$target/$1/release"; else echo "$target/${all[0]}/release"; fi
+}
+
+# Builds the unit libraries for the platform $1.
+build_units() {
+    say "Building the units for $1"
+    local triple crate
+    for triple in $(triples "$1"); do
+        cross_build "$triple" --release --package reentry-fmu-plant --package reentry-fmu-controller
+    done
+    if [[ $1 != macos-universal ]]; then return; fi
+    for crate in "${unit_crates[@]}"; do join "lib${crate//-/_}.dylib" release; done
+}
+
+# Builds the orchestrator for the platform $1 and puts it into the platform's folder.
+build_program() {
+    say "Building the orchestrator for $1"
+    local triple name=orchestrator
+    if [[ $1 == windows-* ]]; then name+=.exe; fi
+    for triple in $(triples "$1"); do
+        cross_build "$triple" --profile program --package orchestrator --bin orchestrator
+    done
+    if [[ $1 == macos-universal ]]; then join "$name" program; fi
+    mkdir -p "$dist/$1"
+    cp "$(dirname "$(built "$1")")/program/$name" "$dist/$1/"
+}
+
+# Joins the file $1 of the profile $2 for both processors of macOS.
+join() {
+    local triple inputs=()
+    for triple in $(triples macos-universal); do inputs+=("$target/$triple/$2/$1"); done
+    "$python" scripts/universal.py "$target/macos-universal/$2/$1" "${inputs[@]}"
+}
+
+# Packs the units of the platform $1 alone.
+pack_platform() {
+    local also=("$(built "$1")") host
+    host="$(built linux-x86_64)"
+    if [[ $1 == linux-x86_64 ]]; then
+        also=()
+        pack_fmus "$host" "$dist/$1/fmu"
+    else
+        pack_fmus "$host" "$dist/$1/fmu" --only-also
+    fi
+}
+
+# Packs the units for every platform that FMI 2.0 has a name for.
+pack_all() {
+    local also=("$(built windows-x86_64)" "$(built macos-universal)")
+    pack_fmus "$(built linux-x86_64)" "$dist/all/fmu"
+}
