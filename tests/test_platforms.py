@@ -1,0 +1,246 @@
+"""The packages of all platforms (scripts/package): what is in them, and that they compute the same.
+
+Windows runs under Wine, Linux on aarch64 under qemu. The binaries of macOS are only read.
+"""
+
+import hashlib
+import os
+import shutil
+import struct
+import subprocess
+import zipfile
+
+import lief
+import pytest
+
+from conftest import NAMES, ROOT, TARGET, merged
+
+DIST = TARGET / "dist"
+FOLDERS = {
+    "all": {"linux64": "so", "win64": "dll", "darwin64": "dylib"},
+    "linux-x86_64": {"linux64": "so"},
+    "linux-aarch64": {"linux64": "so", "aarch64-linux": "so"},
+    "windows-x86_64": {"win64": "dll"},
+    "macos-universal": {"darwin64": "dylib"},
+}
+# Every file of an experiment that `run` takes: no parts, studies or tables of published numbers.
+EXPERIMENTS = [
+    path
+    for path in sorted((ROOT / "orchestrator" / "experiments").glob("*/*.toml"))
+    if path.parent.name not in ("base", "exchange") and path.stem not in ("study", "published", "computed")
+]
+# What Windows 10 and macOS 11 have.
+WINDOWS = ("api-ms-win-core-", "api-ms-win-crt-", "kernel32.", "ntdll.", "bcryptprimitives.", "advapi32.", "ws2_32.", "userenv.")
+MACOS = {"/usr/lib/libSystem.B.dylib", "/usr/lib/libiconv.2.dylib"}
+MACOS_VERSION = [11, 0, 0]
+
+pytestmark = pytest.mark.skipif(not (DIST / "all").is_dir(), reason="no packages: run scripts/package")
+
+
+def packed(platform: str, name: str):
+    path = DIST / platform / "fmu" / f"{name}.fmu"
+    assert path.is_file(), f"{path} does not exist: run scripts/package"
+    return path
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("platform", FOLDERS)
+def test_an_archive_holds_its_platforms_and_the_same_description(platform, name):
+    with zipfile.ZipFile(packed(platform, name)) as archive:
+        binaries = {file for file in archive.namelist() if file.startswith("binaries/")}
+        description = archive.read("modelDescription.xml")
+    assert binaries == {f"binaries/{folder}/{name}.{suffix}" for folder, suffix in FOLDERS[platform].items()}
+    [committed] = ROOT.glob(f"fmu-*/generated/{name}.xml")
+    assert description == committed.read_bytes()
+    assert packed(platform, name).stat().st_size <= 4e6
+
+
+@pytest.fixture(scope="module", params=["ReentryPlant", "CRMPC"])
+def library(request):
+    """Reads the library of a unit in the archive of all platforms; each crate has one library."""
+
+    def read(folder: str, suffix: str) -> bytes:
+        with zipfile.ZipFile(packed("all", request.param)) as archive:
+            return archive.read(f"binaries/{folder}/{request.param}.{suffix}")
+
+    return read
+
+
+def functions(names) -> set[str]:
+    return {name.removeprefix("_") for name in names if name}
+
+
+def test_every_platform_exports_the_same_functions_and_no_others(library):
+    linux = lief.ELF.parse(list(library("linux64", "so")))
+    expected = functions(symbol.name for symbol in linux.exported_symbols)
+    assert len(expected) == 46 and "fmi2DoStep" in expected
+    windows = lief.PE.parse(list(library("win64", "dll")))
+    assert functions(entry.name for entry in windows.get_export().entries) == expected
+    for slice_ in lief.MachO.parse(list(library("darwin64", "dylib"))):
+        assert functions(symbol.name for symbol in slice_.exported_symbols) == expected
+
+
+def test_windows_needs_nothing_but_windows(library):
+    windows = lief.PE.parse(list(library("win64", "dll")))
+    foreign = [entry.name for entry in windows.imports if not entry.name.lower().startswith(WINDOWS)]
+    assert not foreign
+
+
+def signed(slice_: bytes) -> bool:
+    """Whether the ad-hoc signature of a single-architecture Mach-O file covers its content: every
+    page has the hash that the signature's code directory says."""
+    commands = struct.unpack_from("<I", slice_, 16)[0]
+    at = 32
+    for _ in range(commands):
+        kind, size = struct.unpack_from("<II", slice_, at)
+        if kind == 0x1D:  # LC_CODE_SIGNATURE
+            break
+        at += size
+    else:
+        return False
+    offset = struct.unpack_from("<I", slice_, at + 8)[0]
+    magic, _, blobs = struct.unpack_from(">III", slice_, offset)
+    assert magic == 0xFADE0CC0
+    index = dict(struct.unpack_from(">II", slice_, offset + 12 + 8 * i) for i in range(blobs))
+    directory = offset + index[0]
+    magic, _, _, flags, hashes, _, _, pages, limit = struct.unpack_from(">IIIIIIIII", slice_, directory)
+    hash_size, hash_type, _, page = struct.unpack_from(">BBBB", slice_, directory + 36)
+    assert magic == 0xFADE0C02 and flags & 0x2 and (hash_size, hash_type) == (32, 2)
+    assert limit == offset and pages == -(-limit // (1 << page))
+    for i in range(pages):
+        content = slice_[i << page : min((i + 1) << page, limit)]
+        at = directory + hashes + hash_size * i
+        if hashlib.sha256(content).digest() != slice_[at : at + hash_size]:
+            return False
+    return True
+
+
+def slices(universal: bytes) -> list[bytes]:
+    magic, count = struct.unpack_from(">II", universal)
+    assert magic == 0xCAFEBABE
+    entries = [struct.unpack_from(">IIIII", universal, 8 + 20 * i) for i in range(count)]
+    assert all(offset % (1 << alignment) == 0 for _, _, offset, _, alignment in entries)
+    return [universal[offset : offset + size] for _, _, offset, size, _ in entries]
+
+
+def check_macos(universal: bytes):
+    found = set()
+    for content in slices(universal):
+        [binary] = lief.MachO.parse(list(content))
+        found.add(binary.header.cpu_type)
+        libraries = {each.name for each in binary.libraries if each.command != lief.MachO.LoadCommand.TYPE.ID_DYLIB}
+        assert libraries <= MACOS
+        least = binary.build_version.minos if binary.has_build_version else binary.version_min.version
+        assert least <= MACOS_VERSION
+        # Only Apple's processors refuse code without a signature.
+        if binary.header.cpu_type == lief.MachO.Header.CPU_TYPE.ARM64:
+            assert signed(content)
+            broken = bytearray(content)
+            broken[5000] ^= 1
+            assert not signed(bytes(broken))
+    assert found == {lief.MachO.Header.CPU_TYPE.ARM64, lief.MachO.Header.CPU_TYPE.X86_64}
+
+
+def test_macos_has_both_processors_signed_and_needs_nothing_but_macos(library):
+    check_macos(library("darwin64", "dylib"))
+
+
+def test_the_orchestrator_of_macos_has_both_processors_signed():
+    check_macos((DIST / "macos-universal" / "orchestrator").read_bytes())
+
+
+def test_no_path_of_the_build_is_in_a_binary(library):
+    home = os.path.expanduser("~").encode()
+    for folder, suffix in FOLDERS["all"].items():
+        content = library(folder, suffix)
+        assert str(ROOT).encode() not in content
+        assert home + b"/.cargo" not in content
+
+
+@pytest.fixture(scope="session")
+def wine(tmp_path_factory):
+    """Command and environment that run a program for Windows."""
+    if not shutil.which("wine"):
+        pytest.skip("wine is not installed: scripts/install-emulators")
+    environment = os.environ | {
+        "WINEPREFIX": str(tmp_path_factory.mktemp("wine")),
+        "WINEDEBUG": "-all",
+        "DISPLAY": "",
+        # Wine 8 lacks ProcessPrng, which Windows has since version 10.
+        "WINEDLLOVERRIDES": "bcryptprimitives=n;mscoree,mshtml=",
+    }
+    subprocess.run(["wineboot", "--init"], env=environment, capture_output=True, check=True, timeout=120)
+    stand_in = TARGET / "dist" / "wine" / "bcryptprimitives.dll"
+    assert stand_in.is_file(), f"{stand_in} does not exist: run scripts/install-emulators"
+    shutil.copy(stand_in, os.path.join(environment["WINEPREFIX"], "drive_c", "windows", "system32"))
+    yield ["wine"], environment
+    subprocess.run(["wineserver", "--kill"], env=environment, capture_output=True)
+
+
+@pytest.fixture(scope="session")
+def qemu():
+    """Command and environment that run a program for Linux on aarch64."""
+    if not shutil.which("qemu-aarch64"):
+        pytest.skip("qemu-aarch64 is not installed: scripts/install-emulators")
+    return ["qemu-aarch64", "-L", "/usr/aarch64-linux-gnu"], dict(os.environ)
+
+
+@pytest.fixture(params=["windows-x86_64", "linux-aarch64"])
+def foreign(request):
+    """Runs the orchestrator of another platform with that platform's units."""
+    emulator, environment = request.getfixturevalue("wine" if request.param.startswith("windows") else "qemu")
+    program = DIST / request.param / ("orchestrator.exe" if request.param.startswith("windows") else "orchestrator")
+    units = DIST / request.param / "fmu"
+
+    def run(*arguments, **options):
+        command = [*emulator, program, *arguments]
+        return subprocess.run(command, env=environment, capture_output=True, timeout=300, **options)
+
+    run.units = units
+    return run
+
+
+def native(*arguments, **options):
+    program = DIST / "linux-x86_64" / "orchestrator"
+    return subprocess.run([program, *arguments], capture_output=True, check=True, timeout=120, **options)
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_oracle_every_platform_computes_the_same_bits(foreign, experiment, tmp_path):
+    """Times of computation are not recorded in results.csv; everything else is compared."""
+    native("run", experiment, "--out", tmp_path / "here", "--fmu-dir", DIST / "linux-x86_64" / "fmu", "--quiet")
+    there = foreign("run", experiment, "--out", tmp_path / "there", "--fmu-dir", foreign.units, "--quiet")
+    assert there.returncode == 0, there.stderr.decode(errors="replace")
+    expected = (tmp_path / "here" / "results.csv").read_bytes()
+    assert len(expected) > 10_000
+    assert (tmp_path / "there" / "results.csv").read_bytes() == expected
+
+
+def test_windows_takes_spaces_letters_backslashes_and_drive_letters(wine, tmp_path):
+    """The experiment stands in a folder whose path is long, has spaces and letters that are not
+    ASCII, and its lines end as those of Windows do."""
+    folder = tmp_path / ("Flüge über 再突入 " + "x" * 100) / ("y" * 100)
+    folder.mkdir(parents=True)
+    assert len(str(folder)) > 260
+    text = merged(ROOT / "orchestrator" / "experiments" / "crmpc-2022" / "crmpc-robust.toml")
+    (folder / "loop.toml").write_bytes(text.replace("\n", "\r\n").encode())
+    for name in ("ReentryPlant", "CRMPC"):
+        shutil.copy(packed("all", name), folder)
+    emulator, environment = wine
+    program = DIST / "windows-x86_64" / "orchestrator.exe"
+    experiment = "Z:" + str(folder / "loop.toml").replace("/", "\\")
+    command = [*emulator, program, "run", experiment, "--stop", "2", "--quiet"]
+    there = subprocess.run(command, env=environment, capture_output=True, cwd=folder, timeout=120)
+    assert there.returncode == 0, there.stderr.decode(errors="replace")
+    native("run", folder / "loop.toml", "--stop", "2", "--quiet", "--out", tmp_path / "here", cwd=folder)
+    written = (folder / "out" / "loop" / "results.csv").read_bytes()
+    assert written == (tmp_path / "here" / "results.csv").read_bytes()
+
+
+def test_windows_names_a_culprit_in_a_path_with_backslashes(wine):
+    emulator, environment = wine
+    program = DIST / "windows-x86_64" / "orchestrator.exe"
+    command = [*emulator, program, "run", "C:\\nö\\such file.toml"]
+    there = subprocess.run(command, env=environment, capture_output=True, timeout=120)
+    assert there.returncode == 2
+    assert "C:\\nö\\such file.toml" in there.stderr.decode()
