@@ -1,6 +1,7 @@
 """The JSON Schemas of experiments and studies: every file keeps to its own, as it is written and with what it extends."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -18,6 +19,9 @@ FILES = sorted(EXPERIMENTS.parent.glob("*/*.toml"))
 WRITTEN = {path: path.read_text(encoding="utf-8") for path in FILES}
 STUDIES = [path for path in FILES if path.name == "study.toml"]
 EXPERIMENTS_THERE = [path for path in FILES if "title" in (table := tomllib.loads(WRITTEN[path])) and "paper" not in table]
+
+PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs").glob("*.md"))}
+EXAMPLES = [(name, text) for name, page in PAGES.items() for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL)]
 
 
 def check(kind: str, text: str) -> None:
@@ -42,6 +46,13 @@ def test_every_experiment_keeps_to_its_schema_and_names_it(path):
 def test_every_study_keeps_to_its_schema_and_names_it(path):
     assert WRITTEN[path].startswith("#:schema ../../schema/study.json\n")
     check("study", WRITTEN[path])
+
+
+@pytest.mark.parametrize(("page", "text"), EXAMPLES)
+def test_the_examples_of_the_pages_are_toml_and_keep_to_the_schemas(page, text):
+    table = tomllib.loads(text)
+    if "title" in table:
+        check("study" if "paper" in table else "experiment", text)
 
 
 @pytest.mark.parametrize(

@@ -155,7 +155,7 @@ fn grid() -> Vec<SlidingMode> {
 }
 
 /// Returns the gains changed by this share, `changes` of them at a time, within the range that the
-/// controller accepts. A gain of zero starts from `share`.
+/// controller accepts. A gain of zero starts from a tenth of `share`.
 fn neighbours(of: &SlidingMode, share: f64, changes: usize) -> Vec<SlidingMode> {
     let moved = |value: f64, direction: i32| match direction {
         0 => value,

@@ -101,8 +101,8 @@ pub trait Controller {
     /// its place.
     fn limited(&mut self, _memory: &mut Self::Memory, _applied: &Vector3<f64>) {}
 
-    /// Evaluates a tick, and returns the moment to hold until the next one, N m. Nowhere else is a
-    /// command limited.
+    /// Evaluates a tick, and returns the moment to hold until the next one, N m. Commands are
+    /// limited here alone, except that the inner law of [`Dlmpc`](crate::Dlmpc) limits its own too.
     fn update(
         &mut self,
         memory: &mut Self::Memory,

@@ -83,7 +83,7 @@ pub enum DesignError {
         value: f64,
     },
     /// A quantity is outside its range.
-    #[error("`{name}` = {value} must be at least {low} and below {high}")]
+    #[error("`{name}` = {value} must be at least {low} and {}", end(*high))]
     OutOfRange {
         /// Name of the setting.
         name: &'static str,
@@ -91,7 +91,8 @@ pub enum DesignError {
         value: f64,
         /// Smallest value that is allowed.
         low: f64,
-        /// Upper end of the range; it is not allowed itself.
+        /// Upper end of the range; it is not allowed itself. The largest number and infinity stand
+        /// for a range without end.
         high: f64,
     },
     /// The delay that a prediction compensates for is out of its range.
@@ -250,6 +251,11 @@ fn no_guarantee(error: &DesignError) -> String {
         lacks.join(" and "),
         accepted.join(", or ")
     )
+}
+
+/// Describes the upper end of a range, which is not part of it.
+fn end(high: f64) -> String {
+    if high < f64::MAX { format!("below {high}") } else { "finite".into() }
 }
 
 /// Returns the value rounded down to four digits after the point, so that the printed number is

@@ -32,12 +32,12 @@ pub(crate) fn text(kind: Kind) -> String {
             let mut schema = schema_of::<Study>(json!({
                 "extends": texts("Files that this one extends, relative to it; a later one has precedence over those before."),
                 "templates": {
-                    "description": "Tables by name, which items of lists build upon by `use`.",
+                    "description": "Tables by name, upon which other tables build by `use`.",
                     "type": "object",
                     "additionalProperties": { "type": "object" },
                 },
                 "lists": {
-                    "description": "Lists of rows by name: an item of a list stands for one for each row by `each`.",
+                    "description": "Lists of rows by name. A table with `each` stands for one table for each row of a list.",
                     "type": "object",
                     "additionalProperties": { "type": "array", "items": { "type": "object" } },
                 },
@@ -76,10 +76,10 @@ fn with_templates(schema: &mut Schema) {
     {
         properties.insert(
             "use".into(),
-            texts("Templates that this table builds upon, one table for each."),
+            texts("Names of templates that this table builds upon. It stands for one table for each of them."),
         );
         let each = json!({
-            "description": "A list of rows or its name: one table for each row, with the row's values for their names in braces.",
+            "description": "A list of rows, or its name. The table stands for one table for each row, with the row's values in the place of their names in braces.",
             "type": ["string", "array"],
             "items": { "type": "object" },
         });

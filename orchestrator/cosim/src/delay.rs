@@ -201,7 +201,8 @@ const TRANSPORT: &str = "actuation.delay";
 
 /// Returns one warning for each component whose law is designed for another delay than its feedback
 /// loop has. The loop's delay is its ticks times `step` (s), plus the transport delays of the other
-/// components on it. If there are several loops, the one with the longest delay counts.
+/// components on it. If there are several loops, the one with the longest delay counts; the warning
+/// says so if another one has the delay that the law is designed for.
 pub fn warnings(
     parts: &[Part],
     settings: &[Vec<Setting>],
@@ -214,6 +215,8 @@ pub fn warnings(
             continue;
         };
         let own = loops.iter().filter(|feedback| feedback.components.contains(&component));
+        let fits =
+            |delay: f64| (delay - counted_on).abs() <= 1e-9 * delay.abs().max(counted_on.abs());
         let delays = own.map(|feedback| {
             let others = feedback.components.iter().filter(|other| **other != component);
             let transport: f64 = others
@@ -221,12 +224,14 @@ pub fn warnings(
                 .sum();
             (feedback.ticks as f64 * step + transport, feedback)
         });
-        let Some((delay, longest)) = delays.max_by(|(a, _), (b, _)| a.total_cmp(b)) else {
-            continue;
+        let delays: Vec<_> = delays.collect();
+        let longest = delays.iter().max_by(|(a, _), (b, _)| a.total_cmp(b));
+        let Some(&(delay, longest)) = longest.filter(|(delay, _)| !fits(*delay)) else { continue };
+        let unless = if delays.iter().any(|(delay, _)| fits(*delay)) {
+            ", unless its measurements come through another of its loops, which has the delay that is set"
+        } else {
+            ""
         };
-        if (delay - counted_on).abs() <= 1e-9 * delay.abs().max(counted_on.abs()) {
-            continue;
-        }
         let names: Vec<&str> = longest
             .components
             .iter()
@@ -235,7 +240,7 @@ pub fn warnings(
             .collect();
         let (name, delay) = (part.name, rounded(delay));
         warnings.push(format!(
-            "{name}.{COUNTED_ON} = {counted_on} s, but the loop {} has a delay of {delay} s: set {name}.{COUNTED_ON} = {delay}",
+            "{name}.{COUNTED_ON} = {counted_on} s, but the loop {} has a delay of {delay} s: set {name}.{COUNTED_ON} = {delay}{unless}",
             names.join(" -> ")
         ));
     }

@@ -114,7 +114,8 @@ pub fn experiment(name: &Path) -> Result<PathBuf, Error> {
         return Ok(name.to_path_buf());
     }
     if extension == "ssp" || name.is_absolute() {
-        return Err(Error::experiment(format!("{shown}: there is no such file")));
+        let is_what = if name.is_dir() { "this is a folder" } else { "there is no such file" };
+        return Err(Error::experiment(format!("{shown}: {is_what}")));
     }
     let wanted = if extension == "toml" { name.to_path_buf() } else { with_toml(name) };
     if wanted.is_file() {

@@ -94,14 +94,16 @@ impl System {
         self.find(path).is_some()
     }
 
-    /// Returns whether one of the variables belongs to a unit that the command line replaced, so
-    /// that it may be missing.
-    pub fn is_exchanged<'a>(&self, paths: impl IntoIterator<Item = &'a str>) -> bool {
-        paths.into_iter().any(|path| {
-            let component =
-                names::split(path).and_then(|(name, _)| self.experiment.components.get(name));
-            component.is_some_and(|component| component.is_exchanged)
-        })
+    /// Returns whether some of the variables are missing, all of them because the command line
+    /// replaced their units.
+    pub fn lost_by_exchange<'a>(&self, paths: impl IntoIterator<Item = &'a str>) -> bool {
+        let is_exchanged = |path: &str| {
+            names::split(path)
+                .and_then(|(name, _)| self.experiment.components.get(name))
+                .is_some_and(|component| component.is_exchanged)
+        };
+        let mut missing = paths.into_iter().filter(|path| !self.has(path)).peekable();
+        missing.peek().is_some() && missing.all(is_exchanged)
     }
 
     /// Requests that a variable is seen at every communication point.

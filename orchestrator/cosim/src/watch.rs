@@ -1,11 +1,9 @@
 //! Watches the values that a unit gives. A value that is not finite, no item of its enumeration, or
 //! neither true nor false would otherwise spread through the loop and pass for a result.
 
-use fmu_import::description::Carrier;
-use fmu_import::description::{Kind, Variable};
+use fmu_import::description::{Carrier, Kind, Variable};
 use fmu_import::fmu::Fmu;
-use fmu_import::unit::UnitFailure;
-use fmu_import::unit::{CoSimulationUnit, Outcome};
+use fmu_import::unit::{CoSimulationUnit, Outcome, UnitFailure};
 use fmu_import::warnings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -7,6 +7,7 @@ use cosim::experiment::Guarantee;
 use cosim::master::{Observer, Sample};
 use cosim::signal::Resolved;
 use cosim::system::{Probed, System};
+use std::sync::Arc;
 
 /// Variables in which a unit reports whether its guarantee is in force.
 #[derive(Clone, Debug, Default)]
@@ -36,8 +37,9 @@ pub struct Loss {
 /// Course of the guarantee up to a tick.
 #[derive(Clone, Debug, Default)]
 pub struct Course {
-    /// Variables that the course is computed from.
-    pub signals: Signals,
+    /// Variables that the course is computed from. They are shared, because the live view copies
+    /// the course at every communication point.
+    pub signals: Arc<Signals>,
     ticks: u64,
     ticks_in_force: u64,
     status: Option<f64>,
@@ -64,12 +66,13 @@ impl Signals {
     /// # Errors
     /// Returns an error if a required variable does not exist.
     pub fn find(asked: &Guarantee, system: &mut System) -> Result<Option<Self>, String> {
-        let may_lack = asked.optional || system.is_exchanged([asked.in_force.as_str()]);
-        if may_lack && !system.has(&asked.in_force) {
+        let is_left_out = |path: &str, system: &System| {
+            asked.optional && !system.has(path) || system.lost_by_exchange([path])
+        };
+        if is_left_out(&asked.in_force, system) {
             return Ok(None);
         }
         let in_force = system.probe(&asked.in_force)?.place;
-        let is_left_out = |path: &str, system: &System| may_lack && !system.has(path);
         let mut signals = Self { in_force, ..Self::default() };
         if let Some(path) = asked.status.as_ref().filter(|path| !is_left_out(path, system)) {
             signals.status = Some(system.probe(path)?);
@@ -82,7 +85,7 @@ impl Signals {
         let observe = system.experiment.observe.clone();
         let keeps = asked.keeps.as_ref().map_or(Ok(&[][..]), |name| observe.list(name))?;
         for signal in keeps {
-            if signal.paths().into_iter().all(|path| !is_left_out(path, system)) {
+            if !system.lost_by_exchange(signal.paths()) {
                 signals.keeps.push(system.resolve(signal)?);
             }
         }
@@ -93,7 +96,8 @@ impl Signals {
 impl Course {
     /// Creates a course that has seen no samples.
     pub fn new(signals: Signals) -> Self {
-        Self { margins: vec![None; signals.margins.len()], signals, ..Self::default() }
+        let margins = vec![None; signals.margins.len()];
+        Self { margins, signals: Arc::new(signals), ..Self::default() }
     }
 
     /// Returns the share of the ticks at which the guarantee was in force; `None` before the first

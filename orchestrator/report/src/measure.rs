@@ -197,8 +197,8 @@ pub(crate) fn asked(
 ) -> Result<Option<Gauge>, String> {
     let signals = observe.list(measure.signals.get_ref())?;
     let paths = || signals.iter().flat_map(Signal::paths).chain(measure.each.as_deref());
-    let missing = paths().any(|path| !system.has(path));
-    if missing && (measure.optional || system.is_exchanged(paths())) {
+    let is_missing = paths().any(|path| !system.has(path));
+    if is_missing && measure.optional || system.lost_by_exchange(paths()) {
         return Ok(None);
     }
     Gauge::new(measure, signals, system).map(Some)

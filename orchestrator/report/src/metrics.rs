@@ -7,7 +7,7 @@ use cosim::error::Error;
 use cosim::experiment::{Guarantee, Observe};
 use cosim::master::{Observer, Sample};
 use cosim::pacing::report::RealTime;
-use cosim::signal::{Resolved, common_unit};
+use cosim::signal::{Resolved, Signal, common_unit};
 use cosim::system::System;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -61,6 +61,9 @@ pub struct Metrics {
 /// Names of the metrics that every run has.
 const ALWAYS: [&str; 6] =
     ["real_time_factor", "wall_s", "loop_delay_s", "samples", "completed", "lost_at"];
+
+/// Further names in `metrics.json`, which stand for more than one number.
+const TABLES: [&str; 2] = ["step_us", "real_time"];
 
 impl Metrics {
     /// Returns the names of the metrics that runs of an experiment have.
@@ -130,6 +133,8 @@ pub struct Meters {
 /// Bound beyond which a run counts as lost.
 struct Loss {
     what: String,
+    /// Name of the list of signals.
+    list: String,
     signals: Vec<Resolved>,
     beyond: f64,
     ends_run: bool,
@@ -147,9 +152,15 @@ impl Meters {
         if let Some(fault) = observe.fault() {
             return Err(Error::experiment(fault));
         }
+        let mut taken: Vec<String> =
+            ALWAYS.iter().chain(&TABLES).map(ToString::to_string).collect();
+        taken.extend(observe.guarantee.iter().flat_map(of_guarantee));
         let mut gauges = BTreeMap::new();
         for (name, measure) in &observe.metrics {
             let fault = |problem| Error::experiment(format!("[observe.metrics.{name}] {problem}"));
+            if taken.contains(name) {
+                return Err(fault("metrics.json has this name already: choose another".into()));
+            }
             gauges.insert(name.clone(), measure::asked(measure, &observe, system).map_err(fault)?);
         }
         let fault = |problem| Error::experiment(format!("[observe.guarantee] {problem}"));
@@ -162,15 +173,14 @@ impl Meters {
                 return Err(fault(format!("beyond = {}: above 0", loss.beyond)));
             }
             let signals = observe.list(&loss.signals).map_err(fault)?;
-            let (what, beyond) = (loss.what.clone(), loss.beyond);
-            let paths = || signals.iter().flat_map(cosim::signal::Signal::paths);
-            if system.is_exchanged(paths()) && paths().any(|path| !system.has(path)) {
+            let (what, list, beyond) = (loss.what.clone(), loss.signals.clone(), loss.beyond);
+            if system.lost_by_exchange(signals.iter().flat_map(Signal::paths)) {
                 return Ok(None);
             }
             let signals = signals.iter().map(|signal| system.resolve(signal));
             let signals: Vec<_> = signals.collect::<Result<_, _>>().map_err(fault)?;
             common_unit(&signals).map_err(fault)?;
-            Ok(Some(Loss { what, signals, beyond, ends_run: false, at: None }))
+            Ok(Some(Loss { what, list, signals, beyond, ends_run: false, at: None }))
         });
         let loss = loss.transpose()?.flatten();
         Ok(Self { gauges, guarantee: (guarantee, course), loss, samples: 0, completed: false })
@@ -262,10 +272,9 @@ impl Observer for Meters {
                 loss.at = Some(sample.time);
                 if loss.ends_run {
                     let unit = loss.signals.first().map_or("", |signal| &signal.unit);
-                    let reason = format!(
-                        "further than {} {unit} from its reference ([observe.loss])",
-                        loss.beyond
-                    );
+                    let Loss { list, beyond, .. } = loss;
+                    let reason =
+                        format!("the norm of \"{list}\" exceeds {beyond} {unit} ([observe.loss])");
                     return Err(Error::Lost { what: loss.what.clone(), time: sample.time, reason });
                 }
             }

@@ -54,9 +54,7 @@ impl Panel {
 
     fn find(asked: &experiment::Panel, system: &mut System) -> Result<Self, String> {
         let mut found = |signal: &Signal| {
-            if system.is_exchanged(signal.paths())
-                && signal.paths().iter().any(|path| !system.has(path))
-            {
+            if system.lost_by_exchange(signal.paths()) {
                 return Ok(None);
             }
             system.resolve(signal).map(Some)

@@ -97,6 +97,16 @@ none = { kind = "mean", signals = "none", optional = true }
         ),
         ("steps = true", "every = 0", "[observe.metrics.mean_square] every = 0: at least 1"),
         (
+            "ratio = { kind",
+            "samples = { kind",
+            "[observe.metrics.samples] metrics.json has this name already",
+        ),
+        (
+            "ratio = { kind",
+            "ratio = { id = \"share\", kind",
+            "[observe.metrics.ratio] id = \"share\": the key is the name",
+        ),
+        (
             "reference = \"plant.",
             "reference = \"plan.",
             "\"signals\": there is no variable \"plan.output.integral\"",
@@ -105,6 +115,15 @@ none = { kind = "mean", signals = "none", optional = true }
         let message = observed(&section.replacen(from, to, 1)).refusal(&[]);
         assert!(message.contains(said), "{message}");
     }
+    // A unit of the command line may lack variables of its own, but not those of others.
+    let wrong = section.replace("/ plant.output.integral", "/ plant.output.integal");
+    let message = observed(&wrong).refusal(&["--fmu", "gain=Unit.fmu"]);
+    assert!(message.contains("there is no variable \"plant.output.integal\""), "{message}");
+    let own = section.replace("\"gain.output.direct /", "\"gain.output.dirct /");
+    let bench = observed(&own);
+    let (code, _, errors) = bench.run(&["--fmu", "gain=Unit.fmu"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(bench.json("out/loop/metrics.json")["ratio"].is_null());
 }
 
 #[test]

@@ -146,7 +146,8 @@ fn the_longest_loop_counts_and_what_is_on_no_loop_does_not() {
     let warnings = warnings(&parts, &none, &loops, 0.5);
     assert_eq!(
         warnings,
-        ["c.delay = 0 s, but the loop c -> c -> c has a delay of 0.5 s: set c.delay = 0.5"]
+        ["c.delay = 0 s, but the loop c -> c -> c has a delay of 0.5 s: set c.delay = 0.5, \
+          unless its measurements come through another of its loops, which has the delay that is set"]
     );
 }
 

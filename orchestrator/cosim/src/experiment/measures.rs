@@ -54,7 +54,7 @@ pub struct Measure {
     /// has grown.
     #[serde(default)]
     pub each: Option<String>,
-    /// Use of every n-th communication point only, counted from the start.
+    /// Number n, if only every n-th communication point is used, counted from the start.
     #[serde(default = "super::one")]
     pub every: u32,
     /// Whether only those communication points are used at which a step begins, which are all but
@@ -140,7 +140,7 @@ pub struct Guarantee {
     /// does, the guarantee is broken.
     #[serde(default)]
     pub keeps: Option<String>,
-    /// Whether the units may lack these variables.
+    /// Whether the units may lack `in_force`, `status` and the margins.
     #[serde(default)]
     pub optional: bool,
 }
@@ -211,7 +211,8 @@ impl Observe {
         }
     }
 
-    /// Describes a metric that the summary or another metric names and that is not there.
+    /// Describes a metric with an id of its own, or one that the summary or another metric names
+    /// and that is not there.
     pub fn fault(&self) -> Option<String> {
         let unknown = |place: &str, name: &String| {
             let hint = hint(name, self.metrics.keys());
@@ -221,8 +222,14 @@ impl Observe {
         let limit = |(name, measure): (&String, &Measure)| {
             unknown(&format!("[observe.metrics.{name}] limit"), measure.limit.as_ref()?)
         };
+        let id = |(name, measure): (&String, &Measure)| {
+            (!measure.id.is_empty()).then(|| {
+                format!("[observe.metrics.{name}] id = \"{}\": the key is the name", measure.id)
+            })
+        };
         let mut summary = self.summary.iter().filter_map(|name| unknown("[observe] summary", name));
-        summary.next().or_else(|| self.metrics.iter().find_map(limit))
+        let metrics = || self.metrics.iter();
+        summary.next().or_else(|| metrics().find_map(limit)).or_else(|| metrics().find_map(id))
     }
 }
 

@@ -23,6 +23,7 @@ fn meters() -> Meters {
     ];
     let loss = Loss {
         what: "attitude".into(),
+        list: "error".into(),
         signals: errors(),
         beyond: 5.5_f64.to_degrees(),
         ends_run: false,
@@ -90,7 +91,9 @@ fn a_run_is_lost_beyond_its_bound_or_where_the_signal_is_no_number() {
     let error = ending.observe(&sample).unwrap_err();
     assert_eq!(error.exit_code(), 3);
     assert!(
-        error.to_string().starts_with("attitude lost at t = 0.3 s: further than 315.1"),
+        error
+            .to_string()
+            .starts_with("attitude lost at t = 0.3 s: the norm of \"error\" exceeds 315.1"),
         "{error}"
     );
 }

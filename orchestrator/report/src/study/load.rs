@@ -131,8 +131,16 @@ impl Study {
         for within in &self.within {
             self.number(&within.bound)?;
         }
-        for measure in &self.measures {
-            if let Some(fault) = measure.fault() {
+        for (place, measure) in self.measures.iter().enumerate() {
+            let id = &measure.id;
+            let fault = match measure.fault() {
+                _ if id.is_empty() => Some("a measure of a study needs an id".into()),
+                _ if self.measures[..place].iter().any(|other| other.id == *id) => {
+                    Some("there is another measure of that id".into())
+                }
+                fault => fault,
+            };
+            if let Some(fault) = fault {
                 let fault = format!("[[measure]] id = \"{}\": {fault}", measure.id);
                 return Err(self.source.error(&(0..0), fault));
             }
@@ -184,5 +192,29 @@ impl Study {
             self.number(quantity)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measures_of_a_study_have_ids_of_their_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("study.toml");
+        let head =
+            "title = \"\"\npaper = \"\"\nsummary = \"\"\nvalues = []\n[signals]\nx = [\"a.b\"]\n";
+        let loaded = |measures: &[&str]| {
+            let measure =
+                |id: &&str| format!("[[measure]]\n{id}\nkind = \"rms\"\nsignals = \"x\"\n");
+            let text = measures.iter().map(measure).fold(head.to_string(), |all, one| all + &one);
+            std::fs::write(&path, text).unwrap();
+            Study::load(&path).map_err(|error| error.to_string())
+        };
+        assert!(loaded(&["id = \"a\"", "id = \"b\""]).is_ok());
+        assert!(loaded(&[""]).unwrap_err().contains("needs an id"));
+        let twice = loaded(&["id = \"a\"", "id = \"a\""]).unwrap_err();
+        assert!(twice.contains("\"a\": there is another measure of that id"), "{twice}");
     }
 }
