@@ -18,7 +18,10 @@ def hint(wrong: str, known: Iterable[str]) -> str:
     """Ends a message about an unknown name with the nearest right one, or with all of them."""
     names = list(known)
     by_case = {name.lower(): name for name in names}
-    near = get_close_matches(wrong.lower(), by_case, n=1)
+    wrong = wrong.lower()
+    near = get_close_matches(wrong, by_case, n=1)
+    if not near and len(wrong) > 2:
+        near = [name for name in by_case if wrong in name]
     if near:
         return f'; did you mean "{by_case[near[0]]}"?'
     listed = ", ".join(names[:12]) + (", …" if len(names) > 12 else "")

@@ -165,9 +165,9 @@ def read(folder: Path, units: Units) -> Run:
     for column in columns:
         name = column["name"]
         if column["items"]:
-            items = {value: item for item, value in column["items"].items()}
-            labels = pd.Categorical(table[name].map(items), categories=list(items.values()))
-            table[name] = pd.Series(labels, index=table.index)
+            items = {int(value): item for value, item in column["items"].items()}
+            values = table[name].astype(np.int64).map(items)
+            table[name] = pd.Categorical(values, categories=list(items.values()))
         elif column["type"] != "Real":
             table[name] = table[name].astype(bool if column["type"] == "Boolean" else np.int64)
     convert(table, units)

@@ -178,7 +178,7 @@ class ClosedLoop:
                 With a controller it must be left out.
 
         Raises:
-            ValueError: The moment has another shape, or the loop is closed.
+            ValueError: The moment is not three finite numbers, or the loop is closed.
             TypeError: A moment is missing, or is given although there is a controller.
             UnitError: A unit refused the moment or the step. `reset` makes the loop usable again.
         """
@@ -188,11 +188,7 @@ class ClosedLoop:
         if moment is not None:
             if self._has_controller:
                 raise TypeError(f"the moment comes from {self._controller.name}: leave it out")
-            given = np.asarray(moment, dtype=np.float64)
-            if given.shape != (3,):
-                shape = f"the moment has the shape {given.shape}"
-                raise ValueError(f"{shape}, but (3,) is needed: x, y, z in N m")
-            self._moment = given.tolist()
+            self._moment = vector(moment).tolist()
             self._plant.set_reals(self._to_plant, self._moment)
         now = self._tick * self._step
         self._controller.step(now, self._step)
@@ -240,11 +236,7 @@ class ClosedLoop:
             if k > 0:
                 self.step(None if law is None else rows[-1][-3:])
             state = self._state
-            moment = state.moment if law is None else np.asarray(law(state), dtype=np.float64)
-            if moment.shape != (3,):
-                raise ValueError(
-                    f"the law gives a moment of the shape {moment.shape}, but (3,) is needed"
-                )
+            moment = state.moment if law is None else vector(law(state))
             rows.append(
                 [
                     state.time,
@@ -338,6 +330,19 @@ class ClosedLoop:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def vector(moment: npt.ArrayLike) -> Vector:
+    """Checks a moment and returns it as an array of the shape (3,)."""
+    try:
+        given = np.asarray(moment, dtype=np.float64)
+    except (TypeError, ValueError):
+        given = np.array(np.nan)
+    if given.shape != (3,) or not np.isfinite(given).all():
+        raise ValueError(
+            f"a moment is three finite numbers, x, y and z in N m, but this is {moment!r}"
+        )
+    return given
 
 
 def split(parameters: Mapping[str, Value], has_controller: bool) -> dict[str, dict[str, Value]]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import fmpy
 from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
 
 from ._data import hint
 
@@ -22,7 +23,7 @@ class UnitError(RuntimeError):
     """A unit refused a call. The text is the unit's own."""
 
     def __init__(self, unit: str, call: str, message: str) -> None:
-        super().__init__(f"{unit}: {message} ({call})")
+        super().__init__(f"{unit}: {message}")
         self.unit = unit
         """Name of the unit."""
         self.call = call
@@ -94,7 +95,7 @@ class Unit:
         self._messages.clear()
         try:
             result = function(*arguments, **named)
-        except fmi2.FMICallException as error:
+        except FMICallException as error:
             raise UnitError(self.name, error.function, self._said(str(error))) from None
         for status, message in self._messages:
             if status == fmi2.fmi2Warning:
@@ -171,7 +172,7 @@ class Unit:
         unit = f" in {variable.unit}" if getattr(variable, "unit", None) else ""
         try:
             number = float(value)
-        except ValueError:
+        except (TypeError, ValueError):
             raise TypeError(f"{wants} a number{unit}, not {value!r}") from None
         if variable.type == "Real":
             return number
