@@ -1,5 +1,6 @@
 """The Python package: the wheel of this machine is built, installed without a compiler into fresh
-environments of the oldest and the newest Python that are found, and tested there by python/tests."""
+environments of the oldest and the newest Python that are found, and tested there by
+python/tests."""
 
 from __future__ import annotations
 
@@ -82,7 +83,9 @@ def test_the_wheel_holds_what_it_should(wheel):
             assert content.read(stored) == path.read_bytes()
         (information,) = [n.removesuffix("/METADATA") for n in names if n.endswith("/METADATA")]
         for licence in ("LICENSE-MIT", "LICENSE-APACHE"):
-            assert content.read(f"{information}/licenses/{licence}") == (ROOT / licence).read_bytes()
+            assert (
+                content.read(f"{information}/licenses/{licence}") == (ROOT / licence).read_bytes()
+            )
         metadata = content.read(f"{information}/METADATA").decode()
         assert f"{PACKAGE}/py.typed" in names
         assert "Root-Is-Purelib: false" in content.read(f"{information}/WHEEL").decode()
@@ -103,7 +106,9 @@ def test_the_same_inputs_give_the_same_bytes(wheel, tmp_path):
     with zipfile.ZipFile(later) as content:
         times = {entry.date_time for entry in content.infolist()}
     assert times == {(2023, 11, 14, 22, 13, 20)}
-    assert later.read_bytes() == made(units, tmp_path / "later again", epoch="1700000000").read_bytes()
+    assert (
+        later.read_bytes() == made(units, tmp_path / "later again", epoch="1700000000").read_bytes()
+    )
 
 
 @pytest.mark.parametrize(
@@ -165,7 +170,9 @@ class Installed:
         unset = {"PYTHONPATH", "ORCHESTRATOR_PATH", "CC", "CXX"}
         self.environment = {k: v for k, v in os.environ.items() if k not in unset}
         self.environment["PATH"] = str(scripts)
-        assert not any(shutil.which(name, path=str(scripts)) for name in ("cc", "gcc", "clang", "cl"))
+        assert not any(
+            shutil.which(name, path=str(scripts)) for name in ("cc", "gcc", "clang", "cl")
+        )
         constraints = folder / "constraints.txt"
         constraints.write_text(self._lowest(wheel) if lowest else "")
         install = [self.python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:"]
@@ -177,12 +184,16 @@ class Installed:
     def _lowest(wheel: Path) -> str:
         with zipfile.ZipFile(wheel) as content:
             (metadata,) = [n for n in content.namelist() if n.endswith(".dist-info/METADATA")]
-            needed = re.findall(r"^Requires-Dist: (\w+)>=(\S+)$", content.read(metadata).decode(), re.M)
+            needed = re.findall(
+                r"^Requires-Dist: (\w+)>=(\S+)$", content.read(metadata).decode(), re.M
+            )
         assert [name for name, _ in needed] == ["fmpy", "numpy", "pandas"]
         return "\n".join(f"{name}=={version}" for name, version in needed)
 
     def run(self, command: list, folder: Path | None = None) -> str:
-        done = subprocess.run(command, cwd=folder, env=self.environment, capture_output=True, text=True)
+        done = subprocess.run(
+            command, cwd=folder, env=self.environment, capture_output=True, text=True
+        )
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout
 
@@ -198,7 +209,9 @@ def test_the_package_works_where_it_is_installed(which, wheel, tmp_path):
     installed = Installed(interpreter, tmp_path / "venv", wheel, lowest)
     outside = tmp_path / "outside"
     outside.mkdir()
-    said = installed.run([installed.python, "-m", "pytest", "-q", "-p", "no:cacheprovider", TESTS], outside)
+    said = installed.run(
+        [installed.python, "-m", "pytest", "-q", "-p", "no:cacheprovider", TESTS], outside
+    )
     passed = re.search(r"(\d+) passed", said)
     assert passed and int(passed[1]) >= 79, said
 
@@ -215,7 +228,9 @@ def site(wheel, tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "python" / "examples").glob("*.ipynb")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "python" / "examples").glob("*.ipynb")), ids=lambda path: path.stem
+)
 def test_the_notebooks_run(path, site, tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(site))
     notebook = nbformat.read(path, as_version=4)
@@ -226,8 +241,12 @@ def test_the_notebooks_run(path, site, tmp_path, monkeypatch):
     texts = "".join(output.get("text", "") for output in outputs)
     pictures = [output for output in outputs if "image/png" in output.get("data", {})]
     assert "PD: EMS 2.7" in texts and "CRMPC: EMS 2.0" in texts
-    assert len(pictures) == 2 and any("image/svg+xml" in output.get("data", {}) for output in outputs)
+    assert len(pictures) == 2 and any(
+        "image/svg+xml" in output.get("data", {}) for output in outputs
+    )
 
 
 def test_there_is_a_notebook():
-    assert [path.name for path in (ROOT / "python" / "examples").iterdir()] == ["own_controller.ipynb"]
+    assert [path.name for path in (ROOT / "python" / "examples").iterdir()] == [
+        "own_controller.ipynb"
+    ]

@@ -1,5 +1,5 @@
-"""Tests of the installed package. tests/test_wheel.py installs the wheel into fresh environments and
-runs them there; they start in a folder outside the project."""
+"""Tests of the installed package. tests/test_wheel.py installs the wheel into fresh environments
+and runs them there; they start in a folder outside the project."""
 
 import sys
 import tempfile

@@ -59,7 +59,9 @@ def test_a_run_is_a_table_with_figures_of_merit():
 def test_oracle_metrics_follow_from_the_table():
     run = experiment("lqr")
     axes = ("alpha", "beta", "sigma")
-    error = [run.table[f"plant.attitude.{a}"] - run.table[f"controller.reference.{a}"] for a in axes]
+    error = [
+        run.table[f"plant.attitude.{a}"] - run.table[f"controller.reference.{a}"] for a in axes
+    ]
     squares = np.square(error).sum(axis=0)[:-1]
     ems = np.degrees(np.sqrt(squares.mean()))
     assert run.metrics["ems_deg"] == pytest.approx(ems, rel=1e-12)
@@ -282,7 +284,9 @@ ClosedLoop().run(1.0, lambda state: state.atitude)
     right = subprocess.run([*mypy, "right.py"], cwd=tmp_path, capture_output=True, text=True)
     assert right.returncode == 0, right.stdout
     wrong = subprocess.run([*mypy, "wrong.py"], cwd=tmp_path, capture_output=True, text=True)
-    faults = [line.partition(": error")[0] for line in wrong.stdout.splitlines() if ": error" in line]
+    faults = [
+        line.partition(": error")[0] for line in wrong.stdout.splitlines() if ": error" in line
+    ]
     assert faults == [f"wrong.py:{line}" for line in range(3, 8)], wrong.stdout
     package = [*mypy, "--package", "reentry_fmus", "--config-file", tmp_path / "mypy.ini"]
     (tmp_path / "mypy.ini").write_text("[mypy]\n[mypy-fmpy.*]\nignore_missing_imports = true\n")

@@ -188,7 +188,7 @@ def test_nothing_is_left_behind(temporary):
         ),
         (
             {"parameters": {"plant.disturbance.kind": "wite"}},
-            'disturbance.kind wants one of its items, not \'wite\'; did you mean "white"?',
+            "disturbance.kind wants one of its items, not 'wite'; did you mean \"white\"?",
         ),
         (
             {"parameters": {"plant.disturbance.bound": "2 deg/s2"}},

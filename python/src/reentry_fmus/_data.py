@@ -88,7 +88,7 @@ def experiments() -> dict[str, str]:
     stems = [name.rpartition("/")[2] for name in titles]
     return {
         stem if stems.count(stem) == 1 else name: title
-        for stem, (name, title) in zip(stems, titles.items())
+        for stem, (name, title) in zip(stems, titles.items(), strict=True)
     }
 
 

@@ -288,8 +288,9 @@ class ClosedLoop:
         components = {"plant": self._plant, "controller": self._controller}
         component, _, variable = name.partition(".")
         if component not in components:
-            raise ValueError(f'{name}: there is no component "{component}"'
-                             f"{hint(component, components)}")
+            raise ValueError(
+                f'{name}: there is no component "{component}"{hint(component, components)}'
+            )
         return components[component], variable
 
     def reset(self, parameters: Mapping[str, Value] | None = None) -> State:
@@ -351,9 +352,7 @@ def split(parameters: Mapping[str, Value], has_controller: bool) -> dict[str, di
     for name, value in parameters.items():
         component, _, variable = name.partition(".")
         if component not in own:
-            raise ValueError(
-                f'{name}: there is no component "{component}"{hint(component, own)}'
-            )
+            raise ValueError(f'{name}: there is no component "{component}"{hint(component, own)}')
         if component == "controller" and not has_controller:
             if not variable.startswith("reference."):
                 raise ValueError(f"{name}: the loop has no controller, only a reference")

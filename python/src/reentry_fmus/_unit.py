@@ -137,9 +137,7 @@ class Unit:
         number = int(self._call(self._slave.getInteger, references)[0])
         if variable.type == "Enumeration":
             return next(
-                str(item.name)
-                for item in variable.declaredType.items
-                if int(item.value) == number
+                str(item.name) for item in variable.declaredType.items if int(item.value) == number
             )
         return number
 
@@ -159,7 +157,9 @@ class Unit:
         if variable.type == "Enumeration":
             items = {str(item.name): int(item.value) for item in variable.declaredType.items}
             if value not in items:
-                raise ValueError(f"{wants} one of its items, not {value!r}{hint(str(value), items)}")
+                raise ValueError(
+                    f"{wants} one of its items, not {value!r}{hint(str(value), items)}"
+                )
             return items[str(value)]
         if variable.type == "String":
             if isinstance(value, str):
@@ -205,9 +205,7 @@ class Unit:
 
     def step(self, time: float, step: float) -> None:
         """Advances by one communication step, s."""
-        self._call(
-            self._slave.doStep, currentCommunicationPoint=time, communicationStepSize=step
-        )
+        self._call(self._slave.doStep, currentCommunicationPoint=time, communicationStepSize=step)
 
     def reset(self, parameters: Mapping[str, Value]) -> None:
         """Makes the instance new. FMI resets parameters to their start values, so they are set
