@@ -1,6 +1,7 @@
 """Tests of the installed package. tests/test_wheel.py installs the wheel into fresh environments
 and runs them there; they start in a folder outside the project."""
 
+import gc
 import sys
 import tempfile
 from pathlib import Path
@@ -16,11 +17,14 @@ PAGES = [ROOT / "docs" / "python.md", ROOT / "python" / "README.md"]
 
 @pytest.fixture
 def temporary(tmp_path, monkeypatch):
-    """Folder in which temporary files and folders are made."""
+    """Folder in which temporary files and folders are made. The collector of garbage, which would
+    tidy up some time later, is off."""
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    return folder
+    gc.disable()
+    yield folder
+    gc.enable()
 
 
 def pytest_report_header():

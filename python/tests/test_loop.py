@@ -1,6 +1,5 @@
 """ClosedLoop against the orchestrator, and what it refuses."""
 
-import gc
 import math
 import warnings
 
@@ -168,7 +167,6 @@ def test_nothing_is_left_behind(temporary):
     ]:
         with pytest.raises((ValueError, UnitError)):
             ClosedLoop(**arguments)
-        gc.collect()
         assert not list(temporary.iterdir()), arguments
     loop.close()
 
