@@ -1,0 +1,106 @@
+"""What the wheel contains besides Python: the units, the orchestrator and its experiments."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from collections.abc import Iterable
+from difflib import get_close_matches
+from pathlib import Path
+
+DATA = Path(__file__).parent / "data"
+UNITS = DATA / "fmu"
+EXPERIMENTS = DATA / "experiments"
+
+
+def hint(wrong: str, known: Iterable[str]) -> str:
+    """Ends a message about an unknown name with the nearest right one, or with all of them."""
+    names = list(known)
+    by_case = {name.lower(): name for name in names}
+    wrong = wrong.lower()
+    near = get_close_matches(wrong, by_case, n=1)
+    if not near and len(wrong) > 2:
+        near = [name for name in by_case if wrong in name]
+    if near:
+        return f'; did you mean "{by_case[near[0]]}"?'
+    listed = ", ".join(names[:12]) + (", …" if len(names) > 12 else "")
+    return f"; there are: {listed}"
+
+
+def units() -> list[str]:
+    """Returns the names of the units, in alphabetical order.
+
+    >>> units()[:3]
+    ['AttitudeEstimator', 'BTVSMC', 'BTVSMC_DO']
+    """
+    return sorted((path.stem for path in UNITS.glob("*.fmu")), key=str.lower)
+
+
+def fmu(name: str) -> Path:
+    """Returns the path of a unit (an FMI 2.0 archive) by its name.
+
+    >>> fmu("CRMPC").name
+    'CRMPC.fmu'
+    >>> fmu("CRPMC")
+    Traceback (most recent call last):
+        ...
+    ValueError: there is no unit "CRPMC"; did you mean "CRMPC"?
+
+    Raises:
+        ValueError: there is no unit of this name. The message gives the nearest one.
+    """
+    known = units()
+    if name not in known:
+        raise ValueError(f'there is no unit "{name}"{hint(name, known)}')
+    return UNITS / f"{name}.fmu"
+
+
+def unit_path(unit: str | os.PathLike[str]) -> Path:
+    """Returns the path of a unit that is given by its name or as a file."""
+    path = Path(unit)
+    if path.suffix != ".fmu":
+        return fmu(str(unit))
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: there is no such unit")
+    return path.absolute()
+
+
+def program() -> Path:
+    """Returns the path of the orchestrator, an executable file."""
+    return DATA / ("orchestrator.exe" if os.name == "nt" else "orchestrator")
+
+
+def experiments() -> dict[str, str]:
+    """Returns the experiments that the package contains, as titles by name. A name that several
+    papers use is preceded by its folder.
+
+    >>> experiments()["lqr"]
+    'LQR, scenario of Chai 2022'
+    """
+    command = [str(program()), "list", str(EXPERIMENTS)]
+    listed = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=True)
+    section = listed.stdout.partition("\nstudies (")[0]
+    titles = {
+        Path(path).relative_to(EXPERIMENTS).with_suffix("").as_posix(): title
+        for path, title in re.findall(r"^  (.+?\.toml) +(.+)$", section, re.MULTILINE)
+    }
+    stems = [name.rpartition("/")[2] for name in titles]
+    return {
+        stem if stems.count(stem) == 1 else name: title
+        for stem, (name, title) in zip(stems, titles.items(), strict=True)
+    }
+
+
+def experiment_path(experiment: str | os.PathLike[str]) -> str:
+    """Returns the file of an experiment of this package, or else what was given, of which the
+    orchestrator knows what it is."""
+    if Path(experiment).is_file():
+        return str(Path(experiment).absolute())
+    wanted = os.fspath(experiment).removesuffix(".toml") + ".toml"
+    found = [
+        path
+        for path in EXPERIMENTS.rglob("*.toml")
+        if path.as_posix().endswith(f"/{wanted}") and path.name != "study.toml"
+    ]
+    return str(found[0]) if len(found) == 1 else os.fspath(experiment)

@@ -1,0 +1,31 @@
+"""Tests of the installed package. tests/test_wheel.py installs the wheel into fresh environments
+and runs them there; they start in a folder outside the project."""
+
+import gc
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+import reentry_fmus
+
+ROOT = Path(__file__).resolve().parents[2]
+assert ROOT / "python" / "src" not in Path(reentry_fmus.__file__).parents, "install the wheel"
+# The pages are checked as they are in the repository.
+PAGES = [ROOT / "docs" / "python.md", ROOT / "python" / "README.md"]
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """Folder in which temporary files and folders are made. The collector of garbage, which would
+    tidy up some time later, is off."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    gc.disable()
+    yield folder
+    gc.enable()
+
+
+def pytest_report_header():
+    return f"{Path(reentry_fmus.__file__).parent} on Python {sys.version}"

@@ -1,0 +1,294 @@
+"""Units, experiments, and the command."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pandas as pd
+import pytest
+from reentry_fmus import OrchestratorError, OrchestratorWarning, experiment, experiments, fmu, units
+
+COMMAND = Path(sysconfig.get_path("scripts"), "orchestrator" + (".exe" if os.name == "nt" else ""))
+ALPHA = "plant.attitude.alpha"
+
+
+def test_every_unit_is_there_and_simulates():
+    names = "AttitudeEstimator BTVSMC BTVSMC_DO ControlAllocator CRMPC DLMPC FBL LQR ReentryPlant"
+    assert units() == [*names.split(), "SOTVSMC_DO", "TwoLoopSMC"]
+    for name in units():
+        assert fmpy.read_model_description(str(fmu(name))).modelName == name
+        result = fmpy.simulate_fmu(str(fmu(name)), stop_time=0.2, output_interval=0.04)
+        assert len(result) == 6
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("CRPMC", 'there is no unit "CRPMC"; did you mean "CRMPC"?'),
+        ("plant", 'there is no unit "plant"; did you mean "ReentryPlant"?'),
+        ("xyz", 'there is no unit "xyz"; there are: AttitudeEstimator, BTVSMC'),
+        ("", 'there is no unit ""; there are: AttitudeEstimator, BTVSMC'),
+        ("../fmu/CRMPC", 'there is no unit "../fmu/CRMPC"; there are: AttitudeEstimator, BTVSMC'),
+    ],
+)
+def test_unknown_units_are_refused_with_the_nearest_name(name, message):
+    with pytest.raises(ValueError) as caught:
+        fmu(name)
+    assert str(caught.value).startswith(message)
+
+
+def test_a_run_is_a_table_with_figures_of_merit():
+    run = experiment("crmpc-robust")
+    assert run.table.shape[0] == 1251 and run.table.index.name == "time"
+    assert run.table.index[-1] == 50.0
+    assert run.metrics["completed"] and run.metrics["fallbacks"] == 0
+    assert run.metrics["max_rate_deg_s"] < run.metrics["rate_limit_deg_s"] == 5.0
+    assert run.figure.startswith("<svg") and run.figure._repr_svg_() == run._repr_svg_()
+    assert run.description["seeds"]["plant.disturbance.seed"] == 1
+    assert set(run.table.attrs["units"]) == set(run.table.columns)
+    assert run.table.attrs["units"][ALPHA] == "rad"
+    assert run.table.attrs["descriptions"][ALPHA] == "Angle of attack"
+
+
+def test_oracle_metrics_follow_from_the_table():
+    run = experiment("lqr")
+    axes = ("alpha", "beta", "sigma")
+    error = [
+        run.table[f"plant.attitude.{a}"] - run.table[f"controller.reference.{a}"] for a in axes
+    ]
+    squares = np.square(error).sum(axis=0)[:-1]
+    ems = np.degrees(np.sqrt(squares.mean()))
+    assert run.metrics["ems_deg"] == pytest.approx(ems, rel=1e-12)
+
+
+def test_enumerations_are_categoricals_of_their_items():
+    table = experiment("crmpc-robust", stop=2.0).table
+    status = table["controller.solver.status"]
+    assert isinstance(status.dtype, pd.CategoricalDtype)
+    assert "fallback" in status.cat.categories and set(status) <= {"unconstrained", "constrained"}
+    assert status.index.equals(table.index)
+    assert table["controller.solver.iterations"].dtype == np.int64
+
+
+def test_degrees_are_for_reading():
+    si, deg = experiment("lqr", stop=1.0).table, experiment("lqr", stop=1.0, units="deg").table
+    assert np.allclose(deg[ALPHA], np.degrees(si[ALPHA]), rtol=1e-15)
+    assert deg["controller.moment.x"].equals(si["controller.moment.x"])
+    found = {unit for unit in deg.attrs["units"].values() if unit}
+    assert {"deg", "deg/s", "N.m"} <= found and not [u for u in found if u.startswith("rad")]
+
+
+def test_parameters_are_set():
+    quiet = {"plant.disturbance.kind": "none", "controller.saturation": True}
+    run = experiment("lqr", set={**quiet, "plant.inertia.scale": np.float64(1.0)}, stop=1.0)
+    parameters = run.description["components"]
+    assert parameters["plant"]["parameters"]["disturbance.kind"] == "none"
+    assert parameters["plant"]["parameters"]["inertia.scale"] == 1.0
+    assert parameters["controller"]["parameters"]["saturation"] is True
+    by_seed = [
+        experiment("lqr", set={"plant.disturbance.seed": seed}, stop=1.0).table
+        for seed in (1, np.int64(7), 7)
+    ]
+    assert not by_seed[0].equals(by_seed[1]) and by_seed[1].equals(by_seed[2])
+
+
+def test_step_and_units_are_chosen(tmp_path):
+    assert experiment("lqr", stop=1.0, step=0.02).table.shape[0] == 51
+    copy = tmp_path / "My law.fmu"
+    shutil.copy(fmu("FBL"), copy)
+    by_name, by_path = (
+        experiment("lqr", fmu={"controller": unit}, stop=1.0).table for unit in ("FBL", copy)
+    )
+    assert by_name.equals(by_path) and not by_name.equals(experiment("lqr", stop=1.0).table)
+
+
+@pytest.mark.filterwarnings("ignore::reentry_fmus.OrchestratorWarning")
+def test_every_experiment_runs():
+    assert len(experiments()) == 20
+    assert experiments()["crmpc-robust"].startswith("CRMPC, robust constraint sets")
+    for name in experiments():
+        assert experiment(name, stop=1.0).metrics["completed"], name
+
+
+def test_an_experiment_may_be_a_file(tmp_path, monkeypatch):
+    show = [COMMAND, "show", "lqr"]
+    text = subprocess.run(show, capture_output=True, text=True, check=True).stdout
+    (tmp_path / "mine.toml").write_text(text)
+    usual = experiment("lqr", stop=1.0).table
+    monkeypatch.chdir(tmp_path)
+    for name in (tmp_path / "mine.toml", "mine.toml", "mine"):
+        assert experiment(name, stop=1.0).table.equals(usual)
+
+
+def test_files_are_kept_where_they_are_wanted(tmp_path, temporary):
+    experiment("lqr", stop=1.0)
+    assert not list(temporary.iterdir())
+    experiment("lqr", stop=1.0, out=tmp_path / "out")
+    experiment("lqr", stop=2.0, out=tmp_path / "out")
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert metrics["samples"] == 51
+    # Results of an earlier run do not pass for those of one that was refused.
+    with pytest.raises(OrchestratorError) as caught:
+        experiment("lqr", stop=-1.0, out=tmp_path / "out")
+    assert caught.value.run is None
+
+
+def test_the_units_are_those_of_the_package(tmp_path, monkeypatch):
+    """A folder with other units and experiments of the same names changes nothing."""
+    usual = experiment("lqr", stop=1.0).table
+    for folder in ("target/fmu", "orchestrator/experiments"):
+        (tmp_path / folder).mkdir(parents=True)
+    shutil.copy(fmu("FBL"), tmp_path / "target" / "fmu" / "LQR.fmu")
+    (tmp_path / "orchestrator" / "experiments" / "lqr.toml").write_text("title = 1")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ORCHESTRATOR_PATH", str(tmp_path / "target" / "fmu"))
+    assert experiment("lqr", stop=1.0).table.equals(usual)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "message"),
+    [
+        ("crmpc-robus", {}, 'no experiment "crmpc-robus"'),
+        ("crmpc-robus", {}, 'did you mean "crmpc-robust"?'),
+        ("allocated", {}, "several experiments are called allocated"),
+        ("lqr", {"set": {"plant.disturbance.bund": 1}}, 'did you mean "plant.disturbance.bound"?'),
+        ("lqr", {"set": {"plant.disturbance.bound": "1 kg"}}, "kg"),
+        ("lqr", {"stop": -1.0}, "must be at least one step"),
+        ("lqr", {"fmu": {"contoller": "LQR"}}, 'there is no component "contoller"'),
+    ],
+)
+def test_the_orchestrators_errors_are_exceptions(name, arguments, message):
+    with pytest.raises(OrchestratorError) as caught:
+        experiment(name, **arguments)
+    assert message in str(caught.value)
+    assert not str(caught.value).startswith("error")
+    assert caught.value.exit_code == 2 and caught.value.run is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"units": "grad"}, '"si" or "deg"'),
+        ({"set": {"plant.disturbance.bound": [1.0]}}, "not list"),
+        ({"set": {"plant.disturbance.bound": None}}, "not NoneType"),
+        ({"fmu": {"controller": "LQQ"}}, 'did you mean "LQR"?'),
+        ({"fmu": {"controller": "nowhere.fmu"}}, "nowhere.fmu: there is no such unit"),
+    ],
+)
+def test_bad_arguments_are_refused(arguments, message):
+    with pytest.raises((ValueError, TypeError, OSError)) as caught:
+        experiment("lqr", **arguments)
+    assert message in str(caught.value)
+
+
+def test_a_run_that_ends_early_gives_what_it_has():
+    with pytest.raises(OrchestratorError, match="attitude lost") as caught:
+        experiment("lqr", set={"plant.initial.beta": "85 deg"})
+    assert caught.value.exit_code == 3
+    run = caught.value.run
+    assert run is not None and run.metrics["lost_at"] == 0.0 and len(run.table) == 1
+
+
+def test_warnings_of_the_orchestrator_are_warnings():
+    with pytest.warns(OrchestratorWarning, match="set controller.delay = 0"):
+        experiment("lqr", set={"controller.delay": 0.04}, stop=1.0)
+
+
+# The command
+
+
+def orchestrator(folder, *arguments):
+    return subprocess.run(
+        [COMMAND, *arguments], cwd=folder, capture_output=True, text=True, encoding="utf-8"
+    )
+
+
+def test_the_command_runs_an_experiment_from_any_folder(tmp_path):
+    done = orchestrator(tmp_path, "run", "crmpc-robust")
+    assert done.returncode == 0, done.stderr
+    kept = tmp_path / "out" / "crmpc-robust"
+    names = {"results.csv", "results.json", "metrics.json", "plot.svg"}
+    assert {path.name for path in kept.iterdir()} == names
+    metrics = json.loads((kept / "metrics.json").read_text())
+    run = experiment("crmpc-robust")
+    for name in ("ems_deg", "cms", "max_moment_n_m"):
+        assert metrics[name] == run.metrics[name]
+
+
+def test_the_command_lists_what_the_package_has(tmp_path):
+    done = orchestrator(tmp_path, "list")
+    assert done.returncode == 0, done.stderr
+    for line in ("experiments (20)", "studies (4)", "FMUs (11)"):
+        assert line in done.stdout
+    assert "FAULT" not in done.stdout
+
+
+def test_the_command_finds_studies(tmp_path):
+    done = orchestrator(tmp_path, "reproduce", "exchang")
+    assert done.returncode == 2 and 'did you mean "exchange"?' in done.stderr
+
+
+def test_the_commands_exit_code_and_words_come_through(tmp_path):
+    done = orchestrator(tmp_path, "run", "crmpc-robus")
+    assert done.returncode == 2 and done.stderr.startswith("error: ")
+    assert done.stdout == ""
+
+
+# Types
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="mypy is installed for later ones only")
+def test_types_are_strict_and_shipped(tmp_path):
+    (tmp_path / "right.py").write_text(
+        """
+from pathlib import Path
+from typing import Any
+import numpy as np
+import pandas as pd
+from typing_extensions import assert_type
+from reentry_fmus import ClosedLoop, Run, State, experiment, experiments, fmu, units
+
+def law(state: State) -> list[float]:
+    return [0.0, 1e3 * float(state.rate[0]), 0.0]
+
+assert_type(fmu("CRMPC"), Path)
+assert_type(units(), list[str])
+assert_type(experiments(), dict[str, str])
+run = experiment(Path("x.toml"), set={"a.b": 1, "a.c": "white"}, fmu={"a": Path("b")}, units="deg")
+assert_type(run, Run)
+assert_type(run.table, pd.DataFrame)
+assert_type(run.metrics, dict[str, Any])
+with ClosedLoop(controller="CRMPC", step=0.04) as loop:
+    assert_type(loop.step(), State)
+    loop.step(np.zeros(3))
+    assert_type(loop.run(1.0, law), pd.DataFrame)
+"""
+    )
+    (tmp_path / "wrong.py").write_text(
+        """
+from reentry_fmus import ClosedLoop, experiment, fmu
+fmu(1)
+experiment("lqr", units="grad")
+experiment("lqr", set={"a.b": [1.0]})
+ClosedLoop(step="0.04")
+ClosedLoop().run(1.0, lambda state: state.atitude)
+"""
+    )
+    mypy = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", tmp_path / "cache"]
+    right = subprocess.run([*mypy, "right.py"], cwd=tmp_path, capture_output=True, text=True)
+    assert right.returncode == 0, right.stdout
+    wrong = subprocess.run([*mypy, "wrong.py"], cwd=tmp_path, capture_output=True, text=True)
+    faults = [
+        line.partition(": error")[0] for line in wrong.stdout.splitlines() if ": error" in line
+    ]
+    assert faults == [f"wrong.py:{line}" for line in range(3, 8)], wrong.stdout
+    package = [*mypy, "--package", "reentry_fmus", "--config-file", tmp_path / "mypy.ini"]
+    (tmp_path / "mypy.ini").write_text("[mypy]\n[mypy-fmpy.*]\nignore_missing_imports = true\n")
+    whole = subprocess.run(package, cwd=tmp_path, capture_output=True, text=True)
+    assert whole.returncode == 0, whole.stdout

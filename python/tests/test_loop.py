@@ -1,0 +1,300 @@
+"""ClosedLoop against the orchestrator, and what it refuses."""
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+from reentry_fmus import ClosedLoop, UnitError, UnitWarning, experiment, fmu
+
+ATTITUDE = [f"plant.attitude.{axis}" for axis in ("alpha", "beta", "sigma")]
+RATE = [f"plant.rate.{axis}" for axis in "pqr"]
+MOMENT = [f"controller.moment.{axis}" for axis in "xyz"]
+REFERENCE = [f"controller.reference.{axis}" for axis in ("alpha", "beta", "sigma")]
+COLUMNS = ATTITUDE + RATE + REFERENCE + MOMENT
+
+
+def pd_law(state):
+    a = 0.25 * (state.reference - state.attitude) - 0.8 * state.attitude_rate
+    return np.array([0.6e6 * -a[2], 1.3e6 * a[0], 1.5e6 * -a[1]])
+
+
+@pytest.mark.parametrize(("controller", "named"), [("CRMPC", "crmpc-robust"), ("LQR", "lqr")])
+def test_oracle_the_loop_is_the_orchestrators_bit_for_bit(controller, named):
+    recorded = experiment(named).table
+    with ClosedLoop(controller=controller) as loop:
+        table = loop.run(50.0)
+    assert table.shape == (1251, 18)
+    assert np.array_equal(table[COLUMNS].to_numpy(), recorded[COLUMNS].to_numpy())
+    assert np.array_equal(table.index, recorded.index)
+
+
+def test_oracle_the_state_at_10_s_is_the_orchestrators():
+    recorded = experiment("crmpc-robust").table.loc[10.0]
+    with ClosedLoop(controller="CRMPC") as loop:
+        for _ in range(250):
+            state = loop.step()
+    assert state.time == 10.0
+    for found, names in [
+        (state.attitude, ATTITUDE),
+        (state.rate, RATE),
+        (state.reference, REFERENCE),
+        (state.moment, MOMENT),
+    ]:
+        assert found.shape == (3,)
+        assert np.array_equal(found, recorded[names].to_numpy(dtype=float))
+
+
+def test_oracle_parameters_are_those_of_an_experiment():
+    seed = {"plant.disturbance.seed": 7}
+    recorded = experiment("crmpc-paper", set=seed, stop=4.0).table
+    paper = {"controller.constraints": "paper", "controller.feedback.k1": -5.0}
+    values = experiment("crmpc-paper", stop=0.04).description["components"]["controller"]
+    paper |= {f"controller.{name}": value for name, value in values["parameters"].items()}
+    with ClosedLoop(controller="CRMPC", parameters={**seed, **paper}) as loop:
+        table = loop.run(4.0)
+    assert np.array_equal(table[COLUMNS].to_numpy(), recorded[COLUMNS].to_numpy())
+
+
+def test_a_law_in_python_is_a_controller():
+    """The packaged controller's moments, played back as a law, give the same motion."""
+    with ClosedLoop(controller="CRMPC") as loop:
+        recorded = loop.run(10.0)
+    moments = iter(recorded[MOMENT].to_numpy())
+    with ClosedLoop() as loop:
+        table = loop.run(10.0, lambda state: next(moments))
+    assert table.equals(recorded)
+
+
+def test_steps_and_run_agree():
+    with ClosedLoop() as loop:
+        table = loop.run(2.0, pd_law)
+        state = loop.reset()
+        for row in table.itertuples():
+            assert row[0] == state.time
+            assert row[1:4] == tuple(state.attitude)
+            moment = pd_law(state)
+            assert row[-3:] == tuple(moment)
+            state = loop.step(moment)
+            assert np.array_equal(state.moment, moment)
+            applied = [loop.get(f"plant.appliedMoment.{axis}") for axis in "xyz"]
+            assert applied == moment.tolist()
+
+
+def test_run_goes_on_from_the_present_time():
+    with ClosedLoop() as loop:
+        whole = loop.run(2.0, pd_law)
+        loop.reset()
+        loop.run(1.0, pd_law)
+        rest = loop.run(2.0, pd_law)
+    assert rest.equals(whole.loc[1.0:])
+
+
+def test_the_step_is_chosen():
+    with ClosedLoop(step=0.02) as loop:
+        assert [loop.step([0.0, 0.0, 0.0]).time for _ in range(3)] == [0.02, 0.04, 0.06]
+
+
+def test_degrees_are_for_reading():
+    with ClosedLoop() as loop:
+        si = loop.run(1.0, pd_law)
+        loop.reset()
+        deg = loop.run(1.0, pd_law, units="deg")
+    assert np.allclose(deg[ATTITUDE + RATE], np.degrees(si[ATTITUDE + RATE]), rtol=1e-15)
+    assert deg[MOMENT].equals(si[MOMENT])
+    wanted = {ATTITUDE[0]: "deg", RATE[0]: "deg/s", MOMENT[0]: "N.m"}
+    assert {name: deg.attrs["units"][name] for name in wanted} == wanted
+    assert deg.attrs["units"]["controller.referenceAcceleration.alpha"] == "deg/s2"
+    assert deg.attrs["descriptions"][ATTITUDE[0]] == "Angle of attack"
+
+
+def test_the_reference_is_chosen():
+    parameters = {
+        "controller.reference.profile": "constant",
+        "controller.reference.angle.alpha": 0.25,
+    }
+    with ClosedLoop(parameters=parameters) as loop:
+        state = loop.step([0.0, 0.0, 0.0])
+    assert state.reference[0] == 0.25
+    assert not state.reference_rate.any() and not state.reference_acceleration.any()
+
+
+def test_a_reset_repeats_and_takes_other_parameters():
+    with ClosedLoop(controller="LQR") as loop:
+        first = loop.run(2.0)
+        assert loop.reset().time == 0.0
+        assert loop.run(2.0).equals(first)
+        loop.reset({"plant.disturbance.seed": 2})
+        other = loop.run(2.0)
+        assert not other.equals(first)
+        loop.reset()
+        assert loop.run(2.0).equals(other)
+
+
+def test_inputs_that_are_not_connected_can_be_set():
+    with ClosedLoop(parameters={"plant.disturbance.kind": "none"}) as loop:
+        loop.set("plant.disturbanceMoment.x", 1e4)
+        assert loop.step([0.0, 0.0, 0.0]).rate[0] > 0.0
+        assert loop.get("plant.disturbanceMoment.x") == 1e4
+
+
+def test_a_unit_may_be_a_file(tmp_path):
+    copy = tmp_path / "Other name.fmu"
+    copy.write_bytes(fmu("LQR").read_bytes())
+    with ClosedLoop(controller=copy) as loop, ClosedLoop(controller="LQR") as usual:
+        assert loop.run(1.0).equals(usual.run(1.0))
+
+
+def test_two_loops_do_not_disturb_each_other():
+    with ClosedLoop(controller="CRMPC") as one, ClosedLoop(controller="CRMPC") as other:
+        states = [(one.step(), other.step()) for _ in range(50)]
+    assert all(np.array_equal(a.attitude, b.attitude) for a, b in states)
+
+
+# Failure
+
+
+def test_nothing_is_left_behind(temporary):
+    with ClosedLoop(controller="CRMPC") as loop:
+        loop.step()
+        assert len(list(temporary.iterdir())) == 2
+    assert not list(temporary.iterdir())
+    for arguments in [
+        {"controller": "CRPMC"},
+        {"controller": "ControlAllocator"},
+        {"parameters": {"plant.disturbance.bound": -1.0}},
+        {"controller": "CRMPC", "parameters": {"controller.disturbance.bound": 1.0}},
+    ]:
+        with pytest.raises((ValueError, UnitError)):
+            ClosedLoop(**arguments)
+        assert not list(temporary.iterdir()), arguments
+    loop.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"plant": "RentryPlant"}, 'there is no unit "RentryPlant"; did you mean "ReentryPlant"?'),
+        ({"controller": "nowhere/My.fmu"}, "My.fmu: there is no such unit"),
+        ({"controller": "ControlAllocator"}, 'ControlAllocator has no variable "attitude.alpha"'),
+        ({"step": 0.0}, "step = 0.0 s, but a positive time is needed"),
+        ({"step": math.nan}, "step = nan s, but a positive time is needed"),
+        ({"parameters": {"plan.seed": 1}}, 'no component "plan"; did you mean "plant"?'),
+        (
+            {"parameters": {"plant.disturbance.bund": 1.0}},
+            'ReentryPlant has no variable "disturbance.bund"; did you mean "disturbance.bound"?',
+        ),
+        (
+            {"parameters": {"plant.disturbance.kind": "wite"}},
+            "disturbance.kind wants one of its items, not 'wite'; did you mean \"white\"?",
+        ),
+        (
+            {"parameters": {"plant.disturbance.bound": "2 deg/s2"}},
+            "disturbance.bound wants a number in rad/s2, not '2 deg/s2'",
+        ),
+        ({"parameters": {"plant.disturbance.seed": 1.5}}, "disturbance.seed wants an integer"),
+        ({"parameters": {"plant.moment.x": 1.0}}, "moment.x is no parameter"),
+        ({"parameters": {"plant.disturbance.bound": -1.0}}, "= -1.0 is below the minimum 0"),
+        (
+            {"parameters": {"controller.limit.rate": 1.0}},
+            "controller.limit.rate: the loop has no controller, only a reference",
+        ),
+        (
+            {"controller": "CRMPC", "parameters": {"controller.disturbance.bound": 1.0}},
+            "constraints = robust cannot be guaranteed",
+        ),
+    ],
+)
+def test_what_cannot_be_made_is_refused(arguments, message):
+    with pytest.raises((ValueError, TypeError, OSError, UnitError)) as caught:
+        ClosedLoop(**arguments)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "moment", [[1.0, 2.0], [[1.0, 2.0, 3.0]], 1.0, [0.0, 0.0, math.nan], ["a", 0.0, 0.0], {}]
+)
+def test_a_moment_is_three_finite_numbers(moment):
+    with ClosedLoop() as loop:
+        with pytest.raises(ValueError, match="three finite numbers"):
+            loop.step(moment)
+        with pytest.raises(ValueError, match="three finite numbers"):
+            loop.run(1.0, lambda state: moment)
+        # The loop goes on as if nothing had been asked.
+        assert loop.step([0.0, 0.0, 0.0]).time == 0.04
+
+
+def test_who_gives_the_moment_is_clear():
+    with ClosedLoop() as loop:
+        with pytest.raises(TypeError, match="step needs a moment"):
+            loop.step()
+        with pytest.raises(TypeError, match="run needs a law"):
+            loop.run(1.0)
+    with ClosedLoop(controller="LQR") as loop:
+        with pytest.raises(TypeError, match="comes from LQR"):
+            loop.step([0.0, 0.0, 0.0])
+        with pytest.raises(TypeError, match="comes from LQR"):
+            loop.run(1.0, pd_law)
+
+
+def test_run_refuses_times_that_it_cannot_reach():
+    with ClosedLoop(controller="LQR") as loop:
+        loop.run(1.0)
+        with pytest.raises(ValueError, match="before the present time"):
+            loop.run(0.5)
+        with pytest.raises(ValueError, match="no multiple of the step"):
+            loop.run(1.05)
+        with pytest.raises(ValueError, match='"si" or "deg"'):
+            loop.run(2.0, units="grad")
+
+
+def test_variables_are_named_in_errors():
+    with ClosedLoop() as loop:
+        with pytest.raises(ValueError, match='did you mean "attitude.alpha"'):
+            loop.get("plant.atitude.alpha")
+        with pytest.raises(ValueError, match="no component"):
+            loop.get("attitude.alpha")
+        with pytest.raises(ValueError, match="set by the loop itself"):
+            loop.set("plant.moment.x", 1.0)
+        with pytest.raises(ValueError, match="is no input"):
+            loop.set("plant.attitude.alpha", 1.0)
+
+
+def test_a_unit_that_fails_says_why_and_can_be_reset():
+    def spin(loop):
+        while True:
+            loop.step([3e6, 3e6, 3e6])
+
+    with ClosedLoop() as loop:
+        start = loop.state
+        with pytest.raises(UnitError, match="the attitude angles are singular") as caught:
+            spin(loop)
+        assert (caught.value.unit, caught.value.call) == ("ReentryPlant", "fmi2DoStep")
+        with pytest.raises(UnitError, match="reset the unit"):
+            loop.step([0.0, 0.0, 0.0])
+        assert np.array_equal(loop.reset().attitude, start.attitude)
+        assert loop.step([0.0, 0.0, 0.0]).time == 0.04
+
+
+def test_warnings_of_units_are_warnings():
+    # The plant is lighter than the controller is told by far, which no guarantee covers.
+    with ClosedLoop(controller="CRMPC", parameters={"plant.inertia.scale": 0.5}) as loop:
+        with pytest.warns(UnitWarning, match="CRMPC: the guarantee is no longer in force"):
+            loop.run(50.0)
+    with warnings.catch_warnings(), ClosedLoop(controller="CRMPC") as loop:
+        warnings.simplefilter("error")
+        loop.run(50.0)
+
+
+def test_a_closed_loop_is_closed():
+    with ClosedLoop() as loop:
+        pass
+    for use in (
+        lambda: loop.step([0.0, 0.0, 0.0]),
+        lambda: loop.run(1.0, pd_law),
+        lambda: loop.get("plant.rate.p"),
+        lambda: loop.set("plant.disturbanceMoment.x", 0.0),
+        loop.reset,
+    ):
+        with pytest.raises(ValueError, match="the loop is closed"):
+            use()

@@ -1,0 +1,252 @@
+"""The Python package: the wheel of this machine is built, installed without a compiler into fresh
+environments of the oldest and the newest Python that are found, and tested there by
+python/tests."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+from conftest import NAMES, ROOT, TARGET, archive, program
+
+SUPPORTED = [(3, minor) for minor in (10, 11, 12, 13)]
+PACKAGE = "reentry_fmus"
+TESTS = ROOT / "python" / "tests"
+
+
+def interpreters() -> list[tuple[tuple[int, int], Path]]:
+    """The Pythons of supported versions that are found on the PATH and in pyenv, oldest first."""
+    versions = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"), "versions")
+    found = {sys.version_info[:2]: Path(sys.executable)}
+    for version in SUPPORTED:
+        name = "python{}.{}".format(*version)
+        candidates = [shutil.which(name), *sorted(versions.glob(f"*/bin/{name}"))]
+        ask = ["-c", "import ensurepip, sys; print(sys.version_info[:2])"]
+        for candidate in filter(None, candidates):
+            # The shims of pyenv exist for versions that are not active, and fail.
+            said = subprocess.run([candidate, *ask], capture_output=True, text=True)
+            if said.returncode == 0 and said.stdout.strip() == str(version):
+                found[version] = Path(candidate)
+    return sorted(found.items())
+
+
+def make(
+    units: Path,
+    folder: Path,
+    platform: str = "host",
+    epoch: str | None = None,
+    orchestrator: Path | None = None,
+) -> subprocess.CompletedProcess:
+    environment = {**os.environ, **({"SOURCE_DATE_EPOCH": epoch} if epoch else {})}
+    orchestrator = orchestrator or program("orchestrator")
+    command = [ROOT / "scripts" / "wheel", platform, units, orchestrator, folder]
+    return subprocess.run(command, capture_output=True, text=True, env=environment)
+
+
+def made(units: Path, folder: Path, epoch: str | None = None) -> Path:
+    done = make(units, folder, epoch=epoch)
+    assert done.returncode == 0, done.stderr
+    (wheel,) = folder.glob("*.whl")
+    assert done.stdout.endswith(f"{wheel}\n")
+    return wheel
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    return made(TARGET / "fmu", tmp_path_factory.mktemp("wheel"))
+
+
+# What is in the wheel
+
+
+def test_the_wheel_holds_what_it_should(wheel):
+    assert re.fullmatch(rf"{PACKAGE}-\d+\.\d+\.\d+-py3-none-\w+\.whl", wheel.name)
+    assert wheel.stat().st_size <= 25e6
+    with zipfile.ZipFile(wheel) as content:
+        names = content.namelist()
+        for name in NAMES:
+            assert content.read(f"{PACKAGE}/data/fmu/{name}.fmu") == archive(name).read_bytes()
+        stored = next(n for n in names if n.startswith(f"{PACKAGE}/data/orchestrator"))
+        assert content.getinfo(stored).external_attr >> 16 & 0o111 == 0o111
+        experiments = ROOT / "orchestrator" / "experiments"
+        for path in experiments.rglob("*.toml"):
+            stored = f"{PACKAGE}/data/experiments/{path.relative_to(experiments).as_posix()}"
+            assert content.read(stored) == path.read_bytes()
+        (information,) = [n.removesuffix("/METADATA") for n in names if n.endswith("/METADATA")]
+        for licence in ("LICENSE-MIT", "LICENSE-APACHE"):
+            assert (
+                content.read(f"{information}/licenses/{licence}") == (ROOT / licence).read_bytes()
+            )
+        metadata = content.read(f"{information}/METADATA").decode()
+        assert f"{PACKAGE}/py.typed" in names
+        assert "Root-Is-Purelib: false" in content.read(f"{information}/WHEEL").decode()
+    version = re.search(r'(?m)^version = "(.+)"', (ROOT / "Cargo.toml").read_text())[1]
+    assert f"\nVersion: {version}\n" in metadata
+    assert "\nLicense-Expression: MIT OR Apache-2.0\n" in metadata
+    assert (ROOT / "python" / "README.md").read_text() in metadata
+
+
+def test_the_same_inputs_give_the_same_bytes(wheel, tmp_path):
+    units = tmp_path / "units"
+    units.mkdir()
+    # Other times, and another order in the folder.
+    for name in reversed(NAMES):
+        shutil.copyfile(archive(name), units / f"{name}.fmu")
+    assert made(units, tmp_path / "again").read_bytes() == wheel.read_bytes()
+    later = made(units, tmp_path / "later", epoch="1700000000")
+    with zipfile.ZipFile(later) as content:
+        times = {entry.date_time for entry in content.infolist()}
+    assert times == {(2023, 11, 14, 22, 13, 20)}
+    assert (
+        later.read_bytes() == made(units, tmp_path / "later again", epoch="1700000000").read_bytes()
+    )
+
+
+@pytest.mark.parametrize(
+    ("platform", "message"),
+    [
+        ("solaris", "there is no platform solaris; there are: linux-x86_64"),
+        ("windows-x86_64", "but PE x86_64 is needed"),
+        ("macos-universal", "but Mach-O universal is needed"),
+    ],
+)
+def test_what_is_not_for_the_platform_is_refused(tmp_path, platform, message):
+    done = make(TARGET / "fmu", tmp_path / "out", platform)
+    assert done.returncode == 1 and message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.glob("out/*"))
+
+
+def test_units_without_a_library_and_folders_without_units_are_refused(tmp_path):
+    units = tmp_path / "units"
+    units.mkdir()
+    assert "there are no units (*.fmu)" in make(units, tmp_path / "out").stderr
+    assert "there is no folder" in make(tmp_path / "nowhere", tmp_path / "out").stderr
+    with zipfile.ZipFile(units / "Empty.fmu", "w") as empty:
+        empty.writestr("modelDescription.xml", "")
+    assert "Empty.fmu has []" in make(units, tmp_path / "out").stderr
+
+
+def test_binaries_that_need_a_newer_glibc_than_the_tag_allows_are_refused(tmp_path):
+    # The first bytes of an ELF file for x86_64, and the names of the symbols' versions.
+    head = b"\x7fELF\x02\x01\x01" + bytes(9) + b"\x03\x00\x3e\x00" + bytes(44)
+    old, new = head + b"\0GLIBC_2.2.5\0GLIBC_2.17\0", head + b"\0GLIBC_2.2.5\0GLIBC_2.34\0"
+    units, orchestrator = tmp_path / "units", tmp_path / "orchestrator"
+    units.mkdir()
+
+    def said(of_unit: bytes, of_program: bytes) -> str:
+        with zipfile.ZipFile(units / "Some.fmu", "w") as unit:
+            unit.writestr("binaries/linux64/Some.so", of_unit)
+        orchestrator.write_bytes(of_program)
+        return make(units, tmp_path / "out", "linux-x86_64", orchestrator=orchestrator).stderr
+
+    assert "Some.fmu needs glibc 2.34, but manylinux2014_x86_64 allows 2.17" in said(new, old)
+    assert "orchestrator needs glibc 2.34" in said(old, new)
+    assert said(old, old) == ""
+    (wheel,) = (tmp_path / "out").iterdir()
+    assert wheel.name.endswith("-py3-none-manylinux2014_x86_64.whl")
+
+
+# What it does where it is installed
+
+
+class Installed:
+    """A fresh environment with the wheel."""
+
+    def __init__(self, interpreter: Path, folder: Path, wheel: Path, lowest: bool) -> None:
+        subprocess.run([interpreter, "-m", "venv", folder], check=True)
+        scripts = folder / ("Scripts" if os.name == "nt" else "bin")
+        self.python = scripts / "python"
+        # There is no compiler on the PATH, and no package may be built.
+        unset = {"PYTHONPATH", "ORCHESTRATOR_PATH", "CC", "CXX"}
+        self.environment = {k: v for k, v in os.environ.items() if k not in unset}
+        self.environment["PATH"] = str(scripts)
+        assert not any(
+            shutil.which(name, path=str(scripts)) for name in ("cc", "gcc", "clang", "cl")
+        )
+        constraints = folder / "constraints.txt"
+        constraints.write_text(self._lowest(wheel) if lowest else "")
+        install = [self.python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:"]
+        name, version = wheel.name.split("-")[:2]
+        self.run([*install, "--find-links", wheel.parent, "-c", constraints, f"{name}=={version}"])
+        self.run([*install, "-c", constraints, "-r", TESTS / "requirements.txt"])
+
+    @staticmethod
+    def _lowest(wheel: Path) -> str:
+        with zipfile.ZipFile(wheel) as content:
+            (metadata,) = [n for n in content.namelist() if n.endswith(".dist-info/METADATA")]
+            needed = re.findall(
+                r"^Requires-Dist: (\w+)>=(\S+)$", content.read(metadata).decode(), re.M
+            )
+        assert [name for name, _ in needed] == ["fmpy", "numpy", "pandas"]
+        return "\n".join(f"{name}=={version}" for name, version in needed)
+
+    def run(self, command: list, folder: Path | None = None) -> str:
+        done = subprocess.run(
+            command, cwd=folder, env=self.environment, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+
+@pytest.mark.parametrize("which", ["oldest", "newest"])
+def test_the_package_works_where_it_is_installed(which, wheel, tmp_path):
+    found = interpreters()
+    version, interpreter = found[0 if which == "oldest" else -1]
+    if which == "newest" and len(found) == 1:
+        pytest.skip(f"{interpreter} is the only Python here")
+    # The lowest versions of what it needs are those of the lowest Python.
+    lowest = which == "oldest" and version == SUPPORTED[0]
+    installed = Installed(interpreter, tmp_path / "venv", wheel, lowest)
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    said = installed.run(
+        [installed.python, "-m", "pytest", "-q", "-p", "no:cacheprovider", TESTS], outside
+    )
+    passed = re.search(r"(\d+) passed", said)
+    assert passed and int(passed[1]) >= 79, said
+
+
+# What it is shown with
+
+
+@pytest.fixture(scope="module")
+def site(wheel, tmp_path_factory) -> Path:
+    """Folder with the package alone, for the Python of the tests."""
+    folder = tmp_path_factory.mktemp("site")
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps"]
+    subprocess.run([*pip, "--target", folder, wheel], check=True)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "python" / "examples").glob("*.ipynb")), ids=lambda path: path.stem
+)
+def test_the_notebooks_run(path, site, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(site))
+    notebook = nbformat.read(path, as_version=4)
+    assert not any(cell.get("outputs") for cell in notebook.cells), "commit it without outputs"
+    folder = {"metadata": {"path": str(tmp_path)}}
+    NotebookClient(notebook, timeout=120, kernel_name="python3", resources=folder).execute()
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    texts = "".join(output.get("text", "") for output in outputs)
+    pictures = [output for output in outputs if "image/png" in output.get("data", {})]
+    assert "PD: EMS 2.7" in texts and "CRMPC: EMS 2.0" in texts
+    assert len(pictures) == 2 and any(
+        "image/svg+xml" in output.get("data", {}) for output in outputs
+    )
+
+
+def test_there_is_a_notebook():
+    assert [path.name for path in (ROOT / "python" / "examples").iterdir()] == [
+        "own_controller.ipynb"
+    ]
