@@ -7,6 +7,7 @@
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
 use serde::{Deserialize, Serialize};
+use vehicle::math::ln;
 
 /// Feedback gain of one axis with the paper's signs: u = k1 · angle + k2 · rate, both negative
 /// (1/s², 1/s).
@@ -243,7 +244,7 @@ impl SampledError {
     pub fn settling(&self) -> Option<usize> {
         let radius = self.spectral_radius();
         // The response falls at least as fast as n·radiusⁿ.
-        (radius <= LARGEST_RADIUS).then(|| (60.0 / -radius.max(0.5).ln()).ceil() as usize)
+        (radius <= LARGEST_RADIUS).then(|| (60.0 / -ln(radius.max(0.5))).ceil() as usize)
     }
 
     /// Returns the largest effect of errors of the measured angle and of the measured rate within

@@ -1,5 +1,6 @@
 //! Attitude control laws of the papers, with estimation and allocation. The crate knows the vehicle
 //! but not FMI. SI units and radians are used throughout.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod allocation;
 pub mod closed_loop;

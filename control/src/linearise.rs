@@ -12,6 +12,7 @@
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 use std::f64::consts::SQRT_2;
 use vehicle::dynamics::RigidBody;
+use vehicle::math::sin_cos;
 
 /// A vector quantity y(Θ, x_ω, a) at a point with its partial derivatives. Nothing depends on the
 /// bank angle.
@@ -40,7 +41,7 @@ pub struct InverseKinematics {
 impl InverseKinematics {
     /// Computes the kinematics at these angles, rad.
     pub fn at(angles: &Vector3<f64>) -> Self {
-        Self { alpha: angles.x.sin_cos(), beta: angles.y.sin_cos() }
+        Self { alpha: sin_cos(angles.x), beta: sin_cos(angles.y) }
     }
 
     /// Returns the turned vector T [p, t, q].

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
+use vehicle::math::{exp, sin_cos};
 use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
 
@@ -184,7 +185,7 @@ impl OuterKinematics {
             Self::Corrected => kinematics::r(angles),
             Self::Printed => {
                 // Jia, (3): φ̇ = R ω, and Θ = Pᵀ φ.
-                let (sa, ca) = angles.x.sin_cos();
+                let (sa, ca) = sin_cos(angles.x);
                 Matrix3::new(ca, -sa, 0.0, sa, ca, 0.0, 0.0, 0.0, -1.0)
             }
         }
@@ -201,7 +202,7 @@ impl OuterKinematics {
         match self {
             Self::Corrected => kinematics::r_dot(angles, angle_rates),
             Self::Printed => {
-                let (sa, ca) = angles.x.sin_cos();
+                let (sa, ca) = sin_cos(angles.x);
                 Matrix3::new(-sa, -ca, 0.0, ca, -sa, 0.0, 0.0, 0.0, 0.0) * angle_rates.x
             }
         }
@@ -310,7 +311,7 @@ impl TwoLoopSmc {
             // of r is taken from its derivatives, so that its jumps are filtered.
             let TwoLoopMemory { command, reference: before, .. } = memory;
             let (d, d_rate) = (command.angles - before.angles, command.rates - before.rates);
-            let (slope, decay) = (d_rate + d * w, (-w * period).exp());
+            let (slope, decay) = (d_rate + d * w, exp(-w * period));
             let (a, b) = (before.accelerations, reference.accelerations);
             let moved =
                 before.angles + before.rates * period + (a * 2.0 + b) * (period * period / 6.0);

@@ -57,6 +57,7 @@
 //! | [`sampled`] | any unit that works at ticks: steps, saved states |
 //! | [`table`] | the variables that all controllers have, and declarations that laws share |
 //! | [`mod@reference`] | the source of the reference |
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod law;
 pub mod reference;

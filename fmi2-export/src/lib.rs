@@ -14,6 +14,7 @@
 //! Every entry point stops a panic: it returns `fmi2Fatal`, reports it in the log, and leaves the
 //! process and all other instances alone. The process-wide panic hook is not changed, so the
 //! standard hook writes one line to stderr, and a panic is always a defect.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod call;
 mod export;

@@ -1,6 +1,7 @@
 //! The FMI 2.0 units of the controllers for co-simulation: the crate `control` behind tables of
 //! variables. All controllers have the same inputs and outputs, so that one can replace another
 //! without rewiring.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod allocator;
 mod crmpc;

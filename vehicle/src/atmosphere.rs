@@ -1,6 +1,7 @@
 //! US Standard Atmosphere 1976 from sea level to 86 km.
 
 use crate::error::Error;
+use crate::math::{exp, powf, powi};
 use serde::{Deserialize, Serialize};
 
 // U.S. Standard Atmosphere, 1976 (NOAA, NASA, USAF), tables 1 to 4.
@@ -56,9 +57,9 @@ pub fn air(altitude: f64) -> Result<Air, Error> {
         let top = LAYERS.get(i + 1).map_or(height, |next| next.0.min(height));
         let above = temperature + gradient * (top - base);
         pressure *= if gradient == 0.0 {
-            (-weight * (top - base) / temperature).exp()
+            exp(-weight * (top - base) / temperature)
         } else {
-            (temperature / above).powf(weight / gradient)
+            powf(temperature / above, weight / gradient)
         };
         temperature = above;
     }
@@ -88,7 +89,7 @@ impl Flight {
             return Err(Error::of("flight.mach", problem));
         }
         let air = air(self.altitude)?;
-        Ok(0.5 * air.density * (self.mach * air.sound_speed).powi(2))
+        Ok(0.5 * air.density * powi(self.mach * air.sound_speed, 2))
     }
 }
 

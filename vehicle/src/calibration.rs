@@ -3,6 +3,7 @@
 
 use crate::error::Error;
 use crate::kinematics::Kinematics;
+use crate::math::sin_cos;
 use crate::motion::{BETA_LIMIT, State, state};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -48,7 +49,7 @@ impl Sequence {
     /// Attitude angles Θ and their derivatives Θ̇ and Θ̈ (rad, s) at `time` (s) after the start at
     /// the angles `initial` (rad).
     pub fn angles_and_derivatives(&self, initial: &Vector3<f64>, time: f64) -> [Vector3<f64>; 3] {
-        let (sine, cosine) = (self.beta_frequency * time).sin_cos();
+        let (sine, cosine) = sin_cos(self.beta_frequency * time);
         let (amplitude, frequency) = (self.beta_amplitude, self.beta_frequency);
         let swing = Vector3::new(self.alpha_rate * time, amplitude * sine, self.sigma_rate * time);
         [

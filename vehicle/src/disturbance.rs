@@ -4,6 +4,7 @@
 use crate::dynamics::RigidBody;
 use crate::error::Error;
 use crate::kinematics::Kinematics;
+use crate::math::sin;
 use crate::noise::uniform;
 use crate::time::{tick, tick_time, tolerance};
 use nalgebra::Vector3;
@@ -217,7 +218,7 @@ impl Disturbance {
         if self.kind != Kind::Sine {
             return Vector3::zeros();
         }
-        let wave = |wave: &MomentWave| wave.amplitude * (wave.frequency * time + wave.phase).sin();
+        let wave = |wave: &MomentWave| wave.amplitude * sin(wave.frequency * time + wave.phase);
         self.sine.waves.iter().fold(self.sine.offset, |sum, next| sum + wave(next))
     }
 }

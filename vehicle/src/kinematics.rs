@@ -6,36 +6,37 @@
 //! without the term α̇ sin β in its bank row; the free functions have it as printed, and
 //! [`Kinematics`] offers both forms.
 
+use crate::math::{cos, sin, sin_cos};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Matrix R(Θ) of Chai 2022 (2), with which Θ̇ = R ω. It is singular at β = ±π/2.
 pub fn r(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = angles.x.sin_cos();
-    let (sb, cb) = angles.y.sin_cos();
+    let (sa, ca) = sin_cos(angles.x);
+    let (sb, cb) = sin_cos(angles.y);
     let tb = sb / cb;
     Matrix3::new(-ca * tb, 1.0, -sa * tb, sa, 0.0, -ca, -ca * cb, -sb, -cb * sa)
 }
 
 /// Inverse R⁻¹(Θ) of Chai 2022, proof of Lemma 1, with which ω = R⁻¹ Θ̇. It is regular for every Θ.
 pub fn r_inverse(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = angles.x.sin_cos();
-    let (sb, cb) = angles.y.sin_cos();
+    let (sa, ca) = sin_cos(angles.x);
+    let (sb, cb) = sin_cos(angles.y);
     Matrix3::new(-sb * ca * cb, sa, -cb * ca, cb * cb, 0.0, -sb, -sa * cb * sb, -ca, -cb * sa)
 }
 
 /// Partial derivative ∂R/∂α of the printed R.
 pub fn r_alpha(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = angles.x.sin_cos();
-    let (sb, cb) = angles.y.sin_cos();
+    let (sa, ca) = sin_cos(angles.x);
+    let (sb, cb) = sin_cos(angles.y);
     let tb = sb / cb;
     Matrix3::new(sa * tb, 0.0, -ca * tb, ca, 0.0, sa, sa * cb, 0.0, -cb * ca)
 }
 
 /// Partial derivative ∂R/∂β of the printed R.
 pub fn r_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = angles.x.sin_cos();
-    let (sb, cb) = angles.y.sin_cos();
+    let (sa, ca) = sin_cos(angles.x);
+    let (sb, cb) = sin_cos(angles.y);
     let sec2 = 1.0 / (cb * cb);
     Matrix3::new(-ca * sec2, 0.0, -sa * sec2, 0.0, 0.0, 0.0, ca * sb, -cb, sb * sa)
 }
@@ -49,24 +50,24 @@ pub fn r_dot(angles: &Vector3<f64>, angle_rates: &Vector3<f64>) -> Matrix3<f64> 
 
 /// Second partial derivative ∂²R/∂α² of the printed R.
 pub fn r_alpha_alpha(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = angles.x.sin_cos();
-    let (sb, cb) = angles.y.sin_cos();
+    let (sa, ca) = sin_cos(angles.x);
+    let (sb, cb) = sin_cos(angles.y);
     let tb = sb / cb;
     Matrix3::new(ca * tb, 0.0, sa * tb, -sa, 0.0, ca, ca * cb, 0.0, cb * sa)
 }
 
 /// Second partial derivative ∂²R/∂α∂β of the printed R.
 pub fn r_alpha_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = angles.x.sin_cos();
-    let (sb, cb) = angles.y.sin_cos();
+    let (sa, ca) = sin_cos(angles.x);
+    let (sb, cb) = sin_cos(angles.y);
     let sec2 = 1.0 / (cb * cb);
     Matrix3::new(sa * sec2, 0.0, -ca * sec2, 0.0, 0.0, 0.0, -sa * sb, 0.0, sb * ca)
 }
 
 /// Second partial derivative ∂²R/∂β² of the printed R.
 pub fn r_beta_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = angles.x.sin_cos();
-    let (sb, cb) = angles.y.sin_cos();
+    let (sa, ca) = sin_cos(angles.x);
+    let (sb, cb) = sin_cos(angles.y);
     let tb = sb / cb;
     let sec2 = 1.0 / (cb * cb);
     Matrix3::new(
@@ -128,7 +129,7 @@ impl Kinematics {
     pub fn r(self, angles: &Vector3<f64>) -> Matrix3<f64> {
         match self {
             Self::Printed => r(angles),
-            Self::Exact => Self::with_alpha_rate(r(angles), angles.y.sin()),
+            Self::Exact => Self::with_alpha_rate(r(angles), sin(angles.y)),
         }
     }
 
@@ -137,7 +138,7 @@ impl Kinematics {
         let mut inverse = r_inverse(angles);
         if self == Self::Exact {
             // (E R)⁻¹ = R⁻¹ E⁻¹ with E = 1 + sin β e₃ e₁ᵀ
-            let bank = inverse.column(2) * angles.y.sin();
+            let bank = inverse.column(2) * sin(angles.y);
             inverse.set_column(0, &(inverse.column(0) - bank));
         }
         inverse
@@ -145,12 +146,12 @@ impl Kinematics {
 
     /// Partial derivative ∂R/∂α of the matrix R in use.
     pub fn r_alpha(self, angles: &Vector3<f64>) -> Matrix3<f64> {
-        self.complete(r_alpha(angles), &Matrix3::zeros(), angles.y.sin(), 0.0)
+        self.complete(r_alpha(angles), &Matrix3::zeros(), sin(angles.y), 0.0)
     }
 
     /// Partial derivative ∂R/∂β of the matrix R in use.
     pub fn r_beta(self, angles: &Vector3<f64>) -> Matrix3<f64> {
-        let (sb, cb) = angles.y.sin_cos();
+        let (sb, cb) = sin_cos(angles.y);
         self.complete(r_beta(angles), &r(angles), sb, cb)
     }
 
@@ -160,22 +161,22 @@ impl Kinematics {
         let matrix = turn(angles);
         match self {
             Self::Printed => matrix,
-            Self::Exact => Self::with_alpha_rate(matrix, angles.y.sin()),
+            Self::Exact => Self::with_alpha_rate(matrix, sin(angles.y)),
         }
     }
 
     /// Partial derivative ∂/∂β of [`Kinematics::turn`].
     pub fn turn_beta(self, angles: &Vector3<f64>) -> Matrix3<f64> {
-        let (sb, cb) = angles.y.sin_cos();
-        let (ss, cs) = angles.z.sin_cos();
+        let (sb, cb) = sin_cos(angles.y);
+        let (ss, cs) = sin_cos(angles.z);
         let slope = Matrix3::new(0.0, -cs * sb, ss * sb, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) / (cb * cb);
         self.complete(slope, &turn(angles), sb, cb)
     }
 
     /// Partial derivative ∂/∂σ of [`Kinematics::turn`].
     pub fn turn_sigma(self, angles: &Vector3<f64>) -> Matrix3<f64> {
-        let (sb, cb) = angles.y.sin_cos();
-        let (ss, cs) = angles.z.sin_cos();
+        let (sb, cb) = sin_cos(angles.y);
+        let (ss, cs) = sin_cos(angles.z);
         let slope = Matrix3::new(0.0, ss / cb, cs / cb, 0.0, cs, -ss, 0.0, 0.0, 0.0);
         self.complete(slope, &Matrix3::zeros(), sb, 0.0)
     }
@@ -183,8 +184,8 @@ impl Kinematics {
 
 /// Terms of the trajectory in Wu 2015 (1), without those of α̇ sin β.
 fn turn(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let cb = angles.y.cos();
-    let (ss, cs) = angles.z.sin_cos();
+    let cb = cos(angles.y);
+    let (ss, cs) = sin_cos(angles.z);
     Matrix3::new(0.0, -cs / cb, ss / cb, 0.0, ss, cs, 1.0, 0.0, 0.0)
 }
 
@@ -235,9 +236,9 @@ impl Trajectory {
         if [around, climb, turn, north] == [0.0; 4] {
             return Vector3::zeros();
         }
-        let (sg, cg) = self.flight_path_angle.sin_cos();
-        let (sp, cp) = self.heading.sin_cos();
-        let (sl, cl) = self.latitude.sin_cos();
+        let (sg, cg) = sin_cos(self.flight_path_angle);
+        let (sp, cp) = sin_cos(self.heading);
+        let (sl, cl) = sin_cos(self.latitude);
         Vector3::new(
             -turn * sg - north * sp * cg + around * (cl * cp * cg + sl * sg),
             climb - north * cp - around * cl * sp,
@@ -249,9 +250,9 @@ impl Trajectory {
     pub fn turn_rate_by_fields(&self, earth_rate: f64) -> SMatrix<f64, 3, TRAJECTORY> {
         let around = self.longitude_rate + earth_rate;
         let (turn, north) = (self.heading_rate, self.latitude_rate);
-        let (sg, cg) = self.flight_path_angle.sin_cos();
-        let (sp, cp) = self.heading.sin_cos();
-        let (sl, cl) = self.latitude.sin_cos();
+        let (sg, cg) = sin_cos(self.flight_path_angle);
+        let (sp, cp) = sin_cos(self.heading);
+        let (sl, cl) = sin_cos(self.latitude);
         SMatrix::from_columns(&[
             Vector3::new(
                 -turn * cg + north * sp * sg + around * (sl * cg - cl * cp * sg),

@@ -1,6 +1,7 @@
 //! Vehicle model: attitude kinematics and dynamics, inertia, atmosphere, effectors and actuators,
 //! reference profiles, disturbances, sensors and integrators. The crate knows neither control nor
 //! FMI and uses SI units and radians throughout.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod actuators;
 pub mod atmosphere;
@@ -11,6 +12,7 @@ pub mod effectors;
 pub mod error;
 pub mod integrator;
 pub mod kinematics;
+pub mod math;
 pub mod motion;
 pub mod noise;
 pub mod plant;

@@ -1,6 +1,7 @@
 //! Random numbers as pure functions of seed and tick: they do not depend on who asks for them, in
 //! which order, or how often.
 
+use crate::math::{ln, sin_cos};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
@@ -17,8 +18,8 @@ pub fn uniform<const N: usize>(seed: u64, tick: i64) -> [f64; N] {
 /// method of Box and Muller.
 pub fn normal_pair([u, v]: [f64; 2]) -> [f64; 2] {
     // The argument of the logarithm lies in (0, 1], so the logarithm is finite.
-    let radius = (-2.0 * ((1.0 - u) / 2.0).ln()).sqrt();
-    let (sine, cosine) = (std::f64::consts::PI * v).sin_cos();
+    let radius = (-2.0 * ln((1.0 - u) / 2.0)).sqrt();
+    let (sine, cosine) = sin_cos(std::f64::consts::PI * v);
     [radius * cosine, radius * sine]
 }
 

@@ -7,6 +7,7 @@
 
 use crate::error::Error;
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
+use crate::math::{sin, sin_cos};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -45,9 +46,9 @@ impl Surroundings {
 /// Rotation from the trajectory's axes to the body axes. Its rate of change corresponds to ω of
 /// [`Kinematics::Exact`].
 pub fn body_from_velocity(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = angles.x.sin_cos();
-    let (sb, cb) = angles.y.sin_cos();
-    let (ss, cs) = angles.z.sin_cos();
+    let (sa, ca) = sin_cos(angles.x);
+    let (sb, cb) = sin_cos(angles.y);
+    let (ss, cs) = sin_cos(angles.z);
     let bank = Matrix3::new(1.0, 0.0, 0.0, 0.0, cs, -ss, 0.0, ss, cs);
     let sideslip = Matrix3::new(cb, -sb, 0.0, sb, cb, 0.0, 0.0, 0.0, 1.0);
     let attack = Matrix3::new(ca, 0.0, -sa, 0.0, 1.0, 0.0, sa, 0.0, ca);
@@ -56,8 +57,8 @@ pub fn body_from_velocity(angles: &Vector3<f64>) -> Matrix3<f64> {
 
 /// Rotation from the level axes to the trajectory's axes.
 pub fn velocity_from_level(trajectory: &Trajectory) -> Matrix3<f64> {
-    let (sg, cg) = trajectory.flight_path_angle.sin_cos();
-    let (sp, cp) = trajectory.heading.sin_cos();
+    let (sg, cg) = sin_cos(trajectory.flight_path_angle);
+    let (sp, cp) = sin_cos(trajectory.heading);
     let climb = Matrix3::new(cg, 0.0, -sg, 0.0, 1.0, 0.0, sg, 0.0, cg);
     let turn = Matrix3::new(cp, sp, 0.0, -sp, cp, 0.0, 0.0, 0.0, 1.0);
     climb * turn
@@ -65,8 +66,8 @@ pub fn velocity_from_level(trajectory: &Trajectory) -> Matrix3<f64> {
 
 /// Unit vector against the velocity in body axes, about which the bank angle grows.
 fn bank_axis(angles: &Vector3<f64>) -> Vector3<f64> {
-    let (sa, ca) = angles.x.sin_cos();
-    let (sb, cb) = angles.y.sin_cos();
+    let (sa, ca) = sin_cos(angles.x);
+    let (sb, cb) = sin_cos(angles.y);
     Vector3::new(-ca * cb, -sb, -sa * cb)
 }
 
@@ -93,7 +94,7 @@ impl Pose {
     pub fn felt(&self, surroundings: &Surroundings) -> Readings {
         let mut rate = self.rates;
         if self.kinematics == Kinematics::Printed {
-            rate -= bank_axis(&self.angles) * (self.alpha_rate * self.angles.y.sin());
+            rate -= bank_axis(&self.angles) * (self.alpha_rate * sin(self.angles.y));
         }
         let [force, field] = self.fields(surroundings);
         [rate, force, field]
@@ -120,8 +121,8 @@ impl Pose {
         by_state.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
         if self.kinematics == Kinematics::Printed {
             let axis = bank_axis(&self.angles);
-            let (sa, ca) = self.angles.x.sin_cos();
-            let (sb, cb) = self.angles.y.sin_cos();
+            let (sa, ca) = sin_cos(self.angles.x);
+            let (sb, cb) = sin_cos(self.angles.y);
             let mut rate = by_state.fixed_rows_mut::<3>(0);
             rate -= axis * alpha_rate_by_state * sb;
             let mut alpha = rate.column_mut(0);
@@ -135,7 +136,7 @@ impl Pose {
         // A field that is fixed in space turns against the body: v̇ = −ω × v.
         let by_angles = Kinematics::Exact.r_inverse(&self.angles);
         let body_from_velocity = body_from_velocity(&self.angles);
-        let (sg, cg) = self.trajectory.flight_path_angle.sin_cos();
+        let (sg, cg) = sin_cos(self.trajectory.flight_path_angle);
         let by_course =
             [Vector3::y(), Vector3::new(-sg, 0.0, cg)].map(|axis| body_from_velocity * axis);
         for (row, field) in [3, 6].into_iter().zip(self.fields(surroundings)) {

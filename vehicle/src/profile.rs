@@ -1,5 +1,6 @@
 //! Courses of the reference attitude over time.
 
+use crate::math::{cos, sin, sin_cos};
 use crate::reference::Reference;
 use crate::table::LookupTable;
 use crate::time::tolerance;
@@ -63,7 +64,7 @@ impl Profile {
     /// Returns the reference `mean + amplitude · sin(frequency · t + phase)`, with angles and phase
     /// in rad and the frequency in rad/s.
     pub fn sine(mean: Vector3<f64>, amplitude: Vector3<f64>, frequency: f64, phase: f64) -> Self {
-        let (sine, cosine) = (phase.cos(), phase.sin());
+        let (sine, cosine) = (cos(phase), sin(phase));
         let angles = [0, 1, 2].map(|i| Course {
             constant: mean[i],
             waves: vec![Wave {
@@ -113,7 +114,7 @@ impl Segment {
             for wave in &course.waves {
                 if wave.frequency != frequency {
                     frequency = wave.frequency;
-                    (s, c) = (frequency * time).sin_cos();
+                    (s, c) = sin_cos(frequency * time);
                 }
                 let value = wave.sine * s + wave.cosine * c;
                 reference.angles[i] += value;

@@ -3,6 +3,7 @@
 //! converter.
 
 use crate::error::Error;
+use crate::math::exp;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -126,7 +127,7 @@ impl Triad {
         }
         let x = TAU * self.bandwidth * elapsed;
         let lag = (input - before.input) / x;
-        input - lag + (before.filtered - before.input + lag) * (-x).exp()
+        input - lag + (before.filtered - before.input + lag) * exp(-x)
     }
 
     fn convert(&self, value: f64) -> f64 {

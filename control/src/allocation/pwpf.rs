@@ -3,6 +3,7 @@
 
 use crate::error::DesignError;
 use serde::{Deserialize, Serialize};
+use vehicle::math::exp;
 
 /// Constants of the modulator.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,7 +62,7 @@ impl Pwpf {
     pub fn advance(&self, state: Modulator, duty: f64) -> Modulator {
         // The filter obeys T_m df/dt = K_m (duty − on) − f; the step is exact for constant inputs.
         let end = self.gain * (duty - f64::from(u8::from(state.on)));
-        let filtered = end + (state.filtered - end) * (-self.period / self.time_constant).exp();
+        let filtered = end + (state.filtered - end) * exp(-self.period / self.time_constant);
         let on = if state.on { filtered > self.off } else { filtered >= self.on };
         Modulator { filtered, on }
     }

@@ -8,6 +8,7 @@ use crate::error::DesignError;
 use crate::error_dynamics::{Gain, InvariantSet, Reach, SampledError};
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
+use vehicle::math::{exp, hypot, ln, powi, tan};
 
 /// The constants printed in Chai 2022, section 5.1, computed from the raw data.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -81,13 +82,13 @@ pub fn held_terminal_weight(
 /// faster root.
 pub fn step_response_peak(gain: Gain) -> Option<f64> {
     let (slow, fast) = gain.eigenvalues()?;
-    let peak_time = (slow / fast).ln() / (fast - slow);
-    Some(((slow * peak_time).exp() - (fast * peak_time).exp()) / (slow - fast))
+    let peak_time = ln(slow / fast) / (fast - slow);
+    Some((exp(slow * peak_time) - exp(fast * peak_time)) / (slow - fast))
 }
 
 /// Returns the smallest eigenvalue of a symmetric 2×2 matrix.
 fn smallest_eigenvalue(m: &Matrix2<f64>) -> f64 {
-    0.5 * m.trace() - (0.25 * (m.m11 - m.m22).powi(2) + m.m12 * m.m12).sqrt()
+    0.5 * m.trace() - (0.25 * powi(m.m11 - m.m22, 2) + m.m12 * m.m12).sqrt()
 }
 
 /// The result of the offline design.
@@ -262,7 +263,7 @@ fn paper_constants(s: &Settings, smallest: f64, largest: f64) -> Option<PaperCon
     let terminal_scale =
         (0..3).map(|i| smallest_eigenvalue(&weight(i))).fold(f64::INFINITY, f64::min).sqrt();
     let root3 = 3.0_f64.sqrt();
-    let r0 = (1.0 + s.sideslip_bound.tan()).sqrt();
+    let r0 = (1.0 + tan(s.sideslip_bound)).sqrt();
     let r1 = s.limit_rate;
     let omega = root3 * s.limit_rate;
     let condition = largest / smallest;
@@ -277,7 +278,7 @@ fn paper_constants(s: &Settings, smallest: f64, largest: f64) -> Option<PaperCon
     let x_tube = x - root3 * s.disturbance_bound * c;
     let u_tube = u - 2.0 * gyroscopic * x + root3 * s.disturbance_bound * c * (r1 + gyroscopic);
     // Terminal radii (13), with "− r̄₁" as printed; the triangle inequality would give "+ r̄₁".
-    let terminal_gain = s.terminal.k1.hypot(s.terminal.k2);
+    let terminal_gain = hypot(s.terminal.k1, s.terminal.k2);
     let epsilon1 = terminal_scale * (x_tube - s.reference_rate);
     let epsilon2 = terminal_scale
         * (u_tube - (gyroscopic - r1) * x_tube - s.reference_acceleration)

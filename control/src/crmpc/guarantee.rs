@@ -13,6 +13,7 @@ use crate::error::DesignError;
 use crate::error_dynamics::{Reach, SampledError};
 use nalgebra::Vector3;
 use std::f64::consts::SQRT_2;
+use vehicle::math::{exp, powi, sin, sin_cos};
 
 /// Largest deviation of the vehicle from the plan at a feedback tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -132,12 +133,12 @@ pub(super) const BRAKING: f64 = 0.01;
 impl Geometry {
     /// Computes the bounds for |β| ≤ `sideslip` (rad, below π/2).
     pub fn new(sideslip: f64) -> Self {
-        let (s, c) = sideslip.sin_cos();
+        let (s, c) = sin_cos(sideslip);
         let (s2, c2) = (s * s, c * c);
         // ‖Ẇ x‖² = x₂² (2 s x₁ + x₃)² + c² x₁² (s x₁ + x₃)² ≤ A u (1 − u) + E u² with u = x₁² + x₃²
         // for ‖x‖ = 1.
         let a = 1.0 + 4.0 * s2;
-        let e = c2 * (0.5 * (s + (1.0 + s2).sqrt())).powi(2);
+        let e = c2 * powi(0.5 * (s + (1.0 + s2).sqrt()), 2);
         let square = if 2.0 * e < a { a * a / (4.0 * (a - e)) } else { e };
         // The rows of its derivative, [2 s x₂, 2 s x₁ + x₃, x₂] and c [2 s x₁ + x₃, 0, x₁], are
         // squared and added up.
@@ -182,7 +183,7 @@ impl Dynamics {
         let rate = r * s.limit_rate;
         let (gyroscopic, spinning) = gyroscopic(s);
         // Gyroscopic term: ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
-        let spin = s.limit_moment / smallest + 0.5 * spread * s.limit_rate.powi(2);
+        let spin = s.limit_moment / smallest + 0.5 * spread * powi(s.limit_rate, 2);
         let acceleration = r * (spin + drift * rate * rate);
         let by_rates = r * (drift_by_rates * rate + spinning * s.limit_rate);
         // The derivative of R is ∂R = −R ∂W R; that of Ẇ x by the angles takes second derivatives
@@ -245,7 +246,7 @@ impl Dynamics {
     /// Returns the ratio of the distance of two motions after a time (s) to the distance that the
     /// drive alone would cause. The mismatch itself also drives them apart (Gronwall's inequality).
     fn growth(&self, elapsed: f64) -> f64 {
-        ((self.by_rates + self.by_angles * elapsed) * elapsed).exp()
+        exp((self.by_rates + self.by_angles * elapsed) * elapsed)
     }
 
     /// The law cancels f at the predicted middle of the interval in which its moment acts. The
@@ -253,7 +254,7 @@ impl Dynamics {
     /// shifts the angle by τ³ ‖dF/dt‖/12. Returns this shift over τ, rad/s.
     fn swing(&self, s: &Settings) -> f64 {
         let slope = self.by_rates * self.acceleration + self.by_angles * self.rate;
-        slope * s.period_feedback.powi(2) / 12.0
+        slope * powi(s.period_feedback, 2) / 12.0
     }
 }
 
@@ -537,10 +538,10 @@ fn bearing(s: &Settings) -> f64 {
         return any;
     }
     let (xx, zz, xz, yy) = (square[(0, 0)], square[(2, 2)], square[(0, 2)], square[(1, 1)]);
-    let plane = 0.5 * (xx + zz) + (0.25 * (xx - zz).powi(2) + xz * xz).sqrt();
+    let plane = 0.5 * (xx + zz) + (0.25 * powi(xx - zz, 2) + xz * xz).sqrt();
     // The maximum of (1 − x²) (1 + x)² is at one half.
-    let sine = s.sideslip_domain.sin().min(0.5);
-    let across = 1.0 + (1.0 - sine * sine) * (1.0 + sine).powi(2);
+    let sine = sin(s.sideslip_domain).min(0.5);
+    let across = 1.0 + (1.0 - sine * sine) * powi(1.0 + sine, 2);
     (3.0 * yy + (plane - yy).max(0.0) * across).sqrt().min(any)
 }
 
@@ -652,7 +653,7 @@ impl Dynamics {
     /// Returns a bound on ‖d²ω/dt²‖ of a nominal motion with a held and these sizes, rad/s³:
     /// 2 Ẇ a + ∂²W [x, x] x + ∂W [a] x.
     pub(super) fn rate_curvature(x: f64, a: f64) -> f64 {
-        3.0 * TURN * x * a + CURVATURE * x.powi(3)
+        3.0 * TURN * x * a + CURVATURE * powi(x, 3)
     }
 }
 

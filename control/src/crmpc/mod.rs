@@ -39,6 +39,7 @@ use serde::{Deserialize, Serialize};
 use sets::{Certified, Sets};
 use std::time::Instant;
 use vehicle::kinematics;
+use vehicle::math::cos;
 use vehicle::reference::Reference;
 
 /// The state that CRMPC carries from tick to tick.
@@ -670,7 +671,7 @@ impl Crmpc {
     ) -> bool {
         let Some(bounds) = self.sets.explained(tick as usize) else { return false };
         let slack = 1.0 + 1e-9;
-        let r = 1.0 / self.settings.sideslip_domain.cos();
+        let r = 1.0 / cos(self.settings.sideslip_domain);
         let ball = bounds.feedback_norm + bounds.feedback_moment * r / self.design.smallest_inertia;
         let within = |i: usize| feedback[i].abs() <= (bounds.feedback + ball) * slack + 1e-12;
         angles.xy().norm() <= bounds.seen_angle * slack + 1e-12

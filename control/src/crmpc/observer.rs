@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
+use vehicle::math::exp_m1;
 
 /// Largest size of the estimate, relative to the bound of the disturbance.
 const BEYOND: f64 = 2.0;
@@ -29,7 +30,7 @@ impl Observed {
         }
         if let Some([_, before, commanded]) = self.last {
             let residual = (rates - before) / s.period_feedback - commanded;
-            let weight = -(-s.period_feedback / s.observer.time_constant).exp_m1();
+            let weight = -exp_m1(-s.period_feedback / s.observer.time_constant);
             self.disturbance += (residual - self.disturbance) * weight;
             let bound = BEYOND * s.disturbance_bound;
             self.disturbance.apply(|value| *value = value.clamp(-bound, bound));

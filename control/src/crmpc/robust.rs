@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 use vehicle::dynamics::RigidBody;
+use vehicle::math::cos;
 use vehicle::reference::Reference;
 
 /// The robust set: the data from which its bounds follow.
@@ -185,7 +186,7 @@ impl Robust {
         let bound = limit_rate - reserve - self.share * loss;
         // This uses ‖x̃_ω‖ ≤ sec β ‖ω̃‖.
         if k == horizon {
-            bound.min(self.design.assessment.terminal_rate * here.angles.y.cos() - reserve)
+            bound.min(self.design.assessment.terminal_rate * cos(here.angles.y) - reserve)
         } else {
             bound
         }

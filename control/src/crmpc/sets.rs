@@ -11,6 +11,7 @@ use crate::mpc::{self, Ball, Balls, Bounded, Motion, State};
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
 use vehicle::dynamics::RigidBody;
+use vehicle::math::cos;
 use vehicle::reference::Reference;
 
 /// The sets, with the references over the horizon.
@@ -304,7 +305,7 @@ impl Bounded<2> for Sets {
             Kind::Robust(robust) => {
                 let Settings { limit_rate, limit_moment, .. } = robust.settings;
                 let at_rest = kinematics.motion(body, &rates).moment_at_rest;
-                let secant = 1.0 / angles.y.cos();
+                let secant = 1.0 / cos(angles.y);
                 let most = secant * limit_moment / robust.design.smallest_inertia;
                 let drift = vehicle::kinematics::r(&angles) * (body.inverse * -at_rest);
                 // The sideslip will have changed by then.
@@ -312,7 +313,7 @@ impl Bounded<2> for Sets {
                 if beta >= std::f64::consts::FRAC_PI_3 {
                     return false;
                 }
-                (rates + drift * h, h * most, limit_rate / beta.cos())
+                (rates + drift * h, h * most, limit_rate / cos(beta))
             }
             Kind::Paper { x_tube, u_tube, .. } => {
                 (rates - kinematics.input(body, &rates, &Vector3::zeros()) * h, h * u_tube, *x_tube)

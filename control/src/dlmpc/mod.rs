@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::time::Instant;
 use vehicle::kinematics;
+use vehicle::math::{powf, powi};
 use vehicle::reference::Reference;
 
 /// A motion of the angles over the horizon.
@@ -222,7 +223,7 @@ impl Bounded<1> for RateLimit {
         mut of: Range<usize>,
         _: &mut mpc::Bounds,
     ) -> Option<Range<usize>> {
-        let bound = (1.0 + CHECK_SLACK).powi(2);
+        let bound = powi(1.0 + CHECK_SLACK, 2);
         let violates = |k: usize| self.square(k, &motion.states[k], &motion.inputs[k]) > bound;
         let first = of.find(|&k| violates(k))?;
         let last = of.rev().find(|&k| violates(k)).unwrap_or(first);
@@ -434,5 +435,5 @@ fn within(norm: f64, limit: f64) -> f64 {
 
 /// Returns sig^ρ(x) = |x|^ρ sgn x, component by component.
 fn signed_power(x: &Vector3<f64>, rho: f64) -> Vector3<f64> {
-    x.map(|x| x.abs().powf(rho).copysign(x))
+    x.map(|x| powf(x.abs(), rho).copysign(x))
 }

@@ -4,6 +4,7 @@
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, SQRT_2};
+use vehicle::math::tan;
 
 /// The filter y_k = b₀ u_k + b₁ u_{k−1} + b₂ u_{k−2} − a₁ y_{k−1} − a₂ y_{k−2}.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +28,7 @@ impl LowPass {
         if cutoff == 0.0 {
             return Self { b: [1.0, 0.0, 0.0], a: [0.0; 2], delay: 0.0 };
         }
-        let c = (PI * cutoff * period).tan();
+        let c = tan(PI * cutoff * period);
         let scale = 1.0 / (1.0 + SQRT_2 * c + c * c);
         let b0 = c * c * scale;
         let a = [2.0 * (c * c - 1.0) * scale, (1.0 - SQRT_2 * c + c * c) * scale];

@@ -18,6 +18,7 @@ use nalgebra::{Matrix3, Rotation3, SVector, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 use vehicle::kinematics::{self, Kinematics};
+use vehicle::math::{asin, atan2};
 use vehicle::platform::body_from_velocity;
 use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
@@ -151,7 +152,7 @@ impl Default for Settings {
             prediction: true,
             sensor_delay: file.sensor_delay,
             kinematics: Kinematics::Printed,
-            declination: field.y.atan2(field.x),
+            declination: atan2(field.y, field.x),
             alignment: Alignment::Measured,
             initial: Scenario::crmpc2022().initial_angles,
             corrections: [Correction::default(); 3],
@@ -348,8 +349,8 @@ pub struct Estimator {
 /// [`body_from_velocity`]. The bank angle grows against the right-hand rule about the velocity.
 pub fn angles(rotation: &Rotation3<f64>) -> Vector3<f64> {
     let c = rotation.matrix();
-    let beta = c[(1, 0)].clamp(-1.0, 1.0).asin();
-    Vector3::new(c[(2, 0)].atan2(c[(0, 0)]), beta, (-c[(1, 2)]).atan2(c[(1, 1)]))
+    let beta = asin(c[(1, 0)].clamp(-1.0, 1.0));
+    Vector3::new(atan2(c[(2, 0)], c[(0, 0)]), beta, atan2(-c[(1, 2)], c[(1, 1)]))
 }
 
 impl Estimator {

@@ -240,9 +240,11 @@ fn costate<const O: usize>(gain: &Gain<O>, next_slope: &State<O>, d: &State<O>) 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use nalgebra::{DMatrix, DVector, SVector};
+    use nalgebra::SVector;
 
     pub(in crate::mpc) const N: usize = 20;
+    /// Number of all inputs together.
+    const INPUTS: usize = 3 * N;
 
     pub(in crate::mpc) fn chain<const O: usize>() -> Chain<O> {
         Chain::new(0.2)
@@ -285,7 +287,7 @@ pub(super) mod tests {
     pub(in crate::mpc) fn slopes<const O: usize>(
         motion: &Motion<O>,
         terminal: f64,
-    ) -> DVector<f64> {
+    ) -> SVector<f64, INPUTS> {
         let (chain, affine) = (chain(), affine());
         let mut cost = cost::<O>();
         let value = |cost: &Cost<O>, motion: &Motion<O>, i: usize, change: f64| {
@@ -295,7 +297,7 @@ pub(super) mod tests {
             cost.of(&changed)
         };
         cost.end = cost.end.map(|row| row.map(|block| block * (1.0 + terminal)));
-        DVector::from_fn(3 * N, |i, _| {
+        SVector::from_fn(|i, _| {
             (value(&cost, motion, i, 0.5) - value(&cost, motion, i, -0.5)) / 1.0
         })
     }
@@ -308,14 +310,17 @@ pub(super) mod tests {
         assert!(slopes(&motion, 0.0).amax() < 1e-11 * largest);
         // Newton's step from any point leads to the optimum: these are the normal equations.
         let slope = slopes(&still, 0.0);
-        let columns: Vec<_> = (0..3 * N)
+        let columns: Vec<_> = (0..INPUTS)
             .map(|i| {
                 let mut moved = still.clone();
                 moved.inputs[i / 3][i % 3] += 1.0;
-                slopes(&moved, 0.0) - &slope
+                slopes(&moved, 0.0) - slope
             })
             .collect();
-        let solution = DMatrix::from_columns(&columns).cholesky().unwrap().solve(&-slope);
+        let solution = SMatrix::<f64, INPUTS, INPUTS>::from_columns(&columns)
+            .cholesky()
+            .unwrap()
+            .solve(&-slope);
         for (i, value) in solution.iter().enumerate() {
             assert!((motion.inputs[i / 3][i % 3] - value).abs() < 1e-10, "{i}");
         }

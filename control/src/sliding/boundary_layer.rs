@@ -5,6 +5,7 @@ use crate::error::DesignError;
 use crate::sliding::Reaching;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use vehicle::math::{exp2, powf};
 
 /// Returns sat(s) of Wu 2015, (35): s/h within the layer |s| ≤ h, sgn(s) outside.
 pub fn saturated(s: f64, h: f64) -> f64 {
@@ -56,7 +57,7 @@ impl FiniteTimeLayer {
     pub fn value(&self, s: &Vector3<f64>) -> Vector3<f64> {
         Vector3::from_fn(|i, _| {
             let (factor, x, b) = self.scaled(i, s[i]);
-            factor * x.abs().powf(b) * saturated(x, 1.0)
+            factor * powf(x.abs(), b) * saturated(x, 1.0)
         })
     }
 
@@ -65,7 +66,7 @@ impl FiniteTimeLayer {
         Vector3::from_fn(|i, _| {
             let (factor, x, b) = self.scaled(i, s[i]);
             let x = x.abs();
-            let slope = if x <= 1.0 { (b + 1.0) * x.powf(b) } else { b * x.powf(b - 1.0) };
+            let slope = if x <= 1.0 { (b + 1.0) * powf(x, b) } else { b * powf(x, b - 1.0) };
             factor * slope / self.epsilon[i]
         })
     }
@@ -78,7 +79,7 @@ impl FiniteTimeLayer {
     /// Returns ρ 2^(−(b+1)/2), s/ε and b of one axis.
     fn scaled(&self, i: usize, s: f64) -> (f64, f64, f64) {
         let b = self.b[i];
-        (self.rho[i] * (-(b + 1.0) / 2.0).exp2(), s / self.epsilon[i], b)
+        (self.rho[i] * exp2(-(b + 1.0) / 2.0), s / self.epsilon[i], b)
     }
 }
 

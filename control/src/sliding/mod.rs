@@ -26,6 +26,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
+use vehicle::math::powf;
 use vehicle::reference::Reference;
 
 /// A reaching law, which drives the sliding variable to zero.
@@ -231,7 +232,7 @@ fn sign(x: f64) -> f64 {
 
 /// Returns sig^a(x) = |x|^a sgn(x).
 fn power(x: f64, a: f64) -> f64 {
-    x.abs().powf(a) * sign(x)
+    powf(x.abs(), a) * sign(x)
 }
 
 /// Returns an error for a value that is not positive and finite.

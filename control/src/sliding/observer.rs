@@ -4,6 +4,7 @@
 use crate::error::DesignError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use vehicle::math::cbrt;
 
 /// Gains of the observer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,7 +51,7 @@ impl Observer {
             let (z0, z1, z2) =
                 (estimate.sliding[i], estimate.disturbance[i], estimate.disturbance_rate[i]);
             let l = self.l[i];
-            let nu0 = z1 - l0 * l.cbrt() * super::power(z0 - sliding[i], 2.0 / 3.0);
+            let nu0 = z1 - l0 * cbrt(l) * super::power(z0 - sliding[i], 2.0 / 3.0);
             let nu1 = z2 - l1 * l.sqrt() * super::power(z1 - nu0, 0.5);
             next.sliding[i] += period * (drive[i] + nu0);
             next.disturbance[i] += period * nu1;

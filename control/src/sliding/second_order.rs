@@ -4,6 +4,7 @@ use crate::error::DesignError;
 use crate::sliding::Reaching;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use vehicle::math::powi;
 
 /// The reaching law ṡ = −k₁ sig^((m−1)/m)(s) − k₂ s + τ, τ̇ = −k₃ sig^((m−2)/m)(s) − k₄ s, with
 /// sig^a(s) = |s|^a sgn(s). It is printed with + k₃ and a second sgn, which diverges.
@@ -29,7 +30,7 @@ impl SecondOrder {
         let Self { k1, k2, k3, k4, m } = self;
         let (k1, k2, k3, k4) = (k1[axis], k2[axis], k3[axis], k4[axis]);
         m * m * k3 * k4
-            - (m.powi(3) / (m - 1.0) * k3 + (4.0 * m * m - 4.0 * m + 1.0) * k1 * k1) * k2 * k2
+            - (powi(*m, 3) / (m - 1.0) * k3 + (4.0 * m * m - 4.0 * m + 1.0) * k1 * k1) * k2 * k2
     }
 }
 

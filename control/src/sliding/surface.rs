@@ -3,6 +3,7 @@
 use crate::error::DesignError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use vehicle::math::exp;
 
 /// Gains of the surface s = ė + c e + a exp(−λ(t − t₀)).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -67,7 +68,7 @@ impl Surface {
     }
 
     fn decay(&self, anchor: &Anchor, time: f64) -> f64 {
-        (-self.lambda * (time - anchor.time)).exp()
+        exp(-self.lambda * (time - anchor.time))
     }
 }
 

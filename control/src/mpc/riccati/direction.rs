@@ -8,6 +8,7 @@ use super::sweep::minimiser;
 use crate::mpc::balls::Constraints;
 use crate::mpc::problem::{Problem, Start, dot, zero_state};
 use nalgebra::Vector3;
+use vehicle::math::powi;
 
 /// Largest share of the way to the boundary that a step covers.
 const TO_BOUNDARY: f64 = 0.9999;
@@ -61,7 +62,7 @@ impl<const O: usize> Riccati<O> {
     ) -> f64 {
         let least = 0.1 * GAP * residuals.cost / residuals.gap;
         let ratio = self.mean_after(problem, affine, residuals.count) / residuals.mean();
-        ratio.powi(3).max(least).min(1.0)
+        powi(ratio, 3).max(least).min(1.0)
     }
 
     /// Corrector (11): computes the direction to sλ = `centre` with the second-order terms from the

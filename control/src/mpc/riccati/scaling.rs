@@ -6,6 +6,7 @@ use super::sweep::{Blocks, Gain, Quadratic};
 use crate::mpc::balls::Constraints;
 use crate::mpc::problem::{Problem, Start, zero_state};
 use nalgebra::{Matrix3, Vector3};
+use vehicle::math::powi;
 
 impl<const O: usize> Stage<O> {
     /// Adds the balls to the Hessian of the stage, (5).
@@ -49,7 +50,7 @@ impl<const O: usize> Riccati<O> {
         let (mut weight, mut outer) = (1.0, 0.0);
         if let Some(radius) = problem.end.radius {
             weight += self.terminal.multiplier / (radius * radius);
-            outer = self.terminal.scaling() / radius.powi(4);
+            outer = self.terminal.scaling() / powi(radius, 4);
         }
         let slope = problem.end.weighted(&stage.state);
         for i in 0..O {
