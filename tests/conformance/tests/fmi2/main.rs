@@ -6,6 +6,7 @@ mod arguments;
 mod calls;
 mod derivatives;
 mod libraries;
+mod platform;
 mod resources;
 mod states;
 mod steps;

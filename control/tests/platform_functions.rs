@@ -1,0 +1,75 @@
+//! The solver of the cone programs takes no elementary function from the platform. Its cones of
+//! exponentials and powers would, and a built library therefore imports `exp`, `log` and `pow`; but
+//! no optimisation here has such a cone. These three are counted here in place of the C library's.
+#![allow(unsafe_code)]
+
+mod harness;
+
+use control::allocation::{self, Allocator, Command};
+use control::crmpc::{self, Constraints, Settings};
+use control::dlmpc;
+use control::mpc::{Method, SolverSettings};
+use control::report::Status;
+use control::{Crmpc, Dlmpc};
+use harness::{Optimising, disturbance, settings, simulate};
+use nalgebra::Vector3;
+use std::hint::black_box;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use vehicle::disturbance::Kind;
+use vehicle::math;
+
+static CALLS: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: each has the name and the signature of the function of C, whose value it returns.
+#[unsafe(no_mangle)]
+extern "C" fn exp(x: f64) -> f64 {
+    CALLS.fetch_add(1, Ordering::Relaxed);
+    math::exp(x)
+}
+
+// SAFETY: as above.
+#[unsafe(no_mangle)]
+extern "C" fn log(x: f64) -> f64 {
+    CALLS.fetch_add(1, Ordering::Relaxed);
+    math::ln(x)
+}
+
+// SAFETY: as above.
+#[unsafe(no_mangle)]
+extern "C" fn pow(x: f64, y: f64) -> f64 {
+    CALLS.fetch_add(1, Ordering::Relaxed);
+    math::powf(x, y)
+}
+
+/// Flies the scenario and asserts that the cone solver finds every plan.
+fn fly<C: Optimising>(mut controller: C) {
+    let mut memory = controller.memory();
+    simulate(&mut controller, &mut memory, 1.05, disturbance(Kind::White), |memory, _, _| {
+        assert_eq!(C::report(memory).status, Status::Cone);
+    });
+}
+
+#[test]
+fn the_cone_solver_takes_no_exp_log_or_pow_from_the_platform() {
+    let cone = |solver| SolverSettings { method: Method::Cone, shortcuts: false, ..solver };
+    for constraints in [Constraints::Robust, Constraints::Paper] {
+        let settings: crmpc::Settings = settings(constraints);
+        fly(Crmpc::new(Settings { solver: cone(settings.solver), ..settings }).unwrap());
+    }
+    let settings = dlmpc::Settings::published();
+    fly(Dlmpc::new(dlmpc::Settings { solver: cone(settings.solver), ..settings }).unwrap());
+
+    let mut memory = allocation::Memory::default();
+    let moment = Vector3::new(1e4, 2e4, -1e4);
+    Allocator::new(allocation::Settings::published()).unwrap().update(
+        &mut memory,
+        0,
+        &Command { moment, dynamic_pressure: 2859.0 },
+    );
+    assert_eq!(memory.report.status, allocation::Status::Optimal);
+
+    assert_eq!(CALLS.load(Ordering::Relaxed), 0);
+    // The count works.
+    black_box(black_box(2f64).exp() + black_box(2f64).ln() + black_box(2f64).powf(black_box(0.3)));
+    assert_eq!(CALLS.load(Ordering::Relaxed), 3);
+}
