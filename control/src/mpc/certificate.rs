@@ -38,11 +38,11 @@ impl Certificate {
         let n = motion.inputs.len();
         let state_balls = problem.constraints.has_state_balls();
 
-        let (mut largest, mut gap, mut negative) = (1.0_f64, multipliers.start_gap, 0.0_f64);
+        let (mut largest, mut gap, mut least) = (1.0_f64, multipliers.start_gap, 0.0_f64);
         let mut count = |square: f64, multiplier: f64| {
             largest = largest.max(square);
             gap += 0.5 * (multiplier * (square - 1.0)).abs();
-            negative = negative.max(-multiplier);
+            least = least.min(multiplier);
         };
 
         // Costate p of the last stage.
@@ -103,7 +103,7 @@ impl Certificate {
         Self {
             stationarity: slope / scale,
             feasibility: (largest.sqrt() - 1.0).max(chain_error(problem, motion)),
-            complementarity: (gap / half_cost).max(negative / half_cost),
+            complementarity: (gap / half_cost).max(least.abs() / half_cost),
             cost,
         }
     }

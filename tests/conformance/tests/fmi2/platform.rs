@@ -4,6 +4,7 @@ use conformance::library;
 use object::{File, Object};
 use std::collections::BTreeSet;
 use std::fs;
+use std::process::Command;
 
 /// Functions of C whose last digit differs between libraries.
 const ELEMENTARY: [&str; 27] = [
@@ -64,4 +65,19 @@ fn the_controllers_take_no_elementary_function_from_the_platform() {
     let of_clarabel = BTreeSet::from(["exp", "log", "pow"]);
     let taken = taken_from_the_platform("fmu_controller");
     assert!(taken.is_subset(&of_clarabel), "{taken:?}");
+}
+
+/// `matrixmultiply`, which nalgebra brings by default, picks its kernels by the processor.
+#[test]
+fn no_library_has_kernels_that_are_chosen_by_the_processor() {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["tree", "--locked", "--offline", "--edges", "normal", "--prefix", "none"]);
+    let tree = cargo
+        .args(["--package", "reentry-fmu-plant", "--package", "reentry-fmu-controller"])
+        .output()
+        .unwrap();
+    assert!(tree.status.success(), "{}", String::from_utf8_lossy(&tree.stderr));
+    let tree = String::from_utf8(tree.stdout).unwrap();
+    assert!(tree.lines().any(|line| line.starts_with("nalgebra v")), "{tree}");
+    assert!(!tree.contains("matrixmultiply"), "{tree}");
 }
