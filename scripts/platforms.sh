@@ -13,7 +13,8 @@ triples() {
     case "$1" in
     linux-x86_64) echo x86_64-unknown-linux-gnu ;;
     linux-aarch64) echo aarch64-unknown-linux-gnu ;;
-    windows-x86_64) echo x86_64-pc-windows-gnu ;;
+    # Its sibling without "llvm" has no sections of functions, so that unused code stays.
+    windows-x86_64) echo x86_64-pc-windows-gnullvm ;;
     macos-universal) echo x86_64-apple-darwin aarch64-apple-darwin ;;
     *) fail "there is no platform $1; there are ${platforms[*]}" ;;
     esac
@@ -74,7 +75,7 @@ cross_build() {
         case "$triple" in
         *-linux-gnu) set_flags; versioned="$triple.$glibc" ;;
         # Zig's linker keeps unused code unless it is told to strip the file.
-        *-windows-gnu) set_flags -Clink-arg=-s ;;
+        *-windows-gnullvm) set_flags -Clink-arg=-s ;;
         esac
         PATH="$target/zig/bin:$PATH" CARGO_ENCODED_RUSTFLAGS="$flags" \
             cargo zigbuild --locked --target "$versioned" "${@:2}"

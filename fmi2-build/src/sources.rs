@@ -51,6 +51,9 @@ fn packages() -> Result<BTreeSet<String>, String> {
         .args(["tree", "--frozen", "--prefix=none", "--edges=normal,build", "--target=all"])
         .arg("--manifest-path")
         .arg(manifest)
+        // They are for the platform of the library, and cargo would try them on this machine.
+        .env_remove("CARGO_ENCODED_RUSTFLAGS")
+        .env_remove("RUSTFLAGS")
         .output()
         .map_err(|error| format!("cargo tree: {error}"))?;
     if !tree.status.success() {
