@@ -127,20 +127,27 @@ join() {
     "$python" scripts/universal.py "$target/macos-universal/$2/$1" "${inputs[@]}"
 }
 
-# Packs the units of the platform $1 alone.
-pack_platform() {
-    local also=("$(built "$1")") host
+# Builds and packs the units for the given platforms, each by itself; those for Linux, Windows and
+# macOS also together, as FMI 2.0 has a name for each of these.
+package_units() {
+    local platform also host
     host="$(built linux-x86_64)"
-    if [[ $1 == linux-x86_64 ]]; then
-        also=()
-        pack_fmus "$host" "$dist/$1/fmu"
-    else
-        pack_fmus "$host" "$dist/$1/fmu" --only-also
+    need_cross
+    # The descriptions come from the library that this machine can open.
+    build_units linux-x86_64
+    build_release --bin fmu-pack
+    for platform in "$@"; do
+        if [[ $platform == linux-x86_64 ]]; then
+            also=()
+            pack_fmus "$host" "$dist/$platform/fmu"
+        else
+            build_units "$platform"
+            also=("$(built "$platform")")
+            pack_fmus "$host" "$dist/$platform/fmu" --only-also
+        fi
+    done
+    also=("$(built windows-x86_64)" "$(built macos-universal)")
+    if [[ " $* " == *" windows-x86_64 "* && " $* " == *" macos-universal "* ]]; then
+        pack_fmus "$host" "$dist/all/fmu"
     fi
-}
-
-# Packs the units for every platform that FMI 2.0 has a name for.
-pack_all() {
-    local also=("$(built windows-x86_64)" "$(built macos-universal)")
-    pack_fmus "$(built linux-x86_64)" "$dist/all/fmu"
 }
