@@ -67,7 +67,13 @@ cross_build() {
     *-apple-darwin)
         need_macos_sdk
         set_flags -Clinker="$apple_linker" -Clinker-flavor=ld64.lld -Clink-arg=-dead_strip_dylibs
-        SDKROOT="$macos_sdk" MACOSX_DEPLOYMENT_TARGET="$macos" CARGO_ENCODED_RUSTFLAGS="$flags" \
+        # Dependencies in C are compiled by zig.
+        local cc="$target/zig/cc-$triple"
+        printf '#!/bin/sh\nPATH="%s:$PATH" exec cargo-zigbuild zig cc -- -target %s "$@"\n' \
+            "$target/zig/bin" "${triple/apple-darwin/macos.$macos}" >"$cc"
+        chmod +x "$cc"
+        env "CC_${triple//-/_}=$cc" "CFLAGS_${triple//-/_}=-g0" \
+            SDKROOT="$macos_sdk" MACOSX_DEPLOYMENT_TARGET="$macos" CARGO_ENCODED_RUSTFLAGS="$flags" \
             cargo build --locked --target "$triple" "${@:2}"
         ;;
     *)

@@ -1,9 +1,15 @@
 //! Requests from outside to end the work. The results so far are kept, and temporary files are
 //! removed.
 
+#[cfg(unix)]
+use signal_hook::flag;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Numbers of the signals that end a run. On Windows, Ctrl-C counts as the first.
+const SIGINT: i32 = 2;
+const SIGTERM: i32 = 15;
 
 /// A flag that is shared by those who request an end and by the work that is to end. The master
 /// checks it at every communication point.
@@ -27,7 +33,7 @@ pub enum Request {
 
 impl Request {
     /// Request that Ctrl-C makes, which is the signal SIGINT.
-    pub const INTERRUPT: Self = Self::Signal(signal_hook::consts::SIGINT);
+    pub const INTERRUPT: Self = Self::Signal(SIGINT);
 
     /// Returns the exit code of a process that this request ended: 128 plus the signal's number, as
     /// shells count, or 0 for the user.
@@ -43,8 +49,8 @@ impl std::fmt::Display for Request {
     fn fmt(&self, out: &mut std::fmt::Formatter) -> std::fmt::Result {
         match self {
             Self::Quit => write!(out, "the user"),
-            Self::Signal(signal_hook::consts::SIGINT) => write!(out, "a signal (SIGINT)"),
-            Self::Signal(signal_hook::consts::SIGTERM) => write!(out, "a signal (SIGTERM)"),
+            Self::Signal(SIGINT) => write!(out, "a signal (SIGINT)"),
+            Self::Signal(SIGTERM) => write!(out, "a signal (SIGTERM)"),
             Self::Signal(number) => write!(out, "a signal ({number})"),
         }
     }
@@ -55,18 +61,32 @@ impl Interrupt {
     ///
     /// # Errors
     /// Returns an error if the system does not accept the signal handlers.
+    #[cfg(unix)]
     pub fn listen(&self) -> io::Result<()> {
-        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-            signal_hook::flag::register_conditional_shutdown(
-                signal,
-                128 + signal,
-                Arc::clone(&self.again),
-            )?;
-            signal_hook::flag::register(signal, Arc::clone(&self.again))?;
+        for signal in [SIGINT, SIGTERM] {
+            let again = || Arc::clone(&self.again);
+            flag::register_conditional_shutdown(signal, 128 + signal, again())?;
+            flag::register(signal, again())?;
             let number = usize::try_from(signal).unwrap_or_default();
-            signal_hook::flag::register_usize(signal, Arc::clone(&self.signal), number)?;
+            flag::register_usize(signal, Arc::clone(&self.signal), number)?;
         }
         Ok(())
+    }
+
+    /// Treats Ctrl-C as a request from now on. The second time it ends the process at once.
+    ///
+    /// # Errors
+    /// Returns an error if the system does not accept the handler.
+    #[cfg(not(unix))]
+    pub fn listen(&self) -> io::Result<()> {
+        let own = self.clone();
+        let handler = move || {
+            if own.again.swap(true, Ordering::Relaxed) {
+                std::process::exit(128 + SIGINT);
+            }
+            own.ask(Request::INTERRUPT);
+        };
+        ctrlc::set_handler(handler).map_err(io::Error::other)
     }
 
     /// Records a request to end the work.
