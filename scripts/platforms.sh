@@ -56,6 +56,20 @@ targets: [ x86_64-macos, arm64-macos ]
 install-name: '/usr/lib/libiconv.2.dylib'
 ...
 END
+    # A dependency of the orchestrator can ask for the time zone by these functions.
+    local framework="$macos_sdk/System/Library/Frameworks/CoreFoundation.framework"
+    mkdir -p "$framework"
+    cat >"$framework/CoreFoundation.tbd" <<'END'
+--- !tapi-tbd
+tbd-version: 4
+targets: [ x86_64-macos, arm64-macos ]
+install-name: '/System/Library/Frameworks/CoreFoundation.framework/Versions/A/CoreFoundation'
+exports:
+  - targets: [ x86_64-macos, arm64-macos ]
+    symbols: [ _CFRelease, _CFStringGetBytes, _CFStringGetCStringPtr, _CFStringGetLength,
+               _CFTimeZoneCopySystem, _CFTimeZoneGetName, _CFTimeZoneResetSystem ]
+...
+END
     apple_linker="$(rustc --print sysroot)/lib/rustlib/$(rustc -vV | sed -n 's/host: //p')/bin/rust-lld"
 }
 

@@ -33,7 +33,10 @@ EXPERIMENTS = [
 ]
 # What Windows 10 and macOS 11 have.
 WINDOWS = ("api-ms-win-core-", "api-ms-win-crt-", "bcryptprimitives.", "kernel32.", "ntdll.", "userenv.", "ws2_32.")
-MACOS = {"/usr/lib/libSystem.B.dylib", "/usr/lib/libiconv.2.dylib"}
+MACOS = {
+    "/usr/lib/libSystem.B.dylib",
+    "/System/Library/Frameworks/CoreFoundation.framework/Versions/A/CoreFoundation",
+}
 MACOS_VERSION = [11, 0, 0]
 
 pytestmark = pytest.mark.skipif(not (DIST / "all").is_dir(), reason="no packages: run scripts/package")

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-/// Contents of the archives besides the unit itself.
+/// Contents of the archives besides the unit itself, and where its libraries go.
 #[derive(Clone, Debug, Default)]
 pub struct Extras {
     /// Folder whose files go under `resources/`.
@@ -18,6 +18,9 @@ pub struct Extras {
     pub licenses: Vec<PathBuf>,
     /// Folder of icons, with `NAME.png` for the unit of that name.
     pub icons: Option<PathBuf>,
+    /// Only folder below `binaries/` that receives libraries; all folders of a platform if it is
+    /// `None`.
+    pub folder: Option<String>,
 }
 
 /// Text that keeps the folder in the archive, because some importers pass no resource location for
@@ -44,7 +47,8 @@ pub fn pack(
     for Binary { path, folders, suffix, .. } in binaries {
         let library = read(path)?;
         let file = |folder| (format!("binaries/{folder}/{name}.{suffix}"), library.clone());
-        entries.extend(folders.iter().map(file));
+        let wanted = |of: &&&str| extras.folder.as_ref().is_none_or(|folder| folder == **of);
+        entries.extend(folders.iter().filter(wanted).map(file));
     }
     if let Some(icons) = &extras.icons {
         entries.push(("model.png".into(), read(&icons.join(format!("{name}.png")))?));

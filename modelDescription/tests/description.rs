@@ -263,6 +263,7 @@ fn the_archive_is_complete_and_the_same_every_time() {
         resources: Some(at("data")),
         licenses: vec![at("LICENSE-A"), at("LICENSE-B")],
         icons: None,
+        folder: None,
     };
     let path = pack(&unit(), &[binary(&at("library"))], folder.path(), &extras).unwrap();
     assert_eq!(path, at("Small.fmu"));
@@ -304,6 +305,11 @@ fn a_library_goes_into_every_folder_of_its_platform() {
     for folder in ["aarch64-linux", "linux64"] {
         assert!(names.contains(&format!("binaries/{folder}/Small.so")), "{names:?}");
     }
+    let aarch64 = Binary { folders: &["aarch64-linux", "linux64"], ..binary(&library) };
+    let extras = Extras { folder: Some("linux64".into()), ..Extras::default() };
+    let path = pack(&unit(), &[aarch64], folder.path(), &extras).unwrap();
+    let binaries = entries(&path).into_iter().filter(|(name, _)| name.starts_with("binaries/"));
+    assert_eq!(binaries.map(|(name, _)| name).collect::<Vec<_>>(), ["binaries/linux64/Small.so"]);
 }
 
 #[test]

@@ -28,6 +28,9 @@ struct Arguments {
     /// Leaves the libraries themselves out of the archives, so that only those of --also are in them
     #[arg(long, requires = "also")]
     only_also: bool,
+    /// Puts libraries into this folder below binaries/ alone, where a platform has several
+    #[arg(long, value_name = "NAME")]
+    folder: Option<String>,
     /// Folder for the archives; made if it does not exist
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -68,9 +71,13 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     if let Some((twice, _)) = units().find(|(unit, _)| !names.insert(&unit.name)) {
         return Err(Error::SameName(twice.name.clone()));
     }
-    let Arguments { resources, licenses, icons, .. } = arguments;
-    let extras =
-        Extras { resources: resources.clone(), licenses: licenses.clone(), icons: icons.clone() };
+    let Arguments { resources, licenses, icons, folder, .. } = arguments;
+    let extras = Extras {
+        resources: resources.clone(),
+        licenses: licenses.clone(),
+        icons: icons.clone(),
+        folder: folder.clone(),
+    };
     make_folder(&arguments.output)?;
     for (unit, binaries) in units() {
         let archive = pack(unit, binaries, &arguments.output, &extras)?;
