@@ -8,9 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from conftest import ROOT, TARGET
+from conftest import ROOT, TARGET, program
 
-BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", (ROOT / "docs" / "use-it.md").read_text(), re.DOTALL | re.MULTILINE)
+PAGE = (ROOT / "docs" / "use-it.md").read_text()
+BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
+# How the loops of the table of delays are made with the orchestrator, in the table's order.
+LOOPS = [
+    [],
+    ["--coupling", "jacobi"],
+    ["--set", "plant.actuation.delay=0.04"],
+    ["--coupling", "jacobi", "--set", "plant.actuation.delay=0.04"],
+]
 
 
 @pytest.mark.skipif(
@@ -36,3 +44,20 @@ def test_the_steps_of_the_page(libpython, tmp_path):
     for name in [*wanted.split(), "PdController.fmu", "pd"]:
         assert name in made
     assert {language for language, _ in BLOCKS} == {"sh", "python", "toml"}
+
+
+def test_the_attitudes_by_which_a_tool_shows_its_delay(tmp_path):
+    _, table = PAGE.split("| loop | `delay` to set |")
+    rows = [line.split(" | ") for line in table.split("\n\n")[0].splitlines()[2:]]
+    assert len(rows) == len(LOOPS)
+    for row, options in zip(rows, LOOPS):
+        experiment = ROOT / "orchestrator" / "experiments" / "crmpc-2022" / "lqr.toml"
+        command = [program("orchestrator"), "run", experiment, "--stop", "2", *options]
+        folder = ["--fmu-dir", TARGET / "fmu", "--out", tmp_path, "--force", "--no-plot"]
+        subprocess.run([*command, *folder], capture_output=True, check=True, timeout=60)
+        header, *_, last = (tmp_path / "results.csv").read_text().splitlines()
+        values = dict(zip(header.split(","), map(float, last.split(","))))
+        assert values["time"] == 2.0
+        found = [values[f"plant.attitude.{angle}"] for angle in ("alpha", "beta", "sigma")]
+        said = [cell.strip(" |").replace("−", "-") for cell in row[2:]]
+        assert [f"{value:.6f}" for value in found] == said
