@@ -1,10 +1,12 @@
-"""Makes the archives of a release, its README and its checksums. The same inputs give the same bytes.
+"""Makes the archives of a release, its README and its checksums. The same inputs give the same
+bytes.
 
     archives.py DIST OUTPUT VERSION NOTE
     archives.py check DIST                says whether DIST is complete, and no more
 
-DIST is what scripts/package leaves; OUTPUT has the licences and the wheels already. NOTE is a sentence
-of the README. SOURCE_DATE_EPOCH is the time of every entry. Needs Python's standard library alone.
+DIST is what scripts/package leaves; OUTPUT has the licences and the wheels already. NOTE is a
+sentence of the README. SOURCE_DATE_EPOCH is the time of every entry. Needs Python's standard
+library alone.
 """
 
 from __future__ import annotations
@@ -79,14 +81,15 @@ class Fault(Exception):
 
 
 def folder_of_units(dist: Path, platform: str) -> Iterator[Entry]:
-    found = sorted((dist / platform / "fmu").glob("*.fmu"))
-    for path in found:
+    for path in (dist / platform / "fmu").glob("*.fmu"):
         yield path.name, path.read_bytes(), 0o644
 
 
 def check(dist: Path) -> None:
     """Raises a fault unless every platform has the program and all units of this version."""
-    described = {path.stem: path.read_bytes() for path in sorted(ROOT.glob("fmu-*/generated/*.xml"))}
+    described = {
+        path.stem: path.read_bytes() for path in sorted(ROOT.glob("fmu-*/generated/*.xml"))
+    }
     for platform in ("all", *PLATFORMS, *IN_WHEELS):
         for name, description in described.items():
             path = dist / platform / "fmu" / f"{name}.fmu"
@@ -98,13 +101,17 @@ def check(dist: Path) -> None:
         known = {f"{name}.fmu" for name in described}
         for name, _, _ in folder_of_units(dist, platform):
             if name not in known:
-                raise Fault(f"{dist / platform / 'fmu' / name} is no unit of this version: remove it")
+                raise Fault(
+                    f"{dist / platform / 'fmu' / name} is no unit of this version: remove it"
+                )
         if platform != "all" and not program(dist, platform).is_file():
             raise Fault(f"{program(dist, platform)} does not exist: run scripts/package")
 
 
 def program(dist: Path, platform: str) -> Path:
-    return dist / platform / ("orchestrator.exe" if platform.startswith("windows") else "orchestrator")
+    return (
+        dist / platform / ("orchestrator.exe" if platform.startswith("windows") else "orchestrator")
+    )
 
 
 def licences(output: Path) -> Iterator[Entry]:
@@ -144,7 +151,7 @@ def readme(text: str, **values: str) -> Entry:
     return "README.md", text.format(**values).encode(), 0o644
 
 
-def units(dist: Path, output: Path, version: str, epoch: int) -> None:
+def write_units(dist: Path, output: Path, version: str, epoch: int) -> None:
     """Writes the archives of the units alone."""
     for platform, suffix, systems in (
         ("all", "", "Linux and Windows on x86-64 and for macOS"),
@@ -155,7 +162,7 @@ def units(dist: Path, output: Path, version: str, epoch: int) -> None:
         write(output / f"reentry-fmus-{version}{suffix}.zip", entries, epoch)
 
 
-def programs(dist: Path, output: Path, version: str, epoch: int) -> None:
+def write_programs(dist: Path, output: Path, version: str, epoch: int) -> None:
     """Writes the archives of the orchestrator, with all that it finds beside itself."""
     shown = []
     source = ROOT / "orchestrator"
@@ -167,13 +174,20 @@ def programs(dist: Path, output: Path, version: str, epoch: int) -> None:
         binary = program(dist, platform)
         name = binary.stem if binary.suffix else f"./{binary.name}"
         said = readme(PROGRAM_README, version=version, systems=systems, program=name)
-        fmus = [(f"fmu/{place}", *rest) for place, *rest in folder_of_units(dist, platform)]
-        entries = [(binary.name, binary.read_bytes(), 0o755), *shown, *fmus, *licences(output), said]
+        units = folder_of_units(dist, platform)
+        fmus = [(f"fmu/{name}", content, mode) for name, content, mode in units]
+        entries = [
+            (binary.name, binary.read_bytes(), 0o755),
+            *shown,
+            *fmus,
+            *licences(output),
+            said,
+        ]
         suffix = "zip" if platform.startswith("windows") else "tar.gz"
         write(output / f"orchestrator-{version}-{platform}.{suffix}", entries, epoch)
 
 
-def checksums(output: Path) -> None:
+def write_checksums(output: Path) -> None:
     lines = [
         f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n"
         for path in sorted(output.iterdir())
@@ -184,11 +198,11 @@ def checksums(output: Path) -> None:
 
 def main(dist: str, output: str, version: str, note: str) -> None:
     folder, epoch = Path(output), int(os.environ["SOURCE_DATE_EPOCH"])
-    units(Path(dist), folder, version, epoch)
-    programs(Path(dist), folder, version, epoch)
+    write_units(Path(dist), folder, version, epoch)
+    write_programs(Path(dist), folder, version, epoch)
     text = RELEASE_README.format(version=version, note=note)
     (folder / "README.md").write_text(text, newline="\n")
-    checksums(folder)
+    write_checksums(folder)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""Writes what is linked into the units and the orchestrator: `LICENSES.txt`, with the licence texts,
-and `sbom.cdx.json`, a bill of materials in CycloneDX's format.
+"""Writes what is linked into the units and the orchestrator: `LICENSES.txt`, with the licence
+texts, and `sbom.cdx.json`, a bill of materials in CycloneDX's format.
 
     inventory.py OUTPUT ZIG TRIPLE...
 
-OUTPUT is a folder, ZIG that of the cross compiler; the triples are what the binaries are built for. Exit code 1: a licence is
-not allowed or not known, or cargo failed. SOURCE_DATE_EPOCH must be set: the same sources give the
-same bytes.
+OUTPUT is a folder, ZIG that of the cross compiler; the triples are what the binaries are built for.
+Exit code 1: a licence is not allowed or not known, or cargo failed. SOURCE_DATE_EPOCH must be set:
+the same sources give the same bytes.
 """
 
 from __future__ import annotations
@@ -63,10 +63,11 @@ class Fault(Exception):
     """A licence that keeps the release from being made, or a failure of cargo."""
 
 
-def cargo(*arguments: str) -> str:
-    done = subprocess.run(["cargo", *arguments], capture_output=True, text=True)
+def said(*command: str) -> str:
+    """Returns what a command prints."""
+    done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
-        raise Fault(f"cargo {arguments[0]} failed:\n{done.stderr.strip()}")
+        raise Fault(f"{command[0]} {command[1]} failed:\n{done.stderr.strip()}")
     return done.stdout
 
 
@@ -78,11 +79,13 @@ def linked(triples: list[str]) -> list[dict[str, Any]]:
         packages = [argument for root in ROOTS for argument in ("--package", root)]
         # Procedural macros, and what builds need, are not in the binaries.
         edges = ["--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"]
-        for line in cargo("tree", "--locked", "--target", triple, *packages, *edges).splitlines():
+        for line in said(
+            "cargo", "tree", "--locked", "--target", triple, *packages, *edges
+        ).splitlines():
             if line.strip():
                 name, version = line.split()[:2]
                 wanted.add((name, version.removeprefix("v")))
-    metadata = json.loads(cargo("metadata", "--locked", "--format-version", "1"))
+    metadata = json.loads(said("cargo", "metadata", "--locked", "--format-version", "1"))
     found = [each for each in metadata["packages"] if (each["name"], each["version"]) in wanted]
     known = {package["id"] for package in found}
     if len(known) != len(wanted):
@@ -101,16 +104,20 @@ def linked(triples: list[str]) -> list[dict[str, Any]]:
 # Licences
 
 
+def label(package: dict[str, Any]) -> str:
+    return f"{package['name']} {package['version']}"
+
+
 def expression(package: dict[str, Any]) -> Expression:
     """Returns the licence of a package as an expression of known SPDX identifiers."""
-    label = f"{package['name']} {package['version']}"
     if not package["license"]:
-        raise Fault(f"{label} does not name its licence")
+        raise Fault(f"{label(package)} does not name its licence")
     try:
         # Before SPDX, cargo separated alternatives by a slash.
         return LICENSING.parse(package["license"].replace("/", " OR "), validate=True, strict=True)
     except ExpressionError as error:
-        raise Fault(f"{label} has an unknown licence, {package['license']}: {error}") from None
+        message = f"{label(package)} has an unknown licence, {package['license']}: {error}"
+        raise Fault(message) from None
 
 
 def allows(licence: Expression, allowed: set[str]) -> bool:
@@ -127,15 +134,14 @@ def check(packages: list[dict[str, Any]]) -> None:
     for package in packages:
         allowed = ALLOWED | EXCEPTIONS.get(package["name"], set())
         if not allows(expression(package), allowed):
-            label = f"{package['name']} {package['version']}"
-            faults.append(f"{label} is under {package['license']}, which is not allowed")
+            faults.append(f"{label(package)} is under {package['license']}, which is not allowed")
     if faults:
         raise Fault("\n".join(faults))
 
 
 def texts(package: dict[str, Any], sysroot: Path) -> list[str]:
-    """Returns the licence texts that a package brings, also those of fonts and code within it. If it
-    brings none, a usual text of one of its licences takes their place."""
+    """Returns the licence texts that a package brings, also those of fonts and code within it. If
+    it brings none, the usual texts of its licences take their place."""
     folder = Path(package["manifest_path"]).parent
     files = {path for path in folder.rglob("*") if LICENCE_FILE.search(path.name)}
     if package["license_file"]:
@@ -147,21 +153,21 @@ def texts(package: dict[str, Any], sysroot: Path) -> list[str]:
     if found:
         return found
     # The Rust distribution has the texts of SPDX for what its own sources use.
-    for symbol in expression(package).get_symbols():
-        usual = sysroot / "share" / "doc" / "rust" / "licenses" / f"{symbol}.txt"
-        if usual.is_file():
-            label = f"{package['name']} {package['version']}"
-            names = [re.sub(r" *<.*>", "", author) for author in package["authors"]]
-            authors = ", ".join(names) or f"the authors of {label}"
-            return [f"{label} brings no text of its licence. Copyright: {authors}\n\n{usual.read_text().strip()}"]
-    raise Fault(f"{package['name']} {package['version']} brings no text of its licence, {package['license']}")
+    folder = sysroot / "share" / "doc" / "rust" / "licenses"
+    symbols = [str(symbol) for symbol in expression(package).get_symbols()]
+    usual = {each: folder / f"{each}.txt" for each in symbols if (folder / f"{each}.txt").is_file()}
+    if not allows(expression(package), set(usual)):
+        raise Fault(f"{label(package)} brings no text of its licence, {package['license']}")
+    names = [re.sub(r" *<.*>", "", author) for author in package["authors"]]
+    authors = ", ".join(names) or f"the authors of {label(package)}"
+    note = f"{label(package)} brings no text of its licence. Copyright: {authors}"
+    return [f"{note}\n\n{path.read_text('utf-8').strip()}" for path in usual.values()]
 
 
-def licences(packages: list[dict[str, Any]], further: dict[str, list[Path]]) -> str:
-    """Returns the page with the licences of the packages and of what else is linked in."""
-    sysroot = Path(
-        subprocess.run(["rustc", "--print", "sysroot"], capture_output=True, text=True, check=True).stdout.strip()
-    )
+def licences(packages: list[dict[str, Any]], others: dict[str, Path]) -> str:
+    """Returns the page with the licences of the packages and of what else is linked in, which is
+    given with its texts."""
+    sysroot = Path(said("rustc", "--print", "sysroot").strip())
     # Texts that differ in their line breaks alone are one.
     users: dict[str, tuple[str, list[str]]] = {}
     lines = [
@@ -169,21 +175,21 @@ def licences(packages: list[dict[str, Any]], further: dict[str, list[Path]]) -> 
         "The texts follow below, each after the names of those that bring it.",
         "",
     ]
-    def add(label: str, text: str) -> None:
+
+    def add(user: str, text: str) -> None:
         _, names = users.setdefault(" ".join(text.split()), (text, []))
-        if label not in names:
-            names.append(label)
+        if user not in names:
+            names.append(user)
 
     for package in packages:
-        label = f"{package['name']} {package['version']}"
-        lines.append(", ".join(filter(None, [f"{label}: {expression(package)}", package["repository"]])))
+        source = f", {package['repository']}" if package["repository"] else ""
+        lines.append(f"{label(package)}: {expression(package)}{source}")
         for text in texts(package, sysroot):
-            add(label, text)
+            add(label(package), text)
     lines.append("Rust's standard library: see LICENSES-rust-std.html")
-    for label, files in further.items():
-        lines.append(f"{label}: see its text")
-        for path in files:
-            add(label, path.read_text("utf-8").strip())
+    for name, path in others.items():
+        lines.append(f"{name}: see its text")
+        add(name, path.read_text("utf-8").strip())
     for text, names in users.values():
         lines += ["", LINE, ", ".join(names), LINE, "", text]
     return "\n".join(lines) + "\n"
@@ -195,7 +201,8 @@ def licences(packages: list[dict[str, Any]], further: dict[str, list[Path]]) -> 
 def checksums() -> dict[tuple[str, str], str]:
     """Returns the checksums of the packages in the lock file."""
     entry = re.compile(r'name = "(.+)"\nversion = "(.+)"\n(?:source = .+\nchecksum = "(.+)")?')
-    return {(name, version): sum for name, version, sum in entry.findall(Path("Cargo.lock").read_text())}
+    found = entry.findall(Path("Cargo.lock").read_text("utf-8"))
+    return {(name, version): checksum for name, version, checksum in found}
 
 
 def component(package: dict[str, Any], sums: dict[tuple[str, str], str]) -> Component:
@@ -227,10 +234,8 @@ def bill(packages: list[dict[str, Any]], version: str, epoch: int) -> str:
         bom_ref="release",
         licenses=[LicenseExpression("MIT OR Apache-2.0")],
     )
-    compiler = subprocess.run(["rustc", "--version"], capture_output=True, text=True, check=True)
-    standard = Component(
-        type=ComponentType.LIBRARY, name="std", version=compiler.stdout.split()[1], bom_ref="std"
-    )
+    compiler = said("rustc", "--version").split()[1]
+    standard = Component(type=ComponentType.LIBRARY, name="std", version=compiler, bom_ref="std")
     components = {package["id"]: component(package, sums) for package in packages}
     bom.components.update([standard, *components.values()])
     roots = [components[package["id"]] for package in packages if package["name"] in ROOTS]
@@ -248,17 +253,16 @@ def bill(packages: list[dict[str, Any]], version: str, epoch: int) -> str:
     return text
 
 
-def further(zig: Path) -> dict[str, list[Path]]:
+def of_the_compiler(zig: Path) -> dict[str, Path]:
     """Returns what the cross compiler links in beside the packages, with the licence texts."""
     found = {
-        "Zig's start-up code and compiler-rt": [zig / "LICENSE"],
-        "mingw-w64's start-up code (Windows)": [zig / "lib" / "libc" / "mingw" / "COPYING"],
-        "libunwind (Windows)": [zig / "lib" / "libunwind" / "LICENSE.TXT"],
+        "Zig's start-up code and compiler-rt": zig / "LICENSE",
+        "mingw-w64's start-up code (Windows)": zig / "lib" / "libc" / "mingw" / "COPYING",
+        "libunwind (Windows)": zig / "lib" / "libunwind" / "LICENSE.TXT",
     }
-    for paths in found.values():
-        for path in paths:
-            if not path.is_file():
-                raise Fault(f"the cross compiler's licence {path} does not exist: run scripts/package")
+    for path in found.values():
+        if not path.is_file():
+            raise Fault(f"the cross compiler's licence {path} does not exist")
     return found
 
 
@@ -267,9 +271,9 @@ def main(output: str, zig: str, *triples: str) -> None:
     packages = linked(list(triples))
     check(packages)
     (version,) = {package["version"] for package in packages if package["name"] == "orchestrator"}
-    folder = Path(output)
-    (folder / "LICENSES.txt").write_text(licences(packages, further(Path(zig))), newline="\n")
-    (folder / "sbom.cdx.json").write_text(bill(packages, version, epoch), newline="\n")
+    page = licences(packages, of_the_compiler(Path(zig)))
+    Path(output, "LICENSES.txt").write_text(page, "utf-8", newline="\n")
+    Path(output, "sbom.cdx.json").write_text(bill(packages, version, epoch), "utf-8", newline="\n")
     print(f"{len(packages)} packages are linked in; their licences are allowed")
 
 

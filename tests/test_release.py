@@ -1,5 +1,5 @@
-"""The files of a release (scripts/release), made from stand-ins for the binaries: the same bytes each
-time, checksums, licences, the bill of materials, and what keeps a release from being made."""
+"""The files of a release (scripts/release), made from stand-ins for the binaries: the same bytes
+each time, checksums, licences, the bill of materials, and what keeps a release from being made."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ import pytest
 from conftest import NAMES, ROOT, TARGET, library, program
 
 pytestmark = pytest.mark.skipif(
-    (platform.system(), platform.machine()) != ("Linux", "x86_64"), reason="made on Linux x86_64 only"
+    (platform.system(), platform.machine()) != ("Linux", "x86_64"),
+    reason="made on Linux x86_64 only",
 )
 VERSION = re.search(r'(?m)^version = "(.+)"', (ROOT / "Cargo.toml").read_text())[1]
 EPOCH = 1_700_000_000
@@ -108,7 +109,11 @@ def content(request, made) -> dict[str, tuple[bytes, int, float]]:
     if path.suffix == ".zip":
         with zipfile.ZipFile(path) as archive:
             for entry in archive.infolist():
-                found[entry.filename] = (archive.read(entry), entry.external_attr >> 16 & 0o777, entry.date_time)
+                found[entry.filename] = (
+                    archive.read(entry),
+                    entry.external_attr >> 16 & 0o777,
+                    entry.date_time,
+                )
         moment = (2023, 11, 14, 22, 13, 20)
     else:
         with tarfile.open(path) as archive:
@@ -147,7 +152,10 @@ def test_archives_hold_units_licences_and_experiments(content, dist):
         assert content[binary][0] == LIBRARIES[system][0] + b"program"
         experiments = ROOT / "orchestrator" / "experiments"
         shown = {path for path in content if path.startswith("experiments/")}
-        assert shown == {f"experiments/{path.relative_to(experiments).as_posix()}" for path in experiments.rglob("*.toml")}
+        assert shown == {
+            f"experiments/{path.relative_to(experiments).as_posix()}"
+            for path in experiments.rglob("*.toml")
+        }
         assert "schema/experiment.json" in content
     for place, path in places.items():
         assert content[place][0] == path.read_bytes()
@@ -176,7 +184,11 @@ def test_the_same_packages_give_the_same_bytes(made, tmp_path):
 
 def test_the_checksums_are_those_of_the_files(made):
     lines = (made / "SHA256SUMS").read_text().splitlines()
-    sums = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in made.iterdir() if path.name != "SHA256SUMS"}
+    sums = {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in made.iterdir()
+        if path.name != "SHA256SUMS"
+    }
     assert lines == [f"{sums[name]}  {name}" for name in sorted(sums)]
 
 
@@ -222,7 +234,9 @@ def test_the_bill_of_materials_fits_its_schema_and_the_lock_file(made):
     )
     python = TARGET / "release-tools" / "bin" / "python"
     for given, code in ((text, 0), (text.replace('"bomFormat"', '"form"'), 1)):
-        done = subprocess.run([python, "-c", validator], input=given, capture_output=True, text=True)
+        done = subprocess.run(
+            [python, "-c", validator], input=given, capture_output=True, text=True
+        )
         assert done.returncode == code, done.stderr
     components = {(each["name"], each["version"]): each for each in bill["components"]}
     assert compiled_in() <= {"-".join(key) for key in components}
@@ -277,10 +291,12 @@ def test_options_that_do_not_exist_are_refused(dist, tmp_path):
 JUDGE = """
 import inventory
 package = lambda licence, name="some": {"name": name, "version": "1.0.0", "license": licence}
-for licence in ("MIT", "MIT/Apache-2.0", "GPL-3.0-only OR MIT", "(MIT OR MPL-2.0) AND BSD-3-Clause"):
+good = ("MIT", "MIT/Apache-2.0", "GPL-3.0-only OR MIT", "(MIT OR MPL-2.0) AND BSD-3-Clause")
+for licence in good:
     inventory.check([package(licence)])
 inventory.check([package("MPL-2.0", "colored")])
-for licence in ("GPL-3.0-only", "MIT AND GPL-3.0-only", "MPL-2.0", "MIT WITH LLVM-exception", "My own", None):
+bad = ("GPL-3.0-only", "MIT AND GPL-3.0-only", "MPL-2.0", "MIT WITH LLVM-exception", "My own", None)
+for licence in bad:
     try:
         inventory.check([package("MIT", "other"), package(licence)])
     except inventory.Fault as fault:
@@ -292,7 +308,9 @@ for licence in ("GPL-3.0-only", "MIT AND GPL-3.0-only", "MPL-2.0", "MIT WITH LLV
 
 def test_licences_that_are_not_allowed_are_named(made):
     python = TARGET / "release-tools" / "bin" / "python"
-    done = subprocess.run([python, "-c", JUDGE], cwd=ROOT / "scripts", capture_output=True, text=True)
+    done = subprocess.run(
+        [python, "-c", JUDGE], cwd=ROOT / "scripts", capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     said = [line.split(":")[0] for line in done.stdout.splitlines()]
     assert said == [
@@ -332,7 +350,9 @@ def database(folder: Path, package: str, patched: str) -> Path:
 
 
 def test_a_release_says_that_advisories_were_not_checked(made, dist, tmp_path):
-    assert "Advisories: not checked, no database could be fetched." in (made / "README.md").read_text()
+    assert (
+        "Advisories: not checked, no database could be fetched." in (made / "README.md").read_text()
+    )
     done = release(dist, tmp_path / "dist", "--require-advisories")
     assert done.returncode == 1 and not (tmp_path / "dist").exists()
     assert "error: advisories: not checked, no database could be fetched" in done.stderr
@@ -349,7 +369,12 @@ def test_a_folder_without_advisories_is_no_database(dist, tmp_path):
     reason="cargo-audit is not installed: scripts/release --advisory-db installs it",
 )
 def test_an_advisory_against_a_crate_of_the_lock_file_fails_the_release(dist, tmp_path):
-    done = release(dist, tmp_path / "dist", "--advisory-db", database(tmp_path / "hit", "clarabel", ">= 99.0.0"))
+    done = release(
+        dist,
+        tmp_path / "dist",
+        "--advisory-db",
+        database(tmp_path / "hit", "clarabel", ">= 99.0.0"),
+    )
     assert done.returncode == 1 and not (tmp_path / "dist").exists()
     assert "RUSTSEC-2026-9999" in done.stdout and "an advisory concerns a crate" in done.stderr
     mended = database(tmp_path / "mended", "clarabel", ">= 0.0.1")
