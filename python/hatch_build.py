@@ -96,6 +96,9 @@ class PlatformHook(BuildHookInterface):  # type: ignore[type-arg]
             for path in sorted((root / folder).rglob("*")):
                 if path.suffix in (".toml", ".json"):
                     files[path] = path.relative_to(root).as_posix()
+        # A release adds the licences of what is linked in.
+        for notice in filter(None, os.environ.get("WHEEL_NOTICES", "").split(os.pathsep)):
+            files[Path(notice)] = Path(notice).name
         build_data["force_include"].update(
             {str(path): f"{DATA}/{place}" for path, place in files.items()}
         )

@@ -67,6 +67,17 @@ install_tools() {
     CARGO_PROFILE_RELEASE_OPT_LEVEL=0 install_fmi_sim "$tools"
 }
 
+# Installs cargo-audit, which knows whether an advisory concerns a crate, into $tools unless this very
+# version is there. Not optimised it takes three minutes to build, and one second to run.
+cargo_audit=0.22.2
+install_cargo_audit() {
+    if grep --quiet --no-messages "\"cargo-audit $cargo_audit " "$tools/.crates.toml"; then return; fi
+    say "Installing cargo-audit $cargo_audit into $tools"
+    CARGO_PROFILE_RELEASE_OPT_LEVEL=0 cargo install cargo-audit --version "$cargo_audit" --locked \
+        --root "$tools" --target-dir "$tools/build"
+    rm -rf "$tools/build"
+}
+
 # The built library of a crate in a folder, whatever the platform calls it.
 library() {
     local name

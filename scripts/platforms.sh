@@ -1,7 +1,8 @@
 # Cross building of the units and the orchestrator on Linux x86-64. Sourced after environment.sh.
 
-# The platforms, by the names of their folders below $dist.
-platforms=(linux-x86_64 linux-aarch64 windows-x86_64 macos-universal)
+# The platforms, by the names of their folders below $dist. Those of a single processor of macOS are
+# for the wheels: one for both is larger than a wheel may be.
+platforms=(linux-x86_64 linux-aarch64 windows-x86_64 macos-universal macos-x86_64 macos-aarch64)
 dist="$target/dist"
 
 # The oldest systems that the binaries run on: CentOS 7, manylinux2014 and macOS 11 of 2020.
@@ -16,6 +17,8 @@ triples() {
     # Its sibling without "llvm" has no sections of functions, so that unused code stays.
     windows-x86_64) echo x86_64-pc-windows-gnullvm ;;
     macos-universal) echo x86_64-apple-darwin aarch64-apple-darwin ;;
+    macos-x86_64) echo x86_64-apple-darwin ;;
+    macos-aarch64) echo aarch64-apple-darwin ;;
     *) fail "there is no platform $1; there are ${platforms[*]}" ;;
     esac
 }

@@ -24,6 +24,8 @@ FOLDERS = {
     "linux-aarch64": {"linux64": "so", "aarch64-linux": "so"},
     "windows-x86_64": {"win64": "dll"},
     "macos-universal": {"darwin64": "dylib"},
+    "macos-x86_64": {"darwin64": "dylib"},
+    "macos-aarch64": {"darwin64": "dylib"},
 }
 # Every file of an experiment that `run` takes: no parts, studies or tables of published numbers.
 EXPERIMENTS = [

@@ -1,0 +1,215 @@
+"""Makes the archives of a release, its README and its checksums. The same inputs give the same
+bytes.
+
+    archives.py DIST OUTPUT VERSION NOTE
+    archives.py check DIST                says whether DIST is complete, and no more
+
+DIST is what scripts/package leaves; OUTPUT has the licences and the wheels already. NOTE is a
+sentence of the README. SOURCE_DATE_EPOCH is the time of every entry. Needs Python's standard
+library alone.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import io
+import os
+import sys
+import tarfile
+import time
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+# The operating systems in words, by the platforms of the orchestrator's archives.
+PLATFORMS = {
+    "linux-x86_64": "Linux on x86-64, glibc 2.17 or later",
+    "linux-aarch64": "Linux on aarch64, glibc 2.17 or later",
+    "windows-x86_64": "Windows 10 or later on x86-64",
+    "macos-universal": "macOS 11 or later on both processors",
+}
+# Those whose units and program go into wheels alone.
+IN_WHEELS = ("macos-x86_64", "macos-aarch64")
+LICENCES = ("LICENSE-APACHE", "LICENSE-MIT")
+# What inventory.py and the Rust distribution know of the linked packages.
+NOTICES = ("LICENSES.txt", "LICENSES-rust-std.html")
+
+UNITS_README = """# Re-entry attitude control: FMI 2.0 units {version}
+
+The archives (*.fmu) hold the units for {systems}. Any tool for FMI 2.0
+co-simulation opens them; each has its documentation in documentation/index.html.
+
+LICENSE-MIT and LICENSE-APACHE are the licences of the units, either of which may be chosen.
+LICENSES.txt and LICENSES-rust-std.html are those of what is linked in.
+"""
+PROGRAM_README = """# Re-entry attitude control: the orchestrator {version}
+
+For {systems}.
+
+    {program} list                        shows experiments, studies and units
+    {program} run crmpc-2022/crmpc-robust  flies an experiment
+    {program} --help                      says everything else
+
+The program finds experiments/ and fmu/ beside itself, from any folder.
+
+LICENSE-MIT and LICENSE-APACHE are the licences of program and units, either of which may be chosen.
+LICENSES.txt and LICENSES-rust-std.html are those of what is linked in.
+"""
+RELEASE_README = """# Re-entry attitude control {version}
+
+| file | is |
+|---|---|
+| reentry-fmus-{version}.zip | every unit, for Linux and Windows on x86-64 and for macOS |
+| reentry-fmus-{version}-linux-aarch64.zip | every unit, for Linux on aarch64 |
+| orchestrator-{version}-PLATFORM | the program with experiments and the platform's units |
+| *.whl | the Python package, with program, experiments and units |
+| LICENSES.txt, LICENSES-rust-std.html | the licences of what is linked in |
+| sbom.cdx.json | what is linked in, as a bill of materials (CycloneDX) |
+| SHA256SUMS | checksums: `sha256sum --check SHA256SUMS` |
+
+{note}
+"""
+
+# An entry of an archive: its place, content and permissions.
+Entry = tuple[str, bytes, int]
+
+
+class Fault(Exception):
+    """Something that a release needs and that is not there."""
+
+
+def folder_of_units(dist: Path, platform: str) -> Iterator[Entry]:
+    for path in (dist / platform / "fmu").glob("*.fmu"):
+        yield path.name, path.read_bytes(), 0o644
+
+
+def check(dist: Path) -> None:
+    """Raises a fault unless every platform has the program and all units of this version."""
+    described = {
+        path.stem: path.read_bytes() for path in sorted(ROOT.glob("fmu-*/generated/*.xml"))
+    }
+    for platform in ("all", *PLATFORMS, *IN_WHEELS):
+        for name, description in described.items():
+            path = dist / platform / "fmu" / f"{name}.fmu"
+            if not path.is_file():
+                raise Fault(f"{path} does not exist: run scripts/package")
+            with zipfile.ZipFile(path) as unit:
+                if unit.read("modelDescription.xml") != description:
+                    raise Fault(f"{path} is another version of the unit: run scripts/package")
+        known = {f"{name}.fmu" for name in described}
+        for name, _, _ in folder_of_units(dist, platform):
+            if name not in known:
+                raise Fault(
+                    f"{dist / platform / 'fmu' / name} is no unit of this version: remove it"
+                )
+        if platform != "all" and not program(dist, platform).is_file():
+            raise Fault(f"{program(dist, platform)} does not exist: run scripts/package")
+
+
+def program(dist: Path, platform: str) -> Path:
+    return (
+        dist / platform / ("orchestrator.exe" if platform.startswith("windows") else "orchestrator")
+    )
+
+
+def licences(output: Path) -> Iterator[Entry]:
+    for path in [*(ROOT / name for name in LICENCES), *(output / name for name in NOTICES)]:
+        yield path.name, path.read_bytes(), 0o644
+
+
+def write(path: Path, entries: list[Entry], epoch: int) -> None:
+    """Writes an archive whose only folder has the archive's name."""
+    is_zip = path.name.endswith(".zip")
+    top = path.name.removesuffix(".zip" if is_zip else ".tar.gz")
+    entries = sorted((f"{top}/{place}", content, mode) for place, content, mode in entries)
+    if is_zip:
+        # The format knows no time before 1980.
+        moment = max(time.gmtime(epoch)[:6], (1980, 1, 1, 0, 0, 0))
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+            for place, content, mode in entries:
+                info = zipfile.ZipInfo(place, moment)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                # As on Unix, whatever system this is.
+                info.create_system, info.external_attr = 3, (0o100000 | mode) << 16
+                archive.writestr(info, content)
+        return
+    with (
+        path.open("wb") as file,
+        gzip.GzipFile("", "wb", 9, file, mtime=epoch) as packed,
+        tarfile.open(fileobj=packed, mode="w", format=tarfile.USTAR_FORMAT) as archive,
+    ):
+        for place, content, mode in entries:
+            # Without anything else said, the owner is 0 and has no name.
+            entry = tarfile.TarInfo(place)
+            entry.size, entry.mode, entry.mtime = len(content), mode, epoch
+            archive.addfile(entry, io.BytesIO(content))
+
+
+def readme(text: str, **values: str) -> Entry:
+    return "README.md", text.format(**values).encode(), 0o644
+
+
+def write_units(dist: Path, output: Path, version: str, epoch: int) -> None:
+    """Writes the archives of the units alone."""
+    for platform, suffix, systems in (
+        ("all", "", "Linux and Windows on x86-64 and for macOS"),
+        ("linux-aarch64", "-linux-aarch64", PLATFORMS["linux-aarch64"]),
+    ):
+        said = readme(UNITS_README, version=version, systems=systems)
+        entries = [*folder_of_units(dist, platform), *licences(output), said]
+        write(output / f"reentry-fmus-{version}{suffix}.zip", entries, epoch)
+
+
+def write_programs(dist: Path, output: Path, version: str, epoch: int) -> None:
+    """Writes the archives of the orchestrator, with all that it finds beside itself."""
+    shown = []
+    source = ROOT / "orchestrator"
+    # Editors find the schema by the first line of each experiment.
+    for folder, suffix in (("experiments", ".toml"), ("schema", ".json")):
+        for path in (source / folder).rglob(f"*{suffix}"):
+            shown.append((path.relative_to(source).as_posix(), path.read_bytes(), 0o644))
+    for platform, systems in PLATFORMS.items():
+        binary = program(dist, platform)
+        name = binary.stem if binary.suffix else f"./{binary.name}"
+        said = readme(PROGRAM_README, version=version, systems=systems, program=name)
+        units = folder_of_units(dist, platform)
+        fmus = [(f"fmu/{name}", content, mode) for name, content, mode in units]
+        entries = [
+            (binary.name, binary.read_bytes(), 0o755),
+            *shown,
+            *fmus,
+            *licences(output),
+            said,
+        ]
+        suffix = "zip" if platform.startswith("windows") else "tar.gz"
+        write(output / f"orchestrator-{version}-{platform}.{suffix}", entries, epoch)
+
+
+def write_checksums(output: Path) -> None:
+    lines = [
+        f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n"
+        for path in sorted(output.iterdir())
+        if path.name != "SHA256SUMS"
+    ]
+    (output / "SHA256SUMS").write_text("".join(lines), newline="\n")
+
+
+def main(dist: str, output: str, version: str, note: str) -> None:
+    folder, epoch = Path(output), int(os.environ["SOURCE_DATE_EPOCH"])
+    write_units(Path(dist), folder, version, epoch)
+    write_programs(Path(dist), folder, version, epoch)
+    text = RELEASE_README.format(version=version, note=note)
+    (folder / "README.md").write_text(text, newline="\n")
+    write_checksums(folder)
+
+
+if __name__ == "__main__":
+    try:
+        if sys.argv[1] == "check":
+            check(Path(sys.argv[2]))
+        else:
+            main(*sys.argv[1:])
+    except Fault as fault:
+        sys.exit(f"error: {fault}")
