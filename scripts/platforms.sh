@@ -168,6 +168,10 @@ package_units() {
             also=("$(built "$platform")")
             pack_fmus "$host" "$dist/$platform/fmu" --only-also
         fi
+        if [[ $platform == linux-aarch64 ]]; then
+            # In the wheel each library stands once, where FMPy and the orchestrator look for it.
+            pack_fmus "$host" "$dist/$platform/fmu-wheel" --only-also --folder linux64
+        fi
     done
     also=("$(built windows-x86_64)" "$(built macos-universal)")
     if [[ " $* " == *" windows-x86_64 "* && " $* " == *" macos-universal "* ]]; then
