@@ -287,3 +287,41 @@ def test_ctrl_c_on_windows_ends_a_run_and_keeps_its_results(wine, tmp_path):
     rows = (tmp_path / "out" / "results.csv").read_text().splitlines()
     # In step with the clock, five seconds have at most 126 rows below the heading.
     assert 10 < len(rows) < 140
+
+
+def built(platform: str, crate: str) -> Path:
+    names = {"linux-x86_64": f"x86_64-unknown-linux-gnu/release/lib{crate}.so", "windows-x86_64": f"x86_64-pc-windows-gnullvm/release/{crate}.dll"}
+    path = TARGET / names[platform]
+    if not path.is_file():
+        pytest.skip(f"{path} does not exist: run scripts/package")
+    return path
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        (None, b"0" * 64, "is made of other sources"),
+        (b"KERNEL32.dll", b"KERNEL99.dll", "needs kernel99.dll, which not every system has"),
+        (b"fmi2GetReal\0", b"fmi2GetReaf\0", "differs in its exported functions: "),
+        (b"MZ", b"ZM", "Unknown file magic"),
+    ],
+    ids=["sources", "imports", "exports", "format"],
+)
+def test_a_library_that_does_not_belong_to_the_others_is_refused(old, new, words, tmp_path):
+    host, other = (built(platform, "fmu_plant") for platform in ("linux-x86_64", "windows-x86_64"))
+    content = other.read_bytes()
+    if old is None:
+        [section] = [s for s in lief.PE.parse(list(content)).sections if s.name == ".fmi2src"]
+        old = bytes(section.content)[:64]
+    assert content.count(old) >= 1
+    changed = tmp_path / "changed.dll"
+    changed.write_bytes(content.replace(old, new, 1))
+    command = [program("fmu-pack"), host, "--also", changed, "--output", tmp_path]
+    refused = subprocess.run(command, capture_output=True, text=True)
+    assert refused.returncode == 1
+    assert "changed.dll" in refused.stderr and words in refused.stderr
+    command[3] = other
+    assert subprocess.run(command, capture_output=True).returncode == 0
+    command[3] = host
+    same = subprocess.run(command, capture_output=True, text=True)
+    assert same.returncode == 1 and "is for the same platform as" in same.stderr
