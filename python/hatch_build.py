@@ -19,8 +19,8 @@ PLATFORMS = {
     "linux-x86_64": ("manylinux2014_x86_64", "ELF x86_64"),
     "linux-aarch64": ("manylinux2014_aarch64", "ELF aarch64"),
     "windows-x86_64": ("win_amd64", "PE x86_64"),
-    "macos-universal": ("macosx_10_12_universal2", "Mach-O universal"),
-    "macos-x86_64": ("macosx_10_12_x86_64", "Mach-O x86_64"),
+    "macos-universal": ("macosx_11_0_universal2", "Mach-O universal"),
+    "macos-x86_64": ("macosx_11_0_x86_64", "Mach-O x86_64"),
     "macos-aarch64": ("macosx_11_0_arm64", "Mach-O aarch64"),
     "host": (sysconfig.get_platform().replace("-", "_").replace(".", "_"), None),
 }

@@ -39,7 +39,7 @@ WHEELS = {
     "manylinux2014_x86_64",
     "manylinux2014_aarch64",
     "win_amd64",
-    "macosx_10_12_x86_64",
+    "macosx_11_0_x86_64",
     "macosx_11_0_arm64",
 }
 ARCHIVES = {
