@@ -23,12 +23,21 @@ triples() {
     esac
 }
 
-# Gets the standard library for the triple $1 unless it is there.
-need_target() {
+# Gets the standard library for the triple $1 unless it is there; fails if it cannot be had.
+get_target() {
     [[ -d $(rustc --print target-libdir --target "$1") ]] && return
     say "Installing Rust's standard library for $1"
-    command -v rustup >/dev/null && rustup target add "$1" ||
-        fail "rustup target add $1 failed: the standard library for this platform is needed"
+    command -v rustup >/dev/null && rustup target add "$1"
+}
+
+need_target() {
+    get_target "$1" || fail "rustup target add $1 failed: Rust's standard library for it is needed"
+}
+
+# Whether everything for the platform $1 is there or can be had.
+can_build() {
+    local triple
+    for triple in $(triples "$1"); do get_target "$triple" || return 1; done
 }
 
 # Paths of this machine must not get into the binaries, so that builds in other folders give the same
@@ -171,6 +180,10 @@ package_units() {
             build_units "$platform"
             also=("$(built "$platform")")
             pack_fmus "$host" "$dist/$platform/fmu" --only-also
+        fi
+        if [[ $platform == linux-aarch64 ]]; then
+            # In the wheel each library stands once, where FMPy and the orchestrator look for it.
+            pack_fmus "$host" "$dist/$platform/fmu-wheel" --only-also --folder linux64
         fi
     done
     also=("$(built windows-x86_64)" "$(built macos-universal)")

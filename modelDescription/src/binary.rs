@@ -48,8 +48,8 @@ impl Binary {
     /// Reads the library at `path`. That of macOS may hold several architectures.
     ///
     /// # Errors
-    /// Reports a file that cannot be read, is no library for a platform that FMI 2.0 knows, or needs
-    /// libraries that a bare system lacks.
+    /// Reports a file that cannot be read, is no library for a platform that FMI 2.0 knows, or
+    /// needs libraries that a bare system lacks.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let bytes =
             std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;

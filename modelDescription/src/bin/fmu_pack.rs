@@ -12,10 +12,10 @@ use std::{fs, io};
 /// Makes one NAME.fmu of every FMI 2.0 unit in the given libraries.
 ///
 /// Each library, built with fmi2-export, is opened and asked for the descriptions of its units. Its
-/// builds for other platforms, given by --also, are only read: they must be made of the same sources
-/// and export the same functions. No library may need others than every system of its platform has.
-/// The same input gives the same bytes. Exit code 0: done; 1: a library or file is at fault; 2: the
-/// command line is.
+/// builds for other platforms, given by --also, are only read: they must be made of the same
+/// sources and export the same functions. No library may need others than every system of its
+/// platform has. The same input gives the same bytes. Exit code 0: done; 1: a library or file is at
+/// fault; 2: the command line is.
 #[derive(Parser)]
 #[command(version, name = "fmu-pack")]
 struct Arguments {
@@ -25,7 +25,7 @@ struct Arguments {
     /// Build of one of the libraries for another platform; may be given several times
     #[arg(long, value_name = "FILE")]
     also: Vec<PathBuf>,
-    /// Leaves the libraries themselves out of the archives, so that only those of --also are in them
+    /// Leaves the libraries themselves out of the archives, which then hold those of --also alone
     #[arg(long, requires = "also")]
     only_also: bool,
     /// Puts libraries into this folder below binaries/ alone, where a platform has several
