@@ -45,6 +45,8 @@ can_build() {
 set_flags() {
     local flag
     flags="--remap-path-prefix=$root=/source"$'\x1f'"--remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=/cargo"
+    # Build scripts write code there. Usually it is below the first of these folders.
+    if [[ $target/ != "$root/"* ]]; then set -- "--remap-path-prefix=$target=/source/target" "$@"; fi
     for flag in "$@"; do flags+=$'\x1f'"$flag"; done
 }
 
@@ -92,7 +94,9 @@ cross_build() {
     case "$triple" in
     *-apple-darwin)
         need_macos_sdk
-        set_flags -Clinker="$apple_linker" -Clinker-flavor=ld64.lld -Clink-arg=-dead_strip_dylibs
+        # Without a name of its own, a library is named by the path that it was built at.
+        set_flags -Clinker="$apple_linker" -Clinker-flavor=ld64.lld -Clink-arg=-dead_strip_dylibs \
+            -Clink-arg=-install_name -Clink-arg=@rpath/unit.dylib
         # Dependencies in C are compiled by zig.
         local cc="$target/zig/cc-$triple"
         printf '#!/bin/sh\nPATH="%s:$PATH" exec cargo-zigbuild zig cc -- -target %s "$@"\n' \
