@@ -87,24 +87,23 @@ def folder_of_units(dist: Path, platform: str) -> Iterator[Entry]:
 
 def check(dist: Path) -> None:
     """Raises a fault unless every platform has the program and all units of this version."""
-    described = {
-        path.stem: path.read_bytes() for path in sorted(ROOT.glob("fmu-*/generated/*.xml"))
-    }
-    for platform in ("all", *PLATFORMS, *IN_WHEELS):
-        for name, description in described.items():
-            path = dist / platform / "fmu" / f"{name}.fmu"
+    described = {path.stem: path.read_bytes() for path in ROOT.glob("fmu-*/generated/*.xml")}
+    platforms = (*PLATFORMS, *IN_WHEELS)
+    # Wheels may have units of their own.
+    of_wheels = [folder for each in platforms if (folder := dist / each / "fmu-wheel").is_dir()]
+    for folder in [*(dist / each / "fmu" for each in ("all", *platforms)), *of_wheels]:
+        for name, description in sorted(described.items()):
+            path = folder / f"{name}.fmu"
             if not path.is_file():
                 raise Fault(f"{path} does not exist: run scripts/package")
             with zipfile.ZipFile(path) as unit:
                 if unit.read("modelDescription.xml") != description:
                     raise Fault(f"{path} is another version of the unit: run scripts/package")
-        known = {f"{name}.fmu" for name in described}
-        for name, _, _ in folder_of_units(dist, platform):
-            if name not in known:
-                raise Fault(
-                    f"{dist / platform / 'fmu' / name} is no unit of this version: remove it"
-                )
-        if platform != "all" and not program(dist, platform).is_file():
+        for path in sorted(folder.glob("*.fmu")):
+            if path.stem not in described:
+                raise Fault(f"{path} is no unit of this version: remove it")
+    for platform in platforms:
+        if not program(dist, platform).is_file():
             raise Fault(f"{program(dist, platform)} does not exist: run scripts/package")
 
 

@@ -35,12 +35,13 @@ LIBRARIES = {
     "macos-aarch64": (b"\xcf\xfa\xed\xfe\x0c\0\0\1", "binaries/darwin64/{}.dylib"),
 }
 EVERYWHERE = ("linux-x86_64", "windows-x86_64", "macos-universal")
+# Tags of the wheels, and where their units come from.
 WHEELS = {
-    "manylinux2014_x86_64",
-    "manylinux2014_aarch64",
-    "win_amd64",
-    "macosx_11_0_x86_64",
-    "macosx_11_0_arm64",
+    "manylinux2014_x86_64": "linux-x86_64/fmu",
+    "manylinux2014_aarch64": "linux-aarch64/fmu-wheel",
+    "win_amd64": "windows-x86_64/fmu",
+    "macosx_11_0_x86_64": "macos-x86_64/fmu",
+    "macosx_11_0_arm64": "macos-aarch64/fmu",
 }
 ARCHIVES = {
     f"reentry-fmus-{VERSION}.zip",
@@ -68,6 +69,9 @@ def packages(folder: Path, names: list[str]) -> Path:
         unit(folder / "all" / "fmu" / f"{name}.fmu", EVERYWHERE)
         for each in LIBRARIES:
             unit(folder / each / "fmu" / f"{name}.fmu", (each,))
+        # Where there is such a folder, its units go into the wheel.
+        others = ("linux-aarch64", "macos-x86_64")
+        unit(folder / "linux-aarch64" / "fmu-wheel" / f"{name}.fmu", others)
     for each, (content, _) in LIBRARIES.items():
         name = "orchestrator.exe" if each.startswith("windows") else "orchestrator"
         (folder / each / name).write_bytes(content + b"program")
@@ -192,9 +196,13 @@ def test_the_checksums_are_those_of_the_files(made):
     assert lines == [f"{sums[name]}  {name}" for name in sorted(sums)]
 
 
-def test_wheels_have_the_licences_of_what_is_linked_in(made):
-    for wheel in made.glob("*.whl"):
+def test_wheels_have_the_units_and_the_licences_of_what_is_linked_in(made, dist):
+    for tag, folder in WHEELS.items():
+        [wheel] = made.glob(f"*-{tag}.whl")
         with zipfile.ZipFile(wheel) as archive:
+            for name in NAMES:
+                packed = archive.read(f"reentry_fmus/data/fmu/{name}.fmu")
+                assert packed == (dist / folder / f"{name}.fmu").read_bytes()
             for name in ("LICENSES.txt", "LICENSES-rust-std.html"):
                 assert archive.read(f"reentry_fmus/data/{name}") == (made / name).read_bytes()
 
@@ -279,6 +287,10 @@ def test_missing_and_foreign_units_are_named(dist, tmp_path):
     assert f"{one} is another version of the unit" in said()
     one.unlink()
     assert f"{one} does not exist: run scripts/package" in said()
+    shutil.copy(dist / "windows-x86_64" / "fmu" / "LQR.fmu", one)
+    of_wheel = folder / "linux-aarch64" / "fmu-wheel" / "LQR.fmu"
+    of_wheel.unlink()
+    assert f"{of_wheel} does not exist: run scripts/package" in said()
 
 
 def test_options_that_do_not_exist_are_refused(dist, tmp_path):

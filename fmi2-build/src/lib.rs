@@ -34,7 +34,7 @@ pub fn link() {
     match sources::digest() {
         Ok(digest) => println!("cargo::rustc-env=FMI2_SOURCES={digest}"),
         Err(problem) => {
-            println!("cargo::warning=the library gets no digest of its sources: {problem}")
+            println!("cargo::warning=the library gets no digest of its sources: {problem}");
         }
     }
 }
