@@ -88,7 +88,9 @@ END
 }
 
 # cargo build for the triple $1 with the further arguments.
-cross_build() {
+cross_build() (
+    # A release is built by the profile as it stands, whatever the tests set.
+    unset CARGO_PROFILE_RELEASE_LTO CARGO_PROFILE_RELEASE_CODEGEN_UNITS
     local triple="$1"
     need_target "$triple"
     case "$triple" in
@@ -117,7 +119,7 @@ cross_build() {
             cargo zigbuild --locked --target "$versioned" "${@:2}"
         ;;
     esac
-}
+)
 
 # What every build for another platform needs.
 need_cross() {

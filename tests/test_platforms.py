@@ -16,6 +16,7 @@ import lief
 import pytest
 
 from conftest import NAMES, ROOT, TARGET, merged, program
+from fmi import NOT_REPRODUCIBLE, Fmu
 
 DIST = TARGET / "dist"
 FOLDERS = {
@@ -42,7 +43,7 @@ MACOS = {
 MACOS_VERSION = [11, 0, 0]
 
 pytestmark = pytest.mark.skipif(not DIST.is_dir(), reason="no packages: run scripts/package")
-# The tests build these; a release has that of macOS, too.
+# What runs under an emulator. scripts/package makes the programs, the tests of a change only units.
 PROGRAMS = {"windows-x86_64": "orchestrator.exe", "linux-aarch64": "orchestrator"}
 
 
@@ -172,16 +173,24 @@ def test_no_path_of_the_build_is_in_a_binary(library):
         assert home + b"/.cargo" not in content
 
 
-def compile_for_windows(source: str, to: Path, *arguments: str):
-    compiler = [TARGET / "zig" / "bin" / "python", "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", "-s"]
+# Names of zig for the platforms that the tests run; Linux as old as the packages promise.
+ZIG = {
+    "linux-x86_64": "x86_64-linux-gnu.2.17",
+    "linux-aarch64": "aarch64-linux-gnu.2.17",
+    "windows-x86_64": "x86_64-windows-gnu",
+}
+
+
+def compiled(platform: str, source: str, to: Path, *arguments: str) -> Path:
+    """Compiles a program or library in C for a platform."""
+    compiler = [TARGET / "zig" / "bin" / "python", "-m", "ziglang", "cc", "-target", ZIG[platform], "-s"]
     subprocess.run([*compiler, ROOT / "tests" / "platforms" / source, "-o", to, *arguments], check=True)
+    return to
 
 
 @pytest.fixture(scope="session")
 def wine(tmp_path_factory):
     """Command and environment that run a program for Windows."""
-    if not (DIST / "windows-x86_64" / PROGRAMS["windows-x86_64"]).is_file():
-        pytest.skip("no orchestrator for Windows: run scripts/package")
     if not shutil.which("wine"):
         pytest.skip("wine is not installed: scripts/install-emulators")
     environment = os.environ | {
@@ -194,7 +203,7 @@ def wine(tmp_path_factory):
     subprocess.run(["wineboot", "--init"], env=environment, capture_output=True, check=True, timeout=120)
     stand_in = Path(environment["WINEPREFIX"], "drive_c", "windows", "system32", "bcryptprimitives.dll")
     stand_in.unlink(missing_ok=True)
-    compile_for_windows("process_prng.c", stand_in, "-shared", "-ladvapi32")
+    compiled("windows-x86_64", "process_prng.c", stand_in, "-shared", "-ladvapi32")
     yield ["wine"], environment
     subprocess.run(["wineserver", "--kill"], env=environment, capture_output=True)
 
@@ -209,18 +218,63 @@ def qemu():
 
 @pytest.fixture(params=PROGRAMS)
 def foreign(request):
-    """Runs the orchestrator of another platform with that platform's units."""
+    """The name of another platform, and what runs its programs."""
     emulator, environment = request.getfixturevalue("wine" if request.param.startswith("windows") else "qemu")
-    folder = DIST / request.param
-    if not (folder / PROGRAMS[request.param]).is_file():
-        pytest.skip(f"no orchestrator for {request.param}: run scripts/package")
 
-    def run(*arguments, **options):
-        command = [*emulator, folder / PROGRAMS[request.param], *arguments]
-        return subprocess.run(command, env=environment, capture_output=True, timeout=300, **options)
+    def run(*command, **options):
+        return subprocess.run([*emulator, *command], env=environment, capture_output=True, timeout=300, **options)
 
-    run.units = folder / "fmu"
-    return run
+    return request.param, run
+
+
+def orchestrator(platform: str) -> Path:
+    path = DIST / platform / PROGRAMS[platform]
+    if not path.is_file():
+        pytest.skip(f"no orchestrator for {platform}: run scripts/package")
+    return path
+
+
+def driven(variable) -> str:
+    """An input as the importer in C is told of it: its reference, and limits to jump between, near
+    its start value so that sensors are believed."""
+    start = float(variable.start)
+    low, high = (start + sign * 0.05 * max(abs(start), 0.2) for sign in (-1.0, 1.0))
+    low = low if variable.min is None else max(low, float(variable.min))
+    high = high if variable.max is None else min(high, float(variable.max))
+    return f"{variable.valueReference}:{low}:{high}"
+
+
+@pytest.fixture(scope="session")
+def importer(tmp_path_factory):
+    """Command that runs a unit of a platform in the importer in C, without its emulator."""
+    folder = tmp_path_factory.mktemp("importer")
+
+    def command(platform: str, name: str) -> list:
+        program = folder / f"{platform}.exe"
+        if not program.is_file():
+            compiled(platform, "importer.c", program, *([] if platform.startswith("windows") else ["-ldl"]))
+        unit = Fmu.open(packed(platform, name), folder / platform / name)
+        [library] = unit.folder.glob("binaries/*64/*")
+        shown = [n for n in unit.names("output") if unit.variables[n].type == "Real" and n not in NOT_REPRODUCIBLE]
+        outputs = [unit.variables[n].valueReference for n in shown]
+        inputs = [driven(unit.variables[n]) for n in unit.names("input") if unit.variables[n].type == "Real"]
+        resources = (unit.folder / "resources").as_uri()
+        command = [program, library, unit.description.guid, resources, 250, *inputs, "--", *outputs]
+        return [str(part) for part in command]
+
+    return command
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_oracle_every_unit_gives_the_same_bits_in_an_importer_in_c(foreign, importer, name):
+    platform, run = foreign
+    here = subprocess.run(importer("linux-x86_64", name), capture_output=True, timeout=60)
+    assert here.returncode == 0, here.stderr.decode()
+    rows = here.stdout.decode().split("\n")
+    assert len(rows) == 251 and len(set(rows)) > 50
+    there = run(*importer(platform, name))
+    assert there.returncode == 0, there.stderr.decode(errors="replace")
+    assert there.stdout.decode().split() == here.stdout.decode().split()
 
 
 def native(*arguments, **options):
@@ -233,7 +287,9 @@ def test_oracle_every_platform_computes_the_same_bits(foreign, experiment, tmp_p
     """Times of computation are not recorded in results.csv; everything else is compared."""
     units = DIST / "linux-x86_64" / "fmu"
     here = native("run", experiment, "--out", tmp_path / "here", "--fmu-dir", units, "--quiet")
-    there = foreign("run", experiment, "--out", tmp_path / "there", "--fmu-dir", foreign.units, "--quiet")
+    platform, run = foreign
+    own = [orchestrator(platform), "run", experiment, "--fmu-dir", DIST / platform / "fmu"]
+    there = run(*own, "--out", tmp_path / "there", "--quiet")
     # A law as printed loses the attitude, which ends the run early and keeps what was recorded.
     assert here.returncode == (3 if experiment.stem == "printed" else 0), here.stderr.decode()
     assert there.returncode == here.returncode, there.stderr.decode(errors="replace")
@@ -253,7 +309,7 @@ def test_windows_takes_spaces_letters_backslashes_and_drive_letters(wine, tmp_pa
     for name in ("ReentryPlant", "CRMPC"):
         shutil.copy(packed("all", name), folder)
     emulator, environment = wine
-    own = DIST / "windows-x86_64" / PROGRAMS["windows-x86_64"]
+    own = orchestrator("windows-x86_64")
     experiment, out = ("Z:" + str(folder / name).replace("/", "\\") for name in ("loop.toml", "out"))
     command = [*emulator, own, "run", experiment, "--out", out, "--stop", "2", "--quiet"]
     there = subprocess.run(command, env=environment, capture_output=True, timeout=120)
@@ -265,7 +321,7 @@ def test_windows_takes_spaces_letters_backslashes_and_drive_letters(wine, tmp_pa
 
 def test_windows_names_a_culprit_in_a_path_with_backslashes(wine):
     emulator, environment = wine
-    own = DIST / "windows-x86_64" / PROGRAMS["windows-x86_64"]
+    own = orchestrator("windows-x86_64")
     command = [*emulator, own, "run", "C:\\nö\\such file.toml"]
     there = subprocess.run(command, env=environment, capture_output=True, timeout=120)
     assert there.returncode == 2
@@ -274,8 +330,8 @@ def test_windows_names_a_culprit_in_a_path_with_backslashes(wine):
 
 def test_ctrl_c_on_windows_ends_a_run_and_keeps_its_results(wine, tmp_path):
     emulator, environment = wine
-    compile_for_windows("press_ctrl_c.c", tmp_path / "press.exe")
-    own = DIST / "windows-x86_64" / PROGRAMS["windows-x86_64"]
+    compiled("windows-x86_64", "press_ctrl_c.c", tmp_path / "press.exe")
+    own = orchestrator("windows-x86_64")
     experiment = ROOT / "orchestrator" / "experiments" / "crmpc-2022" / "lqr.toml"
     units = DIST / "windows-x86_64" / "fmu"
     run = f"Z:{own} run Z:{experiment} --fmu-dir Z:{units} --out Z:{tmp_path}/out --real-time --quiet"
