@@ -114,7 +114,9 @@ def test_an_inertia_error_of_a_fifth_changes_little(results, run):
 
 def test_regress_fins_and_jets_bear_six_tenths_of_the_disturbance(results):
     assert measure(results, "fins-jets-50", "late") < 0.13
-    assert measure(results, "fins-jets-60", "late") == pytest.approx(0.206, abs=0.01)
+    # The jets' pulses amplify the last digit: with amplitudes that differ by 1e-12 of 60 kN m, 24 runs
+    # have 0.157 to 0.337 deg.
+    assert 0.13 < measure(results, "fins-jets-60", "late") < 0.4
     for run in ("fins-jets-50", "fins-jets-60"):
         assert measure(results, run, "lost") is None and measure(results, run, "settling") < 9.0
     assert measure(results, "fins-jets-65", "lost") == pytest.approx(11.1, abs=0.5)
