@@ -34,6 +34,9 @@ pub fn link() {
     match sources::digest() {
         Ok(digest) => println!("cargo::rustc-env=FMI2_SOURCES={digest}"),
         Err(problem) => {
+            // Of a file that does not exist cargo thinks that it has changed: the next build tries
+            // again.
+            println!("cargo::rerun-if-changed=no-digest-of-the-sources");
             println!("cargo::warning=the library gets no digest of its sources: {problem}");
         }
     }

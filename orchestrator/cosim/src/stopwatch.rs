@@ -106,4 +106,8 @@ impl CoSimulationUnit for Stopwatch {
     fn terminate(&mut self) -> Outcome {
         self.unit.terminate()
     }
+
+    fn reset(&mut self) -> Outcome {
+        self.unit.reset()
+    }
 }

@@ -163,4 +163,8 @@ impl CoSimulationUnit for Watched {
     fn terminate(&mut self) -> Outcome {
         self.unit.terminate()
     }
+
+    fn reset(&mut self) -> Outcome {
+        self.unit.reset()
+    }
 }

@@ -66,7 +66,8 @@ pub(crate) type FreeInstance = unsafe extern "C" fn(Component);
 /// tolerance, the start time, whether there is a stop time, and the stop time.
 pub(crate) type SetupExperiment =
     unsafe extern "C" fn(Component, c_int, f64, f64, c_int, f64) -> c_int;
-/// Type of the functions fmi2EnterInitializationMode, fmi2ExitInitializationMode and fmi2Terminate.
+/// Type of the functions fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2Terminate and
+/// fmi2Reset.
 pub(crate) type Plain = unsafe extern "C" fn(Component) -> c_int;
 /// Type of the functions fmi2GetReal, fmi2GetInteger and fmi2GetBoolean. The arguments are the
 /// value references, their number, and the values.

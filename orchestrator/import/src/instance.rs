@@ -48,6 +48,8 @@ pub(crate) struct Functions {
     get_boolean_status: fmi::GetStatus<c_int>,
     /// Optional, because nothing depends on it and some units lack it.
     get_version: Option<fmi::GetText>,
+    /// Optional, because a new instance does the same.
+    reset: Option<fmi::Plain>,
     _library: Library,
 }
 
@@ -77,6 +79,7 @@ impl Functions {
                 get_real_status: *library.get(b"fmi2GetRealStatus\0")?,
                 get_boolean_status: *library.get(b"fmi2GetBooleanStatus\0")?,
                 get_version: library.get(b"fmi2GetVersion\0").ok().map(|function| *function),
+                reset: library.get(b"fmi2Reset\0").ok().map(|function| *function),
                 _library: library,
             })
         }
@@ -372,5 +375,15 @@ impl CoSimulationUnit for FmuUnit {
         // FMI gives it.
         let status = unsafe { (self.instance.functions.terminate)(self.component) };
         self.check("terminate", status)
+    }
+
+    fn reset(&mut self) -> Outcome {
+        let Some(reset) = self.instance.functions.reset else {
+            return Err(UnitFailure::new("reset", "its library has no fmi2Reset".to_string()));
+        };
+        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
+        // FMI gives it.
+        let status = unsafe { reset(self.component) };
+        self.check("reset", status)
     }
 }

@@ -81,4 +81,10 @@ pub trait CoSimulationUnit {
     /// # Errors
     /// Returns an error if the unit reports a failure.
     fn terminate(&mut self) -> Outcome;
+    /// Sets all variables back to their start values, so that the unit is as if it had just been
+    /// instantiated.
+    ///
+    /// # Errors
+    /// Returns an error if the unit reports a failure.
+    fn reset(&mut self) -> Outcome;
 }

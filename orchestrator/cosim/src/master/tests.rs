@@ -77,6 +77,11 @@ impl CoSimulationUnit for Mock {
         self.note("terminate");
         Ok(())
     }
+    fn reset(&mut self) -> Outcome {
+        (self.input, self.state) = (0.0, 0.0);
+        self.note("reset");
+        Ok(())
+    }
 }
 
 fn port(component: usize, reference: u32) -> Port {
