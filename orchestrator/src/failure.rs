@@ -1,5 +1,6 @@
 //! Errors with which the program ends, and their exit codes.
 
+use campaign::error::Error as Campaign;
 use cosim::error::Error as Single;
 use cosim_report::error::Error as Study;
 use std::io;
@@ -14,6 +15,9 @@ pub(crate) enum Failure {
     /// A study failed, or it could not start.
     #[error(transparent)]
     Study(#[from] Study),
+    /// A campaign failed, or it could not start.
+    #[error(transparent)]
+    Campaign(#[from] Campaign),
     /// An FMU cannot be used.
     #[error(transparent)]
     Import(#[from] fmu_import::error::Error),
@@ -38,6 +42,7 @@ impl Failure {
         match self {
             Self::Single(error) => error.exit_code(),
             Self::Study(error) => error.exit_code(),
+            Self::Campaign(error) => error.exit_code(),
             Self::Import(_) => 2,
             Self::Faults { .. } | Self::Output(_) => 1,
         }

@@ -1,6 +1,7 @@
 //! The command line of the orchestrator.
 
 use clap::{CommandFactory, Parser, Subcommand};
+mod campaign;
 mod catalogue;
 mod failure;
 mod inspect;
@@ -120,6 +121,14 @@ enum Command {
         #[arg(long)]
         quiet: bool,
     },
+    /// Fly thousands of cases of an experiment in which parameters vary, and write cases.parquet,
+    /// summary.json and report.html: how often limits are broken, with which confidence, and the
+    /// worst cases.
+    ///
+    /// Cases that are flown are kept: after an interruption, the same command goes on.
+    Campaign(campaign::Fly),
+    /// Look for the worst case of a campaign, and write it as an experiment.
+    Falsify(campaign::Falsify),
     /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs
     /// included.
     Pack {
@@ -188,8 +197,11 @@ enum Command {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     // A study may have a thousand runs; its report counts their warnings instead.
-    let usual =
-        if matches!(arguments.command, Command::Reproduce { .. }) { "error" } else { "warn" };
+    let usual = if matches!(arguments.command, Command::Reproduce { .. } | Command::Falsify(_)) {
+        "error"
+    } else {
+        "warn"
+    };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(usual));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
@@ -220,7 +232,15 @@ fn main() -> ExitCode {
 }
 
 fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
-    if matches!(command, Command::Run { .. } | Command::Reproduce { .. } | Command::Pack { .. }) {
+    let lasts = matches!(
+        command,
+        Command::Run { .. }
+            | Command::Reproduce { .. }
+            | Command::Campaign(_)
+            | Command::Falsify(_)
+            | Command::Pack { .. }
+    );
+    if lasts {
         interrupt.listen()?;
     }
     match command {
@@ -277,6 +297,27 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             }
             Ok(())
         }
+        Command::Campaign(asked) => match campaign::fly(&asked, out, interrupt)? {
+            campaign::Next::Done => Ok(()),
+            campaign::Next::Run(experiment, folder) => execute(
+                Command::Run {
+                    experiment,
+                    out: Some(folder),
+                    fmu_dir: asked.common.fmu_dir,
+                    overrides: Overrides::default(),
+                    quiet: asked.common.quiet,
+                    real_time: None,
+                    on_miss: OnMiss::default(),
+                    priority: None,
+                    live: false,
+                    files: Files::default(),
+                    force: true,
+                },
+                out,
+                interrupt,
+            ),
+        },
+        Command::Falsify(asked) => campaign::falsify(&asked, out, interrupt),
         Command::Pack {
             experiment: path,
             ssp,

@@ -25,5 +25,6 @@ pub mod signal;
 pub mod ssp;
 mod stopwatch;
 pub mod system;
+pub mod variation;
 mod watch;
 mod wiring;

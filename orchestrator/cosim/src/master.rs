@@ -20,7 +20,7 @@ use crate::pacing::pacer::Pacer;
 use crate::pacing::timer::{Monotonic, Timer};
 use crate::stopwatch::{Spent, Stopwatch};
 use crate::wiring::{Port, Wire};
-use fmu_import::unit::UnitFailure;
+use fmu_import::unit::{CoSimulationUnit, Outcome, UnitFailure};
 use fmu_import::warnings;
 use std::rc::Rc;
 use transfer::{Inputs, Probe};
@@ -138,6 +138,24 @@ impl Master {
         }
         for index in 0..self.members.len() {
             let outcome = self.members[index].unit.exit_initialization();
+            outcome.map_err(|failure| self.error(start, (index, failure)))?;
+        }
+        Ok(())
+    }
+
+    /// Sets all units back to their start values, after which [`Self::initialize`] begins another
+    /// run. `prepare` is called with the index of each unit to set its parameters.
+    ///
+    /// # Errors
+    /// Returns an error if a call of a unit fails.
+    pub fn reset(
+        &mut self,
+        mut prepare: impl FnMut(usize, &mut dyn CoSimulationUnit) -> Outcome,
+    ) -> Result<(), Error> {
+        let start = self.clock.start();
+        for index in 0..self.members.len() {
+            let unit = self.members[index].unit.as_mut();
+            let outcome = unit.reset().and_then(|()| prepare(index, unit));
             outcome.map_err(|failure| self.error(start, (index, failure)))?;
         }
         Ok(())

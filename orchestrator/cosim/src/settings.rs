@@ -79,41 +79,48 @@ pub(crate) fn resolve(
             );
             continue;
         }
-        let (position, variable) = part.description.find(name).ok_or_else(|| {
-            let known: Vec<&str> = part
-                .description
-                .names("parameter")
-                .chain(part.description.names("input"))
-                .collect();
-            let hint = match names::nearest(name, known.iter().copied()) {
-                // The hint names the parameter as it must be written on the command line.
-                Some(near) if is_assigned => format!("; did you mean \"{}.{near}\"?", part.name),
-                _ => names::hint(name, known.iter().copied()),
-            };
-            refuse(format!("there is no such parameter{hint}"))
-        })?;
-        match variable.causality.as_str() {
-            "input"
-                if wires.iter().any(|w| w.to.component == index && w.to.variable == position) =>
-            {
-                return Err(refuse(
-                    "is an input with a connection, so it cannot have a value of its own".into(),
-                ));
-            }
-            "parameter" | "input" => {}
-            other => {
-                return Err(refuse(format!(
-                    "is of causality {other}, only parameters and inputs can be set"
-                )));
-            }
-        }
+        let position = position(name, index, part, wires, is_assigned).map_err(&refuse)?;
+        let variable = &part.description.variables[position];
         let value = value(written.get_ref(), variable, part).map_err(refuse)?;
         settings.push(Setting { name: name.clone(), reference: variable.reference, value });
     }
     Ok(settings)
 }
 
-fn value(written: &Value, variable: &Variable, part: Part) -> Result<SettingValue, String> {
+/// Returns the position of a variable that may be set, among the variables of its component. With
+/// `is_whole` a hint names it together with the component.
+pub(crate) fn position(
+    name: &str,
+    component: usize,
+    part: Part,
+    wires: &[Wire],
+    is_whole: bool,
+) -> Result<usize, String> {
+    let (position, variable) = part.description.find(name).ok_or_else(|| {
+        let known = part.description.names("parameter").chain(part.description.names("input"));
+        let known: Vec<&str> = known.collect();
+        let hint = match names::nearest(name, known.iter().copied()) {
+            Some(near) if is_whole => format!("; did you mean \"{}.{near}\"?", part.name),
+            _ => names::hint(name, known.iter().copied()),
+        };
+        format!("there is no such parameter{hint}")
+    })?;
+    let is_connected = |wire: &Wire| (wire.to.component, wire.to.variable) == (component, position);
+    match variable.causality.as_str() {
+        "input" if wires.iter().any(is_connected) => {
+            Err("is an input with a connection, so it cannot have a value of its own".into())
+        }
+        "parameter" | "input" => Ok(position),
+        other => Err(format!("is of causality {other}, only parameters and inputs can be set")),
+    }
+}
+
+/// Converts a value to the type and the unit of a variable.
+pub(crate) fn value(
+    written: &Value,
+    variable: &Variable,
+    part: Part,
+) -> Result<SettingValue, String> {
     let mismatch = |wanted: &str| Err(format!("wants {wanted}, not {written}"));
     match (&variable.kind, written) {
         (Kind::Real { unit, min, max, .. }, _) => {

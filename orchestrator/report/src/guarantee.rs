@@ -100,6 +100,12 @@ impl Course {
         Self { margins, signals: Arc::new(signals), ..Self::default() }
     }
 
+    /// Forgets all samples.
+    pub fn reset(&mut self) {
+        let margins = vec![None; self.signals.margins.len()];
+        *self = Self { margins, signals: Arc::clone(&self.signals), ..Self::default() };
+    }
+
     /// Returns the share of the ticks at which the guarantee was in force; `None` before the first
     /// tick.
     pub fn share(&self) -> Option<f64> {

@@ -22,6 +22,7 @@ pub(crate) struct Gauge {
     before: Vec<f64>,
     first: Vec<f64>,
     sum: f64,
+    integral: f64,
     count: u64,
     largest: f64,
     pulses: u64,
@@ -70,6 +71,7 @@ impl Gauge {
             before: Vec::new(),
             first: Vec::new(),
             sum: 0.0,
+            integral: 0.0,
             count: 0,
             largest: 0.0,
             pulses: 0,
@@ -80,6 +82,13 @@ impl Gauge {
         }
     }
 
+    /// Forgets what was measured, so that another run can be measured.
+    pub(crate) fn reset(&mut self) {
+        let signals = std::mem::take(&mut self.signals);
+        let each = self.each.map(|(place, _)| (place, 0.0));
+        *self = Self { each, ..Self::of(&self.measure, signals) };
+    }
+
     /// Returns the number, or `None` if there is none.
     pub(crate) fn value(&self) -> Option<f64> {
         let factor = self.measure.unit.as_ref().map_or(1.0, |unit| unit.factor);
@@ -88,6 +97,7 @@ impl Gauge {
         match self.measure.kind {
             Kind::Rms => Some(factor * (self.sum / count).sqrt()),
             Kind::Mean => Some(factor * (self.sum / count)),
+            Kind::Integral => Some(factor * self.integral),
             Kind::P99 => {
                 let mut samples = self.samples.clone();
                 samples.sort_by(f64::total_cmp);
@@ -132,6 +142,13 @@ impl Gauge {
         if self.count == 0 {
             self.first = values.to_vec();
             self.before = vec![0.0; values.len()];
+        }
+        // By the trapezoidal rule. At the first sample, the values before it are zero and no time
+        // has passed.
+        if let (true, Some(now), Some(before)) =
+            (self.count > 0, values.first(), self.before.first())
+        {
+            self.integral += 0.5 * (now + before) * (time - self.last);
         }
         self.count += 1;
         self.last = time;
@@ -248,6 +265,9 @@ mod tests {
         assert_eq!(measured(Kind::Largest, Some([1.0, 2.0]), None, &rows), Some(3.0));
         assert_eq!(measured(Kind::Rms, Some([1.0, 1.0]), None, &rows), Some(3.0));
         assert_eq!(measured(Kind::Pulses, None, None, &rows), Some(2.0));
+        // 6.5 + 1.55 + 0.25 + 0.125 - 0.075
+        let integral = measured(Kind::Integral, None, None, &rows).unwrap();
+        assert!((integral - 8.35).abs() < 1e-12);
         // The first signal is within 0.2 from 4 s on, the second within 0.02 from 3 s on.
         assert_eq!(measured(Kind::Settling, None, Some(0.02), &rows), Some(4.0));
         assert_eq!(measured(Kind::Settling, None, Some(0.001), &rows), None);

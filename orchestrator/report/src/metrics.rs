@@ -195,6 +195,23 @@ impl Meters {
         self
     }
 
+    /// Forgets what was measured, so that another run of the system can be measured.
+    pub fn reset(&mut self) {
+        self.gauges.values_mut().flatten().for_each(Gauge::reset);
+        if let Some(course) = &mut self.guarantee.1 {
+            course.reset();
+        }
+        if let Some(loss) = &mut self.loss {
+            loss.at = None;
+        }
+        (self.samples, self.completed) = (0, false);
+    }
+
+    /// Returns the value of a metric of the communication points seen so far; `None` if it has none.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.gauges.get(name)?.as_ref()?.value()
+    }
+
     /// Returns the single values of the metrics that keep them, by name, in the order of time.
     pub fn samples(&self) -> BTreeMap<String, Vec<f64>> {
         let gauges =

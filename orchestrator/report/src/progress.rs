@@ -70,6 +70,7 @@ impl Drop for Progress {
 /// every few seconds otherwise.
 pub struct Parts {
     bar: ProgressBar,
+    what: &'static str,
     quiet: bool,
     all: u64,
     last_line: Mutex<Instant>,
@@ -79,26 +80,39 @@ pub struct Parts {
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
 impl Parts {
-    /// Creates a display for `all` parts, of which `done` are complete already.
-    pub fn new(title: &str, all: u64, done: u64, quiet: bool) -> Self {
+    /// Creates a display for `all` parts, of which `done` are complete already. `what` names the
+    /// parts, in the plural.
+    pub fn of(what: &'static str, title: &str, all: u64, done: u64, quiet: bool) -> Self {
         let quiet = quiet || done == all;
         if !stderr().is_terminal() && !quiet {
-            tell(format_args!("{title}: {} of {all} parts to run", all - done));
+            tell(format_args!("{title}: {} of {all} {what} to run", all - done));
         }
-        let bar = bar(all, quiet, "[{bar:40}] {pos} of {len} parts, {eta} left, {msg}");
+        let template =
+            format!("[{{bar:40}}] {{pos}} of {{len}} {what}, {{per_sec}}, {{eta}} left, {{msg}}");
+        let bar = bar(all, quiet, &template);
         bar.set_position(done);
         bar.reset_eta();
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self { bar, quiet, all, last_line: Mutex::new(Instant::now()) }
+        Self { bar, what, quiet, all, last_line: Mutex::new(Instant::now()) }
     }
 
     /// Counts one more part as finished.
     pub fn finished(&self, what: &str) {
-        self.bar.inc(1);
         self.bar.set_message(what.to_string());
+        self.advance(1);
+    }
+
+    /// Counts more parts as finished.
+    pub fn advance(&self, count: u64) {
+        self.bar.inc(count);
         let mut last = self.last_line.lock().unwrap_or_else(PoisonError::into_inner);
         if !self.quiet && !stderr().is_terminal() && last.elapsed() >= BETWEEN_LINES {
-            tell(format_args!("{} of {} parts done", self.bar.position(), self.all));
+            let (rate, what) = (self.bar.per_sec(), self.what);
+            tell(format_args!(
+                "{} of {} {what} done, {rate:.0} per second",
+                self.bar.position(),
+                self.all
+            ));
             *last = Instant::now();
         }
     }

@@ -21,3 +21,5 @@ mod runs;
 mod template;
 mod texts;
 mod values;
+
+pub use page::STYLE;

@@ -9,7 +9,8 @@ use crate::figure::{self, interactive};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::fmt::Write as _;
 
-const STYLE: &str = include_str!("page.css");
+/// Style of the pages of reports.
+pub const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
 /// Returns the text of the page. `judged` belongs to the study's claims in order, and `drawn` to

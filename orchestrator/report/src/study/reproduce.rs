@@ -137,7 +137,8 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
         .filter(|part| !done.contains_key(&(part.run, part.range.start)))
         .cloned()
         .collect();
-    let progress = Parts::new(&study.title, all.len() as u64, done.len() as u64, options.quiet);
+    let progress =
+        Parts::of("parts", &study.title, all.len() as u64, done.len() as u64, options.quiet);
 
     if !missing.is_empty() {
         // An earlier report is removed, because it would not fit the new results if the work is

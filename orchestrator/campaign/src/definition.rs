@@ -1,0 +1,403 @@
+//! A campaign as its file describes it.
+//!
+//! docs/campaigns.md explains all keys; `orchestrator/schema/campaign.json` describes them for
+//! editors.
+
+use cosim::document::Source;
+use cosim::error::Error;
+use cosim::experiment::Measure;
+use cosim::signal::Signal;
+use fmu_import::names;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use toml::{Spanned, Value};
+
+/// A campaign: an experiment, what varies from case to case, and what is asked of all cases.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Campaign {
+    /// Title of the campaign, in one line.
+    pub title: String,
+    /// Description of the campaign, of any length.
+    #[serde(default)]
+    pub description: String,
+    /// Experiment whose cases are flown: a file beside this one, or the name of an experiment.
+    #[schemars(with = "String")]
+    pub experiment: Spanned<PathBuf>,
+    /// FMUs in place of those of the experiment, by component.
+    #[serde(default)]
+    pub fmu: BTreeMap<String, PathBuf>,
+    /// Values of parameters that are the same in all cases, as `component.parameter`.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, cosim::experiment::Scalar>")]
+    pub set: BTreeMap<String, Spanned<Value>>,
+    /// Parameters that the experiment sets and that stay at the unit's own value.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub unset: Vec<Spanned<String>>,
+    /// Seed of all random numbers. Case k depends on the seed and k alone.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// Number of cases, and with `until` the largest number. A factorial design needs none.
+    #[serde(default)]
+    pub cases: Option<u64>,
+    /// Way in which the cases fill the space of what varies.
+    #[serde(default)]
+    pub design: Kind,
+    /// Parameters that differ from case to case.
+    #[serde(default)]
+    pub vary: Vec<Vary>,
+    /// Correlations among what varies.
+    #[serde(default, rename = "correlation")]
+    pub correlations: Vec<Correlation>,
+    /// Lists of signals that measures refer to, by name, besides those of the experiment.
+    #[serde(default)]
+    pub signals: BTreeMap<String, Vec<Signal>>,
+    /// Names of metrics of the experiment that are recorded of each case.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub metrics: Vec<Spanned<String>>,
+    /// Further numbers that are computed from the signals of each case.
+    #[serde(default, rename = "measure")]
+    pub measures: Vec<Measure>,
+    /// Limits that each case keeps or breaks.
+    #[serde(default, rename = "limit")]
+    pub limits: Vec<Limit>,
+    /// Question that ends the campaign as soon as it is answered.
+    #[serde(default)]
+    pub until: Option<Until>,
+    /// Choice of the cases whose results are kept in full.
+    #[serde(default)]
+    pub keep: Keep,
+    /// Search for the worst case, for `orchestrator falsify`.
+    #[serde(default)]
+    pub search: Option<Search>,
+    /// The campaign file, together with the files that it extends. This is no key of the file.
+    #[serde(skip)]
+    pub source: Source,
+}
+
+/// Way in which the cases fill the space of what varies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, JsonSchema, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Each case is drawn independently of all others.
+    #[default]
+    Random,
+    /// Each parameter falls once into each of as many strata of equal probability as there are
+    /// cases.
+    LatinHypercube,
+    /// Points of Sobol's sequence, scrambled by Owen's method.
+    Sobol,
+    /// All combinations of the levels of what varies.
+    Factorial,
+    /// The corners of the box of what varies, and random cases. If there are more corners than
+    /// cases, every other case is a corner that is chosen at random.
+    Corners,
+    /// Pairs of random points with exchanged coordinates, which Sobol's indices are computed from.
+    /// The number of cases is a multiple of the number of parameters plus two.
+    Sensitivity,
+}
+
+/// What varies: one parameter or several, with the distribution of their values. Exactly one of the
+/// keys from `uniform` to `case` is given. A number may be a text with a unit (`"5 deg"`), or with a
+/// percent sign, which stands for percent of the value in the experiment.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Vary {
+    /// Parameter, or input without a connection, as `component.parameter`; of several in a list,
+    /// all get the same value.
+    #[serde(default)]
+    #[schemars(with = "Option<OneOrMore>")]
+    pub parameter: Option<Spanned<OneOrMore>>,
+    /// Parameters that each get a value of their own from the same distribution.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub each: Vec<Spanned<String>>,
+    /// Smallest and largest value of a uniform distribution. An integer parameter gets integers,
+    /// both ends included.
+    #[serde(default)]
+    #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
+    pub uniform: Option<Spanned<[Value; 2]>>,
+    /// Mean and standard deviation of a normal distribution.
+    #[serde(default)]
+    #[schemars(with = "Option<Normal>")]
+    pub normal: Option<Spanned<Normal>>,
+    /// Median and spread of a log-normal distribution.
+    #[serde(default)]
+    #[schemars(with = "Option<LogNormal>")]
+    pub log_normal: Option<Spanned<LogNormal>>,
+    /// Smallest, most likely and largest value of a triangular distribution.
+    #[serde(default)]
+    #[schemars(with = "Option<[cosim::experiment::Scalar; 3]>")]
+    pub triangular: Option<Spanned<[Value; 3]>>,
+    /// Values that are equally likely, unless `weights` are given: numbers, texts, items of an
+    /// enumeration or truth values.
+    #[serde(default)]
+    #[schemars(with = "Option<Vec<cosim::experiment::Scalar>>")]
+    pub list: Option<Spanned<Vec<Value>>>,
+    /// Equally spaced values, equally likely.
+    #[serde(default)]
+    #[schemars(with = "Option<Range>")]
+    pub range: Option<Spanned<Range>>,
+    /// Magnitude of a value whose sign is plus or minus.
+    #[serde(default)]
+    #[schemars(with = "Option<cosim::experiment::Scalar>")]
+    pub sign: Option<Spanned<Value>>,
+    /// First of consecutive integers: the parameter is this number plus that of the case, as for
+    /// seeds.
+    #[serde(default)]
+    #[schemars(with = "Option<i64>")]
+    pub case: Option<Spanned<i64>>,
+    /// Bounds that cut off a continuous distribution.
+    #[serde(default)]
+    #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
+    pub within: Option<Spanned<[Value; 2]>>,
+    /// Probabilities of the values of `list`, which are scaled to a sum of 1.
+    #[serde(default)]
+    #[schemars(with = "Option<Vec<f64>>")]
+    pub weights: Option<Spanned<Vec<f64>>>,
+    /// Number of levels of a continuous distribution in a factorial design, equally spaced in
+    /// probability, ends included.
+    #[serde(default)]
+    pub levels: Option<u32>,
+}
+
+/// A single name, or a list of names.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum OneOrMore {
+    /// A single name.
+    One(String),
+    /// Several names.
+    More(Vec<String>),
+}
+
+impl OneOrMore {
+    /// Returns all names.
+    pub fn all(&self) -> &[String] {
+        match self {
+            Self::One(name) => std::slice::from_ref(name),
+            Self::More(names) => names,
+        }
+    }
+}
+
+/// A normal distribution.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Normal {
+    /// Mean of the distribution.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub mean: Value,
+    /// Standard deviation of the distribution.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub deviation: Value,
+}
+
+/// A log-normal distribution.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LogNormal {
+    /// Median of the distribution.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub median: Value,
+    /// Standard deviation of the natural logarithm.
+    pub sigma: f64,
+}
+
+/// Equally spaced values.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// First value.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub from: Value,
+    /// Last value.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub to: Value,
+    /// Number of values, at least 2.
+    pub count: u32,
+}
+
+/// Correlation of two parameters that vary. It is that of the normal scores behind their
+/// distributions (a Gaussian copula).
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Correlation {
+    /// The two parameters.
+    #[schemars(with = "[String; 2]")]
+    pub between: Spanned<[String; 2]>,
+    /// Coefficient of the correlation, above -1 and below 1.
+    pub coefficient: f64,
+}
+
+/// A limit on a measure, which each case keeps or breaks. A case that is lost or fails keeps none.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Limit {
+    /// Name of the limit in the results.
+    pub id: String,
+    /// The limit in words, for the report.
+    #[serde(default)]
+    pub says: String,
+    /// Metric or measure that is limited.
+    #[schemars(with = "String")]
+    pub measure: Spanned<String>,
+    /// Largest value that keeps the limit, in the unit of the measure.
+    #[serde(default)]
+    pub at_most: Option<f64>,
+    /// Smallest value that keeps the limit, in the unit of the measure.
+    #[serde(default)]
+    pub at_least: Option<f64>,
+    /// Whether a case ends as soon as it breaks the limit. The measure must be of the kind
+    /// `largest`, and the limit an `at_most`.
+    #[serde(default)]
+    pub ends: bool,
+}
+
+/// A question that ends the campaign as soon as it is answered: whether a limit is broken with a
+/// probability below a bound.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Until {
+    /// Id of the limit.
+    pub limit: String,
+    /// Probability with which the limit may be broken.
+    pub below: f64,
+    /// Confidence of the answer, by default 0.95.
+    #[serde(default = "confidence")]
+    pub confidence: f64,
+}
+
+/// Choice of the cases whose results are kept in full, as `orchestrator run` writes them.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Keep {
+    /// Number of cases with the largest values of `by`.
+    #[serde(default)]
+    pub worst: u32,
+    /// Measure that orders the cases.
+    #[serde(default)]
+    #[schemars(with = "Option<String>")]
+    pub by: Option<Spanned<String>>,
+    /// Largest number of cases that broke a limit, were lost or failed.
+    #[serde(default)]
+    pub failed: u32,
+    /// Number m, if every m-th case is kept.
+    #[serde(default)]
+    pub every: Option<u64>,
+}
+
+/// A search for the worst case.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Search {
+    /// Measure whose largest value is looked for.
+    #[schemars(with = "String")]
+    pub largest: Spanned<String>,
+    /// Largest number of cases that are flown.
+    #[serde(default = "thousand")]
+    pub cases: u64,
+    /// Value of the measure at which the search ends.
+    #[serde(default)]
+    pub enough: Option<f64>,
+}
+
+fn one() -> u64 {
+    1
+}
+
+fn confidence() -> f64 {
+    0.95
+}
+
+fn thousand() -> u64 {
+    1000
+}
+
+impl Campaign {
+    /// Reads a campaign file and all files that it extends.
+    ///
+    /// # Errors
+    /// Returns an error if a file cannot be read, is not TOML, holds an unknown key, or contradicts
+    /// itself.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        Self::of(Source::load(path)?)
+    }
+
+    fn of(source: Source) -> Result<Self, Error> {
+        let mut campaign: Self = source.read()?;
+        campaign.source = source;
+        campaign.check()?;
+        Ok(campaign)
+    }
+
+    /// Returns the name of the campaign, which is that of its file.
+    pub fn name(&self) -> String {
+        let stem = self.source.path.file_stem();
+        stem.map_or("campaign".into(), |stem| stem.to_string_lossy().into_owned())
+    }
+
+    /// Checks what can be checked without the experiment.
+    fn check(&self) -> Result<(), Error> {
+        let whole = |message: String| self.source.error(&(0..0), message);
+        let mut ids = BTreeSet::new();
+        let all = self.measures.iter().map(|measure| ("measure", &measure.id));
+        for (what, id) in all.chain(self.limits.iter().map(|limit| ("limit", &limit.id))) {
+            if id.is_empty() {
+                return Err(whole(format!("[[{what}]] id is missing: the results need a name")));
+            }
+            if !ids.insert((what, id)) {
+                return Err(whole(format!("there are two [[{what}]] with the id \"{id}\"")));
+            }
+        }
+        for limit in &self.limits {
+            let fault = |problem: &str| {
+                let span = limit.measure.span();
+                Err(self.source.error(&span, format!("[[limit]] {}: {problem}", limit.id)))
+            };
+            if limit.at_most.is_some() == limit.at_least.is_some() {
+                return fault("one of at_most and at_least is needed");
+            }
+            if limit.at_most.or(limit.at_least).is_some_and(f64::is_nan) {
+                return fault("the limit is not a number");
+            }
+            if limit.ends && limit.at_most.is_none() {
+                return fault("ends needs an at_most: nothing is above its least value at first");
+            }
+        }
+        if let Some(until) = &self.until {
+            let ids = self.limits.iter().map(|limit| limit.id.as_str());
+            if !ids.clone().any(|id| id == until.limit) {
+                let hint = names::hint(&until.limit, ids);
+                return Err(whole(format!("[until] there is no limit \"{}\"{hint}", until.limit)));
+            }
+            for (key, value) in [("below", until.below), ("confidence", until.confidence)] {
+                if !(value > 0.0 && value < 1.0) {
+                    return Err(whole(format!("[until] {key} = {value}: between 0 and 1")));
+                }
+            }
+            if self.design != Kind::Random {
+                return Err(whole(
+                    "[until] counts on independent cases: it needs design = \"random\"".into(),
+                ));
+            }
+        }
+        if self.cases == Some(0) {
+            return Err(whole("cases = 0: at least 1".into()));
+        }
+        if self.keep.worst > 0 && self.keep.by.is_none() {
+            return Err(whole("[keep] worst needs by, the measure that orders the cases".into()));
+        }
+        if self.keep.every == Some(0) {
+            return Err(whole("[keep] every = 0: at least 1".into()));
+        }
+        if self.vary.is_empty() {
+            return Err(whole("nothing varies: add a [[vary]]".into()));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,452 @@
+//! The distribution of a parameter that varies: its quantile function, with units converted.
+
+use crate::definition::Vary;
+use crate::design::Place;
+use crate::report::short;
+use cosim::system::System;
+use cosim::variation::{SettingValue, Target};
+use fmu_import::description::Kind;
+use statrs::distribution::{ContinuousCDF, LogNormal, Normal, Triangular};
+use statrs::statistics::{Distribution, Mode};
+use toml::Value;
+
+/// Distribution of the values of a parameter.
+#[derive(Clone, Debug)]
+pub struct Law {
+    shape: Shape,
+    /// Probabilities between which the quantiles lie, if the distribution is cut off.
+    between: [f64; 2],
+    /// Smallest and largest value, if there are any.
+    ends: Option<[f64; 2]>,
+    /// Number of levels in a factorial design, and 0 if it was not given.
+    levels: u64,
+}
+
+#[derive(Clone, Debug)]
+enum Shape {
+    Uniform([f64; 2]),
+    /// Integers, both ends included.
+    Whole([i32; 2]),
+    Normal(Normal),
+    LogNormal(LogNormal),
+    Triangular(Triangular),
+    /// Values with the probabilities up to and including each of them.
+    List(Vec<SettingValue>, Vec<f64>),
+    /// This integer plus the number of the case.
+    Case(i64),
+}
+
+impl Law {
+    /// Reads the distribution of `vary` for a target.
+    ///
+    /// # Errors
+    /// Returns an error if there is not exactly one distribution, or if it cannot be that of the
+    /// target.
+    pub fn new(vary: &Vary, target: Target, system: &System) -> Result<Self, String> {
+        let reader = Reader { system, target };
+        let shape = reader.shape(vary)?;
+        let is_continuous = !matches!(shape, Shape::List(..) | Shape::Case(_) | Shape::Whole(_));
+        let mut law = Self {
+            ends: shape.ends(),
+            shape,
+            between: [0.0, 1.0],
+            levels: u64::from(vary.levels.unwrap_or(0)),
+        };
+        if let Some(within) = &vary.within {
+            if !is_continuous {
+                return Err("within is for continuous distributions only".into());
+            }
+            let [low, high] = within.get_ref();
+            let (low, high) = (reader.number(low)?, reader.number(high)?);
+            if low.is_nan() || high.is_nan() || low >= high {
+                return Err(format!("within = [{low}, {high}]: from a smaller to a larger value"));
+            }
+            law.between = [law.shape.below(low), law.shape.below(high)];
+            if law.between[0] >= law.between[1] {
+                return Err(format!(
+                    "within = [{low}, {high}]: the distribution has no value there"
+                ));
+            }
+            let [least, most] = law.ends.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+            law.ends = Some([low.max(least), high.min(most)]);
+        }
+        if vary.levels.is_some() && !is_continuous {
+            return Err("levels is for continuous distributions only".into());
+        }
+        if vary.levels.is_some_and(|levels| levels < 2) {
+            return Err("levels: at least 2".into());
+        }
+        if vary.weights.is_some() && vary.list.is_none() {
+            return Err("weights belong to a list".into());
+        }
+        // What can be drawn must be within the limits of the variable.
+        for end in law.ends.into_iter().flatten() {
+            reader.checked(end)?;
+        }
+        Ok(law)
+    }
+
+    /// Returns the number of levels in a factorial design.
+    ///
+    /// # Errors
+    /// Returns an error if the distribution has none.
+    pub fn levels(&self) -> Result<u64, String> {
+        match &self.shape {
+            Shape::List(values, _) => Ok(values.len() as u64),
+            Shape::Whole([low, high]) => Ok((i64::from(*high) - i64::from(*low) + 1) as u64),
+            Shape::Case(_) => Err("case has no levels: a factorial design cannot vary it".into()),
+            _ if self.levels == 0 => Err("a factorial design needs levels here".into()),
+            _ if self.ends.is_none() => {
+                Err("has no ends: a factorial design needs within here".into())
+            }
+            _ => Ok(self.levels),
+        }
+    }
+
+    /// Checks that the distribution has ends.
+    ///
+    /// # Errors
+    /// Returns an error if it has none, so that there are no corners.
+    pub fn check_ends(&self) -> Result<(), String> {
+        match self.shape {
+            Shape::List(..) | Shape::Whole(_) | Shape::Case(_) => Ok(()),
+            _ if self.ends.is_some() => Ok(()),
+            _ => Err("has no ends: corners need within here".into()),
+        }
+    }
+
+    /// Returns the distribution in words.
+    pub fn told(&self) -> String {
+        let ends = |[low, high]: [f64; 2]| format!("{} to {}", short(low), short(high));
+        let whole = match &self.shape {
+            Shape::Uniform(own) => format!("uniform, {}", ends(*own)),
+            Shape::Whole([low, high]) => format!("integers, {low} to {high}"),
+            Shape::Normal(law) => {
+                let (mean, deviation) = (law.mean(), law.std_dev());
+                format!(
+                    "normal, mean {}, deviation {}",
+                    short(mean.unwrap_or(f64::NAN)),
+                    short(deviation.unwrap_or(f64::NAN))
+                )
+            }
+            Shape::LogNormal(law) => format!("log-normal, median {}", short(law.inverse_cdf(0.5))),
+            Shape::Triangular(law) => format!(
+                "triangular, {}, most likely {}",
+                ends([law.inverse_cdf(0.0), law.inverse_cdf(1.0)]),
+                short(law.mode().unwrap_or(f64::NAN))
+            ),
+            Shape::List(values, _) => {
+                let shown = values.iter().take(6).map(|value| match value {
+                    SettingValue::Real(value) => short(*value),
+                    other => other.to_json().to_string(),
+                });
+                let more = if values.len() > 6 { ", …" } else { "" };
+                format!("one of {}{more}", shown.collect::<Vec<_>>().join(", "))
+            }
+            Shape::Case(first) => format!("number of the case + {first}"),
+        };
+        match (self.ends, self.shape.ends()) {
+            (Some(own), uncut) if uncut != Some(own) => format!("{whole}, within {}", ends(own)),
+            _ => whole,
+        }
+    }
+
+    /// Returns whether values can be between any two of them, so that correlations and searches make
+    /// sense.
+    pub fn is_ordered(&self) -> bool {
+        !matches!(self.shape, Shape::Case(_))
+            && !matches!(&self.shape, Shape::List(values, _)
+                if !matches!(values.first(), Some(SettingValue::Real(_) | SettingValue::Integer(_))))
+    }
+
+    /// Returns whether the value is a function of the case's number instead of its place.
+    pub fn is_counted(&self) -> bool {
+        matches!(self.shape, Shape::Case(_))
+    }
+
+    /// Returns the value at a place for the case with this number.
+    ///
+    /// # Errors
+    /// Returns an error if the number of the case leads out of the range of an integer.
+    pub fn value(&self, place: Place, case: u64) -> Result<SettingValue, String> {
+        let last = |values: &[SettingValue]| values.len().saturating_sub(1);
+        Ok(match (&self.shape, place) {
+            (Shape::Case(first), _) => {
+                let value = first.checked_add_unsigned(case);
+                let value = value.and_then(|value| i32::try_from(value).ok());
+                SettingValue::Integer(value.ok_or("case: the number is too large for an integer")?)
+            }
+            (Shape::List(values, sums), Place::Quantile(unit)) => {
+                let index = sums.partition_point(|sum| *sum <= unit);
+                values[index.min(last(values))].clone()
+            }
+            (Shape::List(values, _), Place::Level(level)) => {
+                values[(level as usize).min(last(values))].clone()
+            }
+            (Shape::List(values, _), Place::End(is_last)) => {
+                values[if is_last { last(values) } else { 0 }].clone()
+            }
+            (Shape::Whole([low, high]), place) => {
+                let count = (i64::from(*high) - i64::from(*low) + 1) as f64;
+                let offset = match place {
+                    Place::Quantile(unit) => (unit * count).floor(),
+                    Place::Level(level) => level as f64,
+                    Place::End(is_last) => f64::from(u8::from(is_last)) * (count - 1.0),
+                };
+                SettingValue::Integer((f64::from(*low) + offset.min(count - 1.0)) as i32)
+            }
+            (_, Place::End(is_last)) => {
+                SettingValue::Real(self.ends.map_or(f64::NAN, |ends| ends[usize::from(is_last)]))
+            }
+            (_, Place::Level(level)) if level == 0 || level + 1 >= self.levels => {
+                self.value(Place::End(level > 0), case)?
+            }
+            (_, Place::Level(level)) => {
+                let unit = level as f64 / (self.levels - 1) as f64;
+                self.value(Place::Quantile(unit), case)?
+            }
+            (shape, Place::Quantile(unit)) => {
+                let [from, to] = self.between;
+                let value = shape.quantile(from + unit * (to - from));
+                let [low, high] = self.ends.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+                SettingValue::Real(value.clamp(low, high))
+            }
+        })
+    }
+}
+
+impl Shape {
+    fn ends(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Uniform(ends) => Some(*ends),
+            Self::Whole(ends) => Some(ends.map(f64::from)),
+            Self::Triangular(law) => Some([law.inverse_cdf(0.0), law.inverse_cdf(1.0)]),
+            _ => None,
+        }
+    }
+
+    /// Returns the probability of values up to this one.
+    fn below(&self, value: f64) -> f64 {
+        match self {
+            Self::Uniform([low, high]) => ((value - low) / (high - low)).clamp(0.0, 1.0),
+            Self::Normal(law) => law.cdf(value),
+            Self::LogNormal(law) => law.cdf(value),
+            Self::Triangular(law) => law.cdf(value),
+            Self::Whole(_) | Self::List(..) | Self::Case(_) => f64::NAN,
+        }
+    }
+
+    fn quantile(&self, unit: f64) -> f64 {
+        // The ends of an unbounded distribution are infinite.
+        let inside = unit.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0);
+        match self {
+            Self::Uniform([low, high]) => low + unit * (high - low),
+            Self::Normal(law) => law.inverse_cdf(inside),
+            Self::LogNormal(law) => law.inverse_cdf(inside),
+            Self::Triangular(law) => law.inverse_cdf(unit),
+            Self::Whole(_) | Self::List(..) | Self::Case(_) => f64::NAN,
+        }
+    }
+}
+
+/// Reads the values of a distribution for one target.
+struct Reader<'a> {
+    system: &'a System,
+    target: Target,
+}
+
+impl Reader<'_> {
+    fn shape(&self, vary: &Vary) -> Result<Shape, String> {
+        let given = [
+            ("uniform", vary.uniform.is_some()),
+            ("normal", vary.normal.is_some()),
+            ("log_normal", vary.log_normal.is_some()),
+            ("triangular", vary.triangular.is_some()),
+            ("list", vary.list.is_some()),
+            ("range", vary.range.is_some()),
+            ("sign", vary.sign.is_some()),
+            ("case", vary.case.is_some()),
+        ];
+        let chosen: Vec<&str> =
+            given.iter().filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
+        if chosen.len() != 1 {
+            let all = given.map(|(name, _)| name).join(", ");
+            let said = if chosen.is_empty() { "none".into() } else { chosen.join(" and ") };
+            return Err(format!("one distribution is needed ({all}), there is {said}"));
+        }
+        let kind = &self.system.variable(self.target).kind;
+        if !matches!(kind, Kind::Real { .. })
+            && matches!(chosen[0], "normal" | "log_normal" | "triangular")
+        {
+            return Err(format!(
+                "{} is for parameters of type Real, not {}",
+                chosen[0],
+                kind.name()
+            ));
+        }
+        if let Some(uniform) = &vary.uniform {
+            return self.uniform(uniform.get_ref(), kind);
+        }
+        if let Some(normal) = &vary.normal {
+            let normal = normal.get_ref();
+            let (mean, deviation) =
+                (self.number(&normal.mean)?, self.difference(&normal.deviation)?);
+            let law = Normal::new(mean, deviation);
+            return law
+                .map(Shape::Normal)
+                .map_err(|_| format!("normal: deviation = {deviation}: above 0"));
+        }
+        if let Some(log_normal) = &vary.log_normal {
+            let log_normal = log_normal.get_ref();
+            let (median, sigma) = (self.number(&log_normal.median)?, log_normal.sigma);
+            if median.is_nan() || median <= 0.0 {
+                return Err(format!("log_normal: median = {median}: above 0"));
+            }
+            return LogNormal::new(median.ln(), sigma)
+                .map(Shape::LogNormal)
+                .map_err(|_| format!("log_normal: sigma = {sigma}: above 0"));
+        }
+        if let Some(triangular) = &vary.triangular {
+            let [low, mode, high] = triangular.get_ref();
+            let [low, mode, high] = [self.number(low)?, self.number(mode)?, self.number(high)?];
+            return Triangular::new(low, high, mode).map(Shape::Triangular).map_err(|_| {
+                format!(
+                    "triangular = [{low}, {mode}, {high}]: smallest, most likely and largest value"
+                )
+            });
+        }
+        if let Some(list) = &vary.list {
+            let values = list.get_ref().iter().map(|value| self.setting(value));
+            let values = values.collect::<Result<Vec<_>, _>>()?;
+            return weighted(
+                values,
+                vary.weights.as_ref().map(|weights| weights.get_ref().as_slice()),
+            );
+        }
+        if let Some(range) = &vary.range {
+            let range = range.get_ref();
+            if range.count < 2 {
+                return Err(format!("range: count = {}: at least 2", range.count));
+            }
+            let (from, to) = (self.number(&range.from)?, self.number(&range.to)?);
+            let last = f64::from(range.count - 1);
+            let value = |i: u32| {
+                let value = from + (to - from) * f64::from(i) / last;
+                self.checked(value)
+            };
+            return weighted((0..range.count).map(value).collect::<Result<_, _>>()?, None);
+        }
+        if let Some(sign) = &vary.sign {
+            let size = self.number(sign.get_ref())?;
+            return weighted(vec![self.checked(-size)?, self.checked(size)?], None);
+        }
+        let first = vary.case.as_ref().map_or(0, |first| *first.get_ref());
+        if !matches!(kind, Kind::Integer { .. }) {
+            return Err(format!("case is for parameters of type Integer, not {}", kind.name()));
+        }
+        self.setting(&Value::Integer(first))?;
+        Ok(Shape::Case(first))
+    }
+
+    fn uniform(&self, ends: &[Value; 2], kind: &Kind) -> Result<Shape, String> {
+        let [low, high] = ends;
+        if matches!(kind, Kind::Integer { .. }) {
+            let whole = |value: &Value| match self.setting(value)? {
+                SettingValue::Integer(value) => Ok(value),
+                other => Err(format!("uniform: {} is no integer", other.to_json())),
+            };
+            let (low, high) = (whole(low)?, whole(high)?);
+            return if low < high {
+                Ok(Shape::Whole([low, high]))
+            } else {
+                Err(format!("uniform = [{low}, {high}]: from a smaller to a larger value"))
+            };
+        }
+        if !matches!(kind, Kind::Real { .. }) {
+            return Err(format!("uniform is for numbers, not for {}: take a list", kind.name()));
+        }
+        let (low, high) = (self.number(low)?, self.number(high)?);
+        if low < high && (high - low).is_finite() {
+            Ok(Shape::Uniform([low, high]))
+        } else {
+            Err(format!("uniform = [{low}, {high}]: from a smaller to a larger value"))
+        }
+    }
+
+    /// Converts a value; text with a percent sign stands for percent of the experiment's value.
+    fn setting(&self, written: &Value) -> Result<SettingValue, String> {
+        match self.percent(written)? {
+            Some(value) => self.checked(value),
+            None => self.system.value(self.target, written),
+        }
+    }
+
+    fn percent(&self, written: &Value) -> Result<Option<f64>, String> {
+        let Some(number) = written.as_str().and_then(|text| text.trim().strip_suffix('%')) else {
+            return Ok(None);
+        };
+        let percent: f64 =
+            number.trim().parse().map_err(|_| format!("{written} is no number of percent"))?;
+        let nominal = self.system.nominal(self.target).ok_or_else(|| {
+            format!("{written}: the unit states no value that this could be percent of")
+        })?;
+        Ok(Some(nominal * percent / 100.0))
+    }
+
+    /// Converts a number, without a check of the variable's limits: it may be a mean or a bound.
+    fn number(&self, written: &Value) -> Result<f64, String> {
+        if let Some(value) = self.percent(written)? {
+            return Ok(value);
+        }
+        match written {
+            Value::Float(value) => Ok(*value),
+            Value::Integer(value) => Ok(*value as f64),
+            _ => match self.system.value(self.target, written)? {
+                SettingValue::Real(value) => Ok(value),
+                SettingValue::Integer(value) => Ok(f64::from(value)),
+                _ => Err(format!("{written} is no number")),
+            },
+        }
+    }
+
+    /// Converts a difference of two values. Units with an offset are not differences.
+    fn difference(&self, written: &Value) -> Result<f64, String> {
+        self.number(written).map(f64::abs)
+    }
+
+    /// Checks a number against the limits of the variable.
+    fn checked(&self, value: f64) -> Result<SettingValue, String> {
+        let is_real = matches!(self.system.variable(self.target).kind, Kind::Real { .. });
+        let written = if is_real || value.fract() != 0.0 {
+            Value::Float(value)
+        } else {
+            Value::Integer(value as i64)
+        };
+        self.system.value(self.target, &written)
+    }
+}
+
+/// Makes a list whose values have these weights, or the same weight each.
+fn weighted(values: Vec<SettingValue>, weights: Option<&[f64]>) -> Result<Shape, String> {
+    if values.is_empty() {
+        return Err("the list is empty".into());
+    }
+    let equal = vec![1.0; values.len()];
+    let weights = weights.unwrap_or(&equal);
+    if weights.len() != values.len() {
+        return Err(format!("{} weights for {} values", weights.len(), values.len()));
+    }
+    let sum: f64 = weights.iter().sum();
+    if weights.iter().any(|weight| weight.is_nan() || *weight < 0.0)
+        || sum <= 0.0
+        || sum.is_infinite()
+    {
+        return Err("weights must not be negative, and not all zero".into());
+    }
+    let mut reached = 0.0;
+    let sums = weights.iter().map(|weight| {
+        reached += weight / sum;
+        reached
+    });
+    Ok(Shape::List(values, sums.collect()))
+}

@@ -1,0 +1,135 @@
+//! Parts of a campaign: consecutive cases, whose results are kept in a file of their own. A part
+//! whose file is there and fits is not flown again, whoever flew it: this thread, an earlier run, or
+//! another machine.
+
+use crate::flight::{Flight, Row, Status, kept, table};
+use crate::plan::Plan;
+use crate::table::{Reader, Table, Values, Writer};
+use cosim::error::Error;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Number of cases in a part.
+pub const LENGTH: u64 = 250;
+
+/// Returns the parts of the cases below `cases`.
+pub fn parts(cases: u64) -> impl Iterator<Item = Range<u64>> {
+    (0..cases.div_ceil(LENGTH)).map(move |i| i * LENGTH..cases.min((i + 1) * LENGTH))
+}
+
+/// Returns the path of a part's file in the folder of a campaign's results.
+pub fn path(out: &Path, part: &Range<u64>) -> PathBuf {
+    out.join("parts").join(format!("{:010}-{:010}.parquet", part.start, part.end))
+}
+
+/// What is counted of a part, so that its rows need not stay in memory.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Counts {
+    /// Number of cases with each status, in the order of [`Status::ALL`].
+    pub status: [u64; 4],
+    /// Number of cases that broke each limit.
+    pub broken: Vec<u64>,
+}
+
+/// What is found of a part in the folder of the results.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Found {
+    /// The part is there and fits.
+    Whole(Counts),
+    /// There is no such file.
+    Missing,
+    /// The file is damaged.
+    Damaged,
+    /// The file was made with something else, which is named.
+    Other(Vec<String>),
+}
+
+/// Looks for a part.
+pub fn find(plan: &Plan, out: &Path, part: &Range<u64>) -> Found {
+    let path = path(out, part);
+    if !path.exists() {
+        return Found::Missing;
+    }
+    let Ok(reader) = Reader::open(&path) else { return Found::Damaged };
+    let keys = reader.metadata("keys").map(serde_json::from_str::<BTreeMap<String, String>>);
+    let Some(Ok(keys)) = keys else { return Found::Damaged };
+    let mut others: Vec<String> = plan
+        .keys
+        .iter()
+        .filter(|(name, key)| keys.get(*name) != Some(key))
+        .map(|(name, _)| name.clone())
+        .collect();
+    others.extend(keys.keys().filter(|name| !plan.keys.contains_key(*name)).cloned());
+    if !others.is_empty() {
+        return Found::Other(others);
+    }
+    match read(&reader, part) {
+        Some(rows) => Found::Whole(count(plan, &rows)),
+        None => Found::Damaged,
+    }
+}
+
+/// Reads the rows of a part that is whole.
+fn read(reader: &Reader, part: &Range<u64>) -> Option<Table> {
+    let rows = reader.table().ok()?;
+    let is_whole = reader.metadata("digest") == Some(&rows.digest())
+        && rows.rows() as u64 == part.end - part.start;
+    is_whole.then_some(rows)
+}
+
+/// Reads the rows of a part.
+///
+/// # Errors
+/// Returns an error if the file is missing or damaged.
+pub fn rows(out: &Path, part: &Range<u64>) -> Result<Table, Error> {
+    let path = path(out, part);
+    read(&Reader::open(&path)?, part).ok_or_else(|| {
+        Error::experiment(format!(
+            "{} is damaged: remove it, and it is flown again",
+            path.display()
+        ))
+    })
+}
+
+fn count(plan: &Plan, rows: &Table) -> Counts {
+    let broken = plan.campaign.limits.iter().map(|limit| match rows.column(&kept(&limit.id)) {
+        Some(Values::Flag(kept)) => kept.iter().filter(|kept| !**kept).count() as u64,
+        _ => 0,
+    });
+    let mut counts = Counts { broken: broken.collect(), ..Counts::default() };
+    if let Some(Values::Text(all)) = rows.column("status") {
+        for (count, status) in counts.status.iter_mut().zip(Status::ALL) {
+            *count = all.iter().filter(|own| *own == status.name()).count() as u64;
+        }
+    }
+    counts
+}
+
+/// Flies a part and keeps its results. `flown` is called after each case.
+///
+/// # Errors
+/// Returns an error if the work was asked to end, or if the file cannot be written.
+pub fn fly(
+    plan: &Plan,
+    out: &Path,
+    part: &Range<u64>,
+    flight: &mut Flight,
+    mut flown: impl FnMut(&Row),
+) -> Result<Counts, Error> {
+    let mut rows = Vec::with_capacity((part.end - part.start) as usize);
+    for case in part.clone() {
+        let row = flight.fly(case)?;
+        flown(&row);
+        rows.push(row);
+    }
+    let rows = table(plan, &rows);
+    let keys =
+        serde_json::to_string(&plan.keys).map_err(|error| Error::experiment(error.to_string()))?;
+    let metadata = [("units", plan.units()), ("digest", rows.digest()), ("keys", keys)];
+    let counts = count(plan, &rows);
+    let mut writer = Writer::create(&path(out, part), &metadata)?;
+    writer.add(rows)?;
+    writer.finish()?;
+    Ok(counts)
+}

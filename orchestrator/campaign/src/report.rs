@@ -1,0 +1,316 @@
+//! The report of a campaign: one page with verdicts, distributions, sensitivities and the worst
+//! cases, which needs no other file.
+
+mod cloud;
+mod figures;
+
+use crate::definition::Kind;
+use crate::flight::Flight;
+use crate::plan::Plan;
+use crate::run::{Answer, Findings, Kept, Measured, chosen, worst};
+use crate::sensitivity::Sensitivity;
+use crate::statistics::Probability;
+use crate::table::Reader;
+use cosim::error::Error;
+use cosim::interrupt::Interrupt;
+use cosim_report::figure::{Figure, svg};
+use cosim_report::study::STYLE;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+/// Number of the worst cases that the page shows.
+const SHOWN: usize = 5;
+
+/// Writes `report.html`, and the full results of the cases that are kept.
+///
+/// # Errors
+/// Returns an error if a file cannot be read or written, or if the work was asked to end.
+pub fn write(
+    plan: &Plan,
+    findings: &Findings,
+    out: &Path,
+    interrupt: &Interrupt,
+) -> Result<(), Error> {
+    let table = Reader::open(&out.join("cases.parquet"))?;
+    let mut flight = Flight::new(plan, false, interrupt)?;
+    let kept = chosen(plan, &table)?;
+    keep(plan, &mut flight, &kept, out)?;
+    let ranking = ranking(plan);
+    let ranked = match &ranking {
+        Some(name) => worst(&table.column(name)?.numbers(), SHOWN),
+        None => Vec::new(),
+    };
+    let mut pictures = figures::distributions(plan, findings, &table)?;
+    pictures.extend(figures::scatters(plan, &table)?);
+    if let Some(worst) = ranked.first() {
+        pictures.extend(cloud::draw(plan, interrupt, *worst, table.rows())?);
+    }
+    let drawn = pictures.iter().map(drawn).collect::<Result<Vec<_>, _>>()?;
+    let page = page(plan, findings, &drawn, &kept, ranking.zip(Some(ranked)));
+    let path = out.join("report.html");
+    fs::write(&path, page).map_err(Error::file(&path))
+}
+
+fn drawn(figure: &Figure) -> Result<(String, String), Error> {
+    let text = svg::text(figure).map_err(Error::file("report.html"))?;
+    Ok((figure.title.clone(), text))
+}
+
+/// Returns the measure that orders the cases: the one that is asked for, or that of the first limit.
+fn ranking(plan: &Plan) -> Option<String> {
+    let by = plan.campaign.keep.by.as_ref().map(|by| by.get_ref().clone());
+    let limited = || plan.campaign.limits.first().map(|limit| limit.measure.get_ref().clone());
+    by.or_else(limited).or_else(|| plan.recorded.first().map(|own| own.name.clone()))
+}
+
+/// Flies cases once more and keeps everything of them.
+fn keep(plan: &Plan, flight: &mut Flight, cases: &BTreeSet<u64>, out: &Path) -> Result<(), Error> {
+    for case in cases {
+        let folder = out.join("cases").join(case.to_string());
+        fs::create_dir_all(&folder).map_err(Error::file(&folder))?;
+        let title = format!("{}, case {case}", plan.campaign.title);
+        let values = plan.values(*case)?;
+        let text = plan.experiment_of(&title, &values)?;
+        let path = folder.join("case.toml");
+        fs::write(&path, text).map_err(Error::file(&path))?;
+        flight.keep(*case, values, &folder, &title)?;
+    }
+    Ok(())
+}
+
+fn page(
+    plan: &Plan,
+    findings: &Findings,
+    figures: &[(String, String)],
+    kept: &BTreeSet<u64>,
+    ranked: Option<(String, Vec<u64>)>,
+) -> String {
+    let campaign = &plan.campaign;
+    let file = campaign.source.path.display().to_string();
+    let ended = |name: &str| findings.status.get(name).copied().unwrap_or(0);
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (campaign.title) }
+                style { (PreEscaped(STYLE)) (PreEscaped(".plot svg { max-width: 100%; height: auto; } .bar { display: inline-block; height: .8em; vertical-align: -.05em; background: #1f77b4; } .bar.negative { background: #d62728; }")) }
+            }
+            body {
+                header {
+                    h1 { (campaign.title) }
+                    p.paper { (findings.cases) " cases of " (plan.experiment().title) }
+                    nav {
+                        a href="#limits" { "Limits" } " "
+                        a href="#measures" { "Measures" } " "
+                        a href="#figures" { "Figures" } " "
+                        a href="#sensitivity" { "Sensitivity" } " "
+                        a href="#worst" { "Worst cases" } " "
+                        a href="#varied" { "What varies" }
+                    }
+                }
+                main {
+                    @for paragraph in campaign.description.split("\n\n").filter(|text| !text.trim().is_empty()) {
+                        p { (paragraph) }
+                    }
+                    section id="limits" {
+                        h2 { "Limits" }
+                        p {
+                            (ended("completed")) " cases completed"
+                            @for (status, words) in [("ended", "ended by a limit"), ("lost", "lost"), ("failed", "failed")] {
+                                @if ended(status) > 0 { ", " (ended(status)) " " (words) }
+                            }
+                            "."
+                        }
+                        @if let Some(answer) = &findings.answer { (answered(answer)) }
+                        @if findings.limits.is_empty() { p { "The campaign states no limit." } }
+                        @else { (limits(&findings.limits, campaign.design)) }
+                    }
+                    section id="measures" {
+                        h2 { "Measures" }
+                        (measures(&findings.measures))
+                    }
+                    div id="figures" {
+                        @for (title, svg) in figures {
+                            figure { h3 { (title) } div.plot { (PreEscaped(svg)) } }
+                        }
+                    }
+                    section id="sensitivity" {
+                        h2 { "Sensitivity" }
+                        @for own in &findings.measures { (tornado(own)) }
+                        p.note {
+                            "Rank correlation of Spearman: 1 or −1 if the measure only rises or only falls with the parameter. "
+                            "A small p-value says that so large a correlation would hardly come by chance."
+                        }
+                    }
+                    section id="worst" {
+                        h2 { "Worst cases" }
+                        @if let Some((name, cases)) = &ranked {
+                            p { "Largest " code { (name) } " first. Each command flies the case again, with everything recorded:" }
+                            ul { @for case in cases { li { code { "orchestrator campaign " (file) " --case " (case) } } } }
+                        }
+                        @if !kept.is_empty() {
+                            p {
+                                "Kept in full, below " code { "cases" } ": "
+                                @for (i, case) in kept.iter().take(200).enumerate() { @if i > 0 { ", " } (case) }
+                                @if kept.len() > 200 { ", …" }
+                            }
+                        }
+                    }
+                    section id="varied" {
+                        h2 { "What varies" }
+                        table {
+                            thead { tr { th { "Parameter" } th { "Unit" } th { "Distribution" } } }
+                            tbody { @for own in &plan.varied {
+                                tr { td { code { (own.name) } } td { (own.unit) } td { (own.law.told()) } }
+                            } }
+                        }
+                        p.note {
+                            "Design: " (format!("{:?}", campaign.design)) ", seed " (campaign.seed)
+                            ". A case depends on the seed and its number alone. All rows are in "
+                            code { "cases.parquet" } ", what is on this page in " code { "summary.json" }
+                            ". Written by orchestrator " (env!("CARGO_PKG_VERSION")) "."
+                        }
+                    }
+                }
+            }
+        }
+    };
+    markup.into_string()
+}
+
+fn answered(answer: &Answer) -> Markup {
+    let (class, word) = match answer.holds {
+        Some(true) => ("verdict holds", "yes"),
+        Some(false) => ("verdict not", "no"),
+        None => ("verdict partly", "not decided"),
+    };
+    html! {
+        p {
+            "Is the probability of breaking " code { (answer.question.limit) } " below "
+            (answer.question.below) ", with " (percent(answer.question.confidence)) " confidence? "
+            span class=(class) { (word) }
+            " (" (answer.broken.events) " of " (answer.broken.cases) " cases broke it)"
+        }
+    }
+}
+
+fn limits(limits: &[Kept], design: Kind) -> Markup {
+    html! {
+        table.numbers {
+            thead { tr {
+                th { "Limit" } th { "Broken by" } th { "Share" } th { "Probability, 95 %" } th { "" }
+            } }
+            tbody { @for own in limits { tr {
+                td { (own.says) }
+                td { (own.broken.events) " of " (own.broken.cases) }
+                td { (percent(own.broken.share)) }
+                td { (interval(&own.broken)) }
+                td { @if own.broken.events == 0 { span class="verdict holds" { "kept by all" } }
+                     @else { span class="verdict not" { "broken" } } }
+            } } }
+        }
+        p.note {
+            "A case that was lost, failed or ended early keeps no limit. Intervals by Clopper and Pearson; without a broken case, the bound "
+            "that so many cases prove. "
+            @if design != Kind::Random {
+                "They are exact for independent cases; those of this design are spread more evenly over what was asked, and say nothing about "
+                "how often a limit is broken where its points are not drawn by probability (corners, levels)."
+            }
+        }
+    }
+}
+
+fn interval(own: &Probability) -> String {
+    match own.events {
+        0 => format!("≤ {}", short(own.high)),
+        _ => format!("{} to {}", short(own.low), short(own.high)),
+    }
+}
+
+fn measures(measures: &[Measured]) -> Markup {
+    html! {
+        table.numbers {
+            thead { tr {
+                th { "Measure" } th { "Cases" } th { "Mean" } th { "Deviation" } th { "Smallest" } th { "5 %" } th { "Median" } th { "95 %" }
+                th { "99 %" } th { "99.9 %" } th { "Largest" } th { "in case" }
+            } }
+            tbody { @for own in measures { tr {
+                td { (own.name) @if !own.unit.is_empty() { ", " (own.unit) } }
+                @if let Some(summary) = &own.summary {
+                    td { (summary.cases) } td { (short(summary.mean)) } td { (short(summary.deviation)) }
+                    @for quantile in &summary.quantiles {
+                        td {
+                            (short(quantile.value))
+                            @if let (Some(low), Some(high)) = (quantile.low, quantile.high) {
+                                br; span.note { (short(low)) " to " (short(high)) }
+                            }
+                        }
+                    }
+                    td { (summary.worst) }
+                } @else { td colspan="11" { "no case has a value" } }
+            } } }
+        }
+        p.note { "Below a quantile stands its 95 % interval, two values of the sample." }
+    }
+}
+
+/// Returns the parameters in the order of their weight, as bars.
+fn tornado(own: &Measured) -> Markup {
+    let weight = |own: &Sensitivity| own.total.or(own.rank_correlation).map_or(0.0, f64::abs);
+    let mut rows: Vec<&Sensitivity> =
+        own.sensitivities.iter().filter(|own| own.rank_correlation.is_some()).collect();
+    rows.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+    let has_indices = rows.iter().any(|row| row.total.is_some());
+    html! {
+        @if !rows.is_empty() {
+            h3 { (own.name) }
+            table.numbers {
+                thead { tr {
+                    th { "Parameter" } th { "Rank correlation" } th { "" } th { "p-value" }
+                    @if has_indices { th { "First-order index" } th { "Total index" } }
+                } }
+                tbody { @for row in rows.iter().take(20) { tr {
+                    @let correlation = row.rank_correlation.unwrap_or(0.0);
+                    td { code { (row.parameter) } }
+                    td { (format!("{correlation:.3}").replace('-', "−")) }
+                    td {
+                        span class=(if correlation < 0.0 { "bar negative" } else { "bar" })
+                            style=(format!("width: {:.1}rem", 12.0 * correlation.abs())) {}
+                    }
+                    td { (row.p_value.map_or(String::new(), short)) }
+                    @if has_indices {
+                        td { (row.first_order.map_or(String::new(), |s| format!("{s:.3}"))) }
+                        td { (row.total.map_or(String::new(), |t| format!("{t:.3}"))) }
+                    }
+                } } }
+            }
+        }
+    }
+}
+
+fn percent(share: f64) -> String {
+    format!("{} %", short(100.0 * share))
+}
+
+/// Formats a number with four significant digits.
+pub(crate) fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let text = if (1e-3..1e6).contains(&value.abs()) {
+        let digits = (3 - value.abs().log10().floor() as i32).max(0) as usize;
+        let text = format!("{value:.digits$}");
+        if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').to_string()
+        } else {
+            text
+        }
+    } else {
+        format!("{value:.3e}")
+    };
+    text.replace('-', "−")
+}

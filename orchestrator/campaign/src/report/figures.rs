@@ -1,0 +1,171 @@
+//! Histograms, empirical distributions and scatter plots of a campaign's cases.
+
+use crate::flight::kept;
+use crate::plan::{Plan, Recorded};
+use crate::run::Findings;
+use crate::table::Reader;
+use cosim::error::Error;
+use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape};
+
+const BLUE: Color = Color(31, 119, 180);
+const RED: Color = Color(214, 39, 40);
+/// Largest number of bins of a histogram.
+const BINS: usize = 60;
+/// Approximate largest number of points of a curve or of dots in a panel.
+const POINTS: usize = 600;
+/// Largest number of cases that are marked in a panel.
+const MARKED: usize = 300;
+/// Largest number of parameters and of measures whose scatter plots are drawn.
+const PARAMETERS: usize = 12;
+const MEASURES: usize = 3;
+
+fn label(own: &Recorded) -> String {
+    if own.unit.is_empty() { own.name.clone() } else { format!("{}, {}", own.name, own.unit) }
+}
+
+fn curve(name: &str, color: Color, shape: Shape, x: Vec<f64>, y: Vec<f64>) -> Curve {
+    Curve { name: name.into(), color, shape, x, y }
+}
+
+fn panel(x_label: &str, y_label: &str, curves: Vec<Curve>) -> Panel {
+    Panel {
+        title: String::new(),
+        x_label: x_label.into(),
+        y_label: y_label.into(),
+        log_x: false,
+        x_range: None,
+        curves,
+    }
+}
+
+/// Draws the histogram and the empirical distribution of each measure.
+pub(super) fn distributions(
+    plan: &Plan,
+    findings: &Findings,
+    table: &Reader,
+) -> Result<Vec<Figure>, Error> {
+    let mut panels = Vec::new();
+    for own in &plan.recorded {
+        let mut values = table.column(&own.name)?.numbers();
+        values.retain(|value| value.is_finite());
+        values.sort_unstable_by(f64::total_cmp);
+        let (Some(low), Some(high)) = (values.first().copied(), values.last().copied()) else {
+            continue;
+        };
+        if low == high {
+            continue;
+        }
+        let limits = plan.limits().filter(|(limit, _)| limit.measure.get_ref() == &own.name);
+        let limits: Vec<f64> =
+            limits.filter_map(|(limit, _)| limit.at_most.or(limit.at_least)).collect();
+        let marks = || {
+            let mark = |limit: &f64| {
+                curve("limit", Color::LIMIT, Shape::Vertical, vec![*limit], vec![f64::NAN])
+            };
+            limits.iter().map(mark)
+        };
+        let (edges, counts) = histogram(&values, low, high);
+        let mut bars = vec![curve("cases", BLUE, Shape::Steps, edges, counts)];
+        bars.extend(marks());
+        panels.push(panel(&label(own), "cases", bars));
+        let n = values.len();
+        // More points where few values are: the upper end is what one looks at.
+        let stride = n.div_ceil(POINTS).max(1);
+        let places = || (0..n).step_by(stride).chain(n.saturating_sub(POINTS / 3)..n);
+        let x = places().map(|i| values[i]).collect();
+        let y = places().map(|i| (i + 1) as f64 / n as f64).collect();
+        let mut steps = vec![curve("share of cases up to this value", RED, Shape::Line, x, y)];
+        steps.extend(marks());
+        panels.push(panel(&label(own), "share of cases", steps));
+    }
+    if panels.is_empty() {
+        return Ok(Vec::new());
+    }
+    let title = format!("Distributions over {} cases", findings.cases);
+    Ok(vec![Figure { title, columns: 2, legend: Legend::Above, panels }])
+}
+
+/// Returns the edges of a histogram's bins and the number of values in each; the last edge has no
+/// values.
+fn histogram(sorted: &[f64], low: f64, high: f64) -> (Vec<f64>, Vec<f64>) {
+    let bins = ((sorted.len() as f64).sqrt().ceil() as usize).clamp(5, BINS);
+    let width = (high - low) / bins as f64;
+    let mut counts = vec![0.0; bins + 1];
+    for value in sorted {
+        let bin = (((value - low) / width) as usize).min(bins - 1);
+        counts[bin] += 1.0;
+    }
+    ((0..=bins).map(|bin| low + bin as f64 * width).collect(), counts)
+}
+
+/// Draws measures against the parameters that vary, with the cases marked that broke a limit, were
+/// lost or failed.
+pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error> {
+    let mut bad = vec![false; table.rows() as usize];
+    for limit in &plan.campaign.limits {
+        let kept = table.column(&kept(&limit.id))?.numbers();
+        bad.iter_mut().zip(kept).for_each(|(bad, kept)| *bad |= kept == 0.0);
+    }
+    let mut shown: Vec<(usize, Vec<f64>)> = Vec::new();
+    for (place, own) in plan.varied.iter().enumerate() {
+        if shown.len() == PARAMETERS {
+            break;
+        }
+        let values = table.column(&own.name)?.numbers();
+        if !own.law.is_counted() && values.iter().any(|value| value.is_finite()) {
+            shown.push((place, values));
+        }
+    }
+    let limited =
+        |own: &&Recorded| plan.limits().any(|(limit, _)| limit.measure.get_ref() == &own.name);
+    let mut measures: Vec<&Recorded> = plan.recorded.iter().filter(limited).collect();
+    measures.extend(plan.recorded.iter().filter(|own| !limited(own)));
+    let stride = bad.len().div_ceil(POINTS).max(1);
+    let mut figures = Vec::new();
+    for own in measures.into_iter().take(MEASURES) {
+        let y = table.column(&own.name)?.numbers();
+        let panels = shown.iter().map(|(place, x)| {
+            let parameter = &plan.varied[*place];
+            let x_label = if parameter.unit.is_empty() {
+                parameter.name.clone()
+            } else {
+                format!("{}, {}", parameter.name, parameter.unit)
+            };
+            let pick = |cases: &mut dyn Iterator<Item = usize>| -> (Vec<f64>, Vec<f64>) {
+                cases.filter(|i| y[*i].is_finite()).map(|i| (x[i], y[i])).unzip()
+            };
+            let (all_x, all_y) = pick(&mut (0..y.len()).step_by(stride));
+            let (bad_x, bad_y) = pick(&mut (0..y.len()).filter(|i| bad[*i]).take(MARKED));
+            let mut curves = vec![curve("cases", BLUE, Shape::Dots, all_x, all_y)];
+            if !bad_x.is_empty() {
+                curves.push(curve("broke a limit", RED, Shape::Dots, bad_x, bad_y));
+            }
+            panel(&x_label, &label(own), curves)
+        });
+        let panels: Vec<Panel> = panels.collect();
+        if !panels.is_empty() {
+            let title = format!("{} against what varies", own.name);
+            figures.push(Figure {
+                title,
+                columns: 3.min(panels.len()),
+                legend: Legend::Above,
+                panels,
+            });
+        }
+    }
+    Ok(figures)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oracle_a_histogram_by_hand() {
+        let (edges, counts) = histogram(&[0.0, 0.1, 0.2, 0.5, 1.0], 0.0, 1.0);
+        assert_eq!(counts, [2.0, 1.0, 1.0, 0.0, 1.0, 0.0]);
+        assert!(
+            edges.iter().zip([0.0, 0.2, 0.4, 0.6, 0.8, 1.0]).all(|(a, b)| (a - b).abs() < 1e-12)
+        );
+    }
+}

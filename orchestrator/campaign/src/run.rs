@@ -1,0 +1,512 @@
+//! Flies a campaign on all cores, merges its parts, and writes tables and the report.
+
+use crate::definition::Until;
+use crate::error::Error;
+use crate::flight::{Flight, Status, can_reset, kept};
+use crate::parts::{self, Counts, Found};
+use crate::plan::Plan;
+use crate::report;
+use crate::sensitivity::{Sensitivity, sensitivities};
+use crate::statistics::{CONFIDENCE, Probability, Summary, looks, summary};
+use crate::table::{Reader, Table, Values, Writer};
+use cosim::error::Error as Single;
+use cosim::interrupt::Interrupt;
+use cosim::system::System;
+use cosim_report::folder::Folder;
+use cosim_report::progress::Parts;
+use rayon::ThreadPoolBuilder;
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// Names of the files of a campaign's results.
+pub const FILES: [&str; 4] = ["cases.parquet", "cases.csv", "summary.json", "report.html"];
+
+/// Options of a campaign.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Folder for the results; `out/<campaign>` if it is not given.
+    pub out: Option<PathBuf>,
+    /// Number of threads; 0 means one for each core.
+    pub jobs: usize,
+    /// Whether cases that are kept already are flown again.
+    pub fresh: bool,
+    /// Whether the progress display is suppressed.
+    pub quiet: bool,
+    /// Whether the table is written as CSV as well.
+    pub csv: bool,
+    /// Interrupt through which the work can be ended from outside.
+    pub interrupt: Interrupt,
+}
+
+/// What a campaign found out, which `summary.json` holds.
+#[derive(Clone, Debug, Serialize)]
+pub struct Findings {
+    /// Title of the campaign.
+    pub title: String,
+    /// Number of cases that were flown.
+    pub cases: u64,
+    /// Number of cases with each status.
+    pub status: BTreeMap<&'static str, u64>,
+    /// Limits, with the probability that a case breaks them.
+    pub limits: Vec<Kept>,
+    /// Measures over all cases.
+    pub measures: Vec<Measured>,
+    /// Answer to the question of the campaign.
+    pub answer: Option<Answer>,
+}
+
+/// A limit over all cases.
+#[derive(Clone, Debug, Serialize)]
+pub struct Kept {
+    /// Id of the limit.
+    pub id: String,
+    /// The limit in words.
+    pub says: String,
+    /// Probability that a case breaks the limit, with 95 % confidence.
+    pub broken: Probability,
+}
+
+/// A measure over all cases.
+#[derive(Clone, Debug, Serialize)]
+pub struct Measured {
+    /// Name of the measure.
+    pub name: String,
+    /// Unit of the measure, or an empty text.
+    pub unit: String,
+    /// Its distribution; none if no case has a value.
+    pub summary: Option<Summary>,
+    /// What the parameters have to do with it.
+    pub sensitivities: Vec<Sensitivity>,
+}
+
+/// Answer to the question that ends a campaign.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Answer {
+    /// The question.
+    pub question: Until,
+    /// Whether the probability is below the bound; none if the cases do not decide it.
+    pub holds: Option<bool>,
+    /// Probability at the last look, with the confidence of that look.
+    pub broken: Probability,
+    /// Confidence of each look, so that all together have the confidence of the question.
+    pub confidence_of_each_look: f64,
+}
+
+/// Outcome of a campaign.
+#[derive(Debug)]
+pub struct Report {
+    /// What was found out.
+    pub findings: Findings,
+    /// Folder of the results.
+    pub out: PathBuf,
+    /// Number of cases that were flown now.
+    pub flown: u64,
+    /// Elapsed time, s.
+    pub elapsed: f64,
+    /// Remarks, for example why cases were flown again.
+    pub notes: Vec<String>,
+}
+
+/// Work that is left of a campaign, for programs that share it among machines.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Work {
+    /// Number of cases that are needed as far as is known.
+    pub cases: u64,
+    /// First and last-plus-one case of each part that is missing.
+    pub missing: Vec<[u64; 2]>,
+}
+
+/// Locks a mutex. A panic of another thread does not harm the data behind it.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Returns the folder of a campaign's results.
+pub fn folder(plan: &Plan, out: Option<&Path>) -> PathBuf {
+    out.map_or_else(|| Path::new("out").join(plan.campaign.name()), Path::to_path_buf)
+}
+
+/// Parts that are found in the folder of the results.
+struct State<'a> {
+    plan: &'a Plan,
+    out: &'a Path,
+    found: BTreeMap<u64, Counts>,
+    notes: Vec<String>,
+}
+
+impl<'a> State<'a> {
+    fn new(plan: &'a Plan, out: &'a Path) -> Self {
+        Self { plan, out, found: BTreeMap::new(), notes: Vec::new() }
+    }
+
+    /// Looks for the parts of the first `cases` cases, and returns those that are missing.
+    fn missing(&mut self, cases: u64) -> Vec<Range<u64>> {
+        let (mut missing, mut damaged) = (Vec::new(), 0);
+        let mut others: BTreeMap<String, u64> = BTreeMap::new();
+        for part in parts::parts(self.plan.cases()).take_while(|part| part.start < cases) {
+            if self.found.contains_key(&part.start) {
+                continue;
+            }
+            match parts::find(self.plan, self.out, &part) {
+                Found::Whole(counts) => {
+                    self.found.insert(part.start, counts);
+                    continue;
+                }
+                Found::Missing => {}
+                Found::Damaged => damaged += 1,
+                Found::Other(names) => *others.entry(names.join(", ")).or_default() += 1,
+            }
+            missing.push(part);
+        }
+        if damaged > 0 {
+            self.notes.push(format!("damaged, flown again: {damaged} parts"));
+        }
+        for (what, count) in others {
+            self.notes.push(format!("flown again, as this has changed: {what} ({count} parts)"));
+        }
+        missing
+    }
+
+    fn broken(&self, limit: usize, cases: u64) -> u64 {
+        self.found.range(..cases).filter_map(|(_, counts)| counts.broken.get(limit)).sum()
+    }
+
+    /// Returns the number of cases that are needed as far as the parts tell, and the answer to the
+    /// campaign's question if it has one and the parts are all there.
+    fn needed(&mut self) -> (u64, Vec<Range<u64>>, Option<Answer>) {
+        let all = self.plan.cases();
+        let Some(until) = &self.plan.campaign.until else {
+            return (all, self.missing(all), None);
+        };
+        let limit = self.plan.campaign.limits.iter().position(|limit| limit.id == until.limit);
+        let (counts, each) = looks(until.below, until.confidence, all, parts::LENGTH);
+        let mut answer = None;
+        for cases in counts {
+            let missing = self.missing(cases);
+            if !missing.is_empty() {
+                return (cases, missing, None);
+            }
+            let broken = Probability::new(self.broken(limit.unwrap_or(0), cases), cases, each);
+            let holds = if broken.high <= until.below {
+                Some(true)
+            } else if broken.low > until.below {
+                Some(false)
+            } else {
+                None
+            };
+            answer = Some(Answer {
+                question: until.clone(),
+                holds,
+                broken,
+                confidence_of_each_look: each,
+            });
+            if holds.is_some() {
+                return (cases, Vec::new(), answer);
+            }
+        }
+        (all, Vec::new(), answer)
+    }
+}
+
+/// Returns the work that is left of a campaign.
+pub fn work(plan: &Plan, out: &Path) -> Work {
+    let (cases, missing, _) = State::new(plan, out).needed();
+    Work { cases, missing: missing.into_iter().map(|part| [part.start, part.end]).collect() }
+}
+
+/// Flies the parts that lie in a range of cases and are not there yet, and writes nothing else.
+/// Several processes may do this at once in the same folder.
+///
+/// # Errors
+/// Returns an error if the range does not consist of parts, or if a file cannot be written.
+pub fn fly_range(plan: &Plan, range: &Range<u64>, options: &Options) -> Result<u64, Error> {
+    let all = plan.cases();
+    let is_edge = |case: u64| case.is_multiple_of(parts::LENGTH) || case == all;
+    if range.start >= range.end || range.end > all || !is_edge(range.start) || !is_edge(range.end) {
+        let message = format!(
+            "--cases {}..{}: within 0..{all}, with ends that are multiples of {} or the last one",
+            range.start,
+            range.end,
+            parts::LENGTH
+        );
+        return Err(Single::experiment(message).into());
+    }
+    let out = folder(plan, options.out.as_deref());
+    let mut state = State::new(plan, &out);
+    let missing = if options.fresh { Vec::new() } else { state.missing(range.end) };
+    let asked = parts::parts(all).filter(|part| range.contains(&part.start));
+    let asked: Vec<_> = asked.filter(|part| options.fresh || missing.contains(part)).collect();
+    let flown = asked.iter().map(|part| part.end - part.start).sum();
+    fly_parts(plan, &out, &asked, options, &mut state)?;
+    Ok(flown)
+}
+
+/// Flies what is left of a campaign, and writes its tables and its report.
+///
+/// # Errors
+/// Returns an error if a file cannot be written, or if the work was asked to end; what was flown by
+/// then is kept.
+pub fn fly(plan: &Plan, options: &Options) -> Result<Report, Error> {
+    let begin = Instant::now();
+    let out = folder(plan, options.out.as_deref());
+    if out.join("metrics.json").exists() || (out.exists() && !out.is_dir()) {
+        let message =
+            format!("{} holds other results: take another folder by --out", out.display());
+        return Err(Single::experiment(message).into());
+    }
+    let _folder = Folder::take(&out)?;
+    if options.fresh {
+        let old = out.join("parts");
+        if old.is_dir() {
+            fs::remove_dir_all(&old).map_err(Single::file(&old))?;
+        }
+    }
+    let mut state = State::new(plan, &out);
+    let mut flown = 0;
+    let (cases, answer) = loop {
+        let (cases, missing, answer) = state.needed();
+        if missing.is_empty() {
+            break (cases, answer);
+        }
+        if flown == 0 {
+            // An earlier report would not fit the new cases if the work is ended early.
+            remove_results(&out)?;
+        }
+        flown += missing.iter().map(|part| part.end - part.start).sum::<u64>();
+        fly_parts(plan, &out, &missing, options, &mut state)?;
+    };
+    let notes = std::mem::take(&mut state.notes);
+    let path = out.join("cases.parquet");
+    merge(plan, &out, cases, options.csv)?;
+    let findings = findings(plan, &Reader::open(&path)?, answer)?;
+    write_json(&out.join("summary.json"), &findings)?;
+    report::write(plan, &findings, &out, &options.interrupt)?;
+    Ok(Report { findings, out, flown, elapsed: begin.elapsed().as_secs_f64(), notes })
+}
+
+fn remove_results(out: &Path) -> Result<(), Single> {
+    for path in FILES.map(|name| out.join(name)) {
+        if path.exists() {
+            fs::remove_file(&path).map_err(Single::file(&path))?;
+        }
+    }
+    Ok(())
+}
+
+/// Flies parts on several threads.
+fn fly_parts(
+    plan: &Plan,
+    out: &Path,
+    missing: &[Range<u64>],
+    options: &Options,
+    state: &mut State,
+) -> Result<(), Error> {
+    if missing.is_empty() {
+        return Ok(());
+    }
+    let interrupt = &options.interrupt;
+    let resets = can_reset(plan, interrupt)?;
+    if !resets {
+        tracing::warn!(
+            "a case gave another result after fmi2Reset than with a new instance: units are made anew for each case"
+        );
+    }
+    let left: u64 = missing.iter().map(|part| part.end - part.start).sum();
+    let done = state.found.keys().count() as u64 * parts::LENGTH;
+    let done = done.min(plan.cases().saturating_sub(left));
+    let progress = Parts::of("cases", &plan.campaign.title, done + left, done, options.quiet);
+    let next = AtomicUsize::new(0);
+    let found = Mutex::new(BTreeMap::new());
+    let failure: Mutex<Option<Single>> = Mutex::new(None);
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(threads(plan, options.jobs)?.min(missing.len()))
+        .build()
+        .map_err(|error| Single::experiment(error.to_string()))?;
+    let work = || -> Result<(), Single> {
+        // Each thread has units of its own, from an archive that it unpacks itself.
+        let mut flight = Flight::new(plan, resets, interrupt)?;
+        while lock(&failure).is_none() {
+            let Some(part) = missing.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
+            let counts = parts::fly(plan, out, part, &mut flight, |_| progress.advance(1))?;
+            lock(&found).insert(part.start, counts);
+        }
+        Ok(())
+    };
+    pool.broadcast(|_| {
+        if let Err(error) = work() {
+            lock(&failure).get_or_insert(error);
+        }
+    });
+    progress.finish();
+    state.found.append(&mut lock(&found));
+    match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        None => Ok(()),
+        Some(Single::Interrupted { request, .. }) => {
+            let kept = lock(&found).len() + state.found.len();
+            let done = (kept as u64 * parts::LENGTH).min(plan.cases());
+            Err(Error::Unfinished { done, all: plan.cases(), out: out.to_path_buf(), request })
+        }
+        Some(error) => Err(error.into()),
+    }
+}
+
+/// Returns the number of threads: one, if a unit can be made only once in a process.
+pub(crate) fn threads(plan: &Plan, jobs: usize) -> Result<usize, Single> {
+    let system: System = plan.system(&mut BTreeMap::new())?;
+    let single = system.fmus.iter().find(|fmu| {
+        let interface = fmu.description.co_simulation.as_ref();
+        interface.is_some_and(|own| own.has("canBeInstantiatedOnlyOncePerProcess"))
+    });
+    if let Some(fmu) = single {
+        tracing::warn!(
+            "{} can be instantiated only once per process: one thread flies all cases",
+            fmu.path.display()
+        );
+        return Ok(1);
+    }
+    Ok(match jobs {
+        0 => std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        jobs => jobs,
+    })
+}
+
+/// Merges the parts of the first `cases` cases into one table.
+fn merge(plan: &Plan, out: &Path, cases: u64, csv: bool) -> Result<(), Single> {
+    let mut text = csv.then(|| csv::Writer::from_path(out.join("cases.csv"))).transpose();
+    let fault = |error: csv::Error| Single::experiment(format!("cases.csv: {error}"));
+    let mut text =
+        text.as_mut().map_err(|error| Single::experiment(format!("cases.csv: {error}")))?;
+    let metadata = [("units", plan.units())];
+    let mut writer = Writer::create(&out.join("cases.parquet"), &metadata)?;
+    let mut is_first = true;
+    for part in parts::parts(plan.cases()).take_while(|part| part.start < cases) {
+        let rows = parts::rows(out, &part)?;
+        if let Some(text) = &mut text {
+            if is_first {
+                let names = rows.columns.iter().map(|column| column.name.as_str());
+                text.write_record(names).map_err(fault)?;
+            }
+            write_csv(text, &rows).map_err(fault)?;
+        }
+        is_first = false;
+        writer.add(rows)?;
+    }
+    if let Some(text) = &mut text {
+        text.flush().map_err(Single::file(out.join("cases.csv")))?;
+    }
+    writer.finish()
+}
+
+fn write_csv(text: &mut csv::Writer<fs::File>, rows: &Table) -> Result<(), csv::Error> {
+    for row in 0..rows.rows() {
+        let cell = |values: &Values| match values {
+            Values::Real(values) => values[row].to_string(),
+            Values::Optional(values) => values[row].map(|v| v.to_string()).unwrap_or_default(),
+            Values::Count(values) => values[row].to_string(),
+            Values::Integer(values) => values[row].to_string(),
+            Values::Flag(values) => values[row].to_string(),
+            Values::Text(values) => values[row].clone(),
+        };
+        text.write_record(rows.columns.iter().map(|column| cell(&column.values)))?;
+    }
+    Ok(())
+}
+
+/// Computes what a table of cases shows.
+fn findings(plan: &Plan, table: &Reader, answer: Option<Answer>) -> Result<Findings, Single> {
+    let cases = table.rows();
+    let mut status: BTreeMap<&'static str, u64> =
+        Status::ALL.iter().map(|own| (own.name(), 0)).collect();
+    if let Values::Text(all) = table.column("status")? {
+        for own in all {
+            if let Some(count) = status.get_mut(own.as_str()) {
+                *count += 1;
+            }
+        }
+    }
+    let mut limits = Vec::new();
+    for limit in &plan.campaign.limits {
+        let kept = table.column(&kept(&limit.id))?.numbers();
+        let broken = kept.iter().filter(|kept| **kept == 0.0).count() as u64;
+        limits.push(Kept {
+            id: limit.id.clone(),
+            says: says(plan, limit),
+            broken: Probability::new(broken, cases, CONFIDENCE),
+        });
+    }
+    let columns =
+        plan.varied.iter().map(|own| Ok((own.name.clone(), table.column(&own.name)?.numbers())));
+    let columns = columns.collect::<Result<Vec<_>, Single>>()?;
+    let mut measures = Vec::new();
+    for own in &plan.recorded {
+        let values = table.column(&own.name)?.numbers();
+        measures.push(Measured {
+            name: own.name.clone(),
+            unit: own.unit.clone(),
+            summary: summary(&values),
+            sensitivities: sensitivities(plan.campaign.design, &columns, &values),
+        });
+    }
+    Ok(Findings { title: plan.campaign.title.clone(), cases, status, limits, measures, answer })
+}
+
+/// Returns a limit in words.
+pub(crate) fn says(plan: &Plan, limit: &crate::definition::Limit) -> String {
+    if !limit.says.is_empty() {
+        return limit.says.clone();
+    }
+    let name = limit.measure.get_ref();
+    let own = plan.recorded.iter().find(|own| own.name == *name);
+    let unit = own.map(|own| own.unit.as_str()).unwrap_or_default();
+    let (sign, bound) = match (limit.at_most, limit.at_least) {
+        (Some(most), _) => ("≤", most),
+        (None, least) => ("≥", least.unwrap_or(f64::NAN)),
+    };
+    format!("{name} {sign} {bound} {unit}").trim_end().to_string()
+}
+
+/// Returns the numbers of the cases whose results are to be kept in full.
+pub(crate) fn chosen(plan: &Plan, table: &Reader) -> Result<BTreeSet<u64>, Single> {
+    let keep = &plan.campaign.keep;
+    let mut chosen = BTreeSet::new();
+    if let Some(by) = &keep.by {
+        chosen.extend(worst(&table.column(by.get_ref())?.numbers(), keep.worst as usize));
+    }
+    if keep.failed > 0 {
+        let mut broken: BTreeSet<u64> = BTreeSet::new();
+        for limit in &plan.campaign.limits {
+            let kept = table.column(&kept(&limit.id))?.numbers();
+            broken
+                .extend(kept.iter().enumerate().filter(|(_, k)| **k == 0.0).map(|(i, _)| i as u64));
+        }
+        if let Values::Text(all) = table.column("status")? {
+            let bad = [Status::Lost.name(), Status::Failed.name()];
+            let bad = all.iter().enumerate().filter(|(_, own)| bad.contains(&own.as_str()));
+            broken.extend(bad.map(|(i, _)| i as u64));
+        }
+        chosen.extend(broken.into_iter().take(keep.failed as usize));
+    }
+    if let Some(every) = keep.every {
+        chosen.extend((0..table.rows()).step_by(usize::try_from(every).unwrap_or(usize::MAX)));
+    }
+    Ok(chosen)
+}
+
+/// Returns the numbers of the cases with the largest values, the largest first.
+pub(crate) fn worst(values: &[f64], count: usize) -> Vec<u64> {
+    let mut order: Vec<usize> = (0..values.len()).filter(|i| !values[*i].is_nan()).collect();
+    order.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
+    order.into_iter().take(count).map(|i| i as u64).collect()
+}
+
+pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Single> {
+    let text = serde_json::to_string_pretty(value);
+    let text = text.map_err(|error| Single::file(path)(error.into()))? + "\n";
+    fs::write(path, text).map_err(Single::file(path))
+}

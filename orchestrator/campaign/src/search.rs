@@ -1,0 +1,337 @@
+//! Looks for the worst case: an evolution strategy (CMA-ES) with restarts moves through the space of
+//! what varies towards larger values of a measure.
+
+use crate::definition::Search;
+use crate::design::Place;
+use crate::error::Error;
+use crate::flight::{Flight, Row, Status, table};
+use crate::plan::Plan;
+use crate::run::{self, lock, write_json};
+use crate::table::Writer;
+use cmaes::{CMAESOptions, DVector};
+use cosim::error::Error as Single;
+use cosim::interrupt::Interrupt;
+use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
+use cosim_report::folder::Folder;
+use cosim_report::progress::Parts;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde::Serialize;
+use std::cmp::Ordering as CmpOrdering;
+use std::fs;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Step size of a search at its beginning, as a share of the range of each parameter.
+const STEP: f64 = 0.3;
+/// Number of the case that stands for all cases of a search, so that seeds stay the same.
+const CASE: u64 = 0;
+
+/// Options of a search.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Folder for the results; `out/<campaign>-worst` if it is not given.
+    pub out: Option<PathBuf>,
+    /// Number of threads; 0 means one for each core.
+    pub jobs: usize,
+    /// Time after which no further generation begins.
+    pub time: Option<Duration>,
+    /// Whether the progress display is suppressed.
+    pub quiet: bool,
+    /// Whether the results of an earlier search may be replaced.
+    pub force: bool,
+    /// Interrupt through which the work can be ended from outside.
+    pub interrupt: Interrupt,
+}
+
+/// Outcome of a search.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outcome {
+    /// Title of the campaign.
+    pub title: String,
+    /// Measure whose largest value was looked for.
+    pub measure: String,
+    /// Unit of the measure, or an empty text.
+    pub unit: String,
+    /// Largest value that was found.
+    pub largest: Option<f64>,
+    /// Limits that the worst case breaks.
+    pub broken: Vec<String>,
+    /// How the worst case ended.
+    pub status: &'static str,
+    /// Number of cases that were flown.
+    pub cases: u64,
+    /// Number of searches from different starts.
+    pub searches: u64,
+    /// Number of cases in which a unit failed. They are in the table with their messages.
+    pub failed: u64,
+    /// Why the search ended.
+    pub ended: &'static str,
+    /// Folder of the results.
+    #[serde(skip)]
+    pub out: PathBuf,
+    /// Elapsed time, s.
+    #[serde(skip)]
+    pub elapsed: f64,
+}
+
+/// A place that is to be flown, and where its result goes.
+struct Order {
+    places: Vec<Place>,
+    reply: Sender<Result<Row, Single>>,
+}
+
+/// Result of a place, in the order in which places were asked for.
+struct Tried {
+    generation: u64,
+    value: f64,
+    row: Row,
+}
+
+/// Looks for the worst case of a campaign.
+///
+/// # Errors
+/// Returns an error if the campaign says not what to look for, if a file cannot be written, or if the
+/// first generation was ended.
+pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
+    let begin = Instant::now();
+    let search = plan.campaign.search.as_ref().ok_or_else(|| {
+        plan.campaign.source.error(&(0..0), "[search] is missing: what is to be the largest?")
+    })?;
+    let measure = plan
+        .recorded
+        .iter()
+        .position(|own| own.name == *search.largest.get_ref())
+        .unwrap_or_default();
+    for own in &plan.varied {
+        let problem = own.law.check_ends().err();
+        if let Some(problem) = problem {
+            let message = format!("[[vary]] \"{}\": {problem}", own.name);
+            return Err(plan.campaign.source.error(&(0..0), message).into());
+        }
+    }
+    let out = options
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from("out").join(format!("{}-worst", plan.campaign.name())));
+    if out.join("search.json").exists() && !options.force {
+        let message = format!(
+            "{} holds the results of an earlier search: --force replaces them, --out takes another folder",
+            out.display()
+        );
+        return Err(Single::experiment(message).into());
+    }
+    let _folder = Folder::take(&out)?;
+    let progress = Parts::of("cases", &plan.campaign.title, search.cases, 0, options.quiet);
+    let threads = run::threads(plan, options.jobs)?;
+    let (orders, waiting) = channel::<Order>();
+    let waiting = Mutex::new(waiting);
+    let searched = Searched {
+        plan,
+        measure,
+        progress: &progress,
+        generation: AtomicU64::new(0),
+        tried: Mutex::default(),
+        failure: Mutex::default(),
+    };
+    let found = std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| serve(plan, &options.interrupt, &waiting));
+        }
+        let found = look(&searched, search, &orders, &|| {
+            options.time.is_some_and(|time| begin.elapsed() >= time)
+        });
+        // The threads end when nobody can order anything any more.
+        drop(orders);
+        found
+    });
+    progress.finish();
+    let (searches, ended) = found?;
+    let mut tried = searched.tried.into_inner().unwrap_or_else(PoisonError::into_inner);
+    // Within a generation, the threads finish in any order.
+    tried.sort_by(|a, b| {
+        (a.generation, a.value).partial_cmp(&(b.generation, b.value)).unwrap_or(CmpOrdering::Equal)
+    });
+    let worst = tried.iter().filter(|own| !own.value.is_nan());
+    let worst = worst.max_by(|a, b| a.value.total_cmp(&b.value)).or(tried.first());
+    let worst = worst.ok_or_else(|| Single::experiment("no case was flown"))?;
+    let limits = plan.campaign.limits.iter().zip(&worst.row.kept);
+    let outcome = Outcome {
+        title: plan.campaign.title.clone(),
+        measure: plan.recorded[measure].name.clone(),
+        unit: plan.recorded[measure].unit.clone(),
+        largest: Some(worst.value).filter(|value| !value.is_nan()),
+        broken: limits.filter(|(_, kept)| !**kept).map(|(limit, _)| limit.id.clone()).collect(),
+        status: worst.row.status.name(),
+        cases: tried.len() as u64,
+        searches,
+        failed: tried.iter().filter(|own| own.row.status == Status::Failed).count() as u64,
+        ended,
+        out: out.clone(),
+        elapsed: begin.elapsed().as_secs_f64(),
+    };
+    let path = out.join("worst.toml");
+    let title = format!("{}, the worst case that a search found", plan.campaign.title);
+    let text = plan.experiment_of(&title, &worst.row.values)?;
+    fs::write(&path, text).map_err(Single::file(&path))?;
+    let rows: Vec<Row> = tried.iter().map(|own| own.row.clone()).collect();
+    let mut writer = Writer::create(&out.join("search.parquet"), &[("units", plan.units())])?;
+    writer.add(table(plan, &rows))?;
+    writer.finish()?;
+    let path = out.join("history.svg");
+    svg::write(&history(&outcome, &tried), &path)?;
+    write_json(&out.join("search.json"), &outcome)?;
+    Ok(outcome)
+}
+
+/// Flies what is ordered, until nothing can be ordered any more.
+fn serve(plan: &Plan, interrupt: &Interrupt, waiting: &Mutex<Receiver<Order>>) {
+    let mut flight: Option<Flight> = None;
+    loop {
+        let Ok(order) = lock(waiting).recv() else { return };
+        let result = (|| {
+            let own = match flight.take() {
+                Some(flight) => flight,
+                // A case that ends at its limit would hide how much worse it becomes.
+                None => Flight::new(plan, false, interrupt)?.without_ends(),
+            };
+            let own = flight.insert(own);
+            own.fly_with(CASE, plan.values_at(&order.places, CASE)?, &mut [])
+        })();
+        // If nobody waits for the result any more, it is of no use.
+        let _ = order.reply.send(result);
+    }
+}
+
+/// Cases that a search has tried so far.
+struct Searched<'a> {
+    plan: &'a Plan,
+    /// Position of the measure among the recorded numbers.
+    measure: usize,
+    progress: &'a Parts,
+    generation: AtomicU64,
+    tried: Mutex<Vec<Tried>>,
+    failure: Mutex<Option<Single>>,
+}
+
+impl Searched<'_> {
+    /// Flies the case at a point, whose coordinates are cut off at 0 and 1. The strategy looks for
+    /// the smallest value; what has none is as bad as can be.
+    fn evaluate(&self, point: &DVector<f64>, orders: &Sender<Order>) -> f64 {
+        let places = point.iter().map(|unit| Place::Quantile(unit.clamp(0.0, 1.0))).collect();
+        let (reply, result) = channel();
+        if orders.send(Order { places, reply }).is_err() {
+            return f64::MAX;
+        }
+        let row = match result.recv() {
+            Ok(Ok(row)) => row,
+            Ok(Err(error)) => {
+                lock(&self.failure).get_or_insert(error);
+                return f64::MAX;
+            }
+            Err(_) => return f64::MAX,
+        };
+        self.progress.advance(1);
+        let value = row.numbers[self.measure].unwrap_or(f64::NAN);
+        let generation = self.generation.load(Ordering::Relaxed);
+        lock(&self.tried).push(Tried { generation, value, row });
+        if value.is_nan() { f64::MAX } else { -value }
+    }
+
+    /// Returns why the search is to end after this generation, if it is.
+    fn ended(&self, search: &Search, late: bool) -> Result<Option<&'static str>, Single> {
+        match lock(&self.failure).take() {
+            Some(Single::Interrupted { .. }) => return Ok(Some("it was interrupted")),
+            Some(error) => return Err(error),
+            None => {}
+        }
+        let tried = lock(&self.tried);
+        let best = tried.iter().map(|own| own.value).fold(f64::NEG_INFINITY, f64::max);
+        Ok(if search.enough.is_some_and(|enough| best >= enough) {
+            Some("the value is enough")
+        } else if tried.len() as u64 >= search.cases {
+            Some("all cases are used up")
+        } else if late {
+            Some("the time is used up")
+        } else {
+            None
+        })
+    }
+}
+
+/// Searches from one start after another until something ends the work. Returns the number of
+/// searches and what ended them.
+fn look(
+    searched: &Searched,
+    search: &Search,
+    orders: &Sender<Order>,
+    is_late: &dyn Fn() -> bool,
+) -> Result<(u64, &'static str), Single> {
+    let plan = searched.plan;
+    let dimensions = plan.varied.len();
+    let mut random = ChaCha8Rng::seed_from_u64(plan.campaign.seed);
+    let mut unit = || (random.next_u64() >> 11) as f64 / 2.0_f64.powi(53);
+    let usual = 4 + (3.0 * (dimensions as f64).ln()).floor() as usize;
+    for number in 0.. {
+        // The first search begins in the middle, further ones anywhere and with more cases in each
+        // generation.
+        let start: Vec<f64> =
+            (0..dimensions).map(|_| if number == 0 { 0.5 } else { unit() }).collect();
+        let mut strategy = CMAESOptions::new(start, STEP)
+            .population_size(usual << number.min(4))
+            .tol_x(1e-6)
+            .seed(plan.campaign.seed.wrapping_add(number))
+            .build(|point: &DVector<f64>| searched.evaluate(point, orders))
+            .map_err(|error| Single::experiment(format!("[search] {error:?}")))?;
+        loop {
+            let is_over = strategy.next_parallel().is_some();
+            searched.generation.fetch_add(1, Ordering::Relaxed);
+            if let Some(ended) = searched.ended(search, is_late())? {
+                return Ok((number + 1, ended));
+            }
+            if is_over {
+                break;
+            }
+        }
+    }
+    Ok((0, ""))
+}
+
+/// Draws the values that were tried, and the largest one so far.
+fn history(outcome: &Outcome, tried: &[Tried]) -> Figure {
+    let number = (1..=tried.len()).map(|i| i as f64);
+    let mut largest = f64::NEG_INFINITY;
+    let so_far = tried.iter().map(|own| {
+        largest = largest.max(own.value);
+        largest
+    });
+    let curve = |name: &str, color, shape, y: Vec<f64>| Curve {
+        name: name.into(),
+        color,
+        shape,
+        x: number.clone().collect(),
+        y,
+    };
+    let unit = if outcome.unit.is_empty() { String::new() } else { format!(", {}", outcome.unit) };
+    let values = tried.iter().map(|own| own.value).collect();
+    let curves = vec![
+        curve("case", Color(31, 119, 180), Shape::Dots, values),
+        curve("largest so far", Color(214, 39, 40), Shape::Line, so_far.collect()),
+    ];
+    Figure {
+        title: format!("{}: search for the worst case", outcome.title),
+        columns: 1,
+        legend: Legend::Above,
+        panels: vec![Panel {
+            title: String::new(),
+            x_label: "cases flown".into(),
+            y_label: format!("{}{unit}", outcome.measure),
+            log_x: false,
+            x_range: None,
+            curves,
+        }],
+    }
+}

@@ -1,0 +1,222 @@
+//! What a sample of cases says about all cases, with confidence.
+
+use serde::Serialize;
+use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
+
+/// Confidence of the intervals in a report.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// A probability that was estimated from a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Probability {
+    /// Number of events.
+    pub events: u64,
+    /// Number of cases.
+    pub cases: u64,
+    /// Share of the events.
+    pub share: f64,
+    /// Lower end of the interval, by Clopper and Pearson.
+    pub low: f64,
+    /// Upper end of the interval. Without an event it is the bound that the cases prove.
+    pub high: f64,
+}
+
+impl Probability {
+    /// Estimates a probability from `events` among `cases`. Each end is exceeded with half of what
+    /// is left of the confidence; without an event (or with nothing else) the other end has all of
+    /// it.
+    pub fn new(events: u64, cases: u64, confidence: f64) -> Self {
+        let (k, n) = (events as f64, cases as f64);
+        let rest = 1.0 - confidence;
+        let tail = if events == 0 || events == cases { rest } else { rest / 2.0 };
+        let quantile =
+            |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |law| law.inverse_cdf(p));
+        let low = if events == 0 { 0.0 } else { quantile(k, n - k + 1.0, tail) };
+        let high = if events == cases { 1.0 } else { quantile(k + 1.0, n - k, 1.0 - tail) };
+        Self { events, cases, share: k / n, low, high }
+    }
+}
+
+/// Returns the number of cases without an event that prove a probability below `bound`.
+pub fn cases_without_event(bound: f64, confidence: f64) -> u64 {
+    ((1.0 - confidence).ln() / (-bound).ln_1p()).ceil() as u64
+}
+
+/// Numbers of cases at which a campaign looks whether a question is answered, and the confidence of
+/// each look. All looks together err with at most `1 - confidence`.
+pub fn looks(bound: f64, confidence: f64, most: u64, multiple: u64) -> (Vec<u64>, f64) {
+    // The first look comes where no event would be enough; further ones at twice as many cases.
+    let counts = |each: f64| {
+        let first = cases_without_event(bound, each).next_multiple_of(multiple);
+        let doubled = std::iter::successors(Some(first), |count| count.checked_mul(2));
+        let mut all: Vec<u64> = doubled.take_while(|count| *count < most).collect();
+        all.push(most);
+        all
+    };
+    let mut number = counts(confidence).len();
+    let each = |number: usize| 1.0 - (1.0 - confidence) / number as f64;
+    // More confidence of each look may need more cases and thus fewer looks.
+    while counts(each(number)).len() > number {
+        number += 1;
+    }
+    (counts(each(number)), each(number))
+}
+
+/// Numbers that describe a measure over all cases that have it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Number of cases with a value.
+    pub cases: u64,
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Standard deviation of the sample.
+    pub deviation: f64,
+    /// Quantiles with their confidence intervals.
+    pub quantiles: Vec<Quantile>,
+    /// Number of the case with the largest value.
+    pub worst: u64,
+}
+
+/// A quantile of a measure.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Quantile {
+    /// Probability below the quantile; 0 and 1 stand for the smallest and largest value.
+    pub probability: f64,
+    /// Value in the sample.
+    pub value: f64,
+    /// Lower end of the confidence interval, which is a value of the sample; none if the sample is
+    /// too small.
+    pub low: Option<f64>,
+    /// Upper end of the confidence interval.
+    pub high: Option<f64>,
+}
+
+/// Probabilities of the quantiles in a summary.
+pub const PROBABILITIES: [f64; 7] = [0.0, 0.05, 0.5, 0.95, 0.99, 0.999, 1.0];
+
+/// Describes the values of a measure; the position of a value is the number of its case. Values
+/// that are not numbers are missing. Returns `None` if all are.
+pub fn summary(values: &[f64]) -> Option<Summary> {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|value| !value.is_nan()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let largest = *sorted.last()?;
+    let n = sorted.len() as f64;
+    let mean = sorted.iter().sum::<f64>() / n;
+    let squares: f64 = sorted.iter().map(|value| (value - mean).powi(2)).sum();
+    let worst = values.iter().position(|value| *value == largest).unwrap_or(0);
+    Some(Summary {
+        cases: sorted.len() as u64,
+        mean,
+        deviation: (squares / (n - 1.0)).sqrt(),
+        quantiles: PROBABILITIES.map(|p| quantile(&sorted, p)).to_vec(),
+        worst: worst as u64,
+    })
+}
+
+/// Returns a quantile of sorted values by nearest rank, with an interval of order statistics.
+fn quantile(sorted: &[f64], probability: f64) -> Quantile {
+    let n = sorted.len();
+    let rank = ((probability * n as f64).ceil() as usize).clamp(1, n);
+    let value = sorted[rank - 1];
+    let is_end = probability <= 0.0 || probability >= 1.0;
+    let Ok(below) = Binomial::new(probability, n as u64) else {
+        return Quantile { probability, value, low: None, high: None };
+    };
+    let tail = (1.0 - CONFIDENCE) / 2.0;
+    let (mut low, mut high) = (None, None);
+    if !is_end {
+        // Largest r with P(fewer than r values below the quantile) <= tail, and smallest s with
+        // P(at least s values below it) <= tail.
+        let r = below.inverse_cdf(tail);
+        let r = if below.cdf(r) > tail { r } else { r + 1 };
+        low = (r >= 1).then(|| sorted.get(r as usize - 1).copied()).flatten();
+        let s = below.inverse_cdf(1.0 - tail) + 1;
+        high = sorted.get(s as usize - 1).copied();
+    }
+    Quantile { probability, value, low, high }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn published_bounds_of_clopper_and_pearson() {
+        // The rule of three, exactly: 1 - 0.05^(1/n).
+        let none = Probability::new(0, 1000, 0.95);
+        assert!((none.high - (1.0 - 0.05_f64.powf(1e-3))).abs() < 1e-12 && none.low == 0.0);
+        // R: binom.test(7, 20)$conf.int
+        let some = Probability::new(7, 20, 0.95);
+        assert!((some.low - 0.1539092).abs() < 1e-6 && (some.high - 0.5921885).abs() < 1e-6);
+        let all = Probability::new(20, 20, 0.95);
+        assert!(all.high == 1.0 && (all.low - 0.05_f64.powf(1.0 / 20.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn oracle_an_interval_covers_as_often_as_it_says() {
+        // All outcomes of 40 cases, weighed with their probability.
+        for probability in [0.02, 0.2, 0.5] {
+            let law = Binomial::new(probability, 40).unwrap();
+            use statrs::distribution::Discrete;
+            let covered: f64 = (0..=40)
+                .filter(|k| {
+                    let own = Probability::new(*k, 40, 0.95);
+                    own.low <= probability && probability <= own.high
+                })
+                .map(|k| law.pmf(k))
+                .sum();
+            // Without an event the interval has one side: twice the error there.
+            assert!(covered >= 0.925, "{probability}: {covered}");
+        }
+    }
+
+    #[test]
+    fn cases_that_prove_a_bound() {
+        assert_eq!(cases_without_event(1e-4, 0.95), 29_956);
+        assert!(Probability::new(0, 29_956, 0.95).high <= 1e-4);
+        assert!(Probability::new(0, 29_955, 0.95).high > 1e-4);
+    }
+
+    #[test]
+    fn looks_share_the_error_among_them() {
+        let (counts, each) = looks(1e-2, 0.95, 5000, 250);
+        assert_eq!(*counts.last().unwrap(), 5000);
+        assert!((counts.len() as f64 * (1.0 - each) - 0.05).abs() < 1e-12);
+        assert!(Probability::new(0, counts[0], each).high <= 1e-2);
+        assert!(counts[..counts.len() - 1].iter().all(|count| count % 250 == 0));
+        assert_eq!(looks(1e-4, 0.95, 1000, 250).0, [1000]);
+    }
+
+    #[test]
+    fn oracle_quantiles_by_hand() {
+        let values: Vec<f64> = (1..=100).rev().map(f64::from).collect();
+        let own = summary(&values).unwrap();
+        assert_eq!((own.cases, own.mean, own.worst), (100, 50.5, 0));
+        let of = |p: f64| *own.quantiles.iter().find(|q| q.probability == p).unwrap();
+        assert_eq!(
+            (of(0.0).value, of(0.5).value, of(0.95).value, of(1.0).value),
+            (1.0, 50.0, 95.0, 100.0)
+        );
+        // The usual interval of the median of 100 values: the 40th to the 61st.
+        assert_eq!((of(0.5).low, of(0.5).high), (Some(40.0), Some(61.0)));
+        assert_eq!(of(0.999).high, None);
+        assert!(summary(&[f64::NAN]).is_none());
+        assert_eq!(summary(&[f64::NAN, 3.0, 1.0]).unwrap().worst, 1);
+    }
+
+    #[test]
+    fn oracle_the_interval_of_a_quantile_covers_it() {
+        // Values 1 to n of a uniform distribution: the p-quantile lies between order statistics r and
+        // s with the probability that r to s - 1 of n values are below it.
+        use statrs::distribution::Discrete;
+        for (n, p) in [(100, 0.5), (60, 0.95), (1000, 0.99)] {
+            let values: Vec<f64> = (1..=n).map(f64::from).collect();
+            let own = quantile(&values, p);
+            let (low, high) =
+                (own.low.unwrap_or(0.0) as u64, own.high.map_or(n as u64 + 1, |h| h as u64));
+            let law = Binomial::new(p, n as u64).unwrap();
+            let covered: f64 = (low..high).map(|k| law.pmf(k)).sum();
+            assert!(covered >= 0.95, "{n} {p}: {covered}");
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Runs of one system that differ in the values of parameters: the units are made once, and reset
+//! between two runs.
+
+use crate::error::Error;
+use crate::interrupt::Interrupt;
+use crate::master::Master;
+use crate::settings::{self, Setting};
+use crate::system::System;
+use fmu_import::description::Variable;
+use fmu_import::names;
+use toml::Value;
+
+pub use crate::settings::SettingValue;
+
+/// A parameter, or an input without a connection, of a system's component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Target {
+    component: usize,
+    /// Position of the variable in the description of the component.
+    variable: usize,
+}
+
+impl System {
+    /// Finds the parameter, or the input without a connection, `component.variable`.
+    ///
+    /// # Errors
+    /// Returns an error if there is no such variable, or if it cannot be set.
+    pub fn target(&self, path: &str) -> Result<Target, String> {
+        let parts = self.parts();
+        let (name, rest) =
+            names::split(path).ok_or_else(|| format!("\"{path}\" is no component.parameter"))?;
+        let component = self.order.iter().position(|known| known == name).ok_or_else(|| {
+            let hint = names::hint(name, self.order.iter().map(String::as_str));
+            format!("there is no component \"{name}\"{hint}")
+        })?;
+        let variable = settings::position(rest, component, parts[component], &self.wires, true)?;
+        Ok(Target { component, variable })
+    }
+
+    /// Returns the variable of a target.
+    pub fn variable(&self, target: Target) -> &Variable {
+        &self.fmus[target.component].description.variables[target.variable]
+    }
+
+    /// Converts a value to the type and the unit of a target.
+    ///
+    /// # Errors
+    /// Returns an error if the value is of the wrong type, outside the variable's limits, or in a
+    /// unit that does not fit.
+    pub fn value(&self, target: Target, written: &Value) -> Result<SettingValue, String> {
+        settings::value(written, self.variable(target), self.parts()[target.component])
+    }
+
+    /// Returns the value that a target has in this system: that of the experiment, or else the
+    /// start value of the unit. There is none if the unit does not state it, or if it is not of
+    /// type Real.
+    pub fn nominal(&self, target: Target) -> Option<f64> {
+        let variable = self.variable(target);
+        let own = self.settings[target.component].iter().find(|own| own.name == variable.name);
+        match own.map(|setting| &setting.value) {
+            Some(SettingValue::Real(value)) => Some(*value),
+            Some(_) => None,
+            None => variable.start.as_ref()?.parse().ok(),
+        }
+    }
+
+    /// Creates, sets and initializes the units as [`Self::start`] does, with other values for some
+    /// targets.
+    ///
+    /// # Errors
+    /// Returns an error if a unit cannot be instantiated or initialized.
+    pub fn start_varied(
+        &self,
+        changes: &[(Target, SettingValue)],
+        interrupt: &Interrupt,
+    ) -> Result<Master, Error> {
+        self.start_with(&self.varied(changes), interrupt)
+    }
+
+    /// Resets the units of a master that this system has made, and sets and initializes them for
+    /// another run.
+    ///
+    /// # Errors
+    /// Returns an error if a call of a unit fails.
+    pub fn restart(
+        &self,
+        master: &mut Master,
+        changes: &[(Target, SettingValue)],
+    ) -> Result<(), Error> {
+        let settings = self.varied(changes);
+        master.reset(|index, unit| settings::apply(&settings[index], unit))?;
+        master.initialize()
+    }
+
+    /// Returns the settings of all components with the changes made to them.
+    fn varied(&self, changes: &[(Target, SettingValue)]) -> Vec<Vec<Setting>> {
+        let mut settings = self.settings.clone();
+        for (target, value) in changes {
+            let variable = self.variable(*target);
+            let own = &mut settings[target.component];
+            match own.iter_mut().find(|setting| setting.name == variable.name) {
+                Some(setting) => setting.value = value.clone(),
+                None => own.push(Setting {
+                    name: variable.name.clone(),
+                    reference: variable.reference,
+                    value: value.clone(),
+                }),
+            }
+        }
+        settings
+    }
+}

@@ -1,0 +1,258 @@
+//! The commands `campaign` and `falsify`.
+
+use crate::failure::Failure;
+use campaign::definition::Campaign;
+use campaign::plan::{self, Plan};
+use campaign::run::{self, Findings, Options};
+use campaign::{search, statistics::CONFIDENCE};
+use clap::Args;
+use cosim::error::Error;
+use cosim::interrupt::Interrupt;
+use std::io::Write;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// What the commands `campaign` and `falsify` have in common.
+#[derive(Args)]
+pub(crate) struct Common {
+    /// Campaign: a file, or the name of one below orchestrator/experiments/campaigns.
+    campaign: PathBuf,
+    /// Folder for the results [default: out/CAMPAIGN].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Look for FMUs in this folder, too, besides the experiment's own and target/fmu. The option
+    /// may be given several times.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) fmu_dir: Vec<PathBuf>,
+    /// Number of threads [default: one for each core].
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    jobs: usize,
+    /// Show neither progress nor summary.
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+/// Options of `campaign`.
+#[derive(Args)]
+pub(crate) struct Fly {
+    #[command(flatten)]
+    pub(crate) common: Common,
+    /// Write the experiment of one case to a file that `orchestrator run` takes, and run it with
+    /// everything recorded.
+    #[arg(long, value_name = "K", conflicts_with_all = ["cases", "work", "fresh", "csv"])]
+    case: Option<u64>,
+    /// Fly only the cases from FIRST to the one before LAST, and keep them for a later run that
+    /// merges all. Several processes may do this at once in the same folder.
+    #[arg(long, value_name = "FIRST..LAST", value_parser = range, conflicts_with_all = ["work", "csv"])]
+    cases: Option<Range<u64>>,
+    /// Print which parts of the campaign are not flown yet, as JSON, and fly nothing.
+    #[arg(long, conflicts_with_all = ["fresh", "csv"])]
+    work: bool,
+    /// Fly everything again, including what is kept.
+    #[arg(long)]
+    fresh: bool,
+    /// Write the table as cases.csv, too.
+    #[arg(long)]
+    csv: bool,
+}
+
+/// Options of `falsify`.
+#[derive(Args)]
+pub(crate) struct Falsify {
+    #[command(flatten)]
+    common: Common,
+    /// Begin no further cases after this time, s.
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
+    time: Option<u64>,
+    /// Replace the results of an earlier search in the folder.
+    #[arg(long)]
+    force: bool,
+}
+
+fn range(text: &str) -> Result<Range<u64>, String> {
+    let number = |text: &str| text.trim().parse::<u64>().ok();
+    let ends = text.split_once("..").and_then(|(a, b)| Some((number(a)?, number(b)?)));
+    let (first, last) = ends.ok_or("wants two whole numbers, for example 0..250")?;
+    Ok(first..last)
+}
+
+fn prepare(common: &Common) -> Result<Plan, Error> {
+    let campaign = Campaign::load(&plan::find(&common.campaign)?)?;
+    Plan::new(campaign, &common.fmu_dir)
+}
+
+/// What is to be done after a command.
+pub(crate) enum Next {
+    /// Nothing is left.
+    Done,
+    /// This experiment is to be run, with results in this folder.
+    Run(PathBuf, PathBuf),
+}
+
+/// Flies a campaign, a part of it, or one case.
+///
+/// # Errors
+/// Returns an error if the campaign is faulty, or if a file cannot be written.
+pub(crate) fn fly(
+    asked: &Fly,
+    out: &mut impl Write,
+    interrupt: &Interrupt,
+) -> Result<Next, Failure> {
+    let plan = prepare(&asked.common)?;
+    let folder = run::folder(&plan, asked.common.out.as_deref());
+    if asked.work {
+        let work =
+            serde_json::to_string(&run::work(&plan, &folder)).map_err(std::io::Error::from)?;
+        writeln!(out, "{work}")?;
+        return Ok(Next::Done);
+    }
+    if let Some(case) = asked.case {
+        if case >= plan.cases() {
+            let message = format!("--case {case}: the campaign has {} cases", plan.cases());
+            return Err(Error::experiment(message).into());
+        }
+        let folder = match &asked.common.out {
+            Some(folder) => folder.clone(),
+            None => folder.join("cases").join(case.to_string()),
+        };
+        return Ok(Next::Run(write_case(&plan, case, &folder)?, folder));
+    }
+    let options = Options {
+        out: asked.common.out.clone(),
+        jobs: asked.common.jobs,
+        fresh: asked.fresh,
+        quiet: asked.common.quiet,
+        csv: asked.csv,
+        interrupt: interrupt.clone(),
+    };
+    if let Some(cases) = &asked.cases {
+        let flown = run::fly_range(&plan, cases, &options)?;
+        if !asked.common.quiet {
+            writeln!(out, "{flown} cases flown, kept in {}", folder.join("parts").display())?;
+        }
+        return Ok(Next::Done);
+    }
+    let report = run::fly(&plan, &options)?;
+    if !asked.common.quiet {
+        summary(&report, out)?;
+    }
+    Ok(Next::Done)
+}
+
+/// Writes the experiment of a case.
+fn write_case(plan: &Plan, case: u64, folder: &Path) -> Result<PathBuf, Error> {
+    let title = format!("{}, case {case}", plan.campaign.title);
+    let text = plan.experiment_of(&title, &plan.values(case)?)?;
+    std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
+    let path = folder.join("case.toml");
+    std::fs::write(&path, text).map_err(Error::file(&path))?;
+    Ok(path)
+}
+
+fn summary(report: &run::Report, out: &mut impl Write) -> std::io::Result<()> {
+    let Findings { title, cases, status, limits, measures, answer } = &report.findings;
+    let rate = report.flown as f64 / report.elapsed;
+    writeln!(out, "{title}")?;
+    writeln!(
+        out,
+        "  {cases} cases, {} flown now in {:.1} s ({rate:.0} per second)",
+        report.flown, report.elapsed
+    )?;
+    for note in &report.notes {
+        writeln!(out, "  {note}")?;
+    }
+    let others = status.iter().filter(|(name, count)| **name != "completed" && **count > 0);
+    for (name, count) in others {
+        writeln!(out, "  {name}: {count}")?;
+    }
+    for limit in limits {
+        let own = limit.broken;
+        let bound = if own.events == 0 {
+            format!("probability at most {:.3e}", own.high)
+        } else {
+            format!("probability {:.3e} to {:.3e}", own.low, own.high)
+        };
+        writeln!(
+            out,
+            "  {}: broken by {} of {}, {bound} ({:.0} %)",
+            limit.says,
+            own.events,
+            own.cases,
+            100.0 * CONFIDENCE
+        )?;
+    }
+    for measure in measures {
+        let Some(own) = &measure.summary else { continue };
+        let of = |probability: f64| {
+            let found = own.quantiles.iter().find(|quantile| quantile.probability == probability);
+            found.map_or(f64::NAN, |quantile| quantile.value)
+        };
+        writeln!(
+            out,
+            "  {}: mean {:.4}, 99 % {:.4}, largest {:.4} {} (case {})",
+            measure.name,
+            own.mean,
+            of(0.99),
+            of(1.0),
+            measure.unit,
+            own.worst
+        )?;
+    }
+    if let Some(answer) = answer {
+        let word = match answer.holds {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "not decided",
+        };
+        writeln!(
+            out,
+            "  P({} broken) < {} with {} %: {word}",
+            answer.question.limit,
+            answer.question.below,
+            100.0 * answer.question.confidence
+        )?;
+    }
+    writeln!(out, "  {}", report.out.join("report.html").display())
+}
+
+/// Looks for the worst case of a campaign.
+///
+/// # Errors
+/// Returns an error if the campaign is faulty, or if a file cannot be written.
+pub(crate) fn falsify(
+    asked: &Falsify,
+    out: &mut impl Write,
+    interrupt: &Interrupt,
+) -> Result<(), Failure> {
+    let plan = prepare(&asked.common)?;
+    let options = search::Options {
+        out: asked.common.out.clone(),
+        jobs: asked.common.jobs,
+        time: asked.time.map(Duration::from_secs),
+        quiet: asked.common.quiet,
+        force: asked.force,
+        interrupt: interrupt.clone(),
+    };
+    let outcome = search::search(&plan, &options)?;
+    if asked.common.quiet {
+        return Ok(());
+    }
+    let largest = outcome.largest.map_or("none".into(), |value| format!("{value:.6}"));
+    writeln!(out, "{}", outcome.title)?;
+    writeln!(
+        out,
+        "  largest {}: {largest} {} ({} cases in {:.0} s, {} searches; {})",
+        outcome.measure,
+        outcome.unit,
+        outcome.cases,
+        outcome.elapsed,
+        outcome.searches,
+        outcome.ended
+    )?;
+    if !outcome.broken.is_empty() {
+        writeln!(out, "  breaks {}", outcome.broken.join(", "))?;
+    }
+    writeln!(out, "  orchestrator run {}", outcome.out.join("worst.toml").display())?;
+    Ok(())
+}
