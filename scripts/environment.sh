@@ -114,9 +114,14 @@ pack_fmus() {
     done
 }
 
+# Downloads all crates, those of other platforms as well: the digest of a library's sources names all
+# of them.
+fetch() { cargo fetch --locked --quiet; }
+
 # Builds in release the targets of the workspace that the arguments choose. With --workspace, every
 # choice has the same features of the dependencies, so that none of them is built twice.
 build_release() {
+    fetch
     cargo build --release --locked --workspace "$@"
 }
 

@@ -124,6 +124,7 @@ cross_build() (
 # What every build for another platform needs.
 need_cross() {
     need_rust
+    fetch
     need_venv "$target/zig" scripts/package-requirements.txt
 }
 

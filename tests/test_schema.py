@@ -1,4 +1,4 @@
-"""The JSON Schemas of experiments and studies: every file keeps to its own, as it is written and with what it extends."""
+"""The JSON Schemas of experiments, studies and campaigns: every file keeps to its own, as it is written and with what it extends."""
 
 import json
 import re
@@ -18,7 +18,12 @@ else:
 FILES = sorted(EXPERIMENTS.parent.glob("*/*.toml"))
 WRITTEN = {path: path.read_text(encoding="utf-8") for path in FILES}
 STUDIES = [path for path in FILES if path.name == "study.toml"]
-EXPERIMENTS_THERE = [path for path in FILES if "title" in (table := tomllib.loads(WRITTEN[path])) and "paper" not in table]
+CAMPAIGNS = [path for path in FILES if path.parent.name == "campaigns" or path.stem == "campaigns"]
+EXPERIMENTS_THERE = [
+    path
+    for path in FILES
+    if path not in CAMPAIGNS and "title" in (table := tomllib.loads(WRITTEN[path])) and "paper" not in table
+]
 
 PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs").glob("*.md"))}
 EXAMPLES = [(name, text) for name, page in PAGES.items() for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL)]
@@ -48,11 +53,18 @@ def test_every_study_keeps_to_its_schema_and_names_it(path):
     check("study", WRITTEN[path])
 
 
+@pytest.mark.parametrize("path", CAMPAIGNS, ids=named)
+def test_every_campaign_keeps_to_its_schema_and_names_it(path):
+    assert WRITTEN[path].startswith("#:schema ../../schema/campaign.json\n")
+    check("campaign", WRITTEN[path])
+
+
 @pytest.mark.parametrize(("page", "text"), EXAMPLES)
 def test_the_examples_of_the_pages_are_toml_and_keep_to_the_schemas(page, text):
     table = tomllib.loads(text)
     if "title" in table:
-        check("study" if "paper" in table else "experiment", text)
+        kinds = [("paper", "study"), ("vary", "campaign"), ("title", "experiment")]
+        check(next(kind for key, kind in kinds if key in table), text)
 
 
 @pytest.mark.parametrize(

@@ -129,9 +129,14 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
         Self { unit: U::new(), ticks: None, device: None }
     }
 
+    fn reset(&mut self) {
+        *self = Self { device: self.device.take(), ..Self::new() };
+    }
+
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         self.unit.load(context)?;
-        let device = self.unit.design()?;
+        let same = |device: &mut U::Device| self.unit.is_designed(device);
+        let device = self.device.take_if(same).map_or_else(|| self.unit.design(), Ok)?;
         vehicle::time::check_resolution(context.start_time, U::period(&device))
             .map_err(|error| Failure::Error(by_variable(&error, &[])))?;
         self.ticks = Some(Sampled::new(context.start_time, U::period(&device), U::memory(&device)));

@@ -271,7 +271,7 @@ impl Instance {
     /// Brings the instance back to its state after fmi2Instantiate, apart from the logging and the
     /// saved states.
     pub(crate) fn reset(&mut self) {
-        self.unit.reset();
+        self.unit.reset(self.progress.state == State::Error);
         let extrapolations = mem::take(&mut self.progress.extrapolations);
         self.progress = Progress { extrapolations, ..Progress::default() };
         self.progress.extrapolations.clear();

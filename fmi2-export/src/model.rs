@@ -72,6 +72,12 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// are read from here.
     fn new() -> Self;
 
+    /// Brings the model back to what [`Self::new`] makes. It may keep scratch space that determines
+    /// nothing. After a failure the shell makes a new model instead.
+    fn reset(&mut self) {
+        *self = Self::new();
+    }
+
     /// Checks the parameters, loads files, computes the values that follow from them and sets the
     /// initial state. The shell calls it on leaving initialization mode, and earlier in that mode
     /// if an output is requested; it calls it again whenever a parameter changed meanwhile.

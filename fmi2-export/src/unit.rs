@@ -109,7 +109,8 @@ pub(crate) trait FmuUnit: Send {
     fn boolean(&mut self, reference: usize) -> Option<&mut bool>;
     fn string(&mut self, reference: usize) -> Option<&mut String>;
 
-    fn reset(&mut self);
+    /// Brings all variables back to their start values; with `failed` nothing else is kept either.
+    fn reset(&mut self, failed: bool);
     fn initialize(&mut self, context: &Context) -> Result<(), Failure>;
     fn calculate(&mut self, time: f64) -> Result<(), Failure>;
     /// Performs a step and leaves the inputs at their values at `to`.
@@ -196,8 +197,12 @@ impl<M: Model> FmuUnit for Bound<M> {
         }
     }
 
-    fn reset(&mut self) {
-        self.model = M::new();
+    fn reset(&mut self, failed: bool) {
+        if failed {
+            self.model = M::new();
+        } else {
+            self.model.reset();
+        }
     }
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {

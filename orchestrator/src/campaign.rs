@@ -1,12 +1,15 @@
 //! The commands `campaign` and `falsify`.
 
 use crate::failure::Failure;
+use campaign::changes::Changes;
 use campaign::definition::Campaign;
+use campaign::findings::Findings;
 use campaign::plan::{self, Plan};
-use campaign::run::{self, Findings, Options};
+use campaign::run::{self, Options};
 use campaign::{search, statistics::CONFIDENCE};
 use clap::Args;
 use cosim::error::Error;
+use cosim::experiment::Overrides;
 use cosim::interrupt::Interrupt;
 use std::io::Write;
 use std::ops::Range;
@@ -18,6 +21,11 @@ use std::time::Duration;
 pub(crate) struct Common {
     /// Campaign: a file, or the name of one below orchestrator/experiments/campaigns.
     campaign: PathBuf,
+    /// Experiment in place of that of the campaign: a file, or the name of an experiment.
+    #[arg(long, value_name = "EXPERIMENT")]
+    experiment: Option<PathBuf>,
+    #[command(flatten)]
+    overrides: Overrides,
     /// Folder for the results [default: out/CAMPAIGN].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -79,7 +87,9 @@ fn range(text: &str) -> Result<Range<u64>, String> {
 
 fn prepare(common: &Common) -> Result<Plan, Error> {
     let campaign = Campaign::load(&plan::find(&common.campaign)?)?;
-    Plan::new(campaign, &common.fmu_dir)
+    let changes =
+        Changes { experiment: common.experiment.clone(), overrides: common.overrides.clone() };
+    Plan::new(campaign, &changes, &common.fmu_dir)
 }
 
 /// What is to be done after a command.

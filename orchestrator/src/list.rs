@@ -1,6 +1,7 @@
 //! Lists the experiments, studies and FMUs that are found.
 
 use crate::failure::Failure;
+use campaign::definition::Campaign;
 use cosim::error::Error;
 use cosim::experiment::Experiment;
 use cosim::search::{self, files};
@@ -11,7 +12,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::{fs, iter};
 
-/// Prints the experiments and studies below a folder with their titles, and the FMUs below it.
+/// Prints the experiments, studies and campaigns below a folder with their titles, and the FMUs below it.
 /// Without a folder it prints those below the current one, and all others that the program finds
 /// from any folder.
 ///
@@ -47,15 +48,26 @@ pub(crate) fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Fa
     print("experiments", &rows, out)?;
 
     let studies: Vec<(PathBuf, String)> = tables
-        .into_iter()
+        .iter()
         .filter(|path| path.file_name().is_some_and(|name| name == "study.toml"))
         .map(|path| {
-            let title = Study::load(&path)
+            let title = Study::load(path)
                 .map_or_else(|error| format!("FAULT {error}"), |study| study.title);
-            (path, title)
+            (path.clone(), title)
         })
         .collect();
     print("studies", &studies, out)?;
+
+    let campaigns: Vec<(PathBuf, String)> = tables
+        .into_iter()
+        .filter(|path| fs::read_to_string(path).is_ok_and(|text| search::is_campaign(&text)))
+        .map(|path| {
+            let title = Campaign::load(&path)
+                .map_or_else(|error| format!("FAULT {error}"), |campaign| campaign.title);
+            (path, title)
+        })
+        .collect();
+    print("campaigns", &campaigns, out)?;
 
     let others = if folder.is_none() { search::units() } else { vec![PathBuf::from("target/fmu")] };
     let rows: Vec<(PathBuf, String)> = find("fmu", others)

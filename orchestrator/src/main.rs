@@ -186,7 +186,7 @@ enum Command {
         /// Shell that the script is for.
         shell: clap_complete::Shell,
     },
-    /// List experiments, studies and FMUs.
+    /// List experiments, studies, campaigns and FMUs.
     List {
         /// Folder to search [default: the current one, and those where experiments and FMUs are
         /// found from any folder].

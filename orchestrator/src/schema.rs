@@ -5,6 +5,7 @@
 //! therefore knows every key and its type but requires none; missing keys are reported when the
 //! file is read.
 
+use campaign::definition::Campaign;
 use cosim::experiment::Experiment;
 use cosim_report::study::definition::Study;
 use schemars::generate::SchemaSettings;
@@ -19,11 +20,16 @@ pub(crate) enum Kind {
     Experiment,
     /// The file describes a study.
     Study,
+    /// The file describes a campaign.
+    Campaign,
 }
 
 /// Returns the schema of a kind of file as text.
 pub(crate) fn text(kind: Kind) -> String {
     let mut schema = match kind {
+        Kind::Campaign => schema_of::<Campaign>(json!({
+            "extends": texts("Files that this one extends, relative to it; a later one has precedence over those before."),
+        })),
         Kind::Experiment => schema_of::<Experiment>(json!({
             "extends": texts("Files that this one extends, relative to it; a later one has precedence over those before."),
             "unset": texts("Parameters component.parameter of what is extended that are left at the unit's own value."),

@@ -2,7 +2,7 @@
 
 use crate::definition::Vary;
 use crate::design::Place;
-use crate::report::short;
+use crate::texts::short;
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
 use fmu_import::description::Kind;

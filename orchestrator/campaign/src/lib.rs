@@ -6,11 +6,14 @@
 //! by itself. A [`flight`] flies one case after the other with the same units, which are reset
 //! between cases. The cases are divided into parts, whose results are kept in files of their own
 //! ([`parts`], [`table`]) until all are merged ([`run`]). [`statistics`] and [`sensitivity`] say
-//! what the cases show, and [`report`] draws it. [`search`] looks for the worst case.
+//! what the cases show ([`findings`]), and [`report`] draws it. [`search`] looks for the worst case.
 
+pub mod changes;
+mod correlation;
 pub mod definition;
 pub mod design;
 pub mod error;
+pub mod findings;
 pub mod flight;
 pub mod law;
 pub mod parts;
@@ -21,3 +24,4 @@ pub mod search;
 pub mod sensitivity;
 pub mod statistics;
 pub mod table;
+mod texts;

@@ -1,6 +1,8 @@
 //! A campaign that is ready to be flown: all names are looked up, and every parameter that varies
 //! has its distribution.
 
+use crate::changes::Changes;
+use crate::correlation::{Correlated, correlation};
 use crate::definition::{Campaign, Kind, Limit, Vary};
 use crate::design::{Design, Place};
 use crate::law::Law;
@@ -17,11 +19,9 @@ use fmu_import::description::Kind as Type;
 use fmu_import::names;
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
-use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use toml::Spanned;
 
 /// Version of the files of parts, which must be raised when their content changes.
 const FORMAT: u32 = 1;
@@ -66,27 +66,26 @@ pub struct Plan {
     pub design: Design,
     /// Hashes of all that the cases depend on, by what it is.
     pub keys: BTreeMap<String, String>,
-    /// Display of the campaign's time, s: from start to stop.
+    /// Simulated time at which the cases start and stop, s.
     pub span: [f64; 2],
+    /// Arguments of the program that name the campaign and the changes to it.
+    pub command: String,
     experiment: Experiment,
+    /// Paths of the archives, by component.
+    archives: BTreeMap<String, PathBuf>,
+    /// Experiment that the command line names.
+    replaced: Option<PathBuf>,
     fmu_dirs: Vec<PathBuf>,
     correlation: Option<Correlated>,
 }
 
-/// Parameters that are correlated: their dimensions, and the Cholesky factor of the correlation of
-/// their normal scores, row by row.
-struct Correlated {
-    dimensions: Vec<usize>,
-    factor: Vec<Vec<f64>>,
-}
-
 impl Plan {
-    /// Prepares a campaign.
+    /// Prepares a campaign, with what the command line changes.
     ///
     /// # Errors
     /// Returns an error that names the key at fault, with its line and the nearest right name.
-    pub fn new(campaign: Campaign, fmu_dirs: &[PathBuf]) -> Result<Self, Error> {
-        let mut experiment = experiment(&campaign)?;
+    pub fn new(campaign: Campaign, changes: &Changes, fmu_dirs: &[PathBuf]) -> Result<Self, Error> {
+        let mut experiment = experiment(&campaign, changes)?;
         experiment.observe = observe(&campaign, &experiment.observe)?;
         let fmu_dirs = fmu_dirs.to_vec();
         let mut opened = Opened::default();
@@ -105,7 +104,8 @@ impl Plan {
                 return Err(campaign.source.error(&(0..0), message));
             }
         }
-        let correlation = correlation(&campaign, &varied)?;
+        let laws: Vec<_> = varied.iter().map(|own| (own.name.as_str(), &own.law)).collect();
+        let correlation = correlation(&campaign, &laws)?;
         let levels = varied.iter().map(|own| {
             let fault = |problem| {
                 campaign.source.error(&(0..0), format!("[[vary]] \"{}\": {problem}", own.name))
@@ -122,9 +122,18 @@ impl Plan {
             .map_err(|problem| campaign.source.error(&(0..0), problem))?;
         let meters = Meters::new(&mut system)?;
         let recorded = recorded(&campaign, &system.experiment.observe, &meters);
-        let keys = keys(&campaign, &system)?;
+        let keys = keys(&campaign, changes, &system)?;
         let span = [system.clock.start(), system.clock.stop()];
+        let command = changes.command(&campaign);
         let plan = Self {
+            command,
+            archives: system
+                .order
+                .iter()
+                .cloned()
+                .zip(system.fmus.iter().map(|fmu| fmu.path.clone()))
+                .collect(),
+            replaced: changes.experiment.clone(),
             campaign,
             varied,
             recorded,
@@ -137,6 +146,14 @@ impl Plan {
         };
         plan.check_limits()?;
         Ok(plan)
+    }
+
+    /// Returns the name of the results' folder: that of the campaign, and that of the experiment if
+    /// the command line names one.
+    pub fn name(&self) -> String {
+        let campaign = self.campaign.name();
+        let stem = self.replaced.as_ref().and_then(|path| path.file_stem());
+        stem.map_or(campaign.clone(), |stem| format!("{campaign}-{}", stem.to_string_lossy()))
     }
 
     /// Returns the number of cases.
@@ -204,7 +221,7 @@ impl Plan {
         for (name, component) in &self.experiment.components {
             let own = components.as_table_mut().and_then(|all| all.get_mut(name));
             let Some(own) = own.and_then(toml::Value::as_table_mut) else { continue };
-            own.insert("fmu".into(), component.fmu.get_ref().clone().into());
+            own.insert("fmu".into(), self.archive(name).into());
             let parameters = component.parameters.iter();
             let mut parameters: toml::Table =
                 parameters.map(|(name, value)| (name.clone(), value.get_ref().clone())).collect();
@@ -218,6 +235,17 @@ impl Plan {
             own.insert("parameters".into(), parameters.into());
         }
         toml::to_string(&table).map_err(|error| Error::experiment(error.to_string()))
+    }
+
+    /// Returns what an experiment in another folder calls the archive of a component: its file name if
+    /// it is found by that from any folder, and else its path.
+    fn archive(&self, component: &str) -> String {
+        let written = self.experiment.components[component].fmu.get_ref();
+        let is_there = |folder: &PathBuf| folder.join(written).is_file();
+        match self.archives.get(component).and_then(|path| std::path::absolute(path).ok()) {
+            Some(path) if !search::units().iter().any(is_there) => path.display().to_string(),
+            _ => written.clone(),
+        }
     }
 
     /// Returns the limits with the position of their measure in [`Self::recorded`].
@@ -264,34 +292,16 @@ impl Plan {
     }
 }
 
-impl Correlated {
-    /// Replaces the quantiles of the correlated dimensions. Corners and levels stay.
-    fn apply(&self, places: &mut [Place]) {
-        let Ok(normal) = Normal::new(0.0, 1.0) else { return };
-        let scores = self.dimensions.iter().map(|dimension| match places[*dimension] {
-            Place::Quantile(unit) => {
-                Some(normal.inverse_cdf(unit.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0)))
-            }
-            _ => None,
-        });
-        let Some(scores) = scores.collect::<Option<Vec<f64>>>() else { return };
-        for (dimension, row) in self.dimensions.iter().zip(&self.factor) {
-            let score: f64 = row.iter().zip(&scores).map(|(factor, score)| factor * score).sum();
-            places[*dimension] = Place::Quantile(normal.cdf(score).min(1.0 - f64::EPSILON / 2.0));
-        }
-    }
-}
-
-/// Reads the experiment of a campaign, with what the campaign sets in it.
-fn experiment(campaign: &Campaign) -> Result<Experiment, Error> {
+/// Reads the experiment of a campaign, with what the campaign and the command line set in it.
+fn experiment(campaign: &Campaign, changes: &Changes) -> Result<Experiment, Error> {
     let source = &campaign.source;
     let span = campaign.experiment.span();
     let beside = source.beside(campaign.experiment.get_ref());
-    let path = if beside.is_file() {
-        beside
-    } else {
-        search::experiment(campaign.experiment.get_ref())
-            .map_err(|error| source.error(&span, error.to_string()))?
+    let path = match &changes.experiment {
+        Some(name) => search::experiment(name)?,
+        None if beside.is_file() => beside,
+        None => search::experiment(campaign.experiment.get_ref())
+            .map_err(|error| source.error(&span, error.to_string()))?,
     };
     let mut experiment = Experiment::load(&path)?;
     let mut overrides = Overrides::default();
@@ -309,6 +319,7 @@ fn experiment(campaign: &Campaign) -> Result<Experiment, Error> {
         let outcome = experiment.set(name, value.get_ref().clone());
         outcome.map_err(|problem| source.error(&value.span(), format!("[set] {problem}")))?;
     }
+    experiment.apply(&changes.overrides)?;
     Ok(experiment)
 }
 
@@ -404,74 +415,6 @@ fn laws(vary: &Vary, source: &Source, system: &System) -> Result<Vec<Varied>, Er
     Ok(all)
 }
 
-/// Reads the correlations of a campaign.
-fn correlation(campaign: &Campaign, varied: &[Varied]) -> Result<Option<Correlated>, Error> {
-    let source = &campaign.source;
-    let mut dimensions: Vec<usize> = Vec::new();
-    let mut entries = Vec::new();
-    for correlation in &campaign.correlations {
-        let span = correlation.between.span();
-        let fault = |problem: String| source.error(&span, format!("[[correlation]] {problem}"));
-        let mut pair = [0; 2];
-        for (place, name) in pair.iter_mut().zip(correlation.between.get_ref()) {
-            let known = varied.iter().map(|own| own.name.as_str());
-            source.known(
-                [&Spanned::new(span.clone(), name.clone())],
-                "parameter that varies",
-                known,
-            )?;
-            let dimension = varied.iter().position(|own| own.name == *name).unwrap_or(0);
-            if !varied[dimension].law.is_ordered() {
-                return Err(fault(format!("\"{name}\" has no order that could be correlated")));
-            }
-            if !dimensions.contains(&dimension) {
-                dimensions.push(dimension);
-            }
-            *place = dimensions.iter().position(|known| *known == dimension).unwrap_or(0);
-        }
-        let coefficient = correlation.coefficient;
-        if pair[0] == pair[1] || !(coefficient > -1.0 && coefficient < 1.0) {
-            return Err(fault(format!(
-                "coefficient = {coefficient}: of two parameters, above -1 and below 1"
-            )));
-        }
-        entries.push((pair, coefficient));
-    }
-    if entries.is_empty() {
-        return Ok(None);
-    }
-    let mut matrix = vec![vec![0.0; dimensions.len()]; dimensions.len()];
-    matrix.iter_mut().enumerate().for_each(|(i, row)| row[i] = 1.0);
-    for ([i, j], coefficient) in entries {
-        (matrix[i][j], matrix[j][i]) = (coefficient, coefficient);
-    }
-    let factor = cholesky(&matrix).ok_or_else(|| {
-        source.error(&(0..0), "[[correlation]] no parameters can be correlated like this: the matrix of the coefficients is not positive definite")
-    })?;
-    Ok(Some(Correlated { dimensions, factor }))
-}
-
-/// Returns the lower triangular factor of a symmetric matrix, row by row; `None` if the matrix is not
-/// positive definite. (`nalgebra` is built without matrices of any size here, so that the units
-/// compute the same everywhere.)
-fn cholesky(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
-    let mut factor: Vec<Vec<f64>> = Vec::new();
-    for (i, row) in matrix.iter().enumerate() {
-        let mut own: Vec<f64> = Vec::new();
-        for j in 0..=i {
-            let other = factor.get(j).unwrap_or(&own);
-            let rest = row[j] - own.iter().zip(other).map(|(a, b)| a * b).sum::<f64>();
-            let entry = if i == j { rest.sqrt() } else { rest / other[j] };
-            if !entry.is_finite() || i == j && entry <= 0.0 {
-                return None;
-            }
-            own.push(entry);
-        }
-        factor.push(own);
-    }
-    Some(factor)
-}
-
 /// Lists the numbers that are recorded: the metrics in the order of the file, then the measures.
 fn recorded(campaign: &Campaign, observe: &Observe, meters: &Meters) -> Vec<Recorded> {
     let units = meters.metrics().units;
@@ -489,7 +432,11 @@ fn recorded(campaign: &Campaign, observe: &Observe, meters: &Meters) -> Vec<Reco
 }
 
 /// Hashes what the cases depend on.
-fn keys(campaign: &Campaign, system: &System) -> Result<BTreeMap<String, String>, Error> {
+fn keys(
+    campaign: &Campaign,
+    changes: &Changes,
+    system: &System,
+) -> Result<BTreeMap<String, String>, Error> {
     let digest = |bytes: &[u8]| hex(&Sha256::digest(bytes));
     let mut own: toml::Table = toml::from_str(campaign.source.whole())
         .map_err(|error| campaign.source.error(&(0..0), error.to_string()))?;
@@ -501,6 +448,7 @@ fn keys(campaign: &Campaign, system: &System) -> Result<BTreeMap<String, String>
         own.remove("cases");
     }
     let own = toml::to_string(&own).map_err(|error| Error::experiment(error.to_string()))?;
+    let own = format!("{own}{:?}", changes.overrides);
     let mut keys = BTreeMap::from([
         ("campaign".to_string(), digest(own.as_bytes())),
         ("experiment".to_string(), digest(system.experiment.source.whole().as_bytes())),
@@ -545,19 +493,4 @@ pub fn find(name: &Path) -> Result<PathBuf, Error> {
         "there is no campaign \"{}\", neither as a file nor among the experiments' campaigns{hint}",
         name.display()
     )))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn oracle_cholesky_by_hand() {
-        let factor =
-            cholesky(&[vec![4.0, 2.0, 2.0], vec![2.0, 10.0, 4.0], vec![2.0, 4.0, 6.0]]).unwrap();
-        assert_eq!(factor[0], [2.0]);
-        assert_eq!(factor[1], [1.0, 3.0]);
-        assert_eq!(factor[2], [1.0, 1.0, 2.0]);
-        assert!(cholesky(&[vec![1.0, 2.0], vec![2.0, 1.0]]).is_none());
-    }
 }

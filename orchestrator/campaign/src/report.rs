@@ -5,12 +5,13 @@ mod cloud;
 mod figures;
 
 use crate::definition::Kind;
+use crate::findings::{Answer, Findings, Kept, Measured, chosen, worst};
 use crate::flight::Flight;
 use crate::plan::Plan;
-use crate::run::{Answer, Findings, Kept, Measured, chosen, worst};
 use crate::sensitivity::Sensitivity;
 use crate::statistics::Probability;
 use crate::table::Reader;
+use crate::texts::{percent, short};
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim_report::figure::{Figure, svg};
@@ -54,7 +55,9 @@ pub fn write(
 }
 
 fn drawn(figure: &Figure) -> Result<(String, String), Error> {
-    let text = svg::text(figure).map_err(Error::file("report.html"))?;
+    // The page writes the heading.
+    let bare = Figure { title: String::new(), ..figure.clone() };
+    let text = svg::text(&bare).map_err(Error::file("report.html"))?;
     Ok((figure.title.clone(), text))
 }
 
@@ -88,7 +91,6 @@ fn page(
     ranked: Option<(String, Vec<u64>)>,
 ) -> String {
     let campaign = &plan.campaign;
-    let file = campaign.source.path.display().to_string();
     let ended = |name: &str| findings.status.get(name).copied().unwrap_or(0);
     let markup = html! {
         (DOCTYPE)
@@ -150,7 +152,7 @@ fn page(
                         h2 { "Worst cases" }
                         @if let Some((name, cases)) = &ranked {
                             p { "Largest " code { (name) } " first. Each command flies the case again, with everything recorded:" }
-                            ul { @for case in cases { li { code { "orchestrator campaign " (file) " --case " (case) } } } }
+                            ul { @for case in cases { li { code { "orchestrator campaign " (plan.command) " --case " (case) } } } }
                         }
                         @if !kept.is_empty() {
                             p {
@@ -290,27 +292,4 @@ fn tornado(own: &Measured) -> Markup {
             }
         }
     }
-}
-
-fn percent(share: f64) -> String {
-    format!("{} %", short(100.0 * share))
-}
-
-/// Formats a number with four significant digits.
-pub(crate) fn short(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let text = if (1e-3..1e6).contains(&value.abs()) {
-        let digits = (3 - value.abs().log10().floor() as i32).max(0) as usize;
-        let text = format!("{value:.digits$}");
-        if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.').to_string()
-        } else {
-            text
-        }
-    } else {
-        format!("{value:.3e}")
-    };
-    text.replace('-', "−")
 }

@@ -1,13 +1,12 @@
 //! Flies a campaign on all cores, merges its parts, and writes tables and the report.
 
-use crate::definition::Until;
 use crate::error::Error;
-use crate::flight::{Flight, Status, can_reset, kept};
+use crate::findings::{Answer, Findings, findings};
+use crate::flight::{Flight, can_reset};
 use crate::parts::{self, Counts, Found};
 use crate::plan::Plan;
 use crate::report;
-use crate::sensitivity::{Sensitivity, sensitivities};
-use crate::statistics::{CONFIDENCE, Probability, Summary, looks, summary};
+use crate::statistics::{Probability, looks};
 use crate::table::{Reader, Table, Values, Writer};
 use cosim::error::Error as Single;
 use cosim::interrupt::Interrupt;
@@ -16,7 +15,7 @@ use cosim_report::folder::Folder;
 use cosim_report::progress::Parts;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -42,60 +41,6 @@ pub struct Options {
     pub csv: bool,
     /// Interrupt through which the work can be ended from outside.
     pub interrupt: Interrupt,
-}
-
-/// What a campaign found out, which `summary.json` holds.
-#[derive(Clone, Debug, Serialize)]
-pub struct Findings {
-    /// Title of the campaign.
-    pub title: String,
-    /// Number of cases that were flown.
-    pub cases: u64,
-    /// Number of cases with each status.
-    pub status: BTreeMap<&'static str, u64>,
-    /// Limits, with the probability that a case breaks them.
-    pub limits: Vec<Kept>,
-    /// Measures over all cases.
-    pub measures: Vec<Measured>,
-    /// Answer to the question of the campaign.
-    pub answer: Option<Answer>,
-}
-
-/// A limit over all cases.
-#[derive(Clone, Debug, Serialize)]
-pub struct Kept {
-    /// Id of the limit.
-    pub id: String,
-    /// The limit in words.
-    pub says: String,
-    /// Probability that a case breaks the limit, with 95 % confidence.
-    pub broken: Probability,
-}
-
-/// A measure over all cases.
-#[derive(Clone, Debug, Serialize)]
-pub struct Measured {
-    /// Name of the measure.
-    pub name: String,
-    /// Unit of the measure, or an empty text.
-    pub unit: String,
-    /// Its distribution; none if no case has a value.
-    pub summary: Option<Summary>,
-    /// What the parameters have to do with it.
-    pub sensitivities: Vec<Sensitivity>,
-}
-
-/// Answer to the question that ends a campaign.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Answer {
-    /// The question.
-    pub question: Until,
-    /// Whether the probability is below the bound; none if the cases do not decide it.
-    pub holds: Option<bool>,
-    /// Probability at the last look, with the confidence of that look.
-    pub broken: Probability,
-    /// Confidence of each look, so that all together have the confidence of the question.
-    pub confidence_of_each_look: f64,
 }
 
 /// Outcome of a campaign.
@@ -129,7 +74,7 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// Returns the folder of a campaign's results.
 pub fn folder(plan: &Plan, out: Option<&Path>) -> PathBuf {
-    out.map_or_else(|| Path::new("out").join(plan.campaign.name()), Path::to_path_buf)
+    out.map_or_else(|| Path::new("out").join(plan.name()), Path::to_path_buf)
 }
 
 /// Parts that are found in the folder of the results.
@@ -416,93 +361,6 @@ fn write_csv(text: &mut csv::Writer<fs::File>, rows: &Table) -> Result<(), csv::
         text.write_record(rows.columns.iter().map(|column| cell(&column.values)))?;
     }
     Ok(())
-}
-
-/// Computes what a table of cases shows.
-fn findings(plan: &Plan, table: &Reader, answer: Option<Answer>) -> Result<Findings, Single> {
-    let cases = table.rows();
-    let mut status: BTreeMap<&'static str, u64> =
-        Status::ALL.iter().map(|own| (own.name(), 0)).collect();
-    if let Values::Text(all) = table.column("status")? {
-        for own in all {
-            if let Some(count) = status.get_mut(own.as_str()) {
-                *count += 1;
-            }
-        }
-    }
-    let mut limits = Vec::new();
-    for limit in &plan.campaign.limits {
-        let kept = table.column(&kept(&limit.id))?.numbers();
-        let broken = kept.iter().filter(|kept| **kept == 0.0).count() as u64;
-        limits.push(Kept {
-            id: limit.id.clone(),
-            says: says(plan, limit),
-            broken: Probability::new(broken, cases, CONFIDENCE),
-        });
-    }
-    let columns =
-        plan.varied.iter().map(|own| Ok((own.name.clone(), table.column(&own.name)?.numbers())));
-    let columns = columns.collect::<Result<Vec<_>, Single>>()?;
-    let mut measures = Vec::new();
-    for own in &plan.recorded {
-        let values = table.column(&own.name)?.numbers();
-        measures.push(Measured {
-            name: own.name.clone(),
-            unit: own.unit.clone(),
-            summary: summary(&values),
-            sensitivities: sensitivities(plan.campaign.design, &columns, &values),
-        });
-    }
-    Ok(Findings { title: plan.campaign.title.clone(), cases, status, limits, measures, answer })
-}
-
-/// Returns a limit in words.
-pub(crate) fn says(plan: &Plan, limit: &crate::definition::Limit) -> String {
-    if !limit.says.is_empty() {
-        return limit.says.clone();
-    }
-    let name = limit.measure.get_ref();
-    let own = plan.recorded.iter().find(|own| own.name == *name);
-    let unit = own.map(|own| own.unit.as_str()).unwrap_or_default();
-    let (sign, bound) = match (limit.at_most, limit.at_least) {
-        (Some(most), _) => ("≤", most),
-        (None, least) => ("≥", least.unwrap_or(f64::NAN)),
-    };
-    format!("{name} {sign} {bound} {unit}").trim_end().to_string()
-}
-
-/// Returns the numbers of the cases whose results are to be kept in full.
-pub(crate) fn chosen(plan: &Plan, table: &Reader) -> Result<BTreeSet<u64>, Single> {
-    let keep = &plan.campaign.keep;
-    let mut chosen = BTreeSet::new();
-    if let Some(by) = &keep.by {
-        chosen.extend(worst(&table.column(by.get_ref())?.numbers(), keep.worst as usize));
-    }
-    if keep.failed > 0 {
-        let mut broken: BTreeSet<u64> = BTreeSet::new();
-        for limit in &plan.campaign.limits {
-            let kept = table.column(&kept(&limit.id))?.numbers();
-            broken
-                .extend(kept.iter().enumerate().filter(|(_, k)| **k == 0.0).map(|(i, _)| i as u64));
-        }
-        if let Values::Text(all) = table.column("status")? {
-            let bad = [Status::Lost.name(), Status::Failed.name()];
-            let bad = all.iter().enumerate().filter(|(_, own)| bad.contains(&own.as_str()));
-            broken.extend(bad.map(|(i, _)| i as u64));
-        }
-        chosen.extend(broken.into_iter().take(keep.failed as usize));
-    }
-    if let Some(every) = keep.every {
-        chosen.extend((0..table.rows()).step_by(usize::try_from(every).unwrap_or(usize::MAX)));
-    }
-    Ok(chosen)
-}
-
-/// Returns the numbers of the cases with the largest values, the largest first.
-pub(crate) fn worst(values: &[f64], count: usize) -> Vec<u64> {
-    let mut order: Vec<usize> = (0..values.len()).filter(|i| !values[*i].is_nan()).collect();
-    order.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
-    order.into_iter().take(count).map(|i| i as u64).collect()
 }
 
 pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Single> {

@@ -116,7 +116,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
     let out = options
         .out
         .clone()
-        .unwrap_or_else(|| PathBuf::from("out").join(format!("{}-worst", plan.campaign.name())));
+        .unwrap_or_else(|| PathBuf::from("out").join(format!("{}-worst", plan.name())));
     if out.join("search.json").exists() && !options.force {
         let message = format!(
             "{} holds the results of an earlier search: --force replaces them, --out takes another folder",

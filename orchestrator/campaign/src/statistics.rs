@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
+use std::ops::RangeInclusive;
 
 /// Confidence of the intervals in a report.
 pub const CONFIDENCE: f64 = 0.95;
@@ -118,22 +119,34 @@ fn quantile(sorted: &[f64], probability: f64) -> Quantile {
     let n = sorted.len();
     let rank = ((probability * n as f64).ceil() as usize).clamp(1, n);
     let value = sorted[rank - 1];
-    let is_end = probability <= 0.0 || probability >= 1.0;
-    let Ok(below) = Binomial::new(probability, n as u64) else {
-        return Quantile { probability, value, low: None, high: None };
-    };
-    let tail = (1.0 - CONFIDENCE) / 2.0;
-    let (mut low, mut high) = (None, None);
-    if !is_end {
-        // Largest r with P(fewer than r values below the quantile) <= tail, and smallest s with
-        // P(at least s values below it) <= tail.
-        let r = below.inverse_cdf(tail);
-        let r = if below.cdf(r) > tail { r } else { r + 1 };
-        low = (r >= 1).then(|| sorted.get(r as usize - 1).copied()).flatten();
-        let s = below.inverse_cdf(1.0 - tail) + 1;
-        high = sorted.get(s as usize - 1).copied();
+    let none = Quantile { probability, value, low: None, high: None };
+    if probability <= 0.0 || probability >= 1.0 {
+        return none;
     }
-    Quantile { probability, value, low, high }
+    // The number of values below the quantile is binomial.
+    let Ok(below) = Binomial::new(probability, n as u64) else { return none };
+    let tail = (1.0 - CONFIDENCE) / 2.0;
+    // Largest r with P(fewer than r values below) <= tail, and smallest s with P(at least s values
+    // below) <= tail; the values with these ranks are the ends.
+    let ranks = 0..=n as u64;
+    let r = first(&ranks, |count| below.cdf(count) > tail);
+    let s = first(&ranks, |count| below.sf(count) <= tail) + 1;
+    let of_rank = |rank: u64| sorted.get((rank as usize).checked_sub(1)?).copied();
+    Quantile { low: of_rank(r), high: of_rank(s), ..none }
+}
+
+/// Returns the first number in a range from which on a condition holds, or the last one.
+fn first(range: &RangeInclusive<u64>, holds: impl Fn(u64) -> bool) -> u64 {
+    let (mut low, mut high) = (*range.start(), *range.end());
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if holds(middle) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    low
 }
 
 #[cfg(test)]

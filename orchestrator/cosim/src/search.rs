@@ -73,7 +73,8 @@ fn is_passed_over(name: &str) -> bool {
 }
 
 /// Returns whether the text of a TOML file is that of an experiment, with or without faults. A file
-/// without a title only serves to be extended, and a file that names a paper is a study.
+/// without a title only serves to be extended, a file that names a paper is a study, and one in which
+/// something varies is a campaign.
 pub fn is_experiment(text: &str) -> bool {
     let mut lines = text.lines().map(str::trim_start);
     let sets = |key: &str| {
@@ -83,7 +84,12 @@ pub fn is_experiment(text: &str) -> bool {
         text.lines().any(|line| is_it(line.trim_start()))
     };
     let has_components = lines.any(|line| line.starts_with("[components."));
-    sets("title") && !sets("paper") && (has_components || sets("extends"))
+    sets("title") && !sets("paper") && !is_campaign(text) && (has_components || sets("extends"))
+}
+
+/// Returns whether the text of a TOML file is that of a campaign: something varies in it.
+pub fn is_campaign(text: &str) -> bool {
+    text.lines().any(|line| line.trim_start().starts_with("[[vary]]"))
 }
 
 /// Finds the experiments below a folder.

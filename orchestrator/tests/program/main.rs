@@ -1,6 +1,7 @@
 //! The program as its users run it, with units in C.
 
 mod bench;
+mod campaign;
 mod foreign;
 mod results;
 mod timing;

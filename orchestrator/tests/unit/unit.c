@@ -3,13 +3,17 @@
    Output 1 = gain * input (direct), output 2 = integral of the input. It fails, and is slow, as its parameters say. It guarantees something as long
    as the input is at most the parameter "largest". The parameters "delay" and "actuation.delay" do nothing.
    What it does wrong is chosen by the compiler's flags: -DENDS: a discarded step ends the simulation; -DVERSION: its version; -DDIRECT(value),
-   -DITEM(value), -DTRUTH(value): what becomes of output.direct, guarantee.status, guarantee.inForce after two steps. */
+   -DITEM(value), -DTRUTH(value): what becomes of output.direct, guarantee.status, guarantee.inForce after two steps; -DRESETS=0: fmi2Reset leaves
+   the state as it is. */
 #define _POSIX_C_SOURCE 199309L
 #include <stddef.h>
 #include <time.h>
 
 #ifndef ENDS
 #define ENDS 0
+#endif
+#ifndef RESETS
+#define RESETS 1
 #endif
 #ifndef VERSION
 #define VERSION "2.0"
@@ -36,7 +40,7 @@ typedef struct {
     const Callbacks *callbacks;
     const char *name;
     double input, state, gain, fail_time, pause, delay, transport, largest;
-    int fail_status, flag, kind, count;
+    int fail_status, flag, kind, count, seed;
     char text[64];
 } Unit;
 
@@ -47,21 +51,24 @@ static int complain(Unit *unit, int status, const char *what, double value) {
     return status;
 }
 
+static void start(Unit *unit, const Callbacks *callbacks) {
+    *unit = (Unit){.callbacks = callbacks, .name = "unit", .gain = 2.0, .state = 1.0, .fail_time = 1e9, .fail_status = ERROR,
+                   .kind = 1, .largest = 1000.0};
+}
+
 const char *fmi2GetVersion(void) { return VERSION; }
 
 void *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources, const Callbacks *callbacks,
                       int visible, int logging) {
     (void)type, (void)guid, (void)resources, (void)visible, (void)logging;
     Unit *unit = callbacks->allocate(1, sizeof(Unit));
-    unit->callbacks = callbacks;
-    unit->name = "unit";
-    unit->gain = 2.0;
-    unit->state = 1.0;
-    unit->fail_time = 1e9;
-    unit->fail_status = ERROR;
-    unit->kind = 1;
-    unit->largest = 1000.0;
+    start(unit, callbacks);
     return name ? unit : NULL;
+}
+
+int fmi2Reset(Unit *unit) {
+    if (RESETS) start(unit, unit->callbacks);
+    return OK;
 }
 
 void fmi2FreeInstance(Unit *unit) {
@@ -123,6 +130,7 @@ int fmi2GetInteger(Unit *unit, const unsigned *references, size_t n, int *values
         switch (references[i]) {
         case 5: values[i] = unit->fail_status; break;
         case 7: values[i] = unit->kind; break;
+        case 11: values[i] = unit->seed; break;
         case 17:
             values[i] = unit->input <= unit->largest ? 1 : 2;
             if (unit->count >= 2) values[i] = ITEM(values[i]);
@@ -135,7 +143,7 @@ int fmi2GetInteger(Unit *unit, const unsigned *references, size_t n, int *values
 
 int fmi2SetInteger(Unit *unit, const unsigned *references, size_t n, const int *values) {
     for (size_t i = 0; i < n; i++)
-        *(references[i] == 5 ? &unit->fail_status : &unit->kind) = values[i];
+        *(references[i] == 5 ? &unit->fail_status : references[i] == 11 ? &unit->seed : &unit->kind) = values[i];
     return OK;
 }
 

@@ -1,8 +1,8 @@
 //! Histograms, empirical distributions and scatter plots of a campaign's cases.
 
+use crate::findings::Findings;
 use crate::flight::kept;
 use crate::plan::{Plan, Recorded};
-use crate::run::Findings;
 use crate::table::Reader;
 use cosim::error::Error;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape};
@@ -44,7 +44,7 @@ pub(super) fn distributions(
     findings: &Findings,
     table: &Reader,
 ) -> Result<Vec<Figure>, Error> {
-    let mut panels = Vec::new();
+    let mut figures = Vec::new();
     for own in &plan.recorded {
         let mut values = table.column(&own.name)?.numbers();
         values.retain(|value| value.is_finite());
@@ -67,22 +67,21 @@ pub(super) fn distributions(
         let (edges, counts) = histogram(&values, low, high);
         let mut bars = vec![curve("cases", BLUE, Shape::Steps, edges, counts)];
         bars.extend(marks());
-        panels.push(panel(&label(own), "cases", bars));
+        let mut panels = vec![panel(&label(own), "cases", bars)];
         let n = values.len();
-        // More points where few values are: the upper end is what one looks at.
-        let stride = n.div_ceil(POINTS).max(1);
-        let places = || (0..n).step_by(stride).chain(n.saturating_sub(POINTS / 3)..n);
+        // Every value at the upper end, where few are and where one looks; fewer below.
+        let tail = n.saturating_sub(POINTS / 3);
+        let stride = tail.div_ceil(POINTS).max(1);
+        let places = || (0..tail).step_by(stride).chain(tail..n);
         let x = places().map(|i| values[i]).collect();
         let y = places().map(|i| (i + 1) as f64 / n as f64).collect();
         let mut steps = vec![curve("share of cases up to this value", RED, Shape::Line, x, y)];
         steps.extend(marks());
         panels.push(panel(&label(own), "share of cases", steps));
+        let title = format!("Distribution of {} over {} cases", own.name, findings.cases);
+        figures.push(Figure { title, columns: 2, legend: Legend::Above, panels });
     }
-    if panels.is_empty() {
-        return Ok(Vec::new());
-    }
-    let title = format!("Distributions over {} cases", findings.cases);
-    Ok(vec![Figure { title, columns: 2, legend: Legend::Above, panels }])
+    Ok(figures)
 }
 
 /// Returns the edges of a histogram's bins and the number of values in each; the last edge has no
@@ -124,6 +123,10 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
     let mut figures = Vec::new();
     for own in measures.into_iter().take(MEASURES) {
         let y = table.column(&own.name)?.numbers();
+        let finite = || y.iter().filter(|value| value.is_finite());
+        if finite().all(|value| Some(value) == finite().next()) {
+            continue;
+        }
         let panels = shown.iter().map(|(place, x)| {
             let parameter = &plan.varied[*place];
             let x_label = if parameter.unit.is_empty() {
@@ -140,7 +143,7 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
             if !bad_x.is_empty() {
                 curves.push(curve("broke a limit", RED, Shape::Dots, bad_x, bad_y));
             }
-            panel(&x_label, &label(own), curves)
+            Panel { title: x_label, ..panel("", &label(own), curves) }
         });
         let panels: Vec<Panel> = panels.collect();
         if !panels.is_empty() {

@@ -1,0 +1,369 @@
+//! Campaigns and searches of cases of a loop that can be computed by hand.
+
+use crate::bench::{Bench, LOOP, Recipe};
+use serde_json::json;
+use std::fs;
+
+/// The loop's integrator has the values (1 + gain)^k at tick k.
+const CAMPAIGN: &str = r#"
+title = "gains"
+experiment = "loop.toml"
+design = "factorial"
+
+[signals]
+out = ["plant.output.integral"]
+
+[[vary]]
+parameter = "gain.gain"
+list = [0.5, 1.0, 2.0]
+
+[[vary]]
+parameter = "plant.fail.time"
+list = [1e9, 2.0]
+
+[[measure]]
+id = "last"
+kind = "last"
+signals = "out"
+
+[[measure]]
+id = "largest"
+kind = "largest"
+signals = "out"
+
+[[limit]]
+id = "small"
+measure = "largest"
+at_most = 8.0
+"#;
+
+fn bench(campaign: &str) -> Bench {
+    let bench = Bench::new();
+    fs::write(bench.path("c.toml"), campaign).unwrap();
+    bench
+}
+
+/// Flies a campaign, and returns its table as lines of CSV.
+fn flown(bench: &Bench, arguments: &[&str]) -> Vec<String> {
+    let (code, _, errors) = bench.call(&[&["campaign", "c.toml", "--csv"], arguments].concat());
+    assert_eq!(code, 0, "{errors}");
+    table(bench, "out/c")
+}
+
+fn table(bench: &Bench, out: &str) -> Vec<String> {
+    let text = fs::read_to_string(bench.path(&format!("{out}/cases.csv"))).unwrap();
+    text.lines().map(str::to_string).collect()
+}
+
+fn refusal(campaign: &str) -> String {
+    let bench = bench(campaign);
+    let (code, _, errors) = bench.call(&["campaign", "c.toml"]);
+    assert_eq!(code, 2, "{errors}");
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    assert!(!bench.path("out").exists());
+    errors
+}
+
+#[test]
+fn oracle_a_case_is_a_row_also_if_its_unit_fails() {
+    let bench = bench(CAMPAIGN);
+    let rows = flown(&bench, &[]);
+    assert_eq!(
+        rows[0],
+        "case,gain.gain,plant.fail.time,last,largest,kept.small,status,time,message"
+    );
+    let failed = "plant failed at t = 2 s in doStep: out of propellant at 2 (fmi2Error)";
+    assert_eq!(rows[1], "0,0.5,1000000000,3.375,3.375,true,completed,3,");
+    assert_eq!(rows[2], format!("1,0.5,2,2.25,2.25,false,failed,2,{failed}"));
+    assert_eq!(rows[3], "2,1,1000000000,8,8,true,completed,3,");
+    assert_eq!(rows[4], format!("3,1,2,4,4,false,failed,2,{failed}"));
+    assert_eq!(rows[5], "4,2,1000000000,27,27,false,completed,3,");
+    assert_eq!(rows[6], format!("5,2,2,9,9,false,failed,2,{failed}"));
+    assert_eq!(rows.len(), 7);
+    let summary = bench.json("out/c/summary.json");
+    assert_eq!(summary["status"], json!({ "completed": 3, "ended": 0, "failed": 3, "lost": 0 }));
+    assert_eq!(summary["limits"][0]["broken"]["events"], 4);
+    assert_eq!(summary["measures"][0]["summary"]["worst"], 4);
+    let page = fs::read_to_string(bench.path("out/c/report.html")).unwrap();
+    assert!(page.contains("4 of 6") && page.contains("orchestrator campaign c.toml --case 4"));
+}
+
+#[test]
+fn oracle_a_limit_can_end_a_case() {
+    let campaign = CAMPAIGN.replace("at_most = 8.0", "at_most = 4.0\nends = true");
+    let rows = flown(&bench(&campaign.replace("[1e9, 2.0]", "[1e9]")), &[]);
+    assert_eq!(rows[2], "1,1,1000000000,8,8,false,ended,3,limit small broken");
+    assert_eq!(rows[3], "2,2,1000000000,9,9,false,ended,2,limit small broken");
+}
+
+const RANDOM: &str = r#"
+title = "random gains"
+experiment = "loop.toml"
+cases = 1100
+[signals]
+out = ["plant.output.integral"]
+[[vary]]
+parameter = "gain.gain"
+uniform = [0.0, "1000 mm"]
+[[vary]]
+parameter = "gain.kind"
+list = ["calm", "rough"]
+weights = [3.0, 1.0]
+[[vary]]
+parameter = "plant.noise.seed"
+case = 7
+[[measure]]
+id = "last"
+kind = "last"
+signals = "out"
+[[limit]]
+id = "small"
+measure = "last"
+at_most = 7.9
+"#;
+
+#[test]
+fn the_same_bytes_however_the_cases_were_flown() {
+    let bench = bench(RANDOM);
+    let rows = flown(&bench, &["--jobs", "1"]);
+    assert_eq!(rows.len(), 1101);
+    for (case, row) in rows[1..].iter().enumerate() {
+        let cells: Vec<&str> = row.split(',').collect();
+        let gain: f64 = cells[1].parse().unwrap();
+        let last: f64 = cells[4].parse().unwrap();
+        assert!((0.0..1.0).contains(&gain) && (last - (1.0 + gain).powi(3)).abs() < 1e-12);
+        assert_eq!(cells[3], (case + 7).to_string());
+    }
+    let calm = rows.iter().filter(|row| row.contains(",calm,")).count();
+    assert!((770..880).contains(&calm), "{calm}");
+    let bytes = |out: &str| fs::read(bench.path(&format!("{out}/cases.parquet"))).unwrap();
+    let whole = bytes("out/c");
+    let call = |arguments: &[&str]| {
+        let (code, out, errors) = bench.call(&[&["campaign", "c.toml"], arguments].concat());
+        assert_eq!(code, 0, "{errors}");
+        out
+    };
+    // By several processes in one folder, in any order and with a part flown twice.
+    assert_eq!(
+        call(&["--out", "b", "--work"]).trim(),
+        r#"{"cases":1100,"missing":[[0,250],[250,500],[500,750],[750,1000],[1000,1100]]}"#
+    );
+    call(&["--out", "b", "--cases", "750..1100", "--jobs", "2"]);
+    call(&["--out", "b", "--cases", "0..500"]);
+    call(&["--out", "b", "--cases", "0..250", "--fresh"]);
+    assert_eq!(call(&["--out", "b", "--work"]).trim(), r#"{"cases":1100,"missing":[[500,750]]}"#);
+    let said = call(&["--out", "b"]);
+    assert!(said.contains("1100 cases, 250 flown now"), "{said}");
+    assert_eq!(bytes("b"), whole);
+    // What is damaged is flown again, whichever bit was changed.
+    let part = bench.path("b/parts/0000000250-0000000500.parquet");
+    let sound = fs::read(&part).unwrap();
+    for place in (0..sound.len()).step_by(sound.len() / 40) {
+        let mut broken = sound.clone();
+        broken[place] ^= 1 << (place % 8);
+        fs::write(&part, &broken).unwrap();
+        call(&["--out", "b", "--quiet"]);
+        assert_eq!(bytes("b"), whole, "byte {place}");
+    }
+    // One case by itself: the same gain, and everything recorded.
+    let cells: Vec<&str> = rows[901].split(',').collect();
+    call(&["--case", "900"]);
+    let own = fs::read_to_string(bench.path("out/c/cases/900/case.toml")).unwrap();
+    assert!(own.contains(&format!("gain = {}", cells[1])), "{own}");
+    let results = fs::read_to_string(bench.path("out/c/cases/900/results.csv")).unwrap();
+    assert!(results.lines().last().unwrap().contains(cells[4]), "{results}");
+}
+
+#[test]
+fn what_has_changed_is_named_and_flown_again() {
+    let bench = bench(RANDOM);
+    flown(&bench, &[]);
+    let (_, said, _) = bench.call(&["campaign", "c.toml"]);
+    assert!(said.contains("1100 cases, 0 flown now"), "{said}");
+    fs::write(bench.path("c.toml"), RANDOM.replace("cases = 1100", "cases = 1500")).unwrap();
+    let (_, said, _) = bench.call(&["campaign", "c.toml"]);
+    // The last part was not a whole one.
+    assert!(said.contains("1500 cases, 500 flown now") && !said.contains("changed"), "{said}");
+    fs::write(bench.path("c.toml"), RANDOM.replace("1000 mm", "900 mm")).unwrap();
+    let (_, said, _) = bench.call(&["campaign", "c.toml"]);
+    assert!(said.contains("flown again, as this has changed: campaign (5 parts)"), "{said}");
+    fs::write(bench.path("loop.toml"), LOOP.replace("stop = 3.0", "stop = 4.0")).unwrap();
+    let (_, said, _) = bench.call(&["campaign", "c.toml"]);
+    assert!(said.contains("as this has changed: experiment (5 parts)"), "{said}");
+}
+
+#[test]
+fn a_unit_that_cannot_be_reset_is_made_anew() {
+    let flags = ["-DRESETS=0"];
+    let bench = Bench::made(LOOP, &Recipe { flags: &flags, ..Recipe::default() });
+    fs::write(bench.path("c.toml"), RANDOM).unwrap();
+    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
+    assert_eq!(code, 0);
+    assert!(errors.contains("another result after fmi2Reset than with a new instance"), "{errors}");
+    let other = self::bench(RANDOM);
+    flown(&other, &[]);
+    assert_eq!(table(&bench, "out/c"), table(&other, "out/c"));
+}
+
+#[test]
+fn a_campaign_ends_when_its_question_is_answered() {
+    let asked = |below: f64| {
+        let text = format!("{RANDOM}[until]\nlimit = \"small\"\nbelow = {below}\n");
+        let bench = bench(&text.replace("cases = 1100", "cases = 100000"));
+        flown(&bench, &["--jobs", "2"]);
+        bench.json("out/c/summary.json")
+    };
+    // (1 + gain)^3 is above 7.9 with a probability of 1 - (7.9^(1/3) - 1) = 0.00837.
+    let often = asked(0.2);
+    assert_eq!((&often["answer"]["holds"], &often["cases"]), (&json!(true), &json!(250)));
+    let rarely = asked(0.001);
+    assert_eq!(rarely["answer"]["holds"], json!(false));
+    assert!(rarely["cases"].as_u64().unwrap() < 20_000, "{}", rarely["cases"]);
+}
+
+#[test]
+fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
+    for (from, to, said) in [
+        ("title = ", "titel = ", "c.toml:2: unknown field `titel`, expected"),
+        (
+            "design = \"factorial\"",
+            "design = \"factoriel\"",
+            "c.toml:4: unknown variant `factoriel`",
+        ),
+        ("loop.toml", "lop.toml", "c.toml:3: "),
+        (
+            "gain.gain",
+            "gain.gian",
+            "c.toml:10: [[vary]] \"gain.gian\": there is no such parameter; did you mean \"gain.gain\"?",
+        ),
+        ("gain.gain", "gian.gain", "there is no component \"gian\"; did you mean \"gain\"?"),
+        ("gain.gain", "gain.input", "is an input with a connection"),
+        ("gain.gain", "gain.output.direct", "is of causality output"),
+        (
+            "[0.5, 1.0, 2.0]",
+            "[0.5, 2000.0]",
+            "[[vary]] \"gain.gain\": 2000 m is above its maximum 1000 m",
+        ),
+        ("[0.5, 1.0, 2.0]", "[0.5, \"1 s\"]", "cannot be converted to m"),
+        ("[0.5, 1.0, 2.0]", "[]", "the list is empty"),
+        (
+            "list = [0.5, 1.0, 2.0]",
+            "normal = { mean = 1.0, deviation = 0.1 }",
+            "a factorial design needs levels here",
+        ),
+        ("list = [0.5, 1.0, 2.0]", "uniform = [2.0, 1.0]", "from a smaller to a larger value"),
+        ("list = [0.5, 1.0, 2.0]", "list = [1.0]\nsign = 2.0", "one distribution is needed"),
+        ("parameter = \"plant.fail.time\"\nlist = [1e9, 2.0]", "parameter = \"gain.gain\"\nlist = [1.0]", "\"gain.gain\" varies twice"),
+        (
+            "signals = \"out\"",
+            "signals = \"oot\"",
+            "there is no list of signals \"oot\"; did you mean \"out\"?",
+        ),
+        (
+            "plant.output.integral",
+            "plant.output.intgral",
+            "did you mean \"plant.output.integral\"?",
+        ),
+        (
+            "measure = \"largest\"",
+            "measure = \"larges\"",
+            "c.toml:31: there is no metric or measure \"larges\"; did you mean \"largest\"?",
+        ),
+        ("at_most = 8.0", "", "one of at_most and at_least is needed"),
+        (
+            "measure = \"largest\"\nat_most = 8.0",
+            "measure = \"last\"\nat_most = 8.0\nends = true",
+            "ends needs a measure of the kind largest",
+        ),
+        (
+            "design = \"factorial\"",
+            "cases = 5\ndesign = \"factorial\"",
+            "the levels have 6 combinations",
+        ),
+        ("design = \"factorial\"", "design = \"random\"", "cases is missing"),
+        (
+            "design = \"factorial\"",
+            "cases = 5\ndesign = \"factorial\"\nset = { \"gain.flig\" = true }",
+            "did you mean",
+        ),
+        (
+            "design = \"factorial\"",
+            "design = \"factorial\"\nmetrics = [\"sampels\"]",
+            "did you mean \"samples\"?",
+        ),
+    ] {
+        assert!(CAMPAIGN.contains(from), "{from}");
+        let errors = refusal(&CAMPAIGN.replacen(from, to, 1));
+        assert!(errors.contains(said), "{to}: {errors}");
+    }
+}
+
+#[test]
+fn impossible_ranges_of_cases_are_refused() {
+    let bench = bench(RANDOM);
+    for (cases, said) in [
+        ("0..100", "multiples of 250"),
+        ("250..250", "multiples of 250"),
+        ("0..2000", "within 0..1100"),
+        ("0-250", "wants two whole numbers"),
+    ] {
+        let (code, _, errors) = bench.call(&["campaign", "c.toml", "--cases", cases]);
+        assert_eq!(code, 2);
+        assert!(errors.contains(said), "{errors}");
+    }
+    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--case", "1100"]);
+    assert!(code == 2 && errors.contains("the campaign has 1100 cases"), "{errors}");
+}
+
+#[test]
+fn oracle_correlated_parameters_have_their_correlation() {
+    let text = RANDOM.replace(
+        "parameter = \"gain.kind\"\nlist = [\"calm\", \"rough\"]\nweights = [3.0, 1.0]",
+        "parameter = \"gain.largest\"\nnormal = { mean = 5.0, deviation = 2.0 }",
+    );
+    let text = format!(
+        "{text}[[correlation]]\nbetween = [\"gain.gain\", \"gain.largest\"]\ncoefficient = -0.8\n"
+    );
+    let rows = flown(&bench(&text), &[]);
+    let cell =
+        |row: &String, place: usize| row.split(',').nth(place).unwrap().parse::<f64>().unwrap();
+    let columns =
+        [1, 2].map(|place| rows[1..].iter().map(|row| cell(row, place)).collect::<Vec<_>>());
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let centred =
+        columns.map(|values| values.iter().map(|v| v - mean(&values)).collect::<Vec<_>>());
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let [x, y] = &centred;
+    let found = product(x, y) / (product(x, x) * product(y, y)).sqrt();
+    // A uniform and a normal variable: the coefficient times the root of 3 / pi.
+    assert!((found + 0.8 * (3.0 / std::f64::consts::PI).sqrt()).abs() < 0.05, "{found}");
+}
+
+#[test]
+fn a_search_finds_the_corner_and_writes_it_as_an_experiment() {
+    let text = format!("{RANDOM}[search]\nlargest = \"last\"\ncases = 300\n");
+    let text = text.replace("uniform = [0.0", "uniform = [-0.9");
+    let bench = bench(&text);
+    let (code, said, errors) = bench.call(&["falsify", "c.toml", "--out", "w"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(said.contains("breaks small"), "{said}");
+    let found = bench.json("w/search.json");
+    assert!((found["largest"].as_f64().unwrap() - 8.0).abs() < 1e-3, "{found}");
+    let (code, _, errors) = bench.call(&["run", "w/worst.toml", "--fmu-dir", "."]);
+    assert_eq!(code, 0, "{errors}");
+    let rows = fs::read_to_string(bench.path("out/worst/results.csv")).unwrap();
+    let last: f64 = rows.lines().last().unwrap().split(',').nth(2).unwrap().parse().unwrap();
+    assert!((last - found["largest"].as_f64().unwrap()).abs() < 1e-12);
+    // The same search gives the same bytes, on any number of threads.
+    let (code, _, errors) = bench.call(&["falsify", "c.toml", "--out", "w1", "--jobs", "1"]);
+    assert_eq!(code, 0, "{errors}");
+    for file in ["search.parquet", "worst.toml", "search.json", "history.svg"] {
+        let bytes = |out: &str| fs::read(bench.path(&format!("{out}/{file}"))).unwrap();
+        assert!(bytes("w") == bytes("w1"), "{file}");
+    }
+    let (code, _, errors) = bench.call(&["falsify", "c.toml", "--out", "w"]);
+    assert!(code == 2 && errors.contains("--force replaces them"), "{errors}");
+    let without = self::bench(RANDOM);
+    let (code, _, errors) = without.call(&["falsify", "c.toml"]);
+    assert!(code == 2 && errors.contains("[search] is missing"), "{errors}");
+}
