@@ -185,7 +185,7 @@ impl Disturbance {
     /// number of the row in force, from 1, or 0 before the first row.
     pub fn tick(&self, origin: f64, time: f64) -> i64 {
         if self.kind == Kind::Table {
-            return self.table.row(self.start, time) as i64;
+            return i64::try_from(self.table.row(self.start, time)).unwrap_or(i64::MAX);
         }
         self.intervals(origin).map_or(0, |(start, length)| tick(time, start, length))
     }

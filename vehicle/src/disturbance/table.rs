@@ -61,7 +61,7 @@ impl Table {
                 ));
             }
             for (axis, factor) in ["x", "y", "z"].into_iter().zip(direction) {
-                if !(factor.abs() <= 1.0) {
+                if !(-1.0..=1.0).contains(factor) {
                     let problem = format!("= {factor} must lie between -1 and 1");
                     return Err(Error::of(name(i, &format!("direction.{axis}")), problem));
                 }
