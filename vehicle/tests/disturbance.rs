@@ -254,6 +254,26 @@ fn rows_closer_than_rounding_far_from_the_start_neither_stop_time_nor_panic() {
 }
 
 #[test]
+fn far_from_its_start_a_table_still_goes_through_all_rows() {
+    // The start is so long ago that the number of a repetition may be rounded down or up.
+    for start in [-1.1e12, -3.44e10 - 0.1] {
+        let table = table(start, 0.3, &[(0.0, 1.0), (0.15, -1.0)]);
+        let mut time = 0.0;
+        let mut row = table.tick(0.0, time);
+        for change in 0..5000 {
+            let next = table.next_change(0.0, time).unwrap();
+            assert!(next - time < 0.1505, "change {change} from {time} s to {next} s");
+            let shortly_before = next - 2e-6;
+            assert_eq!(table.tick(0.0, shortly_before), row, "change {change} at {next} s");
+            assert_eq!(table.next_change(0.0, shortly_before), Some(next));
+            row = 3 - row;
+            time = next;
+            assert_eq!(table.tick(0.0, time), row, "change {change} at {time} s");
+        }
+    }
+}
+
+#[test]
 fn tables_out_of_range_are_refused_by_name() {
     let row = |time: f64, x: f64| Row { time, direction: Vector3::new(x, 0.5, -1.0) };
     let refusal = |period: f64, rows: [Row; 2]| {
