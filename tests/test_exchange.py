@@ -25,9 +25,26 @@ def moment(tick: int) -> np.ndarray:
     return AMPLITUDE * np.sin(FREQUENCY * tick * STEP)
 
 
-@pytest.fixture(scope="module", params=["none", "white", "square", "sine"])
+# Jumps at times that are no communication points.
+TABLE = {
+    "disturbance.start": 0.15,
+    "disturbance.table.rows": 3,
+    "disturbance.table.period": 3.3,
+    "disturbance.table.time[1]": 0.123,
+    "disturbance.table.alpha[1]": 1.0,
+    "disturbance.table.sigma[1]": -0.5,
+    "disturbance.table.time[2]": 1.4142,
+    "disturbance.table.beta[2]": -0.3,
+    "disturbance.table.time[3]": 2.005,
+    "disturbance.table.alpha[3]": -1.0,
+    "disturbance.table.sigma[3]": 0.7,
+}
+
+
+@pytest.fixture(scope="module", params=["none", "white", "square", "sine", "table"])
 def settings(request):
-    return {"inertia.scale": 1.05, "disturbance.kind": request.param, "disturbance.seed": 7}
+    table = TABLE if request.param == "table" else {}
+    return {"inertia.scale": 1.05, "disturbance.kind": request.param, "disturbance.seed": 7, **table}
 
 
 def co_simulated(fmu, settings) -> np.ndarray:

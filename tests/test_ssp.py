@@ -97,6 +97,49 @@ def test_an_archive_of_ours_is_the_same_run(name, tmp_path):
     assert [unit["sha256"] for unit in ssp["components"].values()] == [unit["sha256"] for unit in toml["components"].values()]
 
 
+TABULATED = """
+extends = '{}/lqr.toml'
+[components.plant.parameters]
+"disturbance.kind" = "table"
+"disturbance.bound" = 0.01
+"disturbance.start" = 0.1
+"disturbance.table.rows" = 2
+"disturbance.table.period" = 0.7
+"disturbance.table.time[1]" = 0.21
+"disturbance.table.alpha[1]" = 1
+"disturbance.table.time[2]" = 0.43
+"disturbance.table.beta[2]" = -0.5
+[record]
+variables = ["plant.rate.*", "plant.disturbance.delta.*"]
+"""
+
+
+def test_a_table_of_the_disturbance_is_the_same_in_experiment_command_line_and_archive(tmp_path):
+    experiment = tmp_path / "tabulated.toml"
+    text = TABULATED.format(EXPERIMENTS)
+    experiment.write_text(text)
+    pack(experiment, tmp_path / "x.ssp", "--stop", "2")
+    finished = run(tmp_path / "x.ssp", tmp_path / "ssp")
+    assert finished.returncode == 0, finished.stderr
+    common = ("--stop", "2", "--fmu-dir", TARGET / "fmu")
+    finished = run(experiment, tmp_path / "toml", *common)
+    assert finished.returncode == 0, finished.stderr
+    # The command line has precedence over the file.
+    experiment.write_text(text.replace("time[1]\" = 0.21", "time[1]\" = 0.3").replace("beta[2]\" = -0.5", "beta[2]\" = 1"))
+    settings = ("plant.disturbance.table.time[1]=0.21", "plant.disturbance.table.beta[2]=-0.5")
+    finished = run(experiment, tmp_path / "set", *common, "--set", settings[0], "--set", settings[1])
+    assert finished.returncode == 0, finished.stderr
+    results = [(tmp_path / name / "results.csv").read_bytes() for name in ("toml", "set", "ssp")]
+    assert results[0] == results[1] == results[2]
+    found = columns(tmp_path / "toml")
+    elapsed = found["time"] - 0.1
+    phase = np.where(elapsed < -1e-9, 0.0, (elapsed + 1e-9) % 0.7)
+    alpha, beta = (phase > 0.21) & (phase < 0.43), phase > 0.43
+    np.testing.assert_array_equal(found["plant.disturbance.delta.alpha"], 0.01 * alpha)
+    np.testing.assert_array_equal(found["plant.disturbance.delta.beta"], -0.005 * beta)
+    assert alpha.sum() > 9 and beta.sum() > 9
+
+
 def test_enumerations_are_connectors(tmp_path):
     pack(EXPERIMENTS / "crmpc-robust.toml", tmp_path / "x.ssp")
     text = zipfile.ZipFile(tmp_path / "x.ssp").read("SystemStructure.ssd").decode()

@@ -7,7 +7,7 @@ use vehicle::Scenario;
 use vehicle::actuators::{self, JetMode};
 use vehicle::atmosphere::Flight;
 use vehicle::calibration::Sequence;
-use vehicle::disturbance::{Disturbance, Kind, MomentWave, SineMoment};
+use vehicle::disturbance::{Disturbance, Kind, MomentWave, Row, SineMoment, Table};
 use vehicle::dynamics::Inertia;
 use vehicle::effectors::Effectors;
 use vehicle::error::Error;
@@ -52,8 +52,16 @@ pub(crate) static KINDS: Enumeration<Kind> = Enumeration {
             "againstMoment",
             "plus or minus the bound against the control moment, chosen every disturbance.period",
         ),
+        (
+            Kind::Table,
+            "table",
+            "bound times the direction of the row in force, rows beginning at given times",
+        ),
     ],
 };
+
+/// Number of rows for which the disturbance's table has variables.
+pub(crate) const TABLE_ROWS: usize = 8;
 
 /// Source of the control moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -113,6 +121,10 @@ pub(crate) struct Parameters {
     pub(crate) square_period: f64,
     pub(crate) sine_offset: Vector3<f64>,
     pub(crate) waves: [MomentWave; 2],
+    /// Number of rows of the table that are used.
+    pub(crate) table_rows: usize,
+    pub(crate) table_period: f64,
+    pub(crate) table: [Row; TABLE_ROWS],
     pub(crate) start: f64,
     pub(crate) end: f64,
     pub(crate) step: f64,
@@ -158,6 +170,9 @@ impl Default for Parameters {
             square_period,
             sine_offset: sine.offset,
             waves: [wave(0), wave(1)],
+            table_rows: 0,
+            table_period: 0.0,
+            table: [Row::default(); TABLE_ROWS],
             start,
             end: end.min(NEVER),
             step: STEP,
@@ -188,6 +203,15 @@ impl Parameters {
     /// Names the parameter that is out of range.
     pub(crate) fn dynamic_pressure(&self) -> Result<f64, Error> {
         Ok(self.flight.dynamic_pressure()? * self.density_scale)
+    }
+
+    /// Table of the disturbance, with the rows that are used.
+    fn table(&self) -> Result<Table, Error> {
+        let rows = self.table.get(..self.table_rows).ok_or_else(|| Error::Parameter {
+            name: "disturbance.table.rows".into(),
+            problem: format!("= {} must lie between 0 and {TABLE_ROWS}", self.table_rows),
+        })?;
+        Ok(Table { period: self.table_period, rows: rows.to_vec() })
     }
 
     /// Configuration of the actuators, or `None` if the control moment is an input.
@@ -236,6 +260,7 @@ impl Parameters {
                 direction: self.direction,
                 square_period: self.square_period,
                 sine: SineMoment { offset: self.sine_offset, waves: self.waves.to_vec() },
+                table: self.table()?,
                 start: self.start,
                 end: self.end,
             },

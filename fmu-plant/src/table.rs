@@ -2,7 +2,7 @@
 
 mod sensors;
 
-use crate::parameters::{ACTUATIONS, KINDS, KINEMATICS};
+use crate::parameters::{ACTUATIONS, KINDS, KINEMATICS, TABLE_ROWS};
 use crate::plant::{MOTION, ReentryPlant};
 use crate::roles::{Known, Role, Unknown, Variables};
 use fmi2_export::fields::Fields;
@@ -34,6 +34,10 @@ pub(crate) const FIELDS: &Fields = &[
     ("moment_delay", "actuation.delay"),
     ("actuators.aerodynamics_scale", "aerodynamics.scale"),
     ("disturbance.square_period", "disturbance.square.period"),
+    ("disturbance.table.rows[].time", "disturbance.table.time[]"),
+    ("disturbance.table.rows[].direction.x", "disturbance.table.alpha[]"),
+    ("disturbance.table.rows[].direction.y", "disturbance.table.beta[]"),
+    ("disturbance.table.rows[].direction.z", "disturbance.table.sigma[]"),
     ("surroundings", "sensor"),
     ("calibration.beta_amplitude", "calibration.beta.amplitude"),
     ("sensors.line", "sensor"),
@@ -60,7 +64,7 @@ fn all() -> Plant {
     let table = table.real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| {
         &mut m.parameters.step
     });
-    delay(sensors::all(kinematics(actuation(table))))
+    disturbance_table(delay(sensors::all(kinematics(actuation(table)))))
 }
 
 /// Returns the description of the unit for FMI.
@@ -458,6 +462,39 @@ fn disturbance(table: Plant) -> Plant {
     let table = vector(table, AXES, offset, none, |m| &mut m.parameters.sine_offset);
     let table = sine(sine(table, "first", 0), "second", 1);
     table.real(time(start), |m| &mut m.parameters.start).real(time(end), |m| &mut m.parameters.end)
+}
+
+/// Adds the table of the disturbance column by column, as FMI wants the elements of an array one
+/// after the other.
+fn disturbance_table(table: Plant) -> Plant {
+    let rows = parameter(
+        "disturbance.table.rows",
+        "Number of rows of the disturbance's table; those beyond are ignored",
+    );
+    let period = parameter(
+        "disturbance.table.period",
+        "Period with which the table repeats, from disturbance.start on; 0: the last row holds",
+    );
+    let mut table = table
+        .integer(rows, (Some(0), i32::try_from(TABLE_ROWS).ok()), |m| &mut m.parameters.table_rows)
+        .real(period.real().unit(unit::time()).min(0.0).nominal(10.0), |m| {
+            &mut m.parameters.table_period
+        });
+    for i in 0..TABLE_ROWS {
+        let name = format!("disturbance.table.time[{}]", i + 1);
+        let text = format!("Time from which row {} holds, after disturbance.start", i + 1);
+        let real = parameter(&name, &text).real().unit(unit::time()).min(0.0).nominal(10.0);
+        table = table.real(real, move |m| &mut m.parameters.table[i].time);
+    }
+    for (component, (axis, meaning)) in ANGLES.into_iter().enumerate() {
+        for i in 0..TABLE_ROWS {
+            let name = format!("disturbance.table.{axis}[{}]", i + 1);
+            let text = format!("Factor on the bound in row {}: component of the {meaning}", i + 1);
+            let real = parameter(&name, &text).real().min(-1.0).max(1.0).nominal(1.0);
+            table = table.real(real, move |m| &mut m.parameters.table[i].direction[component]);
+        }
+    }
+    table
 }
 
 fn sine(table: Plant, which: &'static str, i: usize) -> Plant {

@@ -10,7 +10,7 @@ use fmi2_export::{Context, Failure, Inputs, Model, describe};
 use model_description::variable::{self, Causality, Variability};
 use nalgebra::Vector3;
 use vehicle::Scenario;
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::{Kind, Row};
 use vehicle::effectors::{Jets, Surfaces};
 use vehicle::kinematics::{Kinematics, Trajectory};
 
@@ -478,6 +478,7 @@ fn oracle_model_exchange_agrees_with_co_simulation() {
             unit.parameters.start = 0.3;
             unit.parameters.end = 1.7;
             unit.parameters.square_period = 0.9;
+            tabulate(unit, 0.9, &TABLE);
             unit.input.moment = Vector3::new(2e4, -1e4, 1e4);
         };
         let [mut cs, mut me] = [0, 1].map(|_| started(set));
@@ -490,9 +491,79 @@ fn oracle_model_exchange_agrees_with_co_simulation() {
             &outputs(&mut me, 2.0),
             &format!("kind {kind:?}"),
         );
-        let expected = [1, 38, 3, 3, 6, 38, 38][kind as usize];
+        let expected = [1, 38, 3, 3, 6, 38, 38, 9][kind as usize];
         assert_eq!(events.len(), expected, "kind {kind:?}");
     }
+}
+
+/// Rows of a table: times (s) and directions.
+const TABLE: [(f64, [f64; 3]); 3] =
+    [(0.05, [1.0, 0.0, -1.0]), (0.33, [-0.5, 1.0, 0.0]), (0.61, [0.0, -1.0, 0.7])];
+
+/// Sets the rows of the disturbance's table, and its period in s.
+fn tabulate(unit: &mut ReentryPlant, period: f64, rows: &[(f64, [f64; 3])]) {
+    unit.parameters.table_period = period;
+    unit.parameters.table_rows = rows.len();
+    for (row, &(time, direction)) in unit.parameters.table.iter_mut().zip(rows) {
+        *row = Row { time, direction: direction.into() };
+    }
+}
+
+/// Returns a unit under a table that does not repeat and begins at 0.3 s.
+fn tabulated() -> ReentryPlant {
+    started(|unit| {
+        unit.parameters.kind = Kind::Table;
+        unit.parameters.start = 0.3;
+        tabulate(unit, 0.0, &TABLE);
+    })
+}
+
+#[test]
+fn a_table_has_its_time_events_at_its_rows_and_shows_the_row_in_force() {
+    let mut unit = tabulated();
+    let expected = [0.0, 0.3, 0.3 + 0.05, 0.3 + 0.33, 0.3 + 0.61];
+    assert_eq!(exchange(&mut unit, 0.0, 2.0), expected, "to the last bit");
+    let bound = unit.parameters.bound;
+    assert_eq!(outputs(&mut unit, 2.0).delta, Vector3::from(TABLE[2].1) * bound);
+    // In co-simulation the last step holds two jumps.
+    let mut unit = tabulated();
+    for (from, to, direction) in
+        [(0.0, 0.34, [0.0; 3]), (0.34, 0.4, TABLE[0].1), (0.4, 1.0, TABLE[2].1)]
+    {
+        step(&mut unit, from, to).unwrap();
+        assert_eq!(outputs(&mut unit, to).delta, Vector3::from(direction) * bound, "{to}");
+    }
+}
+
+#[test]
+fn rows_of_the_table_that_are_not_used_are_ignored() {
+    let [mut plain, mut other] = [0, 1].map(|_| tabulated());
+    other.parameters.table[3] = Row { time: -1.0, direction: Vector3::repeat(f64::NAN) };
+    other.initialize(&CONTEXT).unwrap();
+    for unit in [&mut plain, &mut other] {
+        step(unit, 0.0, 2.0).unwrap();
+    }
+    assert_eq!(outputs(&mut plain, 2.0), outputs(&mut other, 2.0));
+}
+
+#[test]
+fn a_state_saved_in_the_middle_of_the_table_goes_on_bit_for_bit() {
+    let saved = |unit: &ReentryPlant| -> ReentryPlant {
+        serde_json::from_str(&serde_json::to_string(unit).unwrap()).unwrap()
+    };
+    let mut unit = tabulated();
+    step(&mut unit, 0.0, 0.5).unwrap();
+    let mut restored = saved(&unit);
+    for unit in [&mut unit, &mut restored] {
+        step(unit, 0.5, 0.7).unwrap();
+        step(unit, 0.7, 1.5).unwrap();
+    }
+    assert_eq!(outputs(&mut unit, 1.5), outputs(&mut restored, 1.5));
+    let mut unit = tabulated();
+    exchange(&mut unit, 0.0, 0.5);
+    let mut restored = saved(&unit);
+    assert_eq!(exchange(&mut unit, 0.5, 1.5), exchange(&mut restored, 0.5, 1.5));
+    assert_eq!(outputs(&mut unit, 1.5), outputs(&mut restored, 1.5));
 }
 
 #[test]
@@ -754,7 +825,7 @@ fn oracle_input_derivatives_are_integrated() {
 
 #[test]
 fn refusals_name_variables() {
-    let changes: [fn(&mut ReentryPlant); 32] = [
+    let changes: [fn(&mut ReentryPlant); 40] = [
         |unit| unit.parameters.inertia.Ixx = 0.0,
         |unit| unit.parameters.inertia.Ixz = 2e6,
         |unit| unit.parameters.inertia.Iyy = 1e7,
@@ -780,6 +851,14 @@ fn refusals_name_variables() {
         |unit| unit.parameters.direction.x = 2.0,
         |unit| unit.parameters.end = -1.0,
         |unit| unit.parameters.waves[0].phase = f64::NAN,
+        |unit| unit.parameters.table_rows = 9,
+        |unit| unit.parameters.table_period = -1.0,
+        |unit| tabulate(unit, 0.0, &[(-1.0, [0.0; 3])]),
+        |unit| tabulate(unit, 0.0, &[(1.0, [0.0; 3]), (1.0, [0.0; 3])]),
+        |unit| tabulate(unit, 2.0, &[(0.0, [0.0; 3]), (1.0, [0.0; 3]), (2.0, [0.0; 3])]),
+        |unit| tabulate(unit, 0.0, &[(0.0, [0.0; 3]), (1.0, [2.0, 0.0, 0.0])]),
+        |unit| tabulate(unit, 0.0, &[(0.0, [0.0, -2.0, 0.0])]),
+        |unit| tabulate(unit, 0.0, &[(0.0, [0.0, 0.0, f64::NAN])]),
         |unit| unit.parameters.surroundings.gravity = -1.0,
         |unit| unit.parameters.surroundings.field.x = f64::NAN,
         |unit| {
@@ -888,7 +967,11 @@ fn outputs_need_no_start_and_inputs_have_one() {
             "aerodynamics.scale",
             "sensor.drop.probability",
         ];
-        let plain_group = variable.name.starts_with("jet[") || variable.name.contains(".matrix[");
+        let group = variable.name.split('[').next().unwrap();
+        let plain_group =
+            ["jet", "disturbance.table.alpha", "disturbance.table.beta", "disturbance.table.sigma"]
+                .contains(&group)
+                || group.ends_with(".matrix");
         assert_eq!(
             unit.is_none(),
             plain_group || plain.contains(&variable.name.as_str()),

@@ -1,6 +1,8 @@
 //! Disturbances: an acceleration Δ that enters ẋ_ω in Chai 2022 (4b), in rad/s² and bounded in each
 //! component, and a sinusoidal moment in N m.
 
+mod table;
+
 use crate::dynamics::RigidBody;
 use crate::error::Error;
 use crate::kinematics::Kinematics;
@@ -9,6 +11,7 @@ use crate::noise::uniform;
 use crate::time::{tick, tick_time, tolerance};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+pub use table::{Row, Table};
 
 /// Kind of disturbance, which decides its course over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,6 +34,8 @@ pub enum Kind {
     /// Each component of Δ is ± bound, opposite in sign to the control acceleration R I⁻¹ m, chosen
     /// at every tick.
     AgainstMoment,
+    /// Δ = bound · direction of the table's row in force, and zero before the first row.
+    Table,
 }
 
 /// Disturbance with all the values that determine it.
@@ -50,8 +55,10 @@ pub struct Disturbance {
     pub square_period: f64,
     /// Moment of the sinusoidal kind, N m.
     pub sine: SineMoment,
-    /// Start of the interval start ≤ t < end in which the disturbance acts, s. The square wave
-    /// begins here.
+    /// Rows of the kind `table`.
+    pub table: Table,
+    /// Start of the interval start ≤ t < end in which the disturbance acts, s. The square wave and
+    /// the table begin here.
     pub start: f64,
     /// End of the interval start ≤ t < end in which the disturbance acts, s.
     pub end: f64,
@@ -108,6 +115,7 @@ impl Default for Disturbance {
             direction: Vector3::repeat(1.0),
             square_period: 1.0,
             sine: SineMoment::default(),
+            table: Table::default(),
             start: 0.0,
             end: f64::INFINITY,
         }
@@ -153,7 +161,7 @@ impl Disturbance {
         if !(finite(&sine.offset) && sine.waves.iter().all(wave_is_finite)) {
             return refuse("disturbance.sine", "holds a value that is not finite".into());
         }
-        Ok(())
+        self.table.check()
     }
 
     /// Whether the disturbance acts at `time` (s).
@@ -163,18 +171,22 @@ impl Disturbance {
             && time + tolerance(time) < self.end
     }
 
-    /// Origin (s) and length (s) of the intervals over which Δ is held; `origin` is the start of
-    /// the experiment (s).
+    /// Origin (s) and length (s) of the intervals over which Δ is held, if all have the same
+    /// length; `origin` is the start of the experiment (s).
     pub(crate) fn intervals(&self, origin: f64) -> Option<(f64, f64)> {
         match self.kind {
-            Kind::None | Kind::Constant | Kind::Sine => None,
+            Kind::None | Kind::Constant | Kind::Sine | Kind::Table => None,
             Kind::White | Kind::AlongRate | Kind::AgainstMoment => Some((origin, self.period)),
             Kind::Square => Some((self.start, self.square_period / 2.0)),
         }
     }
 
-    /// Number of the interval with constant Δ that contains `time` (s).
+    /// Number of the interval with constant Δ that contains `time` (s). For the table it is the
+    /// number of the row in force, from 1, or 0 before the first row.
     pub fn tick(&self, origin: f64, time: f64) -> i64 {
+        if self.kind == Kind::Table {
+            return i64::try_from(self.table.row(self.start, time)).unwrap_or(i64::MAX);
+        }
         self.intervals(origin).map_or(0, |(start, length)| tick(time, start, length))
     }
 
@@ -186,9 +198,12 @@ impl Disturbance {
         if time + tolerance(time) < self.start {
             return Some(self.start);
         }
-        let next = self
-            .intervals(origin)
-            .map(|(start, length)| tick_time(tick(time, start, length) + 1, start, length));
+        let next = if self.kind == Kind::Table {
+            self.table.next_change(self.start, time)
+        } else {
+            self.intervals(origin)
+                .map(|(start, length)| tick_time(tick(time, start, length) + 1, start, length))
+        };
         let next = next.map_or(self.end, |next| next.min(self.end));
         next.is_finite().then_some(next)
     }
@@ -202,6 +217,7 @@ impl Disturbance {
             Kind::Square => {
                 self.direction * if tick.rem_euclid(2) == 0 { self.bound } else { -self.bound }
             }
+            Kind::Table => self.table.direction(tick) * self.bound,
             // d‖ω‖²/dt contains 2 ωᵀ R⁻¹ Δ
             Kind::AlongRate => {
                 signs(&view.kinematics.r_inverse(&view.angles).tr_mul(&view.rates)) * self.bound

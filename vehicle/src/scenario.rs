@@ -2,7 +2,7 @@
 //! papers are embedded.
 
 use crate::atmosphere::Flight;
-use crate::disturbance::{Disturbance, Kind, SineMoment};
+use crate::disturbance::{Disturbance, Kind, SineMoment, Table};
 use crate::dynamics::Inertia;
 use crate::error::Error;
 use crate::kinematics::Kinematics;
@@ -162,6 +162,8 @@ struct FileDisturbance {
     square_period: Option<f64>,
     #[serde(default)]
     sine: SineMoment,
+    #[serde(default)]
+    table: Table,
     start: Option<f64>,
     end: Option<f64>,
 }
@@ -229,6 +231,7 @@ impl FileDisturbance {
             direction: self.direction.unwrap_or(neutral.direction),
             square_period: self.square_period.unwrap_or(neutral.square_period),
             sine: self.sine,
+            table: self.table,
             start: self.start.unwrap_or(neutral.start),
             end: self.end.unwrap_or(neutral.end),
         }

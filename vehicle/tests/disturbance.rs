@@ -4,13 +4,34 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-use vehicle::disturbance::{Disturbance, Kind, View};
+use vehicle::disturbance::{Disturbance, Kind, Row, Table, View};
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics::Kinematics;
 use vehicle::{Scenario, kinematics};
 
 fn of(kind: Kind) -> Disturbance {
     Disturbance { kind, bound: 0.035, period: 0.04, square_period: 3.0, ..Disturbance::default() }
+}
+
+/// Returns a table whose rows have these times (s) and α factors.
+fn table(start: f64, period: f64, rows: &[(f64, f64)]) -> Disturbance {
+    let row = |&(time, alpha): &(f64, f64)| Row { time, direction: Vector3::new(alpha, 0.0, -0.5) };
+    let table = Table { period, rows: rows.iter().map(row).collect() };
+    Disturbance { start, table, bound: 1.0, ..of(Kind::Table) }
+}
+
+/// Times (s) and values of Δ_α after each change until `end` (s).
+fn course(disturbance: &Disturbance, end: f64) -> Vec<(f64, f64)> {
+    let body = body();
+    let mut time = disturbance.start;
+    let mut course = Vec::new();
+    while time < end {
+        course.push((time, disturbance.sample(disturbance.tick(0.0, time), &still(&body)).x));
+        let Some(next) = disturbance.next_change(0.0, time) else { break };
+        assert!(next > time, "{next} after {time}");
+        time = next;
+    }
+    course
 }
 
 fn body() -> RigidBody {
@@ -54,6 +75,38 @@ proptest! {
             let growth = |delta: &Vector3<f64>| rates.dot(&(kinematics::r_inverse(&angles) * delta));
             prop_assert!(growth(&along) >= growth(&other) - 1e-15);
             prop_assert!(against.dot(&control) <= other.dot(&control) + 1e-15);
+        }
+    }
+
+    #[test]
+    fn oracle_a_table_changes_where_its_rows_begin(
+        start in -1e3..1e3,
+        gaps in proptest::collection::vec(1e-3..2.0, 1..9),
+        first in prop_oneof![Just(0.0), 1e-3..2.0],
+        repeats: bool,
+    ) {
+        let times: Vec<f64> = gaps.iter().scan(first, |time, gap| {
+            let now = *time;
+            *time += gap;
+            Some(now)
+        }).collect();
+        let last = times[times.len() - 1] + gaps[gaps.len() - 1];
+        let period = if repeats { last } else { 0.0 };
+        let rows: Vec<_> = times.iter().zip(1..).map(|(&time, i)| (time, 0.1 * f64::from(i))).collect();
+        let disturbance = table(start, period, &rows);
+        disturbance.check().unwrap();
+        // Written out, with the interval before the first row if there is one.
+        let mut expected = Vec::new();
+        for repetition in 0..if repeats { 3 } else { 1 } {
+            let begin = start + f64::from(repetition) * period;
+            expected.extend((first > 0.0).then_some((begin, 0.0)));
+            expected.extend(rows.iter().map(|(time, alpha)| (begin + time, *alpha)));
+        }
+        let found = course(&disturbance, if repeats { start + 3.0 * period - 1e-9 } else { 1e9 });
+        prop_assert_eq!(found.len(), expected.len());
+        for (found, expected) in found.iter().zip(&expected) {
+            prop_assert_eq!(found.1, expected.1);
+            prop_assert!((found.0 - expected.0).abs() <= 1e-12, "{:?} {:?}", found, expected);
         }
     }
 
@@ -151,6 +204,113 @@ fn square_wave_begins_positive_at_its_start() {
     assert_eq!(square.next_change(0.0, 0.0), Some(1.0));
     assert_eq!(square.next_change(0.0, 1.0), Some(2.5));
     assert_eq!(square.next_change(0.0, 2.5), Some(4.0));
+}
+
+#[test]
+fn a_table_holds_each_row_until_the_next_and_the_last_one_for_ever() {
+    let table = table(1.0, 0.0, &[(0.5, 1.0), (2.0, -0.25), (2.5, 0.75)]);
+    table.check().unwrap();
+    assert_eq!(course(&table, 99.0), [(1.0, 0.0), (1.5, 1.0), (3.0, -0.25), (3.5, 0.75)]);
+    assert_eq!(table.next_change(0.0, 0.0), Some(1.0), "the start of the disturbance");
+    assert_eq!(table.next_change(0.0, 3.5), None);
+    let ended = Disturbance { end: 3.25, ..table.clone() };
+    assert_eq!(course(&ended, 3.25), [(1.0, 0.0), (1.5, 1.0), (3.0, -0.25)]);
+    let body = body();
+    let at = |time: f64| table.sample(table.tick(0.0, time), &still(&body));
+    for (time, alpha) in [(1.5 - 1e-12, 1.0), (1.5 - 1e-6, 0.0), (2.999, 1.0), (3.0, -0.25)] {
+        let expected = if alpha == 0.0 { 0.0 } else { -0.5 };
+        assert_eq!(at(time), Vector3::new(alpha, 0.0, expected), "at {time}");
+    }
+}
+
+#[test]
+fn a_table_repeats_with_the_time_before_its_first_row() {
+    let rows = [(0.5, 1.0), (2.0, -0.25)];
+    let expected = [(-1.0, 0.0), (-0.5, 1.0), (1.0, -0.25), (3.0, 0.0), (3.5, 1.0), (5.0, -0.25)];
+    assert_eq!(course(&table(-1.0, 4.0, &rows), 7.0), expected);
+    let rows = [(0.0, 1.0), (2.0, -0.25)];
+    let expected = [(0.0, 1.0), (2.0, -0.25), (4.0, 1.0), (6.0, -0.25)];
+    assert_eq!(course(&table(0.0, 4.0, &rows), 8.0), expected);
+    assert_eq!(course(&table(0.0, 4.0, &[]), 99.0), [(0.0, 0.0)], "without rows nothing changes");
+}
+
+#[test]
+fn rows_closer_than_rounding_far_from_the_start_neither_stop_time_nor_panic() {
+    let rows = [(0.0, 1.0), (1e-13, 0.5), (2e-3, -1.0), (5e14, 1.0)];
+    for (period, rows) in [(0.0, &rows[..]), (3e-3, &rows[..3]), (1e-3, &rows[..2])] {
+        for start in [-1e300, -1e15, -1e9, 0.0, 0.1, 1e9] {
+            let table = table(start, period, rows);
+            table.check().unwrap();
+            for mut time in [-1e300, -1e15, 0.0, start, 1.7e9, 1e15, 1e300] {
+                for _ in 0..100 {
+                    assert!(table.tick(0.0, time) <= 4);
+                    let Some(next) = table.next_change(0.0, time) else { break };
+                    assert!(next > time, "{next} after {time}, start {start}");
+                    time = next;
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn far_from_its_start_a_table_still_goes_through_all_rows() {
+    // The start is so long ago that the number of a repetition may be rounded down or up.
+    for start in [-1.1e12, -3.44e10 - 0.1] {
+        let table = table(start, 0.3, &[(0.0, 1.0), (0.15, -1.0)]);
+        let mut time = 0.0;
+        let mut row = table.tick(0.0, time);
+        for change in 0..5000 {
+            let next = table.next_change(0.0, time).unwrap();
+            assert!(next - time < 0.1505, "change {change} from {time} s to {next} s");
+            let shortly_before = next - 2e-6;
+            assert_eq!(table.tick(0.0, shortly_before), row, "change {change} at {next} s");
+            assert_eq!(table.next_change(0.0, shortly_before), Some(next));
+            row = 3 - row;
+            time = next;
+            assert_eq!(table.tick(0.0, time), row, "change {change} at {time} s");
+        }
+    }
+}
+
+#[test]
+fn tables_out_of_range_are_refused_by_name() {
+    let row = |time: f64, x: f64| Row { time, direction: Vector3::new(x, 0.5, -1.0) };
+    let refusal = |period: f64, rows: [Row; 2]| {
+        let table = Table { period, rows: rows.to_vec() };
+        Disturbance { table, ..of(Kind::Table) }.check().map_err(|error| error.to_string())
+    };
+    assert_eq!(refusal(0.0, [row(0.0, 1.0), row(1e9, -1.0)]), Ok(()));
+    assert_eq!(refusal(1.5, [row(0.5, 1.0), row(1.0, -1.0)]), Ok(()));
+    let (first, second) = ("disturbance.table.rows[0]", "disturbance.table.rows[1]");
+    let period = "disturbance.table.period";
+    for (refusal, text) in [
+        (refusal(0.0, [row(-0.1, 1.0), row(1.0, 1.0)]), format!("`{first}.time` = -0.1 s")),
+        (refusal(0.0, [row(f64::NAN, 1.0), row(1.0, 1.0)]), format!("`{first}.time` = NaN s")),
+        (refusal(0.0, [row(0.1, 1.0), row(f64::INFINITY, 1.0)]), format!("`{second}.time` = inf")),
+        (
+            refusal(0.0, [row(1.0, 1.0), row(1.0, 1.0)]),
+            format!("`{second}.time` = 1 s must come after `{first}.time` = 1 s"),
+        ),
+        (
+            refusal(1.0, [row(0.0, 1.0), row(1.0, 1.0)]),
+            format!("`{second}.time` = 1 s must come before `{period}` = 1 s"),
+        ),
+        (
+            refusal(0.0, [row(0.0, 1.0), row(1.0, -1.5)]),
+            format!("`{second}.direction.x` = -1.5 must lie between -1 and 1"),
+        ),
+        (
+            refusal(0.0, [row(0.0, f64::NAN), row(1.0, 1.0)]),
+            format!("`{first}.direction.x` = NaN must lie"),
+        ),
+        (refusal(-1.0, [row(0.0, 1.0), row(1.0, 1.0)]), format!("`{period}` = -1 s must be 0")),
+        (refusal(1e-4, [row(0.0, 1.0), row(1e-5, 1.0)]), format!("`{period}` = 0.0001 s")),
+        (refusal(f64::INFINITY, [row(0.0, 1.0), row(1.0, 1.0)]), format!("`{period}` = inf s")),
+    ] {
+        let message = refusal.unwrap_err();
+        assert!(message.starts_with(&text), "{message}");
+    }
 }
 
 #[test]

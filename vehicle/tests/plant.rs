@@ -3,7 +3,7 @@
 use nalgebra::{Vector3, Vector6};
 use proptest::prelude::*;
 use vehicle::actuators::{self, Command, JetMode};
-use vehicle::disturbance::{Disturbance, Kind, MomentWave, SineMoment};
+use vehicle::disturbance::{Disturbance, Kind, MomentWave, Row, SineMoment, Table};
 use vehicle::effectors::Effectors;
 use vehicle::kinematics::{Kinematics, Trajectory};
 use vehicle::plant::{
@@ -23,8 +23,8 @@ const TUMBLING: [f64; 6] = [0.2, 0.1, -0.5, 0.08, -0.05, 0.06];
 
 /// One plant for each kind of disturbance, all with the data of crmpc-2022.
 fn kinds() -> impl Iterator<Item = Config> {
-    use Kind::{AgainstMoment, AlongRate, Constant, None, Sine, Square, White};
-    [None, White, Constant, Sine, Square, AlongRate, AgainstMoment].into_iter().map(|kind| {
+    use Kind::{AgainstMoment, AlongRate, Constant, None, Sine, Square, Table, White};
+    [None, White, Constant, Sine, Square, AlongRate, AgainstMoment, Table].into_iter().map(|kind| {
         let wave = |frequency| MomentWave {
             amplitude: Vector3::new(1e4, 2e4, -1e4),
             frequency,
@@ -35,12 +35,20 @@ fn kinds() -> impl Iterator<Item = Config> {
             kind,
             sine,
             square_period: 0.7,
+            table: table(),
             start: 0.5,
             end: 3.3,
             ..config().disturbance
         };
         Config { disturbance, ..config() }
     })
+}
+
+/// Returns a table with jumps between the communication points of any test.
+fn table() -> Table {
+    let rows = [(0.113, [1.0, 0.0, -1.0]), (0.3141, [-0.4, 0.7, 1.0]), (0.7, [0.0, -1.0, 0.2])];
+    let row = |(time, direction)| Row { time, direction: Vector3::from(direction) };
+    Table { period: 0.9, rows: rows.map(row).to_vec() }
 }
 
 fn moment(k: u32) -> Vector3<f64> {
@@ -199,6 +207,99 @@ fn start_time_may_be_anything() {
     }
 }
 
+/// Returns a plant under this disturbance with the bound of crmpc-2022.
+fn disturbed(disturbance: Disturbance) -> Plant {
+    let bound = config().disturbance.bound;
+    let disturbance = Disturbance { bound, start: 0.5, ..disturbance };
+    Plant::new(&Config { disturbance, ..config() }, 0.0).unwrap()
+}
+
+#[test]
+fn oracle_square_and_constant_as_tables_bit_for_bit() {
+    let direction = Vector3::new(1.0, -0.3, 0.8);
+    let tabulated = |period: f64, rows: &[(f64, f64)]| {
+        let row = |&(time, sign)| Row { time, direction: direction * sign };
+        let table = Table { period, rows: rows.iter().map(row).collect() };
+        disturbed(Disturbance { kind: Kind::Table, table, ..Disturbance::default() })
+    };
+    let of = |kind, square_period| {
+        disturbed(Disturbance { kind, direction, square_period, ..Disturbance::default() })
+    };
+    // The jumps k · period / 2 of the square wave and the table's repetition · period + time are
+    // the same numbers if period / 2 is a short binary fraction, and otherwise rounded differently.
+    for (mut kind, mut table, bound) in [
+        (of(Kind::Square, 1.5), tabulated(1.5, &[(0.0, 1.0), (0.75, -1.0)]), 0.0),
+        (of(Kind::Square, 0.7), tabulated(0.7, &[(0.0, 1.0), (0.35, -1.0)]), 1e-14),
+        (of(Kind::Constant, 1.0), tabulated(0.0, &[(0.0, 1.0)]), 0.0),
+    ] {
+        for k in 0..125 {
+            let [from, to] = [0.04 * f64::from(k), 0.04 * f64::from(k + 1)];
+            kind.advance(from, to, moment(k / 5)).unwrap();
+            table.advance(from, to, moment(k / 5)).unwrap();
+            let difference = (kind.state - table.state).amax();
+            assert!(difference <= bound, "{difference} at {to} s");
+        }
+    }
+}
+
+#[test]
+fn oracle_a_table_gives_the_parabolas_of_its_rows_whatever_the_communication_step() {
+    // At beta = 0, without roll and yaw, Δ_α is the second derivative of α.
+    let rows = [(0.3, 1.0), (0.7001, -0.5), (1.15, 0.0), (1.3, -1.0)];
+    let row = |(time, x)| Row { time, direction: Vector3::new(x, 0.0, 0.0) };
+    let table = Table { period: 1.7, rows: rows.map(row).to_vec() };
+    let disturbance =
+        Disturbance { kind: Kind::Table, bound: 0.03, table, start: 0.1, ..Disturbance::default() };
+    let (mut alpha, mut rate, mut time) = (0.1, 0.0, 0.0);
+    for (until, factor) in [0.0, 1.7].into_iter().flat_map(|begin| {
+        [(0.3, 0.0), (0.7001, 1.0), (1.15, -0.5), (1.3, 0.0), (1.7, -1.0)]
+            .map(move |(until, factor)| (0.1 + begin + until, factor))
+    }) {
+        let (t, delta) = (until - time, 0.03 * factor);
+        alpha += rate * t + delta * t * t / 2.0;
+        rate += delta * t;
+        time = until;
+    }
+    for steps in [1, 7, 85, 1000] {
+        let initial = Vector6::new(0.1, 0.0, 0.3, 0.0, 0.0, 0.0);
+        let config = Config { disturbance: disturbance.clone(), ..undisturbed(initial, 0.01) };
+        let mut plant = Plant::new(&config, 0.0).unwrap();
+        let at = |k: u32| time * f64::from(k) / f64::from(steps);
+        for k in 0..steps {
+            plant.advance(at(k), at(k + 1), Vector3::zeros()).unwrap();
+        }
+        assert!((plant.angles().x - alpha).abs() < 1e-14, "{steps}: {}", plant.angles().x - alpha);
+        assert!((plant.rates().y - rate).abs() < 1e-15, "{steps}: {}", plant.rates().y - rate);
+    }
+}
+
+#[test]
+fn communication_points_at_the_jumps_of_a_table_change_nothing() {
+    let plant =
+        || disturbed(Disturbance { kind: Kind::Table, table: table(), ..Disturbance::default() });
+    let [mut between, mut at_jumps] = [0, 1].map(|_| plant());
+    let jumps = (0..4).flat_map(|repetition| {
+        let begin = 0.5 + f64::from(repetition) * 0.9;
+        [0.0, 0.113, 0.3141, 0.7].map(|time| begin + time)
+    });
+    let mut points: Vec<f64> = (1..=20).map(|k| 0.2 * f64::from(k)).chain(jumps).collect();
+    points.sort_by(f64::total_cmp);
+    points.dedup_by(|next, before| *next - *before < 1e-9);
+    let mut from = 0.0;
+    for k in 0..20 {
+        let end = 0.2 * f64::from(k + 1);
+        between.advance(0.2 * f64::from(k), end, moment(k)).unwrap();
+        for &to in points.iter().filter(|&&point| point <= end) {
+            if to > from {
+                at_jumps.advance(from, to, moment(k)).unwrap();
+                from = to;
+            }
+        }
+        let difference = (between.state - at_jumps.state).amax();
+        assert!(difference < 1e-13, "{difference} at {end} s");
+    }
+}
+
 #[test]
 fn state_dependent_disturbance_is_drawn_at_the_tick_and_held() {
     let mut config = config();
@@ -275,7 +376,7 @@ proptest! {
     #[test]
     fn any_communication_points_lead_to_the_same_state(
         mut points in proptest::collection::vec(0.0..2.0, 0..40),
-        kind in prop::sample::select(vec![Kind::White, Kind::Constant, Kind::Sine, Kind::Square]),
+        kind in prop::sample::select(vec![Kind::White, Kind::Constant, Kind::Sine, Kind::Square, Kind::Table]),
     ) {
         let mut config = kinds().find(|config| config.disturbance.kind == kind).unwrap();
         config.disturbance.end = 1.5;

@@ -132,18 +132,12 @@ pub(crate) fn value(
                 }
                 _ => return mismatch("a number, or text with a number and a unit"),
             };
-            let unit = unit.as_deref().unwrap_or_default();
-            if min.is_some_and(|min| value < min) {
-                return Err(format!(
-                    "{value} {unit} is below its minimum {} {unit}",
-                    min.unwrap_or_default()
-                ));
+            let unit = unit.as_ref().map(|unit| format!(" {unit}")).unwrap_or_default();
+            if let Some(min) = min.filter(|min| value < *min) {
+                return Err(format!("{value}{unit} is below its minimum {min}{unit}"));
             }
-            if max.is_some_and(|max| value > max) {
-                return Err(format!(
-                    "{value} {unit} is above its maximum {} {unit}",
-                    max.unwrap_or_default()
-                ));
+            if let Some(max) = max.filter(|max| value > *max) {
+                return Err(format!("{value}{unit} is above its maximum {max}{unit}"));
             }
             Ok(SettingValue::Real(value))
         }

@@ -268,12 +268,56 @@ fn survive_forgeries(
     taken
 }
 
+/// Sets a table of the disturbance that repeats and jumps between the communication points.
+fn tabulate(instance: &Instance) {
+    let reference = |name: &str| instance.unit.reference(&format!("disturbance.{name}"));
+    instance.choose("disturbance.kind", "table");
+    instance.ok(c!(instance, fmi2SetInteger(instance.component, &reference("table.rows"), 1, &3)));
+    for (name, value) in [
+        ("start", 0.05),
+        ("table.period", 0.21),
+        ("table.time[1]", 0.013),
+        ("table.alpha[1]", 1.0),
+        ("table.sigma[1]", -0.3),
+        ("table.time[2]", 0.1),
+        ("table.beta[2]", -1.0),
+        ("table.time[3]", 0.17),
+        ("table.alpha[3]", -0.6),
+    ] {
+        instance.ok(instance.set_real(reference(name), value));
+    }
+}
+
+#[test]
+fn a_state_saved_in_the_middle_of_a_table_brings_back_the_same_future() {
+    let unit = conformance::unit("ReentryPlant");
+    for &fmu_type in unit.interfaces() {
+        let drive = driver(fmu_type);
+        let instance = unit.instance(fmu_type);
+        tabulate(&instance);
+        let instance = instance.initialized();
+        drive(&instance, 0..4);
+        let (handle, bytes) = (instance.save(), instance.serialize());
+        let expected = drive(&instance, 4..20);
+        instance.restore(handle);
+        assert!(drive(&instance, 4..20) == expected);
+        let other = unit.instance(fmu_type);
+        let (status, state) = other.deserialize(&bytes);
+        other.ok(status);
+        other.restore(state);
+        assert!(drive(&other, 4..20) == expected);
+        let real = |name: &str| other.real(unit.reference(&format!("disturbance.{name}")));
+        let delta = ["alpha", "beta", "sigma"].map(|axis| real(&format!("delta.{axis}")).abs());
+        assert_eq!(delta.into_iter().fold(0.0, f64::max), real("bound"), "the table acts");
+    }
+}
+
 /// Approximate number of forgeries for each unit.
 const FORGERIES: usize = 6000;
 
 #[test]
 fn forged_states_neither_hang_nor_panic() {
-    let plants: [fn(&Instance); 3] = [
+    let plants: [fn(&Instance); 4] = [
         |_| (),
         |instance| {
             let reference = instance.unit.reference("sensor.set");
@@ -284,6 +328,7 @@ fn forged_states_neither_hang_nor_panic() {
             let reference = instance.unit.reference("actuation.delay");
             instance.ok(instance.set_real(reference, 0.1));
         },
+        tabulate,
     ];
     for unit in units() {
         let all = if unit.name() == "ReentryPlant" { &plants[..] } else { &plants[..1] };
