@@ -4,7 +4,8 @@ use crate::failure::Failure;
 use campaign::changes::Changes;
 use campaign::definition::Campaign;
 use campaign::findings::Findings;
-use campaign::plan::{self, Plan};
+use campaign::plan::Plan;
+use campaign::prepare;
 use campaign::run::{self, Options};
 use campaign::{search, statistics::CONFIDENCE};
 use clap::Args;
@@ -86,7 +87,7 @@ fn range(text: &str) -> Result<Range<u64>, String> {
 }
 
 fn prepare(common: &Common) -> Result<Plan, Error> {
-    let campaign = Campaign::load(&plan::find(&common.campaign)?)?;
+    let campaign = Campaign::load(&prepare::find(&common.campaign)?)?;
     let changes =
         Changes { experiment: common.experiment.clone(), overrides: common.overrides.clone() };
     Plan::new(campaign, &changes, &common.fmu_dir)

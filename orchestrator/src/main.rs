@@ -7,6 +7,7 @@ mod failure;
 mod inspect;
 mod list;
 mod live;
+mod pack;
 mod run;
 mod schema;
 
@@ -297,56 +298,23 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             }
             Ok(())
         }
-        Command::Campaign(asked) => match campaign::fly(&asked, out, interrupt)? {
-            campaign::Next::Done => Ok(()),
-            campaign::Next::Run(experiment, folder) => execute(
-                Command::Run {
-                    experiment,
-                    out: Some(folder),
-                    fmu_dir: asked.common.fmu_dir,
-                    overrides: Overrides::default(),
-                    quiet: asked.common.quiet,
-                    real_time: None,
-                    on_miss: OnMiss::default(),
-                    priority: None,
-                    live: false,
-                    files: Files::default(),
-                    force: true,
-                },
-                out,
-                interrupt,
-            ),
-        },
+        Command::Campaign(asked) => fly(asked, out, interrupt),
         Command::Falsify(asked) => campaign::falsify(&asked, out, interrupt),
+        Command::Pack { ssp: false, .. } => {
+            let message = "pack wants the form of the archive, of which there is one: --ssp";
+            Err(Error::experiment(message).into())
+        }
         Command::Pack {
-            experiment: path,
-            ssp,
+            experiment,
             out: archive,
             fmu_dir,
             overrides,
             no_enumerations,
             force,
+            ..
         } => {
-            if !ssp {
-                return Err(Error::experiment(
-                    "pack wants the form of the archive, of which there is one: --ssp",
-                )
-                .into());
-            }
-            let path = search::experiment(&path)?;
-            let archive = archive.unwrap_or_else(|| {
-                PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("ssp")
-            });
-            if archive.exists() && !force {
-                let path = archive.display();
-                return Err(Error::experiment(format!(
-                    "{path} is there already: --force replaces it, --out takes another name"
-                ))
-                .into());
-            }
-            let (system, _entries) = system(&path, &overrides, &fmu_dir)?;
-            ssp::pack(&system, !no_enumerations, &archive, interrupt)?;
-            Ok(packed(&system, &archive, out)?)
+            let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };
+            pack::pack(&experiment, &overrides, &fmu_dir, archive, out, interrupt)
         }
         Command::Inspect { fmu, check: true, .. } => inspect::check(&fmu, out),
         Command::Inspect { fmu, filter, json, check: false } => {
@@ -360,6 +328,27 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         }
         Command::List { folder } => list::list(folder.as_deref(), out),
     }
+}
+
+/// Flies a campaign, or runs one of its cases with everything recorded.
+fn fly(asked: campaign::Fly, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
+    let campaign::Next::Run(experiment, folder) = campaign::fly(&asked, out, interrupt)? else {
+        return Ok(());
+    };
+    let run = Command::Run {
+        experiment,
+        out: Some(folder),
+        fmu_dir: asked.common.fmu_dir,
+        overrides: Overrides::default(),
+        quiet: asked.common.quiet,
+        real_time: None,
+        on_miss: OnMiss::default(),
+        priority: None,
+        live: false,
+        files: Files::default(),
+        force: true,
+    };
+    execute(run, out, interrupt)
 }
 
 /// Checks an experiment or the system of an SSP archive. The entries of an archive are needed for
@@ -398,14 +387,4 @@ fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
 fn show(experiment: &Path, out: &mut impl Write) -> Result<(), Failure> {
     let experiment = Experiment::load(&search::experiment(experiment)?)?;
     Ok(out.write_all(experiment.source.whole().as_bytes())?)
-}
-
-/// Prints the components in a packed archive, and which setting the standard cannot store.
-fn packed(system: &System, archive: &Path, out: &mut impl Write) -> std::io::Result<()> {
-    writeln!(out, "{}: {}", archive.display(), system.order.join(", "))?;
-    let step = system.experiment.simulation.step;
-    writeln!(
-        out,
-        "  the standard has no place for the step, {step} s: it stands in annotations, which not every tool reads"
-    )
 }

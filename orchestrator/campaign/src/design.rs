@@ -8,7 +8,7 @@ use sobol::Sobol;
 use sobol::params::JoeKuoD6;
 
 /// Number of bits of a coordinate of Sobol's sequence.
-const BITS: usize = 32;
+const BITS: i32 = 32;
 
 /// Coordinate of a case along one parameter that varies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +49,7 @@ impl Design {
         let cases = match kind {
             Kind::Factorial => {
                 let product = levels.iter().try_fold(1_u64, |all, own| all.checked_mul(*own));
-                let product = product.filter(|all| *all <= u64::from(u32::MAX));
+                let product = product.filter(|all| u32::try_from(*all).is_ok());
                 let product = product.ok_or("there are more combinations than can be flown")?;
                 if let Some(cases) = cases.filter(|cases| *cases != product) {
                     return Err(format!(
@@ -78,7 +78,7 @@ impl Design {
             if levels.len() > params.max_dims {
                 return Err(format!("Sobol's sequence has at most {} parameters", params.max_dims));
             }
-            Sobol::<u32>::init_direction_vals::<u32>(levels.len(), BITS, &params)
+            Sobol::<u32>::init_direction_vals::<u32>(levels.len(), BITS as usize, &params)
         } else {
             Vec::new()
         };
@@ -114,7 +114,7 @@ impl Design {
                 let point = |dimension: usize| {
                     let bits = self.sobol(case as u32, dimension);
                     let unit = f64::from(bits) + rest[dimension];
-                    Place::Quantile(below_one(unit / 2.0_f64.powi(BITS as i32)))
+                    Place::Quantile(below_one(unit / 2.0_f64.powi(BITS)))
                 };
                 (0..dimensions).map(point).collect()
             }
@@ -279,8 +279,8 @@ mod tests {
         // Every elementary interval of a (0, 2)-sequence in base 2, which the first two dimensions
         // are; scrambling keeps this.
         let design = design(Kind::Sobol, 256, 2);
-        for across in 0..=8_u32 {
-            let (x, y) = (2.0_f64.powi(across as i32), 2.0_f64.powi(8 - across as i32));
+        for across in 0..=8 {
+            let (x, y) = (2.0_f64.powi(across), 2.0_f64.powi(8 - across));
             let boxes: BTreeSet<(u64, u64)> = (0..256)
                 .map(|case| units(&design, case))
                 .map(|point| ((point[0] * x) as u64, (point[1] * y) as u64))

@@ -234,7 +234,7 @@ impl Observer for Watch<'_> {
 pub fn table(plan: &Plan, rows: &[Row]) -> Table {
     let mut columns = vec![Column {
         name: "case".into(),
-        values: Values::Count(rows.iter().map(|row| row.case as i64).collect()),
+        values: Values::Count(rows.iter().map(|row| row.case.cast_signed()).collect()),
     }];
     for (place, own) in plan.varied.iter().enumerate() {
         let values = rows.iter().map(|row| &row.values[place]);

@@ -18,6 +18,7 @@ pub mod flight;
 pub mod law;
 pub mod parts;
 pub mod plan;
+pub mod prepare;
 pub mod report;
 pub mod run;
 pub mod search;

@@ -3,57 +3,21 @@
 
 use crate::changes::Changes;
 use crate::correlation::{Correlated, correlation};
-use crate::definition::{Campaign, Kind, Limit, Vary};
+use crate::definition::{Campaign, Kind, Limit};
 use crate::design::{Design, Place};
-use crate::law::Law;
-use crate::table::hex;
 use cosim::check::check;
-use cosim::document::Source;
 use cosim::error::Error;
-use cosim::experiment::{self, Experiment, Observe, Overrides};
+use cosim::experiment::{self, Experiment};
 use cosim::search;
 use cosim::system::{Opened, System};
 use cosim::variation::{SettingValue, Target};
-use cosim_report::metrics::{Meters, Metrics};
-use fmu_import::description::Kind as Type;
+use cosim_report::metrics::Meters;
 use fmu_import::names;
 use serde_json::{Map, Value, json};
-use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-/// Version of the files of parts, which must be raised when their content changes.
-const FORMAT: u32 = 1;
-/// Metrics of every run that are those of the machine, not of the case.
-const OF_THE_MACHINE: [&str; 2] = ["real_time_factor", "wall_s"];
-
-/// A parameter that varies, or several that always have the same value.
-#[derive(Clone, Debug)]
-pub struct Varied {
-    /// Name of the first parameter, `component.parameter`, which is that of the column.
-    pub name: String,
-    /// Unit of the values, or an empty text.
-    pub unit: String,
-    /// Type of the values.
-    pub kind: Type,
-    /// Distribution of the values.
-    pub law: Law,
-    targets: Vec<Target>,
-    paths: Vec<String>,
-}
-
-/// A number that is recorded of each case.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Recorded {
-    /// Name of the metric or measure.
-    pub name: String,
-    /// Unit of the number, or an empty text.
-    pub unit: String,
-    /// Whether a missing value means that something never happened, as with a settling time.
-    pub is_never: bool,
-}
-
+use crate::prepare::{Recorded, Varied, keys, laws, observe, read_experiment, recorded};
 /// A campaign that is ready to be flown.
 pub struct Plan {
     /// The campaign as its file describes it.
@@ -85,7 +49,7 @@ impl Plan {
     /// # Errors
     /// Returns an error that names the key at fault, with its line and the nearest right name.
     pub fn new(campaign: Campaign, changes: &Changes, fmu_dirs: &[PathBuf]) -> Result<Self, Error> {
-        let mut experiment = experiment(&campaign, changes)?;
+        let mut experiment = read_experiment(&campaign, changes)?;
         experiment.observe = observe(&campaign, &experiment.observe)?;
         let fmu_dirs = fmu_dirs.to_vec();
         let mut opened = Opened::default();
@@ -113,7 +77,6 @@ impl Plan {
             match campaign.design {
                 Kind::Factorial => own.law.levels().map_err(fault),
                 Kind::Corners => own.law.check_ends().map(|()| 0).map_err(fault),
-                Kind::Sensitivity if !own.law.is_ordered() && !own.law.is_counted() => Ok(0),
                 _ => Ok(0),
             }
         });
@@ -292,175 +255,6 @@ impl Plan {
     }
 }
 
-/// Reads the experiment of a campaign, with what the campaign and the command line set in it.
-fn experiment(campaign: &Campaign, changes: &Changes) -> Result<Experiment, Error> {
-    let source = &campaign.source;
-    let span = campaign.experiment.span();
-    let beside = source.beside(campaign.experiment.get_ref());
-    let path = match &changes.experiment {
-        Some(name) => search::experiment(name)?,
-        None if beside.is_file() => beside,
-        None => search::experiment(campaign.experiment.get_ref())
-            .map_err(|error| source.error(&span, error.to_string()))?,
-    };
-    let mut experiment = Experiment::load(&path)?;
-    let mut overrides = Overrides::default();
-    for (component, fmu) in &campaign.fmu {
-        let beside = source.beside(fmu);
-        let file = if beside.is_file() { beside } else { fmu.clone() };
-        overrides.fmu.push(format!("{component}={}", file.display()));
-    }
-    experiment.apply(&overrides)?;
-    for name in &campaign.unset {
-        let outcome = experiment.unset(name.get_ref());
-        outcome.map_err(|problem| source.error(&name.span(), format!("unset: {problem}")))?;
-    }
-    for (name, value) in &campaign.set {
-        let outcome = experiment.set(name, value.get_ref().clone());
-        outcome.map_err(|problem| source.error(&value.span(), format!("[set] {problem}")))?;
-    }
-    experiment.apply(&changes.overrides)?;
-    Ok(experiment)
-}
-
-/// Returns what is observed of each case: the metrics that the campaign names and its measures.
-fn observe(campaign: &Campaign, own: &Observe) -> Result<Observe, Error> {
-    let source = &campaign.source;
-    let mut signals = own.signals.clone();
-    signals.extend(campaign.signals.clone());
-    let known = Metrics::names(own);
-    let known = || known.iter().map(String::as_str).filter(|name| !OF_THE_MACHINE.contains(name));
-    source.known(&campaign.metrics, "metric of the experiment", known())?;
-    let mut metrics = BTreeMap::new();
-    for name in &campaign.metrics {
-        let Some(measure) = own.metrics.get(name.get_ref()) else { continue };
-        if measure.timing {
-            let message = format!(
-                "metrics: \"{}\" is a computing time, which differs from run to run",
-                name.get_ref()
-            );
-            return Err(source.error(&name.span(), message));
-        }
-        metrics.insert(name.get_ref().clone(), measure.clone());
-    }
-    for measure in &campaign.measures {
-        source.known([&measure.signals], "list of signals", signals.keys().map(String::as_str))?;
-        let mut measure = measure.clone();
-        let id = std::mem::take(&mut measure.id);
-        if metrics.contains_key(&id) || known().any(|name| name == id) {
-            let message = format!("[[measure]] {id}: the experiment has a metric of this name");
-            return Err(source.error(&measure.signals.span(), message));
-        }
-        metrics.insert(id, measure);
-    }
-    for measure in metrics.values_mut() {
-        measure.limit = None;
-    }
-    let asks_guarantee =
-        campaign.metrics.iter().any(|name| !own.metrics.contains_key(name.get_ref()));
-    Ok(Observe {
-        signals,
-        metrics,
-        summary: Vec::new(),
-        guarantee: own.guarantee.clone().filter(|_| asks_guarantee),
-        loss: own.loss.clone(),
-        panels: own.panels.clone(),
-        readings: BTreeMap::new(),
-    })
-}
-
-/// Makes the distributions of one entry of what varies.
-fn laws(vary: &Vary, source: &Source, system: &System) -> Result<Vec<Varied>, Error> {
-    let mut groups: Vec<(std::ops::Range<usize>, Vec<String>)> = Vec::new();
-    if let Some(parameter) = &vary.parameter {
-        groups.push((parameter.span(), parameter.get_ref().all().to_vec()));
-    }
-    groups.extend(vary.each.iter().map(|name| (name.span(), vec![name.get_ref().clone()])));
-    let both = vary.parameter.is_some() && !vary.each.is_empty();
-    if groups.is_empty() || both || groups.iter().any(|(_, names)| names.is_empty()) {
-        let span = groups.first().map_or(0..0, |(span, _)| span.clone());
-        return Err(source.error(&span, "[[vary]] wants either parameter or each"));
-    }
-    let mut all = Vec::new();
-    for (span, paths) in groups {
-        let name = paths[0].clone();
-        let fault =
-            |problem: String| source.error(&span, format!("[[vary]] \"{name}\": {problem}"));
-        let targets = paths.iter().map(|path| {
-            system
-                .target(path)
-                .map_err(|problem| source.error(&span, format!("[[vary]] \"{path}\": {problem}")))
-        });
-        let targets = targets.collect::<Result<Vec<_>, _>>()?;
-        let variable = system.variable(targets[0]);
-        for other in &targets[1..] {
-            if system.variable(*other).kind.name() != variable.kind.name() {
-                return Err(fault("parameters with the same value must be of one type".into()));
-            }
-        }
-        let law = Law::new(vary, targets[0], system).map_err(&fault)?;
-        let unit = match &variable.kind {
-            Type::Real { unit, .. } => unit.clone().unwrap_or_default(),
-            _ => String::new(),
-        };
-        all.push(Varied {
-            name: name.clone(),
-            unit,
-            kind: variable.kind.clone(),
-            law,
-            targets,
-            paths,
-        });
-    }
-    Ok(all)
-}
-
-/// Lists the numbers that are recorded: the metrics in the order of the file, then the measures.
-fn recorded(campaign: &Campaign, observe: &Observe, meters: &Meters) -> Vec<Recorded> {
-    let units = meters.metrics().units;
-    let names = campaign.metrics.iter().map(|name| name.get_ref().clone());
-    let names = names.chain(campaign.measures.iter().map(|measure| measure.id.clone()));
-    names
-        .map(|name| Recorded {
-            unit: units.get(&name).cloned().unwrap_or_default(),
-            is_never: observe.metrics.get(&name).is_some_and(|measure| {
-                matches!(measure.kind, experiment::Kind::Settling | experiment::Kind::Leaving)
-            }),
-            name,
-        })
-        .collect()
-}
-
-/// Hashes what the cases depend on.
-fn keys(
-    campaign: &Campaign,
-    changes: &Changes,
-    system: &System,
-) -> Result<BTreeMap<String, String>, Error> {
-    let digest = |bytes: &[u8]| hex(&Sha256::digest(bytes));
-    let mut own: toml::Table = toml::from_str(campaign.source.whole())
-        .map_err(|error| campaign.source.error(&(0..0), error.to_string()))?;
-    // These change neither the cases nor what is recorded of them.
-    for key in ["title", "description", "extends", "until", "keep", "search"] {
-        own.remove(key);
-    }
-    if campaign.design != Kind::LatinHypercube && campaign.design != Kind::Corners {
-        own.remove("cases");
-    }
-    let own = toml::to_string(&own).map_err(|error| Error::experiment(error.to_string()))?;
-    let own = format!("{own}{:?}", changes.overrides);
-    let mut keys = BTreeMap::from([
-        ("campaign".to_string(), digest(own.as_bytes())),
-        ("experiment".to_string(), digest(system.experiment.source.whole().as_bytes())),
-        ("program".to_string(), format!("{} {FORMAT}", env!("CARGO_PKG_VERSION"))),
-    ]);
-    for (name, fmu) in system.order.iter().zip(&system.fmus) {
-        let bytes = fs::read(&fmu.path).map_err(Error::file(&fmu.path))?;
-        keys.insert(format!("FMU of {name}"), digest(&bytes));
-    }
-    Ok(keys)
-}
-
 /// Converts a value to TOML.
 fn written(value: &SettingValue) -> toml::Value {
     match value {
@@ -469,28 +263,4 @@ fn written(value: &SettingValue) -> toml::Value {
         SettingValue::Boolean(value) => (*value).into(),
         SettingValue::Item(text, _) | SettingValue::Text(text) => text.as_str().into(),
     }
-}
-
-/// Finds the campaign with this name: a file, or one below the campaigns of the experiments.
-///
-/// # Errors
-/// Returns an error if there is no such campaign.
-pub fn find(name: &Path) -> Result<PathBuf, Error> {
-    if name.is_file() {
-        return Ok(name.to_path_buf());
-    }
-    let folders = || search::experiments().into_iter().map(|root| root.join("campaigns"));
-    let file = name.with_extension("toml");
-    if let Some(path) = folders().map(|folder| folder.join(&file)).find(|path| path.is_file()) {
-        return Ok(path);
-    }
-    let there: Vec<String> = folders()
-        .flat_map(|folder| fs::read_dir(folder).into_iter().flatten().flatten())
-        .filter_map(|entry| Some(entry.path().file_stem()?.to_string_lossy().into_owned()))
-        .collect();
-    let hint = names::hint(&name.to_string_lossy(), there.iter().map(String::as_str));
-    Err(Error::experiment(format!(
-        "there is no campaign \"{}\", neither as a file nor among the experiments' campaigns{hint}",
-        name.display()
-    )))
 }

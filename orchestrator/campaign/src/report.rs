@@ -49,7 +49,7 @@ pub fn write(
         pictures.extend(cloud::draw(plan, interrupt, *worst, table.rows())?);
     }
     let drawn = pictures.iter().map(drawn).collect::<Result<Vec<_>, _>>()?;
-    let page = page(plan, findings, &drawn, &kept, ranking.zip(Some(ranked)));
+    let page = page(plan, findings, &drawn, &kept, ranking.zip(Some(ranked)).as_ref());
     let path = out.join("report.html");
     fs::write(&path, page).map_err(Error::file(&path))
 }
@@ -88,7 +88,7 @@ fn page(
     findings: &Findings,
     figures: &[(String, String)],
     kept: &BTreeSet<u64>,
-    ranked: Option<(String, Vec<u64>)>,
+    ranked: Option<&(String, Vec<u64>)>,
 ) -> String {
     let campaign = &plan.campaign;
     let ended = |name: &str| findings.status.get(name).copied().unwrap_or(0);
@@ -150,7 +150,7 @@ fn page(
                     }
                     section id="worst" {
                         h2 { "Worst cases" }
-                        @if let Some((name, cases)) = &ranked {
+                        @if let Some((name, cases)) = ranked {
                             p { "Largest " code { (name) } " first. Each command flies the case again, with everything recorded:" }
                             ul { @for case in cases { li { code { "orchestrator campaign " (plan.command) " --case " (case) } } } }
                         }

@@ -84,9 +84,10 @@ struct Order {
     reply: Sender<Result<Row, Single>>,
 }
 
-/// Result of a place, in the order in which places were asked for.
+/// A case that was tried: where it lies, and what came of it.
 struct Tried {
     generation: u64,
+    point: Vec<f64>,
     value: f64,
     row: Row,
 }
@@ -153,7 +154,9 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
     let mut tried = searched.tried.into_inner().unwrap_or_else(PoisonError::into_inner);
     // Within a generation, the threads finish in any order.
     tried.sort_by(|a, b| {
-        (a.generation, a.value).partial_cmp(&(b.generation, b.value)).unwrap_or(CmpOrdering::Equal)
+        let points = || a.point.iter().zip(&b.point).map(|(a, b)| a.total_cmp(b));
+        let differing = || points().find(|order| order.is_ne()).unwrap_or(CmpOrdering::Equal);
+        a.generation.cmp(&b.generation).then_with(differing)
     });
     let worst = tried.iter().filter(|own| !own.value.is_nan());
     let worst = worst.max_by(|a, b| a.value.total_cmp(&b.value)).or(tried.first());
@@ -221,7 +224,8 @@ impl Searched<'_> {
     /// Flies the case at a point, whose coordinates are cut off at 0 and 1. The strategy looks for
     /// the smallest value; what has none is as bad as can be.
     fn evaluate(&self, point: &DVector<f64>, orders: &Sender<Order>) -> f64 {
-        let places = point.iter().map(|unit| Place::Quantile(unit.clamp(0.0, 1.0))).collect();
+        let point: Vec<f64> = point.iter().map(|unit| unit.clamp(0.0, 1.0)).collect();
+        let places = point.iter().copied().map(Place::Quantile).collect();
         let (reply, result) = channel();
         if orders.send(Order { places, reply }).is_err() {
             return f64::MAX;
@@ -237,7 +241,7 @@ impl Searched<'_> {
         self.progress.advance(1);
         let value = row.numbers[self.measure].unwrap_or(f64::NAN);
         let generation = self.generation.load(Ordering::Relaxed);
-        lock(&self.tried).push(Tried { generation, value, row });
+        lock(&self.tried).push(Tried { generation, point, value, row });
         if value.is_nan() { f64::MAX } else { -value }
     }
 

@@ -152,6 +152,7 @@ fn first(range: &RangeInclusive<u64>, holds: impl Fn(u64) -> bool) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use statrs::distribution::Discrete;
 
     #[test]
     fn published_bounds_of_clopper_and_pearson() {
@@ -170,7 +171,6 @@ mod tests {
         // All outcomes of 40 cases, weighed with their probability.
         for probability in [0.02, 0.2, 0.5] {
             let law = Binomial::new(probability, 40).unwrap();
-            use statrs::distribution::Discrete;
             let covered: f64 = (0..=40)
                 .filter(|k| {
                     let own = Probability::new(*k, 40, 0.95);
@@ -221,7 +221,6 @@ mod tests {
     fn oracle_the_interval_of_a_quantile_covers_it() {
         // Values 1 to n of a uniform distribution: the p-quantile lies between order statistics r and
         // s with the probability that r to s - 1 of n values are below it.
-        use statrs::distribution::Discrete;
         for (n, p) in [(100, 0.5), (60, 0.95), (1000, 0.99)] {
             let values: Vec<f64> = (1..=n).map(f64::from).collect();
             let own = quantile(&values, p);

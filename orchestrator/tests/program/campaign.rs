@@ -253,7 +253,11 @@ fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
         ),
         ("list = [0.5, 1.0, 2.0]", "uniform = [2.0, 1.0]", "from a smaller to a larger value"),
         ("list = [0.5, 1.0, 2.0]", "list = [1.0]\nsign = 2.0", "one distribution is needed"),
-        ("parameter = \"plant.fail.time\"\nlist = [1e9, 2.0]", "parameter = \"gain.gain\"\nlist = [1.0]", "\"gain.gain\" varies twice"),
+        (
+            "parameter = \"plant.fail.time\"\nlist = [1e9, 2.0]",
+            "parameter = \"gain.gain\"\nlist = [1.0]",
+            "\"gain.gain\" varies twice",
+        ),
         (
             "signals = \"out\"",
             "signals = \"oot\"",
@@ -267,7 +271,7 @@ fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
         (
             "measure = \"largest\"",
             "measure = \"larges\"",
-            "c.toml:31: there is no metric or measure \"larges\"; did you mean \"largest\"?",
+            "c.toml:29: there is no metric or measure \"larges\"; did you mean \"largest\"?",
         ),
         ("at_most = 8.0", "", "one of at_most and at_least is needed"),
         (

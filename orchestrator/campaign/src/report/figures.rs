@@ -2,7 +2,8 @@
 
 use crate::findings::Findings;
 use crate::flight::kept;
-use crate::plan::{Plan, Recorded};
+use crate::plan::Plan;
+use crate::prepare::Recorded;
 use crate::table::Reader;
 use cosim::error::Error;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape};

@@ -1,0 +1,126 @@
+//! What varies from case to case.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+use toml::{Spanned, Value};
+
+/// What varies: one parameter or several, with the distribution of their values. Exactly one of the
+/// keys from `uniform` to `case` is given. A number may be a text with a unit (`"5 deg"`), or with a
+/// percent sign, which stands for percent of the value in the experiment.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Vary {
+    /// Parameter, or input without a connection, as `component.parameter`; of several in a list,
+    /// all get the same value.
+    #[serde(default)]
+    #[schemars(with = "Option<OneOrMore>")]
+    pub parameter: Option<Spanned<OneOrMore>>,
+    /// Parameters that each get a value of their own from the same distribution.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub each: Vec<Spanned<String>>,
+    /// Smallest and largest value of a uniform distribution. An integer parameter gets integers,
+    /// both ends included.
+    #[serde(default)]
+    #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
+    pub uniform: Option<Spanned<[Value; 2]>>,
+    /// Mean and standard deviation of a normal distribution.
+    #[serde(default)]
+    #[schemars(with = "Option<Normal>")]
+    pub normal: Option<Spanned<Normal>>,
+    /// Median and spread of a log-normal distribution.
+    #[serde(default)]
+    #[schemars(with = "Option<LogNormal>")]
+    pub log_normal: Option<Spanned<LogNormal>>,
+    /// Smallest, most likely and largest value of a triangular distribution.
+    #[serde(default)]
+    #[schemars(with = "Option<[cosim::experiment::Scalar; 3]>")]
+    pub triangular: Option<Spanned<[Value; 3]>>,
+    /// Values that are equally likely, unless `weights` are given: numbers, texts, items of an
+    /// enumeration or truth values.
+    #[serde(default)]
+    #[schemars(with = "Option<Vec<cosim::experiment::Scalar>>")]
+    pub list: Option<Spanned<Vec<Value>>>,
+    /// Equally spaced values, equally likely.
+    #[serde(default)]
+    #[schemars(with = "Option<Range>")]
+    pub range: Option<Spanned<Range>>,
+    /// Magnitude of a value whose sign is plus or minus.
+    #[serde(default)]
+    #[schemars(with = "Option<cosim::experiment::Scalar>")]
+    pub sign: Option<Spanned<Value>>,
+    /// First of consecutive integers: the parameter is this number plus that of the case, as for
+    /// seeds.
+    #[serde(default)]
+    #[schemars(with = "Option<i64>")]
+    pub case: Option<Spanned<i64>>,
+    /// Bounds that cut off a continuous distribution.
+    #[serde(default)]
+    #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
+    pub within: Option<Spanned<[Value; 2]>>,
+    /// Probabilities of the values of `list`, which are scaled to a sum of 1.
+    #[serde(default)]
+    #[schemars(with = "Option<Vec<f64>>")]
+    pub weights: Option<Spanned<Vec<f64>>>,
+    /// Number of levels of a continuous distribution in a factorial design, equally spaced in
+    /// probability, ends included.
+    #[serde(default)]
+    pub levels: Option<u32>,
+}
+
+/// A single name, or a list of names.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum OneOrMore {
+    /// A single name.
+    One(String),
+    /// Several names.
+    More(Vec<String>),
+}
+
+impl OneOrMore {
+    /// Returns all names.
+    pub fn all(&self) -> &[String] {
+        match self {
+            Self::One(name) => std::slice::from_ref(name),
+            Self::More(names) => names,
+        }
+    }
+}
+
+/// A normal distribution.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Normal {
+    /// Mean of the distribution.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub mean: Value,
+    /// Standard deviation of the distribution.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub deviation: Value,
+}
+
+/// A log-normal distribution.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LogNormal {
+    /// Median of the distribution.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub median: Value,
+    /// Standard deviation of the natural logarithm.
+    pub sigma: f64,
+}
+
+/// Equally spaced values.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// First value.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub from: Value,
+    /// Last value.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub to: Value,
+    /// Number of values, at least 2.
+    pub count: u32,
+}

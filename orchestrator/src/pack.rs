@@ -1,0 +1,60 @@
+//! The command `pack`, which writes an experiment as an SSP archive.
+
+use crate::failure::Failure;
+use crate::system;
+use cosim::error::Error;
+use cosim::experiment::Overrides;
+use cosim::interrupt::Interrupt;
+use cosim::system::System;
+use cosim::{search, ssp};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// An SSP archive that is to be written.
+pub(crate) struct Archive {
+    /// Path of the archive; that of the experiment if it is not given.
+    pub(crate) path: Option<PathBuf>,
+    /// Whether outputs that are enumerations get connectors.
+    pub(crate) enumerations: bool,
+    /// Whether an archive that is there may be replaced.
+    pub(crate) force: bool,
+}
+
+/// Writes an experiment as an SSP archive.
+///
+/// # Errors
+/// Returns an error if the experiment is faulty, or if the archive is there or cannot be written.
+pub(crate) fn pack(
+    experiment: &Path,
+    overrides: &Overrides,
+    fmu_dirs: &[PathBuf],
+    archive: Archive,
+    out: &mut impl Write,
+    interrupt: &Interrupt,
+) -> Result<(), Failure> {
+    let path = search::experiment(experiment)?;
+    let Archive { path: archive, enumerations, force } = archive;
+    let archive = archive.unwrap_or_else(|| {
+        PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("ssp")
+    });
+    if archive.exists() && !force {
+        let path = archive.display();
+        return Err(Error::experiment(format!(
+            "{path} is there already: --force replaces it, --out takes another name"
+        ))
+        .into());
+    }
+    let (system, _entries) = system(&path, overrides, fmu_dirs)?;
+    ssp::pack(&system, enumerations, &archive, interrupt)?;
+    Ok(packed(&system, &archive, out)?)
+}
+
+/// Prints the components in a packed archive, and which setting the standard cannot store.
+fn packed(system: &System, archive: &Path, out: &mut impl Write) -> std::io::Result<()> {
+    writeln!(out, "{}: {}", archive.display(), system.order.join(", "))?;
+    let step = system.experiment.simulation.step;
+    writeln!(
+        out,
+        "  the standard has no place for the step, {step} s: it stands in annotations, which not every tool reads"
+    )
+}
