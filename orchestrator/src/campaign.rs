@@ -1,6 +1,7 @@
 //! The commands `campaign` and `falsify`.
 
 use crate::failure::Failure;
+use campaign::bundle;
 use campaign::definition::Campaign;
 use campaign::plan::{self, Plan};
 use campaign::run::{self, Findings, Options};
@@ -49,6 +50,10 @@ pub(crate) struct Fly {
     /// Print which parts of the campaign are not flown yet, as JSON, and fly nothing.
     #[arg(long, conflicts_with_all = ["fresh", "csv"])]
     work: bool,
+    /// Write the campaign into a folder with all that its cases need, for another machine, and fly
+    /// nothing. That machine flies DIR/campaign.toml.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "cases", "work", "fresh", "csv"])]
+    bundle: Option<PathBuf>,
     /// Fly everything again, including what is kept.
     #[arg(long)]
     fresh: bool,
@@ -101,6 +106,10 @@ pub(crate) fn fly(
 ) -> Result<Next, Failure> {
     let plan = prepare(&asked.common)?;
     let folder = run::folder(&plan, asked.common.out.as_deref());
+    if let Some(folder) = &asked.bundle {
+        bundle::write(&plan, folder)?;
+        return Ok(Next::Done);
+    }
     if asked.work {
         let work =
             serde_json::to_string(&run::work(&plan, &folder)).map_err(std::io::Error::from)?;

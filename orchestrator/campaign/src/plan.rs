@@ -493,8 +493,9 @@ fn keys(campaign: &Campaign, system: &System) -> Result<BTreeMap<String, String>
     let digest = |bytes: &[u8]| hex(&Sha256::digest(bytes));
     let mut own: toml::Table = toml::from_str(campaign.source.whole())
         .map_err(|error| campaign.source.error(&(0..0), error.to_string()))?;
-    // These change neither the cases nor what is recorded of them.
-    for key in ["title", "description", "extends", "until", "keep", "search"] {
+    // These change neither the cases nor what is recorded of them. Experiment and FMUs count by their
+    // content, wherever they are.
+    for key in ["title", "description", "extends", "experiment", "fmu", "until", "keep", "search"] {
         own.remove(key);
     }
     if campaign.design != Kind::LatinHypercube && campaign.design != Kind::Corners {
