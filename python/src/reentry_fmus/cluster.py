@@ -6,6 +6,8 @@ campaign, its experiment and its units are sent to it. `Campaign.run(client)` us
 
 from __future__ import annotations
 
+import asyncio
+import concurrent.futures
 import hashlib
 import io
 import json
@@ -27,7 +29,15 @@ from ._data import program
 need("distributed", "cluster")
 
 import fsspec  # noqa: E402
-from distributed import Client, Future, Worker, WorkerPlugin, get_worker, wait  # noqa: E402
+from distributed import (  # noqa: E402
+    Client,
+    Future,
+    TimeoutError,
+    Worker,
+    WorkerPlugin,
+    get_worker,
+    wait,
+)
 
 if TYPE_CHECKING:
     from ._campaign import Campaign
@@ -41,6 +51,8 @@ QUEUED = 2
 """Tasks for each thread of the workers. The second one is there when the first one ends."""
 LOOK = 5.0
 """Longest time between two looks for new workers and for a lost scheduler, s."""
+CANCELLED = (asyncio.CancelledError, concurrent.futures.CancelledError)
+"""What Dask raises for a task that the scheduler does not know any more."""
 
 
 class ClusterError(RuntimeError):
@@ -200,6 +212,8 @@ class Flight:
             wait(list(tasks), timeout=LOOK, return_when="FIRST_COMPLETED")
         except TimeoutError:
             pass
+        except CANCELLED as error:
+            raise self.lost("the connection to the scheduler was lost") from error
         if self.client.status != "running":
             raise self.lost("the connection to the scheduler was closed")
         if any(task.status in ("lost", "cancelled") for task in tasks):
@@ -210,7 +224,7 @@ class Flight:
         """Keeps what a task has flown."""
         try:
             flown, seconds = task.result()
-        except Exception as error:
+        except (Exception, *CANCELLED) as error:
             cases = f"cases {parts[0][0]} to {parts[-1][1] - 1}"
             raise self.lost(f"{cases}: {error}") from error
         now = seconds / len(parts)
