@@ -1,6 +1,7 @@
 //! The commands `campaign` and `falsify`.
 
 use crate::failure::Failure;
+use campaign::bundle;
 use campaign::changes::Changes;
 use campaign::definition::Campaign;
 use campaign::findings::Findings;
@@ -58,6 +59,10 @@ pub(crate) struct Fly {
     /// Print which parts of the campaign are not flown yet, as JSON, and fly nothing.
     #[arg(long, conflicts_with_all = ["fresh", "csv"])]
     work: bool,
+    /// Write the campaign into a folder with all that its cases need, for another machine, and fly
+    /// nothing. That machine flies DIR/campaign.toml.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "cases", "work", "fresh", "csv"])]
+    bundle: Option<PathBuf>,
     /// Fly everything again, including what is kept.
     #[arg(long)]
     fresh: bool,
@@ -112,6 +117,16 @@ pub(crate) fn fly(
 ) -> Result<Next, Failure> {
     let plan = prepare(&asked.common)?;
     let folder = run::folder(&plan, asked.common.out.as_deref());
+    if let Some(folder) = &asked.bundle {
+        if asked.common.overrides
+            != (Overrides { fmu: asked.common.overrides.fmu.clone(), ..Overrides::default() })
+        {
+            let message = "--bundle takes no changes of the command line: put them into [set] of the campaign";
+            return Err(Error::experiment(message).into());
+        }
+        bundle::write(&plan, folder)?;
+        return Ok(Next::Done);
+    }
     if asked.work {
         let work =
             serde_json::to_string(&run::work(&plan, &folder)).map_err(std::io::Error::from)?;

@@ -197,15 +197,18 @@ pub(crate) fn keys(
     let digest = |bytes: &[u8]| hex(&Sha256::digest(bytes));
     let mut own: toml::Table = toml::from_str(campaign.source.whole())
         .map_err(|error| campaign.source.error(&(0..0), error.to_string()))?;
-    // These change neither the cases nor what is recorded of them.
-    for key in ["title", "description", "extends", "until", "keep", "search"] {
+    // These change neither the cases nor what is recorded of them. Experiment and FMUs count by their
+    // content, wherever they are.
+    for key in ["title", "description", "extends", "experiment", "fmu", "until", "keep", "search"] {
         own.remove(key);
     }
     if campaign.design != Kind::LatinHypercube && campaign.design != Kind::Corners {
         own.remove("cases");
     }
     let own = toml::to_string(&own).map_err(|error| Error::experiment(error.to_string()))?;
-    let own = format!("{own}{:?}", changes.overrides);
+    // FMUs count by their content here as well.
+    let overrides = Overrides { fmu: Vec::new(), ..changes.overrides.clone() };
+    let own = format!("{own}{overrides:?}");
     let mut keys = BTreeMap::from([
         ("campaign".to_string(), digest(own.as_bytes())),
         ("experiment".to_string(), digest(system.experiment.source.whole().as_bytes())),

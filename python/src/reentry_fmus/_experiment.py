@@ -9,7 +9,7 @@ import re
 import subprocess
 import tempfile
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -104,7 +104,7 @@ def experiment(
         OrchestratorError: The experiment was refused, or its run failed.
     """
     check_units(units)
-    command = [str(program()), "run", experiment_path(name), "--quiet", "--force"]
+    command = ["run", experiment_path(name), "--quiet", "--force"]
     command += ["--fmu-dir", str(UNITS)]
     for component, unit in (fmu or {}).items():
         command += ["--fmu", f"{component}={unit_path(unit)}"]
@@ -113,27 +113,41 @@ def experiment(
     for option, number in (("--stop", stop), ("--step", step)):
         if number is not None:
             command += [option, repr(float(number))]
+    return recorded(command, out, units)
+
+
+def recorded(
+    arguments: Sequence[str], out: str | os.PathLike[str] | None, units: Units, stacklevel: int = 4
+) -> Run:
+    """Calls the orchestrator for one run, and reads what it recorded."""
     with tempfile.TemporaryDirectory(prefix="reentry-") as temporary:
         folder = Path(temporary) if out is None else Path(out)
         # A folder of earlier results must not pass for those of a run that was refused.
         stale = folder / "results.json"
         before = stale.stat().st_mtime_ns if stale.exists() else None
-        done = subprocess.run(
-            [*command, "--out", str(folder)],
-            capture_output=True,
-            text=True,
-            encoding="utf-8",
-            env={**os.environ, "RUST_LOG": "warn"},
-            check=False,
-        )
-        messages, _, error = done.stderr.partition("error: ")
-        for text in re.findall(r"^ *WARN (.+)$", messages, re.MULTILINE):
-            warnings.warn(text, OrchestratorWarning, stacklevel=2)
+        exit_code, error, _ = orchestrate([*arguments, "--out", str(folder)], stacklevel)
         is_new = stale.exists() and stale.stat().st_mtime_ns != before
         run = read(folder, units) if is_new else None
-    if done.returncode != 0 or run is None:
-        raise OrchestratorError(error.strip() or done.stderr.strip(), done.returncode, run)
+    if exit_code != 0 or run is None:
+        raise OrchestratorError(error, exit_code, run)
     return run
+
+
+def orchestrate(arguments: Sequence[str], stacklevel: int) -> tuple[int, str, str]:
+    """Runs the orchestrator. Returns its exit code, the text of its error, and what it printed.
+    Its warnings are Python warnings, as many levels of calls further up as `stacklevel` says."""
+    done = subprocess.run(
+        [str(program()), *arguments],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env={**os.environ, "RUST_LOG": "warn"},
+        check=False,
+    )
+    messages, _, error = done.stderr.partition("error: ")
+    for text in re.findall(r"^ *WARN (.+)$", messages, re.MULTILINE):
+        warnings.warn(text, OrchestratorWarning, stacklevel=stacklevel)
+    return done.returncode, error.strip() or done.stderr.strip(), done.stdout
 
 
 def written(parameter: str, value: Value) -> str:

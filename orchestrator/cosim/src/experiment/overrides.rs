@@ -9,7 +9,7 @@ use std::path::Path;
 use toml::{Spanned, Value};
 
 /// Settings of an experiment that the command line may change.
-#[derive(Clone, Debug, Default, clap::Args)]
+#[derive(Clone, Debug, Default, PartialEq, clap::Args)]
 pub struct Overrides {
     /// Set a parameter: `plant.disturbance.seed=7`, `controller.constraints=paper`,
     /// `plant.disturbance.bound="1 deg/s2"`.

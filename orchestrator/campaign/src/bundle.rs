@@ -1,0 +1,50 @@
+//! A campaign in a folder that holds all that its cases need, so that another machine can fly them.
+
+use crate::plan::Plan;
+use cosim::error::Error;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use toml::Table;
+
+/// Name of the campaign's file in the folder.
+pub const CAMPAIGN: &str = "campaign.toml";
+const EXPERIMENT: &str = "experiment.toml";
+
+/// Writes the campaign, its experiment and its FMUs into a folder. What the files extend is merged
+/// into them. Parts that are flown with these files fit the campaign that they were made from.
+///
+/// # Errors
+/// Returns an error if a file cannot be written.
+pub fn write(plan: &Plan, folder: &Path) -> Result<(), Error> {
+    let keep = |name: &str, content: &[u8]| {
+        let path = folder.join(name);
+        fs::write(&path, content).map_err(Error::file(&path))
+    };
+    fs::create_dir_all(folder).map_err(Error::file(folder))?;
+    let system = plan.system(&mut BTreeMap::new())?;
+    // Components that share an FMU share its copy.
+    let mut copies: BTreeMap<&Path, String> = BTreeMap::new();
+    let mut fmus = Table::new();
+    for (component, fmu) in system.order.iter().zip(&system.fmus) {
+        let number = copies.len();
+        if !copies.contains_key(fmu.path.as_path()) {
+            let file = fmu.path.file_name().unwrap_or_default().to_string_lossy();
+            // FMUs of different folders may have the same name.
+            let copy = format!("{number}-{file}");
+            keep(&copy, &fs::read(&fmu.path).map_err(Error::file(&fmu.path))?)?;
+            copies.insert(&fmu.path, copy);
+        }
+        fmus.insert(component.clone(), copies[fmu.path.as_path()].clone().into());
+    }
+    let source = &plan.campaign.source;
+    let fault = |error: String| source.error(&(0..0), error);
+    let mut campaign: Table =
+        toml::from_str(source.whole()).map_err(|error| fault(error.to_string()))?;
+    campaign.remove("extends");
+    campaign.insert("experiment".into(), EXPERIMENT.into());
+    campaign.insert("fmu".into(), fmus.into());
+    let campaign = toml::to_string(&campaign).map_err(|error| fault(error.to_string()))?;
+    keep(EXPERIMENT, system.experiment.source.whole().as_bytes())?;
+    keep(CAMPAIGN, campaign.as_bytes())
+}

@@ -1,0 +1,203 @@
+"""Campaigns and searches on one machine."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+import reentry_fmus
+from reentry_fmus import OrchestratorError, campaign, experiment, falsify
+
+CAMPAIGN = """
+title = "LQR, inertia and gusts"
+experiment = "lqr"
+cases = 600
+metrics = ["ems_deg"]
+
+[[vary]]
+parameter = "plant.disturbance.seed"
+case = 1
+
+[[vary]]
+parameter = "plant.inertia.scale"
+uniform = [0.95, 1.05]
+
+[[vary]]
+parameter = "plant.initial.alpha"
+uniform = ["6 deg", "9 deg"]
+
+[[measure]]
+id = "rate"
+kind = "largest"
+signals = "rate-norm"
+
+[[limit]]
+id = "rate"
+measure = "rate"
+at_most = 6.0
+
+[signals]
+rate-norm = ["norm(plant.rate.p, plant.rate.q, plant.rate.r)"]
+
+[search]
+largest = "rate"
+cases = 20
+"""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("campaign") / "gusts.toml"
+    path.write_text(CAMPAIGN)
+    return path
+
+
+@pytest.fixture(scope="module")
+def flown(file, tmp_path_factory):
+    return campaign(file).run(out=tmp_path_factory.mktemp("flown"), units="deg")
+
+
+def test_a_campaign_is_a_table_of_cases(flown):
+    table = flown.table
+    assert table.shape[0] == 600 and table.index.name == "case"
+    assert list(table.index) == list(range(600))
+    assert table["plant.disturbance.seed"].tolist() == list(range(1, 601))
+    assert table["plant.inertia.scale"].between(0.95, 1.05).all()
+    assert table["status"].cat.categories.tolist() == ["completed", "ended", "lost", "failed"]
+    assert (table["status"] == "completed").all() and (table["time"] == 50.0).all()
+    assert table["kept.rate"].equals((table["rate"] <= 6.0).rename("kept.rate"))
+
+
+def test_columns_have_units(file, flown):
+    assert set(flown.table.attrs["units"]) == set(flown.table.columns)
+    assert flown.table.attrs["units"]["rate"] == "deg/s"
+    assert flown.table.attrs["units"]["plant.initial.alpha"] == "deg"
+    assert flown.table["plant.initial.alpha"].between(6.0, 9.0).all()
+    si = campaign(file).run(out=flown.folder).table
+    assert si.attrs["units"]["plant.initial.alpha"] == "rad"
+    assert si.attrs["units"]["plant.inertia.scale"] is None
+    assert si["plant.initial.alpha"].max() < 0.16
+
+
+def test_the_summary_follows_from_the_table(flown):
+    assert flown.summary["cases"] == 600
+    (limit,) = flown.summary["limits"]
+    assert limit["broken"]["events"] == (~flown.table["kept.rate"]).sum()
+    (rate,) = [own for own in flown.summary["measures"] if own["name"] == "rate"]
+    assert rate["summary"]["worst"] == flown.table["rate"].idxmax()
+    assert rate["summary"]["mean"] == pytest.approx(flown.table["rate"].mean(), rel=1e-12)
+    assert flown.report.read_text().lstrip().lower().startswith("<!doctype html>")
+
+
+def test_what_is_flown_is_not_flown_again(file, flown):
+    before = {path: path.stat().st_mtime_ns for path in (flown.folder / "parts").iterdir()}
+    assert len(before) == 3
+    bytes_before = (flown.folder / "cases.parquet").read_bytes()
+    next(iter(before)).unlink()
+    again = campaign(file).run(out=flown.folder, jobs=1, units="deg")
+    assert again.table.equals(flown.table)
+    after = {path: path.stat().st_mtime_ns for path in (flown.folder / "parts").iterdir()}
+    assert sum(after[path] == before[path] for path in before) == 2
+    assert (flown.folder / "cases.parquet").read_bytes() == bytes_before
+
+
+def test_results_are_in_out_by_default(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    small = tmp_path / "small.toml"
+    small.write_text(CAMPAIGN.replace("cases = 600", "cases = 100"))
+    run = campaign("small.toml").run()
+    assert run.folder == tmp_path / "out" / "small" and len(run.table) == 100
+
+
+def test_a_case_is_run_again_with_everything_recorded(file, flown, tmp_path):
+    worst = int(flown.table["rate"].idxmax())
+    run = campaign(file).case(worst, out=tmp_path / "worst")
+    assert run.metrics["ems_deg"] == flown.table["ems_deg"][worst]
+    rate = [run.table[f"plant.rate.{axis}"] for axis in "pqr"]
+    largest = np.degrees(np.sqrt(np.square(rate).sum(axis=0))).max()
+    assert largest == pytest.approx(flown.table["rate"][worst], rel=1e-9)
+    again = experiment(tmp_path / "worst" / "case.toml")
+    assert again.table.equals(run.table)
+
+
+def test_parts_do_not_depend_on_where_the_files_are(file, flown, tmp_path):
+    """The experiment is another file with the same text, at another place."""
+    here = tmp_path / "elsewhere"
+    own = campaign(file)
+    own.call("--bundle", str(here))
+    names = {path.name for path in here.iterdir()}
+    assert {"campaign.toml", "experiment.toml"} < names and len(names) == 4
+    taken = campaign(here / "campaign.toml")
+    assert json.loads(taken.call("--work", "--out", str(flown.folder)))["missing"] == []
+    taken.call("--cases", "250..500", "--out", str(tmp_path / "out"))
+    part = "0000000250-0000000500.parquet"
+    assert (tmp_path / "out" / "parts" / part).read_bytes() == (
+        flown.folder / "parts" / part
+    ).read_bytes()
+
+
+def test_a_bundle_holds_what_a_campaign_extends_and_replaces(file, tmp_path):
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "base.toml").write_text(CAMPAIGN.replace("cases = 600", "cases = 250"))
+    own = tmp_path / "deep" / "own.toml"
+    own.write_text('extends = "../base.toml"\nseed = 5\n[fmu]\ncontroller = "FBL.fmu"\n')
+    whole = campaign(own).run(out=tmp_path / "whole")
+    campaign(own).call("--bundle", str(tmp_path / "bundle"))
+    own.unlink()
+    (tmp_path / "base.toml").unlink()
+    taken = campaign(tmp_path / "bundle" / "campaign.toml").run(out=tmp_path / "taken")
+    bytes_of = [(run.folder / "cases.parquet").read_bytes() for run in (whole, taken)]
+    assert bytes_of[0] == bytes_of[1]
+
+
+def test_a_search_finds_a_worse_case(file, flown, tmp_path):
+    search = falsify(file, out=tmp_path / "search", jobs=1)
+    assert search.outcome["measure"] == "rate" and search.outcome["unit"] == "deg/s"
+    assert search.table["rate"].max() == search.outcome["largest"]
+    assert search.figure.startswith("<svg") and search._repr_svg_() == search.figure
+    run = experiment(search.worst)
+    rate = [run.table[f"plant.rate.{axis}"] for axis in "pqr"]
+    largest = np.degrees(np.sqrt(np.square(rate).sum(axis=0))).max()
+    assert largest == pytest.approx(search.outcome["largest"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "message"),
+    [
+        ("at_most = 6.0", 'at_most = "6 deg/s"', "bad.toml:27: invalid type"),
+        ("cases = 600", "cases = 600\ncasses = 1", "casses"),
+        ("plant.inertia.scale", "plant.inertia.scal", 'did you mean "plant.inertia.scale"?'),
+        ('experiment = "lqr"', 'experiment = "lqrr"', 'did you mean "lqr"?'),
+    ],
+)
+def test_the_orchestrators_errors_are_exceptions(right, wrong, message, tmp_path):
+    (tmp_path / "bad.toml").write_text(CAMPAIGN.replace(right, wrong))
+    with pytest.raises(OrchestratorError) as caught:
+        campaign(tmp_path / "bad.toml").run(out=tmp_path / "out")
+    assert message in str(caught.value) and caught.value.exit_code == 2
+
+
+def test_bad_arguments_are_refused(file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(OrchestratorError, match='no campaign "gust"'):
+        campaign("gust").run()
+    with pytest.raises(OrchestratorError, match="the campaign has 600 cases"):
+        campaign(file).case(600)
+    with pytest.raises(ValueError, match="an address is for runs with a client"):
+        campaign(file).run(out="memory://somewhere")
+    with pytest.raises(ValueError, match='"si" or "deg"'):
+        campaign(file).run(units="grad")
+
+
+def test_a_missing_package_is_named(file, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(ModuleNotFoundError) as caught:
+        campaign(file)
+    assert 'pip install "reentry-fmus[campaign]"' in str(caught.value)
+    monkeypatch.undo()
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    monkeypatch.delitem(sys.modules, "reentry_fmus.cluster", raising=False)
+    monkeypatch.delattr(reentry_fmus, "cluster", raising=False)
+    with pytest.raises(ModuleNotFoundError) as caught:
+        campaign(file).run(object())
+    assert 'pip install "reentry-fmus[cluster]"' in str(caught.value)
