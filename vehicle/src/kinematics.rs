@@ -14,6 +14,10 @@ use serde::{Deserialize, Serialize};
 pub fn r(angles: &Vector3<f64>) -> Matrix3<f64> {
     let (sa, ca) = sin_cos(angles.x);
     let (sb, cb) = sin_cos(angles.y);
+    r_of(sa, ca, sb, cb)
+}
+
+fn r_of(sa: f64, ca: f64, sb: f64, cb: f64) -> Matrix3<f64> {
     let tb = sb / cb;
     Matrix3::new(-ca * tb, 1.0, -sa * tb, sa, 0.0, -ca, -ca * cb, -sb, -cb * sa)
 }
@@ -22,7 +26,19 @@ pub fn r(angles: &Vector3<f64>) -> Matrix3<f64> {
 pub fn r_inverse(angles: &Vector3<f64>) -> Matrix3<f64> {
     let (sa, ca) = sin_cos(angles.x);
     let (sb, cb) = sin_cos(angles.y);
+    r_inverse_of(sa, ca, sb, cb)
+}
+
+fn r_inverse_of(sa: f64, ca: f64, sb: f64, cb: f64) -> Matrix3<f64> {
     Matrix3::new(-sb * ca * cb, sa, -cb * ca, cb * cb, 0.0, -sb, -sa * cb * sb, -ca, -cb * sa)
+}
+
+/// Matrix R(Θ) and its inverse, as [`r`] and [`r_inverse`] return them, from the same sines and
+/// cosines. The last result is sin β.
+fn r_and_inverse(angles: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>, f64) {
+    let (sa, ca) = sin_cos(angles.x);
+    let (sb, cb) = sin_cos(angles.y);
+    (r_of(sa, ca, sb, cb), r_inverse_of(sa, ca, sb, cb), sb)
 }
 
 /// Partial derivative ∂R/∂α of the printed R.
@@ -135,13 +151,29 @@ impl Kinematics {
 
     /// Inverse R⁻¹ of the matrix R in use.
     pub fn r_inverse(self, angles: &Vector3<f64>) -> Matrix3<f64> {
-        let mut inverse = r_inverse(angles);
-        if self == Self::Exact {
-            // (E R)⁻¹ = R⁻¹ E⁻¹ with E = 1 + sin β e₃ e₁ᵀ
-            let bank = inverse.column(2) * sin(angles.y);
-            inverse.set_column(0, &(inverse.column(0) - bank));
+        match self {
+            Self::Printed => r_inverse(angles),
+            Self::Exact => Self::inverse_with_alpha_rate(r_inverse(angles), sin(angles.y)),
         }
+    }
+
+    /// Inverse of the matrix that [`Self::with_alpha_rate`] makes, given the inverse of what it is
+    /// made of: (E R)⁻¹ = R⁻¹ E⁻¹ with E = 1 + `factor` e₃ e₁ᵀ.
+    fn inverse_with_alpha_rate(mut inverse: Matrix3<f64>, factor: f64) -> Matrix3<f64> {
+        let bank = inverse.column(2) * factor;
+        inverse.set_column(0, &(inverse.column(0) - bank));
         inverse
+    }
+
+    /// Matrix R in use and its inverse, which together need the sines and cosines once.
+    pub fn r_and_inverse(self, angles: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+        let (matrix, inverse, sb) = r_and_inverse(angles);
+        match self {
+            Self::Printed => (matrix, inverse),
+            Self::Exact => {
+                (Self::with_alpha_rate(matrix, sb), Self::inverse_with_alpha_rate(inverse, sb))
+            }
+        }
     }
 
     /// Partial derivative ∂R/∂α of the matrix R in use.

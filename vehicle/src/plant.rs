@@ -34,9 +34,9 @@ pub struct Load {
 /// R Δ_m of (4b) put into the rate equation.
 pub fn derivative(body: &RigidBody, kinematics: Kinematics, state: &State, load: &Load) -> State {
     let (angles, rates) = (angles(state), rates(state));
-    let acceleration = body.angular_acceleration(&rates, &load.moment)
-        + kinematics.r_inverse(&angles) * load.delta;
-    let mut angle_rates = kinematics.r(&angles) * rates;
+    let (matrix, inverse) = kinematics.r_and_inverse(&angles);
+    let acceleration = body.angular_acceleration(&rates, &load.moment) + inverse * load.delta;
+    let mut angle_rates = matrix * rates;
     if load.turn_rate != Vector3::zeros() {
         angle_rates += kinematics.turn(&angles) * load.turn_rate;
     }

@@ -22,6 +22,14 @@ proptest! {
     }
 
     #[test]
+    fn r_and_its_inverse_together_are_the_same_bits_as_each_by_itself(angles in attitude()) {
+        for kinematics in [Kinematics::Printed, Kinematics::Exact] {
+            let apart = (kinematics.r(&angles), kinematics.r_inverse(&angles));
+            prop_assert_eq!(kinematics.r_and_inverse(&angles), apart);
+        }
+    }
+
+    #[test]
     fn oracle_r_r_transposed_has_eigenvalues_sec2_beta_1_1(angles in attitude()) {
         let mut eigenvalues: Vec<f64> =
             (r(&angles) * r(&angles).transpose()).symmetric_eigenvalues().iter().copied().collect();

@@ -14,6 +14,7 @@ use cosim::variation::{SettingValue, Target};
 use cosim_report::metrics::Meters;
 use fmu_import::names;
 use serde_json::{Map, Value, json};
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -160,7 +161,15 @@ impl Plan {
                 self.campaign.source.error(&(0..0), message)
             })
         });
-        values.collect()
+        let mut values = values.collect::<Result<Vec<_>, _>>()?;
+        let groups = self.varied.iter().enumerate().filter(|(_, own)| own.sorted > 0);
+        for (first, own) in groups {
+            values[first..first + own.sorted].sort_by(|a, b| match (a, b) {
+                (SettingValue::Real(a), SettingValue::Real(b)) => a.total_cmp(b),
+                _ => Ordering::Equal,
+            });
+        }
+        Ok(values)
     }
 
     /// Returns the changes that these values make to the system.

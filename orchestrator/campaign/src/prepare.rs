@@ -17,6 +17,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use toml::Spanned;
 
 /// Version of the files of parts, which must be raised when their content changes.
 const FORMAT: u32 = 1;
@@ -34,6 +35,9 @@ pub struct Varied {
     pub kind: Type,
     /// Distribution of the values.
     pub law: Law,
+    /// Number of entries, from this one on, whose values are put into ascending order; 0 except in
+    /// the first of them.
+    pub(crate) sorted: usize,
     pub(crate) targets: Vec<Target>,
     pub(crate) paths: Vec<String>,
 }
@@ -165,9 +169,20 @@ pub(crate) fn laws(vary: &Vary, source: &Source, system: &System) -> Result<Vec<
             unit,
             kind: variable.kind.clone(),
             law,
+            sorted: 0,
             targets,
             paths,
         });
+    }
+    if vary.sorted {
+        let is_real = all.iter().all(|own| matches!(own.kind, Type::Real { .. }));
+        let Some(first) = all.first_mut().filter(|_| is_real && vary.each.len() > 1) else {
+            let span = vary.each.first().map_or(0..0, Spanned::span);
+            return Err(
+                source.error(&span, "[[vary]] sorted is for several real parameters in each")
+            );
+        };
+        first.sorted = vary.each.len();
     }
     Ok(all)
 }

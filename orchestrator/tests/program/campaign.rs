@@ -344,6 +344,17 @@ fn oracle_correlated_parameters_have_their_correlation() {
 }
 
 #[test]
+fn what_is_sorted_ascends() {
+    let vary = "[[vary]]\neach = [\"gain.pause\", \"gain.delay\", \"plant.delay\"]\nuniform = [0.0, 1e-3]\nsorted = true\n";
+    let text = RANDOM.replace("cases = 1100", "cases = 20") + vary;
+    let rows = flown(&bench(&text), &[]);
+    for row in &rows[1..] {
+        let times: Vec<f64> = row.split(',').skip(4).take(3).map(|t| t.parse().unwrap()).collect();
+        assert!(times[0] < times[1] && times[1] < times[2] && times[2] < 1e-3, "{row}");
+    }
+}
+
+#[test]
 fn a_search_finds_the_corner_and_writes_it_as_an_experiment() {
     let text = format!("{RANDOM}[search]\nlargest = \"last\"\ncases = 300\n");
     let text = text.replace("uniform = [0.0", "uniform = [-0.9");

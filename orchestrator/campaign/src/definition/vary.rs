@@ -19,6 +19,9 @@ pub struct Vary {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub each: Vec<Spanned<String>>,
+    /// Whether the values of `each` are put into ascending order, as times that switch something.
+    #[serde(default)]
+    pub sorted: bool,
     /// Smallest and largest value of a uniform distribution. An integer parameter gets integers,
     /// both ends included.
     #[serde(default)]
