@@ -197,11 +197,12 @@ enum Command {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    // A study may have a thousand runs; its report counts their warnings instead.
-    let usual = if matches!(arguments.command, Command::Reproduce { .. } | Command::Falsify(_)) {
-        "error"
-    } else {
-        "warn"
+    // A study may have a thousand runs; its report counts their warnings instead. Of a campaign the
+    // messages of units are in its table.
+    let usual = match arguments.command {
+        Command::Reproduce { .. } => "error",
+        Command::Campaign(_) | Command::Falsify(_) => "warn,fmu_import=off",
+        _ => "warn",
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(usual));
     tracing_subscriber::fmt()

@@ -181,13 +181,16 @@ fn draw_panel(panel: &Panel, area: &Area, lowest: bool) -> Result<(), DrawError>
         if whole { plain(10_f64.powf(x.round()), 3) } else { String::new() }
     };
     let label_x = |x: &f64| if panel.log_x { decade(x) } else { plain(*x, decimals(right - left)) };
+    // Long labels are few, so that they do not touch each other: about 7 pixels for each digit.
+    let longest = [left, right].map(|end| label_x(&end).chars().count()).into_iter().max();
+    let room = area.dim_in_pixel().0 as usize / (7 * longest.unwrap_or(0) + 14);
     let label_y = |y: &f64| plain(*y, decimals(top - bottom));
     let mut mesh = chart.configure_mesh();
     mesh.y_desc(&panel.y_label)
         .label_style((FONT, 13))
         .axis_desc_style((FONT, 14))
         .light_line_style(TRANSPARENT)
-        .x_labels(11)
+        .x_labels(room.clamp(3, 11))
         .y_labels(7)
         .x_label_formatter(&label_x)
         .y_label_formatter(&label_y);
