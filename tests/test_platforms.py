@@ -28,11 +28,11 @@ FOLDERS = {
     "macos-x86_64": {"darwin64": "dylib"},
     "macos-aarch64": {"darwin64": "dylib"},
 }
-# Every file of an experiment that `run` takes: no parts, studies or tables of published numbers.
+# Every file of an experiment that `run` takes: no parts, studies, campaigns or tables of published numbers.
 EXPERIMENTS = [
     path
     for path in sorted((ROOT / "orchestrator" / "experiments").glob("*/*.toml"))
-    if path.parent.name not in ("base", "exchange") and path.stem not in ("study", "published", "computed")
+    if path.parent.name not in ("base", "campaigns", "exchange") and path.stem not in ("study", "published", "computed")
 ]
 # What Windows 10 and macOS 11 have.
 WINDOWS = ("api-ms-win-core-", "api-ms-win-crt-", "bcryptprimitives.", "kernel32.", "ntdll.", "userenv.", "ws2_32.")
