@@ -181,7 +181,7 @@ impl Source {
     }
 
     fn refusal(&self, error: &toml::de::Error) -> Error {
-        let message = error.message().replace('\n', " ");
+        let message = with_nearest(&error.message().replace('\n', " "));
         self.error(&error.span().map_or(0..0, |s| s.start..s.end.max(s.start + 1)), message)
     }
 
@@ -214,6 +214,16 @@ impl Source {
             }
         }
         Ok(())
+    }
+}
+
+/// Adds the nearest right name to the message about an unknown key, which lists all of them.
+fn with_nearest(message: &str) -> String {
+    let mut names = message.split('`').skip(1).step_by(2);
+    let wrong = names.next().filter(|_| message.starts_with("unknown "));
+    match wrong.and_then(|wrong| names::nearest(wrong, names)) {
+        Some(near) => format!("{message}; did you mean \"{near}\"?"),
+        None => message.to_string(),
     }
 }
 
