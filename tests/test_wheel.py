@@ -181,7 +181,8 @@ class Installed:
         constraints.write_text(self._lowest(wheel) if lowest else "")
         install = [self.python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:"]
         name, version = wheel.name.split("-")[:2]
-        self.run([*install, "--find-links", wheel.parent, "-c", constraints, f"{name}[cluster]=={version}"])
+        package = f"{name}[cluster]=={version}"
+        self.run([*install, "--find-links", wheel.parent, "-c", constraints, package])
         self.run([*install, "-c", constraints, "-r", TESTS / "requirements.txt"])
 
     @staticmethod

@@ -18,6 +18,7 @@ import tempfile
 import time
 import uuid
 import zipfile
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -32,6 +33,7 @@ import fsspec  # noqa: E402
 from distributed import (  # noqa: E402
     Client,
     Future,
+    KilledWorker,
     TimeoutError,
     Worker,
     WorkerPlugin,
@@ -44,13 +46,15 @@ if TYPE_CHECKING:
 
 __all__ = ["ClusterError", "fly"]
 
-TASK = 8.0
+TASK = 10.0
 """Time that a task should take, s: long against the start of the program (about 0.1 s), and short
 enough to be lost."""
 QUEUED = 2
 """Tasks for each thread of the workers. The second one is there when the first one ends."""
 LOOK = 5.0
 """Longest time between two looks for new workers and for a lost scheduler, s."""
+GIVEN_UP = 4
+"""Number of times that Dask gives a task up before the campaign is ended."""
 CANCELLED = (asyncio.CancelledError, concurrent.futures.CancelledError)
 """What Dask raises for a task that the scheduler does not know any more."""
 
@@ -160,6 +164,8 @@ class Flight:
         self.store = store
         self.part = 0.0
         """Time that a part takes, s; 0 before the first one is flown."""
+        self.given_up: Counter[tuple[int, int]] = Counter()
+        """How often Dask gave a task up, by its first part."""
 
     def fly(self, missing: list[tuple[int, int]]) -> Iterator[int]:
         """Flies the parts. Yields the first case of each that is kept."""
@@ -173,8 +179,10 @@ class Flight:
                     tasks[self.submit(parts)] = parts
                 for task in self.done(tasks):
                     parts = tasks.pop(task)
-                    self.keep(task, parts)
-                    yield from (first for first, _ in parts)
+                    if self.keep(task, parts):
+                        yield from (first for first, _ in parts)
+                    else:
+                        left = parts + left
         except OSError as error:
             # The client's own calls fail with such an error when the scheduler is gone.
             raise self.lost(str(error)) from error
@@ -220,10 +228,16 @@ class Flight:
             raise self.lost("the scheduler does not know its tasks any more")
         return [task for task in tasks if task.done()]
 
-    def keep(self, task: Future, parts: list[tuple[int, int]]) -> None:
-        """Keeps what a task has flown."""
+    def keep(self, task: Future, parts: list[tuple[int, int]]) -> bool:
+        """Keeps what a task has flown. Returns whether it has: Dask gives up a task that was lost
+        with several workers, although they may have been taken away for reasons of their own."""
         try:
             flown, seconds = task.result()
+        except KilledWorker as error:
+            self.given_up[parts[0]] += 1
+            if self.given_up[parts[0]] == GIVEN_UP:
+                raise self.lost(str(error)) from error
+            return False
         except (Exception, *CANCELLED) as error:
             cases = f"cases {parts[0][0]} to {parts[-1][1] - 1}"
             raise self.lost(f"{cases}: {error}") from error
@@ -234,6 +248,7 @@ class Flight:
                 put(self.folder / "parts" / name, content)
             else:
                 self.store.fetch(name, self.folder / "parts")
+        return True
 
     def lost(self, problem: str) -> ClusterError:
         kept = sum(1 for _ in (self.folder / "parts").glob("*.parquet"))
