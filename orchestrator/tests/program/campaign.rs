@@ -225,11 +225,7 @@ fn a_campaign_ends_when_its_question_is_answered() {
 fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
     for (from, to, said) in [
         ("title = ", "titel = ", "did you mean \"title\"?"),
-        (
-            "design = \"factorial\"",
-            "design = \"factoriel\"",
-            "did you mean \"factorial\"?",
-        ),
+        ("design = \"factorial\"", "design = \"factoriel\"", "did you mean \"factorial\"?"),
         ("list = [0.5", "lst = [0.5", "c.toml:11: unknown field `lst`, expected"),
         ("loop.toml", "lop.toml", "c.toml:3: "),
         (
