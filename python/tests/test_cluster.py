@@ -159,9 +159,12 @@ def test_parts_are_kept_at_an_address(kind, file, expected, tmp_path, monkeypatc
         shutil.rmtree(tmp_path / "out")
         submitted = []
         submit = client.submit
-        monkeypatch.setattr(
-            client, "submit", lambda *args, **named: submitted.append(args) or submit(*args, **named)
-        )
+
+        def noted(*arguments, **named):
+            submitted.append(arguments)
+            return submit(*arguments, **named)
+
+        monkeypatch.setattr(client, "submit", noted)
         assert content(campaign(file).run(client, out=address).folder) == expected
         assert [arguments[3:5] for arguments in submitted] == [(250, 500)]
         assert store.files.cat_file(f"{store.root}/parts/{damaged}") == right
