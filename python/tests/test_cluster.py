@@ -1,4 +1,4 @@
-"""Campaigns on Dask's workers: whatever happens to them, the results are the bytes of one machine."""
+"""Campaigns on Dask's workers: whatever happens to them, the results are those of one machine."""
 
 import os
 import shutil
@@ -16,6 +16,7 @@ import pytest
 from reentry_fmus import OrchestratorError, campaign
 from reentry_fmus._data import experiment_path
 
+dask = pytest.importorskip("dask")
 pytest.importorskip("distributed")
 from distributed import Client, LocalCluster  # noqa: E402
 from reentry_fmus import cluster  # noqa: E402
@@ -158,9 +159,12 @@ def test_parts_are_kept_at_an_address(kind, file, expected, tmp_path, monkeypatc
         shutil.rmtree(tmp_path / "out")
         submitted = []
         submit = client.submit
-        monkeypatch.setattr(
-            client, "submit", lambda *args, **named: submitted.append(args) or submit(*args, **named)
-        )
+
+        def noted(*arguments, **named):
+            submitted.append(arguments)
+            return submit(*arguments, **named)
+
+        monkeypatch.setattr(client, "submit", noted)
         assert content(campaign(file).run(client, out=address).folder) == expected
         assert [arguments[3:5] for arguments in submitted] == [(250, 500)]
         assert store.files.cat_file(f"{store.root}/parts/{damaged}") == right
@@ -180,9 +184,11 @@ def test_a_campaign_ends_at_the_same_case_when_its_question_is_answered(
         assert (together.folder / name).read_bytes() == (alone.folder / name).read_bytes()
 
 
-def test_a_worker_is_killed(file, expected, tmp_path):
+@pytest.mark.parametrize("failures", [0, 3])
+def test_a_worker_is_killed(failures, file, expected, tmp_path):
+    """Its tasks are flown again, whether Dask does so by itself or gives them up at once."""
     out = tmp_path / "out"
-    with workers() as client:
+    with dask.config.set({"distributed.scheduler.allowed-failures": failures}), workers() as client:
         before = client.run(os.getpid)
         with meanwhile(out, lambda: os.kill(next(iter(before.values())), signal.SIGKILL)):
             run = campaign(file).run(client, out=out)

@@ -252,7 +252,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from typing_extensions import assert_type
-from reentry_fmus import ClosedLoop, Flown, Run, State, campaign, experiment, experiments, fmu, units
+from reentry_fmus import ClosedLoop, Flown, Run, State
+from reentry_fmus import campaign, experiment, experiments, fmu, units
 
 def law(state: State) -> list[float]:
     return [0.0, 1e3 * float(state.rate[0]), 0.0]
