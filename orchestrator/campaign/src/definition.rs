@@ -37,10 +37,6 @@ pub struct Campaign {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, cosim::experiment::Scalar>")]
     pub set: BTreeMap<String, Spanned<Value>>,
-    /// Parameters that the experiment sets and that stay at the unit's own value.
-    #[serde(default)]
-    #[schemars(with = "Vec<String>")]
-    pub unset: Vec<Spanned<String>>,
     /// Seed of all random numbers. Case k depends on the seed and k alone.
     #[serde(default = "one")]
     pub seed: u64,

@@ -72,10 +72,6 @@ pub(crate) fn read_experiment(campaign: &Campaign, changes: &Changes) -> Result<
         overrides.fmu.push(format!("{component}={}", file.display()));
     }
     experiment.apply(&overrides)?;
-    for name in &campaign.unset {
-        let outcome = experiment.unset(name.get_ref());
-        outcome.map_err(|problem| source.error(&name.span(), format!("unset: {problem}")))?;
-    }
     for (name, value) in &campaign.set {
         let outcome = experiment.set(name, value.get_ref().clone());
         outcome.map_err(|problem| source.error(&value.span(), format!("[set] {problem}")))?;
