@@ -11,8 +11,8 @@ HEAD = """# Who keeps what, with which probability
 `scripts/campaigns` flies the campaigns below
 [orchestrator/experiments/campaigns](../orchestrator/experiments/campaigns) with each controller and
 writes this page. Probabilities are those of breaking a limit, with 95 % confidence by Clopper and
-Pearson; at corners, levels and for adversaries they are no more than shares. [campaigns.md](campaigns.md)
-says what the numbers mean.
+Pearson; at corners, levels and for adversaries they are no more than shares.
+[campaigns.md](campaigns.md) says what the numbers mean.
 """
 
 

@@ -12,9 +12,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::{fs, iter};
 
-/// Prints the experiments, studies and campaigns below a folder with their titles, and the FMUs below it.
-/// Without a folder it prints those below the current one, and all others that the program finds
-/// from any folder.
+/// Prints the experiments, studies and campaigns below a folder with their titles, and the FMUs
+/// below it. Without a folder it prints those below the current one, and all others that the
+/// program finds from any folder.
 ///
 /// # Errors
 /// Returns an error if the folder does not exist, or if the text cannot be written.

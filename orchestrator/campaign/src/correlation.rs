@@ -82,8 +82,8 @@ pub(crate) fn correlation(
     Ok(Some(Correlated { dimensions, factor }))
 }
 
-/// Returns the lower triangular factor of a symmetric matrix, row by row; `None` if the matrix is not
-/// positive definite. (`nalgebra` is built without matrices of any size here, so that the units
+/// Returns the lower triangular factor of a symmetric matrix, row by row; `None` if the matrix is
+/// not positive definite. (`nalgebra` is built without matrices of any size here, so that the units
 /// compute the same everywhere.)
 fn cholesky(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let mut factor: Vec<Vec<f64>> = Vec::new();

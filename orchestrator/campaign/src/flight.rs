@@ -102,8 +102,8 @@ impl<'a> Flight<'a> {
         &mut self.system
     }
 
-    /// Flies a case to its end and writes what a single run writes of it: the recorded variables and
-    /// the plot.
+    /// Flies a case to its end and writes what a single run writes of it: the recorded variables
+    /// and the plot.
     ///
     /// # Errors
     /// The errors are those of [`Self::fly`], and of files that cannot be written.
@@ -287,8 +287,8 @@ fn typed<'a>(kind: &Type, values: impl Iterator<Item = &'a SettingValue>) -> Val
     }
 }
 
-/// Returns whether units can be reset: a case that is flown with units that were reset after another
-/// case gives the same result as with new units.
+/// Returns whether units can be reset: a case that is flown with units that were reset after
+/// another case gives the same result as with new units.
 ///
 /// # Errors
 /// The errors are those of [`Flight::fly`].

@@ -1,16 +1,17 @@
 //! The distribution of a parameter that varies: its quantile function, with units converted.
 
 mod reader;
+mod shape;
 
 use crate::definition::Vary;
 use crate::design::Place;
 use crate::texts::short;
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
-use statrs::distribution::{ContinuousCDF, LogNormal, Normal, Triangular};
-use statrs::statistics::{Distribution, Mode};
-
 use reader::Reader;
+use shape::Shape;
+use statrs::distribution::ContinuousCDF;
+use statrs::statistics::{Distribution, Mode};
 
 /// Distribution of the values of a parameter.
 #[derive(Clone, Debug)]
@@ -22,20 +23,6 @@ pub struct Law {
     ends: Option<[f64; 2]>,
     /// Number of levels in a factorial design, and 0 if it was not given.
     levels: u64,
-}
-
-#[derive(Clone, Debug)]
-enum Shape {
-    Uniform([f64; 2]),
-    /// Integers, both ends included.
-    Whole([i32; 2]),
-    Normal(Normal),
-    LogNormal(LogNormal),
-    Triangular(Triangular),
-    /// Values with the probabilities up to and including each of them.
-    List(Vec<SettingValue>, Vec<f64>),
-    /// This integer plus the number of the case.
-    Case(i64),
 }
 
 impl Law {
@@ -153,8 +140,8 @@ impl Law {
         }
     }
 
-    /// Returns whether values can be between any two of them, so that correlations and searches make
-    /// sense.
+    /// Returns whether values can be between any two of them, so that correlations and searches
+    /// make sense.
     pub fn is_ordered(&self) -> bool {
         !matches!(self.shape, Shape::Case(_))
             && !matches!(&self.shape, Shape::List(values, _)
@@ -214,39 +201,5 @@ impl Law {
                 SettingValue::Real(value.clamp(low, high))
             }
         })
-    }
-}
-
-impl Shape {
-    fn ends(&self) -> Option<[f64; 2]> {
-        match self {
-            Self::Uniform(ends) => Some(*ends),
-            Self::Whole(ends) => Some(ends.map(f64::from)),
-            Self::Triangular(law) => Some([law.inverse_cdf(0.0), law.inverse_cdf(1.0)]),
-            _ => None,
-        }
-    }
-
-    /// Returns the probability of values up to this one.
-    fn below(&self, value: f64) -> f64 {
-        match self {
-            Self::Uniform([low, high]) => ((value - low) / (high - low)).clamp(0.0, 1.0),
-            Self::Normal(law) => law.cdf(value),
-            Self::LogNormal(law) => law.cdf(value),
-            Self::Triangular(law) => law.cdf(value),
-            Self::Whole(_) | Self::List(..) | Self::Case(_) => f64::NAN,
-        }
-    }
-
-    fn quantile(&self, unit: f64) -> f64 {
-        // The ends of an unbounded distribution are infinite.
-        let inside = unit.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0);
-        match self {
-            Self::Uniform([low, high]) => low + unit * (high - low),
-            Self::Normal(law) => law.inverse_cdf(inside),
-            Self::LogNormal(law) => law.inverse_cdf(inside),
-            Self::Triangular(law) => law.inverse_cdf(unit),
-            Self::Whole(_) | Self::List(..) | Self::Case(_) => f64::NAN,
-        }
     }
 }

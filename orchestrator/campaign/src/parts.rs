@@ -1,6 +1,6 @@
 //! Parts of a campaign: consecutive cases, whose results are kept in a file of their own. A part
-//! whose file is there and fits is not flown again, whoever flew it: this thread, an earlier run, or
-//! another machine.
+//! whose file is there and fits is not flown again, whoever flew it: this thread, an earlier run,
+//! or another machine.
 
 use crate::flight::{Flight, Row, Status, kept, table};
 use crate::plan::Plan;

@@ -130,7 +130,8 @@ impl Plan {
         &self.experiment
     }
 
-    /// Makes a system of the experiment. Archives that are already in `opened` are not opened again.
+    /// Makes a system of the experiment. Archives that are already in `opened` are not opened
+    /// again.
     ///
     /// # Errors
     /// Returns an error if the experiment or an archive is faulty.
@@ -209,8 +210,8 @@ impl Plan {
         toml::to_string(&table).map_err(|error| Error::experiment(error.to_string()))
     }
 
-    /// Returns what an experiment in another folder calls the archive of a component: its file name if
-    /// it is found by that from any folder, and else its path.
+    /// Returns what an experiment in another folder calls the archive of a component: its file name
+    /// if it is found by that from any folder, and else its path.
     fn archive(&self, component: &str) -> String {
         let written = self.experiment.components[component].fmu.get_ref();
         let is_there = |folder: &PathBuf| folder.join(written).is_file();

@@ -208,8 +208,8 @@ pub(crate) fn keys(
     let digest = |bytes: &[u8]| hex(&Sha256::digest(bytes));
     let mut own: toml::Table = toml::from_str(campaign.source.whole())
         .map_err(|error| campaign.source.error(&(0..0), error.to_string()))?;
-    // These change neither the cases nor what is recorded of them. Experiment and FMUs count by their
-    // content, wherever they are.
+    // These change neither the cases nor what is recorded of them. Experiment and FMUs count by
+    // their content, wherever they are.
     for key in ["title", "description", "extends", "experiment", "fmu", "until", "keep", "search"] {
         own.remove(key);
     }

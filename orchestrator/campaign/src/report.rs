@@ -61,7 +61,8 @@ fn drawn(figure: &Figure) -> Result<(String, String), Error> {
     Ok((figure.title.clone(), text))
 }
 
-/// Returns the measure that orders the cases: the one that is asked for, or that of the first limit.
+/// Returns the measure that orders the cases: the one that is asked for, or that of the first
+/// limit.
 fn ranking(plan: &Plan) -> Option<String> {
     let by = plan.campaign.keep.by.as_ref().map(|by| by.get_ref().clone());
     let limited = || plan.campaign.limits.first().map(|limit| limit.measure.get_ref().clone());

@@ -219,8 +219,8 @@ mod tests {
 
     #[test]
     fn oracle_the_interval_of_a_quantile_covers_it() {
-        // Values 1 to n of a uniform distribution: the p-quantile lies between order statistics r and
-        // s with the probability that r to s - 1 of n values are below it.
+        // Values 1 to n of a uniform distribution: the p-quantile lies between order statistics r
+        // and s with the probability that r to s - 1 of n values are below it.
         for (n, p) in [(100, 0.5), (60, 0.95), (1000, 0.99)] {
             let values: Vec<f64> = (1..=n).map(f64::from).collect();
             let own = quantile(&values, p);

@@ -73,8 +73,8 @@ fn is_passed_over(name: &str) -> bool {
 }
 
 /// Returns whether the text of a TOML file is that of an experiment, with or without faults. A file
-/// without a title only serves to be extended, a file that names a paper is a study, and one in which
-/// something varies is a campaign.
+/// without a title only serves to be extended, a file that names a paper is a study, and one in
+/// which something varies is a campaign.
 pub fn is_experiment(text: &str) -> bool {
     let mut lines = text.lines().map(str::trim_start);
     let sets = |key: &str| {

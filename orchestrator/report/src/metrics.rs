@@ -207,7 +207,8 @@ impl Meters {
         (self.samples, self.completed) = (0, false);
     }
 
-    /// Returns the value of a metric of the communication points seen so far; `None` if it has none.
+    /// Returns the value of a metric of the communication points seen so far; `None` if it has
+    /// none.
     pub fn number(&self, name: &str) -> Option<f64> {
         self.gauges.get(name)?.as_ref()?.value()
     }

@@ -5,8 +5,8 @@ use serde::Deserialize;
 use toml::{Spanned, Value};
 
 /// What varies: one parameter or several, with the distribution of their values. Exactly one of the
-/// keys from `uniform` to `case` is given. A number may be a text with a unit (`"5 deg"`), or with a
-/// percent sign, which stands for percent of the value in the experiment.
+/// keys from `uniform` to `case` is given. A number may be a text with a unit (`"5 deg"`), or with
+/// a percent sign, which stands for percent of the value in the experiment.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Vary {

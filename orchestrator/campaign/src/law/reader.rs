@@ -1,6 +1,6 @@
 //! Reads the distribution of a parameter, with units converted.
 
-use super::Shape;
+use super::shape::Shape;
 use crate::definition::Vary;
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};

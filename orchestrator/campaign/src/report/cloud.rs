@@ -49,8 +49,8 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// Draws the worst case over the band of the first cases. There is no figure if the experiment draws
-/// nothing.
+/// Draws the worst case over the band of the first cases. There is no figure if the experiment
+/// draws nothing.
 pub(super) fn draw(
     plan: &Plan,
     interrupt: &Interrupt,

@@ -98,8 +98,8 @@ pub enum Kind {
     Rms,
     /// Arithmetic mean of the first signal.
     Mean,
-    /// Integral of the first signal over time. A signal in deg gives a number in deg·s, which `unit`
-    /// names.
+    /// Integral of the first signal over time. A signal in deg gives a number in deg·s, which
+    /// `unit` names.
     Integral,
     /// 99th percentile of the first signal, by nearest rank.
     P99,
