@@ -215,9 +215,11 @@ def test_the_package_works_where_it_is_installed(which, wheel, tmp_path):
     installed = Installed(interpreter, tmp_path / "venv", wheel, lowest)
     outside = tmp_path / "outside"
     outside.mkdir()
-    said = installed.run(
-        [installed.python, "-m", "pytest", "-q", "-p", "no:cacheprovider", TESTS], outside
-    )
+    command = [installed.python, "-m", "pytest", "-q", "-p", "no:cacheprovider", TESTS]
+    # They lose workers on purpose and wait for others, for more than a minute.
+    if which == "oldest" and len(found) > 1:
+        command.append(f"--ignore={TESTS / 'test_cluster.py'}")
+    said = installed.run(command, outside)
     passed = re.search(r"(\d+) passed", said)
     assert passed and int(passed[1]) >= 79, said
 
