@@ -58,7 +58,7 @@ def library(crate: str) -> Path:
 
 
 def example(name: str) -> Path:
-    """A built example of a crate: `cargo test` builds them too."""
+    """A built example of a crate: scripts/test builds those that are run."""
     file = name + (".exe" if os.name == "nt" else "")
     candidates = [TARGET / profile / "examples" / file for profile in ("release", "debug")]
     found = [path for path in candidates if path.is_file()]
