@@ -12,6 +12,7 @@ use campaign::{search, statistics::CONFIDENCE};
 use clap::Args;
 use cosim::error::Error;
 use cosim::experiment::Overrides;
+use cosim::files;
 use cosim::interrupt::Interrupt;
 use std::io::Write;
 use std::ops::Range;
@@ -170,9 +171,8 @@ pub(crate) fn fly(
 fn write_case(plan: &Plan, case: u64, folder: &Path) -> Result<PathBuf, Error> {
     let title = format!("{}, case {case}", plan.campaign.title);
     let text = plan.experiment_of(&title, &plan.values(case)?)?;
-    std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
     let path = folder.join("case.toml");
-    std::fs::write(&path, text).map_err(Error::file(&path))?;
+    files::write(&path, text)?;
     Ok(path)
 }
 

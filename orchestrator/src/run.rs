@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::live::{self, Live, scene::Scene};
 use cosim::doubts::doubts;
 use cosim::error::Error;
+use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim::master::Observer;
 use cosim::metadata;
@@ -21,7 +22,6 @@ use cosim_report::plot::Curves;
 use cosim_report::progress::Progress;
 use cosim_report::summary::Report;
 use fmu_import::warnings;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Instant;
@@ -146,7 +146,7 @@ pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Fail
     }
     let metadata =
         metadata::metadata(system, &parameters, options.real_time, outcome.as_ref().err());
-    write_json(&out.join("results.json"), &metadata)?;
+    files::write_json(&out.join("results.json"), &metadata)?;
     let reached = clock.step() * meters.seen().saturating_sub(1) as f64;
     let mut metrics = Metrics {
         real_time_factor: (wall > 0.0).then(|| reached / wall),
@@ -163,7 +163,7 @@ pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Fail
         files.push("realtime.svg");
         metrics.real_time = Some(real_time);
     }
-    write_json(&out.join("metrics.json"), &metrics)?;
+    files::write_json(&out.join("metrics.json"), &metrics)?;
     if !options.files.no_plot && curves.draw(&out.join("plot.svg"), &title)? {
         files.push("plot.svg");
     }
@@ -196,10 +196,4 @@ fn warn(real_time: &RealTime, quiet: bool) {
     {
         tracing::warn!("--priority: {reason}");
     }
-}
-
-fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), Error> {
-    let text = serde_json::to_string_pretty(value);
-    let text = text.map_err(|error| Error::file(path)(error.into()))? + "\n";
-    fs::write(path, text).map_err(Error::file(path))
 }

@@ -126,9 +126,16 @@ mod tests {
 
     #[test]
     fn the_pages_explain_every_key() {
-        for (kind, name) in [(Kind::Experiment, "experiments"), (Kind::Study, "studies")] {
-            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../docs/{name}.md"));
-            let page = std::fs::read_to_string(&path).unwrap();
+        let all = [
+            (Kind::Experiment, &["experiments"][..]),
+            (Kind::Study, &["studies"]),
+            // Signals and measures are those of studies.
+            (Kind::Campaign, &["campaigns", "studies"]),
+        ];
+        for (kind, names) in all {
+            let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+            let read = |name| std::fs::read_to_string(docs.join(format!("{name}.md"))).unwrap();
+            let page: String = names.iter().map(read).collect();
             let is_part = |c: char| c.is_alphanumeric() || c == '_';
             let code =
                 page.split('`').skip(1).step_by(2).flat_map(|code| code.split(|c| !is_part(c)));
@@ -138,7 +145,7 @@ mod tests {
             let tables =
                 definitions.chain([&schema]).filter_map(|table| table["properties"].as_object());
             for key in tables.flat_map(Map::keys) {
-                assert!(explained.contains(key.as_str()), "{}: {key}", path.display());
+                assert!(explained.contains(key.as_str()), "{names:?}: {key}");
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::plan::Plan;
 use cosim::error::Error;
+use cosim::files;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -17,11 +18,7 @@ const EXPERIMENT: &str = "experiment.toml";
 /// # Errors
 /// Returns an error if a file cannot be written.
 pub fn write(plan: &Plan, folder: &Path) -> Result<(), Error> {
-    let keep = |name: &str, content: &[u8]| {
-        let path = folder.join(name);
-        fs::write(&path, content).map_err(Error::file(&path))
-    };
-    fs::create_dir_all(folder).map_err(Error::file(folder))?;
+    let keep = |name: &str, content: &[u8]| files::write(&folder.join(name), content);
     let system = plan.system(&mut BTreeMap::new())?;
     // Components that share an FMU share its copy.
     let mut copies: BTreeMap<&Path, String> = BTreeMap::new();

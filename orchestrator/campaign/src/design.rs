@@ -147,8 +147,7 @@ impl Design {
                 }
             }
             Kind::Sensitivity => {
-                let block = dimensions as u64 + 2;
-                let (sample, member) = (case / block, case % block);
+                let (sample, member) = (self.sample(case), case % self.block());
                 let (a, b) = (self.random(sample, 0), self.random(sample, 1));
                 // Members: A, B, and A with one coordinate of B each.
                 match member {
@@ -163,6 +162,20 @@ impl Design {
                 }
             }
         }
+    }
+
+    /// Returns the number of the sample that a case belongs to. The cases of a sample of a
+    /// sensitivity design differ in nothing but their places.
+    pub fn sample(&self, case: u64) -> u64 {
+        match self.kind {
+            Kind::Sensitivity => case / self.block(),
+            _ => case,
+        }
+    }
+
+    /// Returns the number of cases in a sample of a sensitivity design.
+    fn block(&self) -> u64 {
+        self.dimensions() as u64 + 2
     }
 
     /// Draws a uniform number for each dimension.
@@ -341,6 +354,9 @@ mod tests {
                 assert_eq!(mixed[other], if other == dimension { b[other] } else { a[other] });
             }
         }
+        // What differs from case to case otherwise, such as a seed, is the same within a sample.
+        let samples: Vec<u64> = (0..12).map(|case| design.sample(case)).collect();
+        assert_eq!(samples, [0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2]);
         let error = Design::new(Kind::Sensitivity, 1, Some(21), vec![0; 3]).unwrap_err();
         assert!(error.contains("multiple of 5"), "{error}");
     }

@@ -18,9 +18,9 @@ use std::path::Path;
 /// How a case ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
-    /// It reached its stop time, or a unit ended it, which is no fault.
+    /// It reached its stop time.
     Completed,
-    /// It broke a limit that ends cases.
+    /// It broke a limit that ends cases, or a unit ended it, which is no fault.
     Ended,
     /// It was lost, as the experiment defines it.
     Lost,
@@ -181,7 +181,7 @@ impl<'a> Flight<'a> {
                 (Status::Ended, format!("limit {} broken", limit.unwrap_or_default()))
             }
             Err(error @ Error::Lost { .. }) => (Status::Lost, error.to_string()),
-            Err(error @ Error::EndedByUnit { .. }) => (Status::Completed, error.to_string()),
+            Err(error @ Error::EndedByUnit { .. }) => (Status::Ended, error.to_string()),
             Err(error @ (Error::Unit { .. } | Error::Import(Import::Fmu { .. }))) => {
                 (Status::Failed, error.to_string())
             }

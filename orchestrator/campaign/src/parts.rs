@@ -2,7 +2,7 @@
 //! whose file is there and fits is not flown again, whoever flew it: this thread, an earlier run,
 //! or another machine.
 
-use crate::flight::{Flight, Row, Status, kept, table};
+use crate::flight::{Flight, Row, kept, table};
 use crate::plan::Plan;
 use crate::table::{Reader, Table, Values, Writer};
 use cosim::error::Error;
@@ -23,20 +23,11 @@ pub fn path(out: &Path, part: &Range<u64>) -> PathBuf {
     out.join("parts").join(format!("{:010}-{:010}.parquet", part.start, part.end))
 }
 
-/// What is counted of a part, so that its rows need not stay in memory.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Counts {
-    /// Number of cases with each status, in the order of [`Status::ALL`].
-    pub status: [u64; 4],
-    /// Number of cases that broke each limit.
-    pub broken: Vec<u64>,
-}
-
 /// What is found of a part in the folder of the results.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Found {
-    /// The part is there and fits.
-    Whole(Counts),
+    /// The part is there and fits: the number of its cases that broke each limit.
+    Whole(Vec<u64>),
     /// There is no such file.
     Missing,
     /// The file is damaged.
@@ -65,7 +56,7 @@ pub fn find(plan: &Plan, out: &Path, part: &Range<u64>) -> Found {
         return Found::Other(others);
     }
     match read(&reader, part) {
-        Some(rows) => Found::Whole(count(plan, &rows)),
+        Some(rows) => Found::Whole(broken(plan, &rows)),
         None => Found::Damaged,
     }
 }
@@ -92,21 +83,17 @@ pub fn rows(out: &Path, part: &Range<u64>) -> Result<Table, Error> {
     })
 }
 
-fn count(plan: &Plan, rows: &Table) -> Counts {
+/// Returns the number of cases that broke each limit.
+fn broken(plan: &Plan, rows: &Table) -> Vec<u64> {
     let broken = plan.campaign.limits.iter().map(|limit| match rows.column(&kept(&limit.id)) {
         Some(Values::Flag(kept)) => kept.iter().filter(|kept| !**kept).count() as u64,
         _ => 0,
     });
-    let mut counts = Counts { broken: broken.collect(), ..Counts::default() };
-    if let Some(Values::Text(all)) = rows.column("status") {
-        for (count, status) in counts.status.iter_mut().zip(Status::ALL) {
-            *count = all.iter().filter(|own| *own == status.name()).count() as u64;
-        }
-    }
-    counts
+    broken.collect()
 }
 
-/// Flies a part and keeps its results. `flown` is called after each case.
+/// Flies a part and keeps its results. `flown` is called after each case. Returns the number of
+/// cases that broke each limit.
 ///
 /// # Errors
 /// Returns an error if the work was asked to end, or if the file cannot be written.
@@ -116,7 +103,7 @@ pub fn fly(
     part: &Range<u64>,
     flight: &mut Flight,
     mut flown: impl FnMut(&Row),
-) -> Result<Counts, Error> {
+) -> Result<Vec<u64>, Error> {
     let mut rows = Vec::with_capacity((part.end - part.start) as usize);
     for case in part.clone() {
         let row = flight.fly(case)?;
@@ -127,9 +114,9 @@ pub fn fly(
     let keys =
         serde_json::to_string(&plan.keys).map_err(|error| Error::experiment(error.to_string()))?;
     let metadata = [("units", plan.units()), ("digest", rows.digest()), ("keys", keys)];
-    let counts = count(plan, &rows);
+    let broken = broken(plan, &rows);
     let mut writer = Writer::create(&path(out, part), &metadata)?;
     writer.add(rows)?;
     writer.finish()?;
-    Ok(counts)
+    Ok(broken)
 }

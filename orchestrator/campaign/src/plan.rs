@@ -5,6 +5,7 @@ use crate::changes::Changes;
 use crate::correlation::{Correlated, correlation};
 use crate::definition::{Campaign, Kind, Limit};
 use crate::design::{Design, Place};
+use crate::prepare::{Recorded, Varied, keys, laws, observe, read_experiment, recorded};
 use cosim::check::check;
 use cosim::error::Error;
 use cosim::experiment::{self, Experiment};
@@ -18,7 +19,6 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use crate::prepare::{Recorded, Varied, keys, laws, observe, read_experiment, recorded};
 /// A campaign that is ready to be flown.
 pub struct Plan {
     /// The campaign as its file describes it.
@@ -42,6 +42,8 @@ pub struct Plan {
     replaced: Option<PathBuf>,
     fmu_dirs: Vec<PathBuf>,
     correlation: Option<Correlated>,
+    /// Archive of a unit that can be instantiated only once per process, if there is one.
+    pub(crate) single: Option<PathBuf>,
 }
 
 impl Plan {
@@ -66,14 +68,14 @@ impl Plan {
             });
             if let Some(path) = twice {
                 let message = format!("[[vary]] \"{path}\" varies twice");
-                return Err(campaign.source.error(&(0..0), message));
+                return Err(campaign.source.error(&own.span, message));
             }
         }
         let laws: Vec<_> = varied.iter().map(|own| (own.name.as_str(), &own.law)).collect();
         let correlation = correlation(&campaign, &laws)?;
         let levels = varied.iter().map(|own| {
             let fault = |problem| {
-                campaign.source.error(&(0..0), format!("[[vary]] \"{}\": {problem}", own.name))
+                campaign.source.error(&own.span, format!("[[vary]] \"{}\": {problem}", own.name))
             };
             match campaign.design {
                 Kind::Factorial => own.law.levels().map_err(fault),
@@ -89,6 +91,11 @@ impl Plan {
         let keys = keys(&campaign, changes, &system)?;
         let span = [system.clock.start(), system.clock.stop()];
         let command = changes.command(&campaign);
+        let single = system.fmus.iter().find(|fmu| {
+            let interface = fmu.description.co_simulation.as_ref();
+            interface.is_some_and(|own| own.has("canBeInstantiatedOnlyOncePerProcess"))
+        });
+        let single = single.map(|fmu| fmu.path.clone());
         let plan = Self {
             command,
             archives: system
@@ -107,6 +114,7 @@ impl Plan {
             experiment,
             fmu_dirs,
             correlation,
+            single,
         };
         plan.check_limits()?;
         Ok(plan)
@@ -144,22 +152,23 @@ impl Plan {
     /// # Errors
     /// Returns an error if a value cannot be that of its parameter.
     pub fn values(&self, case: u64) -> Result<Vec<SettingValue>, Error> {
-        self.values_at(&self.design.place(case), case)
+        self.values_at(&self.design.place(case), self.design.sample(case))
     }
 
-    /// Returns the values at a place for the case with this number.
+    /// Returns the values at a place. Seeds that differ from case to case are those of this sample
+    /// of the design.
     ///
     /// # Errors
     /// Returns an error if a value cannot be that of its parameter.
-    pub fn values_at(&self, places: &[Place], case: u64) -> Result<Vec<SettingValue>, Error> {
+    pub fn values_at(&self, places: &[Place], sample: u64) -> Result<Vec<SettingValue>, Error> {
         let mut places = places.to_vec();
         if let Some(correlated) = &self.correlation {
             correlated.apply(&mut places);
         }
         let values = self.varied.iter().zip(places).map(|(own, place)| {
-            own.law.value(place, case).map_err(|problem| {
-                let message = format!("[[vary]] \"{}\", case {case}: {problem}", own.name);
-                self.campaign.source.error(&(0..0), message)
+            own.law.value(place, sample).map_err(|problem| {
+                let message = format!("[[vary]] \"{}\", sample {sample}: {problem}", own.name);
+                self.campaign.source.error(&own.span, message)
             })
         });
         let mut values = values.collect::<Result<Vec<_>, _>>()?;
@@ -190,11 +199,18 @@ impl Plan {
         table.remove("extends");
         table.remove("unset");
         table.insert("title".into(), title.into());
+        // The command line may have changed it.
+        let simulation = toml::Value::try_from(&self.experiment.simulation);
+        let simulation = simulation.map_err(|error| Error::experiment(error.to_string()))?;
+        table.insert("simulation".into(), simulation);
         let components = table.entry("components").or_insert_with(|| toml::Table::new().into());
         for (name, component) in &self.experiment.components {
             let own = components.as_table_mut().and_then(|all| all.get_mut(name));
             let Some(own) = own.and_then(toml::Value::as_table_mut) else { continue };
             own.insert("fmu".into(), self.archive(name).into());
+            if component.is_exchanged {
+                own.insert("exchanged".into(), true.into());
+            }
             let parameters = component.parameters.iter();
             let mut parameters: toml::Table =
                 parameters.map(|(name, value)| (name.clone(), value.get_ref().clone())).collect();

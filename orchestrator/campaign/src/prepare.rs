@@ -3,19 +3,19 @@
 use crate::changes::Changes;
 use crate::definition::{Campaign, Kind, Vary};
 use crate::law::Law;
-use crate::table::hex;
 use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::{self, Experiment, Observe, Overrides};
+use cosim::files;
 use cosim::search;
 use cosim::system::System;
 use cosim::variation::Target;
 use cosim_report::metrics::{Meters, Metrics};
 use fmu_import::description::Kind as Type;
 use fmu_import::names;
-use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
@@ -40,6 +40,8 @@ pub struct Varied {
     pub(crate) sorted: usize,
     pub(crate) targets: Vec<Target>,
     pub(crate) paths: Vec<String>,
+    /// Place of the name in the campaign's file.
+    pub(crate) span: Range<usize>,
 }
 
 /// A number that is recorded of each case.
@@ -128,7 +130,7 @@ pub(crate) fn observe(campaign: &Campaign, own: &Observe) -> Result<Observe, Err
 
 /// Makes the distributions of one entry of what varies.
 pub(crate) fn laws(vary: &Vary, source: &Source, system: &System) -> Result<Vec<Varied>, Error> {
-    let mut groups: Vec<(std::ops::Range<usize>, Vec<String>)> = Vec::new();
+    let mut groups: Vec<(Range<usize>, Vec<String>)> = Vec::new();
     if let Some(parameter) = &vary.parameter {
         groups.push((parameter.span(), parameter.get_ref().all().to_vec()));
     }
@@ -168,6 +170,7 @@ pub(crate) fn laws(vary: &Vary, source: &Source, system: &System) -> Result<Vec<
             sorted: 0,
             targets,
             paths,
+            span,
         });
     }
     if vary.sorted {
@@ -205,7 +208,6 @@ pub(crate) fn keys(
     changes: &Changes,
     system: &System,
 ) -> Result<BTreeMap<String, String>, Error> {
-    let digest = |bytes: &[u8]| hex(&Sha256::digest(bytes));
     let mut own: toml::Table = toml::from_str(campaign.source.whole())
         .map_err(|error| campaign.source.error(&(0..0), error.to_string()))?;
     // These change neither the cases nor what is recorded of them. Experiment and FMUs count by
@@ -221,13 +223,13 @@ pub(crate) fn keys(
     let overrides = Overrides { fmu: Vec::new(), ..changes.overrides.clone() };
     let own = format!("{own}{overrides:?}");
     let mut keys = BTreeMap::from([
-        ("campaign".to_string(), digest(own.as_bytes())),
-        ("experiment".to_string(), digest(system.experiment.source.whole().as_bytes())),
+        ("campaign".to_string(), files::digest(own)),
+        ("experiment".to_string(), files::digest(system.experiment.source.whole())),
         ("program".to_string(), format!("{} {FORMAT}", env!("CARGO_PKG_VERSION"))),
     ]);
     for (name, fmu) in system.order.iter().zip(&system.fmus) {
         let bytes = fs::read(&fmu.path).map_err(Error::file(&fmu.path))?;
-        keys.insert(format!("FMU of {name}"), digest(&bytes));
+        keys.insert(format!("FMU of {name}"), files::digest(bytes));
     }
     Ok(keys)
 }
@@ -241,7 +243,7 @@ pub fn find(name: &Path) -> Result<PathBuf, Error> {
         return Ok(name.to_path_buf());
     }
     let folders = || search::experiments().into_iter().map(|root| root.join("campaigns"));
-    let file = name.with_extension("toml");
+    let file = search::with_toml(name);
     if let Some(path) = folders().map(|folder| folder.join(&file)).find(|path| path.is_file()) {
         return Ok(path);
     }

@@ -13,12 +13,12 @@ use crate::statistics::Probability;
 use crate::table::Reader;
 use crate::texts::{percent, short};
 use cosim::error::Error;
+use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim_report::figure::{Figure, svg};
-use cosim_report::study::STYLE;
+use cosim_report::study::head;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::Path;
 
 /// Number of the worst cases that the page shows.
@@ -46,12 +46,11 @@ pub fn write(
     let mut pictures = figures::distributions(plan, findings, &table)?;
     pictures.extend(figures::scatters(plan, &table)?);
     if let Some(worst) = ranked.first() {
-        pictures.extend(cloud::draw(plan, interrupt, *worst, table.rows())?);
+        pictures.extend(cloud::draw(plan, flight.without_ends(), *worst, table.rows())?);
     }
     let drawn = pictures.iter().map(drawn).collect::<Result<Vec<_>, _>>()?;
     let page = page(plan, findings, &drawn, &kept, ranking.zip(Some(ranked)).as_ref());
-    let path = out.join("report.html");
-    fs::write(&path, page).map_err(Error::file(&path))
+    files::write(&out.join("report.html"), page)
 }
 
 fn drawn(figure: &Figure) -> Result<(String, String), Error> {
@@ -73,12 +72,10 @@ fn ranking(plan: &Plan) -> Option<String> {
 fn keep(plan: &Plan, flight: &mut Flight, cases: &BTreeSet<u64>, out: &Path) -> Result<(), Error> {
     for case in cases {
         let folder = out.join("cases").join(case.to_string());
-        fs::create_dir_all(&folder).map_err(Error::file(&folder))?;
         let title = format!("{}, case {case}", plan.campaign.title);
         let values = plan.values(*case)?;
         let text = plan.experiment_of(&title, &values)?;
-        let path = folder.join("case.toml");
-        fs::write(&path, text).map_err(Error::file(&path))?;
+        files::write(&folder.join("case.toml"), text)?;
         flight.keep(*case, values, &folder, &title)?;
     }
     Ok(())
@@ -96,12 +93,7 @@ fn page(
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (campaign.title) }
-                style { (PreEscaped(STYLE)) (PreEscaped(".plot svg { max-width: 100%; height: auto; } .bar { display: inline-block; height: .8em; vertical-align: -.05em; background: #1f77b4; } .bar.negative { background: #d62728; }")) }
-            }
+            (head(&campaign.title))
             body {
                 header {
                     h1 { (campaign.title) }
@@ -123,7 +115,7 @@ fn page(
                         h2 { "Limits" }
                         p {
                             (ended("completed")) " cases completed"
-                            @for (status, words) in [("ended", "ended by a limit"), ("lost", "lost"), ("failed", "failed")] {
+                            @for (status, words) in [("ended", "ended early by a limit or a unit"), ("lost", "lost"), ("failed", "failed")] {
                                 @if ended(status) > 0 { ", " (ended(status)) " " (words) }
                             }
                             "."

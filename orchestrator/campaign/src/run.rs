@@ -3,16 +3,17 @@
 use crate::error::Error;
 use crate::findings::{Answer, Findings, findings};
 use crate::flight::{Flight, can_reset};
-use crate::parts::{self, Counts, Found};
+use crate::parts::{self, Found};
 use crate::plan::Plan;
 use crate::report;
 use crate::statistics::{Probability, looks};
 use crate::table::{Reader, Table, Values, Writer};
 use cosim::error::Error as Single;
+use cosim::files;
 use cosim::interrupt::Interrupt;
-use cosim::system::System;
 use cosim_report::folder::Folder;
 use cosim_report::progress::Parts;
+use parking_lot::Mutex;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -20,7 +21,6 @@ use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// Names of the files of a campaign's results.
@@ -67,11 +67,6 @@ pub struct Work {
     pub missing: Vec<[u64; 2]>,
 }
 
-/// Locks a mutex. A panic of another thread does not harm the data behind it.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// Returns the folder of a campaign's results.
 pub fn folder(plan: &Plan, out: Option<&Path>) -> PathBuf {
     out.map_or_else(|| Path::new("out").join(plan.name()), Path::to_path_buf)
@@ -81,13 +76,16 @@ pub fn folder(plan: &Plan, out: Option<&Path>) -> PathBuf {
 struct State<'a> {
     plan: &'a Plan,
     out: &'a Path,
-    found: BTreeMap<u64, Counts>,
+    /// Number of cases that broke each limit, by the first case of each part.
+    found: BTreeMap<u64, Vec<u64>>,
     notes: Vec<String>,
+    /// Whether units can be reset, once this is known.
+    resets: Option<bool>,
 }
 
 impl<'a> State<'a> {
     fn new(plan: &'a Plan, out: &'a Path) -> Self {
-        Self { plan, out, found: BTreeMap::new(), notes: Vec::new() }
+        Self { plan, out, found: BTreeMap::new(), notes: Vec::new(), resets: None }
     }
 
     /// Looks for the parts of the first `cases` cases, and returns those that are missing.
@@ -99,8 +97,8 @@ impl<'a> State<'a> {
                 continue;
             }
             match parts::find(self.plan, self.out, &part) {
-                Found::Whole(counts) => {
-                    self.found.insert(part.start, counts);
+                Found::Whole(broken) => {
+                    self.found.insert(part.start, broken);
                     continue;
                 }
                 Found::Missing => {}
@@ -119,7 +117,22 @@ impl<'a> State<'a> {
     }
 
     fn broken(&self, limit: usize, cases: u64) -> u64 {
-        self.found.range(..cases).filter_map(|(_, counts)| counts.broken.get(limit)).sum()
+        self.found.range(..cases).filter_map(|(_, broken)| broken.get(limit)).sum()
+    }
+
+    /// Returns whether units can be reset. This is tried once.
+    fn resets(&mut self, interrupt: &Interrupt) -> Result<bool, Single> {
+        if let Some(known) = self.resets {
+            return Ok(known);
+        }
+        let resets = can_reset(self.plan, interrupt)?;
+        if !resets {
+            tracing::warn!(
+                "a case gave another result after fmi2Reset than with a new instance: units are made anew for each case"
+            );
+        }
+        self.resets = Some(resets);
+        Ok(resets)
     }
 
     /// Returns the number of cases that are needed as far as the parts tell, and the answer to the
@@ -230,7 +243,7 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<Report, Error> {
     let path = out.join("cases.parquet");
     merge(plan, &out, cases, options.csv)?;
     let findings = findings(plan, &Reader::open(&path)?, answer)?;
-    write_json(&out.join("summary.json"), &findings)?;
+    files::write_json(&out.join("summary.json"), &findings)?;
     report::write(plan, &findings, &out, &options.interrupt)?;
     Ok(Report { findings, out, flown, elapsed: begin.elapsed().as_secs_f64(), notes })
 }
@@ -256,12 +269,7 @@ fn fly_parts(
         return Ok(());
     }
     let interrupt = &options.interrupt;
-    let resets = can_reset(plan, interrupt)?;
-    if !resets {
-        tracing::warn!(
-            "a case gave another result after fmi2Reset than with a new instance: units are made anew for each case"
-        );
-    }
+    let resets = state.resets(interrupt)?;
     let left: u64 = missing.iter().map(|part| part.end - part.start).sum();
     let done = state.found.keys().count() as u64 * parts::LENGTH;
     let done = done.min(plan.cases().saturating_sub(left));
@@ -270,31 +278,30 @@ fn fly_parts(
     let found = Mutex::new(BTreeMap::new());
     let failure: Mutex<Option<Single>> = Mutex::new(None);
     let pool = ThreadPoolBuilder::new()
-        .num_threads(threads(plan, options.jobs)?.min(missing.len()))
+        .num_threads(threads(plan, options.jobs).min(missing.len()))
         .build()
         .map_err(|error| Single::experiment(error.to_string()))?;
     let work = || -> Result<(), Single> {
         // Each thread has units of its own, from an archive that it unpacks itself.
         let mut flight = Flight::new(plan, resets, interrupt)?;
-        while lock(&failure).is_none() {
+        while failure.lock().is_none() {
             let Some(part) = missing.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-            let counts = parts::fly(plan, out, part, &mut flight, |_| progress.advance(1))?;
-            lock(&found).insert(part.start, counts);
+            let broken = parts::fly(plan, out, part, &mut flight, |_| progress.advance(1))?;
+            found.lock().insert(part.start, broken);
         }
         Ok(())
     };
     pool.broadcast(|_| {
         if let Err(error) = work() {
-            lock(&failure).get_or_insert(error);
+            failure.lock().get_or_insert(error);
         }
     });
     progress.finish();
-    state.found.append(&mut lock(&found));
-    match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+    state.found.append(&mut found.lock());
+    match failure.into_inner() {
         None => Ok(()),
         Some(Single::Interrupted { request, .. }) => {
-            let kept = lock(&found).len() + state.found.len();
-            let done = (kept as u64 * parts::LENGTH).min(plan.cases());
+            let done = (state.found.len() as u64 * parts::LENGTH).min(plan.cases());
             Err(Error::Unfinished { done, all: plan.cases(), out: out.to_path_buf(), request })
         }
         Some(error) => Err(error.into()),
@@ -302,23 +309,18 @@ fn fly_parts(
 }
 
 /// Returns the number of threads: one, if a unit can be made only once in a process.
-pub(crate) fn threads(plan: &Plan, jobs: usize) -> Result<usize, Single> {
-    let system: System = plan.system(&mut BTreeMap::new())?;
-    let single = system.fmus.iter().find(|fmu| {
-        let interface = fmu.description.co_simulation.as_ref();
-        interface.is_some_and(|own| own.has("canBeInstantiatedOnlyOncePerProcess"))
-    });
-    if let Some(fmu) = single {
+pub(crate) fn threads(plan: &Plan, jobs: usize) -> usize {
+    if let Some(path) = &plan.single {
         tracing::warn!(
             "{} can be instantiated only once per process: one thread flies all cases",
-            fmu.path.display()
+            path.display()
         );
-        return Ok(1);
+        return 1;
     }
-    Ok(match jobs {
+    match jobs {
         0 => std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         jobs => jobs,
-    })
+    }
 }
 
 /// Merges the parts of the first `cases` cases into one table.
@@ -361,10 +363,4 @@ fn write_csv(text: &mut csv::Writer<fs::File>, rows: &Table) -> Result<(), csv::
         text.write_record(rows.columns.iter().map(|column| cell(&column.values)))?;
     }
     Ok(())
-}
-
-pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Single> {
-    let text = serde_json::to_string_pretty(value);
-    let text = text.map_err(|error| Single::file(path)(error.into()))? + "\n";
-    fs::write(path, text).map_err(Single::file(path))
 }

@@ -6,23 +6,23 @@ use crate::design::Place;
 use crate::error::Error;
 use crate::flight::{Flight, Row, Status, table};
 use crate::plan::Plan;
-use crate::run::{self, lock, write_json};
+use crate::run;
 use crate::table::Writer;
 use cmaes::{CMAESOptions, DVector};
 use cosim::error::Error as Single;
+use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use cosim_report::folder::Folder;
 use cosim_report::progress::Parts;
+use parking_lot::Mutex;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::Serialize;
 use std::cmp::Ordering as CmpOrdering;
-use std::fs;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Step size of a search at its beginning, as a share of the range of each parameter.
@@ -111,7 +111,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
         let problem = own.law.check_ends().err();
         if let Some(problem) = problem {
             let message = format!("[[vary]] \"{}\": {problem}", own.name);
-            return Err(plan.campaign.source.error(&(0..0), message).into());
+            return Err(plan.campaign.source.error(&own.span, message).into());
         }
     }
     let out = options
@@ -127,7 +127,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
     }
     let _folder = Folder::take(&out)?;
     let progress = Parts::of("cases", &plan.campaign.title, search.cases, 0, options.quiet);
-    let threads = run::threads(plan, options.jobs)?;
+    let threads = run::threads(plan, options.jobs);
     let (orders, waiting) = channel::<Order>();
     let waiting = Mutex::new(waiting);
     let searched = Searched {
@@ -151,7 +151,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
     });
     progress.finish();
     let (searches, ended) = found?;
-    let mut tried = searched.tried.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let mut tried = searched.tried.into_inner();
     // Within a generation, the threads finish in any order.
     tried.sort_by(|a, b| {
         let points = || a.point.iter().zip(&b.point).map(|(a, b)| a.total_cmp(b));
@@ -179,14 +179,14 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
     let path = out.join("worst.toml");
     let title = format!("{}, the worst case that a search found", plan.campaign.title);
     let text = plan.experiment_of(&title, &worst.row.values)?;
-    fs::write(&path, text).map_err(Single::file(&path))?;
+    files::write(&path, text)?;
     let rows: Vec<Row> = tried.iter().map(|own| own.row.clone()).collect();
     let mut writer = Writer::create(&out.join("search.parquet"), &[("units", plan.units())])?;
     writer.add(table(plan, &rows))?;
     writer.finish()?;
     let path = out.join("history.svg");
     svg::write(&history(&outcome, &tried), &path)?;
-    write_json(&out.join("search.json"), &outcome)?;
+    files::write_json(&out.join("search.json"), &outcome)?;
     Ok(outcome)
 }
 
@@ -194,7 +194,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
 fn serve(plan: &Plan, interrupt: &Interrupt, waiting: &Mutex<Receiver<Order>>) {
     let mut flight: Option<Flight> = None;
     loop {
-        let Ok(order) = lock(waiting).recv() else { return };
+        let Ok(order) = waiting.lock().recv() else { return };
         let result = (|| {
             let own = match flight.take() {
                 Some(flight) => flight,
@@ -233,7 +233,7 @@ impl Searched<'_> {
         let row = match result.recv() {
             Ok(Ok(row)) => row,
             Ok(Err(error)) => {
-                lock(&self.failure).get_or_insert(error);
+                self.failure.lock().get_or_insert(error);
                 return f64::MAX;
             }
             Err(_) => return f64::MAX,
@@ -241,18 +241,18 @@ impl Searched<'_> {
         self.progress.advance(1);
         let value = row.numbers[self.measure].unwrap_or(f64::NAN);
         let generation = self.generation.load(Ordering::Relaxed);
-        lock(&self.tried).push(Tried { generation, point, value, row });
+        self.tried.lock().push(Tried { generation, point, value, row });
         if value.is_nan() { f64::MAX } else { -value }
     }
 
     /// Returns why the search is to end after this generation, if it is.
     fn ended(&self, search: &Search, late: bool) -> Result<Option<&'static str>, Single> {
-        match lock(&self.failure).take() {
+        match self.failure.lock().take() {
             Some(Single::Interrupted { .. }) => return Ok(Some("it was interrupted")),
             Some(error) => return Err(error),
             None => {}
         }
-        let tried = lock(&self.tried);
+        let tried = self.tried.lock();
         let best = tried.iter().map(|own| own.value).fold(f64::NEG_INFINITY, f64::max);
         Ok(if search.enough.is_some_and(|enough| best >= enough) {
             Some("the value is enough")

@@ -4,6 +4,7 @@ mod file;
 
 pub use file::{Reader, Writer};
 
+use cosim::files;
 use parquet::basic::{Repetition, Type as Physical};
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::ByteArray;
@@ -182,7 +183,7 @@ impl Table {
             digest.update(&column.name);
             column.values.hash(&mut digest);
         }
-        hex(&digest.finalize())
+        files::hexadecimal(&digest.finalize())
     }
 
     fn append(&mut self, other: Self) -> Result<(), ParquetError> {
@@ -203,16 +204,6 @@ impl Table {
         };
         Self { columns: self.columns.iter_mut().map(column).collect() }
     }
-}
-
-/// Formats bytes as hexadecimal digits.
-pub(crate) fn hex(bytes: &[u8]) -> String {
-    use std::fmt::Write as _;
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }
 
 #[cfg(test)]

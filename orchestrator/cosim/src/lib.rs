@@ -14,6 +14,7 @@ pub mod document;
 pub mod doubts;
 pub mod error;
 pub mod experiment;
+pub mod files;
 pub mod interrupt;
 pub mod master;
 pub mod metadata;

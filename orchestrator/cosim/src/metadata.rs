@@ -2,13 +2,12 @@
 //! made.
 
 use crate::error::Error;
+use crate::files::digest;
 use crate::pacing;
 use crate::system::{Parameters, System};
 use fmu_import::description::Kind;
 use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 /// Returns the content of `results.json`. If the run ended early, `failure` is the reason.
 pub fn metadata(
@@ -120,7 +119,7 @@ fn component(system: &System, index: usize, name: &str, parameters: &Parameters)
         system.settings[index].iter().map(|s| (s.name.as_str(), s.value.to_json())).collect();
     json!({
         "fmu": fmu.path.file_name().map(|name| name.to_string_lossy()),
-        "sha256": std::fs::read(&fmu.path).ok().map(|bytes| hexadecimal(&Sha256::digest(bytes))),
+        "sha256": std::fs::read(&fmu.path).ok().map(digest),
         "guid": fmu.description.guid,
         "model": fmu.description.model_name,
         "version": fmu.description.version,
@@ -128,13 +127,5 @@ fn component(system: &System, index: usize, name: &str, parameters: &Parameters)
         "every": system.experiment.components[name].every,
         "set": set,
         "parameters": parameters.get(name),
-    })
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
     })
 }

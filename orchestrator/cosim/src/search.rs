@@ -123,7 +123,7 @@ pub fn experiment(name: &Path) -> Result<PathBuf, Error> {
         let is_what = if name.is_dir() { "this is a folder" } else { "there is no such file" };
         return Err(Error::experiment(format!("{shown}: {is_what}")));
     }
-    let wanted = if extension == "toml" { name.to_path_buf() } else { with_toml(name) };
+    let wanted = with_toml(name);
     if wanted.is_file() {
         return Ok(wanted);
     }
@@ -158,7 +158,11 @@ pub fn experiment(name: &Path) -> Result<PathBuf, Error> {
     )))
 }
 
-fn with_toml(name: &Path) -> PathBuf {
+/// Returns the file name of an experiment, a study or a campaign that is called by its name.
+pub fn with_toml(name: &Path) -> PathBuf {
+    if name.extension().is_some_and(|extension| extension == "toml") {
+        return name.to_path_buf();
+    }
     let mut text = name.as_os_str().to_owned();
     text.push(".toml");
     PathBuf::from(text)

@@ -96,6 +96,16 @@ fn oracle_a_limit_can_end_a_case() {
     assert_eq!(rows[3], "2,2,1000000000,9,9,false,ended,2,limit small broken");
 }
 
+#[test]
+fn a_case_that_a_unit_ended_early_keeps_no_limit() {
+    let bench = Bench::made(LOOP, &Recipe { flags: &["-DENDS=1"], ..Recipe::default() });
+    let discards = "set = { \"plant.fail.status\" = 2 }\n\n[signals]";
+    fs::write(bench.path("c.toml"), CAMPAIGN.replace("[signals]", discards)).unwrap();
+    let rows = flown(&bench, &[]);
+    assert!(rows[1].contains("true,completed,3"), "{}", rows[1]);
+    assert!(rows[2].starts_with("1,0.5,2,2.25,2.25,false,ended,2,"), "{}", rows[2]);
+}
+
 const RANDOM: &str = r#"
 title = "random gains"
 experiment = "loop.toml"
@@ -338,6 +348,22 @@ fn oracle_correlated_parameters_have_their_correlation() {
     let found = product(x, y) / (product(x, x) * product(y, y)).sqrt();
     // A uniform and a normal variable: the coefficient times the root of 3 / pi.
     assert!((found + 0.8 * (3.0 / std::f64::consts::PI).sqrt()).abs() < 0.05, "{found}");
+}
+
+#[test]
+fn a_case_by_itself_has_the_changes_of_the_command_line() {
+    let bench = bench(RANDOM);
+    let changes = ["--stop", "2", "--fmu", "gain=Unit.fmu", "--set", "plant.delay=1e-3"];
+    let rows = flown(&bench, &changes);
+    let (code, _, errors) =
+        bench.call(&[&["campaign", "c.toml", "--case", "7"], &changes[..]].concat());
+    assert_eq!(code, 0, "{errors}");
+    let results = fs::read_to_string(bench.path("out/c/cases/7/results.csv")).unwrap();
+    let last: Vec<&str> = results.lines().last().unwrap().split(',').collect();
+    assert_eq!(last[0], "2.0");
+    assert_eq!(last[2], rows[8].split(',').nth(4).unwrap());
+    let case = fs::read_to_string(bench.path("out/c/cases/7/case.toml")).unwrap();
+    assert!(case.contains("exchanged = true") && case.contains("delay = 0.001"), "{case}");
 }
 
 #[test]

@@ -4,7 +4,6 @@
 use crate::flight::Flight;
 use crate::plan::Plan;
 use cosim::error::Error;
-use cosim::interrupt::Interrupt;
 use cosim::master::{Observer, Sample};
 use cosim_report::figure::{self, Color, Curve, Figure, Legend, Shape};
 use cosim_report::panels::Panel;
@@ -49,15 +48,14 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// Draws the worst case over the band of the first cases. There is no figure if the experiment
-/// draws nothing.
+/// Draws the worst case over the band of the first cases, flown with these units. There is no
+/// figure if the experiment draws nothing.
 pub(super) fn draw(
     plan: &Plan,
-    interrupt: &Interrupt,
+    mut flight: Flight,
     worst: u64,
     cases: u64,
 ) -> Result<Option<Figure>, Error> {
-    let mut flight = Flight::new(plan, false, interrupt)?.without_ends();
     let panels = Panel::all(flight.system())?;
     if panels.is_empty() {
         return Ok(None);

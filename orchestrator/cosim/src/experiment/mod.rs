@@ -112,8 +112,9 @@ pub struct Component {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, Scalar>")]
     pub parameters: BTreeMap<String, Spanned<Value>>,
-    /// Whether the command line replaced the FMU. This is no key of an experiment file.
-    #[serde(skip)]
+    /// Whether the FMU takes the place of another one, as after `--fmu`: settings, recorded variables
+    /// and unconnected inputs that it does not have are left out.
+    #[serde(default, rename = "exchanged")]
     pub is_exchanged: bool,
 }
 

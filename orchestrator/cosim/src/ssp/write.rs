@@ -4,6 +4,7 @@ use super::xml::{Xml, element, leaf, real};
 use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
 use crate::error::Error;
 use crate::experiment::Coupling;
+use crate::files;
 use crate::interrupt::Interrupt;
 use crate::settings::SettingValue;
 use crate::system::System;
@@ -15,7 +16,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Cursor, Write};
 use std::ops::Deref;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
@@ -74,15 +75,7 @@ pub fn pack(
     }
     let bytes = archive.finish().map_err(|error| Error::file(path)(error.into()))?.into_inner();
     goes_on()?;
-    // The archive is first written under another name, so that nobody ever opens an incomplete one.
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(format!(".{}.part", std::process::id()));
-    let partial = PathBuf::from(partial);
-    fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path)).map_err(|error| {
-        // The incomplete file is of no use, and it may be what fills the disk.
-        let _ = fs::remove_file(&partial);
-        Error::file(path)(error)
-    })
+    files::write(path, bytes)
 }
 
 fn resource(fmu: &Path) -> String {

@@ -2,6 +2,7 @@
 
 use super::{Color, Curve, Figure, Legend, Panel, Shape};
 use cosim::error::Error;
+use cosim::files;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::Color as _;
@@ -32,8 +33,7 @@ impl From<Color> for RGBColor {
 /// # Errors
 /// Returns an error if the file cannot be written.
 pub fn write(figure: &Figure, path: &Path) -> Result<(), Error> {
-    std::fs::write(path, text(figure).map_err(|error| Error::file(path)(error))?)
-        .map_err(Error::file(path))
+    files::write(path, text(figure).map_err(|error| Error::file(path)(error))?)
 }
 
 /// Draws a figure as the text of an SVG file.

@@ -1,20 +1,10 @@
 //! Files in which the finished parts of a study are kept, so that they need not be run again.
 
 use super::part::{Outcome, Part};
-use cosim::error::Error as Single;
+use cosim::files::digest;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::Path;
-
-pub(super) fn hex(bytes: &[u8]) -> String {
-    use std::fmt::Write as _;
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
-}
 
 /// Content of the file of a finished part.
 #[derive(Serialize, Deserialize)]
@@ -41,7 +31,7 @@ impl Kept {
         members: &std::ops::Range<u32>,
         outcome: &Outcome,
     ) -> serde_json::Result<String> {
-        Ok(hex(&Sha256::digest(serde_json::to_vec(&(key, members, outcome))?)))
+        Ok(digest(serde_json::to_vec(&(key, members, outcome))?))
     }
 
     fn is_whole(&self) -> bool {
@@ -59,14 +49,4 @@ pub(super) fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
         return None;
     };
     (kept.key == key && kept.members == part.range).then_some(kept.outcome)
-}
-
-/// Writes a file completely or not at all.
-pub(super) fn write_whole(path: &Path, content: &[u8]) -> Result<(), Single> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(Single::file(folder))?;
-    }
-    let unfinished = path.with_extension("unfinished");
-    fs::write(&unfinished, content).map_err(Single::file(&unfinished))?;
-    fs::rename(&unfinished, path).map_err(Single::file(path))
 }

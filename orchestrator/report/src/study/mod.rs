@@ -22,4 +22,4 @@ mod template;
 mod texts;
 mod values;
 
-pub use page::STYLE;
+pub use page::head;

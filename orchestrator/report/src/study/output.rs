@@ -1,11 +1,11 @@
 //! Writes the figures, the numbers and the page of a study.
 
 use super::claims;
-use super::kept::write_whole;
 use super::results::Results;
 use super::{figures, page};
 use crate::figure::{png, svg};
 use cosim::error::Error;
+use cosim::files;
 use fmu_import::quantity::rounded;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -23,7 +23,7 @@ pub(super) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Ve
         let picture = figures::figure(figure, results).map_err(fault)?;
         let path = out.join("figures").join(format!("{}.svg", figure.id));
         let text = svg::text(&picture).map_err(Error::file(&path))?;
-        write_whole(&path, text.as_bytes())?;
+        files::write(&path, &text)?;
         png::write(&text, &path.with_extension("png"))?;
         files.push(format!("figures/{}.svg, .png", figure.id));
         drawn.push(picture);
@@ -34,9 +34,9 @@ pub(super) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Ve
         .map(|claim| claims::judge(claim, results))
         .collect::<Result<Vec<_>, _>>()
         .map_err(fault)?;
-    write_whole(&out.join("results.json"), numbers(results, &judged).as_bytes())?;
+    files::write(&out.join("results.json"), numbers(results, &judged))?;
     let page = page::page(results, &judged, &drawn).map_err(fault)?;
-    write_whole(&out.join("report.html"), page.as_bytes())?;
+    files::write(&out.join("report.html"), page)?;
     let verdicts =
         study.claims.iter().zip(&judged).map(|(c, j)| (c.says.clone(), j.verdict)).collect();
     Ok((verdicts, files))

@@ -9,9 +9,20 @@ use crate::figure::{self, interactive};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::fmt::Write as _;
 
-/// Style of the pages of reports.
-pub const STYLE: &str = include_str!("page.css");
+const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
+
+/// Returns the head of the page of a report, with the style of all reports.
+pub fn head(title: &str) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            title { (title) }
+            style { (PreEscaped(STYLE)) }
+        }
+    }
+}
 
 /// Returns the text of the page. `judged` belongs to the study's claims in order, and `drawn` to
 /// its figures.
@@ -31,12 +42,7 @@ pub(super) fn page(
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (study.title) }
-                style { (PreEscaped(STYLE)) }
-            }
+            (head(&study.title))
             body {
                 header {
                     h1 { (study.title) }

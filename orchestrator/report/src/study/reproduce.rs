@@ -6,7 +6,7 @@
 
 use super::claims;
 use super::definition::Study;
-use super::kept::{Kept, hex, kept, write_whole};
+use super::kept::{Kept, kept};
 use super::output::{Judgement, notes, write};
 use super::part::{Outcome, Part, Preparation};
 use super::results::{Results, RunResult, resolve};
@@ -14,15 +14,15 @@ use crate::error::Error;
 use crate::folder::Folder;
 use crate::progress::Parts;
 use cosim::error::Error as Single;
+use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim::search;
 use cosim::system::Opened;
+use parking_lot::Mutex;
 use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, VecDeque};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// Number of members of a run that make up one part.
@@ -260,9 +260,7 @@ fn keys(
     preparations: &[Preparation],
     opened: &mut Opened,
 ) -> Result<Vec<String>, Error> {
-    let digest = |path: &Path| {
-        fs::read(path).map(|bytes| hex(&Sha256::digest(bytes))).map_err(Single::file(path))
-    };
+    let digest = |path: &Path| fs::read(path).map(files::digest).map_err(Single::file(path));
     let executable = std::env::current_exe().map_err(Single::file("the path of this program"))?;
     let program = digest(&executable)?;
     let mut archives: BTreeMap<PathBuf, String> = BTreeMap::new();
@@ -301,7 +299,7 @@ fn keys(
             "timed": run.timed,
             "fmus": fmus,
         });
-        keys.push(hex(&Sha256::digest(all.to_string())));
+        keys.push(files::digest(all.to_string()));
     }
     Ok(keys)
 }
@@ -319,11 +317,6 @@ struct Work<'a> {
 /// Outcomes of parts, by the position of the run and the number of the part's first member.
 type Done = BTreeMap<(usize, u32), Outcome>;
 
-/// Locks a mutex. A panic of another thread does not harm the data behind it.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 impl Work<'_> {
     fn run(&self, parts: Vec<Part>, threads: usize) -> Result<Done, Error> {
         let queue = Mutex::new(VecDeque::from(parts));
@@ -336,26 +329,26 @@ impl Work<'_> {
                     // that thread.
                     let mut opened = Opened::default();
                     loop {
-                        let Some(part) = lock(&queue).pop_front() else { break };
+                        let Some(part) = queue.lock().pop_front() else { break };
                         match self.part(&part, &mut opened) {
                             Ok(outcome) => {
-                                lock(&done).insert((part.run, part.range.start), outcome);
+                                done.lock().insert((part.run, part.range.start), outcome);
                             }
                             // The work was asked to end; parts that the other threads finish are
                             // kept.
-                            Err(Error::Single(Single::Interrupted { .. })) => lock(&queue).clear(),
+                            Err(Error::Single(Single::Interrupted { .. })) => queue.lock().clear(),
                             Err(error) => {
-                                lock(&queue).clear();
-                                lock(&failure).get_or_insert(error);
+                                queue.lock().clear();
+                                failure.lock().get_or_insert(error);
                             }
                         }
                     }
                 });
             }
         });
-        match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        match failure.into_inner() {
             Some(error) => Err(error),
-            None => Ok(done.into_inner().unwrap_or_else(PoisonError::into_inner)),
+            None => Ok(done.into_inner()),
         }
     }
 
@@ -372,7 +365,7 @@ impl Work<'_> {
         let kept =
             Kept::new(self.keys[part.run].clone(), part.range.clone(), outcome).map_err(fault)?;
         let text = serde_json::to_vec(&kept).map_err(fault)?;
-        write_whole(&path, &text)?;
+        files::write(&path, &text)?;
         self.progress.finished(&run.label);
         Ok(kept.outcome)
     }

@@ -1,0 +1,77 @@
+//! Files that are written completely or not at all, and their digests.
+
+use crate::error::Error;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Writes a file, whose folder is made if it is missing. Nobody ever sees an incomplete one, and a
+/// file that was there stays if this fails.
+///
+/// # Errors
+/// Returns an error if the file cannot be written.
+pub fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Error> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(Error::file(folder))?;
+    }
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(format!(".{}.part", std::process::id()));
+    let partial = PathBuf::from(partial);
+    fs::write(&partial, content).and_then(|()| fs::rename(&partial, path)).map_err(|error| {
+        // The incomplete file is of no use, and it may be what fills the disk.
+        let _ = fs::remove_file(&partial);
+        Error::file(path)(error)
+    })
+}
+
+/// Writes a value as JSON, in the manner of [`write`].
+///
+/// # Errors
+/// Returns an error if the file cannot be written.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Error> {
+    let text = serde_json::to_string_pretty(value);
+    write(path, text.map_err(|error| Error::file(path)(error.into()))? + "\n")
+}
+
+/// Returns the SHA-256 of bytes as hexadecimal digits.
+pub fn digest(bytes: impl AsRef<[u8]>) -> String {
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+/// Formats bytes as hexadecimal digits.
+pub fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_cannot_be_replaced_stays_and_nothing_is_left_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("made/for it/a.txt");
+        write(&path, "one").unwrap();
+        write(&path, "two").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "two");
+        // A folder cannot be replaced by a file.
+        let error = write(path.parent().unwrap(), "three").unwrap_err();
+        assert!(error.to_string().contains("for it"), "{error}");
+        let beside = |path: &Path| fs::read_dir(path).unwrap().count();
+        assert_eq!((beside(folder.path()), beside(path.parent().unwrap())), (1, 1));
+        assert_eq!(beside(&folder.path().join("made")), 1);
+    }
+
+    #[test]
+    fn published_digest_of_abc() {
+        // FIPS 180-2, appendix B.1.
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(digest("abc"), expected);
+    }
+}
