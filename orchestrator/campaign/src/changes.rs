@@ -19,7 +19,9 @@ impl Changes {
     /// Returns the arguments that name a campaign and these changes.
     pub(crate) fn command(&self, campaign: &Campaign) -> String {
         let mut words = vec![campaign.source.path.display().to_string()];
-        let Overrides { set, fmu, stop, step, coupling, on_invalid } = &self.overrides;
+        // Processes of units change nothing of a case.
+        let Overrides { set, fmu, stop, step, coupling, on_invalid, isolation: _ } =
+            &self.overrides;
         let name = |value: Option<PossibleValue>| value.map(|value| value.get_name().to_string());
         let experiment = self.experiment.as_ref().map(|path| path.display().to_string());
         let coupling = coupling.as_ref().and_then(|value| name(value.to_possible_value()));

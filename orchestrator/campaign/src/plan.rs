@@ -91,11 +91,12 @@ impl Plan {
         let keys = keys(&campaign, changes, &system)?;
         let span = [system.clock.start(), system.clock.stop()];
         let command = changes.command(&campaign);
-        let single = system.fmus.iter().find(|fmu| {
+        let single = system.order.iter().zip(&system.fmus).find(|(name, fmu)| {
             let interface = fmu.description.co_simulation.as_ref();
             interface.is_some_and(|own| own.has("canBeInstantiatedOnlyOncePerProcess"))
+                && !experiment.isolation.isolates(&experiment.components[*name], fmu)
         });
-        let single = single.map(|fmu| fmu.path.clone());
+        let single = single.map(|(_, fmu)| fmu.path.clone());
         let plan = Self {
             command,
             archives: system

@@ -5,7 +5,7 @@ use crate::definition::{Campaign, Kind, Vary};
 use crate::law::Law;
 use cosim::document::Source;
 use cosim::error::Error;
-use cosim::experiment::{self, Experiment, Observe, Overrides};
+use cosim::experiment::{self, Experiment, Observe, Overrides, Protection};
 use cosim::files;
 use cosim::search;
 use cosim::system::System;
@@ -219,8 +219,9 @@ pub(crate) fn keys(
         own.remove("cases");
     }
     let own = toml::to_string(&own).map_err(|error| Error::experiment(error.to_string()))?;
-    // FMUs count by their content here as well.
-    let overrides = Overrides { fmu: Vec::new(), ..changes.overrides.clone() };
+    // FMUs count by their content here as well, and processes of units change nothing of a case.
+    let (fmu, isolation) = (Vec::new(), Protection::default());
+    let overrides = Overrides { fmu, isolation, ..changes.overrides.clone() };
     let own = format!("{own}{overrides:?}");
     let mut keys = BTreeMap::from([
         ("campaign".to_string(), files::digest(own)),

@@ -46,6 +46,10 @@ pub fn check(
     if let Some(target) = experiment.unplaced.first() {
         return Err(Error::experiment(format!("--set {target}: {}", whereabouts(target, &parts))));
     }
+    experiment
+        .isolation
+        .check()
+        .map_err(|problem| experiment.source.error(&(0..0), format!("[isolation] {problem}")))?;
     check_single_instances(&experiment, &order, &fmus)?;
 
     let wires = wiring::wires(&experiment, &parts)?;
@@ -148,6 +152,7 @@ fn check_single_instances(
             .as_ref()
             .is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"));
         if only_once
+            && !experiment.isolation.isolates(&experiment.components[&order[index]], fmu)
             && let Some(other) = fmus[..index].iter().position(|other| Rc::ptr_eq(other, fmu))
         {
             let message = format!(

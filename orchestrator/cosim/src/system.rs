@@ -15,7 +15,6 @@ use crate::wiring::{self, Column, Part, Port, Wire};
 use fmu_import::description::{Kind, ModelDescription};
 use fmu_import::fmu::Fmu;
 use fmu_import::names;
-use fmu_import::unit::CoSimulationUnit;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -245,7 +244,10 @@ impl System {
         let mut members = Vec::new();
         for (index, name) in self.order.iter().enumerate() {
             let fmu = &self.fmus[index];
-            let unit: Box<dyn CoSimulationUnit> = Box::new(fmu.instantiate(name)?);
+            let protection = &self.experiment.isolation;
+            let isolates = protection.isolates(&self.experiment.components[name], fmu);
+            let limits = isolates.then(|| protection.limits());
+            let unit = fmu.instantiate(name, limits.as_ref())?;
             let on_invalid = self.experiment.simulation.on_invalid;
             let mut unit = Watched::around(unit, name, fmu, on_invalid);
             settings::apply(&settings[index], unit.as_mut()).map_err(|failure| Error::Unit {

@@ -5,6 +5,9 @@ use crate::description::ModelDescription;
 use crate::error::Error;
 use crate::faults;
 use crate::instance::{FmuUnit, Functions};
+use crate::isolation::{self, Isolation, Library, Loaded, with_causes};
+use crate::log::Log;
+use crate::unit::CoSimulationUnit;
 use crate::warnings;
 use crate::xml;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
@@ -61,20 +64,25 @@ impl Fmu {
     pub fn faults(&self) -> Vec<String> {
         let mut faults = faults::faults(&self.description);
         if self.description.co_simulation.is_some() {
-            match self.load() {
-                Ok(functions) => faults.extend(functions.version_fault()),
+            match self.version_fault() {
+                Ok(fault) => faults.extend(fault),
                 Err(fault) => faults.push(fault),
             }
         }
         faults
     }
 
-    /// Loads the shared library of the FMU.
+    /// Returns whether this project's packer made the unit, so that it is trusted to do no harm to
+    /// the process that it is loaded into.
+    pub fn is_own(&self) -> bool {
+        self.description.generation_tool.starts_with("fmu-pack ")
+    }
+
+    /// Finds the shared library of the FMU, and its name in the archive.
     ///
     /// # Errors
-    /// Returns a line that says what is missing or why the library cannot be loaded, and names the
-    /// entry of the archive.
-    fn load(&self) -> Result<Functions, String> {
+    /// Returns a line that says what is missing or wrong.
+    fn library(&self) -> Result<(PathBuf, String), String> {
         let interface = self.description.co_simulation.as_ref().ok_or("offers no co-simulation")?;
         let platforms = self.platforms();
         if !platforms.iter().any(|platform| platform == PLATFORM) {
@@ -104,41 +112,75 @@ impl Fmu {
             check_library(&file).map_err(|reason| format!("{entry} {reason}"))?;
             self.is_sound.set(true);
         }
-        Functions::load(&file).map_err(|error| {
-            let text = with_causes(&error);
-            let text = text.trim_start_matches("dlopen failed: ");
-            match text.split_once(": cannot open shared object file") {
-                Some((missing, _)) => {
-                    format!("{entry} needs {missing}, which is not on this system")
-                }
-                // The path of the temporary folder is removed, because it means nothing to a
-                // reader.
-                None => {
-                    format!(
-                        "{entry}: {}",
-                        text.replace(&format!("{}/", self.folder.path().display()), "")
-                    )
-                }
-            }
-        })
+        Ok((file, entry))
     }
 
-    /// Loads the library and instantiates a co-simulation unit called `name`.
+    /// Tells why the system could not load a library.
+    fn not_loaded(&self, entry: &str, reason: &str) -> String {
+        let text = reason.trim_start_matches("dlopen failed: ");
+        match text.split_once(": cannot open shared object file") {
+            Some((missing, _)) => format!("{entry} needs {missing}, which is not on this system"),
+            // The path of the temporary folder is removed, because it means nothing to a reader.
+            None => {
+                let folder = format!("{}/", self.folder.path().display());
+                format!("{entry}: {}", text.replace(&folder, ""))
+            }
+        }
+    }
+
+    /// Loads the library and instantiates a co-simulation unit called `name`: in this process, or
+    /// in one of its own if `isolation` is given.
     ///
     /// # Errors
     /// Returns an error if the FMU has no binary for this platform or offers no co-simulation, if
     /// the library cannot be loaded, or if the FMU refuses.
-    pub fn instantiate(&self, name: &str) -> Result<FmuUnit, Error> {
+    pub fn instantiate(
+        &self,
+        name: &str,
+        isolation: Option<&Isolation>,
+    ) -> Result<Box<dyn CoSimulationUnit>, Error> {
         let refuse = |message: String| Error::Fmu { path: self.path.clone(), message };
-        let functions = self.load().map_err(refuse)?;
-        if let Some(fault) = functions.version_fault() {
-            warnings::warn_once(format!("{}: {fault}", self.path.display()));
-        }
-
+        let (file, entry) = self.library().map_err(refuse)?;
         let resources = Url::from_directory_path(self.folder.path().join("resources"))
             .map_err(|()| refuse("the temporary folder has no absolute path".into()))?;
-        let (guid, folder) = (&self.description.guid, Rc::clone(&self.folder));
-        FmuUnit::new(functions, name, guid, resources.as_str(), folder).map_err(refuse)
+        let guid = &self.description.guid;
+        let (unit, fault) = if let Some(isolation) = isolation {
+            let library = Library { file, folder: self.folder.path(), isolation };
+            match library.instantiate(name, guid, resources.as_str()) {
+                Loaded::Whole(unit, fault) => (unit, fault),
+                Loaded::NotLoaded(reason) => return Err(refuse(self.not_loaded(&entry, &reason))),
+                Loaded::Refused(reason) => return Err(refuse(reason)),
+            }
+        } else {
+            let functions = Functions::load(&file)
+                .map_err(|error| refuse(self.not_loaded(&entry, &with_causes(&error))))?;
+            let fault = functions.version_fault();
+            let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&self.folder)));
+            let unit = FmuUnit::new(functions, log, guid, resources.as_str(), folder)
+                .map_err(|reason| refuse(format!("the component \"{name}\" {reason}")))?;
+            (Box::new(unit) as Box<dyn CoSimulationUnit>, fault)
+        };
+        if let Some(fault) = fault {
+            warnings::warn_once(format!("{}: {fault}", self.path.display()));
+        }
+        Ok(unit)
+    }
+
+    /// Loads the library in a process of its own where that is possible, and returns what is wrong
+    /// with the version of FMI that it names.
+    fn version_fault(&self) -> Result<Option<String>, String> {
+        let (file, entry) = self.library()?;
+        if !isolation::is_enabled() {
+            let functions = Functions::load(&file)
+                .map_err(|error| self.not_loaded(&entry, &with_causes(&error)))?;
+            return Ok(functions.version_fault());
+        }
+        let isolation = Isolation::default();
+        match (Library { file, folder: self.folder.path(), isolation: &isolation }).check("it") {
+            Loaded::Whole((), fault) => Ok(fault),
+            Loaded::NotLoaded(reason) => Err(self.not_loaded(&entry, &reason)),
+            Loaded::Refused(reason) => Err(format!("{entry}: {reason}")),
+        }
     }
 }
 
@@ -189,9 +231,3 @@ const HOST: (BinaryFormat, Architecture) = (
         Architecture::X86_64
     },
 );
-
-/// Returns an error and its causes as one line.
-fn with_causes(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(Some(error), |error| error.source());
-    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
-}

@@ -1,4 +1,4 @@
-//! Calls an FMU's library. This is the only file of the crate with `unsafe`.
+//! Calls an FMU's library.
 //!
 //! The logger that expands `printf` arguments comes from `fmi-rs`. The calls go through libloading,
 //! because `fmi-rs` frees the callback structure after fmi2Instantiate, while units of several
@@ -14,8 +14,6 @@ use libloading::Library;
 use std::ffi::{CStr, CString, c_int, c_void};
 use std::path::Path;
 use std::rc::Rc;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
 use tempfile::TempDir;
 
 unsafe extern "C" {
@@ -131,31 +129,27 @@ struct Instance {
 }
 
 /// A co-simulation unit that was instantiated from an FMU.
-pub struct FmuUnit {
+pub(crate) struct FmuUnit {
     component: fmi::Component,
     instance: Rc<Instance>,
     fatal: bool,
-    _folder: Rc<TempDir>,
+    _folder: Option<Rc<TempDir>>,
 }
 
 impl FmuUnit {
-    /// Instantiates a co-simulation unit called `name`. `folder` holds the unpacked archive.
+    /// Instantiates a co-simulation unit that is called as its log says. `folder` holds the
+    /// unpacked archive, if it would vanish otherwise.
     pub(crate) fn new(
         functions: Functions,
-        name: &str,
+        log: Rc<Log>,
         guid: &str,
         resources: &str,
-        folder: Rc<TempDir>,
+        folder: Option<Rc<TempDir>>,
     ) -> Result<Self, String> {
         let text =
             |text: &str| CString::new(text).map_err(|_| format!("\"{text:?}\" holds a zero byte"));
-        let (name_text, guid, resources) = (text(name)?, text(guid)?, text(resources)?);
+        let (name, guid, resources) = (text(&log.component)?, text(guid)?, text(resources)?);
 
-        let log = Rc::new(Log {
-            component: name.to_string(),
-            last: Mutex::default(),
-            instantiates: AtomicBool::new(true),
-        });
         // Some units refuse to start without memory functions although they declare that they need
         // none.
         let mut callbacks = fmi::Callbacks {
@@ -174,7 +168,7 @@ impl FmuUnit {
         // keeps callbacks and log alive as long as the instance, as FMI demands.
         let component = unsafe {
             (functions.instantiate)(
-                name_text.as_ptr(),
+                name.as_ptr(),
                 fmi::CO_SIMULATION,
                 guid.as_ptr(),
                 resources.as_ptr(),
@@ -185,9 +179,9 @@ impl FmuUnit {
         };
         if component.is_null() {
             let message = log.take().unwrap_or_else(|| "fmi2Instantiate gave no instance".into());
-            return Err(format!("the component \"{name}\" could not be made of it: {message}"));
+            return Err(format!("could not be made of it: {message}"));
         }
-        log.instantiates.store(false, Ordering::Relaxed);
+        log.is_instantiated();
         let instance = Rc::new(Instance { functions, _callbacks: callbacks, log });
         Ok(Self { component, instance, fatal: false, _folder: folder })
     }

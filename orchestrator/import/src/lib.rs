@@ -9,6 +9,7 @@ pub mod faults;
 mod fmi;
 pub mod fmu;
 mod instance;
+pub mod isolation;
 mod log;
 pub mod names;
 pub mod quantity;

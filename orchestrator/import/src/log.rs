@@ -2,37 +2,208 @@
 
 use crate::fmi::Status;
 use crate::warnings;
+use serde::{Deserialize, Serialize};
 use std::ffi::c_int;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
-/// Forwards an FMU's log messages to `tracing`, and keeps the last one that reports a problem.
+/// Largest number of messages of a unit that are printed in a second, or held until somebody takes
+/// them.
+const MOST: u64 = 100;
+/// Largest number of bytes of a message.
+const LONGEST: usize = 2000;
+
+/// A message that a unit logged.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Said {
+    pub(crate) status: c_int,
+    pub(crate) category: String,
+    pub(crate) text: String,
+}
+
+/// Forwards an FMU's log messages, and keeps the last one that reports a problem.
 pub(crate) struct Log {
     pub(crate) component: String,
-    pub(crate) last: Mutex<Option<String>>,
+    last: Mutex<Option<String>>,
     /// Whether the unit is being instantiated. Messages about problems are then part of the error
     /// that follows.
-    pub(crate) instantiates: AtomicBool,
+    instantiates: AtomicBool,
+    sink: Sink,
+}
+
+enum Sink {
+    /// Prints messages as `tracing` does.
+    Printed(Mutex<Pace>),
+    /// Holds messages for another process, and hands on the text of problems at once.
+    Held(Arc<Held>, Box<dyn Fn(&[u8]) + Send + Sync>),
+}
+
+/// Messages that are held until they are taken.
+#[derive(Default)]
+pub(crate) struct Held(Mutex<(Vec<Said>, u64)>);
+
+/// Messages of the second that is running.
+#[derive(Default)]
+struct Pace {
+    since: Option<Instant>,
+    count: u64,
+}
+
+impl Pace {
+    /// Counts a message. Returns whether it may be printed, and the number of messages of the last
+    /// second that were not.
+    fn count(&mut self) -> (bool, u64) {
+        let now = Instant::now();
+        let mut lost = 0;
+        if self.since.is_none_or(|since| now.duration_since(since) > Duration::from_secs(1)) {
+            lost = self.count.saturating_sub(MOST);
+            *self = Self { since: Some(now), count: 0 };
+        }
+        self.count += 1;
+        (self.count <= MOST, lost)
+    }
+}
+
+impl Held {
+    /// Takes the messages that came since the last call.
+    pub(crate) fn take(&self) -> Vec<Said> {
+        let (mut said, lost) = std::mem::take(&mut *locked(&self.0));
+        if lost > 0 {
+            let text = format!("{lost} further messages are left out");
+            said.push(Said { status: Status::Warning as c_int, category: "log".into(), text });
+        }
+        said
+    }
+
+    fn add(&self, said: Said) {
+        let mut held = locked(&self.0);
+        if (held.0.len() as u64) < MOST { held.0.push(said) } else { held.1 += 1 }
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Log {
+    /// Creates a log of a component whose messages are printed.
+    pub(crate) fn new(component: &str) -> Self {
+        Self::with(component, Sink::Printed(Mutex::default()))
+    }
+
+    /// Creates a log of a component whose messages are held. The text of a problem also goes to
+    /// `problem` at once.
+    pub(crate) fn held(
+        component: &str,
+        held: Arc<Held>,
+        problem: impl Fn(&[u8]) + Send + Sync + 'static,
+    ) -> Self {
+        Self::with(component, Sink::Held(held, Box::new(problem)))
+    }
+
+    fn with(component: &str, sink: Sink) -> Self {
+        Self {
+            component: component.to_string(),
+            last: Mutex::default(),
+            instantiates: AtomicBool::new(true),
+            sink,
+        }
+    }
+
+    /// Says that the unit is instantiated.
+    pub(crate) fn is_instantiated(&self) {
+        self.instantiates.store(false, Ordering::Relaxed);
+    }
+
     pub(crate) fn take(&self) -> Option<String> {
-        self.last.lock().unwrap_or_else(PoisonError::into_inner).take()
+        locked(&self.last).take()
     }
 
     pub(crate) fn message(&self, status: Result<Status, c_int>, category: &str, message: &str) {
-        let (component, message) = (&self.component, message.trim_end().replace('\n', " "));
+        let message = cut(message).trim_end().replace('\n', " ");
+        let is_problem = !matches!(status, Ok(Status::Ok | Status::Pending | Status::Warning));
+        match &self.sink {
+            Sink::Held(held, problem) => {
+                if is_problem {
+                    problem(message.as_bytes());
+                }
+                let status = status.map_or_else(|code| code, |status| status as c_int);
+                let (category, text) = (cut(category).to_string(), message.clone());
+                held.add(Said { status, category, text });
+            }
+            Sink::Printed(pace) => self.print(pace, status, cut(category), &message),
+        }
+        if is_problem {
+            *locked(&self.last) = Some(message);
+        }
+    }
+
+    fn print(
+        &self,
+        pace: &Mutex<Pace>,
+        status: Result<Status, c_int>,
+        category: &str,
+        message: &str,
+    ) {
+        let component = &self.component;
         match status {
-            Ok(Status::Ok | Status::Pending) => {
+            // Warnings are collected, each once.
+            Ok(Status::Warning) => {
+                return warnings::warn(&format!("{component}: [{category}] {message}"));
+            }
+            Ok(Status::Ok | Status::Pending) if !tracing::enabled!(tracing::Level::INFO) => return,
+            _ => {}
+        }
+        let (may_print, lost) = locked(pace).count();
+        if lost > 0 {
+            tracing::warn!("{component}: {lost} further messages are left out");
+        }
+        if !may_print {
+            return;
+        }
+        match status {
+            Ok(Status::Ok | Status::Pending | Status::Warning) => {
                 tracing::info!("{component}: [{category}] {message}");
             }
-            Ok(Status::Warning) => warnings::warn(&format!("{component}: [{category}] {message}")),
             Ok(Status::Discard | Status::Error | Status::Fatal) | Err(_) => {
                 if !self.instantiates.load(Ordering::Relaxed) {
                     tracing::error!("{component}: [{category}] {message}");
                 }
-                *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
             }
         }
+    }
+}
+
+/// Returns the beginning of a text that is too long.
+fn cut(text: &str) -> &str {
+    let end = (0..=LONGEST.min(text.len())).rev().find(|end| text.is_char_boundary(*end));
+    &text[..end.unwrap_or(0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flood_is_counted_and_a_long_message_cut() {
+        let held = Arc::new(Held::default());
+        let words = Arc::new(Mutex::new(Vec::new()));
+        let heard = Arc::clone(&words);
+        let log = Log::held("a", Arc::clone(&held), move |text| *locked(&heard) = text.to_vec());
+        for number in 0..1000 {
+            log.message(Ok(Status::Error), "c", &format!("{number} {}", "é".repeat(2000)));
+        }
+        let said = held.take();
+        assert_eq!(said.len() as u64, MOST + 1);
+        assert_eq!(said[MOST as usize].text, "900 further messages are left out");
+        assert!(said.iter().all(|said| said.text.len() <= LONGEST));
+        assert!(locked(&words).starts_with(b"999 "));
+        assert!(log.take().unwrap().starts_with("999 ") && log.take().is_none());
+        assert!(held.take().is_empty());
+
+        let mut pace = Pace::default();
+        let printed = (0..1000).filter(|_| pace.count().0).count() as u64;
+        assert_eq!(printed, MOST);
     }
 }

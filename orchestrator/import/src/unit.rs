@@ -1,13 +1,16 @@
 //! The interface between the master and a co-simulation unit, which may be an FMU or a mock in a
 //! test.
 
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+
 /// A call to a unit that did not succeed.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UnitFailure {
     /// Whether the unit ended the simulation by this call, which is not a fault.
     pub ends: bool,
     /// Name of the call, for example `doStep`.
-    pub call: &'static str,
+    pub call: Cow<'static, str>,
     /// Message of the unit, or its status if it gave none.
     pub message: String,
 }
@@ -15,7 +18,7 @@ pub struct UnitFailure {
 impl UnitFailure {
     /// Creates a failure of this call that does not end the simulation.
     pub fn new(call: &'static str, message: impl Into<String>) -> Self {
-        Self { ends: false, call, message: message.into() }
+        Self { ends: false, call: call.into(), message: message.into() }
     }
 }
 

@@ -3,6 +3,7 @@
 mod bench;
 mod campaign;
 mod foreign;
+mod isolation;
 mod results;
 mod timing;
 mod usage;

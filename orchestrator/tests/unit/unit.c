@@ -4,10 +4,11 @@
    as the input is at most the parameter "largest". The parameters "delay" and "actuation.delay" do nothing.
    What it does wrong is chosen by the compiler's flags: -DENDS: a discarded step ends the simulation; -DVERSION: its version; -DDIRECT(value),
    -DITEM(value), -DTRUTH(value): what becomes of output.direct, guarantee.status, guarantee.inForce after two steps; -DRESETS=0: fmi2Reset leaves
-   the state as it is. */
+   the state as it is; -DPLACE=STEP -DHOW=ABORT: fault.h. */
 #define _POSIX_C_SOURCE 199309L
 #include <stddef.h>
 #include <time.h>
+#include "fault.h"
 
 #ifndef ENDS
 #define ENDS 0
@@ -63,6 +64,7 @@ void *fmi2Instantiate(const char *name, int type, const char *guid, const char *
     (void)type, (void)guid, (void)resources, (void)visible, (void)logging;
     Unit *unit = callbacks->allocate(1, sizeof(Unit));
     start(unit, callbacks);
+    fault(INSTANTIATE, callbacks->logger, callbacks->environment);
     return name ? unit : NULL;
 }
 
@@ -72,6 +74,7 @@ int fmi2Reset(Unit *unit) {
 }
 
 void fmi2FreeInstance(Unit *unit) {
+    fault(FREE, unit->callbacks->logger, unit->callbacks->environment);
     unit->callbacks->release(unit);
 }
 
@@ -83,10 +86,17 @@ int fmi2SetupExperiment(Unit *unit, int tolerance_defined, double tolerance, dou
 int fmi2EnterInitializationMode(Unit *unit) {
     return unit->gain < 100.0 ? OK : complain(unit, ERROR, "gain too large:", unit->gain);
 }
-int fmi2ExitInitializationMode(Unit *unit) { return unit ? OK : ERROR; }
+int fmi2ExitInitializationMode(Unit *unit) {
+#ifdef REACHES
+    reach(REACHES, unit->callbacks->logger, unit->callbacks->environment);
+#endif
+    fault(INITIALIZE, unit->callbacks->logger, unit->callbacks->environment);
+    return unit ? OK : ERROR;
+}
 int fmi2Terminate(Unit *unit) { return unit ? OK : ERROR; }
 
 int fmi2GetReal(Unit *unit, const unsigned *references, size_t n, double *values) {
+    if (unit->count >= 2) fault(GET, unit->callbacks->logger, unit->callbacks->environment);
     for (size_t i = 0; i < n; i++) {
         switch (references[i]) {
         case 0: values[i] = unit->input; break;
@@ -168,6 +178,10 @@ int fmi2SetString(Unit *unit, const unsigned *references, size_t n, const char *
 
 int fmi2DoStep(Unit *unit, double time, double step, int no_set_state) {
     (void)no_set_state;
+#ifdef HARM_BY_GAIN
+    if (unit->gain == 13.0) abort();
+#endif
+    if (time >= 2.0 - 1e-9) fault(STEP, unit->callbacks->logger, unit->callbacks->environment);
     if (time >= unit->fail_time - 1e-9) return complain(unit, unit->fail_status, "out of propellant at", time);
     if (unit->flag) complain(unit, WARNING, "runs hot at", 7.0);
     struct timespec pause = {(time_t)unit->pause, (long)(1e9 * (unit->pause - (double)(time_t)unit->pause))};

@@ -6,10 +6,12 @@
 
 mod measures;
 mod overrides;
+mod protection;
 
 pub use crate::watch::OnInvalid;
 pub use measures::{Curve, Guarantee, Kind, Loss, Measure, Observe, Panel, Scaled};
 pub use overrides::Overrides;
+pub use protection::Protection;
 
 use crate::document::Source;
 use crate::error::Error;
@@ -42,6 +44,9 @@ pub struct Experiment {
     /// Signals that are measured, watched and drawn.
     #[serde(default)]
     pub observe: Observe,
+    /// Processes of units and their limits.
+    #[serde(default)]
+    pub isolation: Protection,
     /// Whether inputs may stay unconnected without being named. This is no key of an experiment
     /// file.
     #[serde(skip)]
@@ -112,6 +117,9 @@ pub struct Component {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, Scalar>")]
     pub parameters: BTreeMap<String, Spanned<Value>>,
+    /// Whether the unit runs in a process of its own, whatever `[isolation]` says.
+    #[serde(default)]
+    pub isolate: Option<bool>,
     /// Whether the FMU takes the place of another one, as after `--fmu`: settings, recorded variables
     /// and unconnected inputs that it does not have are left out.
     #[serde(default, rename = "exchanged")]

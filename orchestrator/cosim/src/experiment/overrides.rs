@@ -1,6 +1,6 @@
 //! Changes that the command line makes to an experiment.
 
-use super::{Coupling, Experiment};
+use super::{Coupling, Experiment, Protection};
 use crate::error::Error;
 use crate::watch::OnInvalid;
 use fmu_import::names;
@@ -32,6 +32,9 @@ pub struct Overrides {
     /// Choose what happens if a unit gives a value that is not finite, or not valid for its type.
     #[arg(long, value_enum)]
     pub on_invalid: Option<OnInvalid>,
+    /// Processes of units and their limits.
+    #[command(flatten)]
+    pub isolation: Protection,
 }
 
 impl Experiment {
@@ -44,6 +47,7 @@ impl Experiment {
         self.simulation.step = overrides.step.unwrap_or(self.simulation.step);
         self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
         self.simulation.on_invalid = overrides.on_invalid.unwrap_or(self.simulation.on_invalid);
+        self.isolation.apply(&overrides.isolation);
         for assignment in &overrides.fmu {
             let refuse =
                 |message: String| Error::experiment(format!("--fmu {assignment}: {message}"));

@@ -5,7 +5,9 @@ use super::{OPEN_MODELICA, OWN, STRUCTURE};
 use crate::delay;
 use crate::document::Source;
 use crate::error::Error;
-use crate::experiment::{Coupling, Experiment, Observe, OnInvalid, Overrides, Record, Simulation};
+use crate::experiment::{
+    Coupling, Experiment, Observe, OnInvalid, Overrides, Protection, Record, Simulation,
+};
 use crate::system::Opened;
 use crate::wiring::{self, Part};
 use fmu_import::archive;
@@ -205,6 +207,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         connections: structure.connections,
         record: Record { variables: recorded.filter(texts).map(text_of).collect(), every: 1 },
         observe: Observe::default(),
+        isolation: Protection::default(),
         leaves_inputs_open: true,
         assigned: BTreeSet::new(),
         unplaced: Vec::new(),

@@ -28,6 +28,7 @@ impl Found {
             every: 1,
             unconnected: Vec::new(),
             parameters: self.parameters.iter().map(value).collect(),
+            isolate: None,
             is_exchanged: false,
         }
     }

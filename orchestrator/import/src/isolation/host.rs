@@ -1,0 +1,175 @@
+//! The process of a unit: it loads the library and makes the calls that the master asks for.
+
+use super::channel::{Channel, LARGEST, Slot};
+use super::limits;
+use super::protocol::{Action, InstanceOf, Read, Ready, Reply, Request, Set, Setup};
+use crate::instance::{FmuUnit, Functions};
+use crate::log::{Held, Log};
+use crate::unit::{CoSimulationUnit, Outcome};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fs::OpenOptions;
+use std::io::{self, Read as _};
+use std::path::Path;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Serves one unit by the memory in this file, and ends when the unit is freed or the master is
+/// gone.
+///
+/// # Errors
+/// Returns an error if the file is not what the master makes, or if a message cannot be decoded.
+pub fn serve(memory: &Path) -> io::Result<()> {
+    let file = OpenOptions::new().read(true).write(true).open(memory)?;
+    let channel = Arc::new(Channel::open(&file)?);
+    // The master holds the other end of this pipe, which the system closes when the master ends.
+    std::thread::spawn(|| {
+        let _ = io::stdin().read(&mut [0]);
+        std::process::abort();
+    });
+    let mut host = Host { channel, number: 0, bytes: Vec::new() };
+    let setup: Setup = host.receive()?;
+    let held = Arc::new(Held::default());
+    let words = Arc::clone(&host.channel);
+    let log = |name: &str| {
+        Log::held(name, Arc::clone(&held), move |text| words.put(Slot::LastWords, 1, text))
+    };
+    let without = limits::apply(&setup.limits);
+    let functions = match Functions::load(&setup.library) {
+        Ok(functions) => functions,
+        Err(error) => return host.send(&Ready::NotLoaded(super::with_causes(&error))),
+    };
+    let version_fault = functions.version_fault();
+    let Some(InstanceOf { name, guid, resources }) = setup.instance else {
+        host.send(&Ready::Loaded { version_fault, without, said: Vec::new() })?;
+        host.receive::<Request>()?;
+        drop(functions);
+        return host.send(&Reply::default());
+    };
+    let mut unit = match FmuUnit::new(functions, Rc::new(log(&name)), &guid, &resources, None) {
+        Ok(unit) => unit,
+        Err(reason) => return host.send(&Ready::Refused { reason, said: held.take() }),
+    };
+    host.send(&Ready::Loaded { version_fault, without, said: held.take() })?;
+    let (mut lists, mut values) = (Vec::new(), Vec::new());
+    loop {
+        let request: Request = host.receive()?;
+        if request.action == Action::Free {
+            drop(unit);
+            return host.send(&Reply { said: held.take(), ..Reply::default() });
+        }
+        let reply = answer(&mut unit, request, &mut lists, &mut values);
+        host.send_with(&Reply { said: held.take(), ..reply }, &values)?;
+    }
+}
+
+/// The end of the channel at which requests arrive.
+struct Host {
+    channel: Arc<Channel>,
+    number: u32,
+    bytes: Vec<u8>,
+}
+
+impl Host {
+    fn receive<T: DeserializeOwned>(&mut self) -> io::Result<T> {
+        self.number = self.number.wrapping_add(1);
+        let goes_on = |_: Duration| Ok::<(), io::Error>(());
+        self.channel.wait(Slot::Request, self.number, goes_on)?;
+        self.channel.copy(Slot::Request, &mut self.bytes);
+        postcard::from_bytes(&self.bytes).map_err(io::Error::other)
+    }
+
+    fn send(&mut self, message: &impl Serialize) -> io::Result<()> {
+        self.send_with(message, &[])
+    }
+
+    /// Sends a message with these bytes behind it.
+    fn send_with(&mut self, message: &impl Serialize, behind: &[u8]) -> io::Result<()> {
+        self.bytes.clear();
+        self.bytes = postcard::to_extend(message, std::mem::take(&mut self.bytes))
+            .map_err(io::Error::other)?;
+        self.bytes.extend_from_slice(behind);
+        if self.bytes.len() > LARGEST {
+            return Err(io::Error::other("an answer is too large"));
+        }
+        self.channel.put(Slot::Reply, self.number, &self.bytes);
+        Ok(())
+    }
+}
+
+/// A list of variables with room for its values.
+struct List {
+    read: Read,
+    reals: Vec<f64>,
+    wholes: Vec<i32>,
+}
+
+impl List {
+    fn new(read: Read) -> Self {
+        let (reals, wholes) = match &read {
+            Read::Real(references) => (references.len(), 0),
+            Read::Integer(references) | Read::Boolean(references) => (0, references.len()),
+        };
+        Self { read, reals: vec![0.0; reals], wholes: vec![0; wholes] }
+    }
+
+    /// Reads the values and appends their bytes.
+    fn read(&mut self, unit: &mut impl CoSimulationUnit, bytes: &mut Vec<u8>) -> Outcome {
+        let outcome = match &self.read {
+            Read::Real(references) => unit.get_real(references, &mut self.reals),
+            Read::Integer(references) => unit.get_integer(references, &mut self.wholes),
+            Read::Boolean(references) => unit.get_boolean(references, &mut self.wholes),
+        };
+        bytes.extend(self.reals.iter().flat_map(|value| value.to_le_bytes()));
+        bytes.extend(self.wholes.iter().flat_map(|value| value.to_le_bytes()));
+        outcome
+    }
+}
+
+/// Makes the calls of a request until one fails, and reads what is to be read.
+fn answer(
+    unit: &mut impl CoSimulationUnit,
+    request: Request,
+    lists: &mut Vec<List>,
+    bytes: &mut Vec<u8>,
+) -> Reply {
+    let Request { sets, action, reads, once } = request;
+    let outcome = sets.iter().try_for_each(|own| set(unit, own)).and_then(|()| act(unit, action));
+    if !action.reads() {
+        lists.clear();
+    }
+    lists.extend(reads.into_iter().map(List::new));
+    bytes.clear();
+    let mut reply = Reply { failure: outcome.err(), ..Reply::default() };
+    if reply.failure.is_none() && action.reads() {
+        let mut once: Vec<List> = once.into_iter().map(List::new).collect();
+        let read = if once.is_empty() { lists } else { &mut once };
+        for (place, list) in read.iter_mut().enumerate() {
+            if let Err(failure) = list.read(unit, bytes) {
+                reply.unread.push((place, failure));
+            }
+        }
+    }
+    reply
+}
+
+fn set(unit: &mut impl CoSimulationUnit, set: &Set) -> Outcome {
+    match set {
+        Set::Real(references, values) => unit.set_real(references, values),
+        Set::Integer(references, values) => unit.set_integer(references, values),
+        Set::Boolean(references, values) => unit.set_boolean(references, values),
+        Set::Text(reference, value) => unit.set_string(*reference, value),
+    }
+}
+
+fn act(unit: &mut impl CoSimulationUnit, action: Action) -> Outcome {
+    match action {
+        Action::Read | Action::Free => Ok(()),
+        Action::EnterInitialization { start, stop } => unit.enter_initialization(start, stop),
+        Action::ExitInitialization => unit.exit_initialization(),
+        Action::DoStep { time, step } => unit.do_step(time, step),
+        Action::Terminate => unit.terminate(),
+        Action::Reset => unit.reset(),
+    }
+}

@@ -1,0 +1,186 @@
+//! Units in processes of their own. A unit that crashes, ends its process, or never answers then
+//! fails like one that returns an error: the master goes on, and says which unit it was and in
+//! which call.
+//!
+//! | module | what it knows |
+//! |---|---|
+//! | `channel` | memory that both processes share |
+//! | `protocol` | the messages in it |
+//! | `host` | the process of the unit, which makes the calls |
+//! | `process`, `remote` | its master's side: a process that is watched, and the unit it stands for |
+//! | `limits`, `sandbox` | what the process may use |
+
+mod channel;
+mod host;
+mod limits;
+mod process;
+mod protocol;
+mod remote;
+#[cfg(target_os = "linux")]
+mod sandbox;
+
+pub use host::serve;
+pub use process::late_failures;
+
+use crate::unit::CoSimulationUnit;
+use process::Process;
+use protocol::{InstanceOf, Limits, Ready, Setup};
+use remote::RemoteUnit;
+use std::path::{Path, PathBuf};
+use std::process::ExitStatus;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+/// Name of the program's command that [`serve`]s a unit. Its argument is the path of the memory.
+pub const COMMAND: &str = "serve-unit";
+
+/// Program that is started for a unit.
+static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+
+/// Says that this process' program has the command [`COMMAND`], so that units can have processes
+/// of their own.
+pub fn enable() {
+    // On Linux this is the program that runs, also if its file was replaced since.
+    let own = Path::new("/proc/self/exe");
+    let own = if own.exists() { Ok(own.to_path_buf()) } else { std::env::current_exe() };
+    if let Ok(own) = own {
+        PROGRAM.get_or_init(|| own);
+    }
+}
+
+/// Returns whether units can have processes of their own.
+pub fn is_enabled() -> bool {
+    PROGRAM.get().is_some()
+}
+
+/// How a unit is kept from doing harm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Isolation {
+    /// Time within which a call must be answered.
+    pub call_timeout: Duration,
+    /// Number of bytes of memory that the process may write; `None` if it has no limit.
+    pub memory: Option<u64>,
+    /// Processor time that the process may take, s; `None` if it has no limit.
+    pub cpu: Option<u64>,
+    /// Whether the process may write nowhere but in the folder of its archive, and has no network.
+    pub sandbox: bool,
+}
+
+impl Default for Isolation {
+    fn default() -> Self {
+        Self {
+            call_timeout: Duration::from_secs(60),
+            memory: Some(4 << 30),
+            cpu: None,
+            sandbox: false,
+        }
+    }
+}
+
+/// What became of a library in a process of its own.
+pub(crate) enum Loaded<T> {
+    /// It was loaded. The text says what is wrong with the version of FMI that it names.
+    Whole(T, Option<String>),
+    /// The system could not load it, for this reason.
+    NotLoaded(String),
+    /// The unit refused or failed, for this reason.
+    Refused(String),
+}
+
+/// A library with what is needed to make a process for it.
+pub(crate) struct Library<'a> {
+    pub(crate) file: PathBuf,
+    /// Folder of the unpacked archive.
+    pub(crate) folder: &'a Path,
+    pub(crate) isolation: &'a Isolation,
+}
+
+impl Library<'_> {
+    /// Makes an instance in a process of its own.
+    pub(crate) fn instantiate(
+        self,
+        name: &str,
+        guid: &str,
+        resources: &str,
+    ) -> Loaded<Box<dyn CoSimulationUnit>> {
+        let (guid, resources) = (guid.into(), resources.into());
+        let instance = InstanceOf { name: name.into(), guid, resources };
+        let refused = |reason: &str| Loaded::Refused(format!("the component \"{name}\" {reason}"));
+        match self.load(name, Some(instance)) {
+            Loaded::Whole(process, fault) => {
+                Loaded::Whole(Box::new(RemoteUnit::new(process)), fault)
+            }
+            Loaded::NotLoaded(reason) => Loaded::NotLoaded(reason),
+            Loaded::Refused(reason) => refused(&reason),
+        }
+    }
+
+    /// Loads the library in a process of its own, and ends it.
+    pub(crate) fn check(self, name: &str) -> Loaded<()> {
+        match self.load(name, None) {
+            Loaded::Whole(_, fault) => Loaded::Whole((), fault),
+            Loaded::NotLoaded(reason) => Loaded::NotLoaded(reason),
+            Loaded::Refused(reason) => Loaded::Refused(reason),
+        }
+    }
+
+    fn load(self, name: &str, instance: Option<InstanceOf>) -> Loaded<Process> {
+        let Some(program) = PROGRAM.get() else {
+            return Loaded::Refused("has no process: this program cannot make any".into());
+        };
+        let mut process = match Process::start(program, name, self.isolation) {
+            Ok(process) => process,
+            Err(error) => return Loaded::Refused(format!("has no process: {error}")),
+        };
+        let limits = Limits {
+            memory: self.isolation.memory,
+            cpu: self.isolation.cpu,
+            folder: self.isolation.sandbox.then(|| self.folder.to_path_buf()),
+        };
+        match process.set_up(&Setup { library: self.file, instance, limits }) {
+            Ok(Ready::Loaded { version_fault, without, .. }) => {
+                if let Some(without) = without {
+                    crate::warnings::warn_once(format!(
+                        "this system does not limit these for units: {without}"
+                    ));
+                }
+                Loaded::Whole(process, version_fault)
+            }
+            Ok(Ready::NotLoaded(reason)) => Loaded::NotLoaded(reason),
+            Ok(Ready::Refused { reason, .. }) => Loaded::Refused(reason),
+            Err(failure) => {
+                Loaded::Refused(format!("failed in {}: {}", failure.call, failure.message))
+            }
+        }
+    }
+}
+
+/// Returns an error and its causes as one line.
+pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(Some(error), |error| error.source());
+    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
+}
+
+/// Tells how a process has ended.
+fn ended(status: ExitStatus) -> String {
+    #[cfg(unix)]
+    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+        let name = match signal {
+            4 => " (SIGILL, an illegal instruction)",
+            6 => " (SIGABRT, an abort)",
+            7 => " (SIGBUS, access to memory that is not there)",
+            8 => " (SIGFPE, a division by zero or the like)",
+            9 => " (SIGKILL)",
+            11 => " (SIGSEGV, access to memory that is not its own)",
+            15 => " (SIGTERM)",
+            24 => " (SIGXCPU, its processor time is used up)",
+            31 => " (SIGSYS, a call of the system that is not allowed)",
+            _ => "",
+        };
+        return format!("its process was killed by signal {signal}{name}");
+    }
+    match status.code() {
+        Some(code) => format!("it ended its process with exit code {code}"),
+        None => "its process has ended".into(),
+    }
+}

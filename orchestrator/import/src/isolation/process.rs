@@ -1,0 +1,287 @@
+//! The process of a unit, as the master sees it: it is started, asked, watched, and ended.
+
+use super::channel::{Channel, LARGEST, Slot};
+use super::protocol::{Action, Ready, Reply, Request, Setup};
+use super::{COMMAND, Isolation, ended};
+use crate::fmi;
+use crate::log::{Log, Said};
+use crate::unit::UnitFailure;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::io::{self, BufRead, BufReader, PipeReader};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tempfile::NamedTempFile;
+
+/// Time within which a unit must be freed, and its process ended.
+const FAREWELL: Duration = Duration::from_secs(10);
+/// Time within which what an ended process has printed must have arrived.
+const ECHO: Duration = Duration::from_millis(200);
+/// Largest number of bytes of a line of a unit that is passed on.
+const LINE: usize = 2000;
+
+/// Failures that came when the unit's run was over.
+static LATE: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+/// Returns the failures that came when a run was over: units that could not be freed. They are
+/// forgotten by this call.
+pub fn late_failures() -> Vec<String> {
+    std::mem::take(&mut LATE.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// The process of a unit.
+pub(super) struct Process {
+    child: Child,
+    channel: Channel,
+    /// File of the memory, which vanishes with this value.
+    _memory: NamedTempFile,
+    number: u32,
+    /// The last message, and where the values behind it begin.
+    bytes: Vec<u8>,
+    values: usize,
+    log: Log,
+    printed: Arc<Printed>,
+    timeout: Duration,
+    /// Why the process can no longer be asked.
+    gone: Option<String>,
+}
+
+/// What the process prints.
+#[derive(Default)]
+struct Printed {
+    last: Mutex<String>,
+    is_over: AtomicBool,
+}
+
+/// Why a wait has ended without an answer.
+enum Silence {
+    Ended(ExitStatus),
+    Late,
+    Fault(io::Error),
+}
+
+impl Process {
+    /// Starts a process, which then waits for [`Self::set_up`].
+    pub(super) fn start(program: &Path, name: &str, isolation: &Isolation) -> io::Result<Self> {
+        // Memory that is no file of a disk, where the system has it.
+        let folder = Path::new("/dev/shm");
+        let memory = if cfg!(target_os = "linux") && folder.is_dir() {
+            NamedTempFile::with_prefix_in("fmu-", folder)
+        } else {
+            NamedTempFile::with_prefix("fmu-")
+        }?;
+        let channel = Channel::create(memory.as_file())?;
+        let (prints, pipe) = io::pipe()?;
+        let mut command = Command::new(program);
+        command.arg(COMMAND).arg(memory.path()).stdin(Stdio::piped());
+        command.stdout(pipe.try_clone()?).stderr(pipe);
+        apart(&mut command);
+        let child = command.spawn()?;
+        // It holds the writing end of the pipe, which must end with the process.
+        drop(command);
+        let printed = Arc::new(Printed::default());
+        let (heard, component) = (Arc::clone(&printed), name.to_string());
+        std::thread::spawn(move || heard.listen(&component, prints));
+        Ok(Self {
+            child,
+            channel,
+            _memory: memory,
+            number: 0,
+            bytes: Vec::new(),
+            values: 0,
+            log: Log::new(name),
+            printed,
+            timeout: isolation.call_timeout,
+            gone: None,
+        })
+    }
+
+    /// Lets the process load its library and make an instance.
+    pub(super) fn set_up(&mut self, setup: &Setup) -> Result<Ready, UnitFailure> {
+        let mut ready = self.ask_for("instantiate", setup)?;
+        if let Ready::Loaded { said, .. } | Ready::Refused { said, .. } = &mut ready {
+            self.repeat(std::mem::take(said));
+        }
+        self.log.is_instantiated();
+        if !matches!(ready, Ready::Loaded { .. }) {
+            // The process has ended in order.
+            self.gone = Some("there is no instance".into());
+        }
+        Ok(ready)
+    }
+
+    /// Asks for calls and values.
+    pub(super) fn ask(
+        &mut self,
+        call: &'static str,
+        request: &Request,
+    ) -> Result<Reply, UnitFailure> {
+        let mut reply: Reply = self.ask_for(call, request)?;
+        self.repeat(std::mem::take(&mut reply.said));
+        Ok(reply)
+    }
+
+    fn repeat(&self, said: Vec<Said>) {
+        for Said { status, category, text } in said {
+            self.log.message(fmi::status(status), &category, &text);
+        }
+    }
+
+    fn ask_for<T: DeserializeOwned>(
+        &mut self,
+        call: &'static str,
+        message: &impl Serialize,
+    ) -> Result<T, UnitFailure> {
+        if let Some(reason) = &self.gone {
+            return Err(UnitFailure::new(call, reason.clone()));
+        }
+        self.bytes.clear();
+        let bytes = postcard::to_extend(message, std::mem::take(&mut self.bytes));
+        self.bytes = bytes.map_err(|error| UnitFailure::new(call, error.to_string()))?;
+        if self.bytes.len() > LARGEST {
+            return Err(UnitFailure::new(call, "the values are too many for one message"));
+        }
+        self.number = self.number.wrapping_add(1);
+        self.channel.put(Slot::Request, self.number, &self.bytes);
+        let (child, timeout) = (&mut self.child, self.timeout);
+        let waited = self.channel.wait(Slot::Reply, self.number, |waited| match child.try_wait() {
+            Ok(Some(status)) => Err(Silence::Ended(status)),
+            Err(error) => Err(Silence::Fault(error)),
+            Ok(None) if waited > timeout => Err(Silence::Late),
+            Ok(None) => Ok(()),
+        });
+        // A process may end right after its last answer.
+        if let Err(silence) = waited
+            && !self.channel.has(Slot::Reply, self.number)
+        {
+            return Err(self.end(call, &silence));
+        }
+        self.channel.copy(Slot::Reply, &mut self.bytes);
+        match postcard::take_from_bytes(&self.bytes) {
+            Ok((answer, behind)) => {
+                self.values = self.bytes.len() - behind.len();
+                Ok(answer)
+            }
+            Err(_) => Err(self.nonsense(call)),
+        }
+    }
+
+    /// Returns the bytes of the values that came with the last answer.
+    pub(super) fn values(&self) -> &[u8] {
+        &self.bytes[self.values..]
+    }
+
+    /// Returns the failure of a process whose answer is none. It is not asked again.
+    pub(super) fn nonsense(&mut self, call: &'static str) -> UnitFailure {
+        self.kill();
+        let reason = "its process has lost its way: what it answers makes no sense";
+        self.gone = Some(reason.into());
+        UnitFailure::new(call, reason)
+    }
+
+    fn end(&mut self, call: &'static str, silence: &Silence) -> UnitFailure {
+        let reason = match silence {
+            Silence::Ended(status) => ended(*status),
+            Silence::Late => {
+                format!("no answer within {} s (call_timeout)", self.timeout.as_secs_f64())
+            }
+            Silence::Fault(error) => format!("its process cannot be watched: {error}"),
+        };
+        self.kill();
+        let words = self.last_words();
+        let words = words.map(|words| format!("; its last words: {words}")).unwrap_or_default();
+        let reason = reason + &words;
+        self.gone = Some(format!("its process is gone: {reason}"));
+        UnitFailure::new(call, reason)
+    }
+
+    /// Returns what the unit said last: about a problem, or else what it printed.
+    fn last_words(&self) -> Option<String> {
+        let begin = Instant::now();
+        while !self.printed.is_over.load(Ordering::SeqCst) && begin.elapsed() < ECHO {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let mut said = Vec::new();
+        self.channel.copy(Slot::LastWords, &mut said);
+        let said = String::from_utf8_lossy(&said[..said.len().min(LINE)]).into_owned();
+        let printed = self.printed.last.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        [said, printed].into_iter().find(|words| !words.is_empty())
+    }
+
+    fn kill(&mut self) {
+        // It may be gone already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+
+    /// Frees the unit and ends the process.
+    fn free(&mut self) -> Result<(), UnitFailure> {
+        self.timeout = self.timeout.min(FAREWELL);
+        let call = Action::Free.call();
+        self.ask(call, &Request { action: Action::Free, ..Request::default() })?;
+        let begin = Instant::now();
+        loop {
+            match self.child.try_wait() {
+                Ok(Some(status)) if status.success() => return Ok(()),
+                Ok(Some(status)) => return Err(self.end(call, &Silence::Ended(status))),
+                Ok(None) if begin.elapsed() > self.timeout => {
+                    return Err(self.end(call, &Silence::Late));
+                }
+                Ok(None) => std::thread::sleep(Duration::from_micros(200)),
+                Err(error) => return Err(self.end(call, &Silence::Fault(error))),
+            }
+        }
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        if self.gone.is_none()
+            && let Err(failure) = self.free()
+        {
+            let text =
+                format!("{} failed in {}: {}", self.log.component, failure.call, failure.message);
+            LATE.lock().unwrap_or_else(PoisonError::into_inner).push(text);
+        }
+        self.kill();
+    }
+}
+
+impl Printed {
+    /// Passes on what the process prints, until it ends.
+    fn listen(&self, component: &str, prints: PipeReader) {
+        let mut prints = BufReader::new(prints);
+        let mut line = Vec::new();
+        while let Ok(1..) = io::Read::take(&mut prints, LINE as u64).read_until(b'\n', &mut line) {
+            let text = String::from_utf8_lossy(&line).trim_end().to_string();
+            if !text.is_empty() {
+                tracing::info!("{component} prints: {text}");
+                *self.last.lock().unwrap_or_else(PoisonError::into_inner) = text;
+            }
+            line.clear();
+        }
+        self.is_over.store(true, Ordering::SeqCst);
+    }
+}
+
+/// Keeps Ctrl-C from the process: the master ends it in order.
+#[cfg(unix)]
+fn apart(command: &mut Command) {
+    use std::os::unix::process::CommandExt;
+    command.process_group(0);
+}
+
+/// Keeps Ctrl-C from the process: the master ends it in order.
+#[cfg(windows)]
+fn apart(command: &mut Command) {
+    use std::os::windows::process::CommandExt;
+    /// Of Windows' processthreadsapi.h.
+    const CREATE_NEW_PROCESS_GROUP: u32 = 0x200;
+    command.creation_flags(CREATE_NEW_PROCESS_GROUP);
+}
+
+#[cfg(not(any(unix, windows)))]
+fn apart(_command: &mut Command) {}

@@ -1,0 +1,193 @@
+//! A unit in a process of its own, as the master sees it.
+//!
+//! Set calls are kept until the next call that needs an answer, and each answer to a step or a get
+//! call brings the values of all lists of variables that were read before: at a communication
+//! point there is one round trip for the step and one for the exchange of values. A set call that
+//! fails is told by the call that follows it.
+
+use super::process::Process;
+use super::protocol::{Action, Read, Request, Set};
+use crate::unit::{CoSimulationUnit, Outcome, UnitFailure};
+
+/// Number of values that are set or read by one message; longer lists are cut.
+const CHUNK: usize = 4096;
+/// Number of bytes of the values that come with every answer.
+const PREFETCHED: usize = 1 << 18;
+/// Number of bytes of a text that can be set.
+const TEXT: usize = 1 << 19;
+
+/// A unit in a process of its own.
+pub(crate) struct RemoteUnit {
+    process: Process,
+    /// Calls that wait for the next request, and the number of their values.
+    sets: Vec<Set>,
+    waiting: usize,
+    /// Lists whose values come with every answer, and the number of their bytes.
+    lists: Vec<Read>,
+    size: usize,
+    /// Lists that could not be read, by their places.
+    unread: Vec<(usize, UnitFailure)>,
+    /// Whether the values of the last answer are those of the lists and still those of the unit.
+    is_fresh: bool,
+}
+
+impl RemoteUnit {
+    pub(super) fn new(process: Process) -> Self {
+        Self {
+            process,
+            sets: Vec::new(),
+            waiting: 0,
+            lists: Vec::new(),
+            size: 0,
+            unread: Vec::new(),
+            is_fresh: false,
+        }
+    }
+
+    fn ask(&mut self, action: Action, reads: Vec<Read>, once: Vec<Read>) -> Outcome {
+        let sets = std::mem::take(&mut self.sets);
+        self.waiting = 0;
+        self.is_fresh = false;
+        if !action.reads() {
+            self.lists.clear();
+            self.size = 0;
+        }
+        self.size += reads.iter().map(Read::size).sum::<usize>();
+        self.lists.extend(reads.iter().cloned());
+        let wanted = if once.is_empty() { self.size } else { once.iter().map(Read::size).sum() };
+        let is_once = !once.is_empty();
+        let reply = self.process.ask(action.call(), &Request { sets, action, reads, once })?;
+        reply.failure.map_or(Ok(()), Err)?;
+        self.unread = reply.unread;
+        if action.reads() && self.process.values().len() != wanted {
+            return Err(self.process.nonsense(action.call()));
+        }
+        self.is_fresh = action.reads() && !is_once;
+        Ok(())
+    }
+
+    fn act(&mut self, action: Action) -> Outcome {
+        self.ask(action, Vec::new(), Vec::new())
+    }
+
+    fn set(&mut self, set: Set, count: usize) -> Outcome {
+        self.sets.push(set);
+        self.waiting += count;
+        self.is_fresh = false;
+        if self.waiting >= CHUNK { self.act(Action::Read) } else { Ok(()) }
+    }
+
+    /// Returns the bytes of the values of a list. `is_list` tells whether a list is the one that
+    /// `list` makes.
+    fn read(
+        &mut self,
+        is_list: impl Fn(&Read) -> bool,
+        list: impl Fn() -> Read,
+    ) -> Result<&[u8], UnitFailure> {
+        let mut place = self.lists.iter().position(is_list);
+        let mut begin = 0;
+        match place {
+            Some(_) if self.is_fresh => {}
+            Some(_) => self.act(Action::Read)?,
+            None if self.size + list().size() > PREFETCHED => {
+                self.ask(Action::Read, Vec::new(), vec![list()])?;
+                place = Some(0);
+            }
+            None => {
+                self.ask(Action::Read, vec![list()], Vec::new())?;
+                place = Some(self.lists.len() - 1);
+            }
+        }
+        let place = place.unwrap_or_default();
+        if let Some((_, failure)) = self.unread.iter().find(|(unread, _)| *unread == place) {
+            return Err(failure.clone());
+        }
+        if self.is_fresh {
+            begin = self.lists[..place].iter().map(Read::size).sum();
+        }
+        Ok(&self.process.values()[begin..])
+    }
+}
+
+/// Copies values from their bytes.
+fn decode<T, const N: usize>(bytes: &[u8], values: &mut [T], of: fn([u8; N]) -> T) {
+    for (value, bytes) in values.iter_mut().zip(bytes.as_chunks::<N>().0) {
+        *value = of(*bytes);
+    }
+}
+
+impl CoSimulationUnit for RemoteUnit {
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
+        for (references, values) in references.chunks(CHUNK).zip(values.chunks_mut(CHUNK)) {
+            let is_list = |list: &Read| matches!(list, Read::Real(own) if own == references);
+            let bytes = self.read(is_list, || Read::Real(references.to_vec()))?;
+            decode(bytes, values, f64::from_le_bytes);
+        }
+        Ok(())
+    }
+
+    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
+        for (references, values) in references.chunks(CHUNK).zip(values.chunks_mut(CHUNK)) {
+            let is_list = |list: &Read| matches!(list, Read::Integer(own) if own == references);
+            let bytes = self.read(is_list, || Read::Integer(references.to_vec()))?;
+            decode(bytes, values, i32::from_le_bytes);
+        }
+        Ok(())
+    }
+
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
+        for (references, values) in references.chunks(CHUNK).zip(values.chunks_mut(CHUNK)) {
+            let is_list = |list: &Read| matches!(list, Read::Boolean(own) if own == references);
+            let bytes = self.read(is_list, || Read::Boolean(references.to_vec()))?;
+            decode(bytes, values, i32::from_le_bytes);
+        }
+        Ok(())
+    }
+
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
+        references.chunks(CHUNK).zip(values.chunks(CHUNK)).try_for_each(|(references, values)| {
+            self.set(Set::Real(references.to_vec(), values.to_vec()), values.len())
+        })
+    }
+
+    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        references.chunks(CHUNK).zip(values.chunks(CHUNK)).try_for_each(|(references, values)| {
+            self.set(Set::Integer(references.to_vec(), values.to_vec()), values.len())
+        })
+    }
+
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        references.chunks(CHUNK).zip(values.chunks(CHUNK)).try_for_each(|(references, values)| {
+            self.set(Set::Boolean(references.to_vec(), values.to_vec()), values.len())
+        })
+    }
+
+    fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
+        if value.len() > TEXT {
+            let message = format!("the text has {} bytes, at most {TEXT} can be set", value.len());
+            return Err(UnitFailure::new("setString", message));
+        }
+        // A long text is sent at once.
+        self.set(Set::Text(reference, value.to_string()), 1 + value.len() / 16)
+    }
+
+    fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
+        self.act(Action::EnterInitialization { start, stop })
+    }
+
+    fn exit_initialization(&mut self) -> Outcome {
+        self.act(Action::ExitInitialization)
+    }
+
+    fn do_step(&mut self, time: f64, step: f64) -> Outcome {
+        self.act(Action::DoStep { time, step })
+    }
+
+    fn terminate(&mut self) -> Outcome {
+        self.act(Action::Terminate)
+    }
+
+    fn reset(&mut self) -> Outcome {
+        self.act(Action::Reset)
+    }
+}

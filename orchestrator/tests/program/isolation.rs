@@ -1,0 +1,231 @@
+//! Units that do harm to the process they are in.
+
+use crate::bench::{Bench, LOOP, Recipe};
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Ways of harm, with what is told of them.
+const HARM: [(&str, &str); 8] = [
+    ("EXIT", "it ended its process with exit code 0"),
+    ("QUICK_EXIT", "it ended its process with exit code 0"),
+    ("ABORT", "killed by signal 6 (SIGABRT, an abort); its last words: a bolt is loose"),
+    ("SEGFAULT", "killed by signal 11 (SIGSEGV"),
+    ("DIVISION", "killed by signal 8 (SIGFPE"),
+    ("ENDLESS", "no answer within 0.5 s (call_timeout)"),
+    ("OVERWRITE", "killed by signal 11 (SIGSEGV"),
+    ("MEMORY", "killed by signal 6 (SIGABRT, an abort); its last words: no memory is left"),
+];
+
+/// Limits with which a unit that never answers, or takes all memory, does so soon.
+const LIMITS: [&str; 2] = ["--call-timeout=0.5", "--unit-memory=64"];
+
+fn harmful(place: &str, how: &str) -> Bench {
+    let (place, how) = (format!("-DPLACE={place}"), format!("-DHOW={how}"));
+    // What the compiler makes of a write past an array is part of the harm.
+    let flags = [place.as_str(), how.as_str(), "-Wno-error", "-w"];
+    Bench::made(LOOP, &Recipe { flags: &flags, ..Recipe::default() })
+}
+
+/// Runs the experiment with these limits and a temporary folder of its own, which must be empty afterwards.
+fn run(bench: &Bench, arguments: &[&str]) -> (i32, String) {
+    run_within(bench, &LIMITS, arguments)
+}
+
+fn run_within(bench: &Bench, limits: &[&str], arguments: &[&str]) -> (i32, String) {
+    let folder = bench.path("temporary");
+    fs::create_dir_all(&folder).unwrap();
+    let memory = || {
+        let all = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+        let own = all.filter(|file| file.file_name().to_string_lossy().starts_with("fmu-"));
+        own.count()
+    };
+    let before = memory();
+    let mut command = bench.command(&["run", "loop.toml", "--force", "--quiet"]);
+    let begin = Instant::now();
+    let output = command.args(limits).args(arguments).env("TMPDIR", &folder).output().unwrap();
+    assert!(begin.elapsed() < Duration::from_secs(20), "{:?}", begin.elapsed());
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
+    // Other tests have units of their own meanwhile.
+    assert!(memory() <= before + 40);
+    (output.status.code().expect("no signal"), String::from_utf8(output.stderr).unwrap())
+}
+
+fn rows(bench: &Bench) -> usize {
+    let path = bench.path("out/loop/results.csv");
+    fs::read_to_string(path).map_or(0, |text| text.lines().count().saturating_sub(1))
+}
+
+/// Returns the only line of an error. One before it may say where the results are.
+fn told(errors: &str) -> &str {
+    let is_remark = |line: &&str| line.contains("the results until then are in");
+    let lines: Vec<&str> = errors.lines().filter(|line| !is_remark(line)).collect();
+    assert_eq!(lines.len(), 1, "{errors}");
+    lines[0]
+}
+
+#[test]
+fn harm_in_a_step_or_a_get_call_ends_the_run_with_all_rows() {
+    for (how, says) in HARM {
+        let bench = harmful("STEP", how);
+        let (code, errors) = run(&bench, &[]);
+        assert_eq!(code, 1, "{how}: {errors}");
+        assert!(told(&errors).starts_with("error: gain failed at t = 2 s in doStep: "), "{errors}");
+        assert!(errors.contains(says), "{how}: {errors}");
+        assert_eq!(rows(&bench), 3, "{how}");
+
+        let bench = harmful("GET", how);
+        let (code, errors) = run(&bench, &[]);
+        assert_eq!(code, 1, "{how}: {errors}");
+        // The values are read with the step that goes before.
+        assert!(told(&errors).starts_with("error: gain failed at t = 1 s in doStep: "), "{errors}");
+        assert!(errors.contains(says), "{how}: {errors}");
+        assert_eq!(rows(&bench), 2, "{how}");
+    }
+}
+
+#[test]
+fn harm_before_a_run_is_told_with_the_unit_and_the_call() {
+    for (how, says) in HARM {
+        for place in ["LOAD", "INSTANTIATE"] {
+            let (code, errors) = run(&harmful(place, how), &[]);
+            assert_eq!(code, 2, "{place} {how}: {errors}");
+            let begin = "error: ./Unit.fmu: the component \"gain\" failed in instantiate: ";
+            assert!(told(&errors).starts_with(begin), "{errors}");
+            assert!(errors.contains(says), "{place} {how}: {errors}");
+        }
+        let (code, errors) = run(&harmful("INITIALIZE", how), &[]);
+        assert_eq!(code, 1, "{how}: {errors}");
+        let begin = "error: gain failed at t = 0 s in exitInitializationMode: ";
+        assert!(told(&errors).starts_with(begin), "{errors}");
+        assert!(errors.contains(says), "{how}: {errors}");
+    }
+}
+
+#[test]
+fn harm_after_a_run_keeps_the_results_but_is_no_success() {
+    for (how, says) in HARM {
+        for place in ["FREE", "UNLOAD"] {
+            let bench = harmful(place, how);
+            let (code, errors) = run(&bench, &[]);
+            assert_eq!(code, 1, "{place} {how}: {errors}");
+            // Both components are of this unit.
+            assert_eq!(errors.lines().count(), 2, "{errors}");
+            for (line, name) in errors.lines().zip(["gain", "plant"]) {
+                let begin = format!("error: {name} failed in freeInstance: ");
+                assert!(line.starts_with(&begin) && line.contains(says), "{place} {how}: {line}");
+            }
+            assert_eq!(rows(&bench), 4);
+            assert_eq!(bench.json("out/loop/metrics.json")["completed"], true);
+        }
+    }
+}
+
+#[test]
+fn a_flood_of_messages_is_held_back() {
+    let bench = harmful("STEP", "FLOOD");
+    let (code, errors) = run_within(&bench, &["--call-timeout=20"], &[]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(errors.lines().count() < 500, "{}", errors.lines().count());
+    assert!(errors.contains("further messages are left out"), "{errors}");
+    assert_eq!(rows(&bench), 4);
+}
+
+#[test]
+fn results_are_the_same_in_processes_of_their_own() {
+    let bench = Bench::new();
+    let results = || fs::read(bench.path("out/loop/results.csv")).unwrap();
+    assert_eq!(run(&bench, &["--isolate=false"]).0, 0);
+    let expected = results();
+    assert_eq!(run(&bench, &["--isolate"]).0, 0);
+    assert_eq!(results(), expected);
+    assert_eq!(run(&bench, &[]).0, 0);
+    assert_eq!(results(), expected);
+}
+
+#[test]
+fn a_component_says_for_itself_whether_it_is_isolated() {
+    let bench = harmful("STEP", "SEGFAULT");
+    let experiment = LOOP.replace("[components.gain]", "[components.gain]\nisolate = true");
+    fs::write(bench.path("loop.toml"), experiment.clone() + "[isolation]\nisolate = false\n")
+        .unwrap();
+    assert_eq!(run(&bench, &[]).0, 1);
+    let wrong = experiment + "[isolation]\ncall_timeout = 0.0\n";
+    fs::write(bench.path("loop.toml"), wrong).unwrap();
+    let errors = bench.refusal(&["--quiet"]);
+    assert!(errors.contains("[isolation] call_timeout = 0: from 0.001 to 1e6 s"), "{errors}");
+}
+
+#[test]
+fn units_that_may_be_in_a_process_only_once_have_processes_of_their_own() {
+    let only_once = |text: String| {
+        text.replace("<CoSimulation", "<CoSimulation canBeInstantiatedOnlyOncePerProcess=\"true\"")
+    };
+    let bench = Bench::made(LOOP, &Recipe { description: &only_once, ..Recipe::default() });
+    assert_eq!(run(&bench, &[]).0, 0);
+    let errors = bench.refusal(&["--quiet", "--isolate=false"]);
+    assert!(errors.contains("only once per process"), "{errors}");
+}
+
+#[test]
+fn a_sandbox_keeps_a_unit_from_files_and_network() {
+    let outside = Path::new(env!("CARGO_TARGET_TMPDIR")).join("written-by-a-unit");
+    let _ = fs::remove_file(&outside);
+    let flags = format!("-DREACHES=\"{}\"", outside.display());
+    let bench = Bench::made(LOOP, &Recipe { flags: &[&flags], ..Recipe::default() });
+    let (code, errors) = run(&bench, &[]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(outside.is_file());
+    fs::remove_file(&outside).unwrap();
+    let (code, errors) = run(&bench, &["--sandbox"]);
+    // Where the system has no Landlock, it is said.
+    assert!(
+        !outside.exists() || errors.contains("does not limit these for units: files"),
+        "{errors}"
+    );
+    assert_eq!(code, 0, "{errors}");
+    assert!(outside.exists() || errors.contains("no file, no network"), "{errors}");
+    let _ = fs::remove_file(&outside);
+}
+
+#[test]
+fn a_campaign_goes_on_after_a_unit_that_does_harm() {
+    let bench =
+        Bench::made(LOOP, &Recipe { flags: &["-DHARM_BY_GAIN", "-w"], ..Recipe::default() });
+    let campaign = r#"
+title = "gains"
+experiment = "loop.toml"
+design = "factorial"
+[signals]
+out = ["plant.output.integral"]
+[[vary]]
+parameter = "gain.gain"
+list = [0.5, 13.0, 1.0]
+[[measure]]
+id = "last"
+kind = "last"
+signals = "out"
+"#;
+    fs::write(bench.path("c.toml"), campaign).unwrap();
+    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
+    assert_eq!(code, 0, "{errors}");
+    let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    let lines: Vec<&str> = table.lines().collect();
+    assert!(lines[1].starts_with("0,0.5,3.375,completed,3"), "{table}");
+    assert!(lines[2].starts_with("1,13,") && lines[2].contains(",failed,"), "{table}");
+    assert!(
+        lines[2].contains("gain failed at t = 0 s in doStep: its process was killed"),
+        "{table}"
+    );
+    assert!(lines[3].starts_with("2,1,8,completed,3"), "{table}");
+}
+
+#[test]
+fn a_unit_is_inspected_without_harm() {
+    for (how, says) in HARM.iter().filter(|(how, _)| !["ENDLESS", "MEMORY"].contains(how)) {
+        let bench = harmful("LOAD", how);
+        let (code, out, errors) = bench.call(&["inspect", "--check", "Unit.fmu"]);
+        assert_eq!(code, 1, "{out}{errors}");
+        assert!((out + &errors).contains(says), "{how}: {errors}");
+    }
+}

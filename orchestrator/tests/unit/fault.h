@@ -1,0 +1,59 @@
+/* Harm that a unit does in the place PLACE, in the way HOW. */
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+enum { NOWHERE, LOAD, INSTANTIATE, INITIALIZE, GET, STEP, FREE, UNLOAD };
+enum { EXIT, QUICK_EXIT, ABORT, SEGFAULT, DIVISION, ENDLESS, OVERWRITE, MEMORY, FLOOD };
+
+#ifndef PLACE
+#define PLACE NOWHERE
+#endif
+#ifndef HOW
+#define HOW EXIT
+#endif
+
+typedef void (*Logger)(void *, const char *, int, const char *, const char *, ...);
+
+static void fault(int place, Logger logger, void *environment) {
+    if (place != PLACE) return;
+    switch (HOW) {
+    case EXIT: exit(0);
+    case QUICK_EXIT: _exit(0);
+    case ABORT: fputs("a bolt is loose\n", stderr); abort();
+    case SEGFAULT: *(volatile int *)16 = 1; break;
+    case DIVISION: raise(SIGFPE); break;
+    case ENDLESS: for (;;) { volatile int i = 0; (void)i; }
+    case OVERWRITE: {
+        volatile char *array = malloc(32);
+        for (long i = 0; i < 1L << 40; i++) array[i] = 0x41;
+        break;
+    }
+    case MEMORY:
+        for (;;) {
+            char *more = malloc(1 << 20);
+            if (!more) { fputs("no memory is left\n", stderr); abort(); }
+            memset(more, 1, 1 << 20);
+        }
+    case FLOOD:
+        for (int i = 0; i < 200000; i++) {
+            if (logger) logger(environment, "unit", 3, "flood", "wave %d", i);
+            printf("wave %d\n", i);
+        }
+    }
+}
+
+/* Writes a file and opens a socket; says so if neither can be had. */
+void reach(const char *path, Logger logger, void *environment) {
+    FILE *file = fopen(path, "w");
+    int network = socket(AF_INET, SOCK_STREAM, 0);
+    if (!file && network < 0) logger(environment, "unit", 1, "reach", "no file, no network");
+    if (file) fclose(file);
+    if (network >= 0) close(network);
+}
+
+__attribute__((constructor)) static void loaded(void) { fault(LOAD, NULL, NULL); }
+__attribute__((destructor)) static void unloaded(void) { fault(UNLOAD, NULL, NULL); }
