@@ -7,6 +7,11 @@ target="${CARGO_TARGET_DIR:-$root/target}"
 [[ $target == /* ]] || target="$PWD/$target"
 export CARGO_TARGET_DIR="$target"
 fmus="$target/fmu"
+# The profile of the programs that are built and run here: release, or dev, which the tests have built
+# anyway.
+export PROGRAM_PROFILE="${PROGRAM_PROFILE:-release}"
+programs="$target/release"
+if [[ $PROGRAM_PROFILE == dev ]]; then programs="$target/debug"; fi
 cd "$root"
 
 say() { printf '\n== %s\n' "$*"; }
@@ -109,7 +114,7 @@ pack_fmus() {
         for folder in "${also[@]+"${also[@]}"}"; do
             others+=(--also "$(library "${crate//-/_}" "$folder")")
         done
-        (cd "$crate" && "$target/release/fmu-pack" "$library" "${others[@]+"${others[@]}"}" \
+        (cd "$crate" && "$programs/fmu-pack" "$library" "${others[@]+"${others[@]}"}" \
             --output "$2" --icons icons "${licences[@]+"${licences[@]}"}" "${@:3}")
     done
 }
@@ -118,17 +123,17 @@ pack_fmus() {
 # of them.
 fetch() { cargo fetch --locked --quiet; }
 
-# Builds in release the targets of the workspace that the arguments choose. With --workspace, every
-# choice has the same features of the dependencies, so that none of them is built twice.
-build_release() {
+# Builds the targets of the workspace that the arguments choose. With --workspace, every choice has
+# the same features of the dependencies, so that none of them is built twice.
+build() {
     fetch
-    cargo build --release --locked --workspace "$@"
+    cargo build --profile "$PROGRAM_PROFILE" --locked --workspace "$@"
 }
 
 # Builds the programs and the FMU libraries, and packs every FMU into $fmus. Arguments go to fmu-pack.
 build_fmus() {
     need_rust
-    say "Building in release"
-    build_release --lib --bin orchestrator --bin fmu-pack
-    pack_fmus "$target/release" "$fmus" "$@"
+    say "Building the programs and the units"
+    build --lib --bin orchestrator --bin fmu-pack
+    pack_fmus "$programs" "$fmus" "$@"
 }

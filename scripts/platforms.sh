@@ -89,8 +89,6 @@ END
 
 # cargo build for the triple $1 with the further arguments.
 cross_build() (
-    # A release is built by the profile as it stands, whatever the tests set.
-    unset CARGO_PROFILE_RELEASE_LTO CARGO_PROFILE_RELEASE_CODEGEN_UNITS
     local triple="$1"
     need_target "$triple"
     case "$triple" in
@@ -174,7 +172,7 @@ package_units() {
     need_cross
     # The descriptions come from the library that this machine can open.
     build_units linux-x86_64
-    build_release --bin fmu-pack
+    build --bin fmu-pack
     for platform in "$@"; do
         if [[ $platform == linux-x86_64 ]]; then
             also=()

@@ -35,11 +35,17 @@ NAMES = [
 ]
 
 
+def newest(*candidates: Path) -> Path:
+    """The file that was built last."""
+    found = [path for path in candidates if path.is_file()]
+    assert found, f"none of {candidates} exists: run scripts/build-fmus"
+    return max(found, key=lambda path: path.stat().st_mtime)
+
+
 def program(name: str) -> Path:
     """Path of a built program."""
-    path = TARGET / "release" / (name + (".exe" if os.name == "nt" else ""))
-    assert path.is_file(), f"{path} does not exist: run scripts/build-fmus"
-    return path
+    file = name + (".exe" if os.name == "nt" else "")
+    return newest(*(TARGET / profile / file for profile in ("release", "debug")))
 
 
 def archive(name: str) -> Path:
@@ -51,19 +57,15 @@ def archive(name: str) -> Path:
 
 def library(crate: str) -> Path:
     """Path of the built library of a crate."""
-    candidates = [TARGET / "release" / name for name in (f"lib{crate}.so", f"lib{crate}.dylib", f"{crate}.dll")]
-    found = [path for path in candidates if path.is_file()]
-    assert found, f"none of {candidates} exists: run scripts/build-fmus"
-    return found[0]
+    names = (f"lib{crate}.so", f"lib{crate}.dylib", f"{crate}.dll")
+    folders = [TARGET / "release", TARGET / "x86_64-unknown-linux-gnu" / "release"]
+    return newest(*(folder / name for folder in folders for name in names))
 
 
 def example(name: str) -> Path:
     """A built example of a crate: scripts/test builds those that are run."""
     file = name + (".exe" if os.name == "nt" else "")
-    candidates = [TARGET / profile / "examples" / file for profile in ("release", "debug")]
-    found = [path for path in candidates if path.is_file()]
-    assert found, f"none of {candidates} exists: run cargo build --workspace --example {name}"
-    return max(found, key=lambda path: path.stat().st_mtime)
+    return newest(*(TARGET / profile / "examples" / file for profile in ("release", "debug")))
 
 
 @pytest.fixture(scope="session")

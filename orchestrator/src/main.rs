@@ -23,7 +23,7 @@ use cosim_report::study::definition::Study;
 use cosim_report::study::reproduce;
 use cosim_report::summary;
 use failure::Failure;
-use fmu_import::isolation;
+use fmu_import::{crash, isolation};
 use live::log::Messages;
 use run::{Files, Options};
 use std::ffi::OsString;
@@ -215,6 +215,7 @@ fn main() -> ExitCode {
         return serve_unit(words.next());
     }
     isolation::enable();
+    crash::watch();
     let arguments = Arguments::parse();
     // A study may have a thousand runs; its report counts their warnings instead. Of a campaign the
     // messages of units are in its table.

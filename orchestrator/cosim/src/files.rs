@@ -26,7 +26,7 @@ pub fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Error> {
     })
 }
 
-/// Writes a value as JSON, in the manner of [`write`].
+/// Writes a value as JSON, in the manner of [`write()`].
 ///
 /// # Errors
 /// Returns an error if the file cannot be written.

@@ -1,10 +1,10 @@
 //! Unpacks an `.fmu` or `.ssp` archive without trusting it.
 
 use crate::error::Error;
+use crate::folder::TemporaryFolder;
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
-use tempfile::TempDir;
 use zip::ZipArchive;
 
 /// Largest size of an archive's content when unpacked, bytes.
@@ -19,11 +19,15 @@ const ENTRY_LIMIT: usize = 20_000;
 /// Returns an error if the file is not an archive, or if the archive has absolute paths, paths that
 /// lead out of the folder, duplicate names, links, encrypted entries, or more content than any FMU
 /// has.
-pub fn unpack(path: &Path) -> Result<TempDir, Error> {
+pub fn unpack(path: &Path) -> Result<TemporaryFolder, Error> {
     unpack_limited(path, SIZE_LIMIT, ENTRY_LIMIT)
 }
 
-fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<TempDir, Error> {
+fn unpack_limited(
+    path: &Path,
+    size_limit: u64,
+    entry_limit: usize,
+) -> Result<TemporaryFolder, Error> {
     let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
     let file = File::open(path).map_err(|source| refuse(format!("cannot be opened: {source}")))?;
     let mut archive = ZipArchive::new(file)
@@ -38,10 +42,7 @@ fn unpack_limited(path: &Path, size_limit: u64, entry_limit: usize) -> Result<Te
         )));
     }
 
-    let folder = tempfile::Builder::new()
-        .prefix("fmu-")
-        .tempdir()
-        .map_err(Error::file(std::env::temp_dir()))?;
+    let folder = TemporaryFolder::new().map_err(Error::file(std::env::temp_dir()))?;
     let mut left = size_limit;
     for index in 0..archive.len() {
         let mut entry =

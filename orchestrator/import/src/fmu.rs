@@ -4,6 +4,7 @@ use crate::archive;
 use crate::description::ModelDescription;
 use crate::error::Error;
 use crate::faults;
+use crate::folder::TemporaryFolder;
 use crate::instance::{FmuUnit, Functions};
 use crate::isolation::{self, Isolation, Library, Loaded, with_causes};
 use crate::log::Log;
@@ -16,7 +17,6 @@ use object::{Architecture, BinaryFormat, FileKind, Object, ObjectSegment};
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use tempfile::TempDir;
 use url::Url;
 
 /// An unpacked archive, of which several units can be instantiated.
@@ -25,7 +25,7 @@ pub struct Fmu {
     pub path: PathBuf,
     /// The model description in the archive.
     pub description: ModelDescription,
-    folder: Rc<TempDir>,
+    folder: Rc<TemporaryFolder>,
     /// Whether the library for this platform has been checked.
     is_sound: Cell<bool>,
 }
@@ -118,14 +118,11 @@ impl Fmu {
     /// Tells why the system could not load a library.
     fn not_loaded(&self, entry: &str, reason: &str) -> String {
         let text = reason.trim_start_matches("dlopen failed: ");
-        match text.split_once(": cannot open shared object file") {
-            Some((missing, _)) => format!("{entry} needs {missing}, which is not on this system"),
-            // The path of the temporary folder is removed, because it means nothing to a reader.
-            None => {
-                let folder = format!("{}/", self.folder.path().display());
-                format!("{entry}: {}", text.replace(&folder, ""))
-            }
+        if let Some((missing, _)) = text.split_once(": cannot open shared object file") {
+            return format!("{entry} needs {missing}, which is not on this system");
         }
+        // The path of the temporary folder is removed, because it means nothing to a reader.
+        format!("{entry}: {}", text.replace(&format!("{}/", self.folder.path().display()), ""))
     }
 
     /// Loads the library and instantiates a co-simulation unit called `name`: in this process, or
@@ -148,7 +145,7 @@ impl Fmu {
             let library = Library { file, folder: self.folder.path(), isolation };
             match library.instantiate(name, guid, resources.as_str()) {
                 Loaded::Whole(unit, fault) => (unit, fault),
-                Loaded::NotLoaded(reason) => return Err(refuse(self.not_loaded(&entry, &reason))),
+                Loaded::Unloadable(reason) => return Err(refuse(self.not_loaded(&entry, &reason))),
                 Loaded::Refused(reason) => return Err(refuse(reason)),
             }
         } else {
@@ -178,7 +175,7 @@ impl Fmu {
         let isolation = Isolation::default();
         match (Library { file, folder: self.folder.path(), isolation: &isolation }).check("it") {
             Loaded::Whole((), fault) => Ok(fault),
-            Loaded::NotLoaded(reason) => Err(self.not_loaded(&entry, &reason)),
+            Loaded::Unloadable(reason) => Err(self.not_loaded(&entry, &reason)),
             Loaded::Refused(reason) => Err(format!("{entry}: {reason}")),
         }
     }

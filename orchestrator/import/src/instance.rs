@@ -7,14 +7,15 @@
 
 #![allow(unsafe_code)]
 
+use crate::crash::Calling;
 use crate::fmi::{self, Status};
+use crate::folder::TemporaryFolder;
 use crate::log::Log;
 use crate::unit::{CoSimulationUnit, Outcome, UnitFailure};
 use libloading::Library;
 use std::ffi::{CStr, CString, c_int, c_void};
 use std::path::Path;
 use std::rc::Rc;
-use tempfile::TempDir;
 
 unsafe extern "C" {
     /// Wraps the logger in a C function that expands the `printf` arguments of a message. It is
@@ -133,7 +134,7 @@ pub(crate) struct FmuUnit {
     component: fmi::Component,
     instance: Rc<Instance>,
     fatal: bool,
-    _folder: Option<Rc<TempDir>>,
+    _folder: Option<Rc<TemporaryFolder>>,
 }
 
 impl FmuUnit {
@@ -144,7 +145,7 @@ impl FmuUnit {
         log: Rc<Log>,
         guid: &str,
         resources: &str,
-        folder: Option<Rc<TempDir>>,
+        folder: Option<Rc<TemporaryFolder>>,
     ) -> Result<Self, String> {
         let text =
             |text: &str| CString::new(text).map_err(|_| format!("\"{text:?}\" holds a zero byte"));
@@ -164,6 +165,7 @@ impl FmuUnit {
         unsafe { add_logger_proxy(&raw mut callbacks) };
         let callbacks = Rc::new(callbacks);
 
+        let calling = Calling::new(&log.component, "instantiate");
         // SAFETY: FMI 2.0 gives the function this type; the texts outlive the call, and the unit
         // keeps callbacks and log alive as long as the instance, as FMI demands.
         let component = unsafe {
@@ -177,6 +179,7 @@ impl FmuUnit {
                 fmi::TRUE,
             )
         };
+        drop(calling);
         if component.is_null() {
             let message = log.take().unwrap_or_else(|| "fmi2Instantiate gave no instance".into());
             return Err(format!("could not be made of it: {message}"));
@@ -186,12 +189,26 @@ impl FmuUnit {
         Ok(Self { component, instance, fatal: false, _folder: folder })
     }
 
+    /// Makes a call, and names it meanwhile to who asks what a crash came from.
     #[inline]
-    fn check(&mut self, call: &'static str, status: c_int) -> Outcome {
+    fn call(
+        &mut self,
+        call: &'static str,
+        function: impl FnOnce(&Functions, fmi::Component) -> c_int,
+    ) -> Outcome {
+        let calling = Calling::new(&self.instance.log.component, call);
+        let status = function(&self.instance.functions, self.component);
+        drop(calling);
         match fmi::status(status) {
             Ok(Status::Ok | Status::Warning) => Ok(()),
             status => Err(self.failure(call, status)),
         }
+    }
+
+    fn call_plain(&mut self, call: &'static str, function: fmi::Plain) -> Outcome {
+        // SAFETY: the instance is alive until the unit is dropped, and the function is one of its
+        // library with the type that FMI gives it.
+        self.call(call, |_, component| unsafe { function(component) })
     }
 
     #[cold]
@@ -245,6 +262,7 @@ impl Drop for FmuUnit {
             // so the instance is leaked.
             std::mem::forget(Rc::clone(&self.instance));
         } else {
+            let _calling = Calling::new(&self.instance.log.component, "freeInstance");
             // SAFETY: the instance is alive, is freed only here, and is not used afterwards.
             unsafe { (self.instance.functions.free_instance)(self.component) };
         }
@@ -253,72 +271,38 @@ impl Drop for FmuUnit {
 
 /// Performs a get or set call for arrays of references and values.
 macro_rules! call_with_values {
-    ($self:ident, $function:ident, $name:literal, $references:ident, $values:expr, $length:expr) => {{
-        assert_eq!($references.len(), $length, "as many values as references");
+    ($self:ident, $function:ident, $name:literal, $references:ident, $values:ident, $pointer:expr) => {{
+        assert_eq!($references.len(), $values.len(), "as many values as references");
         // SAFETY: the instance is alive, and both arrays have the length that is passed.
-        let status = unsafe {
-            ($self.instance.functions.$function)(
-                $self.component,
-                $references.as_ptr(),
-                $references.len(),
-                $values,
-            )
-        };
-        $self.check($name, status)
+        $self.call($name, |functions, component| unsafe {
+            (functions.$function)(component, $references.as_ptr(), $references.len(), $pointer)
+        })
     }};
 }
 
 impl CoSimulationUnit for FmuUnit {
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
-        call_with_values!(self, get_real, "getReal", references, values.as_mut_ptr(), values.len())
+        call_with_values!(self, get_real, "getReal", references, values, values.as_mut_ptr())
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        call_with_values!(
-            self,
-            get_integer,
-            "getInteger",
-            references,
-            values.as_mut_ptr(),
-            values.len()
-        )
+        call_with_values!(self, get_integer, "getInteger", references, values, values.as_mut_ptr())
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        call_with_values!(
-            self,
-            get_boolean,
-            "getBoolean",
-            references,
-            values.as_mut_ptr(),
-            values.len()
-        )
+        call_with_values!(self, get_boolean, "getBoolean", references, values, values.as_mut_ptr())
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        call_with_values!(self, set_real, "setReal", references, values.as_ptr(), values.len())
+        call_with_values!(self, set_real, "setReal", references, values, values.as_ptr())
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        call_with_values!(
-            self,
-            set_integer,
-            "setInteger",
-            references,
-            values.as_ptr(),
-            values.len()
-        )
+        call_with_values!(self, set_integer, "setInteger", references, values, values.as_ptr())
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        call_with_values!(
-            self,
-            set_boolean,
-            "setBoolean",
-            references,
-            values.as_ptr(),
-            values.len()
-        )
+        call_with_values!(self, set_boolean, "setBoolean", references, values, values.as_ptr())
     }
 
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
@@ -326,58 +310,39 @@ impl CoSimulationUnit for FmuUnit {
             UnitFailure::new("setString", format!("the text {value:?} holds a zero byte"))
         })?;
         let (references, values) = ([reference], [text.as_ptr()]);
-        call_with_values!(self, set_string, "setString", references, values.as_ptr(), values.len())
+        call_with_values!(self, set_string, "setString", references, values, values.as_ptr())
     }
 
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
-        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
-        // FMI gives it.
-        let status = unsafe {
-            (self.instance.functions.setup_experiment)(
-                self.component,
-                fmi::FALSE,
-                0.0,
-                start,
-                fmi::TRUE,
-                stop,
-            )
-        };
-        self.check("setupExperiment", status)?;
-        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
-        // FMI gives it.
-        let status = unsafe { (self.instance.functions.enter_initialization_mode)(self.component) };
-        self.check("enterInitializationMode", status)
+        // SAFETY: the instance is alive, and the function has the type FMI gives it.
+        self.call("setupExperiment", |functions, component| unsafe {
+            (functions.setup_experiment)(component, fmi::FALSE, 0.0, start, fmi::TRUE, stop)
+        })?;
+        self.call_plain(
+            "enterInitializationMode",
+            self.instance.functions.enter_initialization_mode,
+        )
     }
 
     fn exit_initialization(&mut self) -> Outcome {
-        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
-        // FMI gives it.
-        let status = unsafe { (self.instance.functions.exit_initialization_mode)(self.component) };
-        self.check("exitInitializationMode", status)
+        self.call_plain("exitInitializationMode", self.instance.functions.exit_initialization_mode)
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
-        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
-        // FMI gives it.
-        let status =
-            unsafe { (self.instance.functions.do_step)(self.component, time, step, fmi::TRUE) };
-        self.check("doStep", status)
+        // SAFETY: the instance is alive, and the function has the type FMI gives it.
+        self.call("doStep", |functions, component| unsafe {
+            (functions.do_step)(component, time, step, fmi::TRUE)
+        })
     }
 
     fn terminate(&mut self) -> Outcome {
-        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
-        // FMI gives it.
-        let status = unsafe { (self.instance.functions.terminate)(self.component) };
-        self.check("terminate", status)
+        self.call_plain("terminate", self.instance.functions.terminate)
     }
 
     fn reset(&mut self) -> Outcome {
         let Some(reset) = self.instance.functions.reset else {
-            return Err(UnitFailure::new("reset", "its library has no fmi2Reset".to_string()));
+            return Err(UnitFailure::new("reset", "its library has no fmi2Reset"));
         };
-        // SAFETY: the instance is alive until the unit is dropped, and the function has the type
-        // FMI gives it.
-        let status = unsafe { reset(self.component) };
-        self.check("reset", status)
+        self.call_plain("reset", reset)
     }
 }

@@ -3,11 +3,13 @@
 //! that are instantiated from it are called through the trait [`unit::CoSimulationUnit`].
 
 pub mod archive;
+pub mod crash;
 pub mod description;
 pub mod error;
 pub mod faults;
 mod fmi;
 pub mod fmu;
+pub mod folder;
 mod instance;
 pub mod isolation;
 mod log;

@@ -32,11 +32,14 @@ pub(crate) struct Log {
     sink: Sink,
 }
 
+/// Function that is handed a text.
+type Tell = Box<dyn Fn(&[u8]) + Send + Sync>;
+
 enum Sink {
     /// Prints messages as `tracing` does.
     Printed(Mutex<Pace>),
     /// Holds messages for another process, and hands on the text of problems at once.
-    Held(Arc<Held>, Box<dyn Fn(&[u8]) + Send + Sync>),
+    Held(Arc<Held>, Tell),
 }
 
 /// Messages that are held until they are taken.

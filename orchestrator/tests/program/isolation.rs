@@ -122,6 +122,74 @@ fn harm_after_a_run_keeps_the_results_but_is_no_success() {
 }
 
 #[test]
+fn harm_in_the_same_process_names_the_unit_and_the_call() {
+    for (how, what) in [
+        ("EXIT", "exit"),
+        ("ABORT", "SIGABRT"),
+        ("SEGFAULT", "SIGSEGV"),
+        ("DIVISION", "SIGFPE"),
+        ("OVERWRITE", "SIGSEGV"),
+    ] {
+        for (place, call) in
+            [("INSTANTIATE", "instantiate"), ("STEP", "doStep"), ("GET", "getReal")]
+        {
+            let bench = harmful(place, how);
+            let mut command = bench.command(&["run", "loop.toml", "--quiet", "--isolate=false"]);
+            let output = command.output().unwrap();
+            let errors = String::from_utf8(output.stderr).unwrap();
+            let unit = match (place, how) {
+                // The name itself may have been overwritten.
+                (_, "OVERWRITE") => "",
+                ("GET", _) => "plant",
+                _ => "gain",
+            };
+            let says = format!("{unit} ended this process in {call} ({what})");
+            assert!(errors.contains(&says), "{place} {how}: {errors}");
+            // A process that a signal has killed has no exit code.
+            assert_eq!(output.status.code(), (how == "EXIT").then_some(1), "{place} {how}");
+        }
+    }
+}
+
+#[test]
+fn rows_are_on_disk_within_a_second() {
+    let bench = Bench::new();
+    let mut command = bench.command(&["run", "loop.toml", "--quiet", "--set", "gain.pause=0.7"]);
+    let mut child = command.spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(1950));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(rows(&bench) >= 2, "{}", rows(&bench));
+}
+
+#[test]
+fn a_unit_ends_with_the_process_that_asked_for_it() {
+    let bench = harmful("STEP", "ENDLESS");
+    // The name of the unit's memory is an argument of its process, which is found by it.
+    let own = |pid: u32| {
+        let all = fs::read_dir("/proc").into_iter().flatten().flatten();
+        let parent = format!("PPid:\t{pid}\n");
+        let is_own = |folder: &Path| {
+            fs::read_to_string(folder.join("status")).is_ok_and(|status| status.contains(&parent))
+        };
+        all.map(|entry| entry.path()).filter(|folder| is_own(folder)).collect::<Vec<_>>()
+    };
+    let mut child = bench.command(&["run", "loop.toml", "--quiet"]).spawn().unwrap();
+    let begin = Instant::now();
+    let mut units = Vec::new();
+    while units.len() < 2 && begin.elapsed() < Duration::from_secs(10) {
+        units = own(child.id());
+    }
+    assert!(units.len() == 2 || !Path::new("/proc/self/status").exists(), "{units:?}");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    while units.iter().any(|unit| unit.exists()) {
+        assert!(begin.elapsed() < Duration::from_secs(20), "{units:?}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
 fn a_flood_of_messages_is_held_back() {
     let bench = harmful("STEP", "FLOOD");
     let (code, errors) = run_within(&bench, &["--call-timeout=20"], &[]);

@@ -6,16 +6,20 @@ use fmu_import::description::Carrier;
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Number of bytes that are held in memory before they are written.
 const HELD: usize = 1 << 16;
+/// Time after which rows are written in any case, so that a crash of the process loses no more.
+const PERIOD: Duration = Duration::from_secs(1);
 
 /// A CSV file that is being written.
 pub(super) struct Text {
     path: PathBuf,
     file: File,
-    /// Rows that are not yet written.
+    /// Rows that are not yet written, and the time since when.
     held: Vec<u8>,
+    since: Instant,
     columns: Vec<Shown>,
 }
 
@@ -48,7 +52,8 @@ impl Text {
             Shown { place: column.place, carrier: column.carrier, items: items.collect() }
         };
         let columns = columns.iter().map(shown).collect();
-        Ok(Self { path: path.to_path_buf(), file, held, columns })
+        let since = Instant::now();
+        Ok(Self { path: path.to_path_buf(), file, held, since, columns })
     }
 
     pub(super) fn row(&mut self, time: f64, values: &[f64]) -> Result<(), Error> {
@@ -68,13 +73,15 @@ impl Text {
             self.held.extend_from_slice(text.as_bytes());
         }
         self.held.push(b'\n');
-        if self.held.len() < HELD { Ok(()) } else { self.finish() }
+        let may_wait = self.held.len() < HELD && self.since.elapsed() < PERIOD;
+        if may_wait { Ok(()) } else { self.finish() }
     }
 
     /// Writes the rows that are held in memory.
     pub(super) fn finish(&mut self) -> Result<(), Error> {
         let outcome = self.file.write_all(&self.held);
         self.held.clear();
+        self.since = Instant::now();
         outcome.map_err(Error::file(&self.path))
     }
 }

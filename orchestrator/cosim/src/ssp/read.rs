@@ -13,11 +13,11 @@ use crate::wiring::{self, Part};
 use fmu_import::archive;
 use fmu_import::error::Error as Import;
 use fmu_import::fmu::Fmu;
+use fmu_import::folder::TemporaryFolder;
 use fmu_import::xml::{self, Element};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use tempfile::TempDir;
 use toml::Spanned;
 
 /// An experiment that was read from an archive.
@@ -34,7 +34,7 @@ pub struct Loaded {
 /// Entries of an archive, which stay unpacked as long as this value lives.
 pub struct Entries {
     path: PathBuf,
-    folder: TempDir,
+    folder: TemporaryFolder,
 }
 
 impl Entries {

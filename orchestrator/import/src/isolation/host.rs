@@ -38,7 +38,7 @@ pub fn serve(memory: &Path) -> io::Result<()> {
     let without = limits::apply(&setup.limits);
     let functions = match Functions::load(&setup.library) {
         Ok(functions) => functions,
-        Err(error) => return host.send(&Ready::NotLoaded(super::with_causes(&error))),
+        Err(error) => return host.send(&Ready::Unloadable(super::with_causes(&error))),
     };
     let version_fault = functions.version_fault();
     let Some(InstanceOf { name, guid, resources }) = setup.instance else {

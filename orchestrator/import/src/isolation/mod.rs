@@ -82,7 +82,7 @@ pub(crate) enum Loaded<T> {
     /// It was loaded. The text says what is wrong with the version of FMI that it names.
     Whole(T, Option<String>),
     /// The system could not load it, for this reason.
-    NotLoaded(String),
+    Unloadable(String),
     /// The unit refused or failed, for this reason.
     Refused(String),
 }
@@ -110,7 +110,7 @@ impl Library<'_> {
             Loaded::Whole(process, fault) => {
                 Loaded::Whole(Box::new(RemoteUnit::new(process)), fault)
             }
-            Loaded::NotLoaded(reason) => Loaded::NotLoaded(reason),
+            Loaded::Unloadable(reason) => Loaded::Unloadable(reason),
             Loaded::Refused(reason) => refused(&reason),
         }
     }
@@ -119,7 +119,7 @@ impl Library<'_> {
     pub(crate) fn check(self, name: &str) -> Loaded<()> {
         match self.load(name, None) {
             Loaded::Whole(_, fault) => Loaded::Whole((), fault),
-            Loaded::NotLoaded(reason) => Loaded::NotLoaded(reason),
+            Loaded::Unloadable(reason) => Loaded::Unloadable(reason),
             Loaded::Refused(reason) => Loaded::Refused(reason),
         }
     }
@@ -146,7 +146,7 @@ impl Library<'_> {
                 }
                 Loaded::Whole(process, version_fault)
             }
-            Ok(Ready::NotLoaded(reason)) => Loaded::NotLoaded(reason),
+            Ok(Ready::Unloadable(reason)) => Loaded::Unloadable(reason),
             Ok(Ready::Refused { reason, .. }) => Loaded::Refused(reason),
             Err(failure) => {
                 Loaded::Refused(format!("failed in {}: {}", failure.call, failure.message))

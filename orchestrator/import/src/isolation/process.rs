@@ -36,8 +36,8 @@ pub fn late_failures() -> Vec<String> {
 pub(super) struct Process {
     child: Child,
     channel: Channel,
-    /// File of the memory, which vanishes with this value.
-    _memory: NamedTempFile,
+    /// File of the memory, until the process has opened it.
+    memory: Option<NamedTempFile>,
     number: u32,
     /// The last message, and where the values behind it begin.
     bytes: Vec<u8>,
@@ -88,7 +88,7 @@ impl Process {
         Ok(Self {
             child,
             channel,
-            _memory: memory,
+            memory: Some(memory),
             number: 0,
             bytes: Vec::new(),
             values: 0,
@@ -102,6 +102,10 @@ impl Process {
     /// Lets the process load its library and make an instance.
     pub(super) fn set_up(&mut self, setup: &Setup) -> Result<Ready, UnitFailure> {
         let mut ready = self.ask_for("instantiate", setup)?;
+        // Both have opened it. Systems that keep a file which is in use remove it later.
+        if cfg!(unix) {
+            self.memory = None;
+        }
         if let Ready::Loaded { said, .. } | Ready::Refused { said, .. } = &mut ready {
             self.repeat(std::mem::take(said));
         }

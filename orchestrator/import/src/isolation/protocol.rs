@@ -41,7 +41,7 @@ pub(super) enum Ready {
     /// of FMI that the library names, and which limits the system does not know.
     Loaded { version_fault: Option<String>, without: Option<String>, said: Vec<Said> },
     /// The library cannot be loaded, as the system says.
-    NotLoaded(String),
+    Unloadable(String),
     /// The unit refused.
     Refused { reason: String, said: Vec<Said> },
 }

@@ -321,7 +321,7 @@ impl Work<'_> {
     fn run(&self, parts: Vec<Part>, threads: usize) -> Result<Done, Error> {
         let queue = Mutex::new(VecDeque::from(parts));
         let done = Mutex::new(Done::new());
-        let failure: Mutex<Option<Error>> = Mutex::new(None);
+        let failed: Mutex<BTreeMap<(usize, u32), Error>> = Mutex::default();
         std::thread::scope(|scope| {
             for _ in 0..threads.max(1) {
                 scope.spawn(|| {
@@ -330,26 +330,34 @@ impl Work<'_> {
                     let mut opened = Opened::default();
                     loop {
                         let Some(part) = queue.lock().pop_front() else { break };
+                        let place = (part.run, part.range.start);
                         match self.part(&part, &mut opened) {
                             Ok(outcome) => {
-                                done.lock().insert((part.run, part.range.start), outcome);
+                                done.lock().insert(place, outcome);
                             }
                             // The work was asked to end; parts that the other threads finish are
                             // kept.
                             Err(Error::Single(Single::Interrupted { .. })) => queue.lock().clear(),
                             Err(error) => {
-                                queue.lock().clear();
-                                failure.lock().get_or_insert(error);
+                                // The other runs know nothing of a unit that failed, and are kept.
+                                let is_of_unit =
+                                    matches!(error, Error::Run { source: Single::Unit { .. }, .. });
+                                if !is_of_unit {
+                                    queue.lock().clear();
+                                }
+                                failed.lock().insert(place, error);
                             }
                         }
                     }
                 });
             }
         });
-        match failure.into_inner() {
-            Some(error) => Err(error),
-            None => Ok(done.into_inner()),
+        let mut failed = failed.into_inner().into_values();
+        let Some(first) = failed.next() else { return Ok(done.into_inner()) };
+        for error in failed {
+            tracing::error!("{error}");
         }
+        Err(first)
     }
 
     fn part(&self, part: &Part, opened: &mut Opened) -> Result<Outcome, Error> {

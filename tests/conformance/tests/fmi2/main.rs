@@ -5,6 +5,7 @@
 mod arguments;
 mod calls;
 mod derivatives;
+mod finite;
 mod libraries;
 mod platform;
 mod resources;

@@ -1,0 +1,113 @@
+//! Says which unit and which call it was when a unit in this process ends the process.
+
+#![allow(unsafe_code)]
+
+use std::cell::Cell;
+use std::marker::PhantomData;
+
+thread_local! {
+    /// Name of the unit that this thread calls, and name of the call; `None` between calls. A
+    /// constant initialiser keeps the access free of locks and allocation, as in a signal handler
+    /// nothing else is allowed.
+    static CURRENT: Cell<Option<(*const str, &'static str)>> = const { Cell::new(None) };
+}
+
+/// A call that is being made, until this value is dropped.
+pub(crate) struct Calling<'a>(PhantomData<&'a str>);
+
+impl<'a> Calling<'a> {
+    /// Says that this thread makes this call to the unit of this name.
+    #[inline]
+    pub(crate) fn new(unit: &'a str, call: &'static str) -> Self {
+        CURRENT.set(Some((unit, call)));
+        Self(PhantomData)
+    }
+}
+
+impl Drop for Calling<'_> {
+    #[inline]
+    fn drop(&mut self) {
+        CURRENT.set(None);
+    }
+}
+
+/// Watches for signals that end this process, and for calls of `exit`, from now on. If a unit was
+/// being called, one line on standard error names it.
+#[cfg(unix)]
+pub fn watch() {
+    for (place, (signal, _)) in SIGNALS.iter().enumerate() {
+        // SAFETY: all zeros is a valid `sigaction`, the pointers are valid for the calls, and the
+        // handler does only what a handler may do. PREVIOUS is written here alone, before any
+        // signal that its handler reads it for.
+        unsafe {
+            let mut action: libc::sigaction = std::mem::zeroed();
+            action.sa_sigaction = on_signal as extern "C" fn(libc::c_int) as usize;
+            action.sa_flags = libc::SA_ONSTACK;
+            libc::sigaction(*signal, &raw const action, (&raw mut PREVIOUS[place]).cast());
+        }
+    }
+    // SAFETY: the function has the type that C wants and stays where it is.
+    unsafe { libc::atexit(on_exit) };
+}
+
+/// Watches for nothing: this system has no signals.
+#[cfg(not(unix))]
+pub fn watch() {}
+
+#[cfg(unix)]
+const SIGNALS: [(libc::c_int, &str); 5] = [
+    (libc::SIGSEGV, "SIGSEGV"),
+    (libc::SIGBUS, "SIGBUS"),
+    (libc::SIGILL, "SIGILL"),
+    (libc::SIGFPE, "SIGFPE"),
+    (libc::SIGABRT, "SIGABRT"),
+];
+
+/// The handlers that were there before: Rust's own tells of a stack that is used up.
+#[cfg(unix)]
+static mut PREVIOUS: [std::mem::MaybeUninit<libc::sigaction>; 5] =
+    [const { std::mem::MaybeUninit::zeroed() }; 5];
+
+#[cfg(unix)]
+extern "C" fn on_signal(signal: libc::c_int) {
+    for (place, (known, name)) in SIGNALS.iter().enumerate() {
+        if *known == signal {
+            tell(name);
+            // SAFETY: the handler was stored by `watch`. The instruction that made the signal is
+            // run again and meets the former handler, or ends the process.
+            unsafe {
+                libc::sigaction(signal, (&raw const PREVIOUS[place]).cast(), std::ptr::null_mut())
+            };
+        }
+    }
+}
+
+#[cfg(unix)]
+extern "C" fn on_exit() {
+    if tell("exit") {
+        // SAFETY: this ends the process at once. A unit that ends it must not pass for success.
+        unsafe { libc::_exit(1) };
+    }
+}
+
+/// Writes which unit is being called, with system calls only. Returns whether there is one.
+#[cfg(unix)]
+fn tell(what: &str) -> bool {
+    let Some((unit, call)) = CURRENT.get() else { return false };
+    // SAFETY: `Calling` borrows the name as long as the call lasts, which has not returned.
+    let unit = unsafe { &*unit };
+    let parts = [
+        "error: ",
+        unit,
+        " ended this process in ",
+        call,
+        " (",
+        what,
+        "); with --isolate the run would go on to its end in order\n",
+    ];
+    for part in parts {
+        // SAFETY: pointer and length are those of the text. Nobody can be told of a failure.
+        unsafe { libc::write(2, part.as_ptr().cast(), part.len()) };
+    }
+    true
+}
