@@ -10,6 +10,7 @@ mod live;
 mod pack;
 mod run;
 mod schema;
+mod unit;
 
 use catalogue::Filter;
 use cosim::check::check;
@@ -23,10 +24,8 @@ use cosim_report::study::definition::Study;
 use cosim_report::study::reproduce;
 use cosim_report::summary;
 use failure::Failure;
-use fmu_import::{crash, isolation};
 use live::log::Messages;
 use run::{Files, Options};
-use std::ffi::OsString;
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -197,25 +196,10 @@ enum Command {
     },
 }
 
-/// Serves a unit in this process, which another process of this program has started.
-fn serve_unit(memory: Option<OsString>) -> ExitCode {
-    let memory = memory.map(PathBuf::from).unwrap_or_default();
-    match isolation::serve(&memory) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {}: {error}", memory.display());
-            ExitCode::FAILURE
-        }
-    }
-}
-
 fn main() -> ExitCode {
-    let mut words = std::env::args_os().skip(1);
-    if words.next().is_some_and(|word| word == isolation::COMMAND) {
-        return serve_unit(words.next());
+    if let Some(code) = unit::serve() {
+        return code;
     }
-    isolation::enable();
-    crash::watch();
     let arguments = Arguments::parse();
     // A study may have a thousand runs; its report counts their warnings instead. Of a campaign the
     // messages of units are in its table.
@@ -237,13 +221,10 @@ fn main() -> ExitCode {
     let interrupt = Interrupt::default();
     let outcome = execute(arguments.command, &mut out, &interrupt)
         .and_then(|()| out.flush().map_err(Failure::from));
-    let late = isolation::late_failures();
-    for failure in &late {
-        let _ = writeln!(stderr(), "error: {failure}");
-    }
+    let left_in_order = unit::left_in_order();
     match outcome {
-        Ok(()) if late.is_empty() => ExitCode::SUCCESS,
-        // The results are whole, but a unit did not leave in order.
+        Ok(()) if left_in_order => ExitCode::SUCCESS,
+        // The results are whole, but a unit did harm when it was freed.
         Ok(()) => ExitCode::FAILURE,
         Err(error) if error.is_broken_pipe() => {
             // Output that could not be written must not be written again when the writer is

@@ -30,3 +30,9 @@ impl Error {
         move |source| Self::File { path, source }
     }
 }
+
+/// Returns an error and its causes as one line.
+pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(Some(error), |error| error.source());
+    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
+}

@@ -2,11 +2,11 @@
 
 use crate::archive;
 use crate::description::ModelDescription;
-use crate::error::Error;
+use crate::error::{Error, with_causes};
 use crate::faults;
 use crate::folder::TemporaryFolder;
 use crate::instance::{FmuUnit, Functions};
-use crate::isolation::{self, Isolation, Library, Loaded, with_causes};
+use crate::isolation::{self, Isolation, Library, Loaded};
 use crate::log::Log;
 use crate::unit::CoSimulationUnit;
 use crate::warnings;

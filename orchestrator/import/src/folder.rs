@@ -1,5 +1,5 @@
-//! Temporary folders that vanish on every exit that the system lets a process see, and are removed by
-//! the next run after any other.
+//! Temporary folders that vanish on every exit that the system lets a process see, and are removed
+//! by the next run after any other.
 
 use std::fs::{self, File};
 use std::io;

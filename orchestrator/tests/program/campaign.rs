@@ -1,4 +1,4 @@
-//! Campaigns and searches of cases of a loop that can be computed by hand.
+//! Campaigns of cases of a loop that can be computed by hand.
 
 use crate::bench::{Bench, LOOP, Recipe};
 use serde_json::json;
@@ -37,7 +37,7 @@ measure = "largest"
 at_most = 8.0
 "#;
 
-fn bench(campaign: &str) -> Bench {
+pub(crate) fn bench(campaign: &str) -> Bench {
     let bench = Bench::new();
     fs::write(bench.path("c.toml"), campaign).unwrap();
     bench
@@ -106,7 +106,7 @@ fn a_case_that_a_unit_ended_early_keeps_no_limit() {
     assert!(rows[2].starts_with("1,0.5,2,2.25,2.25,false,ended,2,"), "{}", rows[2]);
 }
 
-const RANDOM: &str = r#"
+pub(crate) const RANDOM: &str = r#"
 title = "random gains"
 experiment = "loop.toml"
 cases = 1100
@@ -375,33 +375,4 @@ fn what_is_sorted_ascends() {
         let times: Vec<f64> = row.split(',').skip(4).take(3).map(|t| t.parse().unwrap()).collect();
         assert!(times[0] < times[1] && times[1] < times[2] && times[2] < 1e-3, "{row}");
     }
-}
-
-#[test]
-fn a_search_finds_the_corner_and_writes_it_as_an_experiment() {
-    let text = format!("{RANDOM}[search]\nlargest = \"last\"\ncases = 300\n");
-    let text = text.replace("uniform = [0.0", "uniform = [-0.9");
-    let bench = bench(&text);
-    let (code, said, errors) = bench.call(&["falsify", "c.toml", "--out", "w"]);
-    assert_eq!(code, 0, "{errors}");
-    assert!(said.contains("breaks small"), "{said}");
-    let found = bench.json("w/search.json");
-    assert!((found["largest"].as_f64().unwrap() - 8.0).abs() < 1e-3, "{found}");
-    let (code, _, errors) = bench.call(&["run", "w/worst.toml", "--fmu-dir", "."]);
-    assert_eq!(code, 0, "{errors}");
-    let rows = fs::read_to_string(bench.path("out/worst/results.csv")).unwrap();
-    let last: f64 = rows.lines().last().unwrap().split(',').nth(2).unwrap().parse().unwrap();
-    assert!((last - found["largest"].as_f64().unwrap()).abs() < 1e-12);
-    // The same search gives the same bytes, on any number of threads.
-    let (code, _, errors) = bench.call(&["falsify", "c.toml", "--out", "w1", "--jobs", "1"]);
-    assert_eq!(code, 0, "{errors}");
-    for file in ["search.parquet", "worst.toml", "search.json", "history.svg"] {
-        let bytes = |out: &str| fs::read(bench.path(&format!("{out}/{file}"))).unwrap();
-        assert!(bytes("w") == bytes("w1"), "{file}");
-    }
-    let (code, _, errors) = bench.call(&["falsify", "c.toml", "--out", "w"]);
-    assert!(code == 2 && errors.contains("--force replaces them"), "{errors}");
-    let without = self::bench(RANDOM);
-    let (code, _, errors) = without.call(&["falsify", "c.toml"]);
-    assert!(code == 2 && errors.contains("[search] is missing"), "{errors}");
 }

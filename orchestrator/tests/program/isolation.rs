@@ -27,7 +27,8 @@ fn harmful(place: &str, how: &str) -> Bench {
     Bench::made(LOOP, &Recipe { flags: &flags, ..Recipe::default() })
 }
 
-/// Runs the experiment with these limits and a temporary folder of its own, which must be empty afterwards.
+/// Runs the experiment with these limits and a temporary folder of its own, which must be empty
+/// afterwards.
 fn run(bench: &Bench, arguments: &[&str]) -> (i32, String) {
     run_within(bench, &LIMITS, arguments)
 }

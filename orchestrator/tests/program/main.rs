@@ -5,5 +5,6 @@ mod campaign;
 mod foreign;
 mod isolation;
 mod results;
+mod search;
 mod timing;
 mod usage;

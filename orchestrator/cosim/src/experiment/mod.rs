@@ -120,8 +120,8 @@ pub struct Component {
     /// Whether the unit runs in a process of its own, whatever `[isolation]` says.
     #[serde(default)]
     pub isolate: Option<bool>,
-    /// Whether the FMU takes the place of another one, as after `--fmu`: settings, recorded variables
-    /// and unconnected inputs that it does not have are left out.
+    /// Whether the FMU takes the place of another one, as after `--fmu`: settings, recorded
+    /// variables and unconnected inputs that it does not have are left out.
     #[serde(default, rename = "exchanged")]
     pub is_exchanged: bool,
 }

@@ -24,8 +24,8 @@ pub struct Protection {
     /// Processor time that a unit in a process of its own may take, s [default: no limit].
     #[arg(long = "unit-cpu", value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
     pub cpu: Option<u64>,
-    /// Let units in processes of their own write nowhere but in the folder of their archive, and use
-    /// no network. Linux only; a warning says so where the system cannot do it.
+    /// Let units in processes of their own write nowhere but in the folder of their archive, and
+    /// use no network. Linux only; a warning says so where the system cannot do it.
     #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
     pub sandbox: Option<bool>,
 }

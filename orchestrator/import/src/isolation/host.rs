@@ -3,6 +3,7 @@
 use super::channel::{Channel, LARGEST, Slot};
 use super::limits;
 use super::protocol::{Action, InstanceOf, Read, Ready, Reply, Request, Set, Setup};
+use crate::error::with_causes;
 use crate::instance::{FmuUnit, Functions};
 use crate::log::{Held, Log};
 use crate::unit::{CoSimulationUnit, Outcome};
@@ -38,7 +39,7 @@ pub fn serve(memory: &Path) -> io::Result<()> {
     let without = limits::apply(&setup.limits);
     let functions = match Functions::load(&setup.library) {
         Ok(functions) => functions,
-        Err(error) => return host.send(&Ready::Unloadable(super::with_causes(&error))),
+        Err(error) => return host.send(&Ready::Unloadable(with_causes(&error))),
     };
     let version_fault = functions.version_fault();
     let Some(InstanceOf { name, guid, resources }) = setup.instance else {

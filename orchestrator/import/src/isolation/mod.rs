@@ -8,7 +8,7 @@
 //! | `protocol` | the messages in it |
 //! | `host` | the process of the unit, which makes the calls |
 //! | `process`, `remote` | its master's side: a process that is watched, and the unit it stands for |
-//! | `limits`, `sandbox` | what the process may use |
+//! | `settings`, `limits`, `sandbox` | what the process may use |
 
 mod channel;
 mod host;
@@ -18,21 +18,18 @@ mod protocol;
 mod remote;
 #[cfg(target_os = "linux")]
 mod sandbox;
+mod settings;
 
 pub use host::serve;
 pub use process::late_failures;
+pub use settings::{COMMAND, Isolation};
 
 use crate::unit::CoSimulationUnit;
 use process::Process;
 use protocol::{InstanceOf, Limits, Ready, Setup};
 use remote::RemoteUnit;
 use std::path::{Path, PathBuf};
-use std::process::ExitStatus;
 use std::sync::OnceLock;
-use std::time::Duration;
-
-/// Name of the program's command that [`serve`]s a unit. Its argument is the path of the memory.
-pub const COMMAND: &str = "serve-unit";
 
 /// Program that is started for a unit.
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
@@ -51,30 +48,6 @@ pub fn enable() {
 /// Returns whether units can have processes of their own.
 pub fn is_enabled() -> bool {
     PROGRAM.get().is_some()
-}
-
-/// How a unit is kept from doing harm.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Isolation {
-    /// Time within which a call must be answered.
-    pub call_timeout: Duration,
-    /// Number of bytes of memory that the process may write; `None` if it has no limit.
-    pub memory: Option<u64>,
-    /// Processor time that the process may take, s; `None` if it has no limit.
-    pub cpu: Option<u64>,
-    /// Whether the process may write nowhere but in the folder of its archive, and has no network.
-    pub sandbox: bool,
-}
-
-impl Default for Isolation {
-    fn default() -> Self {
-        Self {
-            call_timeout: Duration::from_secs(60),
-            memory: Some(4 << 30),
-            cpu: None,
-            sandbox: false,
-        }
-    }
 }
 
 /// What became of a library in a process of its own.
@@ -152,35 +125,5 @@ impl Library<'_> {
                 Loaded::Refused(format!("failed in {}: {}", failure.call, failure.message))
             }
         }
-    }
-}
-
-/// Returns an error and its causes as one line.
-pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(Some(error), |error| error.source());
-    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
-}
-
-/// Tells how a process has ended.
-fn ended(status: ExitStatus) -> String {
-    #[cfg(unix)]
-    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
-        let name = match signal {
-            4 => " (SIGILL, an illegal instruction)",
-            6 => " (SIGABRT, an abort)",
-            7 => " (SIGBUS, access to memory that is not there)",
-            8 => " (SIGFPE, a division by zero or the like)",
-            9 => " (SIGKILL)",
-            11 => " (SIGSEGV, access to memory that is not its own)",
-            15 => " (SIGTERM)",
-            24 => " (SIGXCPU, its processor time is used up)",
-            31 => " (SIGSYS, a call of the system that is not allowed)",
-            _ => "",
-        };
-        return format!("its process was killed by signal {signal}{name}");
-    }
-    match status.code() {
-        Some(code) => format!("it ended its process with exit code {code}"),
-        None => "its process has ended".into(),
     }
 }

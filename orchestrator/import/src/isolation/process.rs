@@ -2,7 +2,7 @@
 
 use super::channel::{Channel, LARGEST, Slot};
 use super::protocol::{Action, Ready, Reply, Request, Setup};
-use super::{COMMAND, Isolation, ended};
+use super::settings::{COMMAND, Isolation};
 use crate::fmi;
 use crate::log::{Log, Said};
 use crate::unit::UnitFailure;
@@ -289,3 +289,27 @@ fn apart(command: &mut Command) {
 
 #[cfg(not(any(unix, windows)))]
 fn apart(_command: &mut Command) {}
+
+/// Tells how a process has ended.
+fn ended(status: ExitStatus) -> String {
+    #[cfg(unix)]
+    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+        let name = match signal {
+            4 => " (SIGILL, an illegal instruction)",
+            6 => " (SIGABRT, an abort)",
+            7 => " (SIGBUS, access to memory that is not there)",
+            8 => " (SIGFPE, a division by zero or the like)",
+            9 => " (SIGKILL)",
+            11 => " (SIGSEGV, access to memory that is not its own)",
+            15 => " (SIGTERM)",
+            24 => " (SIGXCPU, its processor time is used up)",
+            31 => " (SIGSYS, a call of the system that is not allowed)",
+            _ => "",
+        };
+        return format!("its process was killed by signal {signal}{name}");
+    }
+    match status.code() {
+        Some(code) => format!("it ended its process with exit code {code}"),
+        None => "its process has ended".into(),
+    }
+}

@@ -14,7 +14,8 @@ const COURSES: u32 = 40;
 /// A variable, chosen by a number, with a value for each type that it may have.
 type Change = (usize, f64, i32);
 
-/// Calls: parameters that are set, and inputs that are set before each step, with the step's length.
+/// Calls: parameters that are set, and inputs that are set before each step, with the step's
+/// length.
 type Course = (Vec<Change>, Vec<(Vec<Change>, f64)>);
 
 /// Finite numbers of all sizes, with those at the edges more often.

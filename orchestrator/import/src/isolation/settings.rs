@@ -1,0 +1,30 @@
+//! What is asked of the process of a unit.
+
+use std::time::Duration;
+
+/// Name of the program's command that [`serve`]s a unit. Its argument is the path of the memory.
+pub const COMMAND: &str = "serve-unit";
+
+/// How a unit is kept from doing harm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Isolation {
+    /// Time within which a call must be answered.
+    pub call_timeout: Duration,
+    /// Number of bytes of memory that the process may write; `None` if it has no limit.
+    pub memory: Option<u64>,
+    /// Processor time that the process may take, s; `None` if it has no limit.
+    pub cpu: Option<u64>,
+    /// Whether the process may write nowhere but in the folder of its archive, and has no network.
+    pub sandbox: bool,
+}
+
+impl Default for Isolation {
+    fn default() -> Self {
+        Self {
+            call_timeout: Duration::from_secs(60),
+            memory: Some(4 << 30),
+            cpu: None,
+            sandbox: false,
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Units in processes of their own, as the command line knows them.
+
+use fmu_import::{crash, isolation};
+use std::io::{Write, stderr};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Serves a unit if another process of this program has started this one for it, and returns the
+/// exit code then. In any other process it prepares for units that do harm.
+pub(crate) fn serve() -> Option<ExitCode> {
+    let mut words = std::env::args_os().skip(1);
+    if words.next().is_none_or(|word| word != isolation::COMMAND) {
+        isolation::enable();
+        crash::watch();
+        return None;
+    }
+    let memory = words.next().map(PathBuf::from).unwrap_or_default();
+    Some(match isolation::serve(&memory) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let _ = writeln!(stderr(), "error: {}: {error}", memory.display());
+            ExitCode::FAILURE
+        }
+    })
+}
+
+/// Prints which units could not be freed. Returns whether all could.
+pub(crate) fn left_in_order() -> bool {
+    let late = isolation::late_failures();
+    for failure in &late {
+        let _ = writeln!(stderr(), "error: {failure}");
+    }
+    late.is_empty()
+}

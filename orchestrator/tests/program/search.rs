@@ -1,0 +1,33 @@
+//! Searches for the worst case of a loop that can be computed by hand.
+
+use crate::campaign::{RANDOM, bench};
+use std::fs;
+
+#[test]
+fn a_search_finds_the_corner_and_writes_it_as_an_experiment() {
+    let text = format!("{RANDOM}[search]\nlargest = \"last\"\ncases = 300\n");
+    let text = text.replace("uniform = [0.0", "uniform = [-0.9");
+    let bench = bench(&text);
+    let (code, said, errors) = bench.call(&["falsify", "c.toml", "--out", "w"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(said.contains("breaks small"), "{said}");
+    let found = bench.json("w/search.json");
+    assert!((found["largest"].as_f64().unwrap() - 8.0).abs() < 1e-3, "{found}");
+    let (code, _, errors) = bench.call(&["run", "w/worst.toml", "--fmu-dir", "."]);
+    assert_eq!(code, 0, "{errors}");
+    let rows = fs::read_to_string(bench.path("out/worst/results.csv")).unwrap();
+    let last: f64 = rows.lines().last().unwrap().split(',').nth(2).unwrap().parse().unwrap();
+    assert!((last - found["largest"].as_f64().unwrap()).abs() < 1e-12);
+    // The same search gives the same bytes, on any number of threads.
+    let (code, _, errors) = bench.call(&["falsify", "c.toml", "--out", "w1", "--jobs", "1"]);
+    assert_eq!(code, 0, "{errors}");
+    for file in ["search.parquet", "worst.toml", "search.json", "history.svg"] {
+        let bytes = |out: &str| fs::read(bench.path(&format!("{out}/{file}"))).unwrap();
+        assert!(bytes("w") == bytes("w1"), "{file}");
+    }
+    let (code, _, errors) = bench.call(&["falsify", "c.toml", "--out", "w"]);
+    assert!(code == 2 && errors.contains("--force replaces them"), "{errors}");
+    let without = crate::campaign::bench(RANDOM);
+    let (code, _, errors) = without.call(&["falsify", "c.toml"]);
+    assert!(code == 2 && errors.contains("[search] is missing"), "{errors}");
+}
