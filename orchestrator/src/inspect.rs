@@ -78,7 +78,7 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
         .collect();
     line("experiment", &proposed.join(", "))?;
 
-    let mut unknown: Vec<&str> = d.variables.iter().map(|v| v.causality.as_str()).collect();
+    let mut unknown: Vec<&str> = d.variables.iter().map(|v| &*v.causality).collect();
     unknown.retain(|causality| !CAUSALITIES.contains(causality));
     unknown.sort_unstable();
     unknown.dedup();
@@ -138,7 +138,7 @@ fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
         Kind::Integer { .. } | Kind::Boolean | Kind::String => {}
     }
     let name = variable.name.clone();
-    [name, kind, variable.variability.clone(), unit, start, variable.description.clone()]
+    [name, kind, variable.variability.to_string(), unit, start, variable.description.clone()]
 }
 
 /// Converts a start value to its display unit, rounded to the digits that people read.

@@ -106,7 +106,7 @@ pub(crate) fn position(
         format!("there is no such parameter{hint}")
     })?;
     let is_connected = |wire: &Wire| (wire.to.component, wire.to.variable) == (component, position);
-    match variable.causality.as_str() {
+    match &*variable.causality {
         "input" if wires.iter().any(is_connected) => {
             Err("is an input with a connection, so it cannot have a value of its own".into())
         }

@@ -16,7 +16,7 @@ use fmu_import::description::{Kind, ModelDescription};
 use fmu_import::fmu::Fmu;
 use fmu_import::names;
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -269,18 +269,19 @@ impl System {
     /// # Errors
     /// Returns an error if a unit cannot be read.
     pub fn parameters(&self, master: &mut Master) -> Result<Parameters, Error> {
-        let parts = self.parts();
         let mut all = Parameters::new();
-        for part in &parts {
-            let mut own = BTreeMap::new();
-            for name in part.description.names("parameter") {
-                let Some(port) = wiring::find(&format!("{}.{name}", part.name), &parts) else {
-                    continue;
-                };
-                let value = master.read(&[port])?[0];
-                own.insert(name.to_string(), plain_value(part.description, port, value));
-            }
-            all.insert(part.name.to_string(), own);
+        for (component, part) in self.parts().iter().enumerate() {
+            let variables = part.description.variables.iter().enumerate();
+            let ports: Vec<Port> = variables
+                .filter(|(_, variable)| variable.causality == "parameter")
+                .filter_map(|(position, variable)| wiring::port(component, position, variable))
+                .collect();
+            let values = master.read(&ports)?;
+            let own = ports.iter().zip(values).map(|(port, value)| {
+                let name = part.description.variables[port.variable].name.clone();
+                (name, plain_value(part.description, *port, value))
+            });
+            all.insert(part.name.to_string(), own.collect());
         }
         Ok(all)
     }
@@ -290,6 +291,8 @@ impl System {
     /// # Errors
     /// Returns an error if the file cannot be written.
     pub fn recorder(&self, folder: &Path, format: Format, labels: bool) -> Result<Recorder, Error> {
+        let places: HashMap<Port, usize> =
+            self.probes.iter().enumerate().rev().map(|(place, port)| (*port, place)).collect();
         let column = |column: &Column| {
             let port = column.port;
             let unit = match self.kind(port) {
@@ -297,7 +300,7 @@ impl System {
                 _ => None,
             };
             let (name, carrier) = (column.name.clone(), port.carrier);
-            let place = self.probes.iter().position(|known| *known == port)?;
+            let place = *places.get(&port)?;
             Some(recorder::Column { name, place, carrier, unit, items: self.items(port) })
         };
         let columns: Vec<_> = self.columns.iter().filter_map(column).collect();

@@ -9,7 +9,7 @@ use fmu_import::description::{Carrier, Kind, ModelDescription, Variable};
 use fmu_import::names;
 use fmu_import::quantity;
 use fmu_import::quantity::Scaling;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::ops::Range;
 use toml::Spanned;
 
@@ -24,7 +24,7 @@ pub struct Part<'a> {
 }
 
 /// A variable of a component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 pub struct Port {
     /// Index of the component.
     pub component: usize,
@@ -122,7 +122,7 @@ impl<'a> Reference<'a> {
     }
 }
 
-fn port(component: usize, position: usize, variable: &Variable) -> Option<Port> {
+pub(crate) fn port(component: usize, position: usize, variable: &Variable) -> Option<Port> {
     let carrier = Carrier::of(&variable.kind)?;
     Some(Port { component, variable: position, reference: variable.reference, carrier })
 }
@@ -345,6 +345,7 @@ fn shortest_patterns<'a>(open: &[&str], all: &(impl Iterator<Item = &'a str> + C
 /// text.
 pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Column>, Error> {
     let mut columns: Vec<Column> = Vec::new();
+    let mut seen: HashSet<Port> = HashSet::new();
     for text in &experiment.record.variables {
         let reference = Reference::new(text, parts, &experiment.source)?;
         let (component, part) = (reference.component, reference.part);
@@ -353,14 +354,13 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
         let mut meant = 0;
         for (position, variable) in part.description.variables.iter().enumerate() {
             if !names::matches(reference.rest, &variable.name)
-                || (is_pattern
-                    && !matches!(variable.causality.as_str(), "input" | "output" | "local"))
+                || (is_pattern && !matches!(&*variable.causality, "input" | "output" | "local"))
             {
                 continue;
             }
             if let Some(port) = port(component, position, variable) {
                 meant += 1;
-                if !columns.iter().any(|column| column.port == port) {
+                if seen.insert(port) {
                     columns.push(Column { name: format!("{}.{}", part.name, variable.name), port });
                 }
             } else if !is_pattern {

@@ -2,9 +2,13 @@
 //! and the dependencies of outputs on inputs. (The reader in `fmi-rs` drops unit definitions and
 //! all types but the first.)
 
+mod read;
+
 use crate::quantity::UnitDefinition;
 use crate::xml::Element;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 /// The model description of an FMU.
 #[derive(Clone, Debug, Default)]
@@ -36,7 +40,14 @@ pub struct ModelDescription {
     pub dependencies: BTreeMap<usize, Vec<usize>>,
     /// Whether the file has a `ModelStructure`, which FMI requires.
     pub has_structure: bool,
+    /// Index of the variables by name.
+    pub by_name: ByName,
 }
+
+/// Positions of variables in the order of their names, put in order by the first search. The
+/// variables must not change afterwards.
+#[derive(Clone, Debug, Default)]
+pub struct ByName(OnceLock<Vec<u32>>);
 
 /// An interface's model identifier and its capability flags.
 #[derive(Clone, Debug, Default)]
@@ -68,7 +79,7 @@ pub struct DefaultExperiment {
 }
 
 /// A scalar variable of an FMU.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Variable {
     /// Name of the variable.
     pub name: String,
@@ -77,9 +88,9 @@ pub struct Variable {
     /// Description of the variable's meaning.
     pub description: String,
     /// Causality: `parameter`, `input`, `output`, `local`, ….
-    pub causality: String,
+    pub causality: Cow<'static, str>,
     /// Variability: `fixed`, `discrete`, `continuous`, ….
-    pub variability: String,
+    pub variability: Cow<'static, str>,
     /// Type of the variable, with its attributes.
     pub kind: Kind,
     /// Start value as the file writes it.
@@ -87,7 +98,7 @@ pub struct Variable {
 }
 
 /// Type of a variable, with the attributes of that type.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Kind {
     /// A real number, held as a 64-bit float.
     Real {
@@ -108,6 +119,7 @@ pub enum Kind {
         max: Option<i32>,
     },
     /// A truth value, true or false.
+    #[default]
     Boolean,
     /// A choice among named items.
     Enumeration {
@@ -137,12 +149,24 @@ impl ModelDescription {
     /// # Errors
     /// Returns a line that says what is wrong with the text, and where.
     pub fn parse(text: &str) -> Result<Self, String> {
-        read::description(&Element::parse(text)?)
+        let mut variables = read::Variables::default();
+        let take = |root: &Element, parent: &str, element| variables.take(root, parent, element);
+        let root = Element::parse_with(text, take)?;
+        read::description(&root, variables)
     }
 
     /// Finds the variable with this name and returns it with its position.
     pub fn find(&self, name: &str) -> Option<(usize, &Variable)> {
-        self.variables.iter().enumerate().find(|(_, variable)| variable.name == name)
+        let name_of = |position: &u32| self.variables[*position as usize].name.as_str();
+        // Of two variables with this name, the first one is meant.
+        let ordered = self.by_name.0.get_or_init(|| {
+            let mut positions: Vec<u32> = (0..).take(self.variables.len()).collect();
+            positions.sort_by(|a, b| name_of(a).cmp(name_of(b)));
+            positions
+        });
+        let place = ordered.partition_point(|position| name_of(position) < name);
+        let position = *ordered.get(place).filter(|position| name_of(position) == name)?;
+        Some((position as usize, &self.variables[position as usize]))
     }
 
     /// Returns the names of the variables with this causality.
@@ -151,213 +175,8 @@ impl ModelDescription {
     }
 }
 
-/// Builds a description from the elements of the file.
-mod read {
-    use super::{DefaultExperiment, Interface, Kind, ModelDescription, Variable};
-    use crate::quantity::UnitDefinition;
-    use crate::xml::Element;
-    use std::collections::BTreeMap;
-
-    /// Flags of an interface, in the order in which they are shown.
-    const FLAGS: [&str; 10] = [
-        "needsExecutionTool",
-        "canHandleVariableCommunicationStepSize",
-        "canInterpolateInputs",
-        "canRunAsynchronuously",
-        "canBeInstantiatedOnlyOncePerProcess",
-        "canNotUseMemoryManagementFunctions",
-        "canGetAndSetFMUstate",
-        "canSerializeFMUstate",
-        "providesDirectionalDerivative",
-        "completedIntegratorStepNotNeeded",
-    ];
-    /// Names that the standard gives to the exponents of a base unit.
-    const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
-
-    type Types<'a> = BTreeMap<&'a str, &'a Element>;
-
-    pub(super) fn description(root: &Element) -> Result<ModelDescription, String> {
-        if root.name != "fmiModelDescription" {
-            return Err(format!("is no FMI description: it begins with {}", root.title()));
-        }
-        let fmi_version = root.required("fmiVersion")?.to_string();
-        if fmi_version != "2.0" && !fmi_version.starts_with("2.0.") {
-            return Err(format!("is an FMU for FMI {fmi_version}, this program runs FMI 2.0"));
-        }
-        let types = root.list("TypeDefinitions", "SimpleType");
-        let types: Types = types.filter_map(|of| Some((of.attribute("name")?, of))).collect();
-        let variables = root.list("ModelVariables", "ScalarVariable");
-        let variables = variables.map(|of| variable(of, &types)).collect::<Result<Vec<_>, _>>()?;
-        let text = |name: &str| root.attribute(name).unwrap_or_default().to_string();
-        let experiment = root.child("DefaultExperiment");
-        let proposed = |name: &str| experiment.map_or(Ok(None), |element| element.number(name));
-        let units = root.list("UnitDefinitions", "Unit");
-        Ok(ModelDescription {
-            model_name: text("modelName"),
-            guid: text("guid"),
-            description: text("description"),
-            version: text("version"),
-            generation_tool: text("generationTool"),
-            co_simulation: root.child("CoSimulation").map(interface).transpose()?,
-            model_exchange: root.child("ModelExchange").map(interface).transpose()?,
-            default_experiment: DefaultExperiment {
-                start: proposed("startTime")?,
-                stop: proposed("stopTime")?,
-                step: proposed("stepSize")?,
-                tolerance: proposed("tolerance")?,
-            },
-            units: units.map(unit).collect::<Result<_, _>>()?,
-            dependencies: dependencies(root, variables.len())?,
-            has_structure: root.child("ModelStructure").is_some(),
-            variables,
-            fmi_version,
-        })
-    }
-
-    fn interface(element: &Element) -> Result<Interface, String> {
-        let mut capabilities = Vec::new();
-        for name in FLAGS {
-            if element.truth(name)? == Some(true) {
-                capabilities.push(name.to_string());
-            }
-        }
-        let order: Option<u32> =
-            element.parsed("maxOutputDerivativeOrder", "a whole number from 0 on")?;
-        if let Some(order) = order.filter(|&order| order > 0) {
-            capabilities.push(format!("maxOutputDerivativeOrder={order}"));
-        }
-        Ok(Interface {
-            model_identifier: element.required("modelIdentifier")?.to_string(),
-            capabilities,
-        })
-    }
-
-    fn unit(element: &Element) -> Result<UnitDefinition, String> {
-        let scale = |element: &Element| -> Result<(f64, f64), String> {
-            Ok((element.number("factor")?.unwrap_or(1.0), element.number("offset")?.unwrap_or(0.0)))
-        };
-        let base = element.child("BaseUnit");
-        let (factor, offset) = base.map_or(Ok((1.0, 0.0)), scale)?;
-        let exponents = |base: &Element| -> Result<[i32; 8], String> {
-            let mut exponents = [0; 8];
-            for (exponent, name) in exponents.iter_mut().zip(BASE) {
-                *exponent = base.parsed(name, "a whole number")?.unwrap_or(0);
-            }
-            Ok(exponents)
-        };
-        let displays =
-            element.children.iter().filter(|child| child.name == "DisplayUnit").map(|display| {
-                let (factor, offset) = scale(display)?;
-                Ok((display.required("name")?.to_string(), factor, offset))
-            });
-        Ok(UnitDefinition {
-            name: element.required("name")?.to_string(),
-            exponents: base.map(exponents).transpose()?,
-            factor,
-            offset,
-            displays: displays.collect::<Result<_, String>>()?,
-        })
-    }
-
-    fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
-        let own = ["Real", "Integer", "Boolean", "String", "Enumeration"];
-        let own = own.iter().find_map(|kind| element.child(kind));
-        let own = own.ok_or_else(|| format!("{} has no type", element.title()))?;
-        // An attribute of the variable itself takes precedence over that of its declared type.
-        let declared =
-            own.attribute("declaredType").and_then(|name| types.get(name)?.child(&own.name));
-        let text = |name: &str| {
-            own.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string)
-        };
-        let kind = match own.name.as_str() {
-            "Real" => {
-                let bound = |name: &str| match own.number(name)? {
-                    None => declared.map_or(Ok(None), |declared| declared.number(name)),
-                    own => Ok(own),
-                };
-                let (min, max) = (bound("min")?, bound("max")?);
-                Kind::Real { unit: text("unit"), display_unit: text("displayUnit"), min, max }
-            }
-            "Integer" => {
-                let bound = |name: &str| match own.parsed(name, "a whole number")? {
-                    None => declared
-                        .map_or(Ok(None), |declared| declared.parsed(name, "a whole number")),
-                    own => Ok::<_, String>(own),
-                };
-                Kind::Integer { min: bound("min")?, max: bound("max")? }
-            }
-            "Boolean" => Kind::Boolean,
-            "String" => Kind::String,
-            _ => {
-                let declared = declared
-                    .ok_or_else(|| format!("{} has no type definition", element.title()))?;
-                let item = |item: &Element| {
-                    let value = item.parsed("value", "a whole number")?;
-                    let value =
-                        value.ok_or_else(|| format!("{} has no attribute value", item.title()))?;
-                    Ok((item.required("name")?.to_string(), value))
-                };
-                let items = declared.children.iter().filter(|child| child.name == "Item");
-                Kind::Enumeration { items: items.map(item).collect::<Result<_, String>>()? }
-            }
-        };
-        let reference = element.parsed("valueReference", "a whole number from 0 to 4294967295")?;
-        let or = |name: &str, default: &str| element.attribute(name).unwrap_or(default).to_string();
-        Ok(Variable {
-            name: element.required("name")?.to_string(),
-            reference: reference
-                .ok_or_else(|| format!("{} has no attribute valueReference", element.title()))?,
-            description: or("description", ""),
-            causality: or("causality", "local"),
-            variability: or("variability", "continuous"),
-            kind,
-            start: own.attribute("start").map(ToString::to_string),
-        })
-    }
-
-    /// Returns the positions of the inputs that each output depends on, by the position of the
-    /// output. Only outputs that declare their dependencies have an entry.
-    fn dependencies(
-        root: &Element,
-        variables: usize,
-    ) -> Result<BTreeMap<usize, Vec<usize>>, String> {
-        let unknowns =
-            root.child("ModelStructure").into_iter().flat_map(|of| of.list("Outputs", "Unknown"));
-        let mut dependencies = BTreeMap::new();
-        for unknown in unknowns {
-            // Indices in the file count from 1.
-            let position = |index: usize| {
-                let position = index.checked_sub(1).filter(|&position| position < variables);
-                position.ok_or_else(|| {
-                    format!(
-                        "{} names variable {index} of {variables} of ModelStructure",
-                        unknown.title()
-                    )
-                })
-            };
-            let index = unknown.parsed("index", "a whole number from 1 on")?;
-            let output = position(
-                index.ok_or_else(|| format!("{} has no attribute index", unknown.title()))?,
-            )?;
-            if let Some(text) = unknown.attribute("dependencies") {
-                let parse = |text: &str| {
-                    let fault = || {
-                        format!("\"{}\" in {} is no index", text.escape_default(), unknown.title())
-                    };
-                    text.parse().map_err(|_| fault()).and_then(position)
-                };
-                dependencies.insert(
-                    output,
-                    text.split_whitespace().map(parse).collect::<Result<Vec<_>, _>>()?,
-                );
-            }
-        }
-        Ok(dependencies)
-    }
-}
-
 /// Type in which a value is transferred.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Carrier {
     /// A real number as `f64`.
     Real,

@@ -2,7 +2,7 @@
 //! but not everywhere, and not always as intended.
 
 use crate::description::{Carrier, Kind, ModelDescription, Variable};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// Values of `causality` that FMI 2.0, section 2.2.7, allows.
 pub const CAUSALITIES: [&str; 6] =
@@ -27,7 +27,7 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
         faults.push("has no ModelStructure, which says what the outputs are".to_string());
     }
     let units: BTreeSet<&str> = description.units.iter().map(|unit| unit.name.as_str()).collect();
-    let (mut names, mut handles) = (BTreeSet::new(), BTreeMap::new());
+    let (mut names, mut handles) = (HashSet::new(), HashMap::new());
     for variable in &description.variables {
         let name = &variable.name;
         if !names.insert(name) {
@@ -35,7 +35,7 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
         }
         // Other variables may share a reference as aliases. Of two that are both set, the later one
         // would overwrite the first.
-        if matches!(variable.causality.as_str(), "input" | "parameter") {
+        if matches!(&*variable.causality, "input" | "parameter") {
             let handle = (variable.reference, Carrier::of(&variable.kind));
             if let Some(other) = handles.insert(handle, name) {
                 faults.push(format!(
@@ -51,13 +51,13 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
 
 fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<String>) {
     let Variable { name, causality, variability, kind, .. } = variable;
-    if !CAUSALITIES.contains(&causality.as_str()) {
+    if !CAUSALITIES.contains(&&**causality) {
         faults.push(format!(
             "the causality \"{}\" of \"{name}\" is not known",
             causality.escape_default()
         ));
     }
-    if !VARIABILITIES.contains(&variability.as_str()) {
+    if !VARIABILITIES.contains(&&**variability) {
         faults.push(format!(
             "the variability \"{}\" of \"{name}\" is not known",
             variability.escape_default()

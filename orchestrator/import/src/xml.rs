@@ -3,7 +3,6 @@
 use encoding_rs::{Encoding, UTF_8};
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
-use std::collections::BTreeMap;
 use std::str::FromStr;
 
 /// Decodes the text of a file. The encoding is that of its byte order mark, or otherwise that of
@@ -46,8 +45,8 @@ pub struct Element {
     pub name: String,
     /// Line where the element begins, counted from 1.
     pub line: usize,
-    /// Attributes of the element, by name with prefix.
-    attributes: BTreeMap<String, String>,
+    /// Attributes of the element, each a name with prefix and a value.
+    attributes: Vec<(String, String)>,
     /// Elements that are nested directly in this one.
     pub children: Vec<Element>,
 }
@@ -62,6 +61,29 @@ impl Element {
     /// # Errors
     /// Returns one line that says what is wrong with the text.
     pub fn parse(text: &str) -> Result<Self, String> {
+        Self::parse_with(text, |_, _, element| Ok(Some(element)))
+    }
+
+    /// Reads an XML document from its text, and offers each element to `take` at its end, with the
+    /// root element as far as it was read and the name of the parent. What `take` returns becomes
+    /// part of the document, so that long lists need not be kept.
+    ///
+    /// # Errors
+    /// Returns one line that says what is wrong with the text, or the error of `take`.
+    pub(crate) fn parse_with(
+        text: &str,
+        mut take: impl FnMut(&Self, &str, Self) -> Result<Option<Self>, String>,
+    ) -> Result<Self, String> {
+        let mut close = |open: &mut Vec<Self>, element: Self| -> Result<(), String> {
+            let kept = match (open.get(1), open.last()) {
+                (Some(root), Some(parent)) => take(root, &parent.name, element)?,
+                _ => Some(element),
+            };
+            if let (Some(kept), Some(parent)) = (kept, open.last_mut()) {
+                parent.children.push(kept);
+            }
+            Ok(())
+        };
         let mut reader = Reader::from_str(text);
         // Stack of the elements that are open; the first one stands for the document itself.
         let mut open = vec![Self::default()];
@@ -84,15 +106,14 @@ impl Element {
                 }
                 Event::Empty(start) => {
                     let element = Self::new(&start, line).map_err(|error| fault(&error))?;
-                    if let Some(parent) = open.last_mut().filter(|_| deeper == 0) {
-                        parent.children.push(element);
+                    if deeper == 0 {
+                        close(&mut open, element)?;
                     }
                 }
                 Event::End(_) if deeper > 0 => deeper -= 1,
                 Event::End(_) => {
-                    let (closed, parent) = (open.pop(), open.last_mut());
-                    if let (Some(closed), Some(parent)) = (closed, parent) {
-                        parent.children.push(closed);
+                    if let Some(closed) = open.pop().filter(|_| !open.is_empty()) {
+                        close(&mut open, closed)?;
                     }
                 }
                 // A document type definition could define entities that expand without end.
@@ -113,13 +134,13 @@ impl Element {
     }
 
     fn new(start: &BytesStart, line: usize) -> Result<Self, String> {
-        let mut attributes = BTreeMap::new();
+        let mut attributes = Vec::new();
         for attribute in start.attributes() {
             let attribute = attribute.map_err(|error| error.to_string())?;
             let value = attribute
                 .normalized_value(XmlVersion::Implicit1_0)
                 .map_err(|error| error.to_string())?;
-            attributes.insert(attribute.key.as_ref().to_string(), value.into_owned());
+            attributes.push((attribute.key.as_ref().to_string(), value.into_owned()));
         }
         Ok(Self {
             name: start.local_name().as_ref().to_string(),
@@ -138,7 +159,7 @@ impl Element {
 
     /// Returns the value of the attribute with this name, if it is present.
     pub fn attribute(&self, name: &str) -> Option<&str> {
-        self.attributes.get(name).map(String::as_str)
+        self.attributes.iter().find(|(own, _)| own == name).map(|(_, value)| value.as_str())
     }
 
     /// Returns the attribute with this name, which must be present.

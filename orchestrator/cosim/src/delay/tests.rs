@@ -7,7 +7,7 @@ use fmu_import::quantity::Scaling;
 /// Variable 0 is an input; outputs 1, 2, … depend on it directly, not at all, or without a
 /// declaration.
 fn unit(outputs: &[Option<bool>]) -> ModelDescription {
-    let variable = |(position, causality): (usize, &str)| Variable {
+    let variable = |(position, causality): (usize, &'static str)| Variable {
         name: format!("v{position}"),
         reference: position as u32,
         description: String::new(),
@@ -81,7 +81,7 @@ fn with_duration(mut unit: ModelDescription, name: &str, unit_name: &str) -> Mod
     let kind =
         Kind::Real { unit: Some(unit_name.into()), display_unit: None, min: Some(0.0), max: None };
     let start = Some("0".to_string());
-    let causality = "parameter".to_string();
+    let causality = "parameter".into();
     let variable =
         Variable { name: name.into(), causality, kind, start, ..unit.variables[0].clone() };
     unit.variables.push(variable);

@@ -195,7 +195,7 @@ fn connectors<'a>(system: &'a Source, index: usize) -> impl Iterator<Item = &'a 
         system.wires.iter().any(|w| w.to.component == index && w.to.variable == position)
     };
     variables.iter().enumerate().filter_map(move |(position, variable)| {
-        match variable.causality.as_str() {
+        match &*variable.causality {
             "input" if is_connected(position) => Some(variable),
             "output" => match variable.kind {
                 Kind::String => None,
@@ -241,7 +241,7 @@ fn enumerations(xml: &mut Xml, system: &Source) -> io::Result<()> {
 }
 
 fn connector(xml: &mut Xml, system: &Source, variable: &Variable) -> io::Result<()> {
-    let attributes = [("name", variable.name.clone()), ("kind", variable.causality.clone())];
+    let attributes = [("name", variable.name.clone()), ("kind", variable.causality.to_string())];
     element(xml, "ssd:Connector", &attributes, |xml| {
         let unit = match &variable.kind {
             Kind::Real { unit: Some(unit), .. } => vec![("unit", unit.clone())],

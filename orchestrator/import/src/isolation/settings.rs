@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-/// Name of the program's command that [`serve`]s a unit. Its argument is the path of the memory.
+/// Name of the program's command that [`serve`](super::serve)s a unit. Its argument is the path of
+/// the memory.
 pub const COMMAND: &str = "serve-unit";
 
 /// How a unit is kept from doing harm.

@@ -1,0 +1,268 @@
+//! Builds a description from the elements of the file.
+
+use super::{ByName, DefaultExperiment, Interface, Kind, ModelDescription, Variable};
+use crate::quantity::UnitDefinition;
+use crate::xml::Element;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+/// Flags of an interface, in the order in which they are shown.
+const FLAGS: [&str; 10] = [
+    "needsExecutionTool",
+    "canHandleVariableCommunicationStepSize",
+    "canInterpolateInputs",
+    "canRunAsynchronuously",
+    "canBeInstantiatedOnlyOncePerProcess",
+    "canNotUseMemoryManagementFunctions",
+    "canGetAndSetFMUstate",
+    "canSerializeFMUstate",
+    "providesDirectionalDerivative",
+    "completedIntegratorStepNotNeeded",
+];
+/// Values of causality and variability that the standard knows, so that they are not copied for each
+/// variable.
+const KNOWN: [&str; 11] = [
+    "parameter",
+    "calculatedParameter",
+    "input",
+    "output",
+    "local",
+    "independent",
+    "constant",
+    "fixed",
+    "tunable",
+    "discrete",
+    "continuous",
+];
+/// Names that the standard gives to the exponents of a base unit.
+const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
+
+type Types = BTreeMap<String, Element>;
+
+/// Variables that are taken from the file as it is read, so that their elements need not be kept.
+#[derive(Default)]
+pub(super) struct Variables {
+    all: Vec<Variable>,
+    /// Definitions of types by name, once the first variable is there.
+    types: Option<Types>,
+    /// Variables that come before the definition of their type, with their places.
+    early: Vec<(usize, Element)>,
+}
+
+impl Variables {
+    /// Takes an element if it is a variable.
+    pub(super) fn take(
+        &mut self,
+        root: &Element,
+        parent: &str,
+        element: Element,
+    ) -> Result<Option<Element>, String> {
+        if parent != "ModelVariables" || element.name != "ScalarVariable" {
+            return Ok(Some(element));
+        }
+        let types = self.types.get_or_insert_with(|| types(root));
+        let is_early = |kind: &Element| {
+            kind.attribute("declaredType").is_some_and(|name| !types.contains_key(name))
+        };
+        if element.children.iter().any(is_early) {
+            self.early.push((self.all.len(), element));
+            self.all.push(Variable::default());
+        } else {
+            self.all.push(variable(&element, types)?);
+        }
+        Ok(None)
+    }
+
+    /// Returns all variables, in the order of the file.
+    fn finish(mut self, root: &Element) -> Result<Vec<Variable>, String> {
+        if !self.early.is_empty() {
+            let types = types(root);
+            for (place, element) in self.early {
+                self.all[place] = variable(&element, &types)?;
+            }
+        }
+        Ok(self.all)
+    }
+}
+
+fn types(root: &Element) -> Types {
+    let types = root.list("TypeDefinitions", "SimpleType");
+    types.filter_map(|of| Some((of.attribute("name")?.to_string(), of.clone()))).collect()
+}
+
+pub(super) fn description(
+    root: &Element,
+    variables: Variables,
+) -> Result<ModelDescription, String> {
+    if root.name != "fmiModelDescription" {
+        return Err(format!("is no FMI description: it begins with {}", root.title()));
+    }
+    let fmi_version = root.required("fmiVersion")?.to_string();
+    if fmi_version != "2.0" && !fmi_version.starts_with("2.0.") {
+        return Err(format!("is an FMU for FMI {fmi_version}, this program runs FMI 2.0"));
+    }
+    let variables = variables.finish(root)?;
+    let text = |name: &str| root.attribute(name).unwrap_or_default().to_string();
+    let experiment = root.child("DefaultExperiment");
+    let proposed = |name: &str| experiment.map_or(Ok(None), |element| element.number(name));
+    let units = root.list("UnitDefinitions", "Unit");
+    Ok(ModelDescription {
+        model_name: text("modelName"),
+        guid: text("guid"),
+        description: text("description"),
+        version: text("version"),
+        generation_tool: text("generationTool"),
+        co_simulation: root.child("CoSimulation").map(interface).transpose()?,
+        model_exchange: root.child("ModelExchange").map(interface).transpose()?,
+        default_experiment: DefaultExperiment {
+            start: proposed("startTime")?,
+            stop: proposed("stopTime")?,
+            step: proposed("stepSize")?,
+            tolerance: proposed("tolerance")?,
+        },
+        units: units.map(unit).collect::<Result<_, _>>()?,
+        dependencies: dependencies(root, variables.len())?,
+        has_structure: root.child("ModelStructure").is_some(),
+        variables,
+        by_name: ByName::default(),
+        fmi_version,
+    })
+}
+
+fn interface(element: &Element) -> Result<Interface, String> {
+    let mut capabilities = Vec::new();
+    for name in FLAGS {
+        if element.truth(name)? == Some(true) {
+            capabilities.push(name.to_string());
+        }
+    }
+    let order: Option<u32> =
+        element.parsed("maxOutputDerivativeOrder", "a whole number from 0 on")?;
+    if let Some(order) = order.filter(|&order| order > 0) {
+        capabilities.push(format!("maxOutputDerivativeOrder={order}"));
+    }
+    Ok(Interface {
+        model_identifier: element.required("modelIdentifier")?.to_string(),
+        capabilities,
+    })
+}
+
+fn unit(element: &Element) -> Result<UnitDefinition, String> {
+    let scale = |element: &Element| -> Result<(f64, f64), String> {
+        Ok((element.number("factor")?.unwrap_or(1.0), element.number("offset")?.unwrap_or(0.0)))
+    };
+    let base = element.child("BaseUnit");
+    let (factor, offset) = base.map_or(Ok((1.0, 0.0)), scale)?;
+    let exponents = |base: &Element| -> Result<[i32; 8], String> {
+        let mut exponents = [0; 8];
+        for (exponent, name) in exponents.iter_mut().zip(BASE) {
+            *exponent = base.parsed(name, "a whole number")?.unwrap_or(0);
+        }
+        Ok(exponents)
+    };
+    let displays =
+        element.children.iter().filter(|child| child.name == "DisplayUnit").map(|display| {
+            let (factor, offset) = scale(display)?;
+            Ok((display.required("name")?.to_string(), factor, offset))
+        });
+    Ok(UnitDefinition {
+        name: element.required("name")?.to_string(),
+        exponents: base.map(exponents).transpose()?,
+        factor,
+        offset,
+        displays: displays.collect::<Result<_, String>>()?,
+    })
+}
+
+fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
+    let own = ["Real", "Integer", "Boolean", "String", "Enumeration"];
+    let own = own.iter().find_map(|kind| element.child(kind));
+    let own = own.ok_or_else(|| format!("{} has no type", element.title()))?;
+    // An attribute of the variable itself takes precedence over that of its declared type.
+    let declared = own.attribute("declaredType").and_then(|name| types.get(name)?.child(&own.name));
+    let text = |name: &str| {
+        own.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string)
+    };
+    let kind = match own.name.as_str() {
+        "Real" => {
+            let bound = |name: &str| match own.number(name)? {
+                None => declared.map_or(Ok(None), |declared| declared.number(name)),
+                own => Ok(own),
+            };
+            let (min, max) = (bound("min")?, bound("max")?);
+            Kind::Real { unit: text("unit"), display_unit: text("displayUnit"), min, max }
+        }
+        "Integer" => {
+            let bound = |name: &str| match own.parsed(name, "a whole number")? {
+                None => {
+                    declared.map_or(Ok(None), |declared| declared.parsed(name, "a whole number"))
+                }
+                own => Ok::<_, String>(own),
+            };
+            Kind::Integer { min: bound("min")?, max: bound("max")? }
+        }
+        "Boolean" => Kind::Boolean,
+        "String" => Kind::String,
+        _ => {
+            let declared =
+                declared.ok_or_else(|| format!("{} has no type definition", element.title()))?;
+            let item = |item: &Element| {
+                let value = item.parsed("value", "a whole number")?;
+                let value =
+                    value.ok_or_else(|| format!("{} has no attribute value", item.title()))?;
+                Ok((item.required("name")?.to_string(), value))
+            };
+            let items = declared.children.iter().filter(|child| child.name == "Item");
+            Kind::Enumeration { items: items.map(item).collect::<Result<_, String>>()? }
+        }
+    };
+    let reference = element.parsed("valueReference", "a whole number from 0 to 4294967295")?;
+    let known = |name: &str, usual: &'static str| {
+        let own = element.attribute(name).unwrap_or(usual);
+        let known = KNOWN.iter().find(|known| **known == own);
+        known.map_or_else(|| Cow::Owned(own.to_string()), |known| Cow::Borrowed(*known))
+    };
+    Ok(Variable {
+        name: element.required("name")?.to_string(),
+        reference: reference
+            .ok_or_else(|| format!("{} has no attribute valueReference", element.title()))?,
+        description: element.attribute("description").unwrap_or_default().to_string(),
+        causality: known("causality", "local"),
+        variability: known("variability", "continuous"),
+        kind,
+        start: own.attribute("start").map(ToString::to_string),
+    })
+}
+
+/// Returns the positions of the inputs that each output depends on, by the position of the
+/// output. Only outputs that declare their dependencies have an entry.
+fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<usize>>, String> {
+    let unknowns =
+        root.child("ModelStructure").into_iter().flat_map(|of| of.list("Outputs", "Unknown"));
+    let mut dependencies = BTreeMap::new();
+    for unknown in unknowns {
+        // Indices in the file count from 1.
+        let position = |index: usize| {
+            let position = index.checked_sub(1).filter(|&position| position < variables);
+            position.ok_or_else(|| {
+                format!(
+                    "{} names variable {index} of {variables} of ModelStructure",
+                    unknown.title()
+                )
+            })
+        };
+        let index = unknown.parsed("index", "a whole number from 1 on")?;
+        let output =
+            position(index.ok_or_else(|| format!("{} has no attribute index", unknown.title()))?)?;
+        if let Some(text) = unknown.attribute("dependencies") {
+            let parse = |text: &str| {
+                let fault =
+                    || format!("\"{}\" in {} is no index", text.escape_default(), unknown.title());
+                text.parse().map_err(|_| fault()).and_then(position)
+            };
+            dependencies
+                .insert(output, text.split_whitespace().map(parse).collect::<Result<Vec<_>, _>>()?);
+        }
+    }
+    Ok(dependencies)
+}
