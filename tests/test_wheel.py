@@ -4,6 +4,7 @@ python/tests."""
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import shutil
@@ -43,6 +44,18 @@ PACKED = TARGET / "dist" / "linux-x86_64" / "fmu"
 UNITS = PACKED if PACKED.is_dir() else TARGET / "fmu"
 
 
+@functools.cache
+def released() -> Path:
+    """The built program without its symbols, as a release has it."""
+    folder = TARGET / "stripped"
+    folder.mkdir(parents=True, exist_ok=True)
+    copy = folder / program("orchestrator").name
+    shutil.copy(program("orchestrator"), copy)
+    if shutil.which("strip"):
+        subprocess.run(["strip", copy], check=True)
+    return copy
+
+
 def make(
     units: Path,
     folder: Path,
@@ -51,7 +64,7 @@ def make(
     orchestrator: Path | None = None,
 ) -> subprocess.CompletedProcess:
     environment = {**os.environ, **({"SOURCE_DATE_EPOCH": epoch} if epoch else {})}
-    orchestrator = orchestrator or program("orchestrator")
+    orchestrator = orchestrator or released()
     command = [ROOT / "scripts" / "wheel", platform, units, orchestrator, folder]
     return subprocess.run(command, capture_output=True, text=True, env=environment)
 
