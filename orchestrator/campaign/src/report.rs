@@ -253,6 +253,11 @@ fn measures(measures: &[Measured]) -> Markup {
     }
 }
 
+/// Returns a p-value as text. What is smaller than any test of it could show is not written as 0.
+fn chance(p_value: f64) -> String {
+    if p_value < 1e-4 { "< 0.0001".into() } else { short(p_value) }
+}
+
 /// Returns the parameters in the order of their weight, as bars.
 fn tornado(own: &Measured) -> Markup {
     let weight = |own: &Sensitivity| own.total.or(own.rank_correlation).map_or(0.0, f64::abs);
@@ -276,7 +281,7 @@ fn tornado(own: &Measured) -> Markup {
                         span class=(if correlation < 0.0 { "bar negative" } else { "bar" })
                             style=(format!("width: {:.1}rem", 12.0 * correlation.abs())) {}
                     }
-                    td { (row.p_value.map_or(String::new(), short)) }
+                    td { (row.p_value.map_or(String::new(), chance)) }
                     @if has_indices {
                         td { (row.first_order.map_or(String::new(), |s| format!("{s:.3}"))) }
                         td { (row.total.map_or(String::new(), |t| format!("{t:.3}"))) }

@@ -19,8 +19,8 @@ const FLAGS: [&str; 10] = [
     "providesDirectionalDerivative",
     "completedIntegratorStepNotNeeded",
 ];
-/// Values of causality and variability that the standard knows, so that they are not copied for each
-/// variable.
+/// Values of causality and variability that the standard knows, so that they are not copied for
+/// each variable.
 const KNOWN: [&str; 11] = [
     "parameter",
     "calculatedParameter",

@@ -1,0 +1,96 @@
+//! What is fuzzed: everything that reads text or files of others. A target returns whatever comes;
+//! a crash, a hang or memory without bound is a fault.
+
+use campaign::definition::Campaign;
+use cosim::experiment::{Experiment, Overrides};
+use cosim::ssp;
+use cosim_report::study::definition::Study;
+use fmu_import::description::ModelDescription;
+use fmu_import::faults::faults;
+use fmu_import::fmu::Fmu;
+use fmu_import::{quantity, xml};
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use tempfile::TempDir;
+use vehicle::table::LookupTable;
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
+
+/// Folder for the files of targets that read files: in memory, where the system has it.
+static FOLDER: LazyLock<TempDir> = LazyLock::new(|| {
+    let memory = Path::new("/dev/shm");
+    let folder = if memory.is_dir() { memory } else { &std::env::temp_dir() };
+    TempDir::with_prefix_in("fuzz-", folder).expect("a temporary folder")
+});
+
+/// Writes a file, and returns its path.
+fn file(name: &str, data: &[u8]) -> PathBuf {
+    let path = FOLDER.path().join(name);
+    std::fs::write(&path, data).expect("room for a file");
+    path
+}
+
+/// Reads a model description, and lists its faults.
+pub fn description(data: &[u8]) {
+    let Ok(text) = xml::decode(data) else { return };
+    let Ok(description) = ModelDescription::parse(&text) else { return };
+    for fault in faults(&description) {
+        assert!(!fault.is_empty() && !fault.contains('\n'), "{fault}");
+    }
+    for (position, variable) in description.variables.iter().enumerate() {
+        let (first, found) = description.find(&variable.name).expect("a name that is there");
+        assert!(first <= position && found.name == variable.name);
+    }
+}
+
+/// Unpacks an archive and reads its description.
+pub fn archive(data: &[u8]) {
+    if let Ok(fmu) = Fmu::open(&file("a.fmu", data)) {
+        fmu.platforms();
+    }
+}
+
+/// Reads an experiment.
+pub fn experiment(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    if let Ok(mut experiment) = Experiment::parse(&FOLDER.path().join("e.toml"), text.into()) {
+        let _ = experiment.apply(&Overrides::default());
+        assert!(!experiment.source.whole().is_empty());
+    }
+}
+
+/// Reads a study.
+pub fn study(data: &[u8]) {
+    let _ = Study::load(&file("study.toml", data));
+}
+
+/// Reads a campaign.
+pub fn campaign(data: &[u8]) {
+    let _ = Campaign::load(&file("campaign.toml", data));
+}
+
+/// Converts a number with a unit: one line with the text, one with the unit that is wanted.
+pub fn quantity(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let (text, wanted) = text.split_once('\n').unwrap_or((text, "rad"));
+    if let Ok(value) = quantity::convert(text, Some(wanted), &[]) {
+        assert!(!value.is_nan(), "{text:?} in {wanted:?}");
+    }
+}
+
+/// Reads an SSP archive that holds this system structure.
+pub fn ssp(data: &[u8]) {
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let written = archive
+        .start_file("SystemStructure.ssd", SimpleFileOptions::default())
+        .and_then(|()| Ok(archive.write_all(data)?))
+        .and_then(|()| archive.finish());
+    let bytes = written.expect("an archive in memory").into_inner();
+    let _ = ssp::load(&file("a.ssp", &bytes), &Overrides::default());
+}
+
+/// Reads a table of reference values.
+pub fn table(data: &[u8]) {
+    let _ = LookupTable::from_csv("t.csv", data);
+}
