@@ -63,9 +63,12 @@ pub fn find(plan: &Plan, out: &Path, part: &Range<u64>) -> Found {
 
 /// Reads the rows of a part that is whole.
 fn read(reader: &Reader, part: &Range<u64>) -> Option<Table> {
+    if reader.rows() != part.end - part.start {
+        return None;
+    }
     let rows = reader.table().ok()?;
-    let is_whole = reader.metadata("digest") == Some(&rows.digest())
-        && rows.rows() as u64 == part.end - part.start;
+    let is_whole =
+        reader.metadata("digest") == Some(&rows.digest()) && rows.rows() as u64 == reader.rows();
     is_whole.then_some(rows)
 }
 

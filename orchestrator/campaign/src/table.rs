@@ -1,6 +1,7 @@
 //! Tables of cases as Parquet files: one row for each case, units and items in the metadata.
 
 mod file;
+mod guard;
 
 pub use file::{Reader, Writer};
 

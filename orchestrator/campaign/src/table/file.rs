@@ -1,5 +1,6 @@
 //! Parquet files of cases.
 
+use super::guard::guarded;
 use super::{Column, Table, Values};
 use cosim::error::Error;
 use parquet::basic::{LogicalType, Type as Physical};
@@ -147,7 +148,7 @@ impl Reader {
     /// Returns an error if the file cannot be read or is no Parquet file.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let file = File::open(path).map_err(Error::file(path))?;
-        let file = SerializedFileReader::new(file).map_err(failed(path))?;
+        let file = guarded(|| SerializedFileReader::new(file)).map_err(failed(path))?;
         Ok(Self { path: path.to_path_buf(), file })
     }
 
@@ -171,7 +172,7 @@ impl Reader {
         let index = columns.columns().iter().position(|column| column.name() == name);
         index
             .ok_or_else(|| ParquetError::General(format!("there is no column \"{name}\"")))
-            .and_then(|index| self.read(index))
+            .and_then(|index| guarded(|| self.read(index)))
             .map_err(failed(&self.path))
     }
 
@@ -185,7 +186,8 @@ impl Reader {
             Ok(Column { name: name.to_string(), values: self.read(index)? })
         };
         let columns = names.iter().map(|column| column.name()).enumerate().map(column);
-        let columns = columns.collect::<Result<_, ParquetError>>().map_err(failed(&self.path))?;
+        let columns: Result<_, ParquetError> = guarded(|| columns.collect());
+        let columns = columns.map_err(failed(&self.path))?;
         Ok(Table { columns })
     }
 
@@ -193,8 +195,12 @@ impl Reader {
         let mut all: Option<Values> = None;
         for group in 0..self.file.num_row_groups() {
             let group = self.file.get_row_group(group)?;
-            let rows = usize::try_from(group.metadata().num_rows())
-                .map_err(|error| ParquetError::General(error.to_string()))?;
+            let rows = u64::try_from(group.metadata().num_rows()).ok();
+            // A damaged file may claim any number of rows, for which there would be no room.
+            let rows = rows.filter(|rows| *rows <= self.rows()).map(|rows| rows as usize);
+            let rows = rows.ok_or_else(|| {
+                ParquetError::General("a group has more rows than the file".into())
+            })?;
             let values = match group.get_column_reader(index)? {
                 ColumnReader::DoubleColumnReader(reader) => {
                     let descriptor = group.metadata().schema_descr().column(index);
