@@ -73,3 +73,29 @@ fn a_changed_value_has_another_digest() {
     }
     assert_ne!(other.digest(), digest);
 }
+
+#[test]
+fn no_changed_bit_goes_unseen_or_ends_the_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    let whole = table(0..12);
+    let mut writer = Writer::create(&path, &[("digest", whole.digest())]).unwrap();
+    writer.add(whole.clone()).unwrap();
+    writer.finish().unwrap();
+    let sound = fs::read(&path).unwrap();
+    let mut seen = 0;
+    for bit in 0..8 * sound.len() {
+        let mut broken = sound.clone();
+        broken[bit / 8] ^= 1 << (bit % 8);
+        fs::write(&path, &broken).unwrap();
+        let reader = Reader::open(&path);
+        let read = reader.and_then(|reader| Ok((reader.table()?, reader)));
+        match read {
+            Ok((found, reader)) if reader.metadata("digest") == Some(&found.digest()) => {
+                assert_eq!(found, whole, "bit {bit}");
+            }
+            _ => seen += 1,
+        }
+    }
+    assert!(seen > 4 * sound.len(), "{seen} of {}", 8 * sound.len());
+}
