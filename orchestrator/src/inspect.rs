@@ -2,8 +2,8 @@
 
 use crate::catalogue::{self, Filter};
 use crate::failure::Failure;
+use fmu_import::description::CAUSALITIES;
 use fmu_import::description::{Interface, Kind, ModelDescription, Variable};
-use fmu_import::faults::CAUSALITIES;
 use fmu_import::fmu::Fmu;
 use std::io::{self, Write};
 use std::path::Path;

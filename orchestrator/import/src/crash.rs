@@ -41,8 +41,8 @@ pub fn watch() {
         // signal that its handler reads it for.
         unsafe {
             let mut action: libc::sigaction = std::mem::zeroed();
-            action.sa_sigaction = on_signal as extern "C" fn(libc::c_int) as usize;
-            action.sa_flags = libc::SA_ONSTACK;
+            action.sa_sigaction = on_signal as Handler as usize;
+            action.sa_flags = libc::SA_ONSTACK | libc::SA_SIGINFO;
             libc::sigaction(*signal, &raw const action, (&raw mut PREVIOUS[place]).cast());
         }
     }
@@ -69,15 +69,28 @@ static mut PREVIOUS: [std::mem::MaybeUninit<libc::sigaction>; 5] =
     [const { std::mem::MaybeUninit::zeroed() }; 5];
 
 #[cfg(unix)]
-extern "C" fn on_signal(signal: libc::c_int) {
+type Handler = extern "C" fn(libc::c_int, *mut libc::siginfo_t, *mut libc::c_void);
+
+#[cfg(unix)]
+extern "C" fn on_signal(
+    signal: libc::c_int,
+    information: *mut libc::siginfo_t,
+    _context: *mut libc::c_void,
+) {
     for (place, (known, name)) in SIGNALS.iter().enumerate() {
         if *known == signal {
             tell(name);
-            // SAFETY: the handler was stored by `watch`. The instruction that made the signal is
-            // run again and meets the former handler, or ends the process.
-            unsafe {
-                libc::sigaction(signal, (&raw const PREVIOUS[place]).cast(), std::ptr::null_mut())
+            // SAFETY: the handler was stored by `watch`, and the system passes the information.
+            let code = unsafe {
+                libc::sigaction(signal, (&raw const PREVIOUS[place]).cast(), std::ptr::null_mut());
+                (*information).si_code
             };
+            // An instruction that made the signal is run again and meets the former handler. A
+            // signal that was sent comes once, and must be sent again. (Only Linux tells which.)
+            if code <= 0 || !cfg!(target_os = "linux") {
+                // SAFETY: the number is that of a signal. It is delivered when this returns.
+                unsafe { libc::raise(signal) };
+            }
         }
     }
 }

@@ -6,9 +6,16 @@ mod read;
 
 use crate::quantity::UnitDefinition;
 use crate::xml::Element;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
+
+/// Values of `causality` that FMI 2.0, section 2.2.7, allows.
+pub const CAUSALITIES: [&str; 6] =
+    ["parameter", "calculatedParameter", "input", "output", "local", "independent"];
+/// Values of `variability` that the same section of FMI 2.0 allows.
+pub const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
 
 /// The model description of an FMU.
 #[derive(Clone, Debug, Default)]
@@ -176,7 +183,7 @@ impl ModelDescription {
 }
 
 /// Type in which a value is transferred.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Carrier {
     /// A real number as `f64`.
     Real,

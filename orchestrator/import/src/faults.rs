@@ -1,14 +1,8 @@
 //! Faults of a model description that do not keep it from being read. Units run with most of them,
 //! but not everywhere, and not always as intended.
 
-use crate::description::{Carrier, Kind, ModelDescription, Variable};
+use crate::description::{CAUSALITIES, Carrier, Kind, ModelDescription, VARIABILITIES, Variable};
 use std::collections::{BTreeSet, HashMap, HashSet};
-
-/// Values of `causality` that FMI 2.0, section 2.2.7, allows.
-pub const CAUSALITIES: [&str; 6] =
-    ["parameter", "calculatedParameter", "input", "output", "local", "independent"];
-/// Values of `variability` that the same section of FMI 2.0 allows.
-const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
 
 /// Lists the faults of a description, one line for each, in the order of the file.
 pub fn faults(description: &ModelDescription) -> Vec<String> {

@@ -2,10 +2,11 @@
 
 use crate::fmi::Status;
 use crate::warnings;
+use parking_lot::Mutex;
 use serde::{Deserialize, Serialize};
 use std::ffi::c_int;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Largest number of messages of a unit that are printed in a second, or held until somebody takes
@@ -54,13 +55,18 @@ struct Pace {
 }
 
 impl Pace {
+    /// Returns the number of messages of this second that were not printed.
+    fn lost(&self) -> u64 {
+        self.count.saturating_sub(MOST)
+    }
+
     /// Counts a message. Returns whether it may be printed, and the number of messages of the last
     /// second that were not.
     fn count(&mut self) -> (bool, u64) {
         let now = Instant::now();
         let mut lost = 0;
         if self.since.is_none_or(|since| now.duration_since(since) > Duration::from_secs(1)) {
-            lost = self.count.saturating_sub(MOST);
+            lost = self.lost();
             *self = Self { since: Some(now), count: 0 };
         }
         self.count += 1;
@@ -71,7 +77,7 @@ impl Pace {
 impl Held {
     /// Takes the messages that came since the last call.
     pub(crate) fn take(&self) -> Vec<Said> {
-        let (mut said, lost) = std::mem::take(&mut *locked(&self.0));
+        let (mut said, lost) = std::mem::take(&mut *self.0.lock());
         if lost > 0 {
             let text = format!("{lost} further messages are left out");
             said.push(Said { status: Status::Warning as c_int, category: "log".into(), text });
@@ -80,13 +86,9 @@ impl Held {
     }
 
     fn add(&self, said: Said) {
-        let mut held = locked(&self.0);
+        let mut held = self.0.lock();
         if (held.0.len() as u64) < MOST { held.0.push(said) } else { held.1 += 1 }
     }
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Log {
@@ -120,7 +122,7 @@ impl Log {
     }
 
     pub(crate) fn take(&self) -> Option<String> {
-        locked(&self.last).take()
+        self.last.lock().take()
     }
 
     pub(crate) fn message(&self, status: Result<Status, c_int>, category: &str, message: &str) {
@@ -138,7 +140,13 @@ impl Log {
             Sink::Printed(pace) => self.print(pace, status, cut(category), &message),
         }
         if is_problem {
-            *locked(&self.last) = Some(message);
+            *self.last.lock() = Some(message);
+        }
+    }
+
+    fn tell_lost(&self, lost: u64) {
+        if lost > 0 {
+            tracing::warn!("{}: {lost} further messages are left out", self.component);
         }
     }
 
@@ -151,29 +159,39 @@ impl Log {
     ) {
         let component = &self.component;
         match status {
-            // Warnings are collected, each once.
-            Ok(Status::Warning) => {
-                return warnings::warn(&format!("{component}: [{category}] {message}"));
-            }
             Ok(Status::Ok | Status::Pending) if !tracing::enabled!(tracing::Level::INFO) => return,
+            // Warnings are collected, each once.
+            Ok(Status::Warning)
+                if warnings::collected(&format!("{component}: [{category}] {message}")) =>
+            {
+                return;
+            }
             _ => {}
         }
-        let (may_print, lost) = locked(pace).count();
-        if lost > 0 {
-            tracing::warn!("{component}: {lost} further messages are left out");
-        }
+        let (may_print, lost) = pace.lock().count();
+        self.tell_lost(lost);
         if !may_print {
             return;
         }
         match status {
-            Ok(Status::Ok | Status::Pending | Status::Warning) => {
+            Ok(Status::Ok | Status::Pending) => {
                 tracing::info!("{component}: [{category}] {message}");
             }
+            Ok(Status::Warning) => tracing::warn!("{component}: [{category}] {message}"),
             Ok(Status::Discard | Status::Error | Status::Fatal) | Err(_) => {
                 if !self.instantiates.load(Ordering::Relaxed) {
                     tracing::error!("{component}: [{category}] {message}");
                 }
             }
+        }
+    }
+}
+
+impl Drop for Log {
+    fn drop(&mut self) {
+        if let Sink::Printed(pace) = &self.sink {
+            let lost = pace.lock().lost();
+            self.tell_lost(lost);
         }
     }
 }
@@ -193,7 +211,7 @@ mod tests {
         let held = Arc::new(Held::default());
         let words = Arc::new(Mutex::new(Vec::new()));
         let heard = Arc::clone(&words);
-        let log = Log::held("a", Arc::clone(&held), move |text| *locked(&heard) = text.to_vec());
+        let log = Log::held("a", Arc::clone(&held), move |text| *heard.lock() = text.to_vec());
         for number in 0..1000 {
             log.message(Ok(Status::Error), "c", &format!("{number} {}", "é".repeat(2000)));
         }
@@ -201,7 +219,7 @@ mod tests {
         assert_eq!(said.len() as u64, MOST + 1);
         assert_eq!(said[MOST as usize].text, "900 further messages are left out");
         assert!(said.iter().all(|said| said.text.len() <= LONGEST));
-        assert!(locked(&words).starts_with(b"999 "));
+        assert!(words.lock().starts_with(b"999 "));
         assert!(log.take().unwrap().starts_with("999 ") && log.take().is_none());
         assert!(held.take().is_empty());
 

@@ -1,9 +1,9 @@
 //! Collects the warnings of units during a run: each is printed once, at the end, with the time at
 //! which it first came and the number of times it came.
 
+use parking_lot::Mutex;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
-use std::sync::{Mutex, PoisonError};
 
 /// Largest number of different warnings that are collected, in case a unit never says the same
 /// twice.
@@ -47,7 +47,14 @@ pub fn at(time: f64) {
 
 /// Records or prints a warning of a unit.
 pub fn warn(text: &str) {
-    let is_collected = HEARD.with_borrow_mut(|heard| {
+    if !collected(text) {
+        tracing::warn!("{text}");
+    }
+}
+
+/// Records a warning of a unit. Returns whether there was room for it.
+pub(crate) fn collected(text: &str) -> bool {
+    HEARD.with_borrow_mut(|heard| {
         let Some(Heard { now, warnings }) = heard else { return false };
         if let Some(warning) = warnings.iter_mut().find(|warning| warning.text == text) {
             warning.count += 1;
@@ -57,16 +64,13 @@ pub fn warn(text: &str) {
             return false;
         }
         true
-    });
-    if !is_collected {
-        tracing::warn!("{text}");
-    }
+    })
 }
 
 /// Prints a warning about a file once, however many threads open the file and however often.
 pub fn warn_once(text: String) {
     static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
-    let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut told = TOLD.lock();
     if !told.contains(&text) {
         tracing::warn!("{text}");
         told.insert(text);

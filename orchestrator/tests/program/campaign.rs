@@ -5,7 +5,7 @@ use serde_json::json;
 use std::fs;
 
 /// The loop's integrator has the values (1 + gain)^k at tick k.
-const CAMPAIGN: &str = r#"
+pub(crate) const CAMPAIGN: &str = r#"
 title = "gains"
 experiment = "loop.toml"
 design = "factorial"

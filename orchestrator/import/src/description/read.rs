@@ -1,6 +1,9 @@
 //! Builds a description from the elements of the file.
 
-use super::{ByName, DefaultExperiment, Interface, Kind, ModelDescription, Variable};
+use super::{
+    ByName, CAUSALITIES, DefaultExperiment, Interface, Kind, ModelDescription, VARIABILITIES,
+    Variable,
+};
 use crate::quantity::UnitDefinition;
 use crate::xml::Element;
 use std::borrow::Cow;
@@ -18,21 +21,6 @@ const FLAGS: [&str; 10] = [
     "canSerializeFMUstate",
     "providesDirectionalDerivative",
     "completedIntegratorStepNotNeeded",
-];
-/// Values of causality and variability that the standard knows, so that they are not copied for
-/// each variable.
-const KNOWN: [&str; 11] = [
-    "parameter",
-    "calculatedParameter",
-    "input",
-    "output",
-    "local",
-    "independent",
-    "constant",
-    "fixed",
-    "tunable",
-    "discrete",
-    "continuous",
 ];
 /// Names that the standard gives to the exponents of a base unit.
 const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
@@ -59,6 +47,9 @@ impl Variables {
     ) -> Result<Option<Element>, String> {
         if parent != "ModelVariables" || element.name != "ScalarVariable" {
             return Ok(Some(element));
+        }
+        if self.types.is_none() {
+            version(root)?;
         }
         let types = self.types.get_or_insert_with(|| types(root));
         let is_early = |kind: &Element| {
@@ -90,17 +81,23 @@ fn types(root: &Element) -> Types {
     types.filter_map(|of| Some((of.attribute("name")?.to_string(), of.clone()))).collect()
 }
 
+/// Returns the version of FMI, which must be one that can be read.
+fn version(root: &Element) -> Result<String, String> {
+    if root.name != "fmiModelDescription" {
+        return Err(format!("is no FMI description: it begins with {}", root.title()));
+    }
+    let version = root.required("fmiVersion")?.to_string();
+    if version != "2.0" && !version.starts_with("2.0.") {
+        return Err(format!("is an FMU for FMI {version}, this program runs FMI 2.0"));
+    }
+    Ok(version)
+}
+
 pub(super) fn description(
     root: &Element,
     variables: Variables,
 ) -> Result<ModelDescription, String> {
-    if root.name != "fmiModelDescription" {
-        return Err(format!("is no FMI description: it begins with {}", root.title()));
-    }
-    let fmi_version = root.required("fmiVersion")?.to_string();
-    if fmi_version != "2.0" && !fmi_version.starts_with("2.0.") {
-        return Err(format!("is an FMU for FMI {fmi_version}, this program runs FMI 2.0"));
-    }
+    let fmi_version = version(root)?;
     let variables = variables.finish(root)?;
     let text = |name: &str| root.attribute(name).unwrap_or_default().to_string();
     let experiment = root.child("DefaultExperiment");
@@ -219,7 +216,8 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
     let reference = element.parsed("valueReference", "a whole number from 0 to 4294967295")?;
     let known = |name: &str, usual: &'static str| {
         let own = element.attribute(name).unwrap_or(usual);
-        let known = KNOWN.iter().find(|known| **known == own);
+        let known = CAUSALITIES.iter().chain(&VARIABILITIES).find(|known| **known == own);
+        // What the standard knows is not copied for each variable.
         known.map_or_else(|| Cow::Owned(own.to_string()), |known| Cow::Borrowed(*known))
     };
     Ok(Variable {

@@ -2,7 +2,8 @@
 
 use super::channel::{Channel, LARGEST, Slot};
 use super::limits;
-use super::protocol::{Action, InstanceOf, Read, Ready, Reply, Request, Set, Setup};
+use super::protocol::{Action, InstanceOf, List, Ready, Reply, Request, Set, Setup};
+use crate::description::Carrier;
 use crate::error::with_causes;
 use crate::instance::{FmuUnit, Functions};
 use crate::log::{Held, Log};
@@ -100,27 +101,26 @@ impl Host {
 }
 
 /// A list of variables with room for its values.
-struct List {
-    read: Read,
+struct Values {
+    list: List,
     reals: Vec<f64>,
     wholes: Vec<i32>,
 }
 
-impl List {
-    fn new(read: Read) -> Self {
-        let (reals, wholes) = match &read {
-            Read::Real(references) => (references.len(), 0),
-            Read::Integer(references) | Read::Boolean(references) => (0, references.len()),
-        };
-        Self { read, reals: vec![0.0; reals], wholes: vec![0; wholes] }
+impl Values {
+    fn new(list: List) -> Self {
+        let count = list.references.len();
+        let (reals, wholes) = if list.carrier == Carrier::Real { (count, 0) } else { (0, count) };
+        Self { list, reals: vec![0.0; reals], wholes: vec![0; wholes] }
     }
 
     /// Reads the values and appends their bytes.
     fn read(&mut self, unit: &mut impl CoSimulationUnit, bytes: &mut Vec<u8>) -> Outcome {
-        let outcome = match &self.read {
-            Read::Real(references) => unit.get_real(references, &mut self.reals),
-            Read::Integer(references) => unit.get_integer(references, &mut self.wholes),
-            Read::Boolean(references) => unit.get_boolean(references, &mut self.wholes),
+        let references = &self.list.references;
+        let outcome = match self.list.carrier {
+            Carrier::Real => unit.get_real(references, &mut self.reals),
+            Carrier::Integer => unit.get_integer(references, &mut self.wholes),
+            Carrier::Boolean => unit.get_boolean(references, &mut self.wholes),
         };
         bytes.extend(self.reals.iter().flat_map(|value| value.to_le_bytes()));
         bytes.extend(self.wholes.iter().flat_map(|value| value.to_le_bytes()));
@@ -132,7 +132,7 @@ impl List {
 fn answer(
     unit: &mut impl CoSimulationUnit,
     request: Request,
-    lists: &mut Vec<List>,
+    lists: &mut Vec<Values>,
     bytes: &mut Vec<u8>,
 ) -> Reply {
     let Request { sets, action, reads, once } = request;
@@ -140,11 +140,11 @@ fn answer(
     if !action.reads() {
         lists.clear();
     }
-    lists.extend(reads.into_iter().map(List::new));
+    lists.extend(reads.into_iter().map(Values::new));
     bytes.clear();
     let mut reply = Reply { failure: outcome.err(), ..Reply::default() };
     if reply.failure.is_none() && action.reads() {
-        let mut once: Vec<List> = once.into_iter().map(List::new).collect();
+        let mut once: Vec<Values> = once.into_iter().map(Values::new).collect();
         let read = if once.is_empty() { lists } else { &mut once };
         for (place, list) in read.iter_mut().enumerate() {
             if let Err(failure) = list.read(unit, bytes) {

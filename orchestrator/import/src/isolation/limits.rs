@@ -8,6 +8,8 @@ use std::path::Path;
 #[cfg(unix)]
 pub(super) fn apply(limits: &Limits) -> Option<String> {
     use rustix::process::{Resource, Rlimit, setrlimit};
+    // The reason of a failure is told; an image of the memory would be of little more use.
+    let _ = setrlimit(Resource::Core, Rlimit { current: Some(0), maximum: Some(0) });
     let mut without = Vec::new();
     let mut limit = |resource, most: u64, name: &str| {
         let both = Rlimit { current: Some(most), maximum: Some(most) };
@@ -15,8 +17,6 @@ pub(super) fn apply(limits: &Limits) -> Option<String> {
             without.push(name.to_string());
         }
     };
-    // The reason of a failure is told; an image of the memory would be of little more use.
-    limit(Resource::Core, 0, "no image of its memory");
     if let Some(bytes) = limits.memory {
         limit(Resource::Data, bytes, "memory");
     }

@@ -6,13 +6,14 @@ use super::settings::{COMMAND, Isolation};
 use crate::fmi;
 use crate::log::{Log, Said};
 use crate::unit::UnitFailure;
+use parking_lot::Mutex;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io::{self, BufRead, BufReader, PipeReader};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tempfile::NamedTempFile;
 
@@ -29,7 +30,7 @@ static LATE: Mutex<Vec<String>> = Mutex::new(Vec::new());
 /// Returns the failures that came when a run was over: units that could not be freed. They are
 /// forgotten by this call.
 pub fn late_failures() -> Vec<String> {
-    std::mem::take(&mut LATE.lock().unwrap_or_else(PoisonError::into_inner))
+    std::mem::take(&mut LATE.lock())
 }
 
 /// The process of a unit.
@@ -68,10 +69,11 @@ impl Process {
     pub(super) fn start(program: &Path, name: &str, isolation: &Isolation) -> io::Result<Self> {
         // Memory that is no file of a disk, where the system has it.
         let folder = Path::new("/dev/shm");
+        let prefix = format!("fmu-{}-", std::process::id());
         let memory = if cfg!(target_os = "linux") && folder.is_dir() {
-            NamedTempFile::with_prefix_in("fmu-", folder)
+            NamedTempFile::with_prefix_in(prefix, folder)
         } else {
-            NamedTempFile::with_prefix("fmu-")
+            NamedTempFile::with_prefix(prefix)
         }?;
         let channel = Channel::create(memory.as_file())?;
         let (prints, pipe) = io::pipe()?;
@@ -211,7 +213,7 @@ impl Process {
         let mut said = Vec::new();
         self.channel.copy(Slot::LastWords, &mut said);
         let said = String::from_utf8_lossy(&said[..said.len().min(LINE)]).into_owned();
-        let printed = self.printed.last.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let printed = self.printed.last.lock().clone();
         [said, printed].into_iter().find(|words| !words.is_empty())
     }
 
@@ -248,7 +250,7 @@ impl Drop for Process {
         {
             let text =
                 format!("{} failed in {}: {}", self.log.component, failure.call, failure.message);
-            LATE.lock().unwrap_or_else(PoisonError::into_inner).push(text);
+            LATE.lock().push(text);
         }
         self.kill();
     }
@@ -263,7 +265,7 @@ impl Printed {
             let text = String::from_utf8_lossy(&line).trim_end().to_string();
             if !text.is_empty() {
                 tracing::info!("{component} prints: {text}");
-                *self.last.lock().unwrap_or_else(PoisonError::into_inner) = text;
+                *self.last.lock() = text;
             }
             line.clear();
         }

@@ -1,5 +1,6 @@
 //! What the master and the process of a unit say to each other.
 
+use crate::description::Carrier;
 use crate::log::Said;
 use crate::unit::UnitFailure;
 use serde::{Deserialize, Serialize};
@@ -52,9 +53,9 @@ pub(super) struct Request {
     pub(super) sets: Vec<Set>,
     pub(super) action: Action,
     /// Lists of variables that are read from now on, in addition to those before.
-    pub(super) reads: Vec<Read>,
+    pub(super) reads: Vec<List>,
     /// Lists that are read only this time, and in place of the others.
-    pub(super) once: Vec<Read>,
+    pub(super) once: Vec<List>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -104,21 +105,18 @@ impl Action {
     }
 }
 
-/// A list of variables.
+/// A list of variables of one type.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) enum Read {
-    Real(Vec<u32>),
-    Integer(Vec<u32>),
-    Boolean(Vec<u32>),
+pub(super) struct List {
+    pub(super) carrier: Carrier,
+    pub(super) references: Vec<u32>,
 }
 
-impl Read {
+impl List {
     /// Returns the number of bytes of its values.
     pub(super) fn size(&self) -> usize {
-        match self {
-            Self::Real(references) => 8 * references.len(),
-            Self::Integer(references) | Self::Boolean(references) => 4 * references.len(),
-        }
+        let each = if self.carrier == Carrier::Real { 8 } else { 4 };
+        each * self.references.len()
     }
 }
 

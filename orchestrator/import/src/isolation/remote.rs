@@ -6,7 +6,8 @@
 //! fails is told by the call that follows it.
 
 use super::process::Process;
-use super::protocol::{Action, Read, Request, Set};
+use super::protocol::{Action, List, Request, Set};
+use crate::description::Carrier;
 use crate::unit::{CoSimulationUnit, Outcome, UnitFailure};
 
 /// Number of values that are set or read by one message; longer lists are cut.
@@ -23,7 +24,7 @@ pub(crate) struct RemoteUnit {
     sets: Vec<Set>,
     waiting: usize,
     /// Lists whose values come with every answer, and the number of their bytes.
-    lists: Vec<Read>,
+    lists: Vec<List>,
     size: usize,
     /// Lists that could not be read, by their places.
     unread: Vec<(usize, UnitFailure)>,
@@ -44,7 +45,7 @@ impl RemoteUnit {
         }
     }
 
-    fn ask(&mut self, action: Action, reads: Vec<Read>, once: Vec<Read>) -> Outcome {
+    fn ask(&mut self, action: Action, reads: Vec<List>, once: Vec<List>) -> Outcome {
         let sets = std::mem::take(&mut self.sets);
         self.waiting = 0;
         self.is_fresh = false;
@@ -52,9 +53,9 @@ impl RemoteUnit {
             self.lists.clear();
             self.size = 0;
         }
-        self.size += reads.iter().map(Read::size).sum::<usize>();
+        self.size += reads.iter().map(List::size).sum::<usize>();
         self.lists.extend(reads.iter().cloned());
-        let wanted = if once.is_empty() { self.size } else { once.iter().map(Read::size).sum() };
+        let wanted = if once.is_empty() { self.size } else { once.iter().map(List::size).sum() };
         let is_once = !once.is_empty();
         let reply = self.process.ask(action.call(), &Request { sets, action, reads, once })?;
         reply.failure.map_or(Ok(()), Err)?;
@@ -77,89 +78,83 @@ impl RemoteUnit {
         if self.waiting >= CHUNK { self.act(Action::Read) } else { Ok(()) }
     }
 
-    /// Returns the bytes of the values of a list. `is_list` tells whether a list is the one that
-    /// `list` makes.
-    fn read(
-        &mut self,
-        is_list: impl Fn(&Read) -> bool,
-        list: impl Fn() -> Read,
-    ) -> Result<&[u8], UnitFailure> {
-        let mut place = self.lists.iter().position(is_list);
-        let mut begin = 0;
-        match place {
-            Some(_) if self.is_fresh => {}
-            Some(_) => self.act(Action::Read)?,
-            None if self.size + list().size() > PREFETCHED => {
-                self.ask(Action::Read, Vec::new(), vec![list()])?;
-                place = Some(0);
+    /// Returns the bytes of the values of a list.
+    fn read(&mut self, carrier: Carrier, references: &[u32]) -> Result<&[u8], UnitFailure> {
+        let is_it = |list: &List| list.carrier == carrier && list.references == references;
+        let mut known = self.lists.iter().position(is_it);
+        if known.is_none() {
+            let list = List { carrier, references: references.to_vec() };
+            if self.size + list.size() > PREFETCHED {
+                self.ask(Action::Read, Vec::new(), vec![list])?;
+            } else {
+                known = Some(self.lists.len());
+                self.ask(Action::Read, vec![list], Vec::new())?;
             }
-            None => {
-                self.ask(Action::Read, vec![list()], Vec::new())?;
-                place = Some(self.lists.len() - 1);
-            }
+        } else if !self.is_fresh {
+            self.act(Action::Read)?;
         }
-        let place = place.unwrap_or_default();
+        // A list that is read only this time stands alone.
+        let place = known.unwrap_or(0);
         if let Some((_, failure)) = self.unread.iter().find(|(unread, _)| *unread == place) {
             return Err(failure.clone());
         }
-        if self.is_fresh {
-            begin = self.lists[..place].iter().map(Read::size).sum();
-        }
+        let begin: usize = self.lists[..place].iter().map(List::size).sum();
         Ok(&self.process.values()[begin..])
     }
-}
 
-/// Copies values from their bytes.
-fn decode<T, const N: usize>(bytes: &[u8], values: &mut [T], of: fn([u8; N]) -> T) {
-    for (value, bytes) in values.iter_mut().zip(bytes.as_chunks::<N>().0) {
-        *value = of(*bytes);
+    /// Reads variables whose values are sent as N bytes each.
+    fn get<T, const N: usize>(
+        &mut self,
+        carrier: Carrier,
+        references: &[u32],
+        values: &mut [T],
+        of: fn([u8; N]) -> T,
+    ) -> Outcome {
+        for (references, values) in references.chunks(CHUNK).zip(values.chunks_mut(CHUNK)) {
+            let bytes = self.read(carrier, references)?.as_chunks::<N>().0;
+            for (value, bytes) in values.iter_mut().zip(bytes) {
+                *value = of(*bytes);
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets variables, by calls of at most [`CHUNK`] values.
+    fn set_all<T: Clone>(
+        &mut self,
+        references: &[u32],
+        values: &[T],
+        of: fn(Vec<u32>, Vec<T>) -> Set,
+    ) -> Outcome {
+        references.chunks(CHUNK).zip(values.chunks(CHUNK)).try_for_each(|(references, values)| {
+            self.set(of(references.to_vec(), values.to_vec()), values.len())
+        })
     }
 }
 
 impl CoSimulationUnit for RemoteUnit {
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
-        for (references, values) in references.chunks(CHUNK).zip(values.chunks_mut(CHUNK)) {
-            let is_list = |list: &Read| matches!(list, Read::Real(own) if own == references);
-            let bytes = self.read(is_list, || Read::Real(references.to_vec()))?;
-            decode(bytes, values, f64::from_le_bytes);
-        }
-        Ok(())
+        self.get(Carrier::Real, references, values, f64::from_le_bytes)
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        for (references, values) in references.chunks(CHUNK).zip(values.chunks_mut(CHUNK)) {
-            let is_list = |list: &Read| matches!(list, Read::Integer(own) if own == references);
-            let bytes = self.read(is_list, || Read::Integer(references.to_vec()))?;
-            decode(bytes, values, i32::from_le_bytes);
-        }
-        Ok(())
+        self.get(Carrier::Integer, references, values, i32::from_le_bytes)
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        for (references, values) in references.chunks(CHUNK).zip(values.chunks_mut(CHUNK)) {
-            let is_list = |list: &Read| matches!(list, Read::Boolean(own) if own == references);
-            let bytes = self.read(is_list, || Read::Boolean(references.to_vec()))?;
-            decode(bytes, values, i32::from_le_bytes);
-        }
-        Ok(())
+        self.get(Carrier::Boolean, references, values, i32::from_le_bytes)
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        references.chunks(CHUNK).zip(values.chunks(CHUNK)).try_for_each(|(references, values)| {
-            self.set(Set::Real(references.to_vec(), values.to_vec()), values.len())
-        })
+        self.set_all(references, values, Set::Real)
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        references.chunks(CHUNK).zip(values.chunks(CHUNK)).try_for_each(|(references, values)| {
-            self.set(Set::Integer(references.to_vec(), values.to_vec()), values.len())
-        })
+        self.set_all(references, values, Set::Integer)
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        references.chunks(CHUNK).zip(values.chunks(CHUNK)).try_for_each(|(references, values)| {
-            self.set(Set::Boolean(references.to_vec(), values.to_vec()), values.len())
-        })
+        self.set_all(references, values, Set::Boolean)
     }
 
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {

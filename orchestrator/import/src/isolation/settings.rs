@@ -23,7 +23,7 @@ impl Default for Isolation {
     fn default() -> Self {
         Self {
             call_timeout: Duration::from_secs(60),
-            memory: Some(4 << 30),
+            memory: cfg!(unix).then_some(4 << 30),
             cpu: None,
             sandbox: false,
         }
