@@ -173,7 +173,8 @@ impl Fmu {
             return Ok(functions.version_fault());
         }
         let isolation = Isolation::default();
-        match (Library { file, folder: self.folder.path(), isolation: &isolation }).check("it") {
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        match (Library { file, folder: self.folder.path(), isolation: &isolation }).check(&name) {
             Loaded::Whole((), fault) => Ok(fault),
             Loaded::Unloadable(reason) => Err(self.not_loaded(&entry, &reason)),
             Loaded::Refused(reason) => Err(format!("{entry}: {reason}")),

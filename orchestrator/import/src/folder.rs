@@ -16,9 +16,10 @@ const AGE: Duration = Duration::from_secs(60);
 /// A temporary folder that is removed when this value is dropped.
 #[derive(Debug)]
 pub struct TemporaryFolder {
-    folder: TempDir,
-    /// Says to other processes that the folder is in use.
+    /// Says to other processes that the folder is in use. It goes first: some systems keep a folder
+    /// as long as a file in it is open.
     _hold: Option<File>,
+    folder: TempDir,
 }
 
 impl TemporaryFolder {
@@ -29,7 +30,7 @@ impl TemporaryFolder {
         let folder = tempfile::Builder::new().prefix(PREFIX).tempdir()?;
         // Without a lock the folder is only removed later by a process that cannot know better.
         let hold = hold(folder.path()).ok().filter(|hold| hold.try_lock().is_ok());
-        Ok(Self { folder, _hold: hold })
+        Ok(Self { _hold: hold, folder })
     }
 
     /// Returns the path of the folder.

@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 
 /// Number of bytes that are held in memory before they are written.
 const HELD: usize = 1 << 16;
-/// Time after which rows are written in any case, so that a crash of the process loses no more.
+/// Time after which rows are written with the next one, so that a crash of the process loses only
+/// rows that came within such a time.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// A CSV file that is being written.

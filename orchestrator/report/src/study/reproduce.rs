@@ -304,6 +304,9 @@ fn keys(
     Ok(keys)
 }
 
+/// Number of failures that are told besides the first one, which ends the study.
+const FAILURES_TOLD: usize = 9;
+
 /// Parts of a study's work, shared by several threads.
 struct Work<'a> {
     study: &'a Study,
@@ -354,8 +357,11 @@ impl Work<'_> {
         });
         let mut failed = failed.into_inner().into_values();
         let Some(first) = failed.next() else { return Ok(done.into_inner()) };
-        for error in failed {
+        for error in failed.by_ref().take(FAILURES_TOLD) {
             tracing::error!("{error}");
+        }
+        if failed.len() > 0 {
+            tracing::error!("{} further parts failed", failed.len());
         }
         Err(first)
     }
