@@ -1,5 +1,10 @@
-//! What is fuzzed: everything that reads text or files of others. A target returns whatever comes;
-//! a crash, a hang or memory without bound is a fault.
+//! What is fuzzed: everything that reads text or files of others, and the C interface of the units.
+//! A target returns whatever comes; a panic, a crash, a hang or memory without bound is a fault.
+#![allow(clippy::missing_panics_doc, reason = "a target fails by panicking")]
+
+mod units;
+
+pub use units::{calls, state};
 
 use campaign::definition::Campaign;
 use cosim::experiment::{Experiment, Overrides};
@@ -89,6 +94,23 @@ pub fn ssp(data: &[u8]) {
     let bytes = written.expect("an archive in memory").into_inner();
     let _ = ssp::load(&file("a.ssp", &bytes), &Overrides::default());
 }
+
+/// What takes any bytes.
+pub type Target = fn(&[u8]);
+
+/// All targets with their names, which are those of the folders of `corpus/`.
+pub const TARGETS: [(&str, Target); 10] = [
+    ("archive", archive),
+    ("calls", calls),
+    ("campaign", campaign),
+    ("description", description),
+    ("experiment", experiment),
+    ("quantity", quantity),
+    ("ssp", ssp),
+    ("state", state),
+    ("study", study),
+    ("table", table),
+];
 
 /// Reads a table of reference values.
 pub fn table(data: &[u8]) {

@@ -12,6 +12,7 @@
 )]
 
 pub mod interface;
+pub mod table;
 
 use interface::{
     CO_SIMULATION, Callbacks, Component, EventInfo, FATAL, Interface, Logger, OK, Status, Text,
@@ -369,6 +370,35 @@ impl Instance {
                 .fold(7, |sum: u64, &byte| sum.wrapping_mul(257).wrapping_add(u64::from(byte)));
         }
         bits
+    }
+
+    /// Returns the first variable whose value is none: not finite, no item of its enumeration, or
+    /// neither true nor false.
+    pub fn wrong_value(&self) -> Option<String> {
+        let component = self.component;
+        let variables = &self.unit.description.variables;
+        for (variable, reference) in variables.iter().zip(0_u32..) {
+            let (mut real, mut whole) = (0.0, 0);
+            let is_wrong = match &variable.kind {
+                Kind::Real { .. } => {
+                    let status = c!(self, fmi2GetReal(component, &reference, 1, &mut real));
+                    status == OK && !real.is_finite()
+                }
+                Kind::Enumeration { of, .. } => {
+                    let status = c!(self, fmi2GetInteger(component, &reference, 1, &mut whole));
+                    status == OK && !(1..).zip(&of.items).any(|(item, _)| item == whole)
+                }
+                Kind::Boolean { .. } => {
+                    let status = c!(self, fmi2GetBoolean(component, &reference, 1, &mut whole));
+                    status == OK && !(0..=1).contains(&whole)
+                }
+                Kind::Integer { .. } | Kind::String { .. } => false,
+            };
+            if is_wrong {
+                return Some(format!("{} = {real}, {whole}", variable.name));
+            }
+        }
+        None
     }
 
     /// Value of the input at a tick of [`Instance::drive`]: small, and different at every tick.

@@ -1,0 +1,479 @@
+//! The C interface of the units: calls in any order, and saved states that were changed.
+
+#![allow(clippy::borrow_as_ptr, reason = "calls read better as in C")]
+
+use conformance::interface::{
+    CO_SIMULATION, DISCARD, ERROR, EventInfo, FmuState, MODEL_EXCHANGE, OK, Status,
+};
+use conformance::table::{Row, State, TABLE, settable};
+use conformance::{Instance, Unit, c, units};
+use model_description::variable::Kind;
+use std::ffi::{CStr, CString, c_int};
+use std::ptr::{null, null_mut};
+use std::sync::LazyLock;
+
+/// Largest number of calls of one input, so that no input takes long.
+const CALLS: usize = 200;
+/// Largest number of saved states that are kept at the same time.
+const SAVED: usize = 8;
+
+thread_local! {
+    // The handles of a library are of one thread here: units are made and freed in it.
+    static UNITS: LazyLock<Vec<Unit>> = LazyLock::new(units);
+}
+
+/// Returns one of the units.
+fn unit(bytes: &mut Bytes) -> Unit {
+    UNITS.with(|units| units[bytes.below(units.len())].clone())
+}
+
+/// Random bytes that are taken one after the other; after the last one come zeros.
+struct Bytes<'a>(&'a [u8]);
+
+impl Bytes<'_> {
+    fn byte(&mut self) -> u8 {
+        let Some((first, rest)) = self.0.split_first() else { return 0 };
+        self.0 = rest;
+        *first
+    }
+
+    fn below(&mut self, number: usize) -> usize {
+        usize::from(u16::from_le_bytes([self.byte(), self.byte()])) % number.max(1)
+    }
+
+    fn is(&mut self, one_in: u8) -> bool {
+        self.byte().is_multiple_of(one_in)
+    }
+
+    fn bits(&mut self) -> u64 {
+        u64::from_le_bytes(std::array::from_fn(|_| self.byte()))
+    }
+
+    /// A number: mostly one that a user might take.
+    fn real(&mut self) -> f64 {
+        const EDGES: [f64; 8] =
+            [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN, 5e-324, -0.0, 1e17];
+        match self.byte() {
+            0..=127 => f64::from(self.byte().cast_signed()) / 16.0,
+            128..=191 => f64::from(self.byte().cast_signed()) * 1e-4,
+            192..=223 => EDGES[self.below(EDGES.len())],
+            _ => f64::from_bits(self.bits()),
+        }
+    }
+
+    fn whole(&mut self) -> c_int {
+        if self.is(8) { self.bits() as c_int } else { c_int::from(self.byte().cast_signed()) / 8 }
+    }
+
+    /// References: mostly of variables that are there, and of that type.
+    fn references(&mut self, unit: &Unit, of: fn(&Kind) -> bool) -> Vec<u32> {
+        let known = unit.references(|variable| of(&variable.kind));
+        let all = unit.description.variables.len();
+        (0..self.byte() % 6)
+            .map(|_| match self.byte() {
+                0..=3 => self.bits() as u32,
+                4..=15 => self.below(all) as u32,
+                _ if known.is_empty() => 0,
+                _ => known[self.below(known.len())],
+            })
+            .collect()
+    }
+}
+
+/// What the standard says of an instance: the state that it is in and the states that it saved.
+struct Model {
+    instance: Instance,
+    fmu_type: c_int,
+    state: State,
+    saved: Vec<(FmuState, State)>,
+    /// Time that the unit has reached, as far as is known.
+    time: f64,
+}
+
+/// Result of a call: its status, whether its arguments are as the standard demands, and the state
+/// in which the standard leaves the instance after success.
+struct Answer {
+    status: Status,
+    is_right: bool,
+    next: State,
+}
+
+/// Calls functions of a unit in any order with any values, as far as they are valid in C. Each
+/// answer must be one that the standard has for the state, and values must be values.
+pub fn calls(data: &[u8]) {
+    let mut bytes = Bytes(data);
+    let unit = unit(&mut bytes);
+    let kinds = unit.interfaces();
+    let fmu_type = kinds[bytes.below(kinds.len())];
+    let instance = unit.instance(fmu_type);
+    let state = State::Instantiated;
+    let mut model = Model { instance, fmu_type, state, saved: Vec::new(), time: 0.0 };
+    for _ in 0..CALLS {
+        if bytes.0.is_empty() {
+            break;
+        }
+        model.call(&TABLE[bytes.below(TABLE.len())], &mut bytes);
+    }
+}
+
+impl Model {
+    /// Makes one call and checks its answer.
+    fn call(&mut self, row: &Row, bytes: &mut Bytes) {
+        let &Row(name, ..) = row;
+        let unit = self.instance.unit.clone();
+        let (before, count) = (self.state, self.saved.len());
+        self.instance.forget();
+        let Answer { status, is_right, next } = self.ask(row, bytes);
+        let texts: Vec<_> = self.instance.messages().into_iter().map(|said| said.text).collect();
+        let what = format!("{}: {name} in {before:?} gave {status}: {texts:?}", unit.name());
+        assert!([OK, DISCARD, ERROR].contains(&status), "{what}");
+        let is_offered =
+            name != "fmi2GetDirectionalDerivative" || unit.description.directional_derivatives();
+        if !row.is_allowed(self.fmu_type, before) || !is_offered {
+            assert_eq!(status, ERROR, "{what}");
+        }
+        assert!(is_right || status != OK, "{what}: the arguments are wrong");
+        // Nobody may have asked to hear of what was discarded.
+        if status == ERROR {
+            assert!(texts.last().is_some_and(|text| text.starts_with(name)), "{what}");
+        }
+        match status {
+            OK => self.state = next,
+            ERROR if !keeps_state(name) => self.state = State::Error,
+            DISCARD if name == "fmi2DoStep" => {
+                self.instance.ok(c!(self.instance, fmi2Reset(self.instance.component)));
+                (self.state, self.time) = (State::Instantiated, 0.0);
+            }
+            _ => assert!(self.saved.len() <= count, "{what}"),
+        }
+        let is_shown = !matches!(self.state, State::Instantiated | State::Error);
+        if is_shown && name.starts_with("fmi2Get") && bytes.is(4) {
+            self.look(&what);
+        }
+    }
+
+    /// Looks at all values. Those that cannot be had put the instance into the error state, so it is
+    /// brought back.
+    fn look(&mut self, what: &str) {
+        let here = self.instance.save();
+        let wrong = self.instance.wrong_value();
+        assert!(wrong.is_none(), "{what}: then {wrong:?}");
+        self.instance.restore(here);
+        let component = self.instance.component;
+        self.instance.ok(c!(self.instance, fmi2FreeFMUstate(component, &mut { here })));
+    }
+
+    #[allow(clippy::too_many_lines, reason = "a table")]
+    fn ask(&mut self, row: &Row, bytes: &mut Bytes) -> Answer {
+        use State::{
+            ContinuousTimeMode, EventMode, InitializationMode, Instantiated, StepComplete,
+            Terminated,
+        };
+        let &Row(name, call, ..) = row;
+        let i = &self.instance;
+        let (it, unit) = (i.component, &i.unit);
+        let mut next = self.state;
+        let mut is_right = true;
+        let status = match name {
+            "fmi2SetupExperiment" => {
+                let (with_stop, start, stop) = (bytes.is(4), bytes.real(), bytes.real());
+                let start = if bytes.is(4) { start } else { 0.0 };
+                is_right = start.is_finite() && !(with_stop && (stop.is_nan() || stop < start));
+                let status =
+                    c!(i, fmi2SetupExperiment(it, 0, 0.0, start, c_int::from(with_stop), stop));
+                if status == OK {
+                    self.time = start;
+                }
+                status
+            }
+            "fmi2SetDebugLogging" => {
+                let names = [c"logAll", c"logEvents", c"nothing"].map(CStr::as_ptr);
+                c!(i, fmi2SetDebugLogging(it, bytes.whole() & 1, bytes.below(4), names.as_ptr()))
+            }
+            "fmi2Reset" => {
+                next = Instantiated;
+                self.time = 0.0;
+                call(i, null_mut())
+            }
+            "fmi2EnterInitializationMode" => {
+                next = InitializationMode;
+                call(i, null_mut())
+            }
+            "fmi2ExitInitializationMode" => {
+                next = if self.fmu_type == MODEL_EXCHANGE { EventMode } else { StepComplete };
+                call(i, null_mut())
+            }
+            "fmi2Terminate" => {
+                next = Terminated;
+                call(i, null_mut())
+            }
+            "fmi2EnterEventMode" => {
+                next = EventMode;
+                call(i, null_mut())
+            }
+            "fmi2EnterContinuousTimeMode" => {
+                next = ContinuousTimeMode;
+                call(i, null_mut())
+            }
+            "fmi2GetReal" => {
+                let references = bytes.references(unit, |kind| matches!(kind, Kind::Real { .. }));
+                let mut values = vec![f64::NAN; references.len()];
+                let n = references.len();
+                let status = c!(i, fmi2GetReal(it, references.as_ptr(), n, values.as_mut_ptr()));
+                is_right = values.iter().all(|value| value.is_finite());
+                status
+            }
+            "fmi2GetInteger" => {
+                let references = bytes.references(unit, is_whole);
+                let (n, mut values) = (references.len(), vec![0; references.len()]);
+                c!(i, fmi2GetInteger(it, references.as_ptr(), n, values.as_mut_ptr()))
+            }
+            "fmi2GetBoolean" => {
+                let references =
+                    bytes.references(unit, |kind| matches!(kind, Kind::Boolean { .. }));
+                let (n, mut values) = (references.len(), vec![0; references.len()]);
+                let status = c!(i, fmi2GetBoolean(it, references.as_ptr(), n, values.as_mut_ptr()));
+                is_right = values.iter().all(|value| [0, 1].contains(value));
+                status
+            }
+            "fmi2GetString" => {
+                let references = bytes.references(unit, |kind| matches!(kind, Kind::String { .. }));
+                let (n, mut values) = (references.len(), vec![null(); references.len()]);
+                let status = c!(i, fmi2GetString(it, references.as_ptr(), n, values.as_mut_ptr()));
+                is_right = values.iter().all(|value| !value.is_null());
+                status
+            }
+            "fmi2SetReal" => {
+                let references = bytes.references(unit, |kind| matches!(kind, Kind::Real { .. }));
+                let values: Vec<_> = references.iter().map(|_| bytes.real()).collect();
+                is_right =
+                    self.are_settable(&references) && values.iter().all(|value| value.is_finite());
+                c!(i, fmi2SetReal(it, references.as_ptr(), values.len(), values.as_ptr()))
+            }
+            "fmi2SetInteger" => {
+                let references = bytes.references(unit, is_whole);
+                let values: Vec<_> = references.iter().map(|_| bytes.whole()).collect();
+                is_right = self.are_settable(&references);
+                c!(i, fmi2SetInteger(it, references.as_ptr(), values.len(), values.as_ptr()))
+            }
+            "fmi2SetBoolean" => {
+                let references =
+                    bytes.references(unit, |kind| matches!(kind, Kind::Boolean { .. }));
+                let values: Vec<_> = references.iter().map(|_| bytes.whole()).collect();
+                is_right = self.are_settable(&references)
+                    && values.iter().all(|value| [0, 1].contains(value));
+                c!(i, fmi2SetBoolean(it, references.as_ptr(), values.len(), values.as_ptr()))
+            }
+            "fmi2SetString" => {
+                let references = bytes.references(unit, |kind| matches!(kind, Kind::String { .. }));
+                let text = CString::new(vec![1 + bytes.byte() % 255; bytes.below(40)]);
+                let text = text.expect("no zero");
+                let values = vec![text.as_ptr(); references.len()];
+                is_right = self.are_settable(&references);
+                c!(i, fmi2SetString(it, references.as_ptr(), values.len(), values.as_ptr()))
+            }
+            "fmi2GetFMUstate" => {
+                if self.saved.len() == SAVED {
+                    let (mut old, _) = self.saved.swap_remove(0);
+                    i.ok(c!(i, fmi2FreeFMUstate(it, &mut old)));
+                }
+                let mut handle = null_mut();
+                let status = c!(i, fmi2GetFMUstate(it, &mut handle));
+                if status == OK {
+                    self.saved.push((handle, self.state));
+                }
+                status
+            }
+            "fmi2SetFMUstate" => {
+                let (handle, saved) = self.handle(bytes);
+                is_right = saved.is_some();
+                next = saved.unwrap_or(next);
+                self.time = f64::NAN;
+                let status = call(i, handle);
+                // Only a unit that runs says where it is.
+                if status == OK && next == StepComplete {
+                    c!(i, fmi2GetRealStatus(it, 2, &mut self.time));
+                }
+                status
+            }
+            "fmi2FreeFMUstate" => {
+                let (mut handle, saved) = self.handle(bytes);
+                is_right = saved.is_some() || handle.is_null();
+                let own = handle;
+                let status = c!(i, fmi2FreeFMUstate(it, &mut handle));
+                if status == OK {
+                    assert!(handle.is_null());
+                    self.saved.retain(|(handle, _)| *handle != own);
+                }
+                status
+            }
+            "fmi2SerializedFMUstateSize" | "fmi2SerializeFMUstate" => {
+                let (handle, saved) = self.handle(bytes);
+                is_right = saved.is_some();
+                call(i, handle)
+            }
+            "fmi2DeSerializeFMUstate" => {
+                let mut state = i.serialize();
+                if bytes.is(2) {
+                    let place = bytes.below(state.len());
+                    state[place] ^= 1 << (bytes.byte() % 8);
+                    is_right = false;
+                }
+                let (status, mut handle) = i.deserialize(&state);
+                if status == OK {
+                    i.ok(c!(i, fmi2FreeFMUstate(it, &mut handle)));
+                }
+                status
+            }
+            "fmi2GetDirectionalDerivative" => {
+                let unknown = bytes.references(unit, |kind| matches!(kind, Kind::Real { .. }));
+                let known = bytes.references(unit, |kind| matches!(kind, Kind::Real { .. }));
+                let seed: Vec<_> = known.iter().map(|_| bytes.real()).collect();
+                let mut values = vec![0.0; unknown.len()];
+                let (nu, nk) = (unknown.len(), known.len());
+                let (u, k) = (unknown.as_ptr(), known.as_ptr());
+                let to = values.as_mut_ptr();
+                c!(i, fmi2GetDirectionalDerivative(it, u, nu, k, nk, seed.as_ptr(), to))
+            }
+            "fmi2SetTime" => {
+                let time = bytes.real();
+                is_right = time.is_finite();
+                c!(i, fmi2SetTime(it, time))
+            }
+            "fmi2SetContinuousStates" => {
+                let n = unit.description.states().len();
+                let states: Vec<_> = (0..n).map(|_| bytes.real()).collect();
+                is_right = states.iter().all(|state| state.is_finite());
+                c!(i, fmi2SetContinuousStates(it, states.as_ptr(), n))
+            }
+            "fmi2NewDiscreteStates" => {
+                let mut event = EventInfo::default();
+                let status = c!(i, fmi2NewDiscreteStates(it, &mut event));
+                is_right = event.next_event_time.is_finite();
+                status
+            }
+            "fmi2SetRealInputDerivatives" => {
+                let references = bytes.references(unit, |kind| matches!(kind, Kind::Real { .. }));
+                let orders: Vec<_> = references.iter().map(|_| bytes.whole()).collect();
+                let values: Vec<_> = references.iter().map(|_| bytes.real()).collect();
+                is_right = self.are_settable(&references)
+                    && orders.iter().all(|order| *order > 0)
+                    && values.iter().all(|value| value.is_finite());
+                let (n, vr) = (references.len(), references.as_ptr());
+                c!(i, fmi2SetRealInputDerivatives(it, vr, n, orders.as_ptr(), values.as_ptr()))
+            }
+            "fmi2DoStep" => {
+                let at = if bytes.is(16) { bytes.real() } else { self.time };
+                let size = match bytes.byte() {
+                    0..=63 => unit.description.default_experiment.step,
+                    64..=79 => bytes.real(),
+                    _ => f64::from(bytes.byte()) * 0.01,
+                };
+                is_right = at.is_finite() && size.is_finite() && size >= 0.0;
+                let status = i.step(at, size);
+                if status == OK {
+                    self.time = (at + size).max(self.time);
+                }
+                status
+            }
+            _ => call(i, null_mut()),
+        };
+        Answer { status, is_right, next }
+    }
+
+    /// Whether each variable may be set now.
+    fn are_settable(&self, references: &[u32]) -> bool {
+        let variables = &self.instance.unit.description.variables;
+        references.iter().all(|reference| {
+            variables
+                .get(*reference as usize)
+                .is_some_and(|variable| settable(variable, self.state))
+        })
+    }
+
+    /// A handle of a saved state with the state, or one that is none.
+    fn handle(&self, bytes: &mut Bytes) -> (FmuState, Option<State>) {
+        match bytes.byte() {
+            0..=15 => (null_mut(), None),
+            16..=31 => (std::ptr::without_provenance_mut(16), None),
+            _ if self.saved.is_empty() => (null_mut(), None),
+            _ => {
+                let (handle, state) = self.saved[bytes.below(self.saved.len())];
+                (handle, Some(state))
+            }
+        }
+    }
+}
+
+fn is_whole(kind: &Kind) -> bool {
+    matches!(kind, Kind::Integer { .. } | Kind::Enumeration { .. })
+}
+
+/// Whether an error of a function leaves the instance in its state.
+fn keeps_state(name: &str) -> bool {
+    name.contains("FMUstate") || name == "fmi2SetDebugLogging"
+}
+
+/// Bytes of a saved state before its content, the last of which are its length and checksum.
+const HEADER: usize = 61;
+
+/// Gives a unit a saved state that was changed, with a checksum that fits. The unit may refuse it,
+/// or must go on with it like any other.
+pub fn state(data: &[u8]) {
+    let mut bytes = Bytes(data);
+    let unit = unit(&mut bytes);
+    let instance = unit.instance(CO_SIMULATION).initialized();
+    let step = unit.description.default_experiment.step;
+    for tick in 0..bytes.byte() % 4 {
+        instance.ok(instance.step(f64::from(tick) * step, step));
+    }
+    let (header, content) = {
+        let mut saved = instance.serialize();
+        let content = saved.split_off(HEADER);
+        (saved, content)
+    };
+    let mut content = content;
+    while !bytes.0.is_empty() {
+        let place = bytes.below(content.len());
+        match bytes.byte() % 8 {
+            0 => drop(content.remove(place)),
+            1 => content.insert(place, bytes.byte()),
+            2 => content.truncate(place.max(1)),
+            3 => {
+                let value = bytes.real().to_le_bytes();
+                content.splice(place..(place + 8).min(content.len()), value);
+            }
+            _ => content[place] = bytes.byte(),
+        }
+        if content.is_empty() {
+            return;
+        }
+    }
+    let length = (content.len() as u64).to_le_bytes();
+    let checksum = crc32fast::hash(&content).to_le_bytes();
+    let whole = [&header[..HEADER - 12], &length, &checksum, &content].concat();
+    let (status, handle) = instance.deserialize(&whole);
+    instance.ok(status);
+    let component = instance.component;
+    let restored = c!(instance, fmi2SetFMUstate(component, handle));
+    assert!([OK, ERROR].contains(&restored), "{}: {restored}", unit.name());
+    if restored == ERROR {
+        // The instance is as it was.
+        let wrong = instance.wrong_value();
+        assert!(wrong.is_none(), "{}: {wrong:?}", unit.name());
+        return;
+    }
+    let mut time = 0.0;
+    if c!(instance, fmi2GetRealStatus(component, 2, &mut time)) != OK {
+        return;
+    }
+    for tick in 0..3 {
+        let status = instance.step(time + f64::from(tick) * step, step);
+        assert!([OK, ERROR, DISCARD].contains(&status), "{}: {status}", unit.name());
+        if status != OK {
+            return;
+        }
+        let wrong = instance.wrong_value();
+        assert!(wrong.is_none(), "{}: {wrong:?}", unit.name());
+    }
+}
