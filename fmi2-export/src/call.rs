@@ -1,8 +1,16 @@
 //! Table of the functions that may be called in each state: FMI 2.0 sections 3.2.3 (model exchange)
 //! and 4.2.4 (co-simulation).
 
+use crate::model::Failure;
 use crate::types::Interface;
 use serde::{Deserialize, Serialize};
+
+/// Result of the body of a call.
+pub(crate) type Outcome = Result<(), Failure>;
+
+pub(crate) fn error<T>(text: impl Into<String>) -> Result<T, Failure> {
+    Err(Failure::Error(text.into()))
+}
 
 /// State of an instance in the standard's state machine. stepInProgress and stepCanceled do not
 /// occur, because a step is finished when `fmi2DoStep` returns.

@@ -1,8 +1,9 @@
 //! One instance of a unit: the part of the shell that handles no pointers.
 
-use crate::call::{Call, State};
+use crate::call::{Call, Outcome, State, error};
 use crate::logger::{Category, Logger};
 use crate::model::{Context, EventInfo, Failure};
+use crate::pointer::Room;
 use crate::saved;
 use crate::scalar::Scalar;
 use crate::types::{Interface, Status};
@@ -26,13 +27,6 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// more than a step. The standard demands an error for computing past a defined stop time;
 /// importers that accumulate time overshoot it by about 1e-9.
 const STOP_TOLERANCE: f64 = 1e-6;
-
-/// Result of the body of a call.
-pub(crate) type Outcome = Result<(), Failure>;
-
-pub(crate) fn error<T>(text: impl Into<String>) -> Result<T, Failure> {
-    Err(Failure::Error(text.into()))
-}
 
 /// One instance of a unit with everything that the shell keeps for it.
 pub(crate) struct Instance {
@@ -650,43 +644,42 @@ impl Instance {
         Ok(())
     }
 
-    pub(crate) fn continuous_states(&mut self, states: &mut [f64]) -> Outcome {
+    pub(crate) fn continuous_states(&mut self, states: Room<f64>) -> Outcome {
         Self::expect_length("continuous states", states.len(), self.states.len())?;
         if self.progress.state == State::InitializationMode {
             self.initialize()?;
         }
-        self.unit.continuous_states(states);
+        self.unit.continuous_states(states.zeroed());
         Ok(())
     }
 
-    pub(crate) fn derivatives(&mut self, derivatives: &mut [f64]) -> Outcome {
+    pub(crate) fn derivatives(&mut self, mut derivatives: Room<f64>) -> Outcome {
         Self::expect_length("derivatives", derivatives.len(), self.states.len())?;
         self.refresh()?;
-        for (value, &(_, reference)) in derivatives.iter_mut().zip(&self.states) {
-            *value = *self.unit.real(reference).expect("only a Real is a derivative");
-        }
+        derivatives.fill(self.states.iter().map(|&(_, reference)| {
+            *self.unit.real(reference).expect("only a Real is a derivative")
+        }));
         Ok(())
     }
 
-    pub(crate) fn event_indicators(&mut self, indicators: &mut [f64]) -> Outcome {
+    pub(crate) fn event_indicators(&mut self, indicators: Room<f64>) -> Outcome {
         Self::expect_length(
             "event indicators",
             indicators.len(),
             self.description.event_indicators,
         )?;
         self.refresh()?;
-        self.unit.event_indicators(indicators);
+        self.unit.event_indicators(indicators.zeroed());
         Ok(())
     }
 
-    pub(crate) fn nominals(&self, nominals: &mut [f64]) -> Outcome {
+    pub(crate) fn nominals(&self, mut nominals: Room<f64>) -> Outcome {
         Self::expect_length("nominal values", nominals.len(), self.states.len())?;
-        for (value, &(state, _)) in nominals.iter_mut().zip(&self.states) {
-            *value = match self.description.variables[state].kind {
-                Kind::Real { nominal: Some(nominal), .. } => nominal,
-                _ => 1.0,
-            };
-        }
+        let variables = &self.description.variables;
+        nominals.fill(self.states.iter().map(|&(state, _)| match variables[state].kind {
+            Kind::Real { nominal: Some(nominal), .. } => nominal,
+            _ => 1.0,
+        }));
         Ok(())
     }
 
@@ -695,7 +688,7 @@ impl Instance {
         unknowns: &[u32],
         knowns: &[u32],
         seed: &[f64],
-        derivative: &mut [f64],
+        mut derivative: Room<f64>,
     ) -> Outcome {
         if self.states.is_empty() {
             return error("this unit offers no directional derivatives");
@@ -719,13 +712,13 @@ impl Instance {
             }
         }
         self.refresh()?;
-        for (&unknown, sum) in unknowns.iter().zip(derivative) {
-            *sum = 0.0;
+        let time = self.progress.time;
+        for (i, &unknown) in unknowns.iter().enumerate() {
+            let mut sum = 0.0;
             for (&known, seed) in knowns.iter().zip(seed) {
-                let time = self.progress.time;
-                *sum +=
-                    self.unit.partial_derivative(time, unknown as usize, known as usize)? * seed;
+                sum += self.unit.partial_derivative(time, unknown as usize, known as usize)? * seed;
             }
+            derivative.put(i, sum);
         }
         Ok(())
     }

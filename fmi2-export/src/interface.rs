@@ -1,4 +1,4 @@
-//! Functions of FMI 2.0 with their C signatures. Pointers are checked here and nowhere else.
+//! Functions of FMI 2.0 with their C signatures.
 //!
 //! [`export_fmus!`](crate::export_fmus) makes an exported function of the same name from each of
 //! them. They are `unsafe` like any C function, because a pointer that is neither null nor as the
@@ -12,10 +12,11 @@
 )]
 #![allow(clippy::not_unsafe_ptr_arg_deref)]
 
-use crate::call::{Call, table};
-use crate::instance::{Instance, Outcome, Saved, Setting, error};
+use crate::call::{Call, Outcome, error, table};
+use crate::instance::{Instance, Saved, Setting};
 use crate::logger::{Category, Logger};
 use crate::model::Failure;
+use crate::pointer::{apart, check, not_null, put, room, slice, text, wanted};
 use crate::resource;
 use crate::types::{
     CEventInfo, Callbacks, DO_STEP_STATUS, Interface, LAST_SUCCESSFUL_TIME, PENDING_STATUS, Status,
@@ -23,7 +24,7 @@ use crate::types::{
 };
 use crate::unit::{Described, Export};
 use std::cell::UnsafeCell;
-use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::ffi::{CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr::null_mut;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -78,63 +79,6 @@ unsafe fn run(
     instance.run(call, body)
 }
 
-fn check_room<T>(name: &str, is_null: bool, n: usize) -> Result<(), Failure> {
-    if is_null {
-        return error(format!("argument '{name}' is NULL"));
-    }
-    if n > isize::MAX as usize / size_of::<T>().max(1) {
-        return error(format!("argument '{name}' cannot have {n} elements"));
-    }
-    Ok(())
-}
-
-/// Returns the `n` values at `pointer`, which may be null if `n` is 0. The caller promises that
-/// they are initialized and do not change during the call.
-unsafe fn slice<'a, T>(name: &str, pointer: *const T, n: usize) -> Result<&'a [T], Failure> {
-    if n == 0 {
-        return Ok(&[]);
-    }
-    check_room::<T>(name, pointer.is_null(), n)?;
-    // SAFETY: `check_room` refused null and lengths beyond `isize::MAX` bytes; the importer vouches
-    // for n aligned and initialized elements that do not change during the call.
-    Ok(unsafe { std::slice::from_raw_parts(pointer, n) })
-}
-
-/// Returns the room for `n` values at `pointer`, which may be null if `n` is 0. The caller promises
-/// that nobody else uses it during the call.
-unsafe fn room<'a, T>(name: &str, pointer: *mut T, n: usize) -> Result<&'a mut [T], Failure> {
-    if n == 0 {
-        return Ok(&mut []);
-    }
-    check_room::<T>(name, pointer.is_null(), n)?;
-    // SAFETY: `check_room` refused null and lengths beyond `isize::MAX` bytes; the importer vouches
-    // for n aligned elements that nobody else uses during the call. Every bit pattern is valid for
-    // the types used here.
-    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, n) })
-}
-
-/// Writes the single result of a call to `pointer`. The caller promises that it is null or points
-/// to room for one value.
-unsafe fn put<T>(name: &str, pointer: *mut T, value: T) -> Outcome {
-    check_room::<T>(name, pointer.is_null(), 1)?;
-    // SAFETY: `check_room` refused null, and the importer vouches for aligned room for one value.
-    // The write does not read the old content, which may be uninitialized.
-    unsafe { pointer.write(value) };
-    Ok(())
-}
-
-/// Reads a text of the importer. The caller promises that `pointer` is null or a NUL-terminated
-/// text that lives during the call.
-unsafe fn text<'a>(name: &str, pointer: *const c_char) -> Result<&'a str, String> {
-    if pointer.is_null() {
-        return Err(format!("argument '{name}' is NULL"));
-    }
-    // SAFETY: null was refused above, so by the importer's promise the text is NUL-terminated and
-    // lives unchanged during the call.
-    let text = unsafe { CStr::from_ptr(pointer) };
-    text.to_str().map_err(|_| format!("'{}' is not UTF-8", text.to_string_lossy()))
-}
-
 // Common functions
 
 /// Returns the descriptions of `exports` as a JSON list in memory of this library, or null if that
@@ -174,8 +118,12 @@ pub unsafe fn fmi2Instantiate(
     _visible: c_int,
     logging_on: c_int,
 ) -> Component {
+    if !callbacks.is_aligned() {
+        // Without a logger there is nobody to tell.
+        return null_mut();
+    }
     // SAFETY: the standard demands null or a pointer to a callback structure that lives and stays
-    // unchanged during the call.
+    // unchanged during the call. Wrong alignment was refused above.
     let callbacks = unsafe { callbacks.as_ref() };
     // SAFETY: the standard demands a NUL-terminated text, and `text` refuses null.
     let name = unsafe { text("instanceName", instance_name) };
@@ -328,9 +276,9 @@ pub unsafe fn fmi2GetReal(
     value: *mut f64,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: the importer vouches for both arrays, as `slice` and `room` require.
-        let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
-        instance.get::<f64>(references, |i, value| values[i] = *value)
+        // SAFETY: the importer vouches for both arrays, as `wanted` requires.
+        let (references, mut values) = unsafe { wanted(vr, n, value) }?;
+        instance.get::<f64>(references, |i, value| values.put(i, *value))
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_REAL, body) }
@@ -343,9 +291,9 @@ pub unsafe fn fmi2GetInteger(
     value: *mut c_int,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: the importer vouches for both arrays, as `slice` and `room` require.
-        let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
-        instance.get::<i32>(references, |i, value| values[i] = *value)
+        // SAFETY: the importer vouches for both arrays, as `wanted` requires.
+        let (references, mut values) = unsafe { wanted(vr, n, value) }?;
+        instance.get::<i32>(references, |i, value| values.put(i, *value))
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_INTEGER, body) }
@@ -358,9 +306,9 @@ pub unsafe fn fmi2GetBoolean(
     value: *mut c_int,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: the importer vouches for both arrays, as `slice` and `room` require.
-        let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
-        instance.get::<bool>(references, |i, value| values[i] = c_int::from(*value))
+        // SAFETY: the importer vouches for both arrays, as `wanted` requires.
+        let (references, mut values) = unsafe { wanted(vr, n, value) }?;
+        instance.get::<bool>(references, |i, value| values.put(i, c_int::from(*value)))
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_BOOLEAN, body) }
@@ -374,10 +322,10 @@ pub unsafe fn fmi2GetString(
     value: *mut *const c_char,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: the importer vouches for both arrays, as `slice` and `room` require.
-        let (references, values) = unsafe { (slice("vr", vr, n)?, room("value", value, n)?) };
-        for (value, text) in values.iter_mut().zip(instance.get_strings(references)?) {
-            *value = text.as_ptr();
+        // SAFETY: the importer vouches for both arrays, as `wanted` requires.
+        let (references, mut values) = unsafe { wanted(vr, n, value) }?;
+        for (i, text) in instance.get_strings(references)?.iter().enumerate() {
+            values.put(i, text.as_ptr());
         }
         Ok(())
     };
@@ -455,8 +403,8 @@ pub unsafe fn fmi2SetString(
 /// Saves the present state. It overwrites the state behind `*state` if `*state` is not null.
 pub unsafe fn fmi2GetFMUstate(component: Component, state: *mut *mut c_void) -> Status {
     let body = |instance: &mut Instance| {
-        check_room::<*mut c_void>("FMUstate", state.is_null(), 1)?;
-        // SAFETY: `check_room` refused null, and the standard demands that `*state` is initialized,
+        check("FMUstate", state, 1)?;
+        // SAFETY: `check` refused null and wrong alignment, and the standard demands that `*state` is initialized,
         // with null or a handle.
         let present = unsafe { state.read() };
         let handle =
@@ -470,7 +418,7 @@ pub unsafe fn fmi2GetFMUstate(component: Component, state: *mut *mut c_void) -> 
 
 pub unsafe fn fmi2SetFMUstate(component: Component, state: *mut c_void) -> Status {
     let body = |instance: &mut Instance| {
-        check_room::<Saved>("FMUstate", state.is_null(), 1)?;
+        not_null("FMUstate", state)?;
         instance.restore(state.cast())
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
@@ -481,14 +429,19 @@ pub unsafe fn fmi2SetFMUstate(component: Component, state: *mut c_void) -> Statu
 /// already.
 pub unsafe fn fmi2FreeFMUstate(component: Component, state: *mut *mut c_void) -> Status {
     let body = |instance: &mut Instance| {
-        // SAFETY: the standard demands null or a pointer to an initialized handle that nobody else
-        // uses during the call.
-        let Some(state) = (unsafe { state.as_mut() }) else { return Ok(()) };
-        if !state.is_null() {
-            instance.free_saved(state.cast())?;
-            *state = null_mut();
+        if state.is_null() {
+            return Ok(());
         }
-        Ok(())
+        check("FMUstate", state, 1)?;
+        // SAFETY: `check` refused wrong alignment, and the standard demands that `*state` is
+        // initialized, with null or a handle.
+        let handle = unsafe { state.read() };
+        if handle.is_null() {
+            return Ok(());
+        }
+        instance.free_saved(handle.cast())?;
+        // SAFETY: the importer vouches for the result pointer, as `put` requires.
+        unsafe { put("FMUstate", state, null_mut()) }
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::FREE_FMU_STATE, body) }
@@ -500,7 +453,7 @@ pub unsafe fn fmi2SerializedFMUstateSize(
     size: *mut usize,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        check_room::<Saved>("FMUstate", state.is_null(), 1)?;
+        not_null("FMUstate", state)?;
         let length = instance.serialized(state.cast())?.len();
         // SAFETY: the importer vouches for the result pointer, as `put` requires.
         unsafe { put("size", size, length) }
@@ -516,14 +469,14 @@ pub unsafe fn fmi2SerializeFMUstate(
     size: usize,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        check_room::<Saved>("FMUstate", state.is_null(), 1)?;
+        not_null("FMUstate", state)?;
         let bytes = instance.serialized(state.cast())?;
         if size < bytes.len() {
             return error(format!("room for {size} bytes, but the state has {}", bytes.len()));
         }
         // SAFETY: the importer vouches for the array, as `room` requires.
         unsafe { room("serializedState", serialized.cast::<u8>(), bytes.len()) }?
-            .copy_from_slice(bytes);
+            .fill(bytes.iter().copied());
         Ok(())
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
@@ -538,7 +491,7 @@ pub unsafe fn fmi2DeSerializeFMUstate(
     state: *mut *mut c_void,
 ) -> Status {
     let body = |instance: &mut Instance| {
-        check_room::<*mut c_void>("FMUstate", state.is_null(), 1)?;
+        check("FMUstate", state, 1)?;
         // SAFETY: the importer vouches for the array, as `slice` requires.
         let handle = instance
             .deserialize(unsafe { slice("serializedState", serialized.cast::<u8>(), size) }?)?;
@@ -567,7 +520,12 @@ pub unsafe fn fmi2GetDirectionalDerivative(
                 slice("dvKnown", dv_known, n_known)?,
             )
         };
-        // SAFETY: the importer vouches for the array, as `room` requires.
+        let written = ("dvUnknown", dv_unknown, n_unknown);
+        apart(("dvKnown", dv_known, n_known), written)?;
+        apart(("vUnknown_ref", unknown, n_unknown), written)?;
+        apart(("vKnown_ref", known, n_known), written)?;
+        // SAFETY: the importer vouches for the array, as `room` requires. It overlaps none of the
+        // others.
         let derivative = unsafe { room("dvUnknown", dv_unknown, n_unknown) }?;
         instance.directional_derivative(unknowns, knowns, seed, derivative)
     };
@@ -588,7 +546,7 @@ pub unsafe fn fmi2EnterEventMode(component: Component) -> Status {
 
 pub unsafe fn fmi2NewDiscreteStates(component: Component, event_info: *mut CEventInfo) -> Status {
     let body = |instance: &mut Instance| {
-        check_room::<CEventInfo>("fmi2eventInfo", event_info.is_null(), 1)?;
+        check("fmi2eventInfo", event_info, 1)?;
         let event = instance.new_discrete_states()?;
         let info = CEventInfo {
             values_of_continuous_states_changed: c_int::from(event.states_changed),

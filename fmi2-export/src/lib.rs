@@ -8,7 +8,8 @@
 //! | `unit` | a model bound to its table, without its type |
 //! | `instance` | one instance: checks, laziness, saved states; no pointers |
 //! | `call` | the table of calls allowed in each state |
-//! | [`interface`], [`types`] | the C signatures and the checks of pointers |
+//! | [`interface`], [`types`] | the C signatures |
+//! | `pointer` | the checks of the importer's pointers |
 //! | `logger`, `resource`, `saved` | messages, the resource URI, the bytes of a saved state |
 //!
 //! Every entry point stops a panic: it returns `fmi2Fatal`, reports it in the log, and leaves the
@@ -25,6 +26,7 @@ pub mod interface;
 mod logger;
 pub mod model;
 mod numbers;
+mod pointer;
 mod resource;
 mod saved;
 mod scalar;

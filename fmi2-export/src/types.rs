@@ -41,9 +41,16 @@ pub struct CEventInfo {
 }
 
 /// C type `fmi2CallbackLogger`. It is variadic, but this crate passes no further arguments and
-/// messages without `%`.
-pub type LogCallback =
-    unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...);
+/// messages without `%`. An importer in C++ may throw in it: the exception may then leave the
+/// callback, and ends the process at the border of the exported function, with a message.
+pub type LogCallback = unsafe extern "C-unwind" fn(
+    *mut c_void,
+    *const c_char,
+    Status,
+    *const c_char,
+    *const c_char,
+    ...
+);
 
 /// C type `fmi2CallbackFunctions`. The memory and step callbacks are not used and may be null.
 #[derive(Clone, Copy, Debug)]

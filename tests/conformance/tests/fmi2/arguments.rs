@@ -1,11 +1,13 @@
-//! Tests with NULL for every pointer argument: the call reports an error that names the argument,
-//! or it succeeds where the standard or importers need that.
+//! Tests with NULL for every pointer argument, with pointers between two values, and with arrays that
+//! overlap: the call reports an error that names the argument, or it succeeds where the standard or
+//! importers need that.
 
 use conformance::interface::{CO_SIMULATION, Callbacks, ERROR, MODEL_EXCHANGE, OK, Status};
 use conformance::{Instance, c, units};
 use model_description::variable::Kind;
 use std::ffi::{CStr, c_int};
 use std::ptr::{null, null_mut};
+use std::sync::atomic::AtomicU64;
 
 type Call = fn(&Instance) -> Status;
 
@@ -47,6 +49,54 @@ const NULLS: &[(Call, &str)] = &[
     // This count exceeds the address space.
     (|i| c!(i, fmi2GetReal(i.component, &0, usize::MAX, &mut 0.0)), "fmi2GetReal: argument 'vr' cannot have"),
 ];
+
+/// Returns an address between two values, where there is room for a few.
+fn between<T>() -> *mut T {
+    static ROOM: [AtomicU64; 16] = [const { AtomicU64::new(0) }; 16];
+    ROOM[0].as_ptr().cast::<u8>().wrapping_add(1).cast()
+}
+
+/// Calls with a pointer that cannot point to a value of its type, and the argument that is named.
+#[rustfmt::skip]
+const BETWEEN: &[(Call, &str)] = &[
+    (|i| c!(i, fmi2SetDebugLogging(i.component, 1, 1, between())), "fmi2SetDebugLogging: argument 'categories' is at 0x"),
+    (|i| c!(i, fmi2GetReal(i.component, between(), 1, &mut 0.0)), "fmi2GetReal: argument 'vr' is at 0x"),
+    (|i| c!(i, fmi2GetReal(i.component, &0, 1, between())), "fmi2GetReal: argument 'value' is at 0x"),
+    (|i| c!(i, fmi2GetInteger(i.component, &0, 1, between())), "fmi2GetInteger: argument 'value' is at 0x"),
+    (|i| c!(i, fmi2GetBoolean(i.component, &0, 1, between())), "fmi2GetBoolean: argument 'value' is at 0x"),
+    (|i| c!(i, fmi2GetString(i.component, &0, 1, between())), "fmi2GetString: argument 'value' is at 0x"),
+    (|i| c!(i, fmi2SetReal(i.component, between(), 1, &0.0)), "fmi2SetReal: argument 'vr' is at 0x"),
+    (|i| c!(i, fmi2SetReal(i.component, &0, 1, between())), "fmi2SetReal: argument 'value' is at 0x"),
+    (|i| c!(i, fmi2SetInteger(i.component, &0, 1, between())), "fmi2SetInteger: argument 'value' is at 0x"),
+    (|i| c!(i, fmi2SetBoolean(i.component, &0, 1, between())), "fmi2SetBoolean: argument 'value' is at 0x"),
+    (|i| c!(i, fmi2SetString(i.component, &0, 1, between())), "fmi2SetString: argument 'value' is at 0x"),
+    (|i| c!(i, fmi2GetFMUstate(i.component, between())), "fmi2GetFMUstate: argument 'FMUstate' is at 0x"),
+    (|i| c!(i, fmi2FreeFMUstate(i.component, between())), "fmi2FreeFMUstate: argument 'FMUstate' is at 0x"),
+    (|i| c!(i, fmi2SerializedFMUstateSize(i.component, i.save(), between())), "fmi2SerializedFMUstateSize: argument 'size' is at 0x"),
+    (|i| c!(i, fmi2DeSerializeFMUstate(i.component, &0, 1, between())), "fmi2DeSerializeFMUstate: argument 'FMUstate' is at 0x"),
+    (|i| c!(i, fmi2GetDirectionalDerivative(i.component, between(), 1, &0, 1, &1.0, &mut 0.0)), "fmi2GetDirectionalDerivative: argument 'vUnknown_ref' is at 0x"),
+    (|i| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, between(), 1, &1.0, &mut 0.0)), "fmi2GetDirectionalDerivative: argument 'vKnown_ref' is at 0x"),
+    (|i| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, &0, 1, between(), &mut 0.0)), "fmi2GetDirectionalDerivative: argument 'dvKnown' is at 0x"),
+    (|i| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, &0, 1, &1.0, between())), "fmi2GetDirectionalDerivative: argument 'dvUnknown' is at 0x"),
+];
+
+/// Calls whose results would overwrite what they read.
+#[rustfmt::skip]
+const OVERLAPS: &[(Call, &str)] = &[
+    (|i| overlapping(|p| c!(i, fmi2GetReal(i.component, p.cast(), 2, p))), "fmi2GetReal: arguments 'vr' and 'value' overlap"),
+    (|i| overlapping(|p| c!(i, fmi2GetReal(i.component, p.wrapping_add(1).cast(), 2, p))), "fmi2GetReal: arguments 'vr' and 'value' overlap"),
+    (|i| overlapping(|p| c!(i, fmi2GetInteger(i.component, p.cast(), 2, p.cast()))), "fmi2GetInteger: arguments 'vr' and 'value' overlap"),
+    (|i| overlapping(|p| c!(i, fmi2GetBoolean(i.component, p.cast(), 2, p.cast()))), "fmi2GetBoolean: arguments 'vr' and 'value' overlap"),
+    (|i| overlapping(|p| c!(i, fmi2GetString(i.component, p.cast(), 2, p.cast()))), "fmi2GetString: arguments 'vr' and 'value' overlap"),
+    (|i| overlapping(|p| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, &0, 1, p, p))), "fmi2GetDirectionalDerivative: arguments 'dvKnown' and 'dvUnknown' overlap"),
+    (|i| overlapping(|p| c!(i, fmi2GetDirectionalDerivative(i.component, p.cast(), 1, &0, 1, &1.0, p))), "fmi2GetDirectionalDerivative: arguments 'vUnknown_ref' and 'dvUnknown' overlap"),
+    (|i| overlapping(|p| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, p.cast(), 1, &1.0, p))), "fmi2GetDirectionalDerivative: arguments 'vKnown_ref' and 'dvUnknown' overlap"),
+];
+
+/// Makes a call with an array of four numbers.
+fn overlapping(call: impl Fn(*mut f64) -> Status) -> Status {
+    call([0.0; 4].as_mut_ptr())
+}
 
 /// Such calls in event mode, for model exchange only.
 #[rustfmt::skip]
@@ -113,11 +163,13 @@ fn check(instance: &Instance, calls: &[(Call, &str)]) {
 }
 
 #[test]
-fn null_arguments_are_errors_that_name_them() {
+fn wrong_pointers_are_errors_that_name_them() {
     for unit in units() {
         for &fmu_type in unit.interfaces() {
             let instance = unit.instance(fmu_type).initialized();
             check(&instance, NULLS);
+            check(&instance, BETWEEN);
+            check(&instance, OVERLAPS);
             for call in NOTHING {
                 instance.ok(call(&instance));
             }
@@ -139,6 +191,17 @@ fn null_arguments_are_errors_that_name_them() {
                 check(&instance, NULLS_OF_CONTINUOUS_TIME);
             }
         }
+    }
+}
+
+#[test]
+fn what_cannot_be_given_leaves_the_room_as_it_was() {
+    for unit in units() {
+        let instance = unit.instance(CO_SIMULATION);
+        let mut value = 7.5;
+        let status = c!(instance, fmi2GetReal(instance.component, &u32::MAX, 1, &mut value));
+        instance.refused(status, ERROR, &["fmi2GetReal"]);
+        assert_eq!(value, 7.5);
     }
 }
 
@@ -180,6 +243,9 @@ fn no_callbacks_or_none_of_their_functions_are_fine() {
             c!(unit, fmi2FreeInstance(component));
             // A refused instantiation has no logger either.
             assert!(instantiate(null()).is_null());
+            let (name, guid) = (c"it".as_ptr(), unit.guid().as_ptr());
+            let made = c!(unit, fmi2Instantiate(name, 1, guid, null(), between(), 0, 1));
+            assert!(made.is_null());
         }
     }
 }
