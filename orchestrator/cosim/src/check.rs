@@ -221,6 +221,12 @@ fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result
     {
         return Ok(path);
     }
+    if let Some(path) =
+        folders.iter().map(|folder| folder.join(written.get_ref())).find(|path| path.is_dir())
+    {
+        let message = format!("[components.{name}] {} is a folder, not an archive", path.display());
+        return Err(experiment.source.error(&written.span(), message));
+    }
     let there: Vec<String> = folders
         .iter()
         .flat_map(|folder| fs::read_dir(folder).into_iter().flatten().flatten())

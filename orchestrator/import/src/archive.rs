@@ -11,6 +11,8 @@ use zip::ZipArchive;
 const SIZE_LIMIT: u64 = 1 << 30;
 /// Largest number of entries in an archive.
 const ENTRY_LIMIT: usize = 20_000;
+/// Number of characters of an entry's name that an error shows.
+const LONGEST_NAME_SHOWN: usize = 200;
 
 /// Unpacks an archive into a new temporary folder, which is removed when the returned value is
 /// dropped.
@@ -49,16 +51,17 @@ fn unpack_limited(
             archive.by_index(index).map_err(|source| refuse(format!("entry {index}: {source}")))?;
         let name = String::from_utf8(entry.name_raw().to_vec())
             .map_err(|_| refuse(format!("refused: the name of entry {index} is not UTF-8")))?;
+        let shown: String = name.escape_default().take(LONGEST_NAME_SHOWN).collect();
         if let Some(reason) = unsafe_name(&name) {
-            return Err(refuse(format!("refused: entry \"{}\" {reason}", name.escape_default())));
+            return Err(refuse(format!("refused: entry \"{shown}\" {reason}")));
         }
         if entry.is_symlink() {
-            return Err(refuse(format!("refused: entry \"{name}\" is a symbolic link")));
+            return Err(refuse(format!("refused: entry \"{shown}\" is a symbolic link")));
         }
         // A fault names the archive and the entry, because a reader does not know the temporary
         // folder.
         let fault =
-            |source: io::Error| refuse(format!("entry \"{name}\" cannot be unpacked: {source}"));
+            |source: io::Error| refuse(format!("entry \"{shown}\" cannot be unpacked: {source}"));
         let target = folder.path().join(&name);
         if name.ends_with('/') {
             fs::create_dir_all(&target).map_err(fault)?;

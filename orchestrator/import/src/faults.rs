@@ -7,6 +7,11 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 /// Lists the faults of a description, one line for each, in the order of the file.
 pub fn faults(description: &ModelDescription) -> Vec<String> {
     let mut faults = Vec::new();
+    for (name, text) in [("modelName", &description.model_name), ("guid", &description.guid)] {
+        if text.is_empty() {
+            faults.push(format!("has no {name}"));
+        }
+    }
     if description.co_simulation.is_none() && description.model_exchange.is_none() {
         faults.push("offers neither co-simulation nor model exchange".to_string());
     }

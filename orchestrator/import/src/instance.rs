@@ -231,6 +231,7 @@ impl FmuUnit {
     fn discarded(&mut self, said: Option<String>) -> UnitFailure {
         let Functions { get_real_status, get_boolean_status, .. } = self.instance.functions;
         let (mut time, mut terminated) = (f64::NAN, fmi::FALSE);
+        let calling = Calling::new(&self.instance.log.component, "getStatus");
         // SAFETY: the instance is alive, both pointers are valid for the calls, and FMI allows
         // these calls after fmi2Discard.
         let statuses = unsafe {
@@ -239,6 +240,7 @@ impl FmuUnit {
                 get_boolean_status(self.component, fmi::TERMINATED, &raw mut terminated),
             ]
         };
+        drop(calling);
         let [knows_time, knows_end] = statuses.map(|status| fmi::status(status) == Ok(Status::Ok));
         let ends = knows_end && terminated != fmi::FALSE;
         let mut parts: Vec<String> = said.into_iter().collect();

@@ -187,6 +187,12 @@ impl Log {
     }
 }
 
+// Units may log from threads of their own.
+const _: () = {
+    const fn is_sync<T: Sync>() {}
+    is_sync::<Log>();
+};
+
 impl Drop for Log {
     fn drop(&mut self) {
         if let Sink::Printed(pace) = &self.sink {

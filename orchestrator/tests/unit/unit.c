@@ -61,7 +61,11 @@ const char *fmi2GetVersion(void) { return VERSION; }
 
 void *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources, const Callbacks *callbacks,
                       int visible, int logging) {
-    (void)type, (void)guid, (void)resources, (void)visible, (void)logging;
+    (void)type, (void)resources, (void)visible, (void)logging;
+    if (strcmp(guid, "{u-1}")) {
+        callbacks->logger(callbacks->environment, name, ERROR, "error", "it has another GUID than %s", guid);
+        return NULL;
+    }
     Unit *unit = callbacks->allocate(1, sizeof(Unit));
     start(unit, callbacks);
     fault(INSTANTIATE, callbacks->logger, callbacks->environment);

@@ -1,0 +1,50 @@
+//! The same command, started twenty times at once.
+
+use crate::bench::Bench;
+use crate::campaign::CAMPAIGN;
+use std::fs;
+use std::process::{Child, Output, Stdio};
+
+/// Starts a command twenty times and returns how often it succeeded. Those that did not must have
+/// said that another one is at work, or that there are results.
+fn successes(bench: &Bench, arguments: &[&str]) -> usize {
+    let start = |_| -> Child {
+        bench.command(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+    };
+    let all: Vec<_> = (0..20).map(start).collect();
+    let mut count = 0;
+    for child in all {
+        let Output { status, stderr, .. } = child.wait_with_output().unwrap();
+        let errors = String::from_utf8(stderr).unwrap();
+        if status.success() {
+            count += 1;
+            continue;
+        }
+        assert_eq!(status.code(), Some(2), "{errors}");
+        let reasons = ["another process is writing", "holds results of an earlier run"];
+        assert!(reasons.iter().any(|reason| errors.contains(reason)), "{errors}");
+        assert_eq!(errors.lines().count(), 1, "{errors}");
+    }
+    count
+}
+
+#[test]
+fn of_twenty_equal_runs_one_writes_the_results() {
+    let bench = Bench::new();
+    assert_eq!(successes(&bench, &["run", "loop.toml", "--quiet"]), 1);
+    let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 5);
+    // Those that may replace results do so one after the other.
+    assert!(successes(&bench, &["run", "loop.toml", "--quiet", "--force"]) >= 1);
+    assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap(), rows);
+}
+
+#[test]
+fn of_twenty_equal_campaigns_none_spoils_another() {
+    let bench = Bench::new();
+    fs::write(bench.path("c.toml"), CAMPAIGN).unwrap();
+    assert!(successes(&bench, &["campaign", "c.toml", "--csv", "--quiet"]) >= 1);
+    let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    assert_eq!(bench.call(&["campaign", "c.toml", "--csv", "--fresh"]).0, 0);
+    assert_eq!(fs::read_to_string(bench.path("out/c/cases.csv")).unwrap(), table);
+}
