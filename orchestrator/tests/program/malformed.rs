@@ -126,12 +126,12 @@ fn rename(entries: &mut Entries, from: &[u8], to: &[u8]) {
 }
 
 fn entities(entries: &mut Entries) {
-    let mut text = String::from("<!DOCTYPE f [<!ENTITY a0 \"ha\">");
-    for k in 1..40 {
-        text += &format!("<!ENTITY a{k} \"&a{};&a{};\">", k - 1, k - 1);
-    }
-    text += "]><fmiModelDescription fmiVersion=\"2.0\" modelName=\"&a39;\"/>";
-    entries[0].1 = text.into_bytes();
+    let more = (1..40).map(|k| format!("<!ENTITY a{k} \"&a{};&a{};\">", k - 1, k - 1));
+    let parts: Vec<_> = std::iter::once("<!DOCTYPE f [<!ENTITY a0 \"ha\">".into())
+        .chain(more)
+        .chain(["]><fmiModelDescription fmiVersion=\"2.0\" modelName=\"&a39;\"/>".into()])
+        .collect();
+    entries[0].1 = parts.concat().into_bytes();
 }
 
 fn nesting(entries: &mut Entries) {
