@@ -404,8 +404,8 @@ pub unsafe fn fmi2SetString(
 pub unsafe fn fmi2GetFMUstate(component: Component, state: *mut *mut c_void) -> Status {
     let body = |instance: &mut Instance| {
         check("FMUstate", state, 1)?;
-        // SAFETY: `check` refused null and wrong alignment, and the standard demands that `*state` is initialized,
-        // with null or a handle.
+        // SAFETY: `check` refused null and wrong alignment, and the standard demands that `*state`
+        // is initialized, with null or a handle.
         let present = unsafe { state.read() };
         let handle =
             instance.save((!present.is_null()).then(|| present.cast::<Saved>().cast_const()))?;

@@ -152,8 +152,8 @@ impl Model {
         }
     }
 
-    /// Looks at all values. Those that cannot be had put the instance into the error state, so it is
-    /// brought back.
+    /// Looks at all values. Those that cannot be had put the instance into the error state, so it
+    /// is brought back.
     fn look(&mut self, what: &str) {
         let here = self.instance.save();
         let wrong = self.instance.wrong_value();

@@ -1,6 +1,6 @@
-//! Tests with NULL for every pointer argument, with pointers between two values, and with arrays that
-//! overlap: the call reports an error that names the argument, or it succeeds where the standard or
-//! importers need that.
+//! Tests with NULL for every pointer argument, with pointers between two values, and with arrays
+//! that overlap: the call reports an error that names the argument, or it succeeds where the
+//! standard or importers need that.
 
 use conformance::interface::{CO_SIMULATION, Callbacks, ERROR, MODEL_EXCHANGE, OK, Status};
 use conformance::{Instance, c, units};
