@@ -47,24 +47,30 @@ fn a_step_allocates_nothing() {
     unsafe {
         let c = fmi2::fmi2Instantiate(c"it".as_ptr(), 1, guid.as_ptr(), null(), null(), 0, 0);
         assert!(!c.is_null());
-        assert_eq!(fmi2::fmi2EnterInitializationMode(c), Status::Ok);
-        assert_eq!(fmi2::fmi2ExitInitializationMode(c), Status::Ok);
-        // The first calculation may enlarge buffers that are kept.
-        assert_eq!(fmi2::fmi2GetReal(c, references.as_ptr(), 4, values.as_mut_ptr()), Status::Ok);
-        let before = COUNT.get();
-        for k in 0..10 {
-            assert_eq!(fmi2::fmi2SetReal(c, &9, 1, &f64::from(k)), Status::Ok);
-            assert_eq!(fmi2::fmi2SetRealInputDerivatives(c, &9, 1, &1, &0.5), Status::Ok);
-            assert_eq!(fmi2::fmi2DoStep(c, f64::from(k) * 0.1, 0.1, 1), Status::Ok);
+        // A reset keeps the room that the first steps need.
+        for _ in 0..2 {
+            assert_eq!(fmi2::fmi2EnterInitializationMode(c), Status::Ok);
+            assert_eq!(fmi2::fmi2ExitInitializationMode(c), Status::Ok);
+            // The first calculation may enlarge buffers that are kept.
             assert_eq!(
                 fmi2::fmi2GetReal(c, references.as_ptr(), 4, values.as_mut_ptr()),
                 Status::Ok
             );
+            let before = COUNT.get();
+            for k in 0..10 {
+                assert_eq!(fmi2::fmi2SetReal(c, &9, 1, &f64::from(k)), Status::Ok);
+                assert_eq!(fmi2::fmi2SetRealInputDerivatives(c, &9, 1, &1, &0.5), Status::Ok);
+                assert_eq!(fmi2::fmi2DoStep(c, f64::from(k) * 0.1, 0.1, 1), Status::Ok);
+                assert_eq!(
+                    fmi2::fmi2GetReal(c, references.as_ptr(), 4, values.as_mut_ptr()),
+                    Status::Ok
+                );
+            }
+            assert_eq!(COUNT.get(), before);
+            // A reset allocates, which shows that the counter works.
+            assert_eq!(fmi2::fmi2Reset(c), Status::Ok);
+            assert!(COUNT.get() > before);
         }
-        assert_eq!(COUNT.get(), before);
-        // A reset allocates, which shows that the counter works.
-        assert_eq!(fmi2::fmi2Reset(c), Status::Ok);
-        assert!(COUNT.get() > before);
         fmi2::fmi2FreeInstance(c);
     }
 }

@@ -29,6 +29,7 @@ pub(crate) struct Counter {
     seen: f64,
     resources: String,
     parity: Parity,
+    resets: i32,
 }
 
 impl Counter {
@@ -59,6 +60,9 @@ impl Model for Counter {
                 .string(discrete_output("resources", "The resource folder"), |m| &mut m.resources)
                 .enumeration(discrete_output("parity", PARITIES.description), &PARITIES, |m| {
                     &mut m.parity
+                })
+                .integer(discrete_output("resets", "Resets of this model"), (None, None), |m| {
+                    &mut m.resets
                 }),
         }
     }
@@ -71,7 +75,12 @@ impl Model for Counter {
             seen: 0.0,
             resources: String::new(),
             parity: Parity::Even,
+            resets: 0,
         }
+    }
+
+    fn reset(&mut self) {
+        *self = Self { resets: self.resets + 1, ..Self::new() };
     }
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {

@@ -48,6 +48,28 @@ fn oracle_an_euler_loop_with_the_time_event_agrees_with_the_closed_form() {
 }
 
 #[test]
+fn outputs_follow_the_time_that_is_set() {
+    const GAIN_NOW: u32 = 13;
+    let instance = Instance::in_event_mode();
+    let component = instance.component;
+    instance.event_info();
+    assert_eq!(c!(fmi2EnterContinuousTimeMode(component)), Status::Ok);
+    assert_eq!(instance.real(GAIN_NOW), 2.0);
+    assert_eq!(c!(fmi2SetTime(component, 1.5)), Status::Ok);
+    assert_eq!(instance.real(GAIN_NOW), 1.0);
+}
+
+#[test]
+fn states_in_initialization_mode_are_those_of_the_parameters() {
+    let instance = Instance::lag(MODEL_EXCHANGE);
+    assert_eq!(instance.set_real(INITIAL, 0.75), Status::Ok);
+    instance.enter_initialization();
+    assert_eq!(state(&instance), 0.75);
+    assert_eq!(instance.set_real(INITIAL, -0.25), Status::Ok);
+    assert_eq!(state(&instance), -0.25);
+}
+
+#[test]
 fn states_have_nominal_values_and_lengths_are_checked() {
     let instance = Instance::in_event_mode();
     let component = instance.component;

@@ -96,6 +96,26 @@ fn interleaved_instances_and_units_do_not_see_each_other() {
 }
 
 #[test]
+fn a_reset_keeps_the_model_unless_it_has_failed() {
+    const COUNT: u32 = 2;
+    const RESETS: u32 = 5;
+    let counter = Instance::of("Counter", CO_SIMULATION);
+    for resets in 1..4 {
+        counter.initialize();
+        assert_eq!(counter.step(0.0, 0.1), Status::Ok);
+        assert_eq!(c!(fmi2Reset(counter.component)), Status::Ok);
+        counter.enter_initialization();
+        assert_eq!((counter.integer(RESETS), counter.real(COUNT)), (2 * resets - 1, 0.0));
+        assert_eq!(c!(fmi2Reset(counter.component)), Status::Ok);
+    }
+    // A refused value puts it into the error state.
+    assert_eq!(counter.set_real(COUNT, 1.0), Status::Error);
+    assert_eq!(c!(fmi2Reset(counter.component)), Status::Ok);
+    counter.enter_initialization();
+    assert_eq!(counter.integer(RESETS), 0);
+}
+
+#[test]
 fn a_panic_is_fatal_for_the_instance_only() {
     const DEFECT: u32 = 0;
     const COUNT: u32 = 2;

@@ -80,6 +80,50 @@ fn a_senseless_experiment_is_refused() {
     );
 }
 
+#[test]
+fn an_experiment_may_end_where_it_starts() {
+    let instance = Instance::lag(CO_SIMULATION);
+    assert_eq!(c!(fmi2SetupExperiment(instance.component, 0, 0.0, 2.0, 1, 2.0)), Status::Ok);
+}
+
+/// Returns a unit at that time, which it reached in one step.
+fn at(time: f64, stop: Option<f64>) -> Instance {
+    let instance = Instance::lag(CO_SIMULATION);
+    let (component, stops) = (instance.component, i32::from(stop.is_some()));
+    let stop = stop.unwrap_or_default();
+    assert_eq!(c!(fmi2SetupExperiment(component, 0, 0.0, time, stops, stop)), Status::Ok);
+    assert_eq!(c!(fmi2EnterInitializationMode(component)), Status::Ok);
+    assert_eq!(c!(fmi2ExitInitializationMode(component)), Status::Ok);
+    instance
+}
+
+#[test]
+fn the_communication_point_may_differ_by_rounding_only() {
+    // The time, and differences that are taken and refused: 1e-9 of the time, but at most 0.1 ms
+    // unless the numbers themselves are coarser.
+    for (time, near, far) in [
+        (1e3, 5e-7, 2e-6),
+        (-1e3, 5e-7, 2e-6),
+        (1e7, 9e-5, 2e-4),
+        (1e13, 5e-3, 2e-2),
+        (1e-3, 5e-13, 2e-10),
+    ] {
+        assert_eq!(at(time, None).step(time + near, 1e-6), Status::Ok, "{time}");
+        assert_eq!(at(time, None).step(time - near, 1e-6), Status::Ok, "{time}");
+        assert_eq!(at(time, None).step(time + far, 1e-6), Status::Error, "{time}");
+        assert_eq!(at(time, None).step(time - far, 1e-6), Status::Error, "{time}");
+    }
+}
+
+#[test]
+fn the_stop_time_may_be_passed_by_rounding_only() {
+    // 1e-6 of the stop time, but never more than the step.
+    assert_eq!(at(99.0, Some(100.0)).step(99.0, 1.0 + 5e-5), Status::Ok);
+    assert_eq!(at(99.0, Some(100.0)).step(99.0, 1.0 + 2e-4), Status::Error);
+    assert_eq!(at(0.0, Some(1e-9)).step(0.0, 1e-9 + 5e-16), Status::Ok);
+    assert_eq!(at(0.0, Some(1e-9)).step(0.0, 1e-9 + 5e-15), Status::Error);
+}
+
 fn set_derivative(instance: &Instance, reference: u32, order: i32, value: f64) -> Status {
     let component = instance.component;
     c!(fmi2SetRealInputDerivatives(component, &reference, 1, &order, &value))
@@ -111,6 +155,17 @@ fn input_derivatives_hold_for_one_step() {
     assert_eq!(instance.real(U), 4.0 * 0.25 / 2.0);
     assert_eq!(instance.step(0.5, 0.5), Status::Ok);
     assert_eq!(instance.real(U), 0.5);
+}
+
+#[test]
+fn oracle_derivatives_of_several_orders_add_up() {
+    let instance = Instance::stepping();
+    for (order, value) in [(1, 2.0), (2, 6.0), (3, -12.0)] {
+        assert_eq!(set_derivative(&instance, U, order, value), Status::Ok);
+    }
+    let h = 0.5;
+    assert_eq!(instance.step(0.0, h), Status::Ok);
+    assert_eq!(instance.real(U), 2.0 * h + 6.0 * h * h / 2.0 - 12.0 * h * h * h / 6.0);
 }
 
 #[test]
