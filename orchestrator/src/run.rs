@@ -127,6 +127,13 @@ pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Fail
     // Requested after the drawing threads have started, because later threads would inherit the
     // scheduling.
     let scheduling = Scheduling::request(options.real_time.and_then(|settings| settings.priority));
+    let isolated = system.isolated();
+    if matches!(scheduling.priority, Priority::Fifo { .. }) && !isolated.is_empty() {
+        tracing::warn!(
+            "--priority: the usual priority is kept by the processes of {}; --isolate=false has no such processes",
+            isolated.join(", ")
+        );
+    }
 
     let begin = Instant::now();
     let mut observers: Vec<&mut dyn Observer> = vec![&mut curves, &mut progress];

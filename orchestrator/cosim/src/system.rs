@@ -83,6 +83,15 @@ impl System {
         Some(ticks as f64 * self.clock.step())
     }
 
+    /// Returns the names of the components whose units have processes of their own.
+    pub fn isolated(&self) -> Vec<&str> {
+        let all = self.order.iter().zip(&self.fmus);
+        let own = all.filter(|(name, fmu)| {
+            self.experiment.isolation.isolates(&self.experiment.components[*name], fmu)
+        });
+        own.map(|(name, _)| name.as_str()).collect()
+    }
+
     /// Returns the full names of the recorded variables.
     pub fn recorded(&self) -> Vec<String> {
         self.columns.iter().map(|column| column.name.clone()).collect()

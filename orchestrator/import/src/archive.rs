@@ -159,6 +159,8 @@ mod tests {
         let entries: Vec<(&str, &[u8])> =
             many.iter().map(|name| (name.as_str(), &b""[..])).collect();
         assert!(refusal(&archive(&entries)).contains("11 entries"));
+        let file = archive(&entries[..10]);
+        assert!(unpack_limited(file.path(), 1000, 10).is_ok());
     }
 
     #[test]
