@@ -50,3 +50,51 @@ pub(super) fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
     };
     (kept.key == key && kept.members == part.range).then_some(kept.outcome)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::Metrics;
+    use crate::study::part::Member;
+    use cosim::system::Parameters;
+    use std::collections::BTreeMap;
+    use tracing::subscriber::{NoSubscriber, with_default};
+
+    #[test]
+    fn no_changed_bit_goes_unseen() {
+        let measures = [("settling", None), ("largest", Some(0.1)), ("mean", Some(-2.5e-7))];
+        let member = Member {
+            value: Some(3),
+            metrics: Metrics::default(),
+            within: BTreeMap::new(),
+            measures: measures.map(|(id, value)| (id.to_string(), value)).into(),
+        };
+        let gain = BTreeMap::from([("gain".to_string(), 2.5.into())]);
+        let outcome = Outcome {
+            members: vec![member],
+            parameters: Parameters::from([("controller".to_string(), gain)]),
+            ..Outcome::default()
+        };
+        let part = Part { run: 0, range: 0..1 };
+        let kept_now = Kept::new("key".into(), part.range.clone(), outcome.clone()).unwrap();
+        let sound = serde_json::to_vec(&kept_now).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("part.json");
+        let read = |bytes: &[u8]| {
+            fs::write(&path, bytes).unwrap();
+            with_default(NoSubscriber::default(), || kept(&path, "key", &part))
+        };
+        assert_eq!(read(&sound), Some(outcome.clone()));
+        let mut seen = 0;
+        for bit in 0..8 * sound.len() {
+            let mut broken = sound.clone();
+            broken[bit / 8] ^= 1 << (bit % 8);
+            match read(&broken) {
+                None => seen += 1,
+                found => assert_eq!(found.as_ref(), Some(&outcome), "bit {bit}"),
+            }
+        }
+        // The others change how a number is written, or a space.
+        assert!(seen > 78 * sound.len() / 10, "{seen} of {}", 8 * sound.len());
+    }
+}
