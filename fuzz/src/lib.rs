@@ -2,9 +2,12 @@
 //! A target returns whatever comes; a panic, a crash, a hang or memory without bound is a fault.
 #![allow(clippy::missing_panics_doc, reason = "a target fails by panicking")]
 
-mod units;
+mod bytes;
+mod calls;
+mod state;
 
-pub use units::{calls, state};
+pub use calls::calls;
+pub use state::state;
 
 use campaign::definition::Campaign;
 use cosim::experiment::{Experiment, Overrides};

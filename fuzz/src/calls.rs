@@ -1,84 +1,19 @@
-//! The C interface of the units: calls in any order, and saved states that were changed.
+//! Calls of the C interface in any order, held against a model of the standard's states.
 
 #![allow(clippy::borrow_as_ptr, reason = "calls read better as in C")]
 
-use conformance::interface::{
-    CO_SIMULATION, DISCARD, ERROR, EventInfo, FmuState, MODEL_EXCHANGE, OK, Status,
-};
+use crate::bytes::{Bytes, unit};
+use conformance::interface::{DISCARD, ERROR, EventInfo, FmuState, MODEL_EXCHANGE, OK, Status};
 use conformance::table::{Row, State, TABLE, settable};
-use conformance::{Instance, Unit, c, units};
+use conformance::{Instance, c};
 use model_description::variable::Kind;
 use std::ffi::{CStr, CString, c_int};
 use std::ptr::{null, null_mut};
-use std::sync::LazyLock;
 
 /// Largest number of calls of one input, so that no input takes long.
 const CALLS: usize = 200;
 /// Largest number of saved states that are kept at the same time.
 const SAVED: usize = 8;
-
-thread_local! {
-    // The handles of a library are of one thread here: units are made and freed in it.
-    static UNITS: LazyLock<Vec<Unit>> = LazyLock::new(units);
-}
-
-/// Returns one of the units.
-fn unit(bytes: &mut Bytes) -> Unit {
-    UNITS.with(|units| units[bytes.below(units.len())].clone())
-}
-
-/// Random bytes that are taken one after the other; after the last one come zeros.
-struct Bytes<'a>(&'a [u8]);
-
-impl Bytes<'_> {
-    fn byte(&mut self) -> u8 {
-        let Some((first, rest)) = self.0.split_first() else { return 0 };
-        self.0 = rest;
-        *first
-    }
-
-    fn below(&mut self, number: usize) -> usize {
-        usize::from(u16::from_le_bytes([self.byte(), self.byte()])) % number.max(1)
-    }
-
-    fn is(&mut self, one_in: u8) -> bool {
-        self.byte().is_multiple_of(one_in)
-    }
-
-    fn bits(&mut self) -> u64 {
-        u64::from_le_bytes(std::array::from_fn(|_| self.byte()))
-    }
-
-    /// A number: mostly one that a user might take.
-    fn real(&mut self) -> f64 {
-        const EDGES: [f64; 8] =
-            [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN, 5e-324, -0.0, 1e17];
-        match self.byte() {
-            0..=127 => f64::from(self.byte().cast_signed()) / 16.0,
-            128..=191 => f64::from(self.byte().cast_signed()) * 1e-4,
-            192..=223 => EDGES[self.below(EDGES.len())],
-            _ => f64::from_bits(self.bits()),
-        }
-    }
-
-    fn whole(&mut self) -> c_int {
-        if self.is(8) { self.bits() as c_int } else { c_int::from(self.byte().cast_signed()) / 8 }
-    }
-
-    /// References: mostly of variables that are there, and of that type.
-    fn references(&mut self, unit: &Unit, of: fn(&Kind) -> bool) -> Vec<u32> {
-        let known = unit.references(|variable| of(&variable.kind));
-        let all = unit.description.variables.len();
-        (0..self.byte() % 6)
-            .map(|_| match self.byte() {
-                0..=3 => self.bits() as u32,
-                4..=15 => self.below(all) as u32,
-                _ if known.is_empty() => 0,
-                _ => known[self.below(known.len())],
-            })
-            .collect()
-    }
-}
 
 /// What the standard says of an instance: the state that it is in and the states that it saved.
 struct Model {
@@ -412,68 +347,4 @@ fn is_whole(kind: &Kind) -> bool {
 /// Whether an error of a function leaves the instance in its state.
 fn keeps_state(name: &str) -> bool {
     name.contains("FMUstate") || name == "fmi2SetDebugLogging"
-}
-
-/// Bytes of a saved state before its content, the last of which are its length and checksum.
-const HEADER: usize = 61;
-
-/// Gives a unit a saved state that was changed, with a checksum that fits. The unit may refuse it,
-/// or must go on with it like any other.
-pub fn state(data: &[u8]) {
-    let mut bytes = Bytes(data);
-    let unit = unit(&mut bytes);
-    let instance = unit.instance(CO_SIMULATION).initialized();
-    let step = unit.description.default_experiment.step;
-    for tick in 0..bytes.byte() % 4 {
-        instance.ok(instance.step(f64::from(tick) * step, step));
-    }
-    let (header, content) = {
-        let mut saved = instance.serialize();
-        let content = saved.split_off(HEADER);
-        (saved, content)
-    };
-    let mut content = content;
-    while !bytes.0.is_empty() {
-        let place = bytes.below(content.len());
-        match bytes.byte() % 8 {
-            0 => drop(content.remove(place)),
-            1 => content.insert(place, bytes.byte()),
-            2 => content.truncate(place.max(1)),
-            3 => {
-                let value = bytes.real().to_le_bytes();
-                content.splice(place..(place + 8).min(content.len()), value);
-            }
-            _ => content[place] = bytes.byte(),
-        }
-        if content.is_empty() {
-            return;
-        }
-    }
-    let length = (content.len() as u64).to_le_bytes();
-    let checksum = crc32fast::hash(&content).to_le_bytes();
-    let whole = [&header[..HEADER - 12], &length, &checksum, &content].concat();
-    let (status, handle) = instance.deserialize(&whole);
-    instance.ok(status);
-    let component = instance.component;
-    let restored = c!(instance, fmi2SetFMUstate(component, handle));
-    assert!([OK, ERROR].contains(&restored), "{}: {restored}", unit.name());
-    if restored == ERROR {
-        // The instance is as it was.
-        let wrong = instance.wrong_value();
-        assert!(wrong.is_none(), "{}: {wrong:?}", unit.name());
-        return;
-    }
-    let mut time = 0.0;
-    if c!(instance, fmi2GetRealStatus(component, 2, &mut time)) != OK {
-        return;
-    }
-    for tick in 0..3 {
-        let status = instance.step(time + f64::from(tick) * step, step);
-        assert!([OK, ERROR, DISCARD].contains(&status), "{}: {status}", unit.name());
-        if status != OK {
-            return;
-        }
-        let wrong = instance.wrong_value();
-        assert!(wrong.is_none(), "{}: {wrong:?}", unit.name());
-    }
 }
