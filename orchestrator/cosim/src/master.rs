@@ -225,15 +225,19 @@ impl Master {
         Ok(&self.probe.values)
     }
 
-    /// Steps the units whose interval ends at this tick.
+    /// Steps the units whose interval ends at this tick: those in processes of their own at the
+    /// same time.
     fn step_to(&mut self, tick: u64) -> Result<(), Error> {
-        for index in 0..self.members.len() {
-            let member = &mut self.members[index];
-            let every = u64::from(member.every);
-            if tick.is_multiple_of(every) {
-                let from = self.clock.time(tick - every);
-                let outcome = member.unit.do_step(from, every as f64 * self.clock.step());
-                outcome.map_err(|failure| self.error(from, (index, failure)))?;
+        for call in [CoSimulationUnit::begin_step, CoSimulationUnit::do_step] {
+            for index in 0..self.members.len() {
+                let member = &mut self.members[index];
+                let every = u64::from(member.every);
+                if tick.is_multiple_of(every) {
+                    let from = self.clock.time(tick - every);
+                    let outcome =
+                        call(member.unit.as_mut(), from, every as f64 * self.clock.step());
+                    outcome.map_err(|failure| self.error(from, (index, failure)))?;
+                }
             }
         }
         Ok(())

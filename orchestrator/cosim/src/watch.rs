@@ -156,6 +156,10 @@ impl CoSimulationUnit for Watched {
         self.unit.exit_initialization()
     }
 
+    fn begin_step(&mut self, time: f64, step: f64) -> Outcome {
+        self.unit.begin_step(time, step)
+    }
+
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
         self.unit.do_step(time, step)
     }

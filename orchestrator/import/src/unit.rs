@@ -74,6 +74,14 @@ pub trait CoSimulationUnit {
     /// # Errors
     /// Returns an error if the unit reports a failure.
     fn exit_initialization(&mut self) -> Outcome;
+    /// Lets the unit begin a step, which [`Self::do_step`] with the same arguments, as the next
+    /// call, completes. A unit in a process of its own computes meanwhile; others do nothing yet.
+    ///
+    /// # Errors
+    /// Returns an error if the unit cannot be reached.
+    fn begin_step(&mut self, _time: f64, _step: f64) -> Outcome {
+        Ok(())
+    }
     /// Steps the unit from the communication point `time` by `step`, both in s.
     ///
     /// # Errors

@@ -256,6 +256,24 @@ fn a_sandbox_keeps_a_unit_from_files_and_network() {
 }
 
 #[test]
+fn a_campaign_is_the_same_with_units_in_processes_of_their_own() {
+    let bench = Bench::new();
+    // The first unit of the order fails while the other one is stepped.
+    let campaign = CAMPAIGN.replace("plant.fail.time", "gain.fail.time");
+    fs::write(bench.path("c.toml"), campaign).unwrap();
+    let table = |isolate| {
+        let arguments = ["campaign", "c.toml", "--csv", "--fresh", isolate];
+        let (code, _, errors) = bench.call(&arguments);
+        assert_eq!(code, 0, "{errors}");
+        fs::read_to_string(bench.path("out/c/cases.csv")).unwrap()
+    };
+    let own = table("--isolate");
+    assert_eq!(own, table("--isolate=false"));
+    assert_eq!(own.matches(",failed,").count(), 3, "{own}");
+    assert_eq!(own.matches(",completed,").count(), 3, "{own}");
+}
+
+#[test]
 fn a_campaign_goes_on_after_a_unit_that_does_harm() {
     let bench =
         Bench::made(LOOP, &Recipe { flags: &["-DHARM_BY_GAIN", "-w"], ..Recipe::default() });

@@ -46,6 +46,8 @@ pub(super) struct Process {
     log: Log,
     printed: Arc<Printed>,
     timeout: Duration,
+    /// Call whose answer was not waited for yet.
+    pending: Option<&'static str>,
     /// Why the process can no longer be asked.
     gone: Option<String>,
 }
@@ -97,13 +99,15 @@ impl Process {
             log: Log::new(name),
             printed,
             timeout: isolation.call_timeout,
+            pending: None,
             gone: None,
         })
     }
 
     /// Lets the process load its library and make an instance.
     pub(super) fn set_up(&mut self, setup: &Setup) -> Result<Ready, UnitFailure> {
-        let mut ready = self.ask_for("instantiate", setup)?;
+        self.put("instantiate", setup)?;
+        let mut ready = self.answer("instantiate")?;
         // Both have opened it. Systems that keep a file which is in use remove it later.
         if cfg!(unix) {
             self.memory = None;
@@ -125,7 +129,29 @@ impl Process {
         call: &'static str,
         request: &Request,
     ) -> Result<Reply, UnitFailure> {
-        let mut reply: Reply = self.ask_for(call, request)?;
+        self.send(call, request)?;
+        self.reply(call)
+    }
+
+    /// Asks without waiting for the answer, which [`Self::reply`] returns.
+    pub(super) fn send(
+        &mut self,
+        call: &'static str,
+        request: &Request,
+    ) -> Result<(), UnitFailure> {
+        // Whoever failed to fetch the last answer no longer wants it.
+        if let Some(last) = self.pending.take() {
+            self.reply(last)?;
+        }
+        self.put(call, request)?;
+        self.pending = Some(call);
+        Ok(())
+    }
+
+    /// Waits for the answer to what was sent.
+    pub(super) fn reply(&mut self, call: &'static str) -> Result<Reply, UnitFailure> {
+        self.pending = None;
+        let mut reply: Reply = self.answer(call)?;
         self.repeat(std::mem::take(&mut reply.said));
         Ok(reply)
     }
@@ -136,11 +162,7 @@ impl Process {
         }
     }
 
-    fn ask_for<T: DeserializeOwned>(
-        &mut self,
-        call: &'static str,
-        message: &impl Serialize,
-    ) -> Result<T, UnitFailure> {
+    fn put(&mut self, call: &'static str, message: &impl Serialize) -> Result<(), UnitFailure> {
         if let Some(reason) = &self.gone {
             return Err(UnitFailure::new(call, reason.clone()));
         }
@@ -152,6 +174,10 @@ impl Process {
         }
         self.number = self.number.wrapping_add(1);
         self.channel.put(Slot::Request, self.number, &self.bytes);
+        Ok(())
+    }
+
+    fn answer<T: DeserializeOwned>(&mut self, call: &'static str) -> Result<T, UnitFailure> {
         let (child, timeout) = (&mut self.child, self.timeout);
         let waited = self.channel.wait(Slot::Reply, self.number, |waited| match child.try_wait() {
             Ok(Some(status)) => Err(Silence::Ended(status)),
@@ -226,6 +252,12 @@ impl Process {
     /// Frees the unit and ends the process.
     fn free(&mut self) -> Result<(), UnitFailure> {
         self.timeout = self.timeout.min(FAREWELL);
+        // The run ended, by the failure of another unit, before it wanted this answer.
+        if let Some(last) = self.pending.take()
+            && self.reply(last).is_err()
+        {
+            return Ok(());
+        }
         let call = Action::Free.call();
         self.ask(call, &Request { action: Action::Free, ..Request::default() })?;
         let begin = Instant::now();

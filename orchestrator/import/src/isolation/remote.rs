@@ -30,6 +30,8 @@ pub(crate) struct RemoteUnit {
     unread: Vec<(usize, UnitFailure)>,
     /// Whether the values of the last answer are those of the lists and still those of the unit.
     is_fresh: bool,
+    /// Step whose answer was not waited for yet.
+    begun: Option<Action>,
 }
 
 impl RemoteUnit {
@@ -42,28 +44,41 @@ impl RemoteUnit {
             size: 0,
             unread: Vec::new(),
             is_fresh: false,
+            begun: None,
         }
     }
 
     fn ask(&mut self, action: Action, reads: Vec<List>, once: Vec<List>) -> Outcome {
+        let sizes = |lists: &[List]| lists.iter().map(List::size).sum::<usize>();
+        let once_size = (!once.is_empty()).then(|| sizes(&once));
+        self.send(action, reads, once)?;
+        self.receive(action, once_size)
+    }
+
+    /// Sends calls, and lists to be read from now on or once.
+    fn send(&mut self, action: Action, reads: Vec<List>, once: Vec<List>) -> Outcome {
         let sets = std::mem::take(&mut self.sets);
         self.waiting = 0;
         self.is_fresh = false;
+        self.begun = None;
         if !action.reads() {
             self.lists.clear();
             self.size = 0;
         }
         self.size += reads.iter().map(List::size).sum::<usize>();
         self.lists.extend(reads.iter().cloned());
-        let wanted = if once.is_empty() { self.size } else { once.iter().map(List::size).sum() };
-        let is_once = !once.is_empty();
-        let reply = self.process.ask(action.call(), &Request { sets, action, reads, once })?;
+        self.process.send(action.call(), &Request { sets, action, reads, once })
+    }
+
+    /// Receives the answer to what was sent; `once` is the size of lists that were read once.
+    fn receive(&mut self, action: Action, once: Option<usize>) -> Outcome {
+        let reply = self.process.reply(action.call())?;
         reply.failure.map_or(Ok(()), Err)?;
         self.unread = reply.unread;
-        if action.reads() && self.process.values().len() != wanted {
+        if action.reads() && self.process.values().len() != once.unwrap_or(self.size) {
             return Err(self.process.nonsense(action.call()));
         }
-        self.is_fresh = action.reads() && !is_once;
+        self.is_fresh = action.reads() && once.is_none();
         Ok(())
     }
 
@@ -174,8 +189,19 @@ impl CoSimulationUnit for RemoteUnit {
         self.act(Action::ExitInitialization)
     }
 
+    fn begin_step(&mut self, time: f64, step: f64) -> Outcome {
+        let action = Action::DoStep { time, step };
+        self.send(action, Vec::new(), Vec::new())?;
+        self.begun = Some(action);
+        Ok(())
+    }
+
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
-        self.act(Action::DoStep { time, step })
+        let action = Action::DoStep { time, step };
+        match self.begun.take() {
+            Some(begun) if begun == action => self.receive(action, None),
+            _ => self.act(action),
+        }
     }
 
     fn terminate(&mut self) -> Outcome {
