@@ -53,6 +53,8 @@ pub struct Master {
     clock: Clock,
     coupling: Coupling,
     members: Vec<Member>,
+    /// Whether there are units whose steps are begun ahead.
+    has_ahead: bool,
     inputs: Vec<Inputs>,
     probe: Probe,
     /// Accumulated computing time of each unit; empty unless it is measured.
@@ -72,8 +74,17 @@ impl Master {
         probes: &[Port],
     ) -> Self {
         let inputs = (0..members.len()).map(|target| Inputs::new(wires, target)).collect();
-        let (probe, interrupt) = (Probe::new(probes), Interrupt::default());
-        Self { clock, coupling, members, inputs, probe, spent: Vec::new(), pacer: None, interrupt }
+        Self {
+            clock,
+            coupling,
+            has_ahead: members.iter().any(|member| member.ahead),
+            members,
+            inputs,
+            probe: Probe::new(probes),
+            spent: Vec::new(),
+            pacer: None,
+            interrupt: Interrupt::default(),
+        }
     }
 
     /// Sets the interrupt through which the run can be ended from outside. It must be set before
@@ -104,11 +115,13 @@ impl Master {
     }
 
     fn measure(&mut self, timer: &Rc<dyn Timer>) {
+        self.has_ahead = false;
         let members = std::mem::take(&mut self.members).into_iter();
         (self.members, self.spent) = members
-            .map(|Member { name, every, unit }| {
+            .map(|Member { name, every, unit, .. }| {
                 let (unit, spent) = Stopwatch::new(unit, Rc::clone(timer));
-                (Member { name, every, unit: Box::new(unit) }, spent)
+                // What two units compute at the same time could not be told apart.
+                (Member { name, every, ahead: false, unit: Box::new(unit) }, spent)
             })
             .unzip();
     }
@@ -228,16 +241,26 @@ impl Master {
     /// Steps the units whose interval ends at this tick: those in processes of their own at the
     /// same time.
     fn step_to(&mut self, tick: u64) -> Result<(), Error> {
-        for call in [CoSimulationUnit::begin_step, CoSimulationUnit::do_step] {
-            for index in 0..self.members.len() {
-                let member = &mut self.members[index];
-                let every = u64::from(member.every);
-                if tick.is_multiple_of(every) {
-                    let from = self.clock.time(tick - every);
-                    let outcome =
-                        call(member.unit.as_mut(), from, every as f64 * self.clock.step());
-                    outcome.map_err(|failure| self.error(from, (index, failure)))?;
-                }
+        if self.has_ahead {
+            self.each_due(tick, |member| member.ahead, CoSimulationUnit::begin_step)?;
+        }
+        self.each_due(tick, |_| true, CoSimulationUnit::do_step)
+    }
+
+    /// Calls those units whose interval ends at this tick with its begin and length.
+    fn each_due(
+        &mut self,
+        tick: u64,
+        wanted: impl Fn(&Member) -> bool,
+        call: impl Fn(&mut (dyn CoSimulationUnit + 'static), f64, f64) -> Outcome,
+    ) -> Result<(), Error> {
+        for index in 0..self.members.len() {
+            let member = &mut self.members[index];
+            let every = u64::from(member.every);
+            if tick.is_multiple_of(every) && wanted(member) {
+                let from = self.clock.time(tick - every);
+                let outcome = call(member.unit.as_mut(), from, every as f64 * self.clock.step());
+                outcome.map_err(|failure| self.error(from, (index, failure)))?;
             }
         }
         Ok(())

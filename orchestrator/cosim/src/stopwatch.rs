@@ -61,7 +61,6 @@ impl Stopwatch {
     }
 }
 
-/// A step is not begun ahead here: what two units compute at the same time could not be told apart.
 impl CoSimulationUnit for Stopwatch {
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
         self.time(|unit| unit.get_real(references, values))

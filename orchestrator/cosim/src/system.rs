@@ -85,11 +85,13 @@ impl System {
 
     /// Returns the names of the components whose units have processes of their own.
     pub fn isolated(&self) -> Vec<&str> {
-        let all = self.order.iter().zip(&self.fmus);
-        let own = all.filter(|(name, fmu)| {
-            self.experiment.isolation.isolates(&self.experiment.components[*name], fmu)
-        });
-        own.map(|(name, _)| name.as_str()).collect()
+        let all = self.order.iter().enumerate();
+        all.filter(|(index, _)| self.isolates(*index)).map(|(_, name)| name.as_str()).collect()
+    }
+
+    fn isolates(&self, index: usize) -> bool {
+        let component = &self.experiment.components[&self.order[index]];
+        self.experiment.isolation.isolates(component, &self.fmus[index])
     }
 
     /// Returns the full names of the recorded variables.
@@ -253,9 +255,8 @@ impl System {
         let mut members = Vec::new();
         for (index, name) in self.order.iter().enumerate() {
             let fmu = &self.fmus[index];
-            let protection = &self.experiment.isolation;
-            let isolates = protection.isolates(&self.experiment.components[name], fmu);
-            let limits = isolates.then(|| protection.limits());
+            let isolates = self.isolates(index);
+            let limits = isolates.then(|| self.experiment.isolation.limits());
             let unit = fmu.instantiate(name, limits.as_ref())?;
             let on_invalid = self.experiment.simulation.on_invalid;
             let mut unit = Watched::around(unit, name, fmu, on_invalid);
@@ -264,7 +265,8 @@ impl System {
                 time: self.clock.start(),
                 failure,
             })?;
-            members.push(Member { name: name.clone(), every: every[index], unit });
+            let (name, every) = (name.clone(), every[index]);
+            members.push(Member { name, every, ahead: isolates, unit });
         }
         let coupling = self.experiment.simulation.coupling;
         let mut master = Master::new(self.clock, coupling, members, &self.wires, &self.probes);

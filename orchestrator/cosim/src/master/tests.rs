@@ -120,7 +120,7 @@ fn run(
             let state = if direct { 0.0 } else { 1.0 };
             let mock =
                 Mock { name, direct, input: 0.0, state, fails_after, journal: Rc::clone(&journal) };
-            Member { name: name.into(), every, unit: Box::new(mock) }
+            Member { name: name.into(), every, ahead: false, unit: Box::new(mock) }
         })
         .collect();
     let gain = order.iter().position(|name| *name == "gain").unwrap();

@@ -13,6 +13,9 @@ pub struct Member {
     pub name: String,
     /// Period of the unit: it steps at every n-th tick.
     pub every: u32,
+    /// Whether its steps are begun before any other is waited for, because it has a process of its
+    /// own.
+    pub ahead: bool,
     /// The unit itself, instantiated and with its parameters set.
     pub unit: Box<dyn CoSimulationUnit>,
 }
