@@ -19,6 +19,7 @@ pub fn state(data: &[u8]) {
     }
     let mut header = instance.serialize();
     let mut content = header.split_off(HEADER);
+    let saved = content.clone();
     while !bytes.0.is_empty() {
         let place = bytes.below(content.len());
         match bytes.byte() % 8 {
@@ -43,6 +44,7 @@ pub fn state(data: &[u8]) {
     let component = instance.component;
     let restored = c!(instance, fmi2SetFMUstate(component, handle));
     assert!([OK, ERROR].contains(&restored), "{}: {restored}", unit.name());
+    assert!(restored == OK || content != saved, "{}: its own state is refused", unit.name());
     if restored == ERROR {
         // The instance is as it was.
         let wrong = instance.wrong_value();
