@@ -94,7 +94,7 @@ class PlatformHook(BuildHookInterface):  # type: ignore[type-arg]
         files[program] = "orchestrator" + program.suffix
         for folder in ("experiments", "schema"):
             for path in sorted((root / folder).rglob("*")):
-                if path.suffix in (".toml", ".json"):
+                if path.suffix in (".toml", ".csv", ".json"):
                     files[path] = path.relative_to(root).as_posix()
         # A release adds the licences of what is linked in.
         for notice in filter(None, os.environ.get("WHEEL_NOTICES", "").split(os.pathsep)):

@@ -166,9 +166,10 @@ def write_programs(dist: Path, output: Path, version: str, epoch: int) -> None:
     shown = []
     source = ROOT / "orchestrator"
     # Editors find the schema by the first line of each experiment.
-    for folder, suffix in (("experiments", ".toml"), ("schema", ".json")):
-        for path in (source / folder).rglob(f"*{suffix}"):
-            shown.append((path.relative_to(source).as_posix(), path.read_bytes(), 0o644))
+    for folder in ("experiments", "schema"):
+        for path in (source / folder).rglob("*"):
+            if path.suffix in (".toml", ".csv", ".json"):
+                shown.append((path.relative_to(source).as_posix(), path.read_bytes(), 0o644))
     for platform, systems in PLATFORMS.items():
         binary = program(dist, platform)
         name = binary.stem if binary.suffix else f"./{binary.name}"

@@ -158,7 +158,8 @@ def test_archives_hold_units_licences_and_experiments(content, dist):
         shown = {path for path in content if path.startswith("experiments/")}
         assert shown == {
             f"experiments/{path.relative_to(experiments).as_posix()}"
-            for path in experiments.rglob("*.toml")
+            for path in experiments.rglob("*")
+            if path.suffix in (".toml", ".csv")
         }
         assert "schema/experiment.json" in content
     for place, path in places.items():

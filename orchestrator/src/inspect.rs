@@ -49,7 +49,11 @@ pub(crate) fn check(path: &Path, out: &mut impl Write) -> Result<(), Failure> {
 
 fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     let d = &fmu.description;
-    writeln!(out, "{} (FMI {})", d.model_name, d.fmi_version)?;
+    if fmu.is_table() {
+        writeln!(out, "{}", d.model_name)?;
+    } else {
+        writeln!(out, "{} (FMI {})", d.model_name, d.fmi_version)?;
+    }
     let mut line = |label: &str, text: &str| {
         if text.is_empty() { Ok(()) } else { writeln!(out, "  {label:<16} {text}") }
     };

@@ -12,6 +12,7 @@ use crate::wiring::{self, Part};
 use fmu_import::faults;
 use fmu_import::fmu::Fmu;
 use fmu_import::names;
+use fmu_import::table::is_table;
 use fmu_import::warnings;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -231,7 +232,10 @@ fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result
         .iter()
         .flat_map(|folder| fs::read_dir(folder).into_iter().flatten().flatten())
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .filter(|file| Path::new(file).extension().is_some_and(|extension| extension == "fmu"))
+        .filter(|file| {
+            let path = Path::new(file);
+            path.extension().is_some_and(|extension| extension == "fmu") || is_table(path)
+        })
         .collect();
     let hint = names::hint(written.get_ref(), there.iter().map(String::as_str));
     let searched: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();

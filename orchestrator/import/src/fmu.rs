@@ -1,4 +1,5 @@
 //! Opens `.fmu` archives, checks their libraries, and instantiates co-simulation units from them.
+//! Tables are opened like archives.
 
 use crate::archive;
 use crate::description::ModelDescription;
@@ -8,6 +9,7 @@ use crate::folder::TemporaryFolder;
 use crate::instance::{FmuUnit, Functions};
 use crate::isolation::{self, Isolation, Library, Loaded};
 use crate::log::Log;
+use crate::table::{self, Table, TableUnit};
 use crate::unit::CoSimulationUnit;
 use crate::warnings;
 use crate::xml;
@@ -19,24 +21,42 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use url::Url;
 
-/// An unpacked archive, of which several units can be instantiated.
+/// An unpacked archive or a table, of which several units can be instantiated.
 pub struct Fmu {
-    /// Path of the archive.
+    /// Path of the archive or table.
     pub path: PathBuf,
-    /// The model description in the archive.
+    /// The model description in the archive, or that of the table.
     pub description: ModelDescription,
+    content: Content,
+}
+
+enum Content {
+    Archive(Archive),
+    Table(Table),
+}
+
+/// An unpacked archive.
+struct Archive {
     folder: Rc<TemporaryFolder>,
     /// Whether the library for this platform has been checked.
     is_sound: Cell<bool>,
 }
 
 impl Fmu {
-    /// Unpacks an archive and reads its description.
+    /// Unpacks an archive and reads its description, or reads a table if the file is a `.csv`.
     ///
     /// # Errors
-    /// Returns an error if the archive is unsafe or damaged, or is not an FMI 2.0 FMU.
+    /// Returns an error if the archive is unsafe or damaged, or is not an FMI 2.0 FMU, or if the
+    /// table has a fault.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
+        if table::is_table(path) {
+            let table = Table::open(path).map_err(refuse)?;
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            let description = table.description(&name).map_err(refuse)?;
+            let content = Content::Table(table);
+            return Ok(Self { path: path.to_path_buf(), description, content });
+        }
         let folder = archive::unpack(path)?;
         let bytes =
             std::fs::read(folder.path().join("modelDescription.xml")).map_err(|source| {
@@ -45,31 +65,36 @@ impl Fmu {
         let description = xml::decode(&bytes)
             .and_then(|text| ModelDescription::parse(&text))
             .map_err(|reason| refuse(format!("modelDescription.xml: {reason}")))?;
-        Ok(Self {
-            path: path.to_path_buf(),
-            description,
-            folder: Rc::new(folder),
-            is_sound: Cell::new(false),
-        })
+        let archive = Archive { folder: Rc::new(folder), is_sound: Cell::new(false) };
+        Ok(Self { path: path.to_path_buf(), description, content: Content::Archive(archive) })
     }
 
     /// Returns the platforms for which the archive has binaries, by FMI's names.
     pub fn platforms(&self) -> Vec<String> {
-        let binaries = self.folder.path().join("binaries");
-        names_in(&binaries).into_iter().filter(|name| binaries.join(name).is_dir()).collect()
+        match &self.content {
+            Content::Archive(archive) => archive.platforms(),
+            Content::Table(_) => Vec::new(),
+        }
     }
 
     /// Lists the faults of the archive that do not keep it from being opened: one line for each
     /// fault of the description and of the library for this platform.
     pub fn faults(&self) -> Vec<String> {
         let mut faults = faults::faults(&self.description);
-        if self.description.co_simulation.is_some() {
-            match self.version_fault() {
+        if let (Content::Archive(archive), Some(_)) =
+            (&self.content, &self.description.co_simulation)
+        {
+            match self.version_fault(archive) {
                 Ok(fault) => faults.extend(fault),
                 Err(fault) => faults.push(fault),
             }
         }
         faults
+    }
+
+    /// Returns whether the file is a table, which runs no code of its own.
+    pub fn is_table(&self) -> bool {
+        matches!(self.content, Content::Table(_))
     }
 
     /// Returns whether this project's packer made the unit, so that it is trusted to do no harm to
@@ -82,9 +107,9 @@ impl Fmu {
     ///
     /// # Errors
     /// Returns a line that says what is missing or wrong.
-    fn library(&self) -> Result<(PathBuf, String), String> {
+    fn library(&self, archive: &Archive) -> Result<(PathBuf, String), String> {
         let interface = self.description.co_simulation.as_ref().ok_or("offers no co-simulation")?;
-        let platforms = self.platforms();
+        let platforms = archive.platforms();
         if !platforms.iter().any(|platform| platform == PLATFORM) {
             let offered = if platforms.is_empty() { "none".into() } else { platforms.join(", ") };
             return Err(format!("has no binary for {PLATFORM}, only for: {offered}"));
@@ -98,7 +123,7 @@ impl Fmu {
                 identifier.escape_default()
             ));
         }
-        let folder = self.folder.path().join("binaries").join(PLATFORM);
+        let folder = archive.folder.path().join("binaries").join(PLATFORM);
         let name = format!("{identifier}{SHARED_LIBRARY_EXTENSION}");
         let (file, entry) = (folder.join(&name), format!("binaries/{PLATFORM}/{name}"));
         if !file.is_file() {
@@ -108,25 +133,15 @@ impl Fmu {
                 "has no {entry}, which its model identifier asks for; there is: {there}"
             ));
         }
-        if !self.is_sound.get() {
+        if !archive.is_sound.get() {
             check_library(&file).map_err(|reason| format!("{entry} {reason}"))?;
-            self.is_sound.set(true);
+            archive.is_sound.set(true);
         }
         Ok((file, entry))
     }
 
-    /// Tells why the system could not load a library.
-    fn not_loaded(&self, entry: &str, reason: &str) -> String {
-        let text = reason.trim_start_matches("dlopen failed: ");
-        if let Some((missing, _)) = text.split_once(": cannot open shared object file") {
-            return format!("{entry} needs {missing}, which is not on this system");
-        }
-        // The path of the temporary folder is removed, because it means nothing to a reader.
-        format!("{entry}: {}", text.replace(&format!("{}/", self.folder.path().display()), ""))
-    }
-
     /// Loads the library and instantiates a co-simulation unit called `name`: in this process, or
-    /// in one of its own if `isolation` is given.
+    /// in one of its own if `isolation` is given. A table is always in this process.
     ///
     /// # Errors
     /// Returns an error if the FMU has no binary for this platform or offers no co-simulation, if
@@ -137,22 +152,28 @@ impl Fmu {
         isolation: Option<&Isolation>,
     ) -> Result<Box<dyn CoSimulationUnit>, Error> {
         let refuse = |message: String| Error::Fmu { path: self.path.clone(), message };
-        let (file, entry) = self.library().map_err(refuse)?;
-        let resources = Url::from_directory_path(self.folder.path().join("resources"))
+        let archive = match &self.content {
+            Content::Archive(archive) => archive,
+            Content::Table(table) => return Ok(Box::new(TableUnit::new(table.clone()))),
+        };
+        let (file, entry) = self.library(archive).map_err(refuse)?;
+        let resources = Url::from_directory_path(archive.folder.path().join("resources"))
             .map_err(|()| refuse("the temporary folder has no absolute path".into()))?;
         let guid = &self.description.guid;
         let (unit, fault) = if let Some(isolation) = isolation {
-            let library = Library { file, folder: self.folder.path(), isolation };
+            let library = Library { file, folder: archive.folder.path(), isolation };
             match library.instantiate(name, guid, resources.as_str()) {
                 Loaded::Whole(unit, fault) => (unit, fault),
-                Loaded::Unloadable(reason) => return Err(refuse(self.not_loaded(&entry, &reason))),
+                Loaded::Unloadable(reason) => {
+                    return Err(refuse(archive.not_loaded(&entry, &reason)));
+                }
                 Loaded::Refused(reason) => return Err(refuse(reason)),
             }
         } else {
             let functions = Functions::load(&file)
-                .map_err(|error| refuse(self.not_loaded(&entry, &with_causes(&error))))?;
+                .map_err(|error| refuse(archive.not_loaded(&entry, &with_causes(&error))))?;
             let fault = functions.version_fault();
-            let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&self.folder)));
+            let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&archive.folder)));
             let unit = FmuUnit::new(functions, log, guid, resources.as_str(), folder)
                 .map_err(|reason| refuse(format!("the component \"{name}\" {reason}")))?;
             (Box::new(unit) as Box<dyn CoSimulationUnit>, fault)
@@ -165,20 +186,38 @@ impl Fmu {
 
     /// Loads the library in a process of its own where that is possible, and returns what is wrong
     /// with the version of FMI that it names.
-    fn version_fault(&self) -> Result<Option<String>, String> {
-        let (file, entry) = self.library()?;
+    fn version_fault(&self, archive: &Archive) -> Result<Option<String>, String> {
+        let (file, entry) = self.library(archive)?;
         if !isolation::is_enabled() {
             let functions = Functions::load(&file)
-                .map_err(|error| self.not_loaded(&entry, &with_causes(&error)))?;
+                .map_err(|error| archive.not_loaded(&entry, &with_causes(&error)))?;
             return Ok(functions.version_fault());
         }
         let isolation = Isolation::default();
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        match (Library { file, folder: self.folder.path(), isolation: &isolation }).check(&name) {
+        match (Library { file, folder: archive.folder.path(), isolation: &isolation }).check(&name)
+        {
             Loaded::Whole((), fault) => Ok(fault),
-            Loaded::Unloadable(reason) => Err(self.not_loaded(&entry, &reason)),
+            Loaded::Unloadable(reason) => Err(archive.not_loaded(&entry, &reason)),
             Loaded::Refused(reason) => Err(format!("{entry}: {reason}")),
         }
+    }
+}
+
+impl Archive {
+    fn platforms(&self) -> Vec<String> {
+        let binaries = self.folder.path().join("binaries");
+        names_in(&binaries).into_iter().filter(|name| binaries.join(name).is_dir()).collect()
+    }
+
+    /// Tells why the system could not load a library.
+    fn not_loaded(&self, entry: &str, reason: &str) -> String {
+        let text = reason.trim_start_matches("dlopen failed: ");
+        if let Some((missing, _)) = text.split_once(": cannot open shared object file") {
+            return format!("{entry} needs {missing}, which is not on this system");
+        }
+        // The path of the temporary folder is removed, because it means nothing to a reader.
+        format!("{entry}: {}", text.replace(&format!("{}/", self.folder.path().display()), ""))
     }
 }
 

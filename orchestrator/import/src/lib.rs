@@ -1,6 +1,7 @@
 //! Imports FMI 2.0 units. An [`fmu::Fmu`] is unpacked ([`archive`]), its description is read
 //! ([`description`], [`xml`], [`quantity`]), and the description is searched for [`faults`]. Units
-//! that are instantiated from it are called through the trait [`unit::CoSimulationUnit`].
+//! that are instantiated from it are called through the trait [`unit::CoSimulationUnit`]. A
+//! [`table`] is a unit, too.
 
 pub mod archive;
 pub mod crash;
@@ -15,6 +16,7 @@ pub mod isolation;
 mod log;
 pub mod names;
 pub mod quantity;
+pub mod table;
 pub mod unit;
 pub mod warnings;
 pub mod xml;

@@ -81,7 +81,8 @@ pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Re
     Ok((unit.factor * in_unit + unit.offset - target.offset) / target.factor)
 }
 
-/// Returns the scaling that converts values in one unit to values in another.
+/// Returns the scaling that converts values in one unit to values in another. If what the first one
+/// measures is not stated, as in a table, its name is looked up among the units of the other side.
 ///
 /// # Errors
 /// Returns an error that says how the units differ, if they do not measure the same quantity.
@@ -93,9 +94,12 @@ pub fn conversion(
 ) -> Result<Scaling, String> {
     let unchanged = Ok(Scaling::default());
     let (Some(from), Some(to)) = (from, to) else {
-        // An FMU that defines no units at all cannot be held to them.
+        // An FMU that defines no units at all cannot be held to them, nor a column of a table that
+        // states none.
+        let defines_none = |units: &[UnitDefinition]| units.iter().all(|u| u.exponents.is_none());
         let known = [(from, from_units), (to, to_units)];
-        return if from == to || known.iter().any(|(unit, units)| unit.is_none() && units.is_empty())
+        return if from == to
+            || known.iter().any(|(unit, units)| unit.is_none() && defines_none(units))
         {
             unchanged
         } else {
@@ -118,6 +122,17 @@ pub fn conversion(
             }
         }
         _ if from == to => unchanged,
+        (Some(a), _) if a.exponents.is_none() => {
+            let of = |value: f64| convert(&format!("{value} {from}"), Some(to), to_units);
+            let is_known = to_units.iter().any(|unit| {
+                unit.name == from || unit.displays.iter().any(|(name, ..)| name == from)
+            });
+            match of(0.0).and_then(|zero| Ok((zero, of(1.0)?))) {
+                Ok((zero, one)) => Ok(Scaling { factor: one - zero, offset: zero }),
+                Err(_) if is_known => Err(format!("{from} against {to}")),
+                Err(problem) => Err(format!("{from} against {to}: {problem}")),
+            }
+        }
         _ => Err(format!("{from} against {to}")),
     }
 }
@@ -239,6 +254,30 @@ mod tests {
             Ok(Scaling::default())
         );
         assert_eq!(conversion(None, &[], Some("rad"), &units), Ok(Scaling::default()));
+    }
+
+    #[test]
+    fn oracle_a_unit_that_is_only_named_is_that_of_the_other_side() {
+        let unit = |name: &str| UnitDefinition {
+            name: name.into(),
+            exponents: None,
+            factor: 1.0,
+            offset: 0.0,
+            displays: Vec::new(),
+        };
+        let named = ["deg", "rad", "degC", "min", "knots"].map(unit);
+        let scaling = |from, to| conversion(from, &named, to, &units());
+        assert_eq!(scaling(Some("rad"), Some("rad")), Ok(Scaling::default()));
+        assert_eq!(scaling(None, Some("rad")), Ok(Scaling::default()));
+        let angle = scaling(Some("deg"), Some("rad")).unwrap();
+        assert!((angle.of(180.0) - std::f64::consts::PI).abs() < 1e-15);
+        let temperature = scaling(Some("degC"), Some("K")).unwrap();
+        assert!((temperature.of(20.0) - 293.15).abs() < 1e-9);
+        assert_eq!(scaling(Some("min"), Some("s")).unwrap().of(2.0), 120.0);
+        assert_eq!(scaling(Some("deg"), Some("K")), Err("deg against K".into()));
+        let unknown = scaling(Some("knots"), Some("K")).unwrap_err();
+        assert!(unknown.contains("defines no unit \"knots\""), "{unknown}");
+        assert!(scaling(Some("deg"), None).is_err());
     }
 
     #[test]

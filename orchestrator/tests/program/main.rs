@@ -7,6 +7,7 @@ mod isolation;
 mod malformed;
 mod results;
 mod search;
+mod table;
 mod timing;
 mod together;
 mod usage;

@@ -99,11 +99,11 @@ pub enum Coupling {
     Jacobi,
 }
 
-/// A component of the experiment: an FMU with its settings.
+/// A component of the experiment: an FMU or a table with its settings.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Component {
-    /// File name of the FMU.
+    /// File name of the FMU, or of a table (`.csv`) whose columns are outputs.
     #[schemars(with = "String")]
     pub fmu: Spanned<String>,
     /// Period of the component: it steps at every n-th communication point.

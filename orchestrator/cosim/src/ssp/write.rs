@@ -56,6 +56,10 @@ pub fn pack(
     interrupt: &Interrupt,
 ) -> Result<(), Error> {
     let goes_on = || interrupt.asked().map_or(Ok(()), |request| Err(Error::Ended(request)));
+    if let Some((name, _)) = system.order.iter().zip(&system.fmus).find(|(_, fmu)| fmu.is_table()) {
+        let message = format!("[components.{name}] is a table, which other tools cannot run");
+        return Err(system.experiment.source.error(&(0..0), message));
+    }
     let mut entries: BTreeMap<String, Vec<u8>> = BTreeMap::new();
     for fmu in &system.fmus {
         entries.insert(resource(&fmu.path), fs::read(&fmu.path).map_err(Error::file(&fmu.path))?);

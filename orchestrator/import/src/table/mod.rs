@@ -1,0 +1,161 @@
+//! A table as a unit: a CSV file whose columns over time are outputs. It needs no library, and is
+//! described, set, stepped and read as other units are.
+
+mod description;
+mod unit;
+
+use std::fs;
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+pub(crate) use unit::TableUnit;
+
+/// Returns whether a path is that of a table, by its extension.
+pub fn is_table(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
+}
+
+/// Largest number of bytes of a file.
+const LARGEST: u64 = 1 << 30;
+/// Largest number of times and values of a table in which they are parameters.
+const MOST_PARAMETERS: usize = 1000;
+
+/// The columns of a file over time.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Table {
+    columns: Vec<Column>,
+    /// Times of the rows, s, none earlier than the one before.
+    times: Arc<Vec<f64>>,
+    /// Values of the columns, row by row.
+    values: Arc<Vec<f64>>,
+}
+
+/// A column that is an output.
+#[derive(Clone, Debug, PartialEq)]
+struct Column {
+    name: String,
+    form: Form,
+}
+
+/// Type of a column's values.
+#[derive(Clone, Debug, PartialEq)]
+enum Form {
+    /// Real numbers in a unit.
+    Real(Option<String>),
+    Integer,
+    Boolean,
+}
+
+impl Column {
+    /// Reads a heading: `name`, `name [unit]`, `name [Integer]` or `name [Boolean]`.
+    fn new(heading: &str) -> Self {
+        let parts = heading.strip_suffix(']').and_then(|rest| rest.rsplit_once(" ["));
+        let (name, form) = match parts {
+            None => (heading, Form::Real(None)),
+            Some((name, "Integer")) => (name, Form::Integer),
+            Some((name, "Boolean")) => (name, Form::Boolean),
+            Some((name, unit)) => (name, Form::Real(Some(unit.into()))),
+        };
+        Self { name: name.trim_end().into(), form }
+    }
+
+    /// Reads a value, or returns what it must be.
+    fn value(&self, text: &str) -> Result<f64, &'static str> {
+        match (&self.form, text) {
+            (Form::Real(_), _) => number(text),
+            (Form::Integer, _) => {
+                text.parse().map(|value: i32| value.into()).or(Err("a whole number of 32 bits"))
+            }
+            (Form::Boolean, "0" | "false") => Ok(0.0),
+            (Form::Boolean, "1" | "true") => Ok(1.0),
+            (Form::Boolean, _) => Err("0, 1, false or true"),
+        }
+    }
+}
+
+fn number(text: &str) -> Result<f64, &'static str> {
+    text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or("a finite number")
+}
+
+impl Table {
+    /// Reads a table. Its first line names the columns: `time`, and then the outputs as
+    /// [`Column::new`] reads them. Lines that begin with `#` are comments.
+    ///
+    /// # Errors
+    /// Returns a text that names the line and the column at fault.
+    pub(crate) fn open(path: &Path) -> Result<Self, String> {
+        let fault = |error: io::Error| format!("cannot be opened: {error}");
+        let size = fs::metadata(path).map_err(fault)?.len();
+        if size > LARGEST {
+            return Err(format!("refused: it has {size} bytes, at most {LARGEST} are allowed"));
+        }
+        Self::parse(&fs::read(path).map_err(fault)?)
+    }
+
+    fn parse(bytes: &[u8]) -> Result<Self, String> {
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .from_reader(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+        let unreadable = |error: csv::Error| format!("is no table: {error}");
+        let headings = reader.headers().map_err(unreadable)?.clone();
+        let columns = columns(&headings)?;
+        let (mut times, mut values) = (Vec::<f64>::new(), Vec::new());
+        let mut row = csv::StringRecord::new();
+        while reader.read_record(&mut row).map_err(unreadable)? {
+            let line = row.position().map_or(0, csv::Position::line);
+            if row.len() != headings.len() {
+                let (has, wanted) = (row.len(), headings.len());
+                return Err(format!("line {line} has {has} values for {wanted} columns"));
+            }
+            let wrong = |place: usize, wanted: &str| {
+                let (name, text) = (&headings[place], row[place].escape_default());
+                format!("line {line}: \"{name}\" is \"{text}\", it must be {wanted}")
+            };
+            let time = number(&row[0]).map_err(|wanted| wrong(0, wanted))?;
+            if times.last().is_some_and(|before| *before > time) {
+                return Err(wrong(0, "no earlier than in the row before"));
+            }
+            times.push(time);
+            for (place, column) in (1..).zip(&columns) {
+                values.push(column.value(&row[place]).map_err(|wanted| wrong(place, wanted))?);
+            }
+        }
+        if times.is_empty() {
+            return Err("is a table without rows".into());
+        }
+        Ok(Self { columns, times: times.into(), values: values.into() })
+    }
+
+    /// Returns whether times and values are parameters. Those of a large table are not.
+    fn is_settable(&self) -> bool {
+        self.times.len() + self.values.len() <= MOST_PARAMETERS
+    }
+}
+
+/// Reads the headings.
+fn columns(headings: &csv::StringRecord) -> Result<Vec<Column>, String> {
+    let mut texts = headings.iter();
+    match texts.next().unwrap_or_default() {
+        "time" | "time [s]" => {}
+        other if other.contains(';') => {
+            return Err("is no table: there must be commas between the columns".into());
+        }
+        other => {
+            let other = other.escape_default();
+            return Err(format!("is no table: the first column is \"{other}\", not \"time\""));
+        }
+    }
+    let columns: Vec<Column> = texts.map(Column::new).collect();
+    if columns.is_empty() {
+        return Err("is a table without columns beside \"time\"".into());
+    }
+    if columns.iter().any(|column| column.name.is_empty()) {
+        return Err("is a table with a column that has no name".into());
+    }
+    Ok(columns)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,163 @@
+use super::*;
+use crate::description::Kind;
+use crate::unit::CoSimulationUnit;
+use proptest::prelude::*;
+
+const FILE: &str = "\u{feff}time,gust.x [N.m],count [Integer],open [Boolean],plain\r\n\
+                    # a comment\r\n\
+                    1,10,3,true,0.5\r\n\
+                    2,20,4,0,1.5\r\n\
+                    2,-20,5,1,1.5\r\n\
+                    4,0,6,false,2.5\r\n";
+
+fn unit(text: &str) -> (TableUnit, crate::description::ModelDescription) {
+    let table = Table::parse(text.as_bytes()).unwrap();
+    let description = table.description("gusts").unwrap();
+    (TableUnit::new(table), description)
+}
+
+fn at(unit: &mut TableUnit, time: f64) -> (f64, i32, i32, f64) {
+    unit.do_step(time - 0.1, 0.1).unwrap();
+    let (mut reals, mut count, mut open) = ([0.0; 2], [0], [0]);
+    unit.get_real(&[0, 3], &mut reals).unwrap();
+    unit.get_integer(&[1], &mut count).unwrap();
+    unit.get_boolean(&[2], &mut open).unwrap();
+    (reals[0], count[0], open[0], reals[1])
+}
+
+fn reference(description: &crate::description::ModelDescription, name: &str) -> u32 {
+    description.find(name).unwrap_or_else(|| panic!("{name}")).1.reference
+}
+
+#[test]
+fn oracle_rows_hold_until_the_next_one() {
+    let (mut unit, _) = unit(FILE);
+    unit.enter_initialization(0.0, 5.0).unwrap();
+    for (time, row) in [
+        (0.0, (10.0, 3, 1, 0.5)),
+        (1.0, (10.0, 3, 1, 0.5)),
+        (1.999, (10.0, 3, 1, 0.5)),
+        // Of two rows at the same time the later one holds.
+        (2.0, (-20.0, 5, 1, 1.5)),
+        (0.1 + 0.2 + 1.7, (-20.0, 5, 1, 1.5)),
+        (4.0, (0.0, 6, 0, 2.5)),
+        (9.0, (0.0, 6, 0, 2.5)),
+    ] {
+        assert_eq!(at(&mut unit, time), row, "at {time} s");
+    }
+}
+
+#[test]
+fn oracle_lines_between_rows_and_jumps_at_equal_times() {
+    let (mut unit, description) = unit(FILE);
+    unit.set_integer(&[reference(&description, "interpolation")], &[2]).unwrap();
+    unit.set_real(&[reference(&description, "shift")], &[0.5]).unwrap();
+    unit.set_real(&[reference(&description, "scale.gust.x")], &[2.0]).unwrap();
+    unit.enter_initialization(0.0, 5.0).unwrap();
+    for (time, row) in [
+        (1.0, (20.0, 3, 1, 0.5)),
+        (1.75, (25.0, 3, 1, 0.75)),
+        (2.5, (-40.0, 5, 1, 1.5)),
+        (3.5, (-20.0, 5, 1, 2.0)),
+        (5.0, (0.0, 6, 0, 2.5)),
+    ] {
+        assert_eq!(at(&mut unit, time), row, "at {time} s");
+    }
+}
+
+#[test]
+fn times_and_values_are_parameters_until_the_run_begins() {
+    let (mut unit, description) = unit(FILE);
+    let variable = description.find("gust.x[3]").unwrap().1;
+    let kind = &variable.kind;
+    assert!(matches!(kind, Kind::Real { unit: Some(unit), .. } if unit == "N.m"), "{kind:?}");
+    assert_eq!(variable.start.as_deref(), Some("-20"));
+    assert_eq!(description.find("open[1]").unwrap().1.start.as_deref(), Some("true"));
+    unit.set_real(&[variable.reference, reference(&description, "time[4]")], &[7.0, 3.0]).unwrap();
+    unit.set_boolean(&[reference(&description, "open[4]")], &[1]).unwrap();
+    unit.enter_initialization(0.0, 5.0).unwrap();
+    assert_eq!(at(&mut unit, 2.5), (7.0, 5, 1, 1.5));
+    assert_eq!(at(&mut unit, 3.0), (0.0, 6, 1, 2.5));
+    let late = unit.set_real(&[variable.reference], &[8.0]).unwrap_err();
+    assert!(late.message.contains("before the run begins"), "{late:?}");
+    unit.reset().unwrap();
+    unit.set_real(&[reference(&description, "time[1]")], &[3.0]).unwrap();
+    let order = unit.enter_initialization(0.0, 5.0).unwrap_err();
+    assert_eq!(order.message, "time[2] = 2 s is earlier than time[1] = 3 s");
+    unit.reset().unwrap();
+    unit.enter_initialization(0.0, 5.0).unwrap();
+    assert_eq!(at(&mut unit, 3.0), (-20.0, 5, 1, 1.5));
+}
+
+#[test]
+fn large_tables_have_no_parameters_for_their_values() {
+    let rows = "0,1\n".repeat(500);
+    assert!(unit(&format!("time,x\n{rows}")).1.find("x[500]").is_some());
+    assert!(unit(&format!("time,x\n{rows}0,1\n")).1.find("x[1]").is_none());
+}
+
+#[test]
+fn faults_name_line_and_column() {
+    let fault = |text: &str| {
+        let table = Table::parse(text.as_bytes());
+        table.and_then(|table| table.description("gusts").map(drop)).unwrap_err()
+    };
+    for (text, message) in [
+        ("", "is no table: the first column is \"\", not \"time\""),
+        ("time;x\n0;1\n", "is no table: there must be commas between the columns"),
+        ("t,x\n0,1\n", "is no table: the first column is \"t\", not \"time\""),
+        ("time\n0\n", "is a table without columns beside \"time\""),
+        ("time,x\n", "is a table without rows"),
+        ("time,\n0,1\n", "is a table with a column that has no name"),
+        ("time,x,x\n0,1,1\n", "is a table in which \"x\" has two meanings"),
+        ("time,shift\n0,1\n", "is a table in which \"shift\" has two meanings"),
+        ("time,x\n0,1\n1\n", "line 3 has 1 values for 2 columns"),
+        ("time,x\n0,1\n1,2,3\n", "line 3 has 3 values for 2 columns"),
+        ("time,x\nnow,1\n", "line 2: \"time\" is \"now\", it must be a finite number"),
+        (
+            "time,x\n1,1\n0,1\n",
+            "line 3: \"time\" is \"0\", it must be no earlier than in the row before",
+        ),
+        ("time,x\n0,NaN\n", "line 2: \"x\" is \"NaN\", it must be a finite number"),
+        ("time,x [N.m]\n0,1 kN\n", "line 2: \"x [N.m]\" is \"1 kN\", it must be a finite number"),
+        (
+            "time,x [Integer]\n0,1.5\n",
+            "line 2: \"x [Integer]\" is \"1.5\", it must be a whole number of 32 bits",
+        ),
+        (
+            "time,x [Boolean]\n0,2\n",
+            "line 2: \"x [Boolean]\" is \"2\", it must be 0, 1, false or true",
+        ),
+    ] {
+        assert_eq!(fault(text), message, "{text}");
+    }
+    assert!(Table::parse(b"time,x\n0,\xff\n").unwrap_err().starts_with("is no table: "));
+}
+
+proptest! {
+    #[test]
+    fn oracle_a_line_stays_between_its_rows(
+        rows in prop::collection::vec((0.0..10.0_f64, -1e6..1e6_f64), 1..20),
+        time in -1.0..12.0_f64,
+    ) {
+        let mut rows = rows;
+        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let lines = rows.iter().map(|(time, value)| format!("{time},{value}"));
+        let text = std::iter::once("time,x".to_string()).chain(lines).collect::<Vec<_>>().join("\n");
+        let (mut unit, description) = unit(&text);
+        unit.set_integer(&[reference(&description, "interpolation")], &[2]).unwrap();
+        unit.enter_initialization(0.0, 12.0).unwrap();
+        unit.do_step(time, 0.0).unwrap();
+        let mut value = [0.0];
+        unit.get_real(&[0], &mut value).unwrap();
+        let before = rows.iter().rposition(|row| row.0 <= time).unwrap_or(0);
+        let after = rows.iter().position(|row| row.0 > time).unwrap_or(rows.len() - 1);
+        let (low, high) = (rows[before].1.min(rows[after].1), rows[before].1.max(rows[after].1));
+        prop_assert!((low - 1e-3..=high + 1e-3).contains(&value[0]), "{} {low} {high}", value[0]);
+    }
+
+    #[test]
+    fn no_text_breaks_the_reader(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        let _ = Table::parse(&bytes).and_then(|table| table.description("x"));
+    }
+}

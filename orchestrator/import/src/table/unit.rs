@@ -1,0 +1,185 @@
+//! A table that is stepped as a unit.
+
+use super::description::{HOLD, LINEAR, Place};
+use super::{Form, Table};
+use crate::unit::{CoSimulationUnit, Outcome, UnitFailure};
+use std::sync::Arc;
+
+/// Part of a time by which two times may differ and still be the same.
+const TOLERANCE: f64 = 1e-9;
+
+/// A table with the time that it has reached.
+pub(crate) struct TableUnit {
+    /// The table as its file has it.
+    file: Table,
+    /// The table with the values that were set.
+    table: Table,
+    places: Vec<Place>,
+    interpolation: i32,
+    shift: f64,
+    /// Factor of each column.
+    scales: Vec<f64>,
+    time: f64,
+    is_running: bool,
+}
+
+impl TableUnit {
+    pub(crate) fn new(table: Table) -> Self {
+        Self {
+            places: table.places(),
+            interpolation: HOLD,
+            shift: 0.0,
+            scales: vec![1.0; table.columns.len()],
+            time: 0.0,
+            is_running: false,
+            file: table.clone(),
+            table,
+        }
+    }
+
+    fn place(&self, call: &'static str, reference: u32) -> Result<Place, UnitFailure> {
+        let place = self.places.get(reference as usize).copied();
+        place.ok_or_else(|| UnitFailure::new(call, format!("there is no variable {reference}")))
+    }
+
+    /// Returns the value of a column at the present time. Before the first row it is that of the
+    /// first, and after the last row that of the last.
+    fn at_present(&self, column: usize) -> f64 {
+        let Table { columns, times, values } = &self.table;
+        let of = |row: usize| values[row * columns.len() + column];
+        let time = self.time - self.shift;
+        let is_past = |row: &f64| *row <= time + TOLERANCE * time.abs().max(1.0);
+        let next = times.partition_point(is_past);
+        let last = next.saturating_sub(1);
+        let is_held = self.interpolation == HOLD
+            || !matches!(columns[column].form, Form::Real(_))
+            || next == 0
+            || next == times.len();
+        let part = if is_held {
+            0.0
+        } else {
+            ((time - times[last]) / (times[next] - times[last])).clamp(0.0, 1.0)
+        };
+        // A part of zero must not bring in the next value, which may be far away.
+        let value = if part == 0.0 { of(last) } else { of(last) + part * (of(next) - of(last)) };
+        self.scales[column] * value
+    }
+
+    fn get(&self, call: &'static str, reference: u32) -> Result<f64, UnitFailure> {
+        Ok(match self.place(call, reference)? {
+            Place::Output(column) => self.at_present(column),
+            Place::Interpolation => self.interpolation.into(),
+            Place::Shift => self.shift,
+            Place::Scale(column) => self.scales[column],
+            Place::Time(row) => self.table.times[row],
+            Place::Value(index) => self.table.values[index],
+        })
+    }
+
+    fn set(&mut self, call: &'static str, reference: u32, value: f64) -> Outcome {
+        let refuse = |problem: String| Err(UnitFailure::new(call, problem));
+        if self.is_running {
+            return refuse("a table can be set before the run begins only".into());
+        }
+        if !value.is_finite() {
+            return refuse(format!("{value} is not finite"));
+        }
+        match self.place(call, reference)? {
+            Place::Output(_) => return refuse("an output cannot be set".into()),
+            Place::Interpolation if value == HOLD.into() || value == LINEAR.into() => {
+                self.interpolation = value as i32;
+            }
+            Place::Interpolation => {
+                return refuse(format!("interpolation = {value} is neither {HOLD} nor {LINEAR}"));
+            }
+            Place::Shift => self.shift = value,
+            Place::Scale(column) => self.scales[column] = value,
+            Place::Time(row) => Arc::make_mut(&mut self.table.times)[row] = value,
+            Place::Value(index) => Arc::make_mut(&mut self.table.values)[index] = value,
+        }
+        Ok(())
+    }
+
+    fn get_whole(&self, call: &'static str, references: &[u32], values: &mut [i32]) -> Outcome {
+        for (value, reference) in values.iter_mut().zip(references) {
+            // Only values of 32 bits are read as whole numbers.
+            *value = self.get(call, *reference)? as i32;
+        }
+        Ok(())
+    }
+
+    fn set_whole(&mut self, call: &'static str, references: &[u32], values: &[i32]) -> Outcome {
+        let mut pairs = references.iter().zip(values);
+        pairs.try_for_each(|(reference, value)| self.set(call, *reference, (*value).into()))
+    }
+}
+
+impl CoSimulationUnit for TableUnit {
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
+        for (value, reference) in values.iter_mut().zip(references) {
+            *value = self.get("getReal", *reference)?;
+        }
+        Ok(())
+    }
+
+    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
+        self.get_whole("getInteger", references, values)
+    }
+
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
+        self.get_whole("getBoolean", references, values)
+    }
+
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
+        let mut pairs = references.iter().zip(values);
+        pairs.try_for_each(|(reference, value)| self.set("setReal", *reference, *value))
+    }
+
+    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        self.set_whole("setInteger", references, values)
+    }
+
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        self.set_whole("setBoolean", references, values)
+    }
+
+    fn set_string(&mut self, reference: u32, _value: &str) -> Outcome {
+        Err(UnitFailure::new("setString", format!("variable {reference} is no text")))
+    }
+
+    fn enter_initialization(&mut self, start: f64, _stop: f64) -> Outcome {
+        let times = &self.table.times;
+        if let Some(row) = times.windows(2).position(|pair| pair[0] > pair[1]) {
+            return Err(UnitFailure::new(
+                "enterInitializationMode",
+                format!(
+                    "time[{}] = {} s is earlier than time[{}] = {} s",
+                    row + 2,
+                    times[row + 1],
+                    row + 1,
+                    times[row]
+                ),
+            ));
+        }
+        (self.time, self.is_running) = (start, true);
+        Ok(())
+    }
+
+    fn exit_initialization(&mut self) -> Outcome {
+        Ok(())
+    }
+
+    fn do_step(&mut self, time: f64, step: f64) -> Outcome {
+        self.time = time + step;
+        Ok(())
+    }
+
+    fn terminate(&mut self) -> Outcome {
+        Ok(())
+    }
+
+    fn reset(&mut self) -> Outcome {
+        *self = Self::new(self.file.clone());
+        Ok(())
+    }
+}

@@ -1,0 +1,143 @@
+//! Tables as units, which drive a unit whose answer can be computed by hand.
+
+use crate::bench::Bench;
+use std::fs;
+
+/// The unit's first output is twice its input.
+const DRIVEN: &str = r#"
+title = "a table drives a gain"
+[simulation]
+stop = 4.0
+step = 1.0
+order = ["drive", "gain"]
+[components.drive]
+fmu = "drive.csv"
+[components.gain]
+fmu = "Unit.fmu"
+[[connections]]
+from = "drive.input"
+to = "gain.input"
+[record]
+variables = ["drive.input", "gain.output.direct"]
+"#;
+const TABLE: &str = "time,input [m]\n1,3\n2,5\n4,-1\n";
+
+fn bench(table: &str) -> Bench {
+    let bench = Bench::with(DRIVEN);
+    fs::write(bench.path("drive.csv"), table).unwrap();
+    bench
+}
+
+fn answers(bench: &Bench, arguments: &[&str]) -> Vec<f64> {
+    let (code, _, errors) = bench.run(&[&["--quiet"], arguments].concat());
+    assert_eq!((code, errors.as_str()), (0, ""));
+    let results = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+    let last = |row: &str| row.rsplit(',').next().unwrap().parse().unwrap();
+    results.lines().skip(1).map(last).collect()
+}
+
+#[test]
+fn oracle_an_input_follows_the_rows_of_a_table() {
+    let bench = bench(TABLE);
+    assert_eq!(answers(&bench, &[]), [6.0, 6.0, 10.0, 10.0, -2.0]);
+    let line = answers(&bench, &["--set", "drive.interpolation=linear"]);
+    assert_eq!(line, [6.0, 6.0, 10.0, 4.0, -2.0]);
+    let set = ["--set", "drive.shift=1 s", "--set", "drive.scale.input=10", "--set"];
+    assert_eq!(
+        answers(&bench, &[&set[..], &["drive.input[1]=4"]].concat())[..4],
+        [80.0, 80.0, 80.0, 100.0]
+    );
+    // Processes of their own are for code of others.
+    assert_eq!(answers(&bench, &["--isolate"]), [6.0, 6.0, 10.0, 10.0, -2.0]);
+    fs::write(bench.path("other.csv"), "time,input\n0,1\n").unwrap();
+    assert_eq!(answers(&bench, &["--fmu", "drive=other.csv"]), [2.0; 5]);
+    let metadata = bench.json("out/loop/results.json");
+    assert_eq!(metadata["components"]["drive"]["fmu"], "other.csv");
+}
+
+#[test]
+fn a_recorded_run_drives_another() {
+    let bench = bench(TABLE);
+    let first = answers(&bench, &["--labels"]);
+    fs::copy(bench.path("out/loop/results.csv"), bench.path("flown.csv")).unwrap();
+    let replay = DRIVEN
+        .replace("drive.csv", "flown.csv")
+        .replace("from = \"drive.input\"", "from = \"drive.gain.output.direct\"")
+        .replace("\"drive.input\", ", "");
+    fs::write(bench.path("loop.toml"), replay).unwrap();
+    let second = answers(&bench, &[]);
+    assert_eq!(second, first.iter().map(|value| 2.0 * value).collect::<Vec<_>>());
+}
+
+#[test]
+fn oracle_units_of_a_table_are_those_of_the_input() {
+    let bench = bench("time,input [mm]\n0,500\n");
+    let message = bench.refusal(&[]);
+    assert!(message.contains("convert_units = true"), "{message}");
+    let converted =
+        DRIVEN.replace("to = \"gain.input\"", "to = \"gain.input\"\nconvert_units = true");
+    fs::write(bench.path("loop.toml"), converted).unwrap();
+    assert_eq!(answers(&bench, &[]), [1.0; 5]);
+    fs::write(bench.path("drive.csv"), "time,input [m/s]\n0,500\n").unwrap();
+    let message = bench.refusal(&[]);
+    assert!(message.contains("m/s against m") && message.contains("loop.toml:13"), "{message}");
+}
+
+#[test]
+fn faults_of_tables_name_file_and_place() {
+    let message = bench("time,input\n1,2\n0,3\n").refusal(&[]);
+    assert!(message.starts_with("error: ./drive.csv: line 3: \"time\" is \"0\""), "{message}");
+    let message = bench("time,inptu\n1,2\n").refusal(&[]);
+    assert!(message.contains("did you mean \"inptu\""), "{message}");
+    let late = ["--set", "drive.time[1]=3"];
+    let (code, _, errors) = bench(TABLE).run(&[&["--quiet"], &late[..]].concat());
+    assert_eq!(code, 1, "{errors}");
+    assert!(errors.contains("time[2] = 2 s is earlier than time[1] = 3 s"), "{errors}");
+    let bench = bench(TABLE);
+    fs::rename(bench.path("drive.csv"), bench.path("driver.csv")).unwrap();
+    let message = bench.refusal(&[]);
+    assert!(message.contains("did you mean \"driver.csv\""), "{message}");
+}
+
+#[test]
+fn oracle_a_campaign_varies_the_rows_of_a_table() {
+    let bench = bench(TABLE);
+    let campaign = r#"
+        title = "rows"
+        experiment = "loop.toml"
+        design = "factorial"
+        [signals]
+        out = ["gain.output.direct"]
+        [[vary]]
+        parameter = "drive.input[2]"
+        list = [7.0, -9.0]
+        [[measure]]
+        id = "largest"
+        kind = "largest"
+        signals = "out"
+    "#;
+    fs::write(bench.path("c.toml"), campaign).unwrap();
+    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
+    assert_eq!(code, 0, "{errors}");
+    let rows = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    let rows: Vec<&str> = rows.lines().skip(1).collect();
+    assert_eq!(rows, ["0,7,14,completed,4,", "1,-9,18,completed,4,"]);
+    // Other rows are other cases.
+    fs::write(bench.path("drive.csv"), TABLE.replace("1,3", "1,30")).unwrap();
+    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
+    assert_eq!(code, 0, "{errors}");
+    let rows = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    assert!(rows.contains("0,7,60,completed,4,"), "{rows}");
+}
+
+#[test]
+fn a_table_can_be_looked_at_but_not_packed_for_other_tools() {
+    let bench = bench(TABLE);
+    let (code, text, errors) = bench.call(&["inspect", "drive.csv"]);
+    assert_eq!((code, errors.as_str()), (0, ""));
+    assert!(text.starts_with("drive\n") && text.contains("table of 3 rows"), "{text}");
+    assert_eq!(bench.call(&["inspect", "--check", "drive.csv"]), (0, String::new(), String::new()));
+    let (code, _, errors) = bench.call(&["pack", "loop.toml", "--ssp"]);
+    assert_eq!(code, 2);
+    assert!(errors.contains("[components.drive] is a table"), "{errors}");
+}
