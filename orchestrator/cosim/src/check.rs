@@ -133,9 +133,9 @@ fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<
         return Err(experiment.source.error(&(0..0), message));
     }
     if gigabytes > 10.0 {
-        tracing::warn!(
+        warnings::warn_once(format!(
             "results.csv will take about {gigabytes:.0} GB: [record] every = n writes every n-th step only"
-        );
+        ));
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ use fmu_import::description::{Kind, Variable};
 use fmu_import::names;
 use fmu_import::quantity;
 use fmu_import::unit::{CoSimulationUnit, Outcome};
+use fmu_import::warnings::warn_once;
 use toml::Value;
 
 /// A variable that is set before initialization.
@@ -73,10 +74,10 @@ pub(crate) fn resolve(
             }
         };
         if component.is_exchanged && !is_assigned && part.description.find(name).is_none() {
-            tracing::warn!(
+            warn_once(format!(
                 "{path}: {} has no such parameter, it is left out",
                 part.description.model_name
-            );
+            ));
             continue;
         }
         let position = position(name, index, part, wires, is_assigned).map_err(&refuse)?;

@@ -9,6 +9,7 @@ use fmu_import::description::{Carrier, Kind, ModelDescription, Variable};
 use fmu_import::names;
 use fmu_import::quantity;
 use fmu_import::quantity::Scaling;
+use fmu_import::warnings::warn_once;
 use std::collections::{BTreeSet, HashSet};
 use std::ops::Range;
 use toml::Spanned;
@@ -294,11 +295,11 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
         };
         let open: Vec<&str> = inputs.iter().filter(open).map(|(_, name)| *name).collect();
         if component.is_exchanged && !open.is_empty() {
-            tracing::warn!(
+            warn_once(format!(
                 "inputs of \"{}\" stay at their start value: {}",
                 part.name,
                 open.join(", ")
-            );
+            ));
             continue;
         }
         if !open.is_empty() {
@@ -372,11 +373,10 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
         }
         if meant == 0 && columns.len() == before {
             if experiment.components[part.name].is_exchanged {
-                tracing::warn!(
+                warn_once(format!(
                     "{}: {} has none, nothing is recorded",
-                    reference.text,
-                    part.description.model_name
-                );
+                    reference.text, part.description.model_name
+                ));
                 continue;
             }
             let known: Vec<&str> =
