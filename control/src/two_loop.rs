@@ -14,6 +14,7 @@ use crate::sliding::{Commanded, FiniteTimeLayer, all_positive, sampled_decay};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
+use vehicle::data;
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
 use vehicle::math::{exp, sin_cos};
@@ -109,12 +110,11 @@ impl TwoLoopSettings {
     /// Returns our gains for the scenario of section V; the paper prints none.
     #[allow(clippy::missing_panics_doc)]
     pub fn ours() -> Self {
-        // Neither can fail, as the tests that use them show: the files are embedded.
         static READ: LazyLock<File> = LazyLock::new(|| {
-            toml::from_str(include_str!("../data/two-loop-smc.toml"))
-                .unwrap_or_else(|error| panic!("{error}"))
+            data::embedded("two-loop-smc.toml", include_str!("../data/two-loop-smc.toml"))
         });
         let file = &*READ;
+        // This cannot fail, as the tests that use it show: the scenario is embedded.
         let body = Scenario::two_loop().inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
         Self {
             form: Form::Corrected,

@@ -54,6 +54,7 @@ fn sampled_inputs() -> impl Iterator<Item = &'static str> {
 }
 
 /// Declares an output of a law, which changes at its ticks only.
+#[inline(never)]
 pub fn sampled_output(name: &str, description: &str) -> Common {
     discrete_output(name, description).depends_on(sampled_inputs())
 }
@@ -86,40 +87,53 @@ pub fn vector<M: 'static>(
     declare: impl Fn(&str, &str) -> Real,
     field: impl Fn(&mut M) -> &mut Vector3<f64> + Copy + Send + Sync + 'static,
 ) -> Table<M> {
-    for (i, (axis, meaning)) in axes.into_iter().enumerate() {
-        table = table.real(declare(axis, meaning), move |m| &mut field(m)[i]);
+    for (i, real) in declared(axes, &declare).into_iter().enumerate() {
+        table = table.real(real, move |m| &mut field(m)[i]);
     }
     table
 }
 
+/// Declares the components of a vector. It is not inlined, so that the libraries stay small.
+#[inline(never)]
+fn declared(axes: [(&str, &str); 3], declare: &dyn Fn(&str, &str) -> Real) -> Vec<Real> {
+    axes.into_iter().map(|(axis, meaning)| declare(axis, meaning)).collect()
+}
+
+fn measured_angle(axis: &str, meaning: &str) -> Real {
+    let text = format!("Measured {meaning}");
+    input(&format!("attitude.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
+}
+
+fn measured_rate(axis: &str, meaning: &str) -> Real {
+    let text = format!("Measured body {meaning} rate");
+    input(&format!("rate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
+}
+
+fn achieved(axis: &str, meaning: &str) -> Real {
+    let text = format!(
+        "{meaning} moment that the actuators really give; for laws with an observer, others ignore it"
+    );
+    let common = input(&format!("achievedMoment.{axis}"), &capital(&text));
+    common.real().unit(unit::moment()).nominal(1e5)
+}
+
+/// Declares inputs for a reference from outside.
+fn external(
+    name: &'static str,
+    what: &'static str,
+    unit: unit::Unit,
+) -> impl Fn(&str, &str) -> Real {
+    move |axis, meaning| {
+        let text = format!("{what} of the {meaning}, used if reference.profile is 'external'");
+        input(&format!("reference.{name}.{axis}"), &text).real().unit(unit.clone()).nominal(0.1)
+    }
+}
+
 fn inputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
-    let angle = |axis: &str, meaning: &str| {
-        let text = format!("Measured {meaning}");
-        input(&format!("attitude.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
-    };
-    let rate = |axis: &str, meaning: &str| {
-        let text = format!("Measured body {meaning} rate");
-        input(&format!("rate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
-    };
-    let achieved = |axis: &str, meaning: &str| {
-        let text = format!(
-            "{meaning} moment that the actuators really give; for laws with an observer, others ignore it"
-        );
-        input(&format!("achievedMoment.{axis}"), &capital(&text))
-            .real()
-            .unit(unit::moment())
-            .nominal(1e5)
-    };
-    let table = vector(table, ANGLES, angle, |m| &mut m.input.measured.angles);
-    let table = vector(table, RATES, rate, |m| &mut m.input.measured.rates);
+    let table = vector(table, ANGLES, measured_angle, |m| &mut m.input.measured.angles);
+    let table = vector(table, RATES, measured_rate, |m| &mut m.input.measured.rates);
     let table = vector(table, AXES, achieved, |m| &mut m.input.achieved_moment);
 
-    let external = |name: &'static str, what: &'static str, unit: unit::Unit| {
-        move |axis: &str, meaning: &str| {
-            let text = format!("{what} of the {meaning}, used if reference.profile is 'external'");
-            input(&format!("reference.{name}.{axis}"), &text).real().unit(unit.clone()).nominal(0.1)
-        }
-    };
     let angles = external("external", "Reference", unit::angle());
     let rates = external("externalRate", "First derivative of the reference", unit::angular_rate());
     let accelerations = external(
@@ -132,22 +146,29 @@ fn inputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     vector(table, ANGLES, accelerations, |m| &mut m.input.reference.accelerations)
 }
 
+fn moment(axis: &str, meaning: &str) -> Real {
+    let text = format!("Commanded {meaning} moment, held between the ticks of period.feedback");
+    let common = sampled_output(&format!("moment.{axis}"), &text);
+    common.real().unit(unit::moment()).nominal(1e5)
+}
+
+/// Declares outputs of the reference, which may come from the inputs `external`.
+fn in_force(
+    name: &'static str,
+    external: &'static str,
+    what: &'static str,
+    unit: unit::Unit,
+) -> impl Fn(&str, &str) -> Real {
+    move |axis, meaning| {
+        let text = format!("{what} of the {meaning} in force");
+        let source = format!("reference.{external}.{axis}");
+        let common = output(&format!("{name}.{axis}"), &text).depends_on([source.as_str()]);
+        common.real().unit(unit.clone()).nominal(0.1)
+    }
+}
+
 fn outputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
-    let moment = |axis: &str, meaning: &str| {
-        let text = format!("Commanded {meaning} moment, held between the ticks of period.feedback");
-        let common = sampled_output(&format!("moment.{axis}"), &text);
-        common.real().unit(unit::moment()).nominal(1e5)
-    };
     let table = vector(table, AXES, moment, |m| &mut m.output.moment);
-    let in_force =
-        |name: &'static str, external: &'static str, what: &'static str, unit: unit::Unit| {
-            move |axis: &str, meaning: &str| {
-                let common =
-                    output(&format!("{name}.{axis}"), &format!("{what} of the {meaning} in force"));
-                let source = format!("reference.{external}.{axis}");
-                common.depends_on([source.as_str()]).real().unit(unit.clone()).nominal(0.1)
-            }
-        };
     let angles = in_force("reference", "external", "Reference", unit::angle());
     let rates = in_force(
         "referenceRate",
@@ -166,23 +187,22 @@ fn outputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     vector(table, ANGLES, accelerations, |m| &mut m.output.reference.accelerations)
 }
 
+fn reference_angle(axis: &str, meaning: &str) -> Real {
+    let text = format!("Reference {meaning} if reference.profile is 'constant' or 'sine'");
+    parameter(&format!("reference.angle.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
+}
+
+fn amplitude(axis: &str, meaning: &str) -> Real {
+    let text = format!("Amplitude of the {meaning} if reference.profile is 'sine'");
+    parameter(&format!("reference.amplitude.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
+}
+
 fn reference<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     let profile = parameter("reference.profile", "Where the reference attitude comes from");
     let file = parameter(
         "reference.file",
         "CSV file with time and angles, if reference.profile is 'table'; a path, or a name inside the unit's resources",
     );
-    let angle = |axis: &str, meaning: &str| {
-        let text = format!("Reference {meaning} if reference.profile is 'constant' or 'sine'");
-        parameter(&format!("reference.angle.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
-    };
-    let amplitude = |axis: &str, meaning: &str| {
-        let text = format!("Amplitude of the {meaning} if reference.profile is 'sine'");
-        parameter(&format!("reference.amplitude.{axis}"), &text)
-            .real()
-            .unit(unit::angle())
-            .nominal(0.1)
-    };
     let frequency =
         parameter("reference.frequency", "Angular frequency if reference.profile is 'sine'").real();
     let phase =
@@ -190,7 +210,7 @@ fn reference<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> 
     let table = table
         .enumeration(profile, &PROFILES, |m| &mut m.parameters.reference.profile)
         .string(file, |m| &mut m.parameters.reference.file);
-    let table = vector(table, ANGLES, angle, |m| &mut m.parameters.reference.angle);
+    let table = vector(table, ANGLES, reference_angle, |m| &mut m.parameters.reference.angle);
     vector(table, ANGLES, amplitude, |m| &mut m.parameters.reference.amplitude)
         .real(frequency.unit(unit::angular_rate()).min(0.0).nominal(1.0), |m| {
             &mut m.parameters.reference.frequency
@@ -198,11 +218,12 @@ fn reference<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> 
         .real(phase.unit(unit::angle()), |m| &mut m.parameters.reference.phase)
 }
 
+fn moment_of_inertia(name: &str, meaning: &str) -> Real {
+    let text = format!("{meaning} as the controller believes it to be");
+    parameter(name, &text).real().unit(unit::inertia()).nominal(1e6)
+}
+
 fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
-    let moment_of_inertia = |name: &str, meaning: &str| {
-        let text = format!("{meaning} as the controller believes it to be");
-        parameter(name, &text).real().unit(unit::inertia()).nominal(1e6)
-    };
     let rate = parameter("limit.rate", "Limit on the norm of the body rates").real();
     let moment = parameter("limit.moment", "Limit on the norm of the control moment").real();
     let saturation =

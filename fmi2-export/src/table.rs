@@ -1,5 +1,8 @@
 //! Table of a unit's variables: the FMI attributes of each, and the field of the model that holds
 //! its value.
+//!
+//! Units declare a hundred variables each, so what a declaration calls is not inlined: that made the
+//! libraries larger by a tenth.
 
 use crate::scalar::Scalar;
 use model_description::DefaultExperiment;
@@ -117,15 +120,7 @@ impl<M: 'static> Table<M> {
         declaration: Real,
         field: impl Fn(&mut M) -> &mut f64 + Send + Sync + 'static,
     ) -> Self {
-        let kind = Kind::Real {
-            unit: declaration.unit,
-            min: declaration.min,
-            max: declaration.max,
-            nominal: declaration.nominal,
-            start: None,
-            derivative_of: declaration.derivative_of,
-        };
-        self.push(declaration.common, kind, Access::Real(Box::new(field)));
+        self.push_real(declaration, Box::new(field));
         self
     }
 
@@ -203,6 +198,14 @@ impl<M: 'static> Table<M> {
         self
     }
 
+    #[inline(never)]
+    fn push_real(&mut self, declaration: Real, field: Lens<M, f64>) {
+        let Real { common, unit, min, max, nominal, derivative_of } = declaration;
+        let kind = Kind::Real { unit, min, max, nominal, start: None, derivative_of };
+        self.push(common, kind, Access::Real(field));
+    }
+
+    #[inline(never)]
     fn push(&mut self, common: Common, kind: Kind, access: Access<M>) {
         let Common { name, description, causality, variability, dependencies } = common;
         let variable = Variable { name, description, causality, variability, kind, dependencies };
@@ -221,6 +224,7 @@ pub struct Common {
 }
 
 impl Common {
+    #[inline(never)]
     fn new(name: &str, description: &str, causality: Causality, variability: Variability) -> Self {
         Self {
             name: name.into(),
@@ -240,6 +244,7 @@ impl Common {
     }
 
     /// Continues the declaration as that of a real variable.
+    #[inline(never)]
     pub fn real(self) -> Real {
         Real { common: self, unit: None, min: None, max: None, nominal: None, derivative_of: None }
     }
@@ -287,24 +292,28 @@ pub struct Real {
 impl Real {
     /// Declares the physical unit of the variable.
     #[must_use]
+    #[inline(never)]
     pub fn unit(mut self, unit: Unit) -> Self {
         self.unit = Some(unit);
         self
     }
     /// Declares the smallest allowed value.
     #[must_use]
+    #[inline(never)]
     pub fn min(mut self, min: f64) -> Self {
         self.min = Some(min);
         self
     }
     /// Declares the largest allowed value.
     #[must_use]
+    #[inline(never)]
     pub fn max(mut self, max: f64) -> Self {
         self.max = Some(max);
         self
     }
     /// Declares the typical magnitude of the variable.
     #[must_use]
+    #[inline(never)]
     pub fn nominal(mut self, nominal: f64) -> Self {
         self.nominal = Some(nominal);
         self

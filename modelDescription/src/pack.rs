@@ -81,6 +81,7 @@ fn write_archive(
 ) -> zip::result::ZipResult<()> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
+        .compression_level(Some(9))
         .last_modified_time(DateTime::default());
     let mut archive = ZipWriter::new(file);
     for (name, content) in entries {

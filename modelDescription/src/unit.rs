@@ -33,6 +33,7 @@ pub struct Unit {
     pub display: Option<DisplayUnit>,
 }
 
+#[inline(never)]
 fn unit(name: &str, [kg, m, s, rad]: [i32; 4], display: Option<&str>) -> Unit {
     let display =
         display.map(|name| DisplayUnit { name: name.into(), factor: 180.0 / std::f64::consts::PI });

@@ -1,5 +1,6 @@
 //! Effectors of the vehicle: eight aerodynamic surfaces and ten jets, Wu 2015 (57)–(59), (63)–(65).
 
+use crate::data;
 use crate::error::Error;
 use nalgebra::{SMatrix, SVector, Vector3};
 use serde::{Deserialize, Serialize};
@@ -68,22 +69,8 @@ impl Effectors {
     /// Says which entry is missing, unknown or out of range.
     pub fn from_toml(file: &str, text: &str) -> Result<Self, Error> {
         let refuse = |problem: String| Error::Effectors { file: file.into(), problem };
-        let File { surfaces, jets } =
-            toml::from_str(text).map_err(|error| refuse(error.to_string()))?;
-        let effectors = Self {
-            effectiveness: matrix(&surfaces.effectiveness_deg) * 1f64.to_degrees(),
-            reference_pressure: surfaces.reference_pressure,
-            min: Surfaces::from(surfaces.min_deg).map(f64::to_radians),
-            max: Surfaces::from(surfaces.max_deg).map(f64::to_radians),
-            rate: Surfaces::from(surfaces.rate_deg_s).map(f64::to_radians),
-            allowed: surfaces.allowed,
-            names: surfaces.names,
-            jet_moments: matrix(&jets.moment),
-            jet_force: jets.force,
-            symmetric_jet_4: jets.symmetric_jet_4,
-        };
-        effectors.check().map_err(refuse)?;
-        Ok(effectors)
+        let parsed: File = toml::from_str(text).map_err(|error| refuse(error.to_string()))?;
+        parsed.into_effectors().map_err(refuse)
     }
 
     fn check(&self) -> Result<(), String> {
@@ -143,7 +130,8 @@ impl Effectors {
 
 fn embedded((file, text): (&str, &str)) -> Effectors {
     // This cannot fail: a test reads the embedded file.
-    Effectors::from_toml(file, text).unwrap_or_else(|error| panic!("{error}"))
+    let effectors = data::embedded::<File>(file, text).into_effectors();
+    effectors.unwrap_or_else(|problem| panic!("{file}: {problem}"))
 }
 
 // The structures below mirror the file, with the units printed in the paper named in the keys.
@@ -153,6 +141,26 @@ fn embedded((file, text): (&str, &str)) -> Effectors {
 struct File {
     surfaces: FileSurfaces,
     jets: FileJets,
+}
+
+impl File {
+    fn into_effectors(self) -> Result<Effectors, String> {
+        let Self { surfaces, jets } = self;
+        let effectors = Effectors {
+            effectiveness: matrix(&surfaces.effectiveness_deg) * 1f64.to_degrees(),
+            reference_pressure: surfaces.reference_pressure,
+            min: Surfaces::from(surfaces.min_deg).map(f64::to_radians),
+            max: Surfaces::from(surfaces.max_deg).map(f64::to_radians),
+            rate: Surfaces::from(surfaces.rate_deg_s).map(f64::to_radians),
+            allowed: surfaces.allowed,
+            names: surfaces.names,
+            jet_moments: matrix(&jets.moment),
+            jet_force: jets.force,
+            symmetric_jet_4: jets.symmetric_jet_4,
+        };
+        effectors.check()?;
+        Ok(effectors)
+    }
 }
 
 #[derive(Deserialize)]

@@ -6,6 +6,7 @@
 pub mod actuators;
 pub mod atmosphere;
 pub mod calibration;
+pub mod data;
 pub mod disturbance;
 pub mod dynamics;
 pub mod effectors;

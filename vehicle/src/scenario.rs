@@ -2,6 +2,7 @@
 //! papers are embedded.
 
 use crate::atmosphere::Flight;
+use crate::data;
 use crate::disturbance::{Disturbance, Kind, SineMoment, Table};
 use crate::dynamics::Inertia;
 use crate::error::Error;
@@ -69,7 +70,12 @@ impl Scenario {
     pub fn from_toml(file: &str, text: &str) -> Result<Self, Error> {
         let refuse = |problem: String| Error::Scenario { file: file.into(), problem };
         let parsed: File = toml::from_str(text).map_err(|error| refuse(error.to_string()))?;
-        let scenario = parsed.into_scenario();
+        parsed.into_scenario().checked(file)
+    }
+
+    fn checked(self, file: &str) -> Result<Self, Error> {
+        let refuse = |problem: String| Error::Scenario { file: file.into(), problem };
+        let scenario = self;
         if let Profile::Piecewise(segments) = &scenario.reference {
             let in_order = segments.windows(2).all(|pair| pair[0].until < pair[1].until);
             if !in_order || segments.last().is_none_or(|last| last.until.is_finite()) {
@@ -107,7 +113,8 @@ impl Scenario {
 
 fn embedded((file, text): (&str, &str)) -> Scenario {
     // This cannot fail: a test reads every embedded file.
-    Scenario::from_toml(file, text).unwrap_or_else(|error| panic!("{error}"))
+    let scenario = data::embedded::<File>(file, text).into_scenario();
+    scenario.checked(file).unwrap_or_else(|error| panic!("{error}"))
 }
 
 // The structures below mirror the files, with the units printed in the papers named in the keys.

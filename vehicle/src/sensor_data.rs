@@ -2,6 +2,7 @@
 //! sequence.
 
 use crate::calibration::Sequence;
+use crate::data;
 use crate::platform::Surroundings;
 use crate::sensors::Line;
 use crate::triad::{Triad, Window};
@@ -60,10 +61,7 @@ impl SensorData {
 }
 
 fn file() -> &'static File {
-    // This cannot fail: a test reads the embedded file.
-    static READ: LazyLock<File> = LazyLock::new(|| {
-        toml::from_str(TEXT).unwrap_or_else(|error| panic!("sensors.toml: {error}"))
-    });
+    static READ: LazyLock<File> = LazyLock::new(|| data::embedded("sensors.toml", TEXT));
     &READ
 }
 

@@ -5,6 +5,7 @@ use crate::error::DesignError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
+use vehicle::data;
 use vehicle::effectors::{Effectors, SURFACES, Surfaces};
 
 /// Choice of the method that divides the moment among the effectors.
@@ -162,10 +163,8 @@ impl Settings {
 }
 
 fn embedded() -> &'static File {
-    // This cannot fail: every test that uses the published settings reads the file.
     static READ: LazyLock<File> = LazyLock::new(|| {
-        toml::from_str(include_str!("../../data/allocation.toml"))
-            .unwrap_or_else(|error| panic!("{error}"))
+        data::embedded("allocation.toml", include_str!("../../data/allocation.toml"))
     });
     &READ
 }

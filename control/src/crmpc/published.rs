@@ -5,6 +5,7 @@ use crate::error_dynamics::Gain;
 use crate::mpc::SolverSettings;
 use serde::Deserialize;
 use std::sync::LazyLock;
+use vehicle::data;
 use vehicle::scenario::Scenario;
 
 #[derive(Deserialize)]
@@ -89,10 +90,8 @@ pub struct Published {
 }
 
 fn embedded() -> &'static File {
-    // This cannot fail: every test that uses the published settings reads the file.
     static READ: LazyLock<File> = LazyLock::new(|| {
-        toml::from_str(include_str!("../../data/crmpc-2022.toml"))
-            .unwrap_or_else(|error| panic!("{error}"))
+        data::embedded("crmpc-2022.toml", include_str!("../../data/crmpc-2022.toml"))
     });
     &READ
 }

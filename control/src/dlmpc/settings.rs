@@ -4,6 +4,7 @@ use crate::error::DesignError;
 use crate::mpc::SolverSettings;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
+use vehicle::data;
 use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
 
@@ -154,10 +155,8 @@ impl Settings {
 }
 
 fn embedded() -> &'static File {
-    // This cannot fail: every test that uses the published settings reads the file.
     static READ: LazyLock<File> = LazyLock::new(|| {
-        toml::from_str(include_str!("../../data/dlmpc-2022.toml"))
-            .unwrap_or_else(|error| panic!("{error}"))
+        data::embedded("dlmpc-2022.toml", include_str!("../../data/dlmpc-2022.toml"))
     });
     &READ
 }

@@ -17,6 +17,7 @@ use lowpass::LowPass;
 use nalgebra::{Matrix3, Rotation3, SVector, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
+use vehicle::data;
 use vehicle::kinematics::{self, Kinematics};
 use vehicle::math::{asin, atan2};
 use vehicle::platform::body_from_velocity;
@@ -139,8 +140,9 @@ impl Default for Settings {
     /// Returns the settings of `data/estimator.toml`, for the start of Chai 2022 and sensors
     /// without errors in the field of the vehicle's data.
     fn default() -> Self {
-        static READ: LazyLock<File> =
-            LazyLock::new(|| embedded(include_str!("../../data/estimator.toml")));
+        static READ: LazyLock<File> = LazyLock::new(|| {
+            data::embedded("estimator.toml", include_str!("../../data/estimator.toml"))
+        });
         let file = &*READ;
         let SensorData { surroundings, mems, .. } = SensorData::embedded();
         let field = surroundings.field;
@@ -166,11 +168,6 @@ impl Default for Settings {
     }
 }
 
-fn embedded<T: for<'a> Deserialize<'a>>(text: &str) -> T {
-    // This cannot fail: tests read every embedded file.
-    toml::from_str(text).unwrap_or_else(|error| panic!("{error}"))
-}
-
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CalibrationFile {
@@ -189,8 +186,12 @@ struct CorrectionFile {
 /// Returns the corrections of gyroscope, accelerometer and magnetometer of the MEMS set, from
 /// `data/sensor-calibration.toml`.
 pub fn mems_corrections() -> [Correction; 3] {
-    static READ: LazyLock<CalibrationFile> =
-        LazyLock::new(|| embedded(include_str!("../../data/sensor-calibration.toml")));
+    static READ: LazyLock<CalibrationFile> = LazyLock::new(|| {
+        data::embedded(
+            "sensor-calibration.toml",
+            include_str!("../../data/sensor-calibration.toml"),
+        )
+    });
     [&READ.gyroscope, &READ.accelerometer, &READ.magnetometer]
         .map(|each| Correction { matrix: Matrix3::from(each.matrix).transpose(), bias: each.bias })
 }

@@ -3,6 +3,7 @@
 use crate::sliding::{BoundaryLayer, FblSettings, Observer, SecondOrder, Surface};
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
+use vehicle::data;
 use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
 
@@ -51,16 +52,15 @@ struct AntiWindup {
     threshold: f64,
 }
 
-// Neither of the two can fail, as the tests that use them show: the files are embedded.
 fn embedded() -> &'static File {
     static READ: LazyLock<File> = LazyLock::new(|| {
-        toml::from_str(include_str!("../../data/tvsmc-2015.toml"))
-            .unwrap_or_else(|error| panic!("{error}"))
+        data::embedded("tvsmc-2015.toml", include_str!("../../data/tvsmc-2015.toml"))
     });
     &READ
 }
 
 fn body() -> RigidBody {
+    // This cannot fail, as the tests that use it show: the scenario is embedded.
     Scenario::tvsmc2015().inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"))
 }
 
