@@ -50,9 +50,38 @@ pub fn watch() {
     unsafe { libc::atexit(on_exit) };
 }
 
-/// Watches for nothing: this system has no signals.
-#[cfg(not(unix))]
+/// Watches for crashes, which the C library passes on as signals, and for calls of `exit`, from now
+/// on. If a unit was being called, one line on standard error names it.
+#[cfg(windows)]
+pub fn watch() {
+    for (signal, _) in SIGNALS {
+        // SAFETY: the handler has the type that C wants and stays where it is.
+        unsafe { libc::signal(signal, on_signal as extern "C" fn(libc::c_int) as usize) };
+    }
+    // SAFETY: the function has the type that C wants and stays where it is.
+    unsafe { libc::atexit(on_exit) };
+}
+
+/// Watches for nothing: nothing is known of this system.
+#[cfg(not(any(unix, windows)))]
 pub fn watch() {}
+
+#[cfg(windows)]
+const SIGNALS: [(libc::c_int, &str); 4] = [
+    (libc::SIGSEGV, "SIGSEGV"),
+    (libc::SIGILL, "SIGILL"),
+    (libc::SIGFPE, "SIGFPE"),
+    (libc::SIGABRT, "SIGABRT"),
+];
+
+/// Ends the process. The code of `abort` would be that of a run in which the attitude is lost.
+#[cfg(windows)]
+extern "C" fn on_signal(signal: libc::c_int) {
+    let known = SIGNALS.iter().find(|(known, _)| *known == signal);
+    tell(known.map_or("a signal", |(_, name)| name));
+    // SAFETY: this ends the process at once.
+    unsafe { libc::_exit(1) };
+}
 
 #[cfg(unix)]
 const SIGNALS: [(libc::c_int, &str); 5] = [
@@ -95,7 +124,7 @@ extern "C" fn on_signal(
     }
 }
 
-#[cfg(unix)]
+#[cfg(any(unix, windows))]
 extern "C" fn on_exit() {
     if tell("exit") {
         // SAFETY: this ends the process at once. A unit that ends it must not pass for success.
@@ -104,7 +133,7 @@ extern "C" fn on_exit() {
 }
 
 /// Writes which unit is being called, with system calls only. Returns whether there is one.
-#[cfg(unix)]
+#[cfg(any(unix, windows))]
 fn tell(what: &str) -> bool {
     let Some((unit, call)) = CURRENT.get() else { return false };
     // SAFETY: `Calling` borrows the name as long as the call lasts, which has not returned.
@@ -120,7 +149,7 @@ fn tell(what: &str) -> bool {
     ];
     for part in parts {
         // SAFETY: pointer and length are those of the text. Nobody can be told of a failure.
-        unsafe { libc::write(2, part.as_ptr().cast(), part.len()) };
+        unsafe { libc::write(2, part.as_ptr().cast(), part.len() as _) };
     }
     true
 }
