@@ -42,6 +42,14 @@ MACOS = {
 }
 MACOS_VERSION = [11, 0, 0]
 
+# An experiment with the unit of the orchestrator's own tests.
+ONE_UNIT = """
+title = "one unit"
+simulation = { stop = 4.0, step = 1.0 }
+components.unit = { fmu = "Unit.fmu", unconnected = ["*"] }
+record.variables = ["unit.steps"]
+"""
+
 pytestmark = pytest.mark.skipif(not DIST.is_dir(), reason="no packages: run scripts/package")
 # What runs under an emulator. scripts/package makes the programs, the tests of a change only units.
 PROGRAMS = {"windows-x86_64": "orchestrator.exe", "linux-aarch64": "orchestrator"}
@@ -186,7 +194,7 @@ ZIG = {
 }
 
 
-def compiled(platform: str, source: str, to: Path, *arguments: str) -> Path:
+def compiled(platform: str, source: str | Path, to: Path, *arguments: str) -> Path:
     """Compiles a program or library in C for a platform."""
     compiler = [TARGET / "zig" / "bin" / "python", "-m", "ziglang", "cc", "-target", ZIG[platform], "-s"]
     subprocess.run([*compiler, ROOT / "tests" / "platforms" / source, "-o", to, *arguments], check=True)
@@ -331,6 +339,32 @@ def test_windows_names_a_culprit_in_a_path_with_backslashes(wine):
     there = subprocess.run(command, env=environment, capture_output=True, timeout=120)
     assert there.returncode == 2
     assert "C:\\nö\\such file.toml" in there.stderr.decode()
+
+
+@pytest.mark.parametrize(
+    ("how", "alone", "together"),
+    [
+        ("EXIT", "it ended its process with exit code 0", "(exit)"),
+        ("ABORT", "its last words: a bolt is loose", "(SIGABRT)"),
+        ("SEGFAULT", "exception 0xc0000005 (access to memory that is not its own)", "(SIGSEGV)"),
+    ],
+)
+def test_a_unit_that_ends_its_process_on_windows_is_named(wine, tmp_path, how, alone, together):
+    """The unit harms its process in its third step: in a process of its own, and in that of the program."""
+    emulator, environment = wine
+    unit = ROOT / "orchestrator" / "tests" / "unit"
+    library = compiled("windows-x86_64", unit / "unit.c", tmp_path / "unit.dll", "-shared", "-DPLACE=STEP", f"-DHOW={how}")
+    with zipfile.ZipFile(tmp_path / "Unit.fmu", "w") as archive:
+        archive.write(unit / "modelDescription.xml", "modelDescription.xml")
+        archive.write(library, "binaries/win64/unit.dll")
+    (tmp_path / "one.toml").write_text(ONE_UNIT)
+    command = [*emulator, orchestrator("windows-x86_64"), "run", "one.toml", "--quiet", "--force"]
+    options = {"env": environment, "capture_output": True, "timeout": 120, "cwd": tmp_path}
+    there = subprocess.run(command, **options)
+    assert there.returncode == 1 and alone in there.stderr.decode()
+    assert len((tmp_path / "out" / "one" / "results.csv").read_text().splitlines()) == 4
+    there = subprocess.run([*command, "--isolate=false"], **options)
+    assert there.returncode == 1 and f"unit ended this process in doStep {together}" in there.stderr.decode()
 
 
 def test_ctrl_c_on_windows_ends_a_run_and_keeps_its_results(wine, tmp_path):

@@ -37,8 +37,8 @@ static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 /// Says that this process' program has the command [`COMMAND`], so that units can have processes
 /// of their own.
 pub fn enable() {
-    // On Linux this is the program that runs, also if its file was replaced since. Other systems may
-    // have such a file, too: under Wine it is Wine itself.
+    // On Linux this is the program that runs, also if its file was replaced since. Other systems
+    // may have such a file, too: under Wine it is Wine itself.
     let own = Path::new("/proc/self/exe");
     let own = if cfg!(target_os = "linux") && own.exists() {
         Ok(own.to_path_buf())
