@@ -1,8 +1,8 @@
 //! Table of a unit's variables: the FMI attributes of each, and the field of the model that holds
 //! its value.
 //!
-//! Units declare a hundred variables each, so what a declaration calls is not inlined: libraries are
-//! smaller without that.
+//! Units declare a hundred variables each, so what a declaration calls is not inlined: libraries
+//! are smaller without that.
 
 use crate::scalar::Scalar;
 use model_description::DefaultExperiment;
