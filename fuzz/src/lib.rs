@@ -115,7 +115,24 @@ pub const TARGETS: [(&str, Target); 10] = [
     ("table", table),
 ];
 
-/// Reads a table of reference values.
+/// Reads a table of reference values, and one that is a unit, whose outputs are finite at any time.
 pub fn table(data: &[u8]) {
     let _ = LookupTable::from_csv("t.csv", data);
+    let Ok(fmu) = Fmu::open(&file("t.csv", data)) else { return };
+    let mut unit = fmu.instantiate("t", None).expect("a table needs no library");
+    let description = &fmu.description;
+    let (_, interpolation) = description.find("interpolation").expect("every table has it");
+    for mode in [1, 2] {
+        unit.reset().expect("nothing is wrong");
+        unit.set_integer(&[interpolation.reference], &[mode]).expect("1 is hold, 2 is linear");
+        unit.enter_initialization(0.0, 1.0).expect("the rows are in order");
+        for time in [-1e9, 0.0, 0.5, 1.0, 7.0, 1e9] {
+            unit.do_step(time, 0.0).expect("a step does nothing else");
+            for output in description.variables.iter().filter(|v| v.causality == "output") {
+                let mut value = [0.0];
+                unit.get_real(&[output.reference], &mut value).expect("the variable is there");
+                assert!(value[0].is_finite(), "{} at {time} s", output.name);
+            }
+        }
+    }
 }

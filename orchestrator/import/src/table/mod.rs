@@ -20,6 +20,9 @@ const LARGEST: u64 = 1 << 30;
 /// Largest number of times and values of a table in which they are parameters.
 const MOST_PARAMETERS: usize = 1000;
 
+/// Largest magnitude of a time, s, with which all differences of times can be computed.
+const LONGEST: f64 = 1e12;
+
 /// The columns of a file over time.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Table {
@@ -114,6 +117,9 @@ impl Table {
                 format!("line {line}: \"{name}\" is \"{text}\", it must be {wanted}")
             };
             let time = number(&row[0]).map_err(|wanted| wrong(0, wanted))?;
+            if time.abs() > LONGEST {
+                return Err(wrong(0, &format!("within {LONGEST:e} s of zero")));
+            }
             if times.last().is_some_and(|before| *before > time) {
                 return Err(wrong(0, "no earlier than in the row before"));
             }

@@ -118,6 +118,7 @@ fn faults_name_line_and_column() {
             "time,x\n1,1\n0,1\n",
             "line 3: \"time\" is \"0\", it must be no earlier than in the row before",
         ),
+        ("time,x\n-1e13,1\n", "line 2: \"time\" is \"-1e13\", it must be within 1e12 s of zero"),
         ("time,x\n0,NaN\n", "line 2: \"x\" is \"NaN\", it must be a finite number"),
         ("time,x [N.m]\n0,1 kN\n", "line 2: \"x [N.m]\" is \"1 kN\", it must be a finite number"),
         (

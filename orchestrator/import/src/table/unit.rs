@@ -1,7 +1,7 @@
 //! A table that is stepped as a unit.
 
 use super::description::{HOLD, LINEAR, Place};
-use super::{Form, Table};
+use super::{Form, LONGEST, Table};
 use crate::unit::{CoSimulationUnit, Outcome, UnitFailure};
 use std::sync::Arc;
 
@@ -60,8 +60,8 @@ impl TableUnit {
         } else {
             ((time - times[last]) / (times[next] - times[last])).clamp(0.0, 1.0)
         };
-        // A part of zero must not bring in the next value, which may be far away.
-        let value = if part == 0.0 { of(last) } else { of(last) + part * (of(next) - of(last)) };
+        // Neither the difference of two values nor a product with zero may overflow.
+        let value = if part == 0.0 { of(last) } else { (1.0 - part) * of(last) + part * of(next) };
         self.scales[column] * value
     }
 
@@ -91,6 +91,9 @@ impl TableUnit {
             }
             Place::Interpolation => {
                 return refuse(format!("interpolation = {value} is neither {HOLD} nor {LINEAR}"));
+            }
+            Place::Shift | Place::Time(_) if value.abs() > LONGEST => {
+                return refuse(format!("{value} s is not within {LONGEST:e} s of zero"));
             }
             Place::Shift => self.shift = value,
             Place::Scale(column) => self.scales[column] = value,
