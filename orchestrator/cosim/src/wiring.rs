@@ -7,7 +7,6 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use fmu_import::description::{Carrier, Kind, ModelDescription, Variable};
 use fmu_import::names;
-use fmu_import::quantity;
 use fmu_import::quantity::Scaling;
 use fmu_import::warnings::warn_once;
 use std::collections::{BTreeSet, HashSet};
@@ -230,15 +229,13 @@ fn check_match(
         &to.part.description.variables[end.variable].kind,
     );
     match (a, b) {
-        (Kind::Real { unit: a, .. }, Kind::Real { unit: b, .. }) => quantity::conversion(
-            a.as_deref(),
-            &from.part.description.units,
-            b.as_deref(),
-            &to.part.description.units,
-        )
-        .map_err(|difference| {
-            to.refuse(format!("the units of {names} do not match: {difference}"))
-        }),
+        (Kind::Real { unit: a, .. }, Kind::Real { unit: b, .. }) => from
+            .part
+            .description
+            .conversion(a.as_deref(), to.part.description, b.as_deref())
+            .map_err(|difference| {
+                to.refuse(format!("the units of {names} do not match: {difference}"))
+            }),
         (Kind::Enumeration { items: a }, Kind::Enumeration { items: b }) if a != b => {
             Err(to.refuse(format!("{names} are enumerations of different items")))
         }

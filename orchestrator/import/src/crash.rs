@@ -56,7 +56,7 @@ pub fn watch() {
 pub fn watch() {
     for (signal, _) in SIGNALS {
         // SAFETY: the handler has the type that C wants and stays where it is.
-        unsafe { libc::signal(signal, on_signal as extern "C" fn(libc::c_int) as usize) };
+        unsafe { libc::signal(*signal, on_signal as extern "C" fn(libc::c_int) as usize) };
     }
     // SAFETY: the function has the type that C wants and stays where it is.
     unsafe { libc::atexit(on_exit) };
@@ -66,9 +66,11 @@ pub fn watch() {
 #[cfg(not(any(unix, windows)))]
 pub fn watch() {}
 
-#[cfg(windows)]
-const SIGNALS: [(libc::c_int, &str); 4] = [
+#[cfg(any(unix, windows))]
+const SIGNALS: &[(libc::c_int, &str)] = &[
     (libc::SIGSEGV, "SIGSEGV"),
+    #[cfg(unix)]
+    (libc::SIGBUS, "SIGBUS"),
     (libc::SIGILL, "SIGILL"),
     (libc::SIGFPE, "SIGFPE"),
     (libc::SIGABRT, "SIGABRT"),
@@ -83,19 +85,10 @@ extern "C" fn on_signal(signal: libc::c_int) {
     unsafe { libc::_exit(1) };
 }
 
-#[cfg(unix)]
-const SIGNALS: [(libc::c_int, &str); 5] = [
-    (libc::SIGSEGV, "SIGSEGV"),
-    (libc::SIGBUS, "SIGBUS"),
-    (libc::SIGILL, "SIGILL"),
-    (libc::SIGFPE, "SIGFPE"),
-    (libc::SIGABRT, "SIGABRT"),
-];
-
 /// The handlers that were there before: Rust's own tells of a stack that is used up.
 #[cfg(unix)]
-static mut PREVIOUS: [std::mem::MaybeUninit<libc::sigaction>; 5] =
-    [const { std::mem::MaybeUninit::zeroed() }; 5];
+static mut PREVIOUS: [std::mem::MaybeUninit<libc::sigaction>; SIGNALS.len()] =
+    [const { std::mem::MaybeUninit::zeroed() }; SIGNALS.len()];
 
 #[cfg(unix)]
 type Handler = extern "C" fn(libc::c_int, *mut libc::siginfo_t, *mut libc::c_void);

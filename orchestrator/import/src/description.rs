@@ -4,7 +4,7 @@
 
 mod read;
 
-use crate::quantity::UnitDefinition;
+use crate::quantity::{self, Scaling, UnitDefinition};
 use crate::xml::Element;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -45,6 +45,8 @@ pub struct ModelDescription {
     /// Positions, in `variables`, of the variables that each output depends on at the same instant;
     /// only for outputs that declare them.
     pub dependencies: BTreeMap<usize, Vec<usize>>,
+    /// Whether this describes a table, whose units are only named.
+    pub is_table: bool,
     /// Whether the file has a `ModelStructure`, which FMI requires.
     pub has_structure: bool,
     /// Index of the variables by name.
@@ -160,6 +162,23 @@ impl ModelDescription {
         let take = |root: &Element, parent: &str, element| variables.take(root, parent, element);
         let root = Element::parse_with(text, take)?;
         read::description(&root, variables)
+    }
+
+    /// Returns the scaling that converts values in a unit of this side to values in one of another.
+    ///
+    /// # Errors
+    /// Returns an error that says how the units differ, if they do not measure the same quantity.
+    pub fn conversion(
+        &self,
+        unit: Option<&str>,
+        to: &Self,
+        wanted: Option<&str>,
+    ) -> Result<Scaling, String> {
+        if self.is_table {
+            quantity::named(unit, wanted, &to.units)
+        } else {
+            quantity::conversion(unit, &self.units, wanted, &to.units)
+        }
     }
 
     /// Finds the variable with this name and returns it with its position.

@@ -94,7 +94,7 @@ impl Fmu {
 
     /// Returns whether the file is a table, which runs no code of its own.
     pub fn is_table(&self) -> bool {
-        matches!(self.content, Content::Table(_))
+        self.description.is_table
     }
 
     /// Returns whether this project's packer made the unit, so that it is trusted to do no harm to

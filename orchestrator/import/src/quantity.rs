@@ -81,8 +81,7 @@ pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Re
     Ok((unit.factor * in_unit + unit.offset - target.offset) / target.factor)
 }
 
-/// Returns the scaling that converts values in one unit to values in another. If what the first one
-/// measures is not stated, as in a table, its name is looked up among the units of the other side.
+/// Returns the scaling that converts values in one unit to values in another.
 ///
 /// # Errors
 /// Returns an error that says how the units differ, if they do not measure the same quantity.
@@ -94,12 +93,9 @@ pub fn conversion(
 ) -> Result<Scaling, String> {
     let unchanged = Ok(Scaling::default());
     let (Some(from), Some(to)) = (from, to) else {
-        // An FMU that defines no units at all cannot be held to them, nor a column of a table that
-        // states none.
-        let defines_none = |units: &[UnitDefinition]| units.iter().all(|u| u.exponents.is_none());
+        // An FMU that defines no units at all cannot be held to them.
         let known = [(from, from_units), (to, to_units)];
-        return if from == to
-            || known.iter().any(|(unit, units)| unit.is_none() && defines_none(units))
+        return if from == to || known.iter().any(|(unit, units)| unit.is_none() && units.is_empty())
         {
             unchanged
         } else {
@@ -122,18 +118,33 @@ pub fn conversion(
             }
         }
         _ if from == to => unchanged,
-        (Some(a), _) if a.exponents.is_none() => {
-            let of = |value: f64| convert(&format!("{value} {from}"), Some(to), to_units);
-            let is_known = to_units.iter().any(|unit| {
-                unit.name == from || unit.displays.iter().any(|(name, ..)| name == from)
-            });
-            match of(0.0).and_then(|zero| Ok((zero, of(1.0)?))) {
-                Ok((zero, one)) => Ok(Scaling { factor: one - zero, offset: zero }),
-                Err(_) if is_known => Err(format!("{from} against {to}")),
-                Err(problem) => Err(format!("{from} against {to}: {problem}")),
-            }
-        }
         _ => Err(format!("{from} against {to}")),
+    }
+}
+
+/// Returns the scaling that converts values of a table, whose unit is only named, to values in
+/// another unit. Without a name they are in that unit already.
+///
+/// # Errors
+/// Returns an error if the other side defines no unit of this name that measures the same quantity.
+pub fn named(
+    from: Option<&str>,
+    to: Option<&str>,
+    to_units: &[UnitDefinition],
+) -> Result<Scaling, String> {
+    let Some(from) = from else { return Ok(Scaling::default()) };
+    let Some(to) = to else { return Err(format!("{from} against no unit")) };
+    if from == to {
+        return Ok(Scaling::default());
+    }
+    let of = |value: f64| convert(&format!("{value} {from}"), Some(to), to_units);
+    let is_known = to_units
+        .iter()
+        .any(|unit| unit.name == from || unit.displays.iter().any(|(name, ..)| name == from));
+    match of(0.0).and_then(|zero| Ok((zero, of(1.0)?))) {
+        Ok((zero, one)) => Ok(Scaling { factor: one - zero, offset: zero }),
+        Err(_) if is_known => Err(format!("{from} against {to}")),
+        Err(problem) => Err(format!("{from} against {to}: {problem}")),
     }
 }
 
@@ -258,15 +269,7 @@ mod tests {
 
     #[test]
     fn oracle_a_unit_that_is_only_named_is_that_of_the_other_side() {
-        let unit = |name: &str| UnitDefinition {
-            name: name.into(),
-            exponents: None,
-            factor: 1.0,
-            offset: 0.0,
-            displays: Vec::new(),
-        };
-        let named = ["deg", "rad", "degC", "min", "knots"].map(unit);
-        let scaling = |from, to| conversion(from, &named, to, &units());
+        let scaling = |from, to| named(from, to, &units());
         assert_eq!(scaling(Some("rad"), Some("rad")), Ok(Scaling::default()));
         assert_eq!(scaling(None, Some("rad")), Ok(Scaling::default()));
         let angle = scaling(Some("deg"), Some("rad")).unwrap();

@@ -119,6 +119,7 @@ pub(super) fn description(
         },
         units: units.map(unit).collect::<Result<_, _>>()?,
         dependencies: dependencies(root, variables.len())?,
+        is_table: false,
         has_structure: root.child("ModelStructure").is_some(),
         variables,
         by_name: ByName::default(),

@@ -61,6 +61,7 @@ impl Table {
             }),
             units: units.into_iter().map(unit).collect(),
             dependencies: (0..self.columns.len()).map(|output| (output, Vec::new())).collect(),
+            is_table: true,
             has_structure: true,
             variables,
             ..ModelDescription::default()

@@ -19,8 +19,17 @@ pub(crate) struct TableUnit {
     shift: f64,
     /// Factor of each column.
     scales: Vec<f64>,
-    time: f64,
+    present: Present,
     is_running: bool,
+}
+
+/// Where the present time is among the rows.
+#[derive(Clone, Copy, Default)]
+struct Present {
+    last: usize,
+    next: usize,
+    /// Part of the way from the last row to the next.
+    part: f64,
 }
 
 impl TableUnit {
@@ -30,7 +39,7 @@ impl TableUnit {
             interpolation: HOLD,
             shift: 0.0,
             scales: vec![1.0; table.columns.len()],
-            time: 0.0,
+            present: Present::default(),
             is_running: false,
             file: table.clone(),
             table,
@@ -42,26 +51,33 @@ impl TableUnit {
         place.ok_or_else(|| UnitFailure::new(call, format!("there is no variable {reference}")))
     }
 
-    /// Returns the value of a column at the present time. Before the first row it is that of the
-    /// first, and after the last row that of the last.
-    fn at_present(&self, column: usize) -> f64 {
-        let Table { columns, times, values } = &self.table;
-        let of = |row: usize| values[row * columns.len() + column];
-        let time = self.time - self.shift;
+    /// Goes to a time. Before the first row the values are those of the first, and after the last row
+    /// those of the last.
+    fn go_to(&mut self, time: f64) {
+        let (times, time) = (&self.table.times, time - self.shift);
         let is_past = |row: &f64| *row <= time + TOLERANCE * time.abs().max(1.0);
         let next = times.partition_point(is_past);
         let last = next.saturating_sub(1);
-        let is_held = self.interpolation == HOLD
-            || !matches!(columns[column].form, Form::Real(_))
-            || next == 0
-            || next == times.len();
-        let part = if is_held {
-            0.0
+        self.present = if next == 0 || next == times.len() {
+            Present { last, next: last, part: 0.0 }
         } else {
-            ((time - times[last]) / (times[next] - times[last])).clamp(0.0, 1.0)
+            let part = (time - times[last]) / (times[next] - times[last]);
+            Present { last, next, part: part.clamp(0.0, 1.0) }
         };
+    }
+
+    /// Returns the value of a column at the present time.
+    fn at_present(&self, column: usize) -> f64 {
+        let Table { columns, values, .. } = &self.table;
+        let of = |row: usize| values[row * columns.len() + column];
+        let Present { last, next, part } = self.present;
+        let is_held = self.interpolation == HOLD || !matches!(columns[column].form, Form::Real(_));
         // Neither the difference of two values nor a product with zero may overflow.
-        let value = if part == 0.0 { of(last) } else { (1.0 - part) * of(last) + part * of(next) };
+        let value = if is_held || part == 0.0 {
+            of(last)
+        } else {
+            (1.0 - part) * of(last) + part * of(next)
+        };
         self.scales[column] * value
     }
 
@@ -164,7 +180,8 @@ impl CoSimulationUnit for TableUnit {
                 ),
             ));
         }
-        (self.time, self.is_running) = (start, true);
+        self.is_running = true;
+        self.go_to(start);
         Ok(())
     }
 
@@ -173,7 +190,7 @@ impl CoSimulationUnit for TableUnit {
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
-        self.time = time + step;
+        self.go_to(time + step);
         Ok(())
     }
 
