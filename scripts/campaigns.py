@@ -21,7 +21,8 @@ that broke a limit while it was. [campaigns.md](campaigns.md) says what the numb
 
 Controllers are at the settings of Chai 2022 where their names are those of experiments
 (`crmpc-robust`), and else at their units' own settings: only the inertia that they believe, the
-limits and the reference come from the scenario. None was designed for the others' scenarios.
+limits and the reference come from the scenario. None was designed for the others' scenarios. With
+sensors, CRMPC has the softer gain and the bounds of the campaign's experiment.
 """
 
 PAPER_SETS = ["controller.constraints=paper", "controller.feedback.k1=-5", "controller.feedback.k2=-5"]
@@ -135,10 +136,20 @@ def section(name: str) -> str:
 
 def main() -> None:
     orchestrator, fmus, *names = sys.argv[1:]
+    if unknown := sorted(set(names) - set(CAMPAIGNS)):
+        sys.exit(f"there is no campaign {unknown[0]}; there are {', '.join(CAMPAIGNS)}")
     for name in names or CAMPAIGNS:
         for controller, arguments in CAMPAIGNS[name].controllers.items():
             where = ["--fmu-dir", fmus, "--out", folder(name, controller)]
             subprocess.run([orchestrator, "campaign", name, *arguments, *where], check=True)
+    missing = [
+        f"{name} with {controller}"
+        for name, campaign in CAMPAIGNS.items()
+        for controller in campaign.controllers
+        if not (folder(name, controller) / "summary.json").is_file()
+    ]
+    if missing:
+        sys.exit(f"{PAGE} stays as it is: there is no {missing[0]} in {OUT}, and {len(missing) - 1} more are missing")
     PAGE.write_text(HEAD + "".join(map(section, CAMPAIGNS)), encoding="utf-8")
 
 

@@ -51,8 +51,8 @@ impl TableUnit {
         place.ok_or_else(|| UnitFailure::new(call, format!("there is no variable {reference}")))
     }
 
-    /// Goes to a time. Before the first row the values are those of the first, and after the last row
-    /// those of the last.
+    /// Goes to a time. Before the first row the values are those of the first, and after the last
+    /// row those of the last.
     fn go_to(&mut self, time: f64) {
         let (times, time) = (&self.table.times, time - self.shift);
         let is_past = |row: &f64| *row <= time + TOLERANCE * time.abs().max(1.0);
