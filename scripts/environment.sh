@@ -95,26 +95,30 @@ library() {
     fail "the library of $1 is not in $2"
 }
 
-# The crates whose libraries are packed as FMUs. Icons and generated descriptions of the units stand
-# in their folders.
-unit_crates=(fmu-plant fmu-controller)
+# The libraries that are packed as FMUs.
+unit_libraries=(fmu_plant fmu_optimising fmu_feedback)
+
+# The folder with the icons and the generated descriptions of the units in the library $1.
+unit_folder() {
+    if [[ $1 == fmu_plant ]]; then echo fmu-plant; else echo fmu-controller; fi
+}
 
 # Packs every FMU of the libraries in the folder $1 into the folder $2, together with their builds for
 # other platforms in the folders $also, if that is set. Further arguments go to fmu-pack, which runs in
-# the folder of each crate: paths among them are relative to that folder.
+# the folder of the units: paths among them are relative to that folder.
 pack_fmus() {
     say "Packing the FMUs"
-    local crate library licence folder others licences=()
+    local name library licence folder others licences=()
     for licence in "$root"/LICENSE-*; do
         if [[ -f $licence ]]; then licences+=(--license "$licence"); fi
     done
-    for crate in "${unit_crates[@]}"; do
-        library="$(library "${crate//-/_}" "$1")"
+    for name in "${unit_libraries[@]}"; do
+        library="$(library "$name" "$1")"
         others=()
         for folder in "${also[@]+"${also[@]}"}"; do
-            others+=(--also "$(library "${crate//-/_}" "$folder")")
+            others+=(--also "$(library "$name" "$folder")")
         done
-        (cd "$crate" && "$programs/fmu-pack" "$library" "${others[@]+"${others[@]}"}" \
+        (cd "$(unit_folder "$name")" && "$programs/fmu-pack" "$library" "${others[@]+"${others[@]}"}" \
             --output "$2" --icons icons "${licences[@]+"${licences[@]}"}" "${@:3}")
     done
 }

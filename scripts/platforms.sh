@@ -136,12 +136,11 @@ built() {
 # Builds the unit libraries for the platform $1.
 build_units() {
     say "Building the units for $1"
-    local triple crate
-    for triple in $(triples "$1"); do
-        cross_build "$triple" --release --package reentry-fmu-plant --package reentry-fmu-controller
-    done
+    local triple name packages=()
+    for name in "${unit_libraries[@]}"; do packages+=(--package "reentry-${name//_/-}"); done
+    for triple in $(triples "$1"); do cross_build "$triple" --release "${packages[@]}"; done
     if [[ $1 != macos-universal ]]; then return; fi
-    for crate in "${unit_crates[@]}"; do join "lib${crate//-/_}.dylib" release; done
+    for name in "${unit_libraries[@]}"; do join "lib$name.dylib" release; done
 }
 
 # Builds the orchestrator for the platform $1 and puts it into the platform's folder.

@@ -35,16 +35,3 @@ pub type SotvsmcDo = ControllerFmu<tvsmc::TvsmcLaw<tvsmc::SotvsmcDo>>;
 pub type TwoLoopSmc = ControllerFmu<two_loop::TwoLoopLaw>;
 /// `LQR`: linear-quadratic regulator.
 pub type Lqr = ControllerFmu<lqr::LqrLaw>;
-
-fmi2_export::export_fmus!(
-    Crmpc,
-    Dlmpc,
-    Lqr,
-    ControlAllocator,
-    Fbl,
-    Btvsmc,
-    BtvsmcDo,
-    SotvsmcDo,
-    TwoLoopSmc,
-    AttitudeEstimator
-);

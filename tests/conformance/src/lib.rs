@@ -61,7 +61,7 @@ pub struct Unit {
     guid: CString,
 }
 
-/// Opens both libraries and lists their units, the plant first.
+/// Opens the libraries and lists their units, the plant first.
 pub fn units() -> Vec<Unit> {
     let open = |krate| {
         let path = library(krate);
@@ -74,7 +74,7 @@ pub fn units() -> Vec<Unit> {
             description,
         })
     };
-    ["fmu_plant", "fmu_controller"].into_iter().flat_map(open).collect()
+    ["fmu_plant", "fmu_optimising", "fmu_feedback"].into_iter().flat_map(open).collect()
 }
 
 /// Returns the unit with that name.

@@ -54,16 +54,18 @@ fn taken_from_the_platform(krate: &str) -> BTreeSet<&'static str> {
 }
 
 #[test]
-fn the_plant_takes_no_elementary_function_from_the_platform() {
-    assert_eq!(taken_from_the_platform("fmu_plant"), BTreeSet::new());
+fn units_without_a_solver_take_no_elementary_function_from_the_platform() {
+    for library in ["fmu_plant", "fmu_feedback"] {
+        assert_eq!(taken_from_the_platform(library), BTreeSet::new(), "{library}");
+    }
 }
 
 /// Clarabel's cones of exponentials and powers call these three. No optimisation here has such
 /// cones (control/tests/platform_functions.rs).
 #[test]
-fn the_controllers_take_no_elementary_function_from_the_platform() {
+fn units_with_a_solver_take_no_other_elementary_function_from_the_platform() {
     let of_clarabel = BTreeSet::from(["exp", "log", "pow"]);
-    let taken = taken_from_the_platform("fmu_controller");
+    let taken = taken_from_the_platform("fmu_optimising");
     assert!(taken.is_subset(&of_clarabel), "{taken:?}");
 }
 
@@ -72,10 +74,10 @@ fn the_controllers_take_no_elementary_function_from_the_platform() {
 fn no_library_has_kernels_that_are_chosen_by_the_processor() {
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["tree", "--locked", "--offline", "--edges", "normal", "--prefix", "none"]);
-    let tree = cargo
-        .args(["--package", "reentry-fmu-plant", "--package", "reentry-fmu-controller"])
-        .output()
-        .unwrap();
+    for library in ["plant", "optimising", "feedback"] {
+        cargo.arg("--package").arg(format!("reentry-fmu-{library}"));
+    }
+    let tree = cargo.output().unwrap();
     assert!(tree.status.success(), "{}", String::from_utf8_lossy(&tree.stderr));
     let tree = String::from_utf8(tree.stdout).unwrap();
     assert!(tree.lines().any(|line| line.starts_with("nalgebra v")), "{tree}");

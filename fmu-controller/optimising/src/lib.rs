@@ -1,0 +1,7 @@
+//! The library of the units that optimise while they run. Only it holds the solvers: they are a
+//! fifth of its size.
+#![deny(clippy::disallowed_methods)]
+
+use fmu_controller::{ControlAllocator, Crmpc, Dlmpc};
+
+fmi2_export::export_fmus!(Crmpc, Dlmpc, ControlAllocator);
