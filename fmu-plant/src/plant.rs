@@ -20,8 +20,8 @@ pub struct ReentryPlant {
     pub(crate) input: Input,
     pub(crate) command: Command,
     pub(crate) output: Output,
-    /// Simulated plant, which exists from initialization on.
-    pub(crate) plant: Option<Plant>,
+    /// Simulated plant, which exists from initialization on. It is large, and every step moves it.
+    pub(crate) plant: Option<Box<Plant>>,
     /// Dynamic pressure of the flight, Pa.
     pub(crate) dynamic_pressure: f64,
     /// Whether the unit runs in model exchange: held quantities then change at events only, and not
@@ -48,7 +48,7 @@ pub(crate) struct Output {
 
 impl ReentryPlant {
     pub(crate) fn ready(&self) -> Result<&Plant, Failure> {
-        self.plant.as_ref().ok_or_else(|| Failure::Error("the plant is not initialized".into()))
+        self.plant.as_deref().ok_or_else(|| Failure::Error("the plant is not initialized".into()))
     }
 
     /// Disturbance and commands that act at `time` (s).

@@ -42,7 +42,7 @@ impl Model for ReentryPlant {
         let failed = |error: vehicle::Error| Failure::Error(by_variable(&error, table::FIELDS));
         self.dynamic_pressure = self.parameters.dynamic_pressure().map_err(failed)?;
         let config = self.parameters.config().map_err(failed)?;
-        self.plant = Some(Plant::new(&config, context.start_time).map_err(failed)?);
+        self.plant = Some(Box::new(Plant::new(&config, context.start_time).map_err(failed)?));
         self.event_driven = false;
         Ok(())
     }

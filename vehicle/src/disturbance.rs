@@ -7,7 +7,7 @@ use crate::dynamics::RigidBody;
 use crate::error::Error;
 use crate::kinematics::Kinematics;
 use crate::math::sin;
-use crate::noise::uniform;
+use crate::noise::{Stream, uniform};
 use crate::time::{tick, tick_time, tolerance};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -89,7 +89,7 @@ pub struct MomentWave {
     pub phase: f64,
 }
 
-/// State of the vehicle that the state-dependent kinds use to choose Δ.
+/// State of the vehicle that the state-dependent kinds use to choose Δ, and what saves time.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     /// Rigid body of the vehicle, with its inertia.
@@ -102,6 +102,9 @@ pub struct View<'a> {
     pub rates: Vector3<f64>,
     /// Control moment m about the body axes, N m.
     pub moment: Vector3<f64>,
+    /// Random numbers of the disturbance's seed, from a tick near the present one: the white noise
+    /// has a short way to its own.
+    pub noise: Option<&'a Stream<3>>,
 }
 
 impl Default for Disturbance {
@@ -212,7 +215,11 @@ impl Disturbance {
     pub fn sample(&self, tick: i64, view: &View) -> Vector3<f64> {
         match self.kind {
             Kind::None | Kind::Sine => Vector3::zeros(),
-            Kind::White => Vector3::from(uniform(self.seed, tick)) * self.bound,
+            Kind::White => {
+                let near = view.noise.filter(|noise| noise.seed() == self.seed);
+                let drawn = near.map_or_else(|| uniform(self.seed, tick), |noise| noise.at(tick));
+                Vector3::from(drawn) * self.bound
+            }
             Kind::Constant => self.direction * self.bound,
             Kind::Square => {
                 self.direction * if tick.rem_euclid(2) == 0 { self.bound } else { -self.bound }

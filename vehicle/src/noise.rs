@@ -6,12 +6,48 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
 /// Returns the `N` numbers of a tick, uniform in [−1, 1), by jumping ahead in the generator's
-/// sequence.
+/// stream.
 pub fn uniform<const N: usize>(seed: u64, tick: i64) -> [f64; N] {
-    let mut generator = Pcg64::seed_from_u64(seed);
-    // Ticks before 0 step the generator backwards, because the distance is taken modulo 2¹²⁸.
-    generator.advance((N as i128 * i128::from(tick)) as u128);
-    std::array::from_fn(|_| (generator.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0)
+    Stream::new(seed).at(tick)
+}
+
+/// The numbers of [`uniform`] for ticks that follow each other. It stands at a tick, and a jump
+/// takes less time the nearer its end is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stream<const N: usize> {
+    seed: u64,
+    tick: i64,
+    generator: Pcg64,
+}
+
+impl<const N: usize> Stream<N> {
+    /// Makes the stream of a seed, which stands at tick 0.
+    pub fn new(seed: u64) -> Self {
+        Self { seed, tick: 0, generator: Pcg64::seed_from_u64(seed) }
+    }
+
+    /// Seed of the numbers.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Moves to a tick.
+    pub fn move_to(&mut self, tick: i64) {
+        let ticks = i128::from(tick) - i128::from(self.tick);
+        // Ticks further back step the generator backwards, because the distance is taken modulo
+        // 2¹²⁸.
+        self.generator.advance((N as i128 * ticks) as u128);
+        self.tick = tick;
+    }
+
+    /// The `N` numbers of a tick, uniform in [−1, 1).
+    pub fn at(&self, tick: i64) -> [f64; N] {
+        let mut there = self.clone();
+        there.move_to(tick);
+        std::array::from_fn(|_| {
+            (there.generator.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        })
+    }
 }
 
 /// Turns two uniform numbers in [−1, 1) into two independent normal ones of variance 1 by the
@@ -37,6 +73,17 @@ mod tests {
             assert_eq!(uniform(7, tick), expected, "tick {tick}");
         }
         assert!(uniform::<3>(7, i64::MIN).iter().all(|value| value.abs() <= 1.0));
+    }
+
+    #[test]
+    fn oracle_numbers_do_not_depend_on_where_the_stream_stands() {
+        let mut stream = Stream::<3>::new(7);
+        for tick in [5, 6, 1250, -3, i64::MAX, i64::MIN, 0] {
+            stream.move_to(tick);
+            for wanted in [tick, tick.saturating_add(1), tick.saturating_sub(1), 0] {
+                assert_eq!(stream.at(wanted), uniform(7, wanted), "from {tick} to {wanted}");
+            }
+        }
     }
 
     #[test]

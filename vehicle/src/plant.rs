@@ -5,13 +5,14 @@ mod sensing;
 
 use crate::actuators::{self, Actuators, Command, Drive};
 use crate::calibration::Sequence;
-use crate::disturbance::{Disturbance, View};
+use crate::disturbance::{Disturbance, Kind, View};
 use crate::dynamics::{Inertia, RigidBody};
 use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::error::Error;
 use crate::integrator::{equal_steps, rk4};
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
 pub use crate::motion::{BETA_LIMIT, State, angles, rates, state};
+use crate::noise::Stream;
 use crate::platform::Surroundings;
 use crate::sensors::{self, Sensors};
 use crate::time::{check_resolution, tolerance};
@@ -36,11 +37,22 @@ pub fn derivative(body: &RigidBody, kinematics: Kinematics, state: &State, load:
     let (angles, rates) = (angles(state), rates(state));
     let (matrix, inverse) = kinematics.r_and_inverse(&angles);
     let acceleration = body.angular_acceleration(&rates, &load.moment) + inverse * load.delta;
-    let mut angle_rates = matrix * rates;
-    if load.turn_rate != Vector3::zeros() {
-        angle_rates += kinematics.turn(&angles) * load.turn_rate;
-    }
+    let angle_rates = angle_rates(kinematics, &matrix, state, &load.turn_rate);
     self::state(&angle_rates, &acceleration)
+}
+
+/// Rates Θ̇ of the attitude angles (rad/s) by Wu 2015 (1), with R at the state as `matrix`.
+fn angle_rates(
+    kinematics: Kinematics,
+    matrix: &Matrix3<f64>,
+    state: &State,
+    turn_rate: &Vector3<f64>,
+) -> Vector3<f64> {
+    let angle_rates = matrix * rates(state);
+    if *turn_rate == Vector3::zeros() {
+        return angle_rates;
+    }
+    angle_rates + kinematics.turn(&angles(state)) * turn_rate
 }
 
 /// Partial derivatives of the state derivative [`derivative`].
@@ -197,6 +209,9 @@ pub struct Plant {
     step: f64,
     start_time: f64,
     held: Option<Held>,
+    /// Random numbers of the white noise, near the present tick. They follow from the seed.
+    #[serde(skip)]
+    noise: Option<Stream<3>>,
     /// Present state of the vehicle, rad and rad/s.
     pub state: State,
     /// Present deflections of the surfaces, rad; zero without actuators.
@@ -266,6 +281,7 @@ impl Plant {
             step: config.step,
             start_time,
             held: None,
+            noise: None,
             state,
             deflections: Surfaces::zeros(),
         })
@@ -369,8 +385,14 @@ impl Plant {
             _ => {
                 let (angles, rates) = (self.angles(), self.rates());
                 let moment = self.control_moment(input, delayed, &drive, 0.0);
-                let view =
-                    View { body: &self.body, kinematics: self.kinematics, angles, rates, moment };
+                let view = View {
+                    body: &self.body,
+                    kinematics: self.kinematics,
+                    angles,
+                    rates,
+                    moment,
+                    noise: self.noise.as_ref(),
+                };
                 Held {
                     tick,
                     since: time,
@@ -393,7 +415,7 @@ impl Plant {
         }
         let held = self.in_force(time, input, command);
         self.settle(time, &held);
-        *self.held.insert(held)
+        self.adopt(held)
     }
 
     /// Does the work of [`Plant::hold`] between two communication points, where no commands are
@@ -403,7 +425,15 @@ impl Plant {
         let directed =
             |actuators: &Actuators| actuators.directed(time, before.drive, &self.deflections);
         let drive = self.actuators.as_ref().map_or_else(Drive::default, directed);
-        *self.held.insert(self.drawn(time, input, drive))
+        self.adopt(self.drawn(time, input, drive))
+    }
+
+    fn adopt(&mut self, held: Held) -> Held {
+        if self.disturbance.kind == Kind::White {
+            let seed = self.disturbance.seed;
+            self.noise.get_or_insert_with(|| Stream::new(seed)).move_to(held.tick);
+        }
+        *self.held.insert(held)
     }
 
     fn settle(&mut self, time: f64, held: &Held) {

@@ -45,6 +45,7 @@ fn still(body: &RigidBody) -> View<'_> {
         angles: Vector3::zeros(),
         rates: Vector3::zeros(),
         moment: Vector3::zeros(),
+        noise: None,
     }
 }
 
@@ -56,7 +57,7 @@ proptest! {
     #[test]
     fn each_component_keeps_the_bound(seed: u64, tick in 0..1_000_000_i64, angles in vector(1.0), rates in vector(0.1), moment in vector(1e5)) {
         let body = body();
-        let view = View { body: &body, kinematics: Kinematics::Printed, angles, rates, moment };
+        let view = View { body: &body, kinematics: Kinematics::Printed, angles, rates, moment, noise: None };
         for kind in [Kind::None, Kind::White, Kind::Constant, Kind::Square, Kind::AlongRate, Kind::AgainstMoment] {
             let delta = Disturbance { seed, ..of(kind) }.sample(tick, &view);
             prop_assert!(delta.amax() <= 0.035, "{kind:?}: {delta}");
@@ -66,7 +67,7 @@ proptest! {
     #[test]
     fn state_dependent_kinds_choose_the_worst_corner(angles in vector(1.0), rates in vector(0.1), moment in vector(1e5)) {
         let body = body();
-        let view = View { body: &body, kinematics: Kinematics::Printed, angles, rates, moment };
+        let view = View { body: &body, kinematics: Kinematics::Printed, angles, rates, moment, noise: None };
         let along = of(Kind::AlongRate).sample(0, &view);
         let against = of(Kind::AgainstMoment).sample(0, &view);
         let control = kinematics::r(&angles) * body.inverse * moment;

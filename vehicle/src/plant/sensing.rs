@@ -1,7 +1,7 @@
 //! Measurements of the plant: the readings of ideal sensors and the samples that the sensors
 //! output.
 
-use super::{Held, Input, Load, Plant};
+use super::{Held, Input, Load, Plant, angle_rates, angles};
 use crate::kinematics::TRAJECTORY;
 use crate::platform::{Pose, Readings};
 use crate::sensors::{Sample, Sensors};
@@ -17,12 +17,17 @@ impl Plant {
     }
 
     fn pose(&self, time: f64, input: &Input) -> Pose {
-        let load = Load { turn_rate: self.turn_rate(input), ..Load::default() };
+        let angle_rates = if self.calibration.is_some() {
+            angles(&self.derivative_at(time, &self.state, &Load::default()))
+        } else {
+            let matrix = self.kinematics.r(&self.angles());
+            angle_rates(self.kinematics, &matrix, &self.state, &self.turn_rate(input))
+        };
         Pose {
             kinematics: self.kinematics,
             angles: self.angles(),
             rates: self.rates(),
-            alpha_rate: self.derivative_at(time, &self.state, &load)[0],
+            alpha_rate: angle_rates.x,
             trajectory: input.trajectory,
         }
     }
