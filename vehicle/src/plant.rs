@@ -415,7 +415,7 @@ impl Plant {
         }
         let held = self.in_force(time, input, command);
         self.settle(time, &held);
-        self.adopt(held)
+        self.adopt(&held)
     }
 
     /// Does the work of [`Plant::hold`] between two communication points, where no commands are
@@ -425,15 +425,15 @@ impl Plant {
         let directed =
             |actuators: &Actuators| actuators.directed(time, before.drive, &self.deflections);
         let drive = self.actuators.as_ref().map_or_else(Drive::default, directed);
-        self.adopt(self.drawn(time, input, drive))
+        self.adopt(&self.drawn(time, input, drive))
     }
 
-    fn adopt(&mut self, held: Held) -> Held {
+    fn adopt(&mut self, held: &Held) -> Held {
         if self.disturbance.kind == Kind::White {
             let seed = self.disturbance.seed;
             self.noise.get_or_insert_with(|| Stream::new(seed)).move_to(held.tick);
         }
-        *self.held.insert(held)
+        *self.held.insert(*held)
     }
 
     fn settle(&mut self, time: f64, held: &Held) {
