@@ -1,5 +1,5 @@
 //! Benchmarks through the C interface: `fmi2DoStep` of plant and controller, and the whole 50 s
-//! loop of Chai 2022 through both libraries (white noise, inertia + 5 %).
+//! loop of Chai 2022 through their libraries (white noise, inertia + 5 %).
 //!
 //! The loop contains only the work that every master must do, 1250 times: set the controller's
 //! inputs, read its moment, set the plant's moment and step both. Instantiation and initialization
