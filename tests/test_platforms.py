@@ -29,10 +29,11 @@ FOLDERS = {
     "macos-aarch64": {"darwin64": "dylib"},
 }
 # Every file of an experiment that `run` takes: no parts, studies, campaigns or tables of published numbers.
+PARTS = ("any", "any-allocated", "study", "published", "computed")
 EXPERIMENTS = [
     path
     for path in sorted((ROOT / "orchestrator" / "experiments").glob("*/*.toml"))
-    if path.parent.name not in ("base", "campaigns", "exchange") and path.stem not in ("study", "published", "computed")
+    if path.parent.name not in ("base", "campaigns") and path.stem not in PARTS
 ]
 # What Windows 10 and macOS 11 have.
 WINDOWS = ("api-ms-win-core-", "api-ms-win-crt-", "bcryptprimitives.", "kernel32.", "ntdll.", "userenv.", "ws2_32.")

@@ -1,6 +1,6 @@
 //! Tests of what the program refuses, in the command line and in files, and of what it finds.
 
-use crate::bench::{Bench, LOOP};
+use crate::bench::{Bench, LOOP, Recipe};
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -248,6 +248,27 @@ fn wrong_wiring_is_refused() {
         "from = \"plant.*\"\nto = \"gain.none.*\"",
     );
     assert!(message.contains("there are: input"), "{message}");
+}
+
+#[test]
+fn whole_numbers_are_passed_on() {
+    let as_input = |text: String| {
+        let (before, after) = text.split_once("name=\"noise.seed\"").unwrap();
+        let after = after.replacen("parameter", "input", 1).replacen("fixed", "discrete", 1);
+        format!("{before}name=\"noise.seed\"{after}")
+    };
+    let connected = "[[connections]]\nfrom = \"plant.steps\"\nto = \"gain.noise.seed\"\n[record]";
+    let experiment = LOOP
+        .replace("[record]", connected)
+        .replace("[components.plant]", "[components.plant]\nunconnected = [\"noise.seed\"]")
+        .replace("\"plant.steps\"]", "\"gain.noise.seed\"]");
+    let recipe = Recipe { description: &as_input, ..Recipe::default() };
+    let bench = Bench::made(&experiment, &recipe);
+    let (code, _, errors) = bench.run(&[]);
+    assert_eq!(code, 0, "{errors}");
+    let results = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+    let seeds: Vec<&str> = results.lines().skip(1).map(|l| l.rsplit(',').next().unwrap()).collect();
+    assert_eq!(seeds, ["0", "1", "2", "3"]);
 }
 
 #[test]
