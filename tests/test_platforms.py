@@ -303,8 +303,9 @@ def test_oracle_every_platform_computes_the_same_bits(foreign, experiment, tmp_p
     platform, run = foreign
     own = [orchestrator(platform), "run", experiment, "--fmu-dir", DIST / platform / "fmu"]
     there = run(*own, "--out", tmp_path / "there", "--quiet")
-    # A law as printed loses the attitude, which ends the run early and keeps what was recorded.
-    assert here.returncode == (3 if experiment.stem == "printed" else 0), here.stderr.decode()
+    # These lose the attitude, which ends the run early and keeps what was recorded.
+    is_lost = experiment.stem in ("printed", "two-loop-smc-allocated")
+    assert here.returncode == (3 if is_lost else 0), here.stderr.decode()
     assert there.returncode == here.returncode, there.stderr.decode(errors="replace")
     expected = (tmp_path / "here" / "results.csv").read_bytes()
     assert len(expected) > 10_000
