@@ -272,7 +272,23 @@ fn whole_numbers_are_passed_on() {
 }
 
 #[test]
+fn enumerations_of_different_items_are_not_connected() {
+    let as_input = |text: String| {
+        let (before, after) = text.split_once("name=\"kind\"").unwrap();
+        let after = after.replacen("parameter", "input", 1).replacen("fixed", "discrete", 1);
+        format!("{before}name=\"kind\"{after}")
+    };
+    let connected =
+        "[[connections]]\nfrom = \"plant.guarantee.status\"\nto = \"gain.kind\"\n[record]";
+    let recipe = Recipe { description: &as_input, ..Recipe::default() };
+    let message = Bench::made(&LOOP.replace("[record]", connected), &recipe).refusal(&[]);
+    assert!(message.contains("are enumerations of different items"), "{message}");
+}
+
+#[test]
 fn inputs_without_connection_must_be_meant() {
+    let message = refusal_of("[components.plant]", "[components.plant]\nunconnected = [\"inptu\"]");
+    assert!(message.contains("\"plant\" has no input \"inptu\""), "{message}");
     let open =
         LOOP.replace("[[connections]]\nfrom = \"gain.output.direct\"\nto = \"plant.input\"\n", "");
     let message = Bench::with(&open).refusal(&[]);
