@@ -20,7 +20,8 @@ pub struct ReentryPlant {
     pub(crate) input: Input,
     pub(crate) command: Command,
     pub(crate) output: Output,
-    /// Simulated plant, which exists from initialization on. It is large, and every step moves it.
+    /// Simulated plant, which exists from initialization on. Every step takes it out and puts it
+    /// back: the box spares moving all of it.
     pub(crate) plant: Option<Box<Plant>>,
     /// Dynamic pressure of the flight, Pa.
     pub(crate) dynamic_pressure: f64,

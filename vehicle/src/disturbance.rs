@@ -89,7 +89,8 @@ pub struct MomentWave {
     pub phase: f64,
 }
 
-/// State of the vehicle that the state-dependent kinds use to choose Δ, and what saves time.
+/// State of the vehicle that the state-dependent kinds use to choose Δ, and the random numbers of
+/// the white noise where its caller keeps them.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     /// Rigid body of the vehicle, with its inertia.

@@ -5,8 +5,7 @@ use crate::math::{ln, sin_cos};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-/// Returns the `N` numbers of a tick, uniform in [−1, 1), by jumping ahead in the generator's
-/// stream.
+/// Returns the `N` numbers of a tick, uniform in [−1, 1), by a jump from the generator's start.
 pub fn uniform<const N: usize>(seed: u64, tick: i64) -> [f64; N] {
     Stream::new(seed).at(tick)
 }

@@ -250,19 +250,22 @@ fn wrong_wiring_is_refused() {
     assert!(message.contains("there are: input"), "{message}");
 }
 
+/// A description in which the parameter is an input.
+fn as_input(description: &str, parameter: &str) -> String {
+    let (before, after) = description.split_once(&format!("name=\"{parameter}\"")).unwrap();
+    let after = after.replacen("parameter", "input", 1).replacen("fixed", "discrete", 1);
+    format!("{before}name=\"{parameter}\"{after}")
+}
+
 #[test]
 fn whole_numbers_are_passed_on() {
-    let as_input = |text: String| {
-        let (before, after) = text.split_once("name=\"noise.seed\"").unwrap();
-        let after = after.replacen("parameter", "input", 1).replacen("fixed", "discrete", 1);
-        format!("{before}name=\"noise.seed\"{after}")
-    };
     let connected = "[[connections]]\nfrom = \"plant.steps\"\nto = \"gain.noise.seed\"\n[record]";
     let experiment = LOOP
         .replace("[record]", connected)
         .replace("[components.plant]", "[components.plant]\nunconnected = [\"noise.seed\"]")
         .replace("\"plant.steps\"]", "\"gain.noise.seed\"]");
-    let recipe = Recipe { description: &as_input, ..Recipe::default() };
+    let description = |text: String| as_input(&text, "noise.seed");
+    let recipe = Recipe { description: &description, ..Recipe::default() };
     let bench = Bench::made(&experiment, &recipe);
     let (code, _, errors) = bench.run(&[]);
     assert_eq!(code, 0, "{errors}");
@@ -273,14 +276,10 @@ fn whole_numbers_are_passed_on() {
 
 #[test]
 fn enumerations_of_different_items_are_not_connected() {
-    let as_input = |text: String| {
-        let (before, after) = text.split_once("name=\"kind\"").unwrap();
-        let after = after.replacen("parameter", "input", 1).replacen("fixed", "discrete", 1);
-        format!("{before}name=\"kind\"{after}")
-    };
     let connected =
         "[[connections]]\nfrom = \"plant.guarantee.status\"\nto = \"gain.kind\"\n[record]";
-    let recipe = Recipe { description: &as_input, ..Recipe::default() };
+    let description = |text: String| as_input(&text, "kind");
+    let recipe = Recipe { description: &description, ..Recipe::default() };
     let message = Bench::made(&LOOP.replace("[record]", connected), &recipe).refusal(&[]);
     assert!(message.contains("are enumerations of different items"), "{message}");
 }
