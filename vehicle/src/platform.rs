@@ -7,7 +7,7 @@
 
 use crate::error::Error;
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
-use crate::math::{sin, sin_cos};
+use crate::math::sin_cos;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -64,13 +64,6 @@ pub fn velocity_from_level(trajectory: &Trajectory) -> Matrix3<f64> {
     climb * turn
 }
 
-/// Unit vector against the velocity in body axes, about which the bank angle grows.
-fn bank_axis(angles: &Vector3<f64>) -> Vector3<f64> {
-    let (sa, ca) = sin_cos(angles.x);
-    let (sb, cb) = sin_cos(angles.y);
-    Vector3::new(-ca * cb, -sb, -sa * cb)
-}
-
 /// Orientation of the platform and its motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
@@ -92,18 +85,24 @@ impl Pose {
     /// about the bank axis. The platform's centre moves steadily, so gravity alone gives the
     /// specific force.
     pub fn felt(&self, surroundings: &Surroundings) -> Readings {
+        let body_from_velocity = body_from_velocity(&self.angles);
         let mut rate = self.rates;
         if self.kinematics == Kinematics::Printed {
-            rate -= bank_axis(&self.angles) * (self.alpha_rate * sin(self.angles.y));
+            // The bank axis points against the velocity, whose second component is sin β.
+            let velocity = body_from_velocity.column(0);
+            rate += velocity * (self.alpha_rate * velocity.y);
         }
-        let [force, field] = self.fields(surroundings);
+        let [force, field] = self.fields(&body_from_velocity, surroundings);
         [rate, force, field]
     }
 
     /// Specific force (m/s²) and magnetic field (T) in body axes.
-    fn fields(&self, surroundings: &Surroundings) -> [Vector3<f64>; 2] {
-        let body_from_level =
-            body_from_velocity(&self.angles) * velocity_from_level(&self.trajectory);
+    fn fields(
+        &self,
+        body_from_velocity: &Matrix3<f64>,
+        surroundings: &Surroundings,
+    ) -> [Vector3<f64>; 2] {
+        let body_from_level = body_from_velocity * velocity_from_level(&self.trajectory);
         let lift = Vector3::new(0.0, 0.0, -surroundings.gravity);
         [body_from_level * lift, body_from_level * surroundings.field]
     }
@@ -119,8 +118,9 @@ impl Pose {
         let mut by_state = SMatrix::<f64, 9, 6>::zeros();
         let mut by_trajectory = SMatrix::<f64, 9, TRAJECTORY>::zeros();
         by_state.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
+        let body_from_velocity = body_from_velocity(&self.angles);
         if self.kinematics == Kinematics::Printed {
-            let axis = bank_axis(&self.angles);
+            let axis = -body_from_velocity.column(0);
             let (sa, ca) = sin_cos(self.angles.x);
             let (sb, cb) = sin_cos(self.angles.y);
             let mut rate = by_state.fixed_rows_mut::<3>(0);
@@ -135,11 +135,11 @@ impl Pose {
         }
         // A field that is fixed in space turns against the body: v̇ = −ω × v.
         let by_angles = Kinematics::Exact.r_inverse(&self.angles);
-        let body_from_velocity = body_from_velocity(&self.angles);
         let (sg, cg) = sin_cos(self.trajectory.flight_path_angle);
         let by_course =
             [Vector3::y(), Vector3::new(-sg, 0.0, cg)].map(|axis| body_from_velocity * axis);
-        for (row, field) in [3, 6].into_iter().zip(self.fields(surroundings)) {
+        let fields = self.fields(&body_from_velocity, surroundings);
+        for (row, field) in [3, 6].into_iter().zip(fields) {
             for i in 0..3 {
                 by_state
                     .fixed_view_mut::<3, 1>(row, i)
