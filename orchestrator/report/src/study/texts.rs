@@ -53,9 +53,9 @@ pub(super) fn percent(fractions: &Numbers) -> String {
     };
     if fractions.vary() {
         let (low, high) = fractions.extent();
-        format!("{} % [{}, {}]", one(fractions.mean()), one(low), one(high))
+        format!("{}\u{a0}% [{},\u{a0}{}]", one(fractions.mean()), one(low), one(high))
     } else {
-        format!("{} %", one(fractions.mean()))
+        format!("{}\u{a0}%", one(fractions.mean()))
     }
 }
 
@@ -85,6 +85,6 @@ mod tests {
         assert_eq!(several(&Numbers(vec![1.0, 1.0])), "1");
         assert_eq!(several(&Numbers(vec![1.0, 2.0])), "1.5 [1,\u{a0}2]");
         assert_eq!(several(&Numbers(Vec::new())), "–");
-        assert_eq!(percent(&Numbers(vec![-0.342])), "−34.2 %");
+        assert_eq!(percent(&Numbers(vec![-0.342])), "−34.2\u{a0}%");
     }
 }
