@@ -128,10 +128,14 @@ pack_fmus() {
 fetch() { cargo fetch --locked --quiet; }
 
 # Builds the targets of the workspace that the arguments choose. With --workspace, every choice has
-# the same features of the dependencies, so that none of them is built twice.
+# the same features of the dependencies, so that none of them is built twice. With an example they
+# have those of the tests, which the development profile is for.
 build() {
+    local like_tests=()
+    if [[ $PROGRAM_PROFILE == dev ]]; then like_tests=(--example fmi_rs); fi
     fetch
-    cargo build --profile "$PROGRAM_PROFILE" --locked --workspace "$@"
+    cargo build --profile "$PROGRAM_PROFILE" --locked --workspace \
+        "${like_tests[@]+"${like_tests[@]}"}" "$@"
 }
 
 # Builds the programs and the FMU libraries, and packs every FMU into $fmus. Arguments go to fmu-pack.

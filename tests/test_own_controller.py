@@ -24,7 +24,9 @@ def columns(folder):
 
 def test_oracle_a_law_from_outside_is_built_flown_and_agrees_with_lqr(experiment, tmp_path):
     packed = tmp_path / "fmu" / "PD.fmu"
+    locked = (FOLDER / "Cargo.lock").read_text()
     subprocess.run([ROOT / "scripts" / "pack-crate", FOLDER, packed.parent], check=True, capture_output=True)
+    assert (FOLDER / "Cargo.lock").read_text() == locked, "Cargo.lock is not up to date"
     assert validate_fmu(str(packed)) == []
     assert len((FOLDER / "src" / "lib.rs").read_text().splitlines()) <= 60
 
