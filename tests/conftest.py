@@ -34,6 +34,10 @@ NAMES = [
     "AttitudeEstimator",
 ]
 
+# The files that take longest. Begun first, none of them runs alone at the end while the other
+# processes of scripts/test have nothing left to do.
+LONGEST = ["test_wheel.py", "test_platforms.py"]
+
 
 def newest(*candidates: Path) -> Path:
     """The file that was built last."""
@@ -170,11 +174,29 @@ def pytest_configure(config):
     config.stash[importers.FINDINGS] = importers.Findings(NAMES)
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Lets one process run all tests of a file, and those of files that belong together."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    together = {path.name: "importers" for path in importers.files()} | {"test_importers_page.py": "importers"}
+    # Both make what scripts/wheel needs.
+    together |= {"test_wheel.py": "wheel", "test_release.py": "wheel"}
+
+    class ByFile(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            name = Path(nodeid.split("::")[0]).name
+            return together.get(name, name)
+
+    return ByFile(config, log)
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
     config.stash[importers.FINDINGS].expect(items)
-    # This test looks at the outcomes of the others, so it runs last.
-    items.sort(key=lambda item: "whole_matrix" in item.keywords)
+    rank = {name: place for place, name in enumerate(LONGEST)}
+    # The test that looks at the outcomes of others runs behind them.
+    items.sort(key=lambda item: ("whole_matrix" in item.keywords, rank.get(item.path.name, len(rank))))
 
 
 @pytest.hookimpl(hookwrapper=True)

@@ -50,9 +50,9 @@ class Findings:
 
     def missing(self) -> str | None:
         """Says why the table cannot be made, or returns None if it can."""
-        wanted = {path for path in Path(__file__).parent.glob("test_*.py") if "mark.importer(" in path.read_text()}
-        if wanted - self.files:
-            return f"{', '.join(sorted(path.name for path in wanted - self.files))} did not run"
+        missing = files() - self.files
+        if missing:
+            return f"{', '.join(sorted(path.name for path in missing))} did not run"
         not_run = [test for test in self.expected if self.outcomes.get(test, "skipped") == "skipped"]
         return f"{len(not_run)} tests of importers did not run, as {not_run[0]}" if not_run else None
 
@@ -75,6 +75,11 @@ class Findings:
             raise pytest.UsageError(f"docs/importers.md stays as it is: {reason}")
         before, _, after = split()
         PAGE.write_text(before + BEGIN + "\n" + self.table() + "\n" + END + after)
+
+
+def files() -> set[Path]:
+    """The files whose tests fill the table."""
+    return {path for path in Path(__file__).parent.glob("test_*.py") if "mark.importer(" in path.read_text()}
 
 
 def split() -> tuple[str, str, str]:
