@@ -2,13 +2,14 @@
 
 import subprocess
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
-from conftest import NAMES, ROOT, archive, library, program
+from conftest import NAMES, ROOT, TARGET, archive, library, newest, program
 
 # The libraries by the folder with their units' descriptions.
 LIBRARIES = {"fmu-plant": ["fmu_plant"], "fmu-controller": ["fmu_optimising", "fmu_feedback"]}
@@ -27,6 +28,18 @@ def test_fmpy_finds_no_problem(name):
 
 def test_every_unit_was_packed_and_tested():
     assert sorted(path.stem for path in archive("LQR").parent.glob("*.fmu")) == sorted(NAMES)
+
+
+@pytest.mark.parametrize("crate", ["reentry-fmu-plant", "reentry-fmu-optimising", "reentry-fmu-feedback"])
+def test_a_library_is_built_again_if_a_source_or_a_dependency_has_changed_and_only_then(crate):
+    # What cargo watches. Of a path that does not exist it thinks that it has changed.
+    said = newest(*TARGET.glob(f"*/build/{crate}-*/output"), *TARGET.glob(f"*/*/build/{crate}-*/output")).read_text()
+    prefix = "cargo::rerun-if-changed="
+    watched = {Path(line.removeprefix(prefix)) for line in said.splitlines() if line.startswith(prefix)}
+    # This one is relative to the crate.
+    watched.remove(Path("build.rs"))
+    assert {ROOT / "Cargo.lock", ROOT / "vehicle" / "src", ROOT / "vehicle" / "data"} <= watched
+    assert [path for path in watched if not path.exists()] == []
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -2,6 +2,7 @@
 
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -14,8 +15,15 @@ const PARTS: [&str; 4] = ["Cargo.toml", "build.rs", "data", "src"];
 /// of all its dependencies' names and versions, and of all files of those which are folders on this
 /// machine. The platform and the places of the folders do not enter it.
 pub(crate) fn digest() -> Result<String, String> {
+    let manifest = PathBuf::from(variable("CARGO_MANIFEST_DIR")?).join("Cargo.toml");
+    // Other versions of the dependencies may change no file of ours but this one.
+    let workspace = cargo(&["locate-project", "--workspace", "--message-format=plain"], &manifest)?;
+    let locked = Path::new(workspace.trim_end()).with_file_name("Cargo.lock");
+    if locked.exists() {
+        println!("cargo::rerun-if-changed={}", locked.display());
+    }
     let mut digest = Sha256::new();
-    for package in packages()? {
+    for package in packages(&manifest)? {
         let (name, folder) = match package.split_once(" (") {
             Some((name, folder)) => (name, Path::new(folder.trim_end_matches(')'))),
             None => (package.as_str(), Path::new("")),
@@ -45,25 +53,33 @@ pub(crate) fn digest() -> Result<String, String> {
 }
 
 /// Returns the package that is being built and all that it depends on, as cargo prints them.
-fn packages() -> Result<BTreeSet<String>, String> {
-    let variable = |name| env::var_os(name).ok_or_else(|| format!("cargo did not set {name}"));
-    let manifest = PathBuf::from(variable("CARGO_MANIFEST_DIR")?).join("Cargo.toml");
-    let tree = Command::new(variable("CARGO")?)
-        .args(["tree", "--frozen", "--prefix=none", "--edges=normal,build", "--target=all"])
+fn packages(manifest: &Path) -> Result<BTreeSet<String>, String> {
+    let what = ["tree", "--frozen", "--prefix=none", "--edges=normal,build", "--target=all"];
+    let tree = cargo(&what, manifest)?;
+    // A package that stands in the tree once more is marked.
+    Ok(tree.lines().map(|line| line.trim_end_matches(" (*)").to_string()).collect())
+}
+
+/// Returns what cargo prints about the package of a manifest.
+fn cargo(what: &[&str], manifest: &Path) -> Result<String, String> {
+    let done = Command::new(variable("CARGO")?)
+        .args(what)
         .arg("--manifest-path")
         .arg(manifest)
         // They are for the platform of the library, and cargo would try them on this machine.
         .env_remove("CARGO_ENCODED_RUSTFLAGS")
         .env_remove("RUSTFLAGS")
         .output()
-        .map_err(|error| format!("cargo tree: {error}"))?;
-    if !tree.status.success() {
-        let words = String::from_utf8_lossy(&tree.stderr).replace('\n', " ");
-        return Err(format!("cargo tree: {words}"));
+        .map_err(|error| format!("cargo {}: {error}", what[0]))?;
+    if !done.status.success() {
+        let words = String::from_utf8_lossy(&done.stderr).replace('\n', " ");
+        return Err(format!("cargo {}: {words}", what[0]));
     }
-    let lines = String::from_utf8_lossy(&tree.stdout);
-    // A package that stands in the tree once more is marked.
-    Ok(lines.lines().map(|line| line.trim_end_matches(" (*)").to_string()).collect())
+    Ok(String::from_utf8_lossy(&done.stdout).into_owned())
+}
+
+fn variable(name: &str) -> Result<OsString, String> {
+    env::var_os(name).ok_or_else(|| format!("cargo did not set {name}"))
 }
 
 /// Returns all files at or below a path, sorted; none if it does not exist.
