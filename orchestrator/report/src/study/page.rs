@@ -207,8 +207,8 @@ fn because(check: &Check, checked: &Checked) -> Markup {
     let asked = match (check.relation, checked.by) {
         (Relation::Below, None) => "not above".to_string(),
         (Relation::Above, None) => "not below".to_string(),
-        (Relation::Below, Some(by)) => format!("at least {} % below", shown(100.0 * by)),
-        (Relation::Above, Some(by)) => format!("at least {} % above", shown(100.0 * by)),
+        (Relation::Below, Some(by)) => format!("at least {}\u{a0}% below", shown(100.0 * by)),
+        (Relation::Above, Some(by)) => format!("at least {}\u{a0}% above", shown(100.0 * by)),
     };
     let mut count = if all > 1 { format!(", in {held} of {all} runs") } else { String::new() };
     let missing = all - checked.difference.0.len();
