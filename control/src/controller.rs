@@ -15,6 +15,9 @@ pub struct Measurement {
     /// The moment that acted since the last tick, N m, if it is measured. Without it a controller
     /// assumes that its own command acted.
     pub achieved_moment: Option<Vector3<f64>>,
+    /// Whether the measurement was made at an earlier instant than the tick, because the
+    /// communication step is longer than the period or no multiple of it.
+    pub stale: bool,
 }
 
 /// The reference as a function of time (s), so that a controller with preview can also ask for the

@@ -63,6 +63,11 @@ where
         Some(self.next_time()).filter(|tick| *tick < time - tick_tolerance(time, self.period))
     }
 
+    /// Returns whether a tick has been committed.
+    pub fn has_committed(&self) -> bool {
+        self.next > 0
+    }
+
     /// Returns whether a unit with this `period` (s) can be in this state at `time` (s) in an
     /// experiment that began at `start` (s). All earlier ticks must be committed and, unless a step
     /// has `failed` in the middle, no later ones. `fits` checks each memory.

@@ -39,8 +39,12 @@ fn simulate<C: Controller>(
     let first = (plant.angles() - reference(0.0).angles).abs();
     for tick in 0..=ticks {
         let time = tick as f64 * period;
-        let measured =
-            Measurement { angles: plant.angles(), rates: plant.rates(), achieved_moment: achieved };
+        let measured = Measurement {
+            angles: plant.angles(),
+            rates: plant.rates(),
+            achieved_moment: achieved,
+            stale: false,
+        };
         let error = measured.angles - reference(time).angles;
         for i in 0..3 {
             if error[i].abs() > 0.02 * first[i] {

@@ -46,8 +46,12 @@ fn run(
     let mut achieved_moment = None;
     for tick in 0..(scenario.duration / period).round() as u64 {
         let time = tick as f64 * period;
-        let measured =
-            Measurement { angles: plant.angles(), rates: plant.rates(), achieved_moment };
+        let measured = Measurement {
+            angles: plant.angles(),
+            rates: plant.rates(),
+            achieved_moment,
+            stale: false,
+        };
         let error = (measured.angles - reference(time).angles).amax().to_degrees();
         if error > 0.5 {
             outcome.settling = time + period;

@@ -2,7 +2,7 @@
 
 use control::schedule::Sampled;
 use fmi2_export::fields::by_variable;
-use fmi2_export::{Context, Description, Failure, Inputs, Model, Restoration};
+use fmi2_export::{Context, Description, Failure, Inputs, LastEvent, Model, Restoration};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::ops::{Deref, DerefMut};
 
@@ -61,6 +61,24 @@ pub trait SampledUnit: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// # Errors
     /// Returns an error that names the input at fault.
     fn evaluate(&self, device: &mut Self::Device, ticks: &mut Ticks<Self>) -> Result<(), Failure>;
+
+    /// Evaluates the first uncommitted tick with inputs that were set at an earlier instant.
+    ///
+    /// # Errors
+    /// Returns an error that names the input at fault.
+    fn evaluate_stale(
+        &self,
+        device: &mut Self::Device,
+        ticks: &mut Ticks<Self>,
+    ) -> Result<(), Failure> {
+        self.evaluate(device, ticks)
+    }
+
+    /// Returns the output that is shown at the start time, if it is not that of the first tick
+    /// because this tick's output acts later.
+    fn output_before_the_first(_device: &Self::Device) -> Option<Self::Output> {
+        None
+    }
 
     /// Returns a warning for the log if something went wrong between two ticks.
     fn warning(_before: &Self::Memory, _after: &Self::Memory) -> Option<&'static str> {
@@ -144,19 +162,26 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
         Ok(())
     }
 
-    fn calculate(&mut self, time: f64) -> Result<(), Failure> {
+    /// A due tick is evaluated, except after a step: the outputs are then those of the tick that
+    /// was committed, which acted over that step.
+    fn calculate(&mut self, time: f64, last: LastEvent) -> Result<(), Failure> {
         let (unit, device, ticks) = self.parts()?;
-        if ticks.is_due(time) {
+        let holds = last == LastEvent::Step && ticks.has_committed();
+        if !holds && ticks.is_due(time) {
             unit.evaluate(device, ticks)?;
         }
         if let (Some(device), Some(ticks)) = (&self.device, &self.ticks) {
-            self.unit.show(time, device, ticks.in_force());
+            let (output, memory) = ticks.in_force();
+            let before = (last == LastEvent::Initialization)
+                .then(|| U::output_before_the_first(device))
+                .flatten();
+            self.unit.show(time, device, (before.unwrap_or(output), memory));
         }
         Ok(())
     }
 
     /// Evaluates and commits every tick from `from` up to, but not at, `to`, with the inputs at
-    /// that time.
+    /// that time. At a tick after `from` they are stale, unless they are extrapolated.
     fn step(
         &mut self,
         from: f64,
@@ -169,7 +194,11 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
             let Some(tick) = ticks.next_before(to) else { return Ok(()) };
             inputs.advance(self, tick.max(from));
             let (unit, device, ticks) = self.parts()?;
-            unit.evaluate(device, ticks)?;
+            if ticks.is_due(from) || inputs.are_extrapolated() {
+                unit.evaluate(device, ticks)?;
+            } else {
+                unit.evaluate_stale(device, ticks)?;
+            }
             ticks.commit();
             if let Some(text) = ticks.last_change(U::warning) {
                 log(text);

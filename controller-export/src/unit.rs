@@ -33,6 +33,32 @@ impl<L: Law> ControllerUnit<L> {
     }
 }
 
+impl<L: Law> ControllerUnit<L> {
+    /// Evaluates the first uncommitted tick. Its inputs are `stale` if they were set before it.
+    fn evaluate_with(
+        &self,
+        device: &mut Designed<L>,
+        ticks: &mut Ticks<Self>,
+        stale: bool,
+    ) -> Result<(), Failure> {
+        let Self { parameters, input, source, .. } = self;
+        let controller = &mut device.controller;
+        let achieved_moment = parameters.achieved_moment_used.then_some(input.achieved_moment);
+        let measured = Measurement { achieved_moment, stale, ..input.measured };
+        let now = ticks.next_time();
+        // An external reference is only known now; the law uses its present value for the time at
+        // which its moment acts.
+        let known = now + controller.acts_after();
+        ticks.evaluate(controller, &measured, &source.preview(known, &input.reference));
+        if ticks.in_force().0.iter().all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        Err(Failure::Error(format!(
+            "the control moment at t = {now} s is not finite; the attitude may be singular (sideslip angle near 90 deg)"
+        )))
+    }
+}
+
 impl<L: Law> SampledUnit for ControllerUnit<L> {
     type Device = Designed<L>;
     type Memory = <Delayed<L::Controller> as Controller>::Memory;
@@ -102,21 +128,21 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
     }
 
     fn evaluate(&self, device: &mut Designed<L>, ticks: &mut Ticks<Self>) -> Result<(), Failure> {
-        let Self { parameters, input, source, .. } = self;
-        let controller = &mut device.controller;
-        let achieved_moment = parameters.achieved_moment_used.then_some(input.achieved_moment);
-        let measured = Measurement { achieved_moment, ..input.measured };
-        let now = ticks.next_time();
-        // An external reference is only known now; the law uses its present value for the time at
-        // which its moment acts.
-        let known = now + controller.acts_after();
-        ticks.evaluate(controller, &measured, &source.preview(known, &input.reference));
-        if ticks.in_force().0.iter().all(|value| value.is_finite()) {
-            return Ok(());
-        }
-        Err(Failure::Error(format!(
-            "the control moment at t = {now} s is not finite; the attitude may be singular (sideslip angle near 90 deg)"
-        )))
+        self.evaluate_with(device, ticks, false)
+    }
+
+    fn evaluate_stale(
+        &self,
+        device: &mut Designed<L>,
+        ticks: &mut Ticks<Self>,
+    ) -> Result<(), Failure> {
+        self.evaluate_with(device, ticks, true)
+    }
+
+    /// With a delay no command acts at the start, and the law takes the moment for zero until its
+    /// first one does.
+    fn output_before_the_first(device: &Designed<L>) -> Option<Vector3<f64>> {
+        (device.controller.acts_after() > 0.0).then(Vector3::zeros)
     }
 
     fn warning(before: &Self::Memory, after: &Self::Memory) -> Option<&'static str> {

@@ -2,7 +2,7 @@
 
 use crate::call::{Call, Outcome, State, error};
 use crate::logger::{Category, Logger};
-use crate::model::{Context, EventInfo, Failure};
+use crate::model::{Context, EventInfo, Failure, LastEvent};
 use crate::pointer::Room;
 use crate::saved;
 use crate::scalar::Scalar;
@@ -300,7 +300,11 @@ impl Instance {
             self.initialize()?;
         }
         if self.stale {
-            self.unit.calculate(self.progress.time)?;
+            let last = match self.interface {
+                Interface::ModelExchange => LastEvent::InputSet,
+                Interface::CoSimulation => self.progress.last_event,
+            };
+            self.unit.calculate(self.progress.time, last)?;
             self.stale = false;
         }
         Ok(())
@@ -393,6 +397,11 @@ impl Instance {
             if let Some(problem) = value.problem(&variable.kind) {
                 return error(format!("'{name}' = {value:?} {problem}; it keeps its value"));
             }
+        }
+        if self.progress.state == State::StepComplete && !references.is_empty() {
+            // Parameters cannot be set in this state, so these are inputs.
+            self.stale |= self.progress.last_event != LastEvent::InputSet;
+            self.progress.last_event = LastEvent::InputSet;
         }
         for (i, &reference) in references.iter().enumerate() {
             let value = value(i).map_err(Failure::Error)?;
@@ -571,6 +580,9 @@ impl Instance {
         let mut log = |text: &str| logger.log(Category::Warning, text);
         match self.unit.step(from, to, &self.progress.extrapolations, &mut log) {
             Ok(()) => {
+                if to > from {
+                    self.progress.last_event = LastEvent::Step;
+                }
                 self.progress.time = to;
                 self.progress.extrapolations.clear();
                 self.stale = true;

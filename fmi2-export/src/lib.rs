@@ -37,6 +37,6 @@ mod unit;
 
 #[doc(hidden)]
 pub use export::sources;
-pub use model::{Context, EventInfo, Failure, Inputs, Model, Restoration};
+pub use model::{Context, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
 pub use table::{Description, Enumeration, Table};
 pub use unit::{Export, MAX_INPUT_DERIVATIVE_ORDER, describe};

@@ -1,7 +1,7 @@
 //! Interface that a unit must offer to become an FMU.
 
 use crate::table::Description;
-use serde::{Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::path::Path;
 
 /// Reason why a call failed. Its text reaches the user through the FMI logger.
@@ -31,6 +31,26 @@ pub trait Inputs<M> {
     /// Sets the model's real inputs to their values at `time` (s). It returns at once if no
     /// derivatives were given.
     fn advance(&self, model: &mut M, time: f64);
+
+    /// Returns whether the importer gave derivatives, so that the inputs move during the step.
+    fn are_extrapolated(&self) -> bool;
+}
+
+/// Last event before outputs are read. In co-simulation it decides what the outputs of a sampled
+/// unit mean: FMI 2.0 forbids reading them after an input was set, until a step has been made
+/// (2.0.5, section 4.2.1), so that a master which keeps to the standard reads them after a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum LastEvent {
+    /// No step has been made, and no input was set since initialization mode. The outputs are
+    /// those of the start time.
+    #[default]
+    Initialization,
+    /// A step has been made, and no input was set since. The outputs are those that held over this
+    /// step.
+    Step,
+    /// An input was set by a call, whatever its value, or the unit runs in model exchange. The
+    /// outputs respond to the inputs.
+    InputSet,
 }
 
 /// Outcome of an event iteration in model exchange.
@@ -86,13 +106,13 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// Names the parameter at fault.
     fn initialize(&mut self, context: &Context) -> Result<(), Failure>;
 
-    /// Updates all outputs and local variables to the state, the inputs and `time`. It must not
-    /// change anything on which a later call depends. The shell calls it before a read, and only if
-    /// something changed since.
+    /// Updates all outputs and local variables to the state, the inputs and `time`, as they are to
+    /// be read after `last`. It must not change anything on which a later call depends. The shell
+    /// calls it before a read, and only if something changed since.
     ///
     /// # Errors
     /// Says which value could not be computed.
-    fn calculate(&mut self, time: f64) -> Result<(), Failure>;
+    fn calculate(&mut self, time: f64, last: LastEvent) -> Result<(), Failure>;
 
     /// Performs a co-simulation step from communication point `from` to `to` (both s). It is never
     /// called with `to < from`; `to == from` is a step of zero length. Outputs are not read here

@@ -14,7 +14,7 @@
 use crate::types::Interface;
 
 const MAGIC: &[u8; 8] = b"fmi2save";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const GUID: usize = 36;
 const HEADER: usize = 8 + 4 + 1 + GUID + 8 + 4;
 

@@ -1,7 +1,7 @@
 //! A model bound to its table behind a trait that hides the model's type, for use by the shell.
 
 use crate::call::State;
-use crate::model::{Context, EventInfo, Failure, Inputs, Model, Restoration};
+use crate::model::{Context, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
 use crate::numbers::are_numbers;
 use crate::table::{Access, Description, Table};
 use crate::types::Interface;
@@ -43,6 +43,8 @@ pub(crate) struct Progress {
     pub(crate) stop_time: Option<f64>,
     /// Whether the model was initialized with its present parameters.
     pub(crate) initialized: bool,
+    /// Last step of co-simulation, or input that was set after it.
+    pub(crate) last_event: LastEvent,
     pub(crate) extrapolations: Vec<Extrapolation>,
 }
 
@@ -54,6 +56,7 @@ impl Default for Progress {
             start_time: 0.0,
             stop_time: None,
             initialized: false,
+            last_event: LastEvent::default(),
             extrapolations: Vec::new(),
         }
     }
@@ -62,7 +65,7 @@ impl Default for Progress {
 impl Progress {
     /// Says why no instance can have this progress, or `None` if one can.
     fn problem<M>(&self, table: &Table<M>, interface: Interface) -> Option<String> {
-        let Self { state, time, start_time, stop_time, initialized, extrapolations } = self;
+        let Self { state, time, start_time, stop_time, initialized, extrapolations, .. } = self;
         if !(time.is_finite() && start_time.is_finite() && !stop_time.is_some_and(f64::is_nan)) {
             return Some("it holds a time that is not a finite number".into());
         }
@@ -112,7 +115,7 @@ pub(crate) trait FmuUnit: Send {
     /// Brings all variables back to their start values; with `failed` nothing else is kept either.
     fn reset(&mut self, failed: bool);
     fn initialize(&mut self, context: &Context) -> Result<(), Failure>;
-    fn calculate(&mut self, time: f64) -> Result<(), Failure>;
+    fn calculate(&mut self, time: f64, last: LastEvent) -> Result<(), Failure>;
     /// Performs a step and leaves the inputs at their values at `to`.
     fn step(
         &mut self,
@@ -157,6 +160,10 @@ impl<M> Inputs<M> for Extrapolated<'_, M> {
                 *field(model) = input.at(time - self.from);
             }
         }
+    }
+
+    fn are_extrapolated(&self) -> bool {
+        !self.inputs.is_empty()
     }
 }
 
@@ -209,8 +216,8 @@ impl<M: Model> FmuUnit for Bound<M> {
         self.model.initialize(context)
     }
 
-    fn calculate(&mut self, time: f64) -> Result<(), Failure> {
-        self.model.calculate(time)
+    fn calculate(&mut self, time: f64, last: LastEvent) -> Result<(), Failure> {
+        self.model.calculate(time, last)
     }
 
     fn step(

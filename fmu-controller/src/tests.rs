@@ -9,7 +9,7 @@ use crate::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo};
 use control::error_dynamics::Gain;
 use controller_export::reference::Choice;
 use controller_export::{ControllerFmu, Law};
-use fmi2_export::{Context, Failure, Inputs, Model, describe};
+use fmi2_export::{Context, Failure, Inputs, LastEvent, Model, describe};
 use model_description::ModelDescription;
 use model_description::variable::Causality;
 use nalgebra::Vector3;
@@ -23,6 +23,9 @@ struct Held;
 
 impl<M> Inputs<M> for Held {
     fn advance(&self, _model: &mut M, _time: f64) {}
+    fn are_extrapolated(&self) -> bool {
+        false
+    }
 }
 
 fn context() -> Context<'static> {
@@ -40,7 +43,7 @@ fn step<M: Model>(unit: &mut M, from: f64, to: f64) {
     // The assumptions of CRMPC do not explain the motion of inputs that jump.
     unit.step(from, to, &Held, &mut |text| assert!(text.contains("the guarantee is"), "{text}"))
         .unwrap();
-    unit.calculate(to).unwrap();
+    unit.calculate(to, LastEvent::InputSet).unwrap();
 }
 
 fn refusal<M: Model>(change: impl FnOnce(&mut M)) -> String {
@@ -78,11 +81,11 @@ fn a_tick_evaluated_with_other_inputs_leaves_no_trace() {
     let mut twice: Crmpc = ready(|_| ());
     let measured = once.input.measured;
     twice.input.measured.angles *= 1.1;
-    twice.calculate(0.0).unwrap();
+    twice.calculate(0.0, LastEvent::InputSet).unwrap();
     let other = twice.output.moment;
     twice.input.measured = measured;
     for unit in [&mut once, &mut twice] {
-        unit.calculate(0.0).unwrap();
+        unit.calculate(0.0, LastEvent::InputSet).unwrap();
         step(unit, 0.0, 0.2);
     }
     assert_ne!(other, once.output.moment);
@@ -161,11 +164,11 @@ fn the_external_reference_is_followed() {
     unit.input.reference.angles = unit.input.measured.angles;
     unit.input.reference.rates = Vector3::zeros();
     unit.input.reference.accelerations = Vector3::zeros();
-    unit.calculate(0.0).unwrap();
+    unit.calculate(0.0, LastEvent::InputSet).unwrap();
     assert_eq!(unit.output.moment, Vector3::zeros());
     assert_eq!(unit.output.reference.angles, unit.input.measured.angles);
     unit.input.reference.angles.x += 0.01;
-    unit.calculate(0.0).unwrap();
+    unit.calculate(0.0, LastEvent::InputSet).unwrap();
     assert!(unit.output.moment.y > 0.0, "a positive error of alpha asks for a pitch-up moment");
 }
 
@@ -173,8 +176,8 @@ fn the_external_reference_is_followed() {
 fn saturation_scales_into_the_limit() {
     let mut free: Lqr = ready(|_| ());
     let mut scaled: Lqr = ready(|unit: &mut Lqr| unit.parameters.saturation = true);
-    free.calculate(0.0).unwrap();
-    scaled.calculate(0.0).unwrap();
+    free.calculate(0.0, LastEvent::InputSet).unwrap();
+    scaled.calculate(0.0, LastEvent::InputSet).unwrap();
     let limit = scaled.parameters.limit_moment;
     assert!(free.output.moment.norm() > limit);
     assert!((scaled.output.moment.norm() - limit).abs() < 1e-9 * limit);
@@ -185,7 +188,9 @@ fn saturation_scales_into_the_limit() {
 fn a_singular_attitude_is_an_error_not_a_number() {
     let mut unit: Lqr = ready(|_| ());
     unit.input.measured.angles.y = f64::NAN;
-    let Err(Failure::Error(text)) = unit.calculate(0.0) else { panic!("accepted") };
+    let Err(Failure::Error(text)) = unit.calculate(0.0, LastEvent::InputSet) else {
+        panic!("accepted")
+    };
     assert!(text.contains("not finite"), "{text}");
 }
 
@@ -196,7 +201,7 @@ fn the_achieved_moment_counts_only_if_it_is_used() {
             unit.parameters.achieved_moment_used = used;
             unit.input.achieved_moment = Vector3::repeat(achieved);
         });
-        unit.calculate(0.0).unwrap();
+        unit.calculate(0.0, LastEvent::InputSet).unwrap();
         step(&mut unit, 0.0, 0.1);
         unit.output.moment
     };
@@ -211,7 +216,7 @@ fn sliding_modes_are_scaled_into_the_limit() {
         unit.parameters.saturation = true;
         unit.parameters.limit_moment = 1e4;
     });
-    unit.calculate(0.0).unwrap();
+    unit.calculate(0.0, LastEvent::InputSet).unwrap();
     assert!((unit.output.moment.norm() - 1e4).abs() < 1e-6);
 }
 
@@ -228,7 +233,7 @@ fn saturated_loop(start: f64, delay: f64, ticks: u32) -> Vec<State> {
     let mut go = |k: u32| {
         let [from, to] = [k, k + 1].map(|k| start + 0.04 * f64::from(k));
         (unit.input.measured.angles, unit.input.measured.rates) = (plant.angles(), plant.rates());
-        unit.calculate(from).unwrap();
+        unit.calculate(from, LastEvent::InputSet).unwrap();
         plant.advance(from, to, unit.output.moment).unwrap();
         unit.step(from, to, &Held, &mut |text| panic!("{text}")).unwrap();
         plant.state
@@ -256,10 +261,10 @@ fn an_external_reference_counts_when_the_moment_acts() {
         unit.parameters.latency.action = 0.1;
     });
     unit.input.reference = Reference { angles: unit.input.measured.angles, ..Reference::default() };
-    unit.calculate(0.0).unwrap();
+    unit.calculate(0.0, LastEvent::InputSet).unwrap();
     assert_eq!(unit.output.moment, Vector3::zeros(), "at rest on the reference");
     unit.input.reference.accelerations.x = 0.01;
-    unit.calculate(0.0).unwrap();
+    unit.calculate(0.0, LastEvent::InputSet).unwrap();
     assert!(unit.output.moment.y > 0.0, "the acceleration is not taken for unknown");
 }
 
@@ -274,10 +279,10 @@ fn a_time_budget_of_any_length_is_worked_with() {
     for budget in [1e9, 1e19, 1e300, f64::MAX] {
         let mut crmpc: Crmpc =
             ready(|unit: &mut Crmpc| unit.law.settings.solver.time_budget = budget);
-        crmpc.calculate(0.0).unwrap();
+        crmpc.calculate(0.0, LastEvent::InputSet).unwrap();
         let mut dlmpc: Dlmpc =
             ready(|unit: &mut Dlmpc| unit.law.settings.solver.time_budget = budget);
-        dlmpc.calculate(0.0).unwrap();
+        dlmpc.calculate(0.0, LastEvent::InputSet).unwrap();
         assert!(crmpc.output.moment.norm() > 0.0 && dlmpc.output.moment.norm() > 0.0, "{budget} s");
     }
 }

@@ -6,7 +6,7 @@ use crate::parameters::{Actuation, KINDS};
 use crate::plant::{Output, ReentryPlant};
 use crate::roles::{Known, Unknown};
 use crate::table::role;
-use fmi2_export::{Context, Failure, Inputs, Model, describe};
+use fmi2_export::{Context, Failure, Inputs, LastEvent, Model, describe};
 use model_description::variable::{self, Causality, Variability};
 use nalgebra::Vector3;
 use vehicle::Scenario;
@@ -21,6 +21,9 @@ struct Constant;
 
 impl Inputs<ReentryPlant> for Constant {
     fn advance(&self, _: &mut ReentryPlant, _: f64) {}
+    fn are_extrapolated(&self) -> bool {
+        false
+    }
 }
 
 /// Pitch moment that rises with time.
@@ -29,6 +32,9 @@ struct Ramp(f64);
 impl Inputs<ReentryPlant> for Ramp {
     fn advance(&self, model: &mut ReentryPlant, time: f64) {
         model.input.moment.y = self.0 * time;
+    }
+    fn are_extrapolated(&self) -> bool {
+        true
     }
 }
 
@@ -44,7 +50,7 @@ fn step(unit: &mut ReentryPlant, from: f64, to: f64) -> Result<(), Failure> {
 }
 
 fn outputs(unit: &mut ReentryPlant, time: f64) -> Output {
-    unit.calculate(time).unwrap();
+    unit.calculate(time, LastEvent::InputSet).unwrap();
     unit.output
 }
 
@@ -412,7 +418,7 @@ fn states(unit: &ReentryPlant) -> States {
 }
 
 fn indicators(unit: &mut ReentryPlant, time: f64) -> [f64; 8] {
-    unit.calculate(time).unwrap();
+    unit.calculate(time, LastEvent::InputSet).unwrap();
     let mut indicators = [f64::NAN; 8];
     unit.event_indicators(&mut indicators);
     indicators
@@ -915,11 +921,13 @@ fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_excha
     let mut unit = in_model_exchange(Kind::None);
     unit.set_continuous_states(&singular);
     assert!(
-        matches!(unit.calculate(0.1), Err(Failure::Discard(text)) if text.contains("singular"))
+        matches!(unit.calculate(0.1, LastEvent::InputSet), Err(Failure::Discard(text)) if text.contains("singular"))
     );
     let mut unit = started(|_| {});
     unit.set_continuous_states(&singular);
-    assert!(matches!(unit.calculate(0.0), Err(Failure::Error(text)) if text.contains("singular")));
+    assert!(
+        matches!(unit.calculate(0.0, LastEvent::InputSet), Err(Failure::Error(text)) if text.contains("singular"))
+    );
     let mut unit = started(|unit| {
         unit.parameters.kind = Kind::None;
         unit.parameters.inertia.Ixz = 0.0;
@@ -935,7 +943,9 @@ fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_excha
 fn a_wrong_moment_is_an_error_and_the_unit_starts_again() {
     let mut unit = started(|_| {});
     unit.input.moment.x = f64::NAN;
-    assert!(matches!(unit.calculate(0.0), Err(Failure::Error(text)) if text.contains("moment")));
+    assert!(
+        matches!(unit.calculate(0.0, LastEvent::InputSet), Err(Failure::Error(text)) if text.contains("moment"))
+    );
     assert!(
         matches!(step(&mut unit, 0.0, 0.04), Err(Failure::Error(text)) if text.contains("moment"))
     );
@@ -947,7 +957,9 @@ fn a_wrong_moment_is_an_error_and_the_unit_starts_again() {
 #[test]
 fn before_initialization_it_says_so() {
     let mut unit = ReentryPlant::new();
-    assert!(unit.calculate(0.0).unwrap_err().to_string().contains("initialized"));
+    assert!(
+        unit.calculate(0.0, LastEvent::InputSet).unwrap_err().to_string().contains("initialized")
+    );
     assert!(step(&mut unit, 0.0, 1.0).is_err());
     assert!(unit.new_discrete_states(0.0).is_err());
 }

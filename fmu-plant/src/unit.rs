@@ -5,7 +5,9 @@ use crate::plant::{MOTION, Output, ReentryPlant};
 use crate::roles::{Known, Unknown};
 use crate::table;
 use fmi2_export::fields::by_variable;
-use fmi2_export::{Context, Description, EventInfo, Failure, Inputs, Model, Restoration};
+use fmi2_export::{
+    Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, Restoration,
+};
 use nalgebra::{SMatrix, Vector3};
 use vehicle::actuators::Command;
 use vehicle::plant::{Input, Plant, State, check};
@@ -47,10 +49,14 @@ impl Model for ReentryPlant {
         Ok(())
     }
 
-    fn calculate(&mut self, time: f64) -> Result<(), Failure> {
+    /// After a step, the disturbance and the moment that acted over it are shown.
+    fn calculate(&mut self, time: f64, last: LastEvent) -> Result<(), Failure> {
         let plant = self.ready()?;
         self.check(&plant.state, time)?;
-        let held = self.held(plant, time);
+        let held = match plant.held() {
+            Some(held) if last == LastEvent::Step => held,
+            _ => self.held(plant, time),
+        };
         let derivative = plant.derivative(time, &self.input, &held);
         if !derivative.iter().all(|value| value.is_finite()) {
             return Err(Failure::Error(format!(

@@ -2,7 +2,9 @@
 //! tells when x crosses 1. Every kind of variable occurs in it.
 
 use fmi2_export::table::{discrete_input, discrete_output, input, local, output, parameter};
-use fmi2_export::{Context, Description, Enumeration, EventInfo, Failure, Inputs, Model, Table};
+use fmi2_export::{
+    Context, Description, Enumeration, EventInfo, Failure, Inputs, LastEvent, Model, Table,
+};
 use model_description::DefaultExperiment;
 use model_description::unit;
 use serde::{Deserialize, Serialize};
@@ -190,7 +192,7 @@ impl Model for Lag {
         Ok(())
     }
 
-    fn calculate(&mut self, time: f64) -> Result<(), Failure> {
+    fn calculate(&mut self, time: f64, _last: LastEvent) -> Result<(), Failure> {
         self.gain_now = self.gain(time);
         self.derivative = self.rate(self.x, self.gain_now);
         self.y = self.x + self.u + self.offset_held.unwrap_or(self.offset);

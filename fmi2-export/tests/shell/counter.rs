@@ -2,7 +2,7 @@
 //! panic can start.
 
 use fmi2_export::table::{discrete_output, input, parameter};
-use fmi2_export::{Context, Description, Enumeration, Failure, Inputs, Model, Table};
+use fmi2_export::{Context, Description, Enumeration, Failure, Inputs, LastEvent, Model, Table};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -96,7 +96,7 @@ impl Model for Counter {
         Ok(())
     }
 
-    fn calculate(&mut self, _time: f64) -> Result<(), Failure> {
+    fn calculate(&mut self, _time: f64, _last: LastEvent) -> Result<(), Failure> {
         self.meet("calculate");
         self.seen = self.count;
         self.parity = if self.count % 2.0 == 0.0 { Parity::Even } else { Parity::Odd };
