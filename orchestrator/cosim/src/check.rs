@@ -168,7 +168,7 @@ fn check_single_instances(
     Ok(())
 }
 
-/// Returns the names of the components, in the order in which their inputs are set.
+/// Returns the names of the components, in the order in which they are stepped.
 fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
     let refuse = |message: String| Err(experiment.source.error(&(0..0), message));
     let names: Vec<&str> = experiment.components.keys().map(String::as_str).collect();
@@ -199,8 +199,8 @@ fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
     }
     if order.is_empty() {
         return refuse(format!(
-            "[simulation] there is no order: name the components in the order in which they get their inputs, those \
-             first that answer at once, for example order = [{}]",
+            "[simulation] there is no order: name the components in the order in which they are stepped, those first \
+             whose outputs respond to their inputs at once, for example order = [{}]",
             names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
         ));
     }

@@ -1,15 +1,16 @@
 //! Effective delay of each feedback loop, derived from the connections, the coupling and the
 //! dependencies that the FMUs declare for their outputs.
 //!
-//! An output that depends on its unit's inputs at the same instant is *direct*. If such an output
-//! is read before its unit's inputs are set (always with Jacobi coupling; with Gauss–Seidel if the
-//! unit comes later in the order), the reader gets the value of the previous communication point,
-//! which delays it by one of its steps. An output that depends on states alone is never late. A
-//! loop in which every output is direct is algebraic: no order of calls solves it.
+//! An output that depends on its unit's inputs at the same instant is *direct*. It can be read only
+//! after the step for which these inputs are set. If a reader is stepped before that (always with
+//! Jacobi coupling; with sequential coupling if the unit comes later in the order), it gets the
+//! response to the inputs of the previous communication point, which delays it by one of its steps.
+//! An output that depends on states alone is never late. A loop in which every output is direct is
+//! algebraic: no order of calls solves it.
 
 use crate::experiment::Coupling;
 use crate::settings::{Setting, SettingValue};
-use crate::wiring::{Part, Wire};
+use crate::wiring::{Part, Port, Reading, Wire};
 use fmu_import::description::Kind;
 use fmu_import::quantity::rounded;
 use std::collections::BTreeSet;
@@ -27,14 +28,14 @@ pub struct FeedbackLoop {
 }
 
 /// Way in which an output depends on an input of its unit.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Passage {
     /// The output depends on the input through states only.
     Delayed,
-    /// The output depends on the input at the same instant.
-    Direct,
     /// The FMU does not declare the dependency.
     Undeclared,
+    /// The output depends on the input at the same instant.
+    Direct,
 }
 
 fn passage(parts: &[Part], component: usize, input: usize, output: usize) -> Passage {
@@ -43,6 +44,42 @@ fn passage(parts: &[Part], component: usize, input: usize, output: usize) -> Pas
         Some(known) if known.contains(&input) => Passage::Direct,
         Some(_) => Passage::Delayed,
     }
+}
+
+/// Returns when the source of each connection is read. A direct output is read after the step, also
+/// if the dependency is not declared, but never so with Jacobi coupling.
+pub fn readings_of_wires(
+    parts: &[Part],
+    wires: &[Wire],
+    coupling: Coupling,
+) -> Vec<(Wire, Reading)> {
+    let reading = |wire: &Wire| match (coupling, strongest_passage(parts, wires, wire.from)) {
+        (Coupling::Jacobi, _) | (_, None | Some(Passage::Delayed)) => Reading::BeforeStep,
+        (Coupling::Sequential, _) => Reading::AfterStep,
+    };
+    wires.iter().map(|wire| (*wire, reading(wire))).collect()
+}
+
+/// Returns when each variable that an observer asks for is read, so that it shows at a
+/// communication point what belongs to it: an input, and an output that is declared to be direct, is
+/// read after the step that begins there.
+pub fn readings_of_probes(parts: &[Part], wires: &[Wire], probes: &[Port]) -> Vec<(Port, Reading)> {
+    let reading = |port: &Port| {
+        let variable = &parts[port.component].description.variables[port.variable];
+        match strongest_passage(parts, wires, *port) {
+            Some(Passage::Direct) => Reading::AfterStep,
+            _ if variable.causality == "input" => Reading::AfterStep,
+            _ => Reading::BeforeStep,
+        }
+    };
+    probes.iter().map(|port| (*port, reading(port))).collect()
+}
+
+/// Returns how an output depends on those of its unit's inputs that are connected; `None` if there
+/// are none.
+fn strongest_passage(parts: &[Part], wires: &[Wire], output: Port) -> Option<Passage> {
+    let connected = wires.iter().filter(|wire| wire.to.component == output.component);
+    connected.map(|wire| passage(parts, output.component, wire.to.variable, output.variable)).max()
 }
 
 /// Finds all feedback loops, each once. `parts` are in the experiment's order, `every` are their
@@ -104,7 +141,7 @@ fn measure(
             .collect();
         let read_too_early = match coupling {
             Coupling::Jacobi => true,
-            Coupling::GaussSeidel => component >= after,
+            Coupling::Sequential => component >= after,
         };
         if passages.iter().any(|p| *p != Passage::Delayed) && read_too_early {
             ticks += u64::from(every[after]);
@@ -116,7 +153,7 @@ fn measure(
     FeedbackLoop { components: components.to_vec(), ticks, undeclared }
 }
 
-/// Finds an order of the components in which Gauss–Seidel coupling has no delay, if there is one: a
+/// Finds an order of the components in which sequential coupling has no delay, if there is one: a
 /// component whose outputs depend on its inputs at the same instant comes before those that read
 /// them. Otherwise the order of `parts` is kept.
 pub fn order(parts: &[Part], wires: &[Wire]) -> Vec<usize> {

@@ -1,11 +1,12 @@
-//! The master algorithm, which transfers values at communication points and steps the units between
-//! them.
+//! The master algorithm, which sets the units' inputs, steps the units, and reads their outputs.
 //!
-//! At tick k, every unit that has reached t_k receives its inputs; then the observers see the
-//! probed values, and then time advances. A unit that steps at every n-th tick is stepped when its
-//! interval *ends*: until then it stays at its last communication point, so that its outputs show
-//! nothing of its future. Each unit sees the calls set, get and doStep in this order, as with any
-//! master.
+//! Every unit sees the calls set, doStep and get in this order, as FMI 2.0.5, section 4.2.1, asks:
+//! nothing is read between setting and stepping. At tick k, every unit that stands at t_k is set and
+//! stepped. With sequential coupling this is done unit by unit, so that outputs which respond to
+//! inputs, such as the moment of a controller, are handed on at once: they are read after the step
+//! for which the inputs were set. All other outputs are those that were read when the unit came to
+//! t_k, even if it has been stepped since. So nothing shows of a unit's future, and a unit that steps
+//! at every n-th tick only is stepped when its interval begins.
 
 mod transfer;
 
@@ -19,13 +20,15 @@ use crate::pacing::Settings;
 use crate::pacing::pacer::Pacer;
 use crate::pacing::timer::{Monotonic, Timer};
 use crate::stopwatch::{Spent, Stopwatch};
-use crate::wiring::{Port, Wire};
+use crate::wiring::{Port, Reading, Wire};
 use fmu_import::unit::{CoSimulationUnit, Outcome, UnitFailure};
 use fmu_import::warnings;
 use std::rc::Rc;
-use transfer::{Inputs, Probe};
+use transfer::{Inputs, Row, Values};
 
-/// The values that an observer sees at a communication point, after all inputs were transferred.
+/// The values that an observer sees at a communication point. Those that respond to the inputs set
+/// there were read after the step; at the last point, where no step begins, they are those of the
+/// step before.
 pub struct Sample<'a> {
     /// Number of the communication point, counted from 0.
     pub tick: u64,
@@ -48,15 +51,19 @@ pub trait Observer {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error>;
 }
 
+/// Index of a unit whose call failed, with the failure.
+type Culprit = (usize, UnitFailure);
+
 /// The units with their connections, which are ready to run.
 pub struct Master {
     clock: Clock,
     coupling: Coupling,
     members: Vec<Member>,
-    /// Whether there are units whose steps are begun ahead.
-    has_ahead: bool,
+    /// Units that are stepping in a process of their own, while others work.
+    stepping: Vec<bool>,
     inputs: Vec<Inputs>,
-    probe: Probe,
+    values: Values,
+    row: Row,
     /// Accumulated computing time of each unit; empty unless it is measured.
     spent: Vec<Rc<Spent>>,
     pacer: Option<Pacer>,
@@ -70,17 +77,20 @@ impl Master {
         clock: Clock,
         coupling: Coupling,
         members: Vec<Member>,
-        wires: &[Wire],
-        probes: &[Port],
+        wires: &[(Wire, Reading)],
+        probes: &[(Port, Reading)],
     ) -> Self {
-        let inputs = (0..members.len()).map(|target| Inputs::new(wires, target)).collect();
+        let wired: Vec<Port> = wires.iter().map(|(wire, _)| wire.from).collect();
+        let probed: Vec<Port> = probes.iter().map(|(port, _)| *port).collect();
+        let values = Values::new(members.len(), &wired, &probed);
         Self {
             clock,
             coupling,
-            has_ahead: members.iter().any(|member| member.ahead),
+            stepping: vec![false; members.len()],
+            inputs: (0..members.len()).map(|target| Inputs::new(&values, wires, target)).collect(),
+            row: Row::new(&values, probes),
             members,
-            inputs,
-            probe: Probe::new(probes),
+            values,
             spent: Vec::new(),
             pacer: None,
             interrupt: Interrupt::default(),
@@ -115,7 +125,6 @@ impl Master {
     }
 
     fn measure(&mut self, timer: &Rc<dyn Timer>) {
-        self.has_ahead = false;
         let members = std::mem::take(&mut self.members).into_iter();
         (self.members, self.spent) = members
             .map(|Member { name, every, unit, .. }| {
@@ -145,7 +154,7 @@ impl Master {
             outcome.map_err(|failure| self.error(start, (index, failure)))?;
         }
         // Whatever the coupling, inputs are transferred one after the other here, so that the
-        // simulation starts from consistent values.
+        // simulation starts from consistent values. Reading after setting is allowed in this mode.
         for index in 0..self.members.len() {
             self.pass_on(index).map_err(|culprit| self.error(start, culprit))?;
         }
@@ -153,7 +162,19 @@ impl Master {
             let outcome = self.members[index].unit.exit_initialization();
             outcome.map_err(|failure| self.error(start, (index, failure)))?;
         }
+        for index in 0..self.members.len() {
+            self.read_unit(index, true).map_err(|culprit| self.error(start, culprit))?;
+        }
         Ok(())
+    }
+
+    fn pass_on(&mut self, index: usize) -> Result<(), Culprit> {
+        for place in 0..self.inputs[index].sources.len() {
+            let source = self.inputs[index].sources[place];
+            self.read_unit(source, false)?;
+            self.values.arrive(source);
+        }
+        self.set(index)
     }
 
     /// Sets all units back to their start values, after which [`Self::initialize`] begins another
@@ -179,9 +200,15 @@ impl Master {
     /// # Errors
     /// Returns an error if a call of the unit fails.
     pub fn read(&mut self, ports: &[Port]) -> Result<Vec<f64>, Error> {
-        let mut probe = Probe::new(ports);
-        probe.read(&mut self.members).map_err(|culprit| self.error(self.clock.start(), culprit))?;
-        Ok(probe.values)
+        let mut values = Values::new(self.members.len(), &[], ports);
+        for index in 0..self.members.len() {
+            let outcome = values.read(index, self.members[index].unit.as_mut(), true);
+            outcome.map_err(|failure| self.error(self.clock.start(), (index, failure)))?;
+        }
+        let latest: Vec<_> = ports.iter().map(|port| (*port, Reading::AfterStep)).collect();
+        let mut row = Row::new(&values, &latest);
+        row.fill(&values);
+        Ok(row.values)
     }
 
     /// Runs from the start time to the stop time.
@@ -202,15 +229,18 @@ impl Master {
             if let Some(pacer) = &mut self.pacer {
                 pacer.wait(tick);
             }
-            self.advance(tick)?;
             let time = self.clock.time(tick);
+            if let Some(request) = self.interrupt.asked() {
+                return Err(Error::Interrupted { time, request });
+            }
+            let outcome = self.round(tick);
             let deadlines = self.pacer.as_mut().map_or(Ok(()), |pacer| pacer.check(tick));
-            let sample =
-                Sample { tick, time, last: tick == self.clock.ticks(), values: &self.probe.values };
+            let last = tick == self.clock.ticks();
+            let sample = Sample { tick, time, last, values: &self.row.values };
             for observer in observers.iter_mut() {
                 observer.observe(&sample)?;
             }
-            deadlines?;
+            outcome.and(deadlines)?;
         }
         for index in 0..self.members.len() {
             let outcome = self.members[index].unit.terminate();
@@ -219,90 +249,119 @@ impl Master {
         Ok(())
     }
 
-    /// Advances to this tick, which must follow the last one; tick 0 follows initialization.
+    /// Does the round of this tick, which must follow the last one; tick 0 follows initialization.
     /// Returns the probed values at this tick, in the order in which the probes were requested.
     ///
     /// # Errors
     /// Returns an error if a unit fails, or if the run was ended from outside.
     pub fn advance(&mut self, tick: u64) -> Result<&[f64], Error> {
+        if let Some(request) = self.interrupt.asked() {
+            return Err(Error::Interrupted { time: self.clock.time(tick), request });
+        }
+        self.round(tick)?;
+        Ok(&self.row.values)
+    }
+
+    /// Sets and steps the units whose communication point is this tick, and fills the row. If one
+    /// fails, the row shows what could be read.
+    fn round(&mut self, tick: u64) -> Result<(), Error> {
         let time = self.clock.time(tick);
         warnings::at(time);
-        if let Some(request) = self.interrupt.asked() {
-            return Err(Error::Interrupted { time, request });
-        }
-        if tick > 0 {
-            self.step_to(tick)?;
-        }
-        self.propagate(tick).map_err(|culprit| self.error(time, culprit))?;
-        self.probe.read(&mut self.members).map_err(|culprit| self.error(time, culprit))?;
-        Ok(&self.probe.values)
-    }
-
-    /// Steps the units whose interval ends at this tick: those in processes of their own at the
-    /// same time.
-    fn step_to(&mut self, tick: u64) -> Result<(), Error> {
-        if self.has_ahead {
-            self.each_due(tick, |member| member.ahead, CoSimulationUnit::begin_step)?;
-        }
-        self.each_due(tick, |_| true, CoSimulationUnit::do_step)
-    }
-
-    /// Calls those units whose interval ends at this tick with its begin and length.
-    fn each_due(
-        &mut self,
-        tick: u64,
-        wanted: impl Fn(&Member) -> bool,
-        call: impl Fn(&mut (dyn CoSimulationUnit + 'static), f64, f64) -> Outcome,
-    ) -> Result<(), Error> {
         for index in 0..self.members.len() {
-            let member = &mut self.members[index];
-            let every = u64::from(member.every);
-            if tick.is_multiple_of(every) && wanted(member) {
-                let from = self.clock.time(tick - every);
-                let outcome = call(member.unit.as_mut(), from, every as f64 * self.clock.step());
-                outcome.map_err(|failure| self.error(from, (index, failure)))?;
+            if tick.is_multiple_of(u64::from(self.members[index].every)) {
+                self.values.arrive(index);
             }
         }
-        Ok(())
+        let outcome = match self.coupling {
+            Coupling::Sequential => self.step_one_by_one(tick),
+            Coupling::Jacobi => self.step_all_at_once(tick),
+        };
+        self.row.fill(&self.values);
+        outcome.map_err(|culprit| self.error(time, culprit))
     }
 
-    /// Transfers values to the units whose communication point is this tick.
-    fn propagate(&mut self, tick: u64) -> Result<(), (usize, UnitFailure)> {
-        let due = |member: &Member| tick.is_multiple_of(u64::from(member.every));
-        match self.coupling {
-            Coupling::GaussSeidel => {
-                for index in 0..self.members.len() {
-                    if due(&self.members[index]) {
-                        self.pass_on(index)?;
-                    }
+    fn step_one_by_one(&mut self, tick: u64) -> Result<(), Culprit> {
+        for index in 0..self.members.len() {
+            if self.begins(index, tick) {
+                for place in 0..self.inputs[index].awaited.len() {
+                    self.finish(self.inputs[index].awaited[place], tick)?;
                 }
+                self.set(index)?;
+                self.begin(index, tick)?;
             }
-            Coupling::Jacobi => {
-                for index in 0..self.members.len() {
-                    if due(&self.members[index]) {
-                        self.inputs[index].gather(&mut self.members)?;
-                    }
-                }
-                for (index, (member, inputs)) in
-                    self.members.iter_mut().zip(&self.inputs).enumerate()
-                {
-                    if due(member) {
-                        inputs.scatter(member.unit.as_mut()).map_err(|failure| (index, failure))?;
-                    }
+        }
+        self.finish_all(tick)
+    }
+
+    fn step_all_at_once(&mut self, tick: u64) -> Result<(), Culprit> {
+        for index in 0..self.members.len() {
+            if self.begins(index, tick) {
+                self.set(index)?;
+            }
+        }
+        // Units in processes of their own compute while the others are stepped.
+        for ahead in [true, false] {
+            for index in 0..self.members.len() {
+                if self.begins(index, tick) && self.members[index].ahead == ahead {
+                    self.begin(index, tick)?;
                 }
             }
         }
-        Ok(())
+        self.finish_all(tick)
     }
 
-    fn pass_on(&mut self, index: usize) -> Result<(), (usize, UnitFailure)> {
+    /// Returns whether a step of the unit begins at this tick and ends by the stop time.
+    fn begins(&self, index: usize, tick: u64) -> bool {
+        let every = u64::from(self.members[index].every);
+        tick.is_multiple_of(every) && tick + every <= self.clock.ticks()
+    }
+
+    fn set(&mut self, index: usize) -> Result<(), Culprit> {
         let inputs = &mut self.inputs[index];
-        inputs.gather(&mut self.members)?;
+        inputs.gather(&self.values);
         inputs.scatter(self.members[index].unit.as_mut()).map_err(|failure| (index, failure))
     }
 
+    /// Begins the step of a unit at this tick. Only one in a process of its own is not finished yet
+    /// then.
+    fn begin(&mut self, index: usize, tick: u64) -> Result<(), Culprit> {
+        self.stepping[index] = true;
+        if !self.members[index].ahead {
+            return self.finish(index, tick);
+        }
+        self.step(index, tick, CoSimulationUnit::begin_step)
+    }
+
+    fn finish(&mut self, index: usize, tick: u64) -> Result<(), Culprit> {
+        if !std::mem::take(&mut self.stepping[index]) {
+            return Ok(());
+        }
+        self.step(index, tick, CoSimulationUnit::do_step)?;
+        self.read_unit(index, true)
+    }
+
+    fn finish_all(&mut self, tick: u64) -> Result<(), Culprit> {
+        (0..self.members.len()).try_for_each(|index| self.finish(index, tick))
+    }
+
+    fn step(
+        &mut self,
+        index: usize,
+        tick: u64,
+        call: impl Fn(&mut (dyn CoSimulationUnit + 'static), f64, f64) -> Outcome,
+    ) -> Result<(), Culprit> {
+        let Member { every, unit, .. } = &mut self.members[index];
+        let length = f64::from(*every) * self.clock.step();
+        call(unit.as_mut(), self.clock.time(tick), length).map_err(|failure| (index, failure))
+    }
+
+    fn read_unit(&mut self, index: usize, probed: bool) -> Result<(), Culprit> {
+        let unit = self.members[index].unit.as_mut();
+        self.values.read(index, unit, probed).map_err(|failure| (index, failure))
+    }
+
     #[cold]
-    fn error(&self, time: f64, (index, failure): (usize, UnitFailure)) -> Error {
+    fn error(&self, time: f64, (index, failure): Culprit) -> Error {
         let component = self.members[index].name.clone();
         if failure.ends {
             Error::EndedByUnit { component, time, message: failure.message }

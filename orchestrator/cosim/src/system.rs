@@ -2,7 +2,7 @@
 //! and then the units are initialized and stepped.
 
 use crate::clock::Clock;
-use crate::delay::FeedbackLoop;
+use crate::delay::{self, FeedbackLoop};
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::interrupt::Interrupt;
@@ -32,7 +32,7 @@ pub struct System {
     pub experiment: Experiment,
     /// Start time, stop time and communication step.
     pub clock: Clock,
-    /// Names of the components, in the order in which their inputs are set.
+    /// Names of the components, in the order in which they are stepped.
     pub order: Vec<String>,
     /// FMU of each component, in the same order.
     pub fmus: Vec<Rc<Fmu>>,
@@ -269,7 +269,10 @@ impl System {
             members.push(Member { name, every, ahead: isolates, unit });
         }
         let coupling = self.experiment.simulation.coupling;
-        let mut master = Master::new(self.clock, coupling, members, &self.wires, &self.probes);
+        let parts = self.parts();
+        let wires = delay::readings_of_wires(&parts, &self.wires, coupling);
+        let probes = delay::readings_of_probes(&parts, &self.wires, &self.probes);
+        let mut master = Master::new(self.clock, coupling, members, &wires, &probes);
         master.heed(interrupt);
         master.initialize()?;
         Ok(master)

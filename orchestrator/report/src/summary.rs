@@ -31,7 +31,7 @@ pub struct Report {
 pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Result<()> {
     let (System { clock, experiment, order, loops, .. }, metrics) = (system, &report.metrics);
     let coupling = match experiment.simulation.coupling {
-        Coupling::GaussSeidel => "Gauss-Seidel",
+        Coupling::Sequential => "sequential",
         Coupling::Jacobi => "Jacobi",
     };
     writeln!(out, "{}", experiment.title)?;
@@ -72,8 +72,8 @@ pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Re
         let reason = match (feedback.ticks, experiment.simulation.coupling) {
             (0, _) => "",
             (_, Coupling::Jacobi) => ", from the Jacobi coupling",
-            (_, Coupling::GaussSeidel) => {
-                ", from the order: an output is read before its unit's inputs are set"
+            (_, Coupling::Sequential) => {
+                ", from the order: a component is stepped before one whose response it receives"
             }
         };
         let undeclared: Vec<&str> =

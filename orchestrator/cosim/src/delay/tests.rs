@@ -56,13 +56,13 @@ fn oracle_controller_and_plant() {
     let wires = [wire((0, 1), 1), wire((1, 1), 0)];
     let in_order = [controller.clone(), plant.clone()];
     let against = [plant, controller];
-    assert_eq!(ticks(&in_order, &[1, 1], &wires, Coupling::GaussSeidel), [0]);
-    assert_eq!(ticks(&against, &[1, 1], &wires, Coupling::GaussSeidel), [1]);
+    assert_eq!(ticks(&in_order, &[1, 1], &wires, Coupling::Sequential), [0]);
+    assert_eq!(ticks(&against, &[1, 1], &wires, Coupling::Sequential), [1]);
     assert_eq!(ticks(&in_order, &[1, 1], &wires, Coupling::Jacobi), [1]);
     assert_eq!(ticks(&against, &[1, 1], &wires, Coupling::Jacobi), [1]);
     // A value that is read too early is read again only at the reader's next communication
     // point.
-    assert_eq!(ticks(&against, &[5, 1], &wires, Coupling::GaussSeidel), [5]);
+    assert_eq!(ticks(&against, &[5, 1], &wires, Coupling::Sequential), [5]);
 }
 
 #[test]
@@ -70,9 +70,9 @@ fn oracle_three_in_a_ring_and_a_loop_within() {
     // The loops are 0 -> 1 -> 2 -> 0 and 1 -> 0; only component 2 has a state.
     let units = [unit(&[Some(true)]), unit(&[Some(true), Some(false)]), unit(&[Some(false)])];
     let wires = [wire((0, 1), 1), wire((1, 1), 2), wire((2, 1), 0), wire((1, 2), 0)];
-    assert_eq!(ticks(&units, &[1; 3], &wires[..3], Coupling::GaussSeidel), [0]);
+    assert_eq!(ticks(&units, &[1; 3], &wires[..3], Coupling::Sequential), [0]);
     assert_eq!(ticks(&units, &[1; 3], &wires[..3], Coupling::Jacobi), [2]);
-    assert_eq!(ticks(&units, &[1; 3], &wires, Coupling::GaussSeidel), [0, 0]);
+    assert_eq!(ticks(&units, &[1; 3], &wires, Coupling::Sequential), [0, 0]);
     assert!(ticks(&units, &[1; 3], &wires[..2], Coupling::Jacobi).is_empty());
 }
 
@@ -109,9 +109,9 @@ fn warned(counted_on: Option<f64>, transport: Option<f64>, coupling: Coupling) -
 
 #[test]
 fn oracle_a_law_that_counts_on_its_loops_delay_is_not_warned_of() {
-    assert!(warned(None, None, Coupling::GaussSeidel).is_empty());
+    assert!(warned(None, None, Coupling::Sequential).is_empty());
     assert!(warned(Some(0.04), None, Coupling::Jacobi).is_empty());
-    assert!(warned(Some(0.02), Some(0.02), Coupling::GaussSeidel).is_empty());
+    assert!(warned(Some(0.02), Some(0.02), Coupling::Sequential).is_empty());
     assert!(warned(Some(0.07), Some(0.03), Coupling::Jacobi).is_empty());
     assert!(warned(Some(0.04 * (1.0 + 1e-12)), None, Coupling::Jacobi).is_empty());
 }
@@ -126,7 +126,7 @@ fn oracle_a_law_that_counts_on_another_delay_is_told_the_right_one() {
         vec![expected]
     };
     assert_eq!(warned(None, None, Coupling::Jacobi), told("0", "0.04"));
-    assert_eq!(warned(Some(0.04), None, Coupling::GaussSeidel), told("0.04", "0"));
+    assert_eq!(warned(Some(0.04), None, Coupling::Sequential), told("0.04", "0"));
     assert_eq!(warned(Some(0.04), Some(0.02), Coupling::Jacobi), told("0.04", "0.06"));
     assert_eq!(warned(Some(0.0400001), None, Coupling::Jacobi), told("0.0400001", "0.04"));
 }
@@ -141,7 +141,7 @@ fn the_longest_loop_counts_and_what_is_on_no_loop_does_not() {
         units.iter().map(|description| Part { name: "c", description }).collect();
     let wires =
         [wire((0, 1), 1), wire((1, 1), 0), wire((0, 1), 2), wire((2, 1), 0), wire((2, 1), 3)];
-    let loops = feedback_loops(&parts, &[1; 4], &wires, Coupling::GaussSeidel);
+    let loops = feedback_loops(&parts, &[1; 4], &wires, Coupling::Sequential);
     let none = [const { Vec::new() }; 4];
     let warnings = warnings(&parts, &none, &loops, 0.5);
     assert_eq!(

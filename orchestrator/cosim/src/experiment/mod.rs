@@ -73,10 +73,10 @@ pub struct Simulation {
     pub stop: f64,
     /// Length of the communication step, s.
     pub step: f64,
-    /// Way in which values are passed on at a communication point.
+    /// Way in which components are stepped and values handed on.
     #[serde(default)]
     pub coupling: Coupling,
-    /// Names of components, in the order in which their inputs are set at each communication point.
+    /// Names of components, in the order in which they are stepped from each communication point.
     #[serde(default)]
     pub order: Vec<String>,
     /// Action taken if a unit gives a value that is not finite, or not valid for its type.
@@ -84,18 +84,20 @@ pub struct Simulation {
     pub on_invalid: OnInvalid,
 }
 
-/// Way in which values are passed on at a communication point.
+/// Way in which components are stepped and values handed on.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Coupling {
-    /// The components are served one after the other: each receives what those before it have
-    /// computed from their new inputs.
+    /// One after the other, each component gets its inputs, is stepped, and hands on: those after
+    /// it receive its responses to these inputs. Earlier versions called this "gauss-seidel".
     #[default]
-    GaussSeidel,
-    /// All components are served at once: each receives what the others had computed before the
-    /// inputs of this communication point were set.
+    #[serde(alias = "gauss-seidel")]
+    #[value(alias = "gauss-seidel")]
+    Sequential,
+    /// All components get their inputs, then all are stepped: each receives what the others gave
+    /// after their last step.
     Jacobi,
 }
 

@@ -20,7 +20,7 @@ fn parse(text: &str) -> Result<Experiment, Error> {
 #[test]
 fn defaults_are_filled_in() {
     let experiment = parse(TEXT).unwrap();
-    assert_eq!(experiment.simulation.coupling, Coupling::GaussSeidel);
+    assert_eq!(experiment.simulation.coupling, Coupling::Sequential);
     assert_eq!(
         (experiment.simulation.start, experiment.components["a"].every, experiment.record.every),
         (0.0, 1, 1)

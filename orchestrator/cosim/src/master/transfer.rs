@@ -1,58 +1,150 @@
-//! Transfers values between units, with one call per unit and type.
+//! Values on their way from unit to unit, which are read with one call per unit and type.
 
-use crate::wiring::{Port, Wire};
+use crate::wiring::{Port, Reading, Wire};
 use fmu_import::description::Carrier;
 use fmu_import::quantity::Scaling;
-use fmu_import::unit::{CoSimulationUnit, Outcome, UnitFailure};
-use std::ops::Range;
+use fmu_import::unit::{CoSimulationUnit, Outcome};
+use std::collections::BTreeSet;
 
 /// A unit together with what the master must know to step it. Members are kept in the order in
-/// which their inputs are set.
+/// which they are stepped.
 pub struct Member {
     /// Name of the component in the experiment.
     pub name: String,
     /// Period of the unit: it steps at every n-th tick.
     pub every: u32,
-    /// Whether its steps are begun before any other is waited for, because it has a process of its
-    /// own.
+    /// Whether others may work while it steps, because it has a process of its own.
     pub ahead: bool,
     /// The unit itself, instantiated and with its parameters set.
     pub unit: Box<dyn CoSimulationUnit>,
 }
 
-/// All values of one type that one unit receives: they are read with one get call per source and
-/// written with one set call.
-struct Bundle<T> {
+/// Variables of one unit and type, which are read by one call into neighbouring places.
+struct Read {
+    carrier: Carrier,
     references: Vec<u32>,
-    values: Vec<T>,
-    sources: Vec<(usize, Vec<u32>, Range<usize>)>,
+    /// Index of the first value; the others follow.
+    first: usize,
+    integers: Vec<i32>,
 }
 
-impl<T: Copy + Default> Bundle<T> {
-    fn new(wires: &[Wire], target: usize, carrier: Carrier) -> Self {
-        let mut wires: Vec<&Wire> =
-            wires.iter().filter(|w| w.to.component == target && w.to.carrier == carrier).collect();
-        wires.sort_by_key(|wire| wire.from.component);
-        let mut sources: Vec<(usize, Vec<u32>, Range<usize>)> = Vec::new();
-        for (place, wire) in wires.iter().enumerate() {
-            match sources.last_mut() {
-                Some((source, references, range)) if *source == wire.from.component => {
-                    references.push(wire.from.reference);
-                    range.end = place + 1;
-                }
-                _ => {
-                    sources.push((
-                        wire.from.component,
-                        vec![wire.from.reference],
-                        place..place + 1,
-                    ));
+/// All values that are read from the units. Integers and booleans are kept as floats, which hold
+/// them without loss.
+pub(super) struct Values {
+    ports: Vec<Port>,
+    /// Reads of each unit: those of connected outputs, then those that only observers ask for.
+    reads: Vec<[Vec<Read>; 2]>,
+    /// Values at the communication point at which a unit stands before its step.
+    before: Vec<f64>,
+    /// Values that were read last.
+    latest: Vec<f64>,
+}
+
+impl Values {
+    /// Provides for what this number of units give to one another, `wired`, and to observers.
+    pub(super) fn new(units: usize, wired: &[Port], probed: &[Port]) -> Self {
+        let mut values =
+            Self { ports: Vec::new(), reads: Vec::new(), before: Vec::new(), latest: Vec::new() };
+        for unit in 0..units {
+            let reads = [values.add(unit, wired), values.add(unit, probed)];
+            values.reads.push(reads);
+        }
+        values.before = vec![0.0; values.ports.len()];
+        values.latest = values.before.clone();
+        values
+    }
+
+    /// Adds those ports of a unit that are not there yet.
+    fn add(&mut self, unit: usize, ports: &[Port]) -> Vec<Read> {
+        let mut reads = Vec::new();
+        for carrier in [Carrier::Real, Carrier::Integer, Carrier::Boolean] {
+            let first = self.ports.len();
+            for port in ports.iter().filter(|p| p.component == unit && p.carrier == carrier) {
+                if !self.ports.contains(port) {
+                    self.ports.push(*port);
                 }
             }
+            let references: Vec<u32> = self.ports[first..].iter().map(|p| p.reference).collect();
+            if !references.is_empty() {
+                let length = if carrier == Carrier::Real { 0 } else { references.len() };
+                reads.push(Read { carrier, references, first, integers: vec![0; length] });
+            }
         }
-        Self {
-            references: wires.iter().map(|wire| wire.to.reference).collect(),
-            values: vec![T::default(); wires.len()],
-            sources,
+        reads
+    }
+
+    fn place(&self, port: &Port) -> usize {
+        let place = self.ports.iter().position(|known| known == port);
+        place.expect("every connected or probed output has a place")
+    }
+
+    /// Reads the connected outputs of a unit, and with `probed` what observers ask for.
+    pub(super) fn read(
+        &mut self,
+        index: usize,
+        unit: &mut dyn CoSimulationUnit,
+        probed: bool,
+    ) -> Outcome {
+        let [wired, others] = &mut self.reads[index];
+        let others = others.iter_mut().take(if probed { usize::MAX } else { 0 });
+        for read in wired.iter_mut().chain(others) {
+            let into = &mut self.latest[read.first..read.first + read.references.len()];
+            match read.carrier {
+                Carrier::Real => unit.get_real(&read.references, into)?,
+                Carrier::Integer => unit.get_integer(&read.references, &mut read.integers)?,
+                Carrier::Boolean => unit.get_boolean(&read.references, &mut read.integers)?,
+            }
+            for (value, integer) in into.iter_mut().zip(&read.integers) {
+                *value = f64::from(*integer);
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes the values that a unit shows at its communication point those before its step.
+    pub(super) fn arrive(&mut self, index: usize) {
+        for read in self.reads[index].iter().flatten() {
+            let range = read.first..read.first + read.references.len();
+            self.before[range.clone()].copy_from_slice(&self.latest[range]);
+        }
+    }
+}
+
+/// Place among the values, with the time of the reading that counts.
+#[derive(Clone, Copy)]
+struct Place {
+    index: usize,
+    reading: Reading,
+}
+
+impl Place {
+    fn of(self, values: &Values) -> f64 {
+        match self.reading {
+            Reading::BeforeStep => values.before[self.index],
+            Reading::AfterStep => values.latest[self.index],
+        }
+    }
+}
+
+/// Values that observers see.
+pub(super) struct Row {
+    places: Vec<Place>,
+    pub(super) values: Vec<f64>,
+}
+
+impl Row {
+    /// Makes a row of `probes`.
+    pub(super) fn new(values: &Values, probes: &[(Port, Reading)]) -> Self {
+        let place = |(port, reading): &(Port, Reading)| Place {
+            index: values.place(port),
+            reading: *reading,
+        };
+        Self { places: probes.iter().map(place).collect(), values: vec![0.0; probes.len()] }
+    }
+
+    pub(super) fn fill(&mut self, values: &Values) {
+        for (value, place) in self.values.iter_mut().zip(&self.places) {
+            *value = place.of(values);
         }
     }
 }
@@ -62,58 +154,62 @@ pub(super) struct Inputs {
     real: Bundle<f64>,
     integer: Bundle<i32>,
     boolean: Bundle<i32>,
-    /// Indices of the real inputs whose values are converted on the way, with their scaling.
-    scaled: Vec<(usize, Scaling)>,
+    /// Units that must have stepped before the values are there.
+    pub(super) awaited: Vec<usize>,
+    /// Units that give any of the values.
+    pub(super) sources: Vec<usize>,
+}
+
+/// Inputs of one type: they are written by one call.
+struct Bundle<T> {
+    references: Vec<u32>,
+    places: Vec<(Place, Scaling)>,
+    values: Vec<T>,
+}
+
+impl<T: Copy + Default> Bundle<T> {
+    fn new(values: &Values, wires: &[(Wire, Reading)], target: usize, carrier: Carrier) -> Self {
+        let wires =
+            wires.iter().filter(|(w, _)| w.to.component == target && w.to.carrier == carrier);
+        let place = |&(wire, reading): &(Wire, Reading)| {
+            (Place { index: values.place(&wire.from), reading }, wire.scaling)
+        };
+        let references: Vec<u32> = wires.clone().map(|(wire, _)| wire.to.reference).collect();
+        let values = vec![T::default(); references.len()];
+        Self { references, places: wires.map(place).collect(), values }
+    }
+
+    /// Takes the values over; `convert` is exact for what was read.
+    fn gather(&mut self, values: &Values, convert: impl Fn(f64) -> T) {
+        for (value, (place, scaling)) in self.values.iter_mut().zip(&self.places) {
+            let read = place.of(values);
+            *value = convert(if *scaling == Scaling::default() { read } else { scaling.of(read) });
+        }
+    }
 }
 
 impl Inputs {
-    pub(super) fn new(wires: &[Wire], target: usize) -> Self {
-        let real: Bundle<f64> = Bundle::new(wires, target, Carrier::Real);
-        let scaling = |reference: u32| {
-            let is_it = |w: &&Wire| w.to.component == target && w.to.reference == reference;
-            wires
-                .iter()
-                .filter(|w| w.to.carrier == Carrier::Real)
-                .find(is_it)
-                .map(|wire| wire.scaling)
+    pub(super) fn new(values: &Values, wires: &[(Wire, Reading)], target: usize) -> Self {
+        let sources = |readings: &[Reading]| {
+            let chosen = wires.iter().filter(|(wire, reading)| {
+                wire.to.component == target && readings.contains(reading)
+            });
+            let sources: BTreeSet<usize> = chosen.map(|(wire, _)| wire.from.component).collect();
+            sources.into_iter().collect()
         };
-        let scaled = real.references.iter().enumerate();
-        let scaled = scaled.filter_map(|(place, &reference)| Some((place, scaling(reference)?)));
         Self {
-            scaled: scaled.filter(|(_, scaling)| *scaling != Scaling::default()).collect(),
-            real,
-            integer: Bundle::new(wires, target, Carrier::Integer),
-            boolean: Bundle::new(wires, target, Carrier::Boolean),
+            real: Bundle::new(values, wires, target, Carrier::Real),
+            integer: Bundle::new(values, wires, target, Carrier::Integer),
+            boolean: Bundle::new(values, wires, target, Carrier::Boolean),
+            awaited: sources(&[Reading::AfterStep]),
+            sources: sources(&[Reading::BeforeStep, Reading::AfterStep]),
         }
     }
 
-    /// Reads the sources of the inputs. An error carries the index of the member whose call failed.
-    pub(super) fn gather(&mut self, members: &mut [Member]) -> Result<(), (usize, UnitFailure)> {
-        for (source, references, range) in &self.real.sources {
-            let values = &mut self.real.values[range.clone()];
-            members[*source]
-                .unit
-                .get_real(references, values)
-                .map_err(|failure| (*source, failure))?;
-        }
-        for (place, scaling) in &self.scaled {
-            self.real.values[*place] = scaling.of(self.real.values[*place]);
-        }
-        for (source, references, range) in &self.integer.sources {
-            let values = &mut self.integer.values[range.clone()];
-            members[*source]
-                .unit
-                .get_integer(references, values)
-                .map_err(|failure| (*source, failure))?;
-        }
-        for (source, references, range) in &self.boolean.sources {
-            let values = &mut self.boolean.values[range.clone()];
-            members[*source]
-                .unit
-                .get_boolean(references, values)
-                .map_err(|failure| (*source, failure))?;
-        }
-        Ok(())
+    pub(super) fn gather(&mut self, values: &Values) {
+        self.real.gather(values, |value| value);
+        self.integer.gather(values, |value| value as i32);
+        self.boolean.gather(values, |value| value as i32);
     }
 
     pub(super) fn scatter(&self, unit: &mut dyn CoSimulationUnit) -> Outcome {
@@ -125,72 +221,6 @@ impl Inputs {
         }
         if !self.boolean.references.is_empty() {
             unit.set_boolean(&self.boolean.references, &self.boolean.values)?;
-        }
-        Ok(())
-    }
-}
-
-/// Reads the probed variables for the observers, with one call per unit and type.
-pub(super) struct Probe {
-    reads: Vec<Read>,
-    pub(super) values: Vec<f64>,
-}
-
-struct Read {
-    component: usize,
-    carrier: Carrier,
-    references: Vec<u32>,
-    /// Index of each value among the probed values.
-    places: Vec<usize>,
-    reals: Vec<f64>,
-    integers: Vec<i32>,
-}
-
-impl Probe {
-    pub(super) fn new(ports: &[Port]) -> Self {
-        let mut reads: Vec<Read> = Vec::new();
-        for (place, port) in ports.iter().enumerate() {
-            let known = reads
-                .iter_mut()
-                .find(|r| r.component == port.component && r.carrier == port.carrier);
-            if let Some(read) = known {
-                read.references.push(port.reference);
-                read.places.push(place);
-            } else {
-                reads.push(Read {
-                    component: port.component,
-                    carrier: port.carrier,
-                    references: vec![port.reference],
-                    places: vec![place],
-                    reals: Vec::new(),
-                    integers: Vec::new(),
-                });
-            }
-        }
-        for read in &mut reads {
-            match read.carrier {
-                Carrier::Real => read.reals = vec![0.0; read.places.len()],
-                Carrier::Integer | Carrier::Boolean => read.integers = vec![0; read.places.len()],
-            }
-        }
-        Self { reads, values: vec![0.0; ports.len()] }
-    }
-
-    pub(super) fn read(&mut self, members: &mut [Member]) -> Result<(), (usize, UnitFailure)> {
-        for read in &mut self.reads {
-            let unit = &mut members[read.component].unit;
-            match read.carrier {
-                Carrier::Real => unit.get_real(&read.references, &mut read.reals),
-                Carrier::Integer => unit.get_integer(&read.references, &mut read.integers),
-                Carrier::Boolean => unit.get_boolean(&read.references, &mut read.integers),
-            }
-            .map_err(|failure| (read.component, failure))?;
-            for (value, place) in read.reals.iter().zip(&read.places) {
-                self.values[*place] = *value;
-            }
-            for (value, place) in read.integers.iter().zip(&read.places) {
-                self.values[*place] = f64::from(*value);
-            }
         }
         Ok(())
     }

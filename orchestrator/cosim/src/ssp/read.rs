@@ -79,7 +79,7 @@ impl Own {
             text.parse::<u32>().map_err(|_| format!("{name}=\"{text}\" is no count"))
         };
         let coupling = match element.required("coupling")? {
-            "gauss-seidel" => Coupling::GaussSeidel,
+            "sequential" | "gauss-seidel" => Coupling::Sequential,
             "jacobi" => Coupling::Jacobi,
             other => return Err(format!("the coupling \"{other}\" is not known")),
         };
@@ -181,7 +181,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         start: time("startTime")?.unwrap_or(0.0),
         stop: stop.ok_or_else(|| refuse("has no stop time: give --stop".into()))?,
         step: step.ok_or_else(|| refuse("none of its FMUs proposes a step: give --step".into()))?,
-        coupling: Coupling::GaussSeidel,
+        coupling: Coupling::Sequential,
         order: structure.components.iter().map(|component| component.name.clone()).collect(),
     };
     let text_of = |text: String| Spanned::new(0..0, text);

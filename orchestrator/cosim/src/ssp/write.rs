@@ -152,7 +152,7 @@ fn open_modelica(xml: &mut Xml, system: &Source) -> io::Result<()> {
 fn own(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let experiment = &system.experiment;
     let coupling = match experiment.simulation.coupling {
-        Coupling::GaussSeidel => "gauss-seidel",
+        Coupling::Sequential => "sequential",
         Coupling::Jacobi => "jacobi",
     };
     let attributes = [
