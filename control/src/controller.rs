@@ -18,6 +18,8 @@ pub struct Measurement {
     /// Whether the measurement was made at an earlier instant than the tick, because the
     /// communication step is longer than the period or no multiple of it.
     pub stale: bool,
+    /// Whether the motion shows another delay of the loop than the one that was told.
+    pub has_other_delay: bool,
 }
 
 /// The reference as a function of time (s), so that a controller with preview can also ask for the

@@ -15,6 +15,7 @@
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
+use crate::loop_delay::{LoopDelay, LoopDelaySettings};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
@@ -124,17 +125,24 @@ pub struct Memory<M> {
     /// Commands whose action has not ended yet, oldest first, N m. They are zero until enough ticks
     /// have passed.
     pub under_way: Vec<Vector3<f64>>,
+    /// Estimate of the delay that the loop really has.
+    pub loop_delay: LoopDelay,
 }
 
 impl<M: Clone> Clone for Memory<M> {
     fn clone(&self) -> Self {
-        Self { inner: self.inner.clone(), under_way: self.under_way.clone() }
+        Self {
+            inner: self.inner.clone(),
+            under_way: self.under_way.clone(),
+            loop_delay: self.loop_delay.clone(),
+        }
     }
 
     // The derived version would allocate at every tick.
     fn clone_from(&mut self, source: &Self) {
         self.inner.clone_from(&source.inner);
         self.under_way.clone_from(&source.under_way);
+        self.loop_delay.clone_from(&source.loop_delay);
     }
 }
 
@@ -146,6 +154,7 @@ pub struct Delayed<C> {
     inner: C,
     predictor: Predictor,
     latency: Latency,
+    loop_delay: LoopDelaySettings,
     moment_limit: f64,
 }
 
@@ -181,12 +190,19 @@ impl<C: Controller> Delayed<C> {
             return Err(DesignError::Delay { value: action, longest: LONGEST });
         }
         let predictor = Predictor::new(body, latency.total(), period)?;
-        Ok(Self { inner, predictor, latency, moment_limit })
+        let loop_delay = LoopDelaySettings { body, period, told: latency.total() };
+        Ok(Self { inner, predictor, latency, loop_delay, moment_limit })
     }
 
     /// Returns the time from a tick until its command acts, s.
     pub fn acts_after(&self) -> f64 {
         self.latency.action
+    }
+
+    /// Returns the estimated delay of the loop, s; the one that was told as long as the motion does
+    /// not tell it.
+    pub fn estimated_delay(&self, memory: &Memory<C::Memory>) -> f64 {
+        memory.loop_delay.estimate.unwrap_or(self.loop_delay.told)
     }
 
     /// Returns the law behind the prediction.
@@ -207,11 +223,14 @@ impl<C: Controller> Controller for Delayed<C> {
         Memory {
             inner: self.inner.memory(),
             under_way: vec![Vector3::zeros(); self.predictor.count],
+            loop_delay: self.loop_delay.memory(),
         }
     }
 
     fn fits(&self, memory: &Self::Memory) -> bool {
-        memory.under_way.len() == self.predictor.count && self.inner.fits(&memory.inner)
+        memory.under_way.len() == self.predictor.count
+            && self.loop_delay.fits(&memory.loop_delay)
+            && self.inner.fits(&memory.inner)
     }
 
     fn command(
@@ -222,13 +241,18 @@ impl<C: Controller> Controller for Delayed<C> {
         measured: &Measurement,
         reference: ReferenceAt,
     ) -> Vector3<f64> {
-        let Memory { inner, under_way } = memory;
+        let Memory { inner, under_way, loop_delay } = memory;
+        self.loop_delay.observe(loop_delay, measured);
+        let measured = Measurement { has_other_delay: loop_delay.is_other, ..*measured };
         if self.predictor.count == 0 {
-            return self.inner.command(inner, tick, time, measured, reference);
+            let moment = self.inner.command(inner, tick, time, &measured, reference);
+            self.loop_delay.remember(loop_delay, &moment);
+            return moment;
         }
-        let predicted = self.predictor.predict(under_way, measured);
+        let predicted = self.predictor.predict(under_way, &measured);
         let moment =
             self.inner.command(inner, tick, time + self.latency.action, &predicted, reference);
+        self.loop_delay.remember(loop_delay, &moment);
         // A default memory has no room yet.
         under_way.resize(self.predictor.count, Vector3::zeros());
         under_way.rotate_left(1);
@@ -246,6 +270,7 @@ impl<C: Controller> Controller for Delayed<C> {
         if let Some(newest) = memory.under_way.last_mut() {
             *newest = *applied;
         }
+        memory.loop_delay.limit(applied);
         self.inner.limited(&mut memory.inner, applied);
     }
 }

@@ -13,6 +13,7 @@ pub mod error;
 pub mod error_dynamics;
 pub mod estimation;
 pub mod linearise;
+pub mod loop_delay;
 pub mod lqr;
 pub mod mpc;
 pub mod report;

@@ -43,7 +43,7 @@ fn simulate<C: Controller>(
             angles: plant.angles(),
             rates: plant.rates(),
             achieved_moment: achieved,
-            stale: false,
+            ..Measurement::default()
         };
         let error = measured.angles - reference(time).angles;
         for i in 0..3 {

@@ -50,7 +50,7 @@ fn run(
             angles: plant.angles(),
             rates: plant.rates(),
             achieved_moment,
-            stale: false,
+            ..Measurement::default()
         };
         let error = (measured.angles - reference(time).angles).amax().to_degrees();
         if error > 0.5 {

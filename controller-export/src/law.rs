@@ -96,6 +96,10 @@ pub struct Output {
     pub moment: Vector3<f64>,
     /// Reference that is in force.
     pub reference: Reference,
+    /// Estimated delay of the loop, s.
+    pub loop_delay: f64,
+    /// Whether it differs from the one that was told by more than half a period.
+    pub has_other_delay: bool,
 }
 
 /// A control law with the variables that only it has. The value holds those variables; its default

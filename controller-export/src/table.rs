@@ -184,7 +184,18 @@ fn outputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     );
     let table = vector(table, ANGLES, angles, |m| &mut m.output.reference.angles);
     let table = vector(table, ANGLES, rates, |m| &mut m.output.reference.rates);
-    vector(table, ANGLES, accelerations, |m| &mut m.output.reference.accelerations)
+    let table = vector(table, ANGLES, accelerations, |m| &mut m.output.reference.accelerations);
+    let estimate = sampled_output(
+        "loopDelay.estimate",
+        "Delay from a measurement to the moment that results from it, estimated from the motion; delay + measurement.age until the motion tells it",
+    );
+    let differs = sampled_output(
+        "loopDelay.differs",
+        "Whether the estimated delay differs from delay + measurement.age by more than half a period",
+    );
+    table
+        .real(estimate.real().unit(unit::time()).nominal(0.1), |m| &mut m.output.loop_delay)
+        .boolean(differs, |m| &mut m.output.has_other_delay)
 }
 
 fn reference_angle(axis: &str, meaning: &str) -> Real {

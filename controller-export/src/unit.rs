@@ -146,18 +146,27 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
     }
 
     fn warning(before: &Self::Memory, after: &Self::Memory) -> Option<&'static str> {
+        if after.loop_delay.is_other && !before.loop_delay.is_other {
+            return Some(
+                "the motion shows another delay of the loop than delay and measurement.age say: loopDelay.estimate tells which",
+            );
+        }
         L::warning(&before.inner, &after.inner)
     }
 
     fn show(
         &mut self,
         time: f64,
-        _device: &Designed<L>,
+        device: &Designed<L>,
         (moment, memory): (Vector3<f64>, &Self::Memory),
     ) {
         self.law.show(&memory.inner);
-        self.output =
-            Output { moment, reference: self.source.preview(time, &self.input.reference).at(time) };
+        self.output = Output {
+            moment,
+            reference: self.source.preview(time, &self.input.reference).at(time),
+            loop_delay: device.controller.estimated_delay(memory),
+            has_other_delay: memory.loop_delay.is_other,
+        };
     }
 
     fn fits(device: &Designed<L>, memory: &Self::Memory) -> bool {

@@ -2,7 +2,8 @@
 
 use crate::solver;
 use control::crmpc::{
-    Constraints, Crmpc, Guarantee, InitialState, Margins, Memory, Settings, Standing,
+    Constraints, Contradiction, Crmpc, Guarantee, InitialState, Margins, Memory, Settings,
+    Standing, Supervision,
 };
 use control::error::DesignError;
 use control::error_dynamics::Gain;
@@ -31,7 +32,7 @@ struct Shown {
     angles: Vector3<f64>,
     rates: Vector3<f64>,
     in_force: bool,
-    standing: Standing,
+    supervision: Supervision,
     margins: Margins,
     disturbance: Vector3<f64>,
     report: Report,
@@ -99,7 +100,45 @@ static STANDINGS: Enumeration<Standing> = Enumeration {
         (
             Standing::Exceeded,
             "exceeded",
-            "the vehicle is further from the plan than the assumptions explain",
+            "an assumption is contradicted, see guarantee.contradiction, or was during the last second",
+        ),
+        (
+            Standing::Stale,
+            "stale",
+            "the inputs were set before the tick, or were during the last second: step with period.feedback or a whole part of it",
+        ),
+    ],
+};
+
+const CONTRADICTIONS: Enumeration<Contradiction> = Enumeration {
+    name: "Contradiction",
+    description: "What contradicts an assumption of the guarantee, or did during the last second",
+    items: &[
+        (Contradiction::None, "none", "nothing"),
+        (
+            Contradiction::Step,
+            "step",
+            "the communication step: inputs were set before the tick at which they are used",
+        ),
+        (
+            Contradiction::Delay,
+            "delay",
+            "the delay of the loop: loopDelay differs from delay + measurement.age",
+        ),
+        (
+            Contradiction::Disturbance,
+            "disturbance",
+            "the observed disturbance: it exceeds what disturbance.bound, inertia.error and estimation.rateError explain",
+        ),
+        (
+            Contradiction::Deviation,
+            "deviation",
+            "the vehicle is further from the plan than disturbance, inertia, measurements and delay together explain",
+        ),
+        (
+            Contradiction::Limit,
+            "limit",
+            "a limit is exceeded, or the moment that the law asks for exceeds it",
         ),
     ],
 };
@@ -155,8 +194,8 @@ impl Law for CrmpcLaw {
         self.shown = Shown {
             angles: shown_vector(&memory.nominal.fixed_rows::<3>(0).into()),
             rates: shown_vector(&memory.nominal.fixed_rows::<3>(3).into()),
-            in_force: memory.standing == Standing::InForce,
-            standing: memory.standing,
+            in_force: memory.supervision.status == Standing::InForce,
+            supervision: memory.supervision,
             margins: Margins {
                 rate: shown(memory.margins.rate),
                 moment: shown(memory.margins.moment),
@@ -168,11 +207,27 @@ impl Law for CrmpcLaw {
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
         // The warning is given the first time only; `guarantee.status` shows the later ones.
-        let ends = after.ended == 1 && before.ended == 0;
-        match (before.standing, after.standing) {
-            (_, Standing::Exceeded) if ends => Some(
-                "the guarantee is no longer in force: the vehicle is further from the plan than disturbance.bound, inertia.error, estimation.*, measurement.age and delay explain",
-            ),
+        let (before_then, now) = (&before.supervision, &after.supervision);
+        if now.ended == 1 && before_then.ended == 0 {
+            return Some(match now.contradiction {
+                Contradiction::Step => {
+                    "the guarantee is no longer in force: inputs were set before the tick at which they are used; step with period.feedback or a whole part of it"
+                }
+                Contradiction::Delay => {
+                    "the guarantee is no longer in force: the loop has another delay than delay and measurement.age say"
+                }
+                Contradiction::Disturbance => {
+                    "the guarantee is no longer in force: the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError explain"
+                }
+                Contradiction::Limit => {
+                    "the guarantee is no longer in force: a limit is exceeded although it was guaranteed"
+                }
+                Contradiction::Deviation | Contradiction::None => {
+                    "the guarantee is no longer in force: the vehicle is further from the plan than disturbance.bound, inertia.error, estimation.*, measurement.age and delay explain"
+                }
+            });
+        }
+        match (before_then.status, now.status) {
             (Standing::None, Standing::Uncertified) => Some(
                 "the guarantee is not in force: no plan keeps its conditions from the present state",
             ),
@@ -346,8 +401,13 @@ fn outputs(table: Controller) -> Controller {
             |m| &mut m.law.shown.in_force,
         )
         .enumeration(sampled("guarantee.status", STANDINGS.description), &STANDINGS, |m| {
-            &mut m.law.shown.standing
+            &mut m.law.shown.supervision.status
         })
+        .enumeration(
+            sampled("guarantee.contradiction", CONTRADICTIONS.description),
+            &CONTRADICTIONS,
+            |m| &mut m.law.shown.supervision.contradiction,
+        )
         .real(margin("rateMargin", "rate limit"), |m| &mut m.law.shown.margins.rate)
         .real(margin("momentMargin", "moment limit"), |m| &mut m.law.shown.margins.moment);
     let table = vector(table, ANGLES, observed, |m| &mut m.law.shown.disturbance);

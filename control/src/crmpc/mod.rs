@@ -14,6 +14,7 @@ mod published;
 mod robust;
 mod sets;
 mod settings;
+mod supervision;
 
 pub use crate::report::{Report, Status};
 pub use design::{
@@ -28,6 +29,7 @@ pub use published::Published;
 pub use robust::Margins;
 pub use sets::Bounds;
 pub use settings::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
+pub use supervision::{Contradiction, Supervision};
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
@@ -53,8 +55,10 @@ pub struct Memory {
     pub report: Report,
     /// Nominal state (Θ̃, x̃_ω) at the last tick.
     pub nominal: Vector6<f64>,
-    /// Status of the guarantee: in force, or the reason why not.
+    /// Whether the plan in force gives the guarantee, or the reason why not.
     pub standing: Standing,
+    /// What is said of the guarantee, which takes into account what contradicts its assumptions.
+    pub supervision: Supervision,
     /// Margins to the limits that the plan in force leaves in its first interval.
     pub margins: Margins,
     /// Feedback ticks from the beginning of the nominal motion to the beginning of the plan in
@@ -62,8 +66,6 @@ pub struct Memory {
     pub age: u32,
     /// Feedback ticks until a pending guarantee is in force.
     pub pending: u32,
-    /// Number of times that the guarantee has ended.
-    pub ended: u32,
     /// Estimate of the disturbance with its filter state.
     pub observed: Observed,
 }
@@ -84,15 +86,24 @@ pub enum Standing {
     Refused,
     /// No plan has been found that satisfies the conditions of the theorem.
     Uncertified,
-    /// The vehicle is further from the plan than the assumptions explain.
+    /// The vehicle is further from the plan than the assumptions explain, or something else
+    /// contradicts them.
     Exceeded,
+    /// The inputs were set before the tick.
+    Stale,
+}
+
+impl Standing {
+    fn is_assured(self) -> bool {
+        matches!(self, Self::Pending | Self::InForce)
+    }
 }
 
 impl Memory {
     /// Returns whether the plan in force is certified and the vehicle no further from it than the
     /// assumptions explain.
     pub fn assured(&self) -> bool {
-        matches!(self.standing, Standing::Pending | Standing::InForce)
+        self.standing.is_assured()
     }
 }
 
@@ -114,7 +125,7 @@ impl Clone for Memory {
             margins,
             age,
             pending,
-            ended,
+            supervision,
             observed,
         } = source;
         self.plan.clone_from(plan);
@@ -125,7 +136,7 @@ impl Clone for Memory {
         self.margins = *margins;
         self.age = *age;
         self.pending = *pending;
-        self.ended = *ended;
+        self.supervision = *supervision;
         self.observed = *observed;
     }
 }
@@ -229,15 +240,16 @@ impl Crmpc {
     }
 
     /// Runs one optimisation at `time` from the measured state (Θ, x_ω). The plan and the report
-    /// are left in `memory`.
+    /// are left in `memory`. Returns whether the vehicle was further from the plan before than the
+    /// assumptions explain, although a guarantee was given.
     fn optimise(
         &mut self,
         memory: &mut Memory,
         time: f64,
         measured: Vector6<f64>,
         reference: ReferenceAt,
-    ) {
-        let clock = Instant::now();
+    ) -> bool {
+        let (clock, was_assured) = (Instant::now(), memory.assured());
         self.optimiser.begin();
         // Without guarantee the command compensates for the disturbance instead.
         let shift =
@@ -258,6 +270,7 @@ impl Crmpc {
             Constraints::Paper => self.plan_as_printed(memory, &measured, first),
         };
         memory.report.record(&report, self.optimiser.is_exhausted(), clock);
+        was_assured && anew && !first
     }
 
     /// Returns whether the vehicle is further from the plan than the assumptions explain. The plan
@@ -583,11 +596,12 @@ impl Controller for Crmpc {
     ) -> Vector3<f64> {
         let angle_rates = kinematics::r(&measured.angles) * measured.rates;
         let within = tick % self.design.ratio as u64;
-        let assured = memory.assured();
         memory.pending = memory.pending.saturating_sub(1);
         memory.observed.observe(&self.settings, &angle_rates);
+        let mut left_behind = false;
         if within == 0 {
-            self.optimise(memory, time, join(&measured.angles, &angle_rates), reference);
+            let state = join(&measured.angles, &angle_rates);
+            left_behind = self.optimise(memory, time, state, reference);
         }
         let a = memory.plan.accelerations[0];
         memory.nominal = plan::advance(
@@ -612,21 +626,22 @@ impl Controller for Crmpc {
         } else {
             linearise::moment(body, &measured.angles, &angle_rates, &commanded)
         };
+        let mut found = Contradiction::None;
         if robust {
             // The guarantee is judged by the moment before the limit.
-            let excess = moment.norm() / limit_moment;
+            let kept = moment.norm() <= limit_moment * (1.0 + 1e-9)
+                && measured.rates.norm() <= self.rate_shown();
             let explained = self.explains(within, &off_angles, &off_rates, &(commanded - a));
-            let explained = explained && self.credible(memory);
-            let kept = excess <= 1.0 + 1e-9 && measured.rates.norm() <= self.rate_shown();
-            if memory.assured() && !(explained && kept) {
+            if memory.assured() && !(explained && self.credible(memory) && kept) {
                 memory.standing = Standing::Exceeded;
             }
+            found = self.contradiction(memory, measured, explained && !left_behind, kept);
             if memory.standing == Standing::Pending && memory.pending == 0 {
                 memory.standing = Standing::InForce;
             }
             memory.observed.remember([&measured.angles, &angle_rates], &commanded);
         }
-        memory.ended = memory.ended.saturating_add(u32::from(assured && !memory.assured()));
+        memory.supervision.judge(memory.standing, found, self.settings.period_feedback);
         moment
     }
 
@@ -658,6 +673,32 @@ impl Crmpc {
         let half = 0.5 * self.settings.period_feedback;
         let angles = angles + (rates + commanded * (0.5 * half)) * half;
         linearise::moment(&self.settings.body, &angles, &(rates + commanded * half), commanded)
+    }
+
+    /// Returns what contradicts the assumptions at a tick. As long as no plan was certified, a motion
+    /// beyond the limits, or away from the plan, contradicts nothing.
+    fn contradiction(
+        &self,
+        memory: &Memory,
+        measured: &Measurement,
+        explained: bool,
+        kept: bool,
+    ) -> Contradiction {
+        let certified = memory.supervision.status.is_assured()
+            || memory.supervision.contradiction != Contradiction::None;
+        if measured.stale {
+            Contradiction::Step
+        } else if measured.has_other_delay {
+            Contradiction::Delay
+        } else if !self.credible(memory) {
+            Contradiction::Disturbance
+        } else if certified && !explained {
+            Contradiction::Deviation
+        } else if certified && !kept {
+            Contradiction::Limit
+        } else {
+            Contradiction::None
+        }
     }
 
     /// Returns whether the assumptions explain the deviation of the predicted state from the

@@ -1,0 +1,67 @@
+//! Supervision of the guarantee: what a controller says of it, tick by tick.
+//!
+//! The theorem needs a certified plan and true assumptions. The plan is judged where it is made. The
+//! assumptions are judged here, by what contradicts them: once one has been contradicted, the
+//! guarantee is in force again only after nothing has contradicted them for a while.
+
+use super::Standing;
+use serde::{Deserialize, Serialize};
+
+/// Time without contradiction after which the assumptions are believed again, s.
+const PROBATION: f64 = 1.0;
+
+/// What contradicts the assumptions of the theorem.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Contradiction {
+    /// Nothing does.
+    #[default]
+    None,
+    /// The inputs were set before the tick, because the communication step is longer than the period
+    /// of the feedback law, or no part of it.
+    Step,
+    /// The motion shows another delay of the loop than the one that was told.
+    Delay,
+    /// The observed disturbance is larger than the bounds of disturbance, inertia and measurement
+    /// errors explain.
+    Disturbance,
+    /// The vehicle is further from the plan than all assumptions together explain.
+    Deviation,
+    /// A limit is exceeded, or the moment that the law asks for exceeds it.
+    Limit,
+}
+
+/// Status of the guarantee that is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Supervision {
+    /// Status of the guarantee at the last tick.
+    pub status: Standing,
+    /// Last contradiction, until the assumptions are believed again.
+    pub contradiction: Contradiction,
+    /// Ticks left until they are.
+    probation: u32,
+    /// Number of times that a guarantee in force or pending has ended.
+    pub ended: u32,
+}
+
+impl Supervision {
+    /// Takes the `standing` of the plan and what contradicts the assumptions at a tick, one `period`
+    /// (s) after the last.
+    pub(super) fn judge(&mut self, standing: Standing, found: Contradiction, period: f64) {
+        let was_assured = self.status.is_assured();
+        if found == Contradiction::None {
+            self.probation = self.probation.saturating_sub(1);
+            if self.probation == 0 {
+                self.contradiction = Contradiction::None;
+            }
+        } else {
+            self.contradiction = found;
+            self.probation = (PROBATION / period).ceil() as u32;
+        }
+        self.status = match (standing, self.contradiction) {
+            (Standing::None | Standing::Refused, _) | (_, Contradiction::None) => standing,
+            (_, Contradiction::Step) => Standing::Stale,
+            _ => Standing::Exceeded,
+        };
+        self.ended = self.ended.saturating_add(u32::from(was_assured && !self.status.is_assured()));
+    }
+}
