@@ -178,12 +178,12 @@ def number(written):
 
 
 class Loop:
-    """Controller and plant stepped by hand.
+    """Controller and plant stepped by hand, in the order of calls that FMI 2.0 prescribes.
 
-    At each communication point the plant's state goes to the controller, then the controller's
-    moment to the plant (Gauss-Seidel in the order controller, plant). With `jacobi`, both are read
-    before either is set. The values read are returned. A clock gives time and length of each step,
-    because importers compute them in ways that round differently.
+    In each step, the plant's state goes to the controller, which is stepped and read; its moment
+    goes to the plant, which is stepped. With `jacobi`, both are read, then both are set, then both
+    are stepped. A clock gives time and length of each step, because importers compute them in ways
+    that round differently.
     """
 
     def __init__(self, controller: Unit, plant: Unit, step: float, jacobi: bool = False, clock: Callable | None = None):
@@ -191,32 +191,43 @@ class Loop:
         self.clock = clock or (lambda tick: (tick * step, step))
         self.tick = 0
 
-    def pass_on(self) -> list[float]:
-        state = self.plant.get(ANGLES + RATES)
-        self.controller.set(dict(zip(ANGLES + RATES, state)))
-        moment = self.controller.get(MOMENT)
-        self.plant.set(dict(zip(MOMENT, moment)))
-        return state + moment
-
-    def start(self) -> list[float]:
+    def start(self) -> None:
         self.controller.enter()
         self.plant.enter()
-        self.pass_on()
+        state = self.plant.get(ANGLES + RATES)
+        self.controller.set(dict(zip(ANGLES + RATES, state)))
+        self.plant.set(dict(zip(MOMENT, self.controller.get(MOMENT))))
         self.controller.exit()
         self.plant.exit()
-        return self.couple()
 
-    def couple(self) -> list[float]:
-        if not self.jacobi:
-            return self.pass_on()
+    def read(self) -> list[float]:
+        """Returns state and moment at the present communication point."""
+        return self.plant.get(ANGLES + RATES) + self.controller.get(MOMENT)
+
+    def advance(self) -> None:
+        now = self.clock(self.tick)
         state, moment = self.plant.get(ANGLES + RATES), self.controller.get(MOMENT)
         self.controller.set(dict(zip(ANGLES + RATES, state)))
-        self.plant.set(dict(zip(MOMENT, moment)))
-        return state + moment
-
-    def advance(self) -> list[float]:
-        now = self.clock(self.tick)
+        if self.jacobi:
+            self.plant.set(dict(zip(MOMENT, moment)))
         self.controller.step(*now)
+        if not self.jacobi:
+            self.plant.set(dict(zip(MOMENT, self.controller.get(MOMENT))))
         self.plant.step(*now)
         self.tick += 1
-        return self.couple()
+
+    def fly(self, steps: int) -> list[list[float]]:
+        """Starts, makes all steps, and returns state and moment at each communication point. The
+        moment is that of the step before."""
+        self.start()
+        rows = [self.read()]
+        for _ in range(steps):
+            self.advance()
+            rows.append(self.read())
+        return rows
+
+
+def of_step(rows):
+    """Shifts the moments, so that each row has that of the step which begins there, as in the
+    orchestrator's results. The last row, where none begins, keeps its own."""
+    return [row[:6] + after[6:] for row, after in zip(rows, [*rows[1:], rows[-1]])]

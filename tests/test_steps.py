@@ -26,7 +26,9 @@ def held(k: int) -> dict:
 def sampled(unit: Unit) -> list:
     """Returns the exact outputs that change at ticks only, and the reference, which depends on
     time."""
-    names = [n for n in unit.fmu.names("output") if not n.startswith("reference") and n != "solver.time"]
+    # In a longer step some ticks have old inputs, which the guarantee's status says.
+    other = ("reference", "guarantee", "solver.time")
+    names = [n for n in unit.fmu.names("output") if not n.startswith(other)]
     return unit.get(names), unit.get(REFERENCE)
 
 
@@ -67,6 +69,8 @@ def test_outputs_are_held_between_ticks_and_follow_inputs_at_a_tick(fmu, name):
         unit.set(held(1))
         assert unit.get(MOMENT) == at_tick
         unit.step(FEEDBACK / 2, FEEDBACK / 2)
+        assert unit.get(MOMENT) == at_tick, "the moment that acted over the step"
+        unit.set(held(1))
         assert unit.get(MOMENT) != at_tick
 
 

@@ -109,8 +109,8 @@ fn done(status: fmi2Status) -> Result<(), Box<dyn Error>> {
     if status == fmi2Status::Ok { Ok(()) } else { Err(format!("{status:?}").into()) }
 }
 
-/// Simulates a closed loop. At each communication point the state goes to the controller, and then
-/// the moment to the plant.
+/// Simulates a closed loop. In each step the state goes to the controller, which is stepped; then
+/// its moment goes to the plant, which is stepped. Nothing is read between setting and stepping.
 fn closed_loop(
     controller: &str,
     plant: &str,
@@ -120,31 +120,32 @@ fn closed_loop(
 ) -> Result<(), Box<dyn Error>> {
     let (controller, plant) = (Unit::new(controller)?, Unit::new(plant)?);
     let (mut state, mut moment) = ([0.0; 6], [0.0; 3]);
-    let mut pass_on = || -> Result<String, Box<dyn Error>> {
-        done(plant.fmu.getReal(&plant.state, &mut state))?;
-        done(controller.fmu.setReal(&controller.state, &state))?;
-        done(controller.fmu.getReal(&controller.moment, &mut moment))?;
-        done(plant.fmu.setReal(&plant.moment, &moment))?;
-        Ok(state.iter().chain(&moment).map(f64::to_string).collect::<Vec<_>>().join(","))
-    };
     for unit in [&controller, &plant] {
         done(unit.fmu.setupExperiment(None, 0.0, None))?;
         done(unit.fmu.enterInitializationMode())?;
     }
-    pass_on()?;
+    done(plant.fmu.getReal(&plant.state, &mut state))?;
+    done(controller.fmu.setReal(&controller.state, &state))?;
+    done(controller.fmu.getReal(&controller.moment, &mut moment))?;
+    done(plant.fmu.setReal(&plant.moment, &moment))?;
     for unit in [&controller, &plant] {
         done(unit.fmu.exitInitializationMode())?;
     }
     let mut file = BufWriter::new(File::create(out)?);
     writeln!(file, "time,{},{}", STATE.join(","), MOMENT.join(","))?;
-    for tick in 0..=(stop / step).round() as u32 {
+    let steps = (stop / step).round() as u32;
+    for tick in 0..=steps {
         let time = f64::from(tick) * step;
-        if tick > 0 {
-            for unit in [&controller, &plant] {
-                done(unit.fmu.doStep(f64::from(tick - 1) * step, step, 0))?;
-            }
+        done(plant.fmu.getReal(&plant.state, &mut state))?;
+        if tick < steps {
+            done(controller.fmu.setReal(&controller.state, &state))?;
+            done(controller.fmu.doStep(time, step, 0))?;
+            done(controller.fmu.getReal(&controller.moment, &mut moment))?;
+            done(plant.fmu.setReal(&plant.moment, &moment))?;
+            done(plant.fmu.doStep(time, step, 0))?;
         }
-        writeln!(file, "{time},{}", pass_on()?)?;
+        let values = state.iter().chain(&moment).map(f64::to_string).collect::<Vec<_>>();
+        writeln!(file, "{time},{}", values.join(","))?;
     }
     Ok(())
 }

@@ -58,17 +58,17 @@ def simulate(controller, stop=50.0, step=0.04, parameters=None, fmus=FMUS):
     plant = Unit(str(fmus / "ReentryPlant.fmu"), parameters)
     law = Unit(str(fmus / f"{controller}.fmu"))
     rows = []
-    for k in range(round(stop / step) + 1):
-        if k > 0:
-            law.fmu.doStep((k - 1) * step, step)
-            plant.fmu.doStep((k - 1) * step, step)
-        # The controller answers to the state of this very instant, so there is no delay in the
-        # loop.
-        state = plant.get(ATTITUDE + RATE)
+    for k in range(round(stop / step)):
+        state, reference = plant.get(ATTITUDE + RATE), law.get(REFERENCE)
+        # Each unit is set, stepped, and then read: FMI 2.0 forbids reading between setting and
+        # stepping. The controller is stepped first, so there is no delay in the loop.
         law.set(ATTITUDE + RATE, state)
+        law.fmu.doStep(k * step, step)
         moment = law.get(MOMENT)
         plant.set(MOMENT, moment)
-        rows.append([k * step, *state, *moment, *law.get(REFERENCE)])
+        plant.fmu.doStep(k * step, step)
+        rows.append([k * step, *state, *moment, *reference])
+    rows.append([stop, *plant.get(ATTITUDE + RATE), *law.get(MOMENT), *law.get(REFERENCE)])
     plant.close()
     law.close()
     return rows

@@ -1,8 +1,9 @@
 """An attitude controller in Python, packed as an FMU by PythonFMU with
 `pythonfmu build -f pd_controller.py`.
 
-The moment is proportional to the errors of the angles and damped by their rates. It is computed at
-the beginning of a step, so it acts one step late.
+The moment is proportional to the errors of the angles and damped by their rates. It is computed in
+the step for which the inputs are set and read after it: where this unit is stepped before the
+vehicle, as in the orchestrator, the loop has no delay.
 """
 
 from math import cos, sin

@@ -10,10 +10,10 @@ fn oracle_a_run_writes_its_results() {
         bench.run(&["--set", "gain.gain=500 mm", "--set", "gain.kind=rough"]);
     assert_eq!(code, 0, "{errors}");
     assert!(summary.contains("loop delay        none (gain -> plant -> gain)"), "{summary}");
-    // The state follows x⁺ = x + x/2.
+    // The state follows x⁺ = x + x/2. At the stop time no step begins: the gain keeps its output.
     let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
     let expected = "time,gain.output.direct,plant.output.integral,plant.steps\n\
-                    0.0,0.5,1.0,0\n1.0,0.75,1.5,1\n2.0,1.125,2.25,2\n3.0,1.6875,3.375,3\n";
+                    0.0,0.5,1.0,0\n1.0,0.75,1.5,1\n2.0,1.125,2.25,2\n3.0,1.125,3.375,3\n";
     assert_eq!(rows, expected);
 
     let metadata = bench.json("out/loop/results.json");
@@ -62,10 +62,10 @@ none = { kind = "mean", signals = "none", optional = true }
     let number = |name: &str| metrics[name].as_f64().unwrap();
     let mean_square = (0.25 + 0.5625 + 1.265625) / 3.0;
     assert!((number("mean_square") - f64::sqrt(mean_square)).abs() < 1e-15);
-    assert_eq!((number("largest"), number("ratio")), (1.6875, 0.5));
+    assert_eq!((number("largest"), number("ratio")), (1.125, (3.0 * 0.5 + 1.0 / 3.0) / 4.0));
     assert!(metrics.as_object().unwrap()["none"].is_null());
     assert!(summary.contains("  RMS               0.8323"), "{summary}");
-    assert!(summary.contains("within its limit 1.6875"), "{summary}");
+    assert!(summary.contains("within its limit 1.125"), "{summary}");
     assert!(std::fs::read_to_string(bench.path("out/loop/plot.svg")).unwrap().contains("signals"));
 
     for (from, to, said) in [
@@ -200,7 +200,7 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
             summary.lines().find(|line| line.starts_with("  guarantee ")).unwrap().to_string();
         (line, bench.json("out/loop/metrics.json"))
     };
-    // The input is 1, 1.5, 2.25, 3.375; the margins are 1 - input/largest, and half of that.
+    // The input is 1, 1.5, 2.25, which is kept at the stop time; the margins are 1 - input/largest, and half of that.
     let (line, metrics) = guarantee("2");
     assert_eq!(
         line,
@@ -217,7 +217,7 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
     let (line, metrics) = guarantee("3.75");
     assert_eq!(
         line,
-        "  guarantee         in force throughout, margins 5.0 % (moment), 10.0 % (rate)"
+        "  guarantee         in force throughout, margins 20.0 % (moment), 40.0 % (rate)"
     );
     assert!(metrics["guarantee_lost_at"].is_null());
     assert_eq!(guarantee("0.5").0, "  guarantee         never in force (exceeded)");
@@ -273,7 +273,7 @@ fn a_warning_is_told_once_with_first_time_and_count() {
     assert_eq!(code, 0);
     assert_eq!(errors.lines().count(), 1, "{errors}");
     assert!(
-        errors.contains("plant: [trouble] runs hot at 7 (first at t = 1 s, 3 times)"),
+        errors.contains("plant: [trouble] runs hot at 7 (first at t = 0 s, 3 times)"),
         "{errors}"
     );
 }

@@ -1,7 +1,8 @@
 /* A small FMI 2.0 co-simulation unit, to try the orchestrator on a library that is not ours: it keeps the pointer to the
    callbacks, wants memory from its environment, and logs with printf arguments.
    Output 1 = gain * input (direct), output 2 = integral of the input. It fails, and is slow, as its parameters say. It guarantees something as long
-   as the input is at most the parameter "largest". The parameters "delay" and "actuation.delay" do nothing.
+   as the input is at most the parameter "largest". The parameters "delay" and "actuation.delay" do nothing. It refuses to be read between
+   setting and stepping, once it is initialized, as FMI 2.0.5, section 4.2.1, allows it to.
    What it does wrong is chosen by the compiler's flags: -DENDS: a discarded step ends the simulation; -DVERSION: its version; -DDIRECT(value),
    -DITEM(value), -DTRUTH(value): what becomes of output.direct, guarantee.status, guarantee.inForce after two steps; -DRESETS=0: fmi2Reset leaves
    the state as it is; -DPLACE=STEP -DHOW=ABORT: fault.h. */
@@ -41,7 +42,7 @@ typedef struct {
     const Callbacks *callbacks;
     const char *name;
     double input, state, gain, fail_time, pause, delay, transport, largest;
-    int fail_status, flag, kind, count, seed;
+    int fail_status, flag, kind, count, seed, runs, is_set;
     char text[64];
 } Unit;
 
@@ -50,6 +51,12 @@ enum { OK = 0, WARNING = 1, ERROR = 3, FATAL = 4 };
 static int complain(Unit *unit, int status, const char *what, double value) {
     unit->callbacks->logger(unit->callbacks->environment, unit->name, status, "trouble", "%s %g", what, value);
     return status;
+}
+
+static int refuses(Unit *unit) {
+    if (!unit->runs || !unit->is_set) return 0;
+    complain(unit, ERROR, "it is read after it was set, before a step; steps:", unit->count);
+    return 1;
 }
 
 static void start(Unit *unit, const Callbacks *callbacks) {
@@ -95,11 +102,14 @@ int fmi2ExitInitializationMode(Unit *unit) {
     reach(REACHES, unit->callbacks->logger, unit->callbacks->environment);
 #endif
     fault(INITIALIZE, unit->callbacks->logger, unit->callbacks->environment);
+    unit->runs = 1;
+    unit->is_set = 0;
     return unit ? OK : ERROR;
 }
 int fmi2Terminate(Unit *unit) { return unit ? OK : ERROR; }
 
 int fmi2GetReal(Unit *unit, const unsigned *references, size_t n, double *values) {
+    if (refuses(unit)) return ERROR;
     if (unit->count >= 2) fault(GET, unit->callbacks->logger, unit->callbacks->environment);
     for (size_t i = 0; i < n; i++) {
         switch (references[i]) {
@@ -124,6 +134,7 @@ int fmi2GetReal(Unit *unit, const unsigned *references, size_t n, double *values
 }
 
 int fmi2SetReal(Unit *unit, const unsigned *references, size_t n, const double *values) {
+    unit->is_set = 1;
     for (size_t i = 0; i < n; i++) {
         switch (references[i]) {
         case 0: unit->input = values[i]; break;
@@ -140,6 +151,7 @@ int fmi2SetReal(Unit *unit, const unsigned *references, size_t n, const double *
 }
 
 int fmi2GetInteger(Unit *unit, const unsigned *references, size_t n, int *values) {
+    if (refuses(unit)) return ERROR;
     for (size_t i = 0; i < n; i++) {
         switch (references[i]) {
         case 5: values[i] = unit->fail_status; break;
@@ -156,12 +168,14 @@ int fmi2GetInteger(Unit *unit, const unsigned *references, size_t n, int *values
 }
 
 int fmi2SetInteger(Unit *unit, const unsigned *references, size_t n, const int *values) {
+    unit->is_set = 1;
     for (size_t i = 0; i < n; i++)
         *(references[i] == 5 ? &unit->fail_status : references[i] == 11 ? &unit->seed : &unit->kind) = values[i];
     return OK;
 }
 
 int fmi2GetBoolean(Unit *unit, const unsigned *references, size_t n, int *values) {
+    if (refuses(unit)) return ERROR;
     for (size_t i = 0; i < n; i++) {
         values[i] = references[i] == 16 ? unit->input <= unit->largest : unit->flag;
         if (references[i] == 16 && unit->count >= 2) values[i] = TRUTH(values[i]);
@@ -170,17 +184,20 @@ int fmi2GetBoolean(Unit *unit, const unsigned *references, size_t n, int *values
 }
 
 int fmi2SetBoolean(Unit *unit, const unsigned *references, size_t n, const int *values) {
+    unit->is_set = 1;
     for (size_t i = 0; i < n; i++) unit->flag = references ? values[i] : 0;
     return OK;
 }
 
 int fmi2SetString(Unit *unit, const unsigned *references, size_t n, const char *const *values) {
+    unit->is_set = 1;
     for (size_t i = 0; i < n && references; i++)
         for (size_t k = 0; k < sizeof unit->text - 1 && values[i][k]; k++) unit->text[k] = values[i][k];
     return OK;
 }
 
 int fmi2DoStep(Unit *unit, double time, double step, int no_set_state) {
+    unit->is_set = 0;
     (void)no_set_state;
 #ifdef HARM_BY_GAIN
     if (unit->gain == 13.0) abort();

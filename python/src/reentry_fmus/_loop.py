@@ -55,8 +55,8 @@ class State:
     """Second derivative of the reference, rad/s2."""
 
     moment: Vector
-    """Roll, pitch and yaw moment, N m. With a controller this is what it commands at this time;
-    without one it is the moment of the last step, and zero before the first."""
+    """Roll, pitch and yaw moment of the last step, N m. Before the first it is what the controller
+    gives at the start, and zero without a controller."""
 
 
 class ClosedLoop:
@@ -74,7 +74,9 @@ class ClosedLoop:
     (10.0, (3,))
 
     With a controller of the package, or an FMU with the same inputs and outputs, the loop is that
-    of the orchestrator bit for bit: the controller answers to the state of this very instant.
+    of the orchestrator bit for bit, and has no delay: in each step the controller gets the state,
+    is stepped, and hands its moment to the plant, which is then stepped. Nothing is read between
+    setting and stepping, as FMI 2.0 asks.
 
     >>> with ClosedLoop(controller="LQR") as loop:
     ...     state = loop.step()
@@ -135,30 +137,27 @@ class ClosedLoop:
     def _initialize(self) -> None:
         self._tick = 0
         self._moment = [0.0, 0.0, 0.0]
+        self._pending: list[tuple[Unit, str, Value]] = []
         self._controller.enter()
         self._plant.enter()
-        self._pass_on()
-        self._controller.exit()
-        self._plant.exit()
-        self._state = self._couple()
-
-    def _pass_on(self) -> list[float]:
-        """Gives the plant's state to the controller, and the controller's moment to the plant."""
-        state = self._plant.get_reals(self._from_plant)
         if self._has_controller:
+            state = self._plant.get_reals(self._from_plant)
             self._controller.set_reals(self._to_controller, state)
             self._moment = self._controller.get_reals(self._from_controller)
             self._plant.set_reals(self._to_plant, self._moment)
-        return state
+        self._controller.exit()
+        self._plant.exit()
+        self._measured, self._state = self._read()
 
-    def _couple(self) -> State:
-        state = self._pass_on()
+    def _read(self) -> tuple[list[float], State]:
+        """Returns what the controller is to be given, and the state."""
+        measured = self._plant.get_reals(self._from_plant)
         reference = self._controller.get_reals(self._reference)
-        return State(
+        return measured, State(
             time=self._tick * self._step,
-            attitude=np.array(state[:3]),
+            attitude=np.array(measured[:3]),
             attitude_rate=np.array(self._plant.get_reals(self._more_of_plant)),
-            rate=np.array(state[3:]),
+            rate=np.array(measured[3:]),
             reference=np.array(reference[:3]),
             reference_rate=np.array(reference[3:6]),
             reference_acceleration=np.array(reference[6:]),
@@ -189,12 +188,19 @@ class ClosedLoop:
             if self._has_controller:
                 raise TypeError(f"the moment comes from {self._controller.name}: leave it out")
             self._moment = vector(moment).tolist()
-            self._plant.set_reals(self._to_plant, self._moment)
+        for unit, name, value in self._pending:
+            unit.set({name: value}, "input")
+        self._pending.clear()
         now = self._tick * self._step
+        if self._has_controller:
+            self._controller.set_reals(self._to_controller, self._measured)
         self._controller.step(now, self._step)
+        if self._has_controller:
+            self._moment = self._controller.get_reals(self._from_controller)
+        self._plant.set_reals(self._to_plant, self._moment)
         self._plant.step(now, self._step)
         self._tick += 1
-        self._state = self._couple()
+        self._measured, self._state = self._read()
         return self._state
 
     def run(
@@ -218,7 +224,9 @@ class ClosedLoop:
 
         Returns:
             One row for each communication point, the present one included, with the time (s) as
-            index. Columns and `attrs` are those of `experiment`: "plant.attitude.alpha", ...
+            index. The moment is that of the step which begins there; the last row repeats the one
+            before, or has the law's. Columns and `attrs` are those of `experiment`:
+            "plant.attitude.alpha", ...
         """
         check_units(units)
         self._check_open()
@@ -235,6 +243,7 @@ class ClosedLoop:
         for k in range(steps + 1):
             if k > 0:
                 self.step(None if law is None else rows[-1][-3:])
+                rows[-1][-3:] = self._moment
             state = self._state
             moment = state.moment if law is None else vector(law(state))
             rows.append(
@@ -276,13 +285,14 @@ class ClosedLoop:
 
     def set(self, name: str, value: Value) -> None:
         """Sets an input that the loop does not set itself, such as "plant.disturbanceMoment.x"
-        (N m). It holds until it is set again."""
+        (N m). It acts from the next step on, until it is set again."""
         self._check_open()
         component, variable = self._component(name)
         connected = MOMENT if component is self._plant else ATTITUDE + RATE
         if variable in connected:
             raise ValueError(f"{name} is set by the loop itself")
-        component.set({variable: value}, "input")
+        component.values({variable: value}, "input")
+        self._pending.append((component, variable, value))
 
     def _component(self, name: str) -> tuple[Unit, str]:
         components = {"plant": self._plant, "controller": self._controller}
