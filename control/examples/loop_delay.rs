@@ -15,6 +15,7 @@ use vehicle::disturbance::Kind;
 use vehicle::plant::Plant;
 
 const PERIOD: f64 = 0.04;
+const SECONDS: f64 = 50.0;
 
 /// Returns the time at which another delay is found, s, and the estimate at the end, s.
 fn fly<C: Controller>(
@@ -49,48 +50,53 @@ fn fly<C: Controller>(
     (found, law.estimated_delay(&memory))
 }
 
+/// Returns the scenario of a flight: a seed, a corner, a square wave and an inertia of its own.
+fn scenario(kind: Kind, flight: u64) -> Scenario {
+    let mut scenario = Scenario::crmpc2022();
+    let corner = |bit: u64| if flight >> bit & 1 == 0 { 1.0 } else { -1.0 };
+    let disturbance = &mut scenario.disturbance;
+    (disturbance.kind, disturbance.seed) = (kind, 1000 + flight);
+    disturbance.direction = Vector3::new(corner(0), corner(1), corner(2));
+    disturbance.square_period = 1.0 + 0.37 * (flight % 29) as f64;
+    scenario.inertia_scale = 0.95 + 0.001 * ((flight * 7919) % 101) as f64;
+    scenario
+}
+
+fn outcome(is_lqr: bool, scenario: &Scenario, (told, truly): (f64, f64)) -> (Option<f64>, f64) {
+    if is_lqr {
+        let body = scenario.inertia.body(1.0).unwrap();
+        let settings = LqrSettings { body, p: [50.0; 6], q: [10.0; 3], period: PERIOD };
+        return fly(Lqr::new(settings), scenario, told, truly, SECONDS);
+    }
+    let mut settings = Settings::new(Constraints::Robust);
+    (settings.delay, settings.guarantee) = (told, Guarantee::BestEffort);
+    fly(Crmpc::new(settings), scenario, told, truly, SECONDS)
+}
+
 fn main() {
     let flights: u64 = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(100);
-    for kind in [Kind::White, Kind::Constant, Kind::Square] {
-        for is_lqr in [false, true] {
-            for (told, truly) in
-                [(0.0, 0.04), (0.04, 0.04), (0.0, 0.0), (0.04, 0.0), (0.0, 0.02), (0.0, 0.12)]
-            {
-                let mut times = Vec::new();
-                let mut estimates = Vec::new();
-                for seed in 0..flights {
-                    let mut scenario = Scenario::crmpc2022();
-                    scenario.disturbance.kind = kind;
-                    scenario.disturbance.seed = 1000 + seed;
-                    let corner = |bit: u64| if seed >> bit & 1 == 0 { 1.0 } else { -1.0 };
-                    scenario.disturbance.direction = Vector3::new(corner(0), corner(1), corner(2));
-                    scenario.disturbance.square_period = 1.0 + 0.37 * (seed % 29) as f64;
-                    scenario.inertia_scale = 0.95 + 0.1 * ((seed * 7919) % 101) as f64 / 100.0;
-                    let body = scenario.inertia.body(1.0).unwrap();
-                    let outcome = if is_lqr {
-                        let settings =
-                            LqrSettings { body, p: [50.0; 6], q: [10.0; 3], period: PERIOD };
-                        fly(Lqr::new(settings), &scenario, told, truly, 50.0)
-                    } else {
-                        let mut settings = Settings::new(Constraints::Robust);
-                        settings.delay = told;
-                        settings.guarantee = Guarantee::BestEffort;
-                        fly(Crmpc::new(settings), &scenario, told, truly, 50.0)
-                    };
-                    times.push(outcome.0.unwrap_or(f64::INFINITY));
-                    estimates.push(outcome.1);
-                }
+    println!(
+        "law, disturbance, told, truly: share found within 10 s, found ever, 95 % found at, estimates"
+    );
+    for is_lqr in [false, true] {
+        for kind in [Kind::White, Kind::Constant, Kind::Square] {
+            for delays in [(0.0, 0.04), (0.04, 0.0), (0.0, 0.12), (0.0, 0.0), (0.04, 0.04)] {
+                let all = (0..flights).map(|n| outcome(is_lqr, &scenario(kind, n), delays));
+                let (found, mut estimates): (Vec<_>, Vec<_>) = all.unzip();
+                let mut times: Vec<f64> =
+                    found.into_iter().map(|time| time.unwrap_or(f64::INFINITY)).collect();
                 times.sort_by(f64::total_cmp);
                 estimates.sort_by(f64::total_cmp);
-                let within = times.iter().filter(|time| **time <= 10.0).count();
-                let ever = times.iter().filter(|time| time.is_finite()).count();
+                let share = |within: f64| {
+                    100.0 * times.partition_point(|time| *time <= within) as f64 / flights as f64
+                };
                 println!(
-                    "{kind:?} {} told {told} truly {truly}: within 10 s {within}, ever {ever} of {flights}; median {:.2} s, p95 {:.2}; estimates {:.4} {:.4} {:.4}",
+                    "{} {kind:?} {delays:?}: {:.1} %, {:.1} %, {:.2} s, {:.3} to {:.3} s",
                     if is_lqr { "LQR" } else { "CRMPC" },
-                    times[times.len() / 2],
+                    share(10.0),
+                    share(SECONDS),
                     times[times.len() * 95 / 100],
                     estimates[0],
-                    estimates[estimates.len() / 2],
                     estimates[estimates.len() - 1],
                 );
             }

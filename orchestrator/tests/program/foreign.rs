@@ -219,25 +219,25 @@ fn values_that_are_none_end_the_run() {
     for (flag, place, value, what) in [
         (
             "-DDIRECT(value)=0.0/0.0",
-            "gain failed at t = 2 s in getReal: \"output.direct\"",
+            "gain failed at t = 1 s in getReal: \"output.direct\"",
             "NaN",
             "not finite",
         ),
         (
             "-DDIRECT(value)=1e308*10",
-            "gain failed at t = 2 s in getReal: \"output.direct\"",
+            "gain failed at t = 1 s in getReal: \"output.direct\"",
             "inf",
             "not finite",
         ),
         (
             "-DITEM(value)=7",
-            "plant failed at t = 2 s in getInteger: \"guarantee.status\"",
+            "plant failed at t = 1 s in getInteger: \"guarantee.status\"",
             "7",
             "no item",
         ),
         (
             "-DTRUTH(value)=3",
-            "plant failed at t = 2 s in getBoolean: \"guarantee.inForce\"",
+            "plant failed at t = 1 s in getBoolean: \"guarantee.inForce\"",
             "3",
             "neither true nor false",
         ),

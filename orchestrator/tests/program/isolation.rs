@@ -134,12 +134,8 @@ fn harm_in_the_same_process_names_the_unit_and_the_call() {
             let mut command = bench.command(&["run", "loop.toml", "--quiet", "--isolate=false"]);
             let output = command.output().unwrap();
             let errors = String::from_utf8(output.stderr).unwrap();
-            let unit = match (place, how) {
-                // The name itself may have been overwritten.
-                (_, "OVERWRITE") => "",
-                ("GET", _) => "plant",
-                _ => "gain",
-            };
+            // The name itself may have been overwritten.
+            let unit = if how == "OVERWRITE" { "" } else { "gain" };
             let says = format!("{unit} ended this process in {call} ({what})");
             assert!(errors.contains(&says), "{place} {how}: {errors}");
             // A process that a signal has killed has no exit code.

@@ -39,16 +39,17 @@ fn answers(bench: &Bench, arguments: &[&str]) -> Vec<f64> {
 #[test]
 fn oracle_an_input_follows_the_rows_of_a_table() {
     let bench = bench(TABLE);
-    assert_eq!(answers(&bench, &[]), [6.0, 6.0, 10.0, 10.0, -2.0]);
+    // At the stop time no step begins: the gain keeps its output.
+    assert_eq!(answers(&bench, &[]), [6.0, 6.0, 10.0, 10.0, 10.0]);
     let line = answers(&bench, &["--set", "drive.interpolation=linear"]);
-    assert_eq!(line, [6.0, 6.0, 10.0, 4.0, -2.0]);
+    assert_eq!(line, [6.0, 6.0, 10.0, 4.0, 4.0]);
     let set = ["--set", "drive.shift=1 s", "--set", "drive.scale.input=10", "--set"];
     assert_eq!(
         answers(&bench, &[&set[..], &["drive.input[1]=4"]].concat())[..4],
         [80.0, 80.0, 80.0, 100.0]
     );
     // Processes of their own are for code of others.
-    assert_eq!(answers(&bench, &["--isolate"]), [6.0, 6.0, 10.0, 10.0, -2.0]);
+    assert_eq!(answers(&bench, &["--isolate"]), [6.0, 6.0, 10.0, 10.0, 10.0]);
     fs::write(bench.path("other.csv"), "time,input\n0,1\n").unwrap();
     assert_eq!(answers(&bench, &["--fmu", "drive=other.csv"]), [2.0; 5]);
     let metadata = bench.json("out/loop/results.json");

@@ -73,6 +73,13 @@ struct Task {
     series: Series,
 }
 
+impl Task {
+    /// Returns whether a step of the component begins at this tick and ends by the `last`.
+    fn begins(&self, tick: u64, last: u64) -> bool {
+        tick.is_multiple_of(self.every) && tick + self.every <= last
+    }
+}
+
 /// Keeps a run in step with a timer, and records how well it did.
 pub struct Pacer {
     settings: Settings,
@@ -213,7 +220,7 @@ impl Pacer {
         }
         let release = self.release(tick);
         for (component, task) in self.tasks.iter_mut().enumerate() {
-            if !tick.is_multiple_of(task.every) {
+            if !task.begins(tick, self.clock.ticks()) {
                 continue;
             }
             let duration = task.spent.time().saturating_sub(task.counted);
@@ -231,7 +238,7 @@ impl Pacer {
         let mut outcome = Ok(());
         for component in 0..self.tasks.len() {
             let task = &self.tasks[component];
-            if !tick.is_multiple_of(task.every) {
+            if !task.begins(tick, self.clock.ticks()) {
                 continue;
             }
             let late = task.spent.ended().saturating_sub(self.release(tick + task.every));

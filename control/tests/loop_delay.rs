@@ -1,0 +1,80 @@
+//! Tests of the estimate of a loop's own delay.
+
+use control::controller::{Controller, Measurement};
+use control::crmpc::{Constraints, Contradiction, Crmpc, Guarantee, Settings, Standing};
+use control::delay::{Delayed, Latency};
+use vehicle::Scenario;
+use vehicle::disturbance::Kind;
+use vehicle::plant::Plant;
+
+const PERIOD: f64 = 0.04;
+
+/// Outcome of a flight.
+struct Flight {
+    /// Time at which another delay than the one that was told is found, s.
+    found: Option<f64>,
+    /// Estimated delay at the end, s.
+    estimate: f64,
+    contradiction: Contradiction,
+    status: Standing,
+}
+
+fn fly(kind: Kind, seed: u64, (told, truly): (f64, f64), scale: f64) -> Flight {
+    let mut scenario = Scenario::crmpc2022();
+    (scenario.disturbance.kind, scenario.disturbance.seed) = (kind, seed);
+    scenario.disturbance.square_period = 1.5;
+    scenario.inertia_scale = scale;
+    let mut settings = Settings::new(Constraints::Robust);
+    (settings.delay, settings.guarantee) = (told, Guarantee::BestEffort);
+    let (law, latency) = (Crmpc::new(settings).unwrap(), Latency::of_action(told));
+    let mut law = Delayed::new(law, settings.body, PERIOD, latency, f64::INFINITY).unwrap();
+    let mut memory = law.memory();
+    let mut config = scenario.config(0.01);
+    config.moment_delay = truly;
+    let mut plant = Plant::new(&config, 0.0).unwrap();
+    let mut found = None;
+    for tick in 0..500 {
+        let time = f64::from(tick) * PERIOD;
+        let measured =
+            Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
+        let reference = |time: f64| scenario.reference.at(time);
+        let moment = law.update(&mut memory, tick as u64, time, &measured, &reference);
+        found = found.or(memory.loop_delay.is_other.then_some(time));
+        plant.advance(time, time + PERIOD, moment).unwrap();
+    }
+    let supervision = memory.inner.supervision;
+    Flight {
+        found,
+        estimate: law.estimated_delay(&memory),
+        contradiction: supervision.contradiction,
+        status: supervision.status,
+    }
+}
+
+#[test]
+fn oracle_a_delay_that_was_not_told_is_found_and_ends_the_guarantee() {
+    for kind in [Kind::White, Kind::Constant, Kind::Square] {
+        for (told, truly) in [(0.0, 0.04), (0.04, 0.0), (0.0, 0.12)] {
+            let flight = fly(kind, 3, (told, truly), 0.97);
+            let found = flight.found.is_some_and(|time| time <= 15.0);
+            assert!(found, "{kind:?} {told} {truly} {:?}", flight.found);
+            assert!((flight.estimate - truly).abs() <= 0.25 * PERIOD + 1e-9, "{}", flight.estimate);
+            assert_eq!(flight.contradiction, Contradiction::Delay);
+            assert_eq!(flight.status, Standing::Exceeded);
+        }
+    }
+}
+
+#[test]
+fn oracle_a_delay_that_was_told_is_not_doubted() {
+    for kind in [Kind::White, Kind::Constant, Kind::Square] {
+        for delay in [0.0, 0.04] {
+            for scale in [0.95, 1.05] {
+                let flight = fly(kind, 5, (delay, delay), scale);
+                assert_eq!(flight.found, None, "{kind:?} {delay}");
+                assert!((flight.estimate - delay).abs() <= 0.5 * PERIOD);
+                assert_eq!(flight.contradiction, Contradiction::None);
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+"""FMI 2.0.5, section 4.2.1: in co-simulation, nothing is read from a unit between setting its inputs
+and stepping it. Two orders of calls remain for a loop, and what is promised holds in both."""
+
+import math
+import sys
+
+import fmpy.fmi2
+import numpy as np
+import pytest
+
+from conftest import ROOT
+from fmi import ANGLES, MOMENT, RATES, Loop, Unit, of_step
+
+sys.path.insert(0, str(ROOT / "scripts" / "examples"))
+STEP = 0.04
+CONTROLLERS = ["CRMPC", "DLMPC", "LQR", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "TwoLoopSMC"]
+SIXTY_SECONDS = 60.0
+
+
+@pytest.fixture
+def strict(monkeypatch):
+    """Makes every unit that FMPy steps refuse the order of calls that the standard forbids."""
+    is_set, runs = set(), set()
+    slave = fmpy.fmi2.FMU2Slave
+
+    def wrapped(name, before):
+        original = getattr(slave, name)
+
+        def call(self, *arguments, **named):
+            before(self)
+            return original(self, *arguments, **named)
+
+        monkeypatch.setattr(slave, name, call)
+
+    def read(self):
+        assert not (id(self) in runs and id(self) in is_set), "read between setting and stepping"
+
+    for kind in ("Real", "Integer", "Boolean", "String"):
+        wrapped(f"get{kind}", read)
+        wrapped(f"set{kind}", lambda self: is_set.add(id(self)))
+    wrapped("doStep", lambda self: is_set.discard(id(self)))
+    wrapped("exitInitializationMode", lambda self: (runs.add(id(self)), is_set.discard(id(self))))
+    wrapped("instantiate", lambda self: (runs.discard(id(self)), is_set.discard(id(self))))
+    wrapped("reset", lambda self: (runs.discard(id(self)), is_set.discard(id(self))))
+
+
+def test_the_strict_unit_refuses(strict, fmu):
+    with Unit(fmu("LQR")).start() as unit:
+        unit.set(dict.fromkeys(ANGLES, 0.1))
+        with pytest.raises(AssertionError, match="between setting and stepping"):
+            unit.get(MOMENT)
+
+
+@pytest.mark.parametrize("jacobi", [False, True])
+def test_loops_by_hand_keep_to_the_order(strict, fmu, jacobi):
+    with Unit(fmu("CRMPC")) as controller, Unit(fmu("ReentryPlant")) as plant:
+        assert len(Loop(controller, plant, STEP, jacobi).fly(50)) == 51
+
+
+def test_the_example_keeps_to_the_order(strict):
+    from closed_loop import mean_error, simulate
+
+    assert 1.0 < mean_error(simulate("LQR", stop=50.0)) < 3.0
+
+
+def fly(fmu, settings=None, plant=None, jacobi=False, steps=1250, name="CRMPC", step=STEP):
+    """Returns state and moment at each point, and what the guarantee's status is after each step."""
+    with Unit(fmu(name), settings) as controller, Unit(fmu("ReentryPlant"), plant) as vehicle:
+        loop = Loop(controller, vehicle, step, jacobi)
+        loop.start()
+        rows, in_force = [loop.read()], []
+        for _ in range(steps):
+            loop.advance()
+            rows.append(loop.read())
+            in_force.append(controller.get(["guarantee.inForce"])[0])
+        return np.array(rows), np.array(in_force)
+
+
+ADVERSARIES = {
+    "white": {"disturbance.kind": "white"},
+    "along the rate": {"disturbance.kind": "alongRate"},
+    "against the moment": {"disturbance.kind": "againstMoment"},
+    "constant": {"disturbance.kind": "constant"},
+    "square": {"disturbance.kind": "square", "disturbance.square.period": 3.0},
+    "light": {"disturbance.kind": "againstMoment", "inertia.scale": 0.95},
+    "heavy": {"disturbance.kind": "constant", "inertia.scale": 1.05},
+}
+
+
+@pytest.mark.parametrize("adversary", ADVERSARIES)
+def test_oracle_read_set_step_has_exactly_one_step_of_delay(fmu, adversary):
+    """It is the loop of a plant that acts one step late, bit for bit, and the guarantee holds."""
+    plant = {"disturbance.seed": 11, **ADVERSARIES[adversary]}
+    rows, in_force = fly(fmu, {"delay": STEP}, plant, jacobi=True)
+    late, late_in_force = fly(fmu, {"delay": STEP}, plant | {"actuation.delay": STEP})
+    assert (rows[:, :6] == late[:, :6]).all() and (in_force == late_in_force).all()
+    assert np.mean(in_force) >= 0.99
+    assert np.degrees(np.linalg.norm(rows[:, 3:6], axis=1)).max() <= 5.0
+    assert np.linalg.norm(rows[:, 6:9], axis=1).max() <= 1.356e5
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_with_a_delay_nothing_acts_before_the_first_command(fmu, name):
+    with Unit(fmu(name), {"delay": STEP}).start() as unit:
+        assert unit.get(MOMENT) == [0.0] * 3
+        unit.step(0.0, STEP)
+        assert np.abs(unit.get(MOMENT)).max() > 0.0
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_outputs_are_held_after_a_step_until_an_input_is_set(fmu, name):
+    values = dict(zip(ANGLES + RATES, [0.13, 0.16, -0.5, 0.01, -0.02, 0.0]))
+    later = dict(zip(ANGLES + RATES, [0.12, 0.15, -0.4, 0.02, -0.01, 0.01]))
+    with Unit(fmu(name)).start(inputs=values) as unit:
+        first = unit.get(MOMENT)
+        unit.step(0.0, STEP)
+        assert unit.get(MOMENT) == first, "the moment that acted over the step"
+        saved = unit.save()
+        unit.set(values)
+        due = unit.get(MOMENT)
+        assert due != first or name == "FBL", "an equal value counts as set, and the next tick is due"
+        unit.set(later)
+        assert unit.get(MOMENT) != due
+        unit.restore(saved)
+        assert unit.get(MOMENT) == first, "the saved state knows that no input was set"
+        unit.set(later)
+        expected = unit.get(MOMENT)
+        unit.restore(saved)
+        unit.set(later)
+        unit.step(STEP, STEP)
+        assert unit.get(MOMENT) == expected, "what is read after the step is what was asked for before"
+        unit.reset()
+        unit.start(inputs=values)
+        assert unit.get(MOMENT) == first
+
+
+def irregular(k: int) -> float:
+    return [0.013, 0.04, 0.021, 0.09, 0.04, 0.0371, 0.2][k % 7]
+
+
+STEPS = {f"{step} s": lambda k, step=step: step for step in (0.01, 0.02, 0.03, 0.04, 0.05, 0.1, 0.2, 0.4)}
+
+
+@pytest.mark.parametrize("step", [*STEPS, "irregular"])
+def test_a_guarantee_in_force_is_kept_with_any_communication_step(fmu, step):
+    length = STEPS.get(step, irregular)
+    with Unit(fmu("CRMPC")) as controller, Unit(fmu("ReentryPlant")) as plant:
+        loop = Loop(controller, plant, STEP)
+        loop.start()
+        time, k, withdrawals, was, statuses = 0.0, 0, 0, False, []
+        while time < SIXTY_SECONDS:
+            loop.clock = lambda _, now=(time, length(k)): now
+            loop.advance()
+            time, k = time + length(k), k + 1
+            rows = loop.read()
+            is_in_force, status = controller.get(["guarantee.inForce", "guarantee.status"])
+            statuses.append(status)
+            if is_in_force:
+                assert math.degrees(np.linalg.norm(rows[3:6])) <= 5.0, time
+                assert np.linalg.norm(rows[6:9]) <= 1.356e5, time
+            withdrawals += was and not is_in_force
+            was = is_in_force
+    assert withdrawals <= 2
+    is_part = step in ("0.01 s", "0.02 s", "0.04 s")
+    stale = fmu("CRMPC").item("guarantee.status", "stale")
+    assert is_part == was and (is_part or statuses.count(stale) > 0.9 * len(statuses))
+
+
+@pytest.mark.parametrize("name", ["CRMPC", "LQR"])
+def test_a_delay_that_nobody_told_is_found(fmu, name):
+    plant = {"disturbance.kind": "square", "disturbance.square.period": 3.0}
+    for jacobi, told, delay in [(True, 0.0, STEP), (True, STEP, STEP), (False, 0.0, 0.0), (False, STEP, 0.0)]:
+        with Unit(fmu(name), {"delay": told}) as controller, Unit(fmu("ReentryPlant"), plant) as vehicle:
+            Loop(controller, vehicle, STEP, jacobi).fly(250)
+            estimate, differs = controller.get(["loopDelay.estimate", "loopDelay.differs"])
+            assert estimate == pytest.approx(delay, abs=0.25 * STEP) and differs == (told != delay)
+            if name == "CRMPC":
+                status, contradiction = controller.get(["guarantee.status", "guarantee.contradiction"])
+                named = (controller.fmu.item("guarantee.status", "exceeded"), controller.fmu.item("guarantee.contradiction", "delay"))
+                assert ((status, contradiction) == named) == differs
+            assert ("another delay" in controller.messages()) == differs
+
+
+def test_moments_of_both_couplings_belong_to_the_step_that_begins(fmu):
+    rows = [[*range(6), 10.0 * k, 0.0, 0.0] for k in range(3)]
+    assert [row[6] for row in of_step(rows)] == [10.0, 20.0, 20.0]
