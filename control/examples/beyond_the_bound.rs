@@ -54,7 +54,7 @@ fn main() {
                 let mut memory = law.memory();
                 let outcome =
                     simulate(&mut law, &mut memory, case.inertia_scale, larger(case), |_, _, _| {});
-                (outcome, Kept { fallbacks: 0, in_force: 0.0, broken: false })
+                (outcome, Kept { fallbacks: 0, in_force: 0.0, broken: false, withdrawn: 0 })
             });
             let crmpc = [robust(&published), robust(&told)];
             let only = crmpc.each_ref().map(|all| {

@@ -27,7 +27,7 @@ fn assert_keeps_limits(settings: &Settings, cases: &[Case]) -> f64 {
         assert!(outcome.rate <= 1.0, "{name}: rate {} of its limit", outcome.rate);
         assert!(outcome.moment <= 1.0, "{name}: moment {} of its limit", outcome.moment);
         assert_eq!(kept.fallbacks, 0, "{name}");
-        assert!(kept.in_force >= 1.0 && !kept.broken, "{name}: {kept:?}");
+        assert!(kept.in_force >= 1.0 && !kept.broken && kept.withdrawn == 0, "{name}: {kept:?}");
     }
     outcomes.iter().map(|(outcome, _)| outcome.ems_deg).fold(0.0, f64::max)
 }

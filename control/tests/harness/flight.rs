@@ -26,6 +26,8 @@ use vehicle::transport::Transport;
 const LOST: f64 = 30.0 * std::f64::consts::PI / 180.0;
 /// Relative tolerance for rounding when limits are checked.
 const SLACK: f64 = 1e-9;
+/// Measurements of ‖ω‖ and β between two checks: one every millisecond.
+const FINE: u32 = 10;
 
 /// Random numbers that repeat for the same seed.
 #[derive(Clone, Debug)]
@@ -203,16 +205,19 @@ pub struct Flight {
 /// Results of a flight, relative to the limits of the settings.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shown {
-    /// Largest ‖ω‖ relative to its limit in the periods that began under guarantee, checked every
-    /// [`CHECK`].
+    /// Largest ‖ω‖ relative to its limit in the periods that began under guarantee, measured every
+    /// millisecond.
     pub rate: f64,
     /// Time of this largest ‖ω‖, s.
     pub rate_time: f64,
+    /// Largest |β| relative to the bound up to which the guarantee is given, in the same periods
+    /// and as often.
+    pub sideslip: f64,
     /// Largest ‖m‖ relative to its limit that was commanded under guarantee.
     pub moment: f64,
     /// Largest ‖ω‖ relative to its limit over the whole flight.
     pub rate_at_all: f64,
-    /// Whether one of the two exceeded its limit under guarantee.
+    /// Whether ‖ω‖, |β| or ‖m‖ exceeded its limit under guarantee.
     pub broken: bool,
     /// Time at which the guarantee ended, s.
     pub withdrawn: Option<f64>,
@@ -232,7 +237,9 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// Returns whether the guarantee failed.
+    /// Returns whether the guarantee failed: a limit was exceeded under guarantee, or the guarantee
+    /// was withdrawn while its assumptions were true. A command over the limit ends the guarantee
+    /// in the same tick, so that only the withdrawal shows it.
     pub fn defective(&self) -> bool {
         self.assumed && (self.broken || self.withdrawn.is_some()) || self.lost
     }
@@ -297,6 +304,68 @@ impl Flight {
         flight
     }
 
+    /// Draws a flight that begins just inside the set of states from which a plan is certified:
+    /// with much sideslip, with fast rates, or with both. The result is `None` if not even the
+    /// reference at rest is certified.
+    pub fn at_the_edge(settings: &Settings, seed: u64) -> Option<Self> {
+        let random = &mut Random::new(seed ^ (1 << 40));
+        let mut flight = Self::random(settings, seed);
+        flight.duration = 4.0;
+        let angles = flight.reference.at(flight.reference_start).angles;
+        let mut far = angles + random.vector().component_mul(&degrees([8.0, 0.0, 10.0]));
+        let mut rates = random.direction(settings.limit_rate);
+        let kind = random.below(4);
+        if kind != 1 {
+            far.y = settings.sideslip_domain * if random.below(2) == 0 { 1.0 } else { -1.0 };
+        }
+        let mut share = random.between(0.0, 1.0);
+        if kind == 0 {
+            // The sideslip begins below its bound by this share of it, and moves outwards.
+            let below = 10.0_f64.powf(random.between(-5.0, -1.0));
+            far.y *= 1.0 - below;
+            rates.y = rates.y.abs() * far.y.signum();
+            share = 1.0;
+        }
+        if kind == 3 {
+            rates *= random.between(0.0, 0.7);
+        }
+        let mut law = Crmpc::new(*settings).unwrap();
+        let begin = |size: f64| {
+            // Either the angles or the rates stay as they are while the others grow.
+            let (of_angles, of_rates) = match kind {
+                0 | 1 => (share, size),
+                2 => (size, size),
+                _ => (size, 1.0),
+            };
+            (angles + (far - angles) * of_angles, rates * of_rates)
+        };
+        let mut certified = |size: f64| {
+            let ((angles, rates), mut memory) = (begin(size), law.memory());
+            let measured = Measurement { angles, rates, ..Measurement::default() };
+            let reference = |time: f64| flight.reference.at(flight.reference_start + time);
+            law.update(&mut memory, 0, 0.0, &measured, &reference);
+            memory.assured()
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        if !certified(low) {
+            return None;
+        }
+        for _ in 0..14 {
+            let middle = 0.5 * (low + high);
+            if certified(middle) { low = middle } else { high = middle }
+        }
+        (flight.angles, flight.rates) = begin(low * if random.below(2) == 0 { 1.0 } else { 0.999 });
+        // Many disturbances drive the sideslip further outwards, and some flights have none.
+        let mut outwards = random.corner();
+        outwards.y = flight.angles.y.signum();
+        match random.below(4) {
+            0 => flight.disturbance = Course::Constant(outwards),
+            1 => flight.disturbance = Course::Constant(Vector3::zeros()),
+            _ => {}
+        }
+        Some(flight)
+    }
+
     fn random_sine(random: &mut Random) -> Profile {
         let mean =
             degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([5.0, 2.0, 20.0]));
@@ -356,16 +425,24 @@ impl Flight {
                 if check % holds == 0 {
                     delta = disturbance.at(at(i), &vehicle) * s.disturbance_bound;
                 }
-                vehicle.advance(at(i), at(i + 1), &delta);
-                eyes.sample(at(i + 1), &vehicle);
-                let rate = vehicle.rates().norm() / s.limit_rate;
-                shown.rate_at_all = shown.rate_at_all.max(rate);
-                if now && rate > shown.rate {
-                    (shown.rate, shown.rate_time) = (rate, at(i + 1));
+                let fine = |j: u32| at(i) + f64::from(j) * (CHECK / f64::from(FINE));
+                for j in 0..FINE {
+                    vehicle.advance(fine(j), fine(j + 1), &delta);
+                    let rate = vehicle.rates().norm() / s.limit_rate;
+                    shown.rate_at_all = shown.rate_at_all.max(rate);
+                    if now && rate > shown.rate {
+                        (shown.rate, shown.rate_time) = (rate, fine(j + 1));
+                    }
+                    if now {
+                        let sideslip = vehicle.angles().y.abs() / s.sideslip_domain;
+                        shown.sideslip = shown.sideslip.max(sideslip);
+                    }
                 }
+                eyes.sample(at(i + 1), &vehicle);
             }
         }
-        shown.broken = !(shown.rate <= 1.0 + SLACK && shown.moment <= 1.0 + SLACK);
+        let largest = shown.rate.max(shown.moment).max(shown.sideslip);
+        shown.broken = !(largest <= 1.0 + SLACK);
         Shown {
             fallbacks: memory.inner.report.fallbacks,
             in_force: in_force as f64 / ticks as f64,
@@ -555,6 +632,16 @@ impl Eyes {
         let within = |value: f64, bound: f64| value <= bound * (1.0 + SLACK) + 1e-12;
         within(self.largest.0, angle) && within(self.largest.1, rate)
     }
+}
+
+/// Returns the settings of Chai 2022 with another period of the optimisation (s), and with a
+/// horizon of 20 s as there, or of 100 steps if that is shorter. The terminal law is one that is
+/// stable if it is held over the period.
+pub fn optimised_every(period: f64) -> Settings {
+    let published = Settings::new(Constraints::Robust);
+    let terminal = if period > 0.3 { Gain { k1: -0.6, k2: -1.6 } } else { published.terminal };
+    let horizon = ((20.0 / period).round() as usize).min(100);
+    Settings { period_optimisation: period, horizon, terminal, ..published }
 }
 
 /// Result of trying some settings.

@@ -84,9 +84,11 @@ pub struct Kept {
     pub fallbacks: u32,
     /// Share of the ticks at which the guarantee was in force.
     pub in_force: f64,
-    /// Whether ‖ω‖ exceeded its limit at a tick at which, or before which, the guarantee was in
-    /// force.
+    /// Whether ‖ω‖ or |β| exceeded its bound at a tick before which the guarantee was in force.
     pub broken: bool,
+    /// Number of times that the guarantee was withdrawn. If the assumptions were true, each time is
+    /// a broken promise.
+    pub withdrawn: u32,
 }
 
 /// Simulates the loop over the whole scenario (50 s); `observe` receives memory, tick and
@@ -129,12 +131,15 @@ pub fn run(settings: &Settings, inertia_scale: f64, disturbance: Disturbance) ->
             let now = memory.standing == Standing::InForce;
             ticks += 1;
             in_force += u32::from(now);
-            broken |= before && measured.rates.norm() > settings.limit_rate;
+            broken |= before
+                && (measured.rates.norm() > settings.limit_rate
+                    || measured.angles.y.abs() > settings.sideslip_domain);
             before = now;
         },
     );
     let in_force = f64::from(in_force) / f64::from(ticks);
-    (outcome, Kept { fallbacks: memory.report.fallbacks, in_force, broken })
+    let Memory { ended, report, .. } = memory;
+    (outcome, Kept { fallbacks: report.fallbacks, in_force, broken, withdrawn: ended })
 }
 
 /// Definition of a run: a name for messages, the vehicle's inertia and the disturbance.

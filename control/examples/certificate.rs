@@ -1,0 +1,125 @@
+//! Measures what the certificate of a plan costs, and whether it holds to its edge:
+//!
+//! ```text
+//! cargo run --release -p reentry-control --example certificate -- ARGUMENTS
+//!     cost
+//!     edge PERIOD FIRST COUNT
+//! ```
+//!
+//! `cost` flies the scenario of Chai 2022 with white noise and with constant disturbances, and
+//! prints EMS, kept plans and computing times. `edge` flies COUNT flights, with the seeds from FIRST
+//! on, that begin just inside the set of certified states, optimising every PERIOD seconds. A line
+//! shows each broken promise with its seed.
+
+#[path = "../tests/harness/mod.rs"]
+mod harness;
+
+use control::Crmpc;
+use control::crmpc::{Constraints, Memory, Settings, Standing, Status};
+use harness::flight::{Flight, optimised_every};
+use harness::{Case, constant, in_parallel, settings, simulate, white};
+
+/// Sums over the runs of one kind of disturbance.
+#[derive(Default)]
+struct Cost {
+    ems_deg: f64,
+    in_force: f64,
+    kept: u32,
+    iterations: u64,
+    /// Computing times of all optimisations, s.
+    times: Vec<f64>,
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let number = |i: usize| arguments.get(i).and_then(|text| text.parse::<f64>().ok());
+    match arguments.first().map(String::as_str) {
+        Some("cost") => cost(),
+        Some("edge") => {
+            let [Some(period), Some(first), Some(count)] = [1, 2, 3].map(number) else { usage() };
+            edge(period, first as u64, count as u64);
+        }
+        _ => usage(),
+    }
+}
+
+fn usage() -> ! {
+    eprintln!("usage: certificate cost | certificate edge PERIOD FIRST COUNT");
+    std::process::exit(2);
+}
+
+fn cost() {
+    for (name, cases) in [("white noise", white(1..=20, 0.04)), ("corners", constant())] {
+        let settings = settings(Constraints::Robust);
+        let mut cost = Cost::default();
+        for case in &cases {
+            add(&mut cost, &settings, case);
+        }
+        let runs = cases.len() as f64;
+        cost.times.sort_by(f64::total_cmp);
+        let mean = cost.times.iter().sum::<f64>() / cost.times.len() as f64;
+        let median = cost.times[cost.times.len() / 2];
+        println!(
+            "{name:12} {runs} runs: EMS {:.4}°, in force {:.2} %, {} kept plans, {} iterations, mean time {:.4} ms, median {:.4} ms",
+            cost.ems_deg / runs,
+            100.0 * cost.in_force / runs,
+            cost.kept,
+            cost.iterations,
+            1e3 * mean,
+            1e3 * median
+        );
+    }
+}
+
+fn add(cost: &mut Cost, settings: &Settings, case: &Case) {
+    let mut law = Crmpc::new(*settings).unwrap();
+    let ratio = law.design().ratio as u64;
+    let (mut memory, mut ticks, mut in_force) = (Memory::default(), 0u32, 0u32);
+    let outcome = simulate(
+        &mut law,
+        &mut memory,
+        case.inertia_scale,
+        case.disturbance.clone(),
+        |memory, tick, _| {
+            ticks += 1;
+            in_force += u32::from(memory.standing == Standing::InForce);
+            if tick % ratio == 0 {
+                cost.times.push(memory.report.time);
+                cost.iterations += u64::from(memory.report.iterations);
+                cost.kept += u32::from(memory.report.status == Status::Kept);
+            }
+        },
+    );
+    cost.ems_deg += outcome.ems_deg;
+    cost.in_force += f64::from(in_force) / f64::from(ticks);
+}
+
+fn edge(period: f64, first: u64, count: u64) {
+    let settings = optimised_every(period);
+    let seeds: Vec<u64> = (first..first + count).collect();
+    let shown = in_parallel(&seeds, |&seed| {
+        Flight::at_the_edge(&settings, seed).map(|flight| flight.fly())
+    });
+    let (mut flown, mut broken, mut withdrawn, mut lost, mut in_force) = (0, 0, 0, 0, 0.0);
+    let mut largest = [0.0_f64; 3];
+    for (seed, shown) in seeds.iter().zip(shown) {
+        let Some(shown) = shown else { continue };
+        flown += 1;
+        broken += u32::from(shown.broken);
+        withdrawn += u32::from(shown.withdrawn.is_some());
+        lost += u32::from(shown.lost);
+        in_force += shown.in_force;
+        let values = [shown.sideslip, shown.rate, shown.moment];
+        for (largest, value) in largest.iter_mut().zip(values) {
+            *largest = largest.max(value);
+        }
+        if shown.broken || shown.withdrawn.is_some() {
+            println!("seed {seed}: {shown:?}");
+        }
+    }
+    let [sideslip, rate, moment] = largest;
+    println!(
+        "period {period} s: {flown} flights, {broken} broke a bound, {withdrawn} withdrawn, {lost} lost, in force {:.2} %; largest share of the bound on the sideslip {sideslip:.6}, rate {rate:.6}, moment {moment:.6}",
+        100.0 * in_force / f64::from(flown)
+    );
+}
