@@ -71,6 +71,11 @@ pub struct Reach {
     pub seen_angle: f64,
     /// Largest deviation of the rate in the predicted state on which the law acts, s.
     pub seen_rate: f64,
+    /// Largest deviation of the angle in the state that the law predicts for the middle of the
+    /// period, where it evaluates f and R, s².
+    pub middle_angle: f64,
+    /// Largest deviation of the rate in that state, s.
+    pub middle_rate: f64,
     /// Largest |K o| that the law commands, dimensionless.
     pub feedback: f64,
     /// Sum of the parts of the feedback, each multiplied by the time since it was caused, s.
@@ -81,40 +86,32 @@ impl Reach {
     /// Returns the sum of each bound and its counterpart.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Self {
+        self.with(other, |own, other| own + other)
+    }
+
+    fn with(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
         Self {
-            angle: self.angle + other.angle,
-            rate: self.rate + other.rate,
-            seen_angle: self.seen_angle + other.seen_angle,
-            seen_rate: self.seen_rate + other.seen_rate,
-            feedback: self.feedback + other.feedback,
-            feedback_age: self.feedback_age + other.feedback_age,
+            angle: of(self.angle, other.angle),
+            rate: of(self.rate, other.rate),
+            seen_angle: of(self.seen_angle, other.seen_angle),
+            seen_rate: of(self.seen_rate, other.seen_rate),
+            middle_angle: of(self.middle_angle, other.middle_angle),
+            middle_rate: of(self.middle_rate, other.middle_rate),
+            feedback: of(self.feedback, other.feedback),
+            feedback_age: of(self.feedback_age, other.feedback_age),
         }
     }
 
     /// Returns the larger of each bound and its counterpart.
     #[must_use]
     pub fn or(&self, other: &Self) -> Self {
-        Self {
-            angle: self.angle.max(other.angle),
-            rate: self.rate.max(other.rate),
-            seen_angle: self.seen_angle.max(other.seen_angle),
-            seen_rate: self.seen_rate.max(other.seen_rate),
-            feedback: self.feedback.max(other.feedback),
-            feedback_age: self.feedback_age.max(other.feedback_age),
-        }
+        self.with(other, f64::max)
     }
 
     /// Returns every bound multiplied by `size`.
     #[must_use]
     pub fn times(&self, size: f64) -> Self {
-        Self {
-            angle: self.angle * size,
-            rate: self.rate * size,
-            seen_angle: self.seen_angle * size,
-            seen_rate: self.seen_rate * size,
-            feedback: self.feedback * size,
-            feedback_age: self.feedback_age * size,
-        }
+        self.with(self, |own, _| own * size)
     }
 }
 
@@ -128,6 +125,8 @@ pub struct SampledError {
     /// Matrices of o⁺ = Φ o + Γ Δ for a held Δ.
     phi: Matrix2<f64>,
     gamma: Vector2<f64>,
+    /// Transition under the feedback from the beginning of a period to its middle.
+    to_middle: Matrix2<f64>,
 }
 
 /// Number of impulse responses that an invariant set holds one by one; the remaining ones are
@@ -143,6 +142,7 @@ pub struct InvariantSet {
     generators: Vec<Vector2<f64>>,
     gain: Gain,
     latency: f64,
+    to_middle: Matrix2<f64>,
 }
 
 impl InvariantSet {
@@ -161,11 +161,14 @@ impl InvariantSet {
     /// command is under way.
     pub fn reach(&self) -> Reach {
         let (angle, rate) = (self.support(&Vector2::x()), self.support(&Vector2::y()));
+        let middle = |i: usize| self.support(&self.to_middle.row(i).transpose());
         Reach {
             angle: angle + 0.5 * self.latency * self.latency,
             rate: rate + self.latency,
             seen_angle: angle,
             seen_rate: rate,
+            middle_angle: middle(0),
+            middle_rate: middle(1),
             feedback: self.support(&self.gain.row().transpose()),
             feedback_age: 0.0,
         }
@@ -179,8 +182,15 @@ const LARGEST_RADIUS: f64 = 1.0 - 1e-4;
 impl SampledError {
     /// Returns the error dynamics under `gain` sampled every `period` s, acting at once.
     pub fn new(gain: Gain, period: f64) -> Self {
-        let gamma = response(period);
-        Self { gain, period, latency: 0.0, phi: transition(period) + gamma * gain.row(), gamma }
+        let held = |time: f64| transition(time) + response(time) * gain.row();
+        Self {
+            gain,
+            period,
+            latency: 0.0,
+            phi: held(period),
+            gamma: response(period),
+            to_middle: held(0.5 * period),
+        }
     }
 
     /// Returns the error dynamics under `gain` sampled every `period` s, acting `latency` s after
@@ -219,11 +229,14 @@ impl SampledError {
             let size = |row: RowVector2<f64>| integral_of_size(row.y, row.x, within);
             let (angle, rate) = (size(power.row(0).into()), size(power.row(1).into()));
             let feedback = size(self.gain.row() * power);
+            let middle = self.to_middle * power;
             reach = Reach {
                 angle: reach.angle + angle,
                 rate: reach.rate + rate,
                 seen_angle: reach.seen_angle + angle,
                 seen_rate: reach.seen_rate + rate,
+                middle_angle: reach.middle_angle + size(middle.row(0).into()),
+                middle_rate: reach.middle_rate + size(middle.row(1).into()),
                 feedback: reach.feedback + feedback,
                 feedback_age: reach.feedback_age + feedback * (within.1 + n as f64 * self.period),
             };
@@ -259,9 +272,9 @@ impl SampledError {
     /// A_d is the transition over `latency`. Then ô_n = A_d e_n + Σ_{0<j<n} Φ^{n−1−j} Γ K A_d e_j −
     /// Φ^{n−1} A A_d e_0, and the vehicle itself deviates by o_n = ô_n − A_d e_n.
     fn errors_along(&self, newest: Vector2<f64>, steps: usize) -> Vec<Reach> {
-        let Self { gain, period, phi, gamma, .. } = *self;
+        let Self { gain, period, phi, gamma, to_middle, .. } = *self;
         let feedback = |deviation: &Vector2<f64>| (gain.row() * deviation).x.abs();
-        let (mut sum, mut sum_feedback) = (Vector2::zeros(), 0.0);
+        let (mut sum, mut sum_middle, mut sum_feedback) = (Vector2::zeros(), Vector2::zeros(), 0.0);
         let mut older = gamma * (gain.row() * newest).x;
         let mut first = -(transition(period) * newest);
         let mut all = Vec::with_capacity(steps + 1);
@@ -269,16 +282,20 @@ impl SampledError {
         for n in 1..=steps {
             if n > 1 {
                 sum += older.abs();
+                sum_middle += (to_middle * older).abs();
                 sum_feedback += feedback(&older);
                 older = phi * older;
             }
             let own = sum + first.abs();
             let seen = own + newest;
+            let middle = sum_middle + (to_middle * first).abs() + (to_middle * newest).abs();
             all.push(Reach {
                 angle: own.x,
                 rate: own.y,
                 seen_angle: seen.x,
                 seen_rate: seen.y,
+                middle_angle: middle.x,
+                middle_rate: middle.y,
                 feedback: sum_feedback + feedback(&first) + feedback(&newest),
                 feedback_age: 0.0,
             });
@@ -295,11 +312,14 @@ impl SampledError {
         let mut all = Vec::with_capacity(steps + 1);
         all.push(reach);
         for _ in 0..steps {
+            let middle = self.to_middle * shift;
             reach = Reach {
                 angle: reach.angle + shift.x.abs(),
                 rate: reach.rate + shift.y.abs(),
                 seen_angle: reach.seen_angle + shift.x.abs(),
                 seen_rate: reach.seen_rate + shift.y.abs(),
+                middle_angle: reach.middle_angle + middle.x.abs(),
+                middle_rate: reach.middle_rate + middle.y.abs(),
                 feedback: reach.feedback + (self.gain.row() * shift).x.abs(),
                 feedback_age: 0.0,
             };
@@ -338,7 +358,8 @@ impl SampledError {
                 vectors[i] * ((rest[i].abs() + shift[i].abs()) / (1.0 - eigenvalues[i].abs())),
             );
         }
-        Some(InvariantSet { generators, gain: self.gain, latency: self.latency })
+        let Self { gain, latency, to_middle, .. } = *self;
+        Some(InvariantSet { generators, gain, latency, to_middle })
     }
 
     /// Returns the sampling period, s.
@@ -398,9 +419,9 @@ mod tests {
     fn superposed(
         steps: usize,
         sources: usize,
-        respond: impl Fn(usize) -> Vec<[f64; 5]>,
-    ) -> Vec<[f64; 5]> {
-        let mut sums = vec![[0.0; 5]; steps + 1];
+        respond: impl Fn(usize) -> Vec<[f64; 7]>,
+    ) -> Vec<[f64; 7]> {
+        let mut sums = vec![[0.0; 7]; steps + 1];
         for source in 0..sources {
             for (sum, value) in sums.iter_mut().zip(respond(source)) {
                 for (sum, value) in sum.iter_mut().zip(value) {
@@ -411,12 +432,19 @@ mod tests {
         sums
     }
 
-    fn assert_agree(found: &[Reach], expected: &[[f64; 5]], tolerance: f64) {
+    /// Deviation half a period after the law has seen `deviation`, with its feedback held.
+    fn in_the_middle(error: &SampledError, deviation: &Vector2<f64>) -> Vector2<f64> {
+        let half = 0.5 * error.period;
+        transition(half) * deviation + response(half) * (error.gain.row() * deviation).x
+    }
+
+    fn assert_agree(found: &[Reach], expected: &[[f64; 7]], tolerance: f64) {
         for (n, (found, expected)) in found.iter().zip(expected).enumerate() {
-            let Reach { angle, rate, seen_angle, seen_rate, feedback, .. } = *found;
-            for (found, expected) in
-                [angle, rate, seen_angle, seen_rate, feedback].iter().zip(expected)
-            {
+            let Reach { angle, rate, seen_angle, seen_rate, middle_angle, middle_rate, .. } =
+                *found;
+            let found =
+                [angle, rate, seen_angle, seen_rate, middle_angle, middle_rate, found.feedback];
+            for (found, expected) in found.iter().zip(expected) {
                 assert!(
                     (found - expected).abs() <= tolerance * (1.0 + expected),
                     "tick {n}: {found} {expected}"
@@ -438,7 +466,16 @@ mod tests {
                     .map(|n| {
                         let seen = deviation + off(n);
                         let feedback = (error.gain.row() * seen).x;
-                        let values = [deviation.x, deviation.y, seen.x, seen.y, feedback];
+                        let middle = in_the_middle(&error, &seen);
+                        let values = [
+                            deviation.x,
+                            deviation.y,
+                            seen.x,
+                            seen.y,
+                            middle.x,
+                            middle.y,
+                            feedback,
+                        ];
                         deviation = transition(error.period) * deviation + error.gamma * feedback;
                         values
                     })
@@ -480,7 +517,9 @@ mod tests {
                             }
                         }
                         let own = seen + fresh;
-                        [own.x, own.y, seen.x, seen.y, (error.gain.row() * seen).x]
+                        let middle = in_the_middle(&error, &seen);
+                        let feedback = (error.gain.row() * seen).x;
+                        [own.x, own.y, seen.x, seen.y, middle.x, middle.y, feedback]
                             .map(|value| value * pulse)
                     })
                     .collect()

@@ -12,6 +12,10 @@ struct Drive {
     mismatch: Interval,
     varying: Interval,
     swing: Interval,
+    /// Deviation of the rates between two ticks.
+    between: Interval,
+    /// Largest difference of the mismatch from its mean.
+    variation: Interval,
     norm: Interval,
     norm_of_two: Interval,
     turning: Interval,
@@ -36,14 +40,24 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
     let off_rate = (all * (elapsed - half * tau) + rate_error) * growth;
     let off_angle = (half * all * elapsed.square() + angle_error + rate_error * elapsed) * growth;
     let square = tau.square();
-    let mismatch = by_rates * off_rate + by_angles * off_angle + jerk * square / number(24.0);
     let varying = by_rates * all * tau * growth + jerk * square / number(8.0);
     let slope = by_rates * number(lemmas.acceleration) + by_angles * number(lemmas.rate);
+    // Where the motion is in the middle of the period, beside its prediction with a constant
+    // acceleration: F there drives it off in turn, which sums up to a geometric series.
+    let in_turn = by_rates * half * tau + by_angles * square / number(8.0);
+    let beside = slope
+        * (by_rates * square / number(8.0) + by_angles * square * tau / number(24.0))
+        / (Interval::ONE - in_turn);
+    let mismatch =
+        by_rates * off_rate + by_angles * off_angle + jerk * square / number(24.0) + beside;
     let swing = slope * square / number(12.0) + number(0.125) * tau * varying;
     Drive {
         mismatch,
         varying,
         swing,
+        between: slope * square / number(8.0)
+            + jerk * square * tau / (number(36.0) * number(12.0).sqrt()),
+        variation: varying + half * tau * slope,
         norm: all + mismatch,
         norm_of_two: root2 * disturbance + of_inertia + mismatch,
         turning: largest / smallest * number(lemmas.turn) * r * number(lemmas.rate),
@@ -52,12 +66,31 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
 }
 
 /// Fields of a [`Deviation`] in their order.
-type Deviations = [Interval; 7];
+type Deviations = [Interval; 9];
 
-fn values(deviation: &Deviation) -> [f64; 7] {
-    let Deviation { angle, rate, seen_angle, seen_rate, feedback, feedback_norm, feedback_moment } =
-        *deviation;
-    [angle, rate, seen_angle, seen_rate, feedback, feedback_norm, feedback_moment]
+fn values(deviation: &Deviation) -> [f64; 9] {
+    let Deviation {
+        angle,
+        rate,
+        seen_angle,
+        seen_rate,
+        middle_angle,
+        middle_rate,
+        feedback,
+        feedback_norm,
+        feedback_moment,
+    } = *deviation;
+    [
+        angle,
+        rate,
+        seen_angle,
+        seen_rate,
+        middle_angle,
+        middle_rate,
+        feedback,
+        feedback_norm,
+        feedback_moment,
+    ]
 }
 
 fn deviation(
@@ -74,18 +107,25 @@ fn deviation(
     let errors: Bounds =
         std::array::from_fn(|i| errors[0][i] * angle_error + errors[1][i] * rate_error);
     let swing = shifts.map(|shift| shift * drive.swing);
-    let between =
-        tau.square() / number(8.0) * (drive.norm * (Interval::ONE + reach[4]) + root3 * errors[4]);
+    let between = tau.square() / number(8.0)
+        * (drive.norm * (Interval::ONE + reach[6])
+            + root3 * errors[6]
+            + swing[6]
+            + drive.variation);
+    let of_angles = |i: usize| reach[i] * drive.norm_of_two + root2 * errors[i] + swing[i];
+    let of_rates = |i: usize| reach[i] * drive.norm + root3 * errors[i] + swing[i];
     [
-        reach[0] * drive.norm_of_two + root2 * errors[0] + swing[0] + between,
-        reach[1] * drive.norm + root3 * errors[1] + swing[1],
-        reach[2] * drive.norm_of_two + root2 * errors[2] + swing[2],
-        reach[3] * drive.norm + root3 * errors[3] + swing[3],
-        reach[4] * number(s.disturbance_bound) + errors[4],
-        reach[4] * drive.mismatch + swing[4],
+        of_angles(0) + between,
+        of_rates(1) + drive.between,
+        of_angles(2),
+        of_rates(3),
+        of_angles(4),
+        of_rates(5),
+        reach[6] * number(s.disturbance_bound) + errors[6],
+        reach[6] * drive.mismatch + swing[6],
         drive.inertia
             * number(s.limit_moment)
-            * (reach[4] + drive.turning * (reach[5] + delay * reach[4])),
+            * (reach[6] + drive.turning * (reach[7] + delay * reach[6])),
     ]
 }
 
@@ -94,7 +134,8 @@ fn deviation(
 fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
     let number = Interval::from;
     let half = number(0.5);
-    let [angle, rate, seen_angle, seen_rate, feedback, feedback_norm, feedback_moment] = *forever;
+    let [angle, rate, _, _, middle_angle, middle_rate, feedback, feedback_norm, feedback_moment] =
+        *forever;
     let [largest, smallest, drift, curvature, mixed, twice, turn_by_angles] = [
         lemmas.largest,
         lemmas.smallest,
@@ -115,14 +156,17 @@ fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
         + turn_by_angles * gyroscopic * x.square();
     let slope_by_rates = (largest * number(lemmas.drift_by_rates) + gyroscopic) * x;
     let by_feedback = feedback * number(lemmas.bearing) + feedback_norm * largest + feedback_moment;
-    let (four, twelve, further) = (number(4.0), number(12.0), x + seen_rate);
-    let second = half * largest * curvature * a * seen_angle.square()
-        + (largest * drift + half * spread) * seen_rate.square()
-        + (largest * mixed + four * spread) * further * seen_angle * seen_rate
-        + half * (largest * twice + twelve * spread) * further.square() * seen_angle.square();
+    let (four, twelve, further) = (number(4.0), number(12.0), x + middle_rate);
+    let second = half * largest * curvature * a * middle_angle.square()
+        + (largest * drift + half * spread) * middle_rate.square()
+        + (largest * mixed + four * spread) * further * middle_angle * middle_rate
+        + half * (largest * twice + twelve * spread) * further.square() * middle_angle.square();
     let nominal = largest * (a + drift * x.square()) + half * spread * x.square();
-    let moment =
-        by_feedback + slope_by_angles * seen_angle + slope_by_rates * seen_rate + second + nominal;
+    let moment = by_feedback
+        + slope_by_angles * middle_angle
+        + slope_by_rates * middle_rate
+        + second
+        + nominal;
     [rates, moment]
 }
 
@@ -162,7 +206,7 @@ pub fn check(
     let last = reach.last()?;
     let names = ["Σ angle", "Σ rate", "Σ feedback", "Σ feedback times age"];
     for ((name, bound), truth) in
-        names.into_iter().zip(sums).zip([last[0], last[1], last[4], last[5]])
+        names.into_iter().zip(sums).zip([last[0], last[1], last[6], last[7]])
     {
         note(&format!("{name} of a disturbance, for ever"), bound, truth);
     }
@@ -171,6 +215,8 @@ pub fn check(
         "deviation of the rates",
         "deviation of the angles, seen",
         "deviation of the rates, seen",
+        "deviation of the angles, in the middle",
+        "deviation of the rates, in the middle",
         "feedback, box",
         "feedback, ball",
         "feedback, moment of the inertia error",

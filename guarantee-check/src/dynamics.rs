@@ -179,18 +179,27 @@ fn ascent(f: impl Fn(&[f64; COORDINATES]) -> f64) -> f64 {
     largest
 }
 
+/// Direction of the angles at a trial point.
+fn angle_unit(z: &[f64; COORDINATES]) -> [f64; 2] {
+    let size = z[8].hypot(z[9]).max(1e-9);
+    [z[8] / size, z[9] / size]
+}
+
+/// Vector that begins at `x` and changes by `v` per unit of time.
+fn line(x: &Vector<f64>, v: &Vector<f64>) -> Vector<Series> {
+    std::array::from_fn(|i| Series::line(x[i], v[i]))
+}
+
+/// Direction of these three coordinates.
+fn unit(z: &[f64]) -> Vector<f64> {
+    let size = norm(&[z[0], z[1], z[2]]).max(1e-9);
+    scaled(1.0 / size, [z[0], z[1], z[2]])
+}
+
 /// Returns the largest values that the search found, in the order of [`from_lemmas`].
-fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
+fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 12] {
     let body = Body::new(s);
     let angles = |z: &[f64; COORDINATES]| [PI * z[1], s.sideslip_domain * z[0]];
-    let unit = |z: &[f64]| {
-        let size = norm(&[z[0], z[1], z[2]]).max(1e-9);
-        scaled(1.0 / size, [z[0], z[1], z[2]])
-    };
-    let angle_unit = |z: &[f64; COORDINATES]| {
-        let size = z[8].hypot(z[9]).max(1e-9);
-        [z[8] / size, z[9] / size]
-    };
     // This gives the state (α, β), x and m, with x = R ω.
     let state = |z: &[f64; COORDINATES]| {
         let [alpha, beta] = angles(z);
@@ -202,7 +211,6 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
     let along = |[alpha, beta]: [f64; 2], o: [f64; 2]| {
         [Series::line(alpha, o[0]), Series::line(beta, o[1])]
     };
-    let line = |x: &Vector<f64>, v: &Vector<f64>| std::array::from_fn(|i| Series::line(x[i], v[i]));
     let acceleration = |z: &[f64; COORDINATES]| {
         let (angles, x, m) = state(z);
         norm(&coefficient(&body.acceleration(&held(angles), &vector(&x), &vector(&m)), 0))
@@ -248,9 +256,31 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
         let (angles, x, a) = nominal(z, sizes);
         norm(&coefficient(&body.moment(&held(angles), &vector(&x), &vector(&a)), 0))
     };
+    let [moment_curvature, rate_curvature, by_angles_curvature, by_rates_curvature, bearing] =
+        attained_along_a_motion(s, &body, curved);
+    [
+        ascent(acceleration),
+        ascent(by_rates),
+        ascent(by_angles),
+        ascent(jerk),
+        ascent(moment_by_angles),
+        ascent(moment_by_rates),
+        ascent(moment),
+        moment_curvature,
+        rate_curvature,
+        by_angles_curvature,
+        by_rates_curvature,
+        bearing,
+    ]
+}
+
+/// Returns the largest second derivatives that the search found along motions with a held.
+fn attained_along_a_motion(s: &Settings, body: &Body, curved: (f64, f64)) -> [f64; 5] {
+    let angles = |z: &[f64; COORDINATES]| [PI * z[1], s.sideslip_domain * z[0]];
     // This gives a motion along which a is held.
     let motion = |z: &[f64; COORDINATES]| {
-        let (from, x, a) = nominal(z, curved);
+        let from = angles(z);
+        let (x, a) = (ball(&z[2..5], curved.0), ball(&z[5..8], curved.1));
         let angles: [Series; 2] = std::array::from_fn(|i| Series([from[i], x[i], 0.5 * a[i]]));
         (angles, line(&x, &a), vector(&a))
     };
@@ -262,32 +292,58 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 9] {
         let (angles, x, _) = motion(z);
         2.0 * norm(&coefficient(&Body::rates(&angles, &x), 2))
     };
+    // The derivatives by the angles and rates are those of differences over a short distance.
+    let short = 1e-4;
+    let difference = |after: Vector<Series>, before: Vector<Series>| {
+        let change = sum(after, before.map(Neg::neg));
+        norm(&coefficient(&change, 2)) / short
+    };
+    let curvature_by_angles = |z: &[f64; COORDINATES]| {
+        let (angles, x, a) = motion(z);
+        let o = angle_unit(z);
+        let moved = |side: f64| {
+            let turned = std::array::from_fn(|i| angles[i] + Series::constant(side * short * o[i]));
+            body.moment(&turned, &x, &a)
+        };
+        difference(moved(1.0), moved(-1.0))
+    };
+    let curvature_by_rates = |z: &[f64; COORDINATES]| {
+        let (angles, x, a) = motion(z);
+        let v = unit(&z[10..]);
+        let moved = |side: f64| {
+            let changed = std::array::from_fn(|i| x[i] + Series::constant(side * short * v[i]));
+            body.moment(&angles, &changed, &a)
+        };
+        difference(moved(1.0), moved(-1.0))
+    };
+    let curvature_of_bearing = |z: &[f64; COORDINATES]| {
+        let (angles, ..) = motion(z);
+        let corner = [z[10], z[11], z[12]].map(|z| if z < 0.0 { -1.0 } else { 1.0 });
+        let at_rest = vector(&[0.0; 3]);
+        2.0 * norm(&coefficient(&body.moment(&angles, &at_rest, &vector(&corner)), 2))
+    };
     [
-        ascent(acceleration),
-        ascent(by_rates),
-        ascent(by_angles),
-        ascent(jerk),
-        ascent(moment_by_angles),
-        ascent(moment_by_rates),
-        ascent(moment),
         ascent(moment_curvature),
         ascent(rate_curvature),
+        ascent(curvature_by_angles),
+        ascent(curvature_by_rates),
+        ascent(curvature_of_bearing),
     ]
 }
 
-/// Returns bounds of the same nine quantities from the verified inequalities, which hold with
+/// Returns bounds of the same quantities from the verified inequalities, which hold with
 /// certainty.
 fn from_lemmas(
     s: &Settings,
     sup: &Suprema,
     sizes: (f64, f64),
     curved: (f64, f64),
-) -> [Interval; 9] {
+) -> [Interval; 12] {
     let number = Interval::from;
     let (two, half) = (number(2.0), number(0.5));
     let upper = |of: Interval| number(of.high);
-    let [drift, curvature, turn, mixed, third, r] =
-        [sup.drift, sup.curvature, sup.turn, sup.mixed, sup.twice, sup.r].map(upper);
+    let [drift, curvature, turn, mixed, third, fourth, r] =
+        [sup.drift, sup.curvature, sup.turn, sup.mixed, sup.twice, sup.fourth, sup.r].map(upper);
     let [largest, inverse, bilinear, bilinear_inverse] =
         [sup.largest, sup.inverse, two * sup.spin, two * sup.spin_inverse].map(upper);
     let (limit, moment) = (number(s.limit_rate), number(s.limit_moment));
@@ -323,6 +379,25 @@ fn from_lemmas(
         + (largest * third + bilinear * (turn.square() + curvature)) * x.square().square()
         + (largest * curvature + bilinear * turn) * x.square() * a;
     let rate_curvature = number(3.0) * turn * x * a + curvature * x.square() * x;
+    // The derivatives of ω and of P = ∂W[o] x, or of W v, along the motion.
+    let (root2, root3) = (two.sqrt(), number(3.0).sqrt());
+    let three = number(3.0);
+    let [omega, omega_first, omega_second] = [x, turn * x.square() + a, rate_curvature];
+    let [p, p_first, p_second] = [
+        turn * x,
+        curvature * x.square() + turn * a,
+        third * x.square() * x + three * curvature * x * a,
+    ];
+    let curvature_by_angles = largest
+        * (third * x.square() * a
+            + curvature * a.square()
+            + fourth * x.square().square()
+            + (three + two) * third * x.square() * a
+            + two * curvature * a.square())
+        + bilinear * (omega_second * p + two * omega_first * p_first + omega * p_second);
+    let curvature_by_rates = largest
+        * (p_second + third * x.square() * x + three * curvature * x * a)
+        + bilinear * (omega_second + two * omega_first * turn * x + omega * p_first);
     [
         acceleration,
         by_rates,
@@ -333,6 +408,9 @@ fn from_lemmas(
         nominal,
         moment_curvature,
         rate_curvature,
+        root2 * curvature_by_angles,
+        root3 * curvature_by_rates,
+        root3 * largest * p_first,
     ]
 }
 
@@ -343,6 +421,8 @@ pub fn check(s: &Settings, lemmas: &Lemmas, sup: &Suprema, terminal_rate: f64) -
     let curved = (lemmas.rate, lemmas.acceleration);
     let [moment_by_angles, moment_by_rates, moment] = lemmas.moment(sizes.0, sizes.1);
     let [moment_curvature, rate_curvature] = lemmas.curvatures(curved.0, curved.1);
+    let [curvature_by_angles, curvature_by_rates, curvature_of_bearing] =
+        lemmas.slope_curvatures(curved.0, curved.1);
     let bounds = [
         ("‖F‖ ≤ b", lemmas.acceleration),
         ("‖∂F/∂x‖ ≤ b", lemmas.by_rates),
@@ -353,6 +433,9 @@ pub fn check(s: &Settings, lemmas: &Lemmas, sup: &Suprema, terminal_rate: f64) -
         ("‖m‖ ≤ b at the terminal sizes", moment),
         ("‖d²m/dt²‖ ≤ b at the largest sizes, a held", moment_curvature),
         ("‖d²ω/dt²‖ ≤ b at the largest sizes, a held", rate_curvature),
+        ("‖d²/dt² ∂m/∂(α, β)‖ ≤ b at the largest sizes", curvature_by_angles),
+        ("‖d²/dt² ∂m/∂x‖ ≤ b at the largest sizes", curvature_by_rates),
+        ("d²/dt² ‖I W s‖ ≤ b at the largest sizes", curvature_of_bearing),
     ];
     let (below, above) = (attained(s, sizes, curved), from_lemmas(s, sup, sizes, curved));
     bounds

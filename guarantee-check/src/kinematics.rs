@@ -64,16 +64,17 @@ impl<T: Number> Turn<T> {
         Self { sine, cosine, double: (product + product, cosine.squared() - sine.squared()) }
     }
 
-    /// Derivative ∂ʲ(V y)/∂βʲ for j ≤ 3, from V y = [−½ y₁ sin 2β − y₃ cos β, ½ y₁ (1 + cos 2β) −
+    /// Derivative ∂ʲ(V y)/∂βʲ for j ≤ 4, from V y = [−½ y₁ sin 2β − y₃ cos β, ½ y₁ (1 + cos 2β) −
     /// y₃ sin β, y₂].
     pub fn by_sideslip(&self, order: usize, y: &Vector<T>) -> Vector<T> {
         let Self { sine: s, cosine: c, double: (s2, c2) } = *self;
-        let (two, four) = (T::constant(2.0), T::constant(4.0));
+        let [two, four, eight] = [2.0, 4.0, 8.0].map(T::constant);
         match order {
             0 => [-(c * (s * y[0] + y[2])), c.squared() * y[0] - s * y[2], y[1]],
             1 => [s * y[2] - c2 * y[0], -(s2 * y[0] + c * y[2]), T::constant(0.0)],
             2 => [two * s2 * y[0] + c * y[2], s * y[2] - two * c2 * y[0], T::constant(0.0)],
-            _ => [four * c2 * y[0] - s * y[2], four * s2 * y[0] + c * y[2], T::constant(0.0)],
+            3 => [four * c2 * y[0] - s * y[2], four * s2 * y[0] + c * y[2], T::constant(0.0)],
+            _ => [-(eight * s2 * y[0] + c * y[2]), eight * c2 * y[0] - s * y[2], T::constant(0.0)],
         }
     }
 

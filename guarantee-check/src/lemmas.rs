@@ -64,6 +64,8 @@ pub struct Suprema {
     pub mixed: Interval,
     /// Largest ‖∂³W[o, o, x̂] x‖ over unit vectors.
     pub twice: Interval,
+    /// Largest ‖∂⁴W[o, o, o, o] y‖ over unit vectors.
+    pub fourth: Interval,
     /// Largest ‖ω × I ω‖ over unit vectors ω, kg m².
     pub spin: Interval,
     /// Largest ‖I⁻¹ (ω × I ω)‖ over unit vectors ω.
@@ -177,7 +179,7 @@ fn gyroscopic<const N: usize>(
 pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema) {
     let u = half_angles(s.sideslip_domain);
     let mut search = Search { u, gap, boxes: 4_000_000, findings: Vec::new() };
-    let (drift, curvature, turn, mixed, twice) = geometry(&mut search, lemmas);
+    let [drift, curvature, turn, mixed, twice, fourth] = geometry(&mut search, lemmas);
     let r = lemma1(&mut search, lemmas, s.sideslip_domain);
     let (spin, spin_inverse, largest, inverse) = inertia(&mut search, s, lemmas);
     let bearing = bearing(&mut search, s, lemmas);
@@ -187,6 +189,7 @@ pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema)
         turn,
         mixed,
         twice,
+        fourth,
         spin,
         spin_inverse,
         largest,
@@ -197,10 +200,7 @@ pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema)
     (search.findings, suprema)
 }
 
-fn geometry(
-    search: &mut Search,
-    lemmas: &Lemmas,
-) -> (Interval, Interval, Interval, Interval, Interval) {
+fn geometry(search: &mut Search, lemmas: &Lemmas) -> [Interval; 6] {
     let u = search.u;
     let three = [u, SIDE, SIDE];
     let drift = search.check(
@@ -271,7 +271,13 @@ fn geometry(
             square(&value) / (length(&o) * square(&x)).squared()
         },
     );
-    (drift, curvature, by_turn, mixed, twice)
+    let statement = "‖∂⁴(W y)/∂(α, β)⁴‖ ≤ b ‖y‖";
+    let fourth = search.check(statement, lemmas.fourth, 1.0, 6, four, |chart, &[u, o, a, b]| {
+        let (o, y) = (plane(chart % 2, o), space(chart / 2, a, b));
+        let value = turn(u).along(&[o, o, o, o], &y);
+        square(&value) / (length(&o).squared().squared() * square(&y))
+    });
+    [drift, curvature, by_turn, mixed, twice, fourth]
 }
 
 /// Checks the bounds of ‖W‖ and ‖R‖.

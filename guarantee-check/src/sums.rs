@@ -58,11 +58,14 @@ pub struct Axis {
     powers: Vec<Matrix>,
     /// Power Φᵇ, which at least halves every vector.
     block: Matrix,
+    /// Transition from the beginning of a period to its middle, with the feedback held.
+    to_middle: Matrix,
 }
 
 /// Bounds on the effect of a drive by the end of some period: angle, rate, both as the law sees
-/// them, feedback, and the feedback times its age.
-pub type Bounds = [Interval; 6];
+/// them, both as it predicts them for the middle of the period, feedback, and the feedback times its
+/// age.
+pub type Bounds = [Interval; 8];
 
 /// Largest b that is allowed: stable dynamics that fade more slowly are refused.
 const LONGEST_BLOCK: usize = 4000;
@@ -92,6 +95,7 @@ impl Axis {
             latency: Interval::from(latency),
             powers,
             block: next,
+            to_middle: step(gain, 0.5 * period),
         })
     }
 
@@ -120,21 +124,25 @@ impl Axis {
     /// Bounds on the effect of any |Δ| ≤ 1 within 0, 1, …, `steps` periods, and last for ever.
     pub fn reach(&self, steps: usize) -> Vec<Bounds> {
         let unseen = [Interval::from(0.5) * self.latency.square(), self.latency];
-        let (mut seen, mut feedback, mut age) =
-            ([Interval::ZERO; 2], Interval::ZERO, Interval::ZERO);
+        let (mut seen, mut middle) = ([Interval::ZERO; 2], [Interval::ZERO; 2]);
+        let (mut feedback, mut age) = (Interval::ZERO, Interval::ZERO);
         let mut all = Vec::with_capacity(steps + 2);
-        let bounds = |seen: &Pair, feedback: Interval, age: Interval| {
-            [seen[0] + unseen[0], seen[1] + unseen[1], seen[0], seen[1], feedback, age]
+        let bounds = |seen: &Pair, middle: &Pair, feedback: Interval, age: Interval| {
+            let [angle, rate] = *seen;
+            let [of_angle, of_rate] = *middle;
+            [angle + unseen[0], rate + unseen[1], angle, rate, of_angle, of_rate, feedback, age]
         };
-        all.push(bounds(&seen, feedback, age));
+        all.push(bounds(&seen, &middle, feedback, age));
         let end = self.latency + self.period;
         for (n, power) in self.transitions(steps).enumerate() {
             let size = |row: &Pair| integral_of_size(row, self.latency, self.period);
             seen = std::array::from_fn(|i| seen[i] + size(&power[i]));
+            let in_the_middle = product(&self.to_middle, &power);
+            middle = std::array::from_fn(|i| middle[i] + size(&in_the_middle[i]));
             let fed = size(&applied(&transposed(&power), &self.gain));
             feedback = feedback + fed;
             age = age + fed * (end + Interval::from(n as f64) * self.period);
-            all.push(bounds(&seen, feedback, age));
+            all.push(bounds(&seen, &middle, feedback, age));
         }
         // The tail uses ‖Φⁿ [u, 1]‖ ≤ ‖Φⁿ‖ max(u, 1).
         let scale = self.period * end.max(Interval::ONE);
@@ -144,27 +152,38 @@ impl Axis {
         let old = end + Interval::from(steps as f64) * self.period;
         let more = |value: Interval, by: Interval| value + Interval::new(0.0, by.high);
         let seen = seen.map(|seen| more(seen, tail));
+        let middle = middle.map(|middle| more(middle, norm(&self.to_middle) * tail));
         all.push(bounds(
             &seen,
+            &middle,
             more(feedback, gain * tail),
             more(age, gain * (tail * old + moment)),
         ));
         all
     }
 
-    /// Sums Σ |Φʲ x| and Σ |K Φʲ x| over j < 0, 1, …, `steps`, and last over all j.
-    fn series(&self, x: &Pair, steps: usize) -> Vec<[Interval; 3]> {
-        let mut sum = [Interval::ZERO; 3];
+    /// Sizes of the components of x, of those in the middle of the period, and of K x.
+    fn sizes(&self, x: &Pair) -> [Interval; 5] {
+        let middle = applied(&self.to_middle, x);
+        [x[0], x[1], middle[0], middle[1], along(&self.gain, x)].map(Interval::abs)
+    }
+
+    /// Bounds of [`Self::sizes`] for components of at most `largest`.
+    fn sizes_within(&self, largest: Interval) -> [Interval; 5] {
+        let middle = norm(&self.to_middle) * largest;
+        [largest, largest, middle, middle, (self.gain[0].abs() + self.gain[1].abs()) * largest]
+    }
+
+    /// Sums of [`Self::sizes`] of Φʲ x over j < 0, 1, …, `steps`, and last over all j.
+    fn series(&self, x: &Pair, steps: usize) -> Vec<[Interval; 5]> {
+        let mut sum = [Interval::ZERO; 5];
         let mut all = vec![sum];
         for power in self.transitions(steps) {
-            let value = applied(&power, x);
-            let sizes = [value[0].abs(), value[1].abs(), along(&self.gain, &value).abs()];
+            let sizes = self.sizes(&applied(&power, x));
             sum = std::array::from_fn(|i| sum[i] + sizes[i]);
             all.push(sum);
         }
-        let tail = self.tails(steps).0 * x[0].abs().max(x[1].abs());
-        let gain = self.gain[0].abs() + self.gain[1].abs();
-        let tails = [tail, tail, gain * tail];
+        let tails = self.sizes_within(self.tails(steps).0 * x[0].abs().max(x[1].abs()));
         all.push(std::array::from_fn(|i| sum[i] + Interval::new(0.0, tails[i].high)));
         all
     }
@@ -184,34 +203,27 @@ impl Axis {
         let sums = self.series(&[half * held, self.period * held], steps);
         // The first error contributes −Φⁿ⁻¹ A A_d e₀.
         let first = [newest[0] + self.period * newest[1], newest[1]];
-        let fed = held.abs();
-        let bounds = |sum: &[Interval; 3], first: &[Interval; 3]| {
-            let own = [sum[0] + first[0], sum[1] + first[1]];
-            let feedback = sum[2] + first[2] + fed;
-            [own[0], own[1], own[0] + newest[0], own[1] + newest[1], feedback, Interval::ZERO]
+        let newest_sizes = self.sizes(newest);
+        let bounds = |sum: &[Interval; 5], first: &[Interval; 5]| {
+            let own: [Interval; 5] = std::array::from_fn(|i| sum[i] + first[i]);
+            let seen: [Interval; 5] = std::array::from_fn(|i| own[i] + newest_sizes[i]);
+            [own[0], own[1], seen[0], seen[1], seen[2], seen[3], seen[4], Interval::ZERO]
         };
         let mut all = Vec::with_capacity(steps + 2);
-        all.push([
-            newest[0],
-            newest[1],
-            Interval::ZERO,
-            Interval::ZERO,
-            Interval::ZERO,
-            Interval::ZERO,
-        ]);
-        let mut largest = [Interval::ZERO; 3];
+        let mut begin = [Interval::ZERO; 8];
+        [begin[0], begin[1]] = *newest;
+        all.push(begin);
+        let mut largest = [Interval::ZERO; 5];
         for (n, power) in self.transitions(steps).enumerate() {
-            let value = applied(&power, &first);
-            let sizes = [value[0].abs(), value[1].abs(), along(&self.gain, &value).abs()];
+            let sizes = self.sizes(&applied(&power, &first));
             all.push(bounds(&sums[n], &sizes));
             largest = sizes;
         }
         // After the last period no power of Φ makes the first error larger than this, because
         // ‖Φᵐᵇ⁺ʳ‖ ≤ ‖Φʳ‖.
         let after = self.powers.iter().fold(Interval::ZERO, |most, power| most.max(norm(power)));
-        let faded = after * largest[0].max(largest[1]);
-        let gain = self.gain[0].abs() + self.gain[1].abs();
-        all.push(bounds(&sums[steps + 1], &[faded, faded, gain * faded]));
+        let faded = self.sizes_within(after * largest[0].max(largest[1]));
+        all.push(bounds(&sums[steps + 1], &faded));
         all
     }
 
@@ -220,7 +232,9 @@ impl Axis {
     pub fn shifts(&self, steps: usize) -> Vec<Bounds> {
         let sums = self.series(&[self.period, Interval::ZERO], steps);
         sums.into_iter()
-            .map(|[angle, rate, feedback]| [angle, rate, angle, rate, feedback, Interval::ZERO])
+            .map(|[angle, rate, of_angle, of_rate, feedback]| {
+                [angle, rate, angle, rate, of_angle, of_rate, feedback, Interval::ZERO]
+            })
             .collect()
     }
 }

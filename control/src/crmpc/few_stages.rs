@@ -3,6 +3,7 @@
 //!
 //! Gain: mean time 0.044 → 0.031 ms (robust set), measured as in `mpc::shortcuts`.
 
+use super::guarantee::End;
 use super::robust::{Interval, Point, Robust, largest_over_box};
 use crate::linearise::{BodyMotion, MomentSlopeBounds, TURN_BY_ANGLES};
 use nalgebra::Vector3;
@@ -16,10 +17,10 @@ pub(super) struct Anchor {
     /// Norm of the rates, ‖x_ω‖.
     size: f64,
     pub(super) motion: BodyMotion,
-    /// Largest ‖I W δ‖ over the disturbances.
-    feedback: f64,
-    /// Upper bound on the growth of `feedback` with the angles.
-    feedback_by_angles: f64,
+    /// Largest ‖I W s‖ over the corners s of the unit box.
+    bearing: f64,
+    /// Upper bound on the growth of `bearing` with the angles.
+    bearing_by_angles: f64,
 }
 
 impl Robust {
@@ -50,11 +51,11 @@ impl Robust {
     /// Evaluates a stage from which its neighbours are estimated.
     pub(super) fn anchor(&self, here: &Point) -> Anchor {
         let motion = here.motion(&self.settings.body);
-        let feedback = largest_over_box(&motion.moment_by_acceleration);
+        let bearing = largest_over_box(&motion.moment_by_acceleration);
         // ‖∂W/∂α‖² and ‖∂W/∂β‖² are at most 2, and the two are orthogonal.
-        let feedback_by_angles = self.design.largest_inertia * SQRT_2 * 3.0_f64.sqrt();
+        let bearing_by_angles = self.design.largest_inertia * SQRT_2 * 3.0_f64.sqrt();
         let Point { angles, rates, size, .. } = *here;
-        Anchor { angles, rates, size, motion, feedback, feedback_by_angles }
+        Anchor { angles, rates, size, motion, bearing, bearing_by_angles }
     }
 
     /// Returns bounds that are at most those of [`Self::interval`], and norms that are at least
@@ -80,19 +81,20 @@ impl Robust {
             + by_rates * (here.rates - anchor.rates).norm();
         let turn_within = (next.angles - here.angles).xy().norm();
         let after = moment + by_angles * turn_within + by_rates * (next.rates - here.rates).norm();
-        let feedback = anchor.feedback + anchor.feedback_by_angles * turn;
+        let bearing = anchor.bearing + anchor.bearing_by_angles * turn;
+        let end = |moment: f64, bearing: f64| End {
+            moment,
+            bearing,
+            slopes: (by_angles, by_rates),
+            size,
+        };
+        let ends =
+            [end(moment, bearing), end(after, bearing + anchor.bearing_by_angles * turn_within)];
         Interval {
             rate: next.size,
             rate_bound: self.rate_bound(k + 1, TURN_BY_ANGLES * next.size, next, here),
             moment,
-            moment_bound: self.moment_bound(
-                k,
-                moment,
-                after,
-                feedback,
-                (by_angles, by_rates),
-                here,
-            ),
+            moment_bound: self.moment_bound(k, &ends, here.pull),
         }
     }
 }

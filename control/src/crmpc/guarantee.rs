@@ -27,6 +27,11 @@ pub struct Deviation {
     pub seen_angle: f64,
     /// Deviation of the rates in the predicted state on which the law acts, rad/s.
     pub seen_rate: f64,
+    /// Deviation of angle of attack and sideslip in the state that the law predicts for the middle
+    /// of the period, where it evaluates f and R, rad.
+    pub middle_angle: f64,
+    /// Deviation of the rates in that state, rad/s.
+    pub middle_rate: f64,
     /// Half width of the box part of K ô, rad/s²; the ball part below is added to it.
     pub feedback: f64,
     /// Radius of the ball part of K ô, rad/s².
@@ -43,6 +48,8 @@ impl Deviation {
             rate: self.rate.max(other.rate),
             seen_angle: self.seen_angle.max(other.seen_angle),
             seen_rate: self.seen_rate.max(other.seen_rate),
+            middle_angle: self.middle_angle.max(other.middle_angle),
+            middle_rate: self.middle_rate.max(other.middle_rate),
             feedback: self.feedback.max(other.feedback),
             feedback_norm: self.feedback_norm.max(other.feedback_norm),
             feedback_moment: self.feedback_moment.max(other.feedback_moment),
@@ -54,8 +61,11 @@ impl Deviation {
 /// state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tightening {
-    /// Deviation at each tick; the last one holds from then on.
+    /// Deviation at each tick; the last one is never exceeded.
     at: Vec<Deviation>,
+    /// Largest amount by which the deviation of the angles exceeds the straight line between its
+    /// values at both ends of the optimisation period that begins at each tick, rad.
+    angle_bulge: Vec<f64>,
     /// Loss of moment by the largest deviation within the optimisation period that begins at each
     /// tick.
     moment: Vec<MomentLoss>,
@@ -95,6 +105,12 @@ impl Tightening {
         &self.rate[self.place(tick)]
     }
 
+    /// Returns the largest amount by which the deviation of the angles exceeds the straight line
+    /// between its values at both ends of the optimisation period that begins at `tick`, rad.
+    pub(super) fn angle_bulge(&self, tick: usize) -> f64 {
+        self.angle_bulge[self.place(tick)]
+    }
+
     /// Returns the deviation that is never exceeded.
     pub fn forever(&self) -> &Deviation {
         self.at(usize::MAX)
@@ -126,6 +142,12 @@ const DRIFT_MIXED: f64 = 2.0 * CURVATURE;
 /// Bound on the second derivative of Ẇ x by the angles, relative to ‖x‖², from the third
 /// derivatives of W.
 const DRIFT_BY_ANGLES_TWICE: f64 = 8.0;
+/// Bound on ‖∂⁴(W y)/∂(α, β)⁴‖ relative to ‖y‖. Along a line of unit speed in (α, β), W y is a sum
+/// of sines whose frequencies are at most |α̇| + 2 |β̇| ≤ √5. As ‖W y‖ ≤ ‖y‖ everywhere, Bernstein's
+/// inequality bounds the fourth derivative by √5⁴.
+const FOURTH: f64 = 25.0;
+/// Largest z for which 1/(1 − z) ≤ exp(2 z) is used; it is true up to 0.79.
+const LARGEST_IN_TURN: f64 = 0.75;
 /// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; for the sideslip
 /// it is the smallest rate. See [`braking`].
 pub(super) const BRAKING: f64 = 0.01;
@@ -167,10 +189,19 @@ pub(super) struct Dynamics {
     by_rates: f64,
     /// Bound on ‖∂F/∂(α, β)‖ in the domain, 1/s².
     by_angles: f64,
+    /// Bound on ‖dF/dt‖ along the predicted motion with m held, rad/s³.
+    slope: f64,
     /// Bound on ‖d²F/dt²‖ along the predicted motion with m held, rad/s⁴.
     jerk: f64,
     /// Coefficients of ‖a‖², ‖x_ω‖² ‖a‖ and ‖x_ω‖⁴ in [`Self::moment_curvature`].
     curvature: [f64; 3],
+    /// Coefficients of the same powers in the curvature of ∂m/∂(α, β), see
+    /// [`Self::slope_curvatures`].
+    curvature_by_angles: [f64; 3],
+    /// Coefficients of ‖x_ω‖ ‖a‖ and ‖x_ω‖³ in the curvature of ∂m/∂x_ω.
+    curvature_by_rates: [f64; 2],
+    /// Coefficients of ‖a‖ and ‖x_ω‖² in the curvature of the largest ‖I W s‖.
+    curvature_of_bearing: [f64; 2],
 }
 
 impl Dynamics {
@@ -203,6 +234,7 @@ impl Dynamics {
             + angles_twice * rate * rate
             + by_angles * acceleration
             + by_rates * (by_rates * acceleration + by_angles * rate);
+        let slope = by_rates * acceleration + by_angles * rate;
         // I Ẅ a gives ∂²W [x, x] a + ∂W [a] a. The rest is as in `MomentLoss`, with ẋ_ω = a and
         // Θ̈ = a.
         let twisted = largest - smallest;
@@ -213,6 +245,27 @@ impl Dynamics {
                 + TURN * SQRT_2 * twisted,
             largest * DRIFT_BY_ANGLES_TWICE + 12.0 * twisted,
         ];
+        // With P = ∂W[o] x and the symmetric bilinear form B(ω, ω) = 2 ω × I ω, ∂m/∂(α, β) [o] is
+        // I (∂W[o] a + ∂²W[x, o] x) + B(ω, P). Here ‖P‖ ≤ t x, ‖Ṗ‖ ≤ c x² + t a and ‖P̈‖ ≤ d x³ +
+        // 3 c x a with the bounds t, c and d on the first three derivatives of W; ‖ω̇‖ ≤ t x² + a,
+        // and ω̈ is that of `rate_curvature`. Likewise ∂m/∂x_ω [v] is I (∂W[v] x + ∂W[x] v) +
+        // B(ω, W v). Two and three columns make the norm one of Frobenius.
+        let root3 = 3.0_f64.sqrt();
+        let curvature_by_angles = [
+            SQRT_2 * (3.0 * largest * CURVATURE + 2.0 * twisted * TURN),
+            SQRT_2
+                * (6.0 * largest * DRIFT_BY_ANGLES_TWICE
+                    + 5.0 * twisted * (TURN * TURN + CURVATURE)),
+            SQRT_2
+                * (largest * FOURTH + twisted * (3.0 * TURN * CURVATURE + DRIFT_BY_ANGLES_TWICE)),
+        ];
+        let curvature_by_rates = [
+            root3 * (6.0 * largest * CURVATURE + 6.0 * twisted * TURN),
+            root3
+                * (2.0 * largest * DRIFT_BY_ANGLES_TWICE
+                    + 2.0 * twisted * (CURVATURE + TURN * TURN)),
+        ];
+        let curvature_of_bearing = [root3 * largest * TURN, root3 * largest * CURVATURE];
         Self {
             geometry,
             largest,
@@ -222,8 +275,12 @@ impl Dynamics {
             acceleration,
             by_rates,
             by_angles,
+            slope,
             jerk,
             curvature,
+            curvature_by_angles,
+            curvature_by_rates,
+            curvature_of_bearing,
         }
     }
 
@@ -238,9 +295,24 @@ impl Dynamics {
         let off_rate = (drive * (elapsed - 0.5 * tau) + rate_error) * growth;
         let off_angle =
             (0.5 * drive * elapsed * elapsed + angle_error + rate_error * elapsed) * growth;
-        let mean =
-            self.by_rates * off_rate + self.by_angles * off_angle + self.jerk * tau * tau / 24.0;
+        let mean = self.by_rates * off_rate
+            + self.by_angles * off_angle
+            + self.jerk * tau * tau / 24.0
+            + self.middle(tau) * growth;
         (mean, self.by_rates * drive * tau * growth + self.jerk * tau * tau / 8.0)
+    }
+
+    /// The law predicts the middle of the period with a constant acceleration. As F changes until
+    /// then, the motion is elsewhere in the middle: its rates by up to τ²/8 ‖dF/dt‖, its angles by
+    /// up to τ³/24 ‖dF/dt‖. Returns the part of F there that the law does not cancel, rad/s². It
+    /// drives the motion off in turn, by no more than [`Self::growth`] if that is not large.
+    fn middle(&self, tau: f64) -> f64 {
+        let in_turn = (self.by_rates + 0.25 * self.by_angles * tau) * 0.5 * tau;
+        if in_turn > LARGEST_IN_TURN {
+            return f64::INFINITY;
+        }
+        let square = tau * tau;
+        self.slope * (self.by_rates * square / 8.0 + self.by_angles * square * tau / 24.0)
     }
 
     /// Returns the ratio of the distance of two motions after a time (s) to the distance that the
@@ -253,8 +325,15 @@ impl Dynamics {
     /// change of F of first order in time therefore cancels in the rate over the interval, and
     /// shifts the angle by τ³ ‖dF/dt‖/12. Returns this shift over τ, rad/s.
     fn swing(&self, s: &Settings) -> f64 {
-        let slope = self.by_rates * self.acceleration + self.by_angles * self.rate;
-        slope * powi(s.period_feedback, 2) / 12.0
+        self.slope * powi(s.period_feedback, 2) / 12.0
+    }
+
+    /// Returns the largest amount by which the mismatch moves the rates, between two ticks, beyond
+    /// the straight line of its mean, rad/s: τ²/8 ‖dF/dt‖ by the change of first order in time, and
+    /// τ³/(36 √12) ‖d²F/dt²‖ by that of second order.
+    fn between(&self, s: &Settings) -> f64 {
+        let tau = s.period_feedback;
+        self.slope * tau * tau / 8.0 + self.jerk * powi(tau, 3) / 120.0
     }
 }
 
@@ -316,7 +395,7 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     let ratio = (s.period_optimisation / s.period_feedback).round().max(1.0) as usize;
     let dynamics = Dynamics::new(s);
     let parts = Parts::new(s, &dynamics);
-    let at: Vec<Deviation> = match s.initial_state {
+    let mut at: Vec<Deviation> = match s.initial_state {
         InitialState::Measured | InitialState::Nominal => {
             let [of_angles, of_rates] = error.errors(steps);
             let all = error
@@ -341,11 +420,13 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
         }
     };
     let last = at.len() - 1;
+    // Errors of the measurement may drive the vehicle further at first than later on.
+    at[last] = at.iter().fold(Deviation::default(), |largest, at| largest.or(at));
     let bearing = bearing(s);
     let moment = (0..at.len()).map(|n| {
         let within =
             (n..n + ratio).fold(Deviation::default(), |largest, n| largest.or(&at[n.min(last)]));
-        MomentLoss::new(&dynamics, &within, bearing)
+        MomentLoss::new(&dynamics, &within, bearing, s.period_optimisation)
     });
     // Between the ends of an optimisation period the deviation can exceed the straight line between
     // its end values by this amount.
@@ -356,12 +437,22 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
         (1..ratio).map(above).fold(0.0, f64::max)
     };
     let rate = (0..at.len()).map(|n| {
+        let before = n.checked_sub(ratio);
         let with_bulge = |value: fn(&Deviation) -> f64| {
-            let before = n.checked_sub(ratio).map_or(0.0, |before| bulge(before, value));
+            let before = before.map_or(0.0, |before| bulge(before, value));
             value(&at[n]) + before.max(bulge(n, value))
         };
-        RateLoss::new(with_bulge(|d| d.angle), with_bulge(|d| d.rate))
+        let angle = |n: usize| at[n.min(last)].angle;
+        let change = before.map_or(0.0, |before| (angle(n) - angle(before)).abs());
+        let change = change.max((angle(n + ratio) - angle(n)).abs());
+        RateLoss::new(
+            with_bulge(|d| d.angle),
+            with_bulge(|d| d.rate),
+            change,
+            s.period_optimisation,
+        )
     });
+    let angle_bulge = (0..at.len()).map(|n| bulge(n, |d| d.angle)).collect();
     let (moment, rate) = (moment.collect(), rate.collect());
     // The observer uses predicted rates, and each prediction has its own error. The first-order
     // filter amplifies the differences of these errors by no more than this.
@@ -371,6 +462,7 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
         + 2.0 * predicted / s.observer.time_constant)
         * dynamics.growth(s.delay + s.period_feedback);
     let tightening = Tightening {
+        angle_bulge,
         moment,
         rate,
         bearing,
@@ -407,6 +499,10 @@ struct Parts {
     mismatch: f64,
     /// Shift of the angle per time, see [`Dynamics::swing`].
     swing: f64,
+    /// Deviation of the rates between two ticks, see [`Dynamics::between`], rad/s.
+    between: f64,
+    /// Largest amount by which the mismatch exceeds its mean within a period, rad/s².
+    variation: f64,
     /// Bound on the norm of all parts together, rad/s².
     norm: f64,
     /// Bound on the norm of all parts in two of the axes, rad/s².
@@ -427,12 +523,15 @@ impl Parts {
         // |∫ g (e − ē)| ≤ ¼ τ ½ (range of g) (range of e) for the response g to a
         // pulse, which is linear within a period.
         let swing = dynamics.swing(s) + 0.125 * s.period_feedback * varying;
+        let variation = varying + 0.5 * s.period_feedback * dynamics.slope;
         // Bound of ‖I (W − W′) R′ I⁻¹‖ for angles that lie `age` apart, per unit of `age`.
         let turning = largest / smallest * TURN * geometry.r * rate;
         Self {
             inertia,
             mismatch,
             swing,
+            between: dynamics.between(s),
+            variation,
             norm: drive + mismatch,
             norm_of_two: SQRT_2 * s.disturbance_bound + of_inertia + mismatch,
             turning,
@@ -453,15 +552,24 @@ impl Parts {
         let swing = shifts.times(self.swing);
         let tau = s.period_feedback;
         // Between two ticks an angle departs from the straight line by no more than this.
-        let between =
-            tau * tau / 8.0 * (self.norm * (1.0 + reach.feedback) + root3 * errors.feedback);
+        let between = tau * tau / 8.0
+            * (self.norm * (1.0 + reach.feedback)
+                + root3 * errors.feedback
+                + swing.feedback
+                + self.variation);
         Deviation {
             angle: reach.angle * self.norm_of_two + SQRT_2 * errors.angle + swing.angle + between,
-            rate: reach.rate * self.norm + root3 * errors.rate + swing.rate,
+            rate: reach.rate * self.norm + root3 * errors.rate + swing.rate + self.between,
             seen_angle: reach.seen_angle * self.norm_of_two
                 + SQRT_2 * errors.seen_angle
                 + swing.seen_angle,
             seen_rate: reach.seen_rate * self.norm + root3 * errors.seen_rate + swing.seen_rate,
+            middle_angle: reach.middle_angle * self.norm_of_two
+                + SQRT_2 * errors.middle_angle
+                + swing.middle_angle,
+            middle_rate: reach.middle_rate * self.norm
+                + root3 * errors.middle_rate
+                + swing.middle_rate,
             feedback: reach.feedback * s.disturbance_bound + errors.feedback,
             feedback_norm: reach.feedback * self.mismatch + swing.feedback,
             feedback_moment: self.inertia
@@ -475,12 +583,9 @@ impl Parts {
 /// with the deviation that is never exceeded, at any attitude.
 fn left(s: &Settings, dynamics: &Dynamics, tightening: &Tightening, x: f64, a: f64) -> (f64, f64) {
     let Deviation { angle, rate, .. } = *tightening.forever();
-    let of_rates = s.limit_rate - RateLoss::new(angle, rate).at(TURN_OF_RATES * x, x);
-    let loss = tightening.moment_loss(usize::MAX).at(
-        (tightening.bearing, 0.0),
-        dynamics.slopes(x, a),
-        (x, a),
-    );
+    let of_rates = s.limit_rate - RateLoss::new(angle, rate, 0.0, 0.0).at(TURN_OF_RATES * x, x);
+    let loss =
+        tightening.moment_loss(usize::MAX).at(tightening.bearing, dynamics.slopes(x, a), (x, a));
     (of_rates - x, s.limit_moment - loss - dynamics.nominal_moment(x, a))
 }
 
@@ -552,11 +657,33 @@ pub(super) struct RateLoss {
     constant: f64,
     by_angles: f64,
     by_size: f64,
+    /// Coefficients of ‖a‖, ‖x_ω‖ ‖a‖, ‖x_ω‖² and ‖x_ω‖³ in [`Self::within`].
+    within: [f64; 4],
 }
 
 impl RateLoss {
-    fn new(angle: f64, rate: f64) -> Self {
-        Self { constant: rate, by_angles: angle, by_size: 0.5 * CURVATURE * angle * angle }
+    /// Computes the loss of a deviation of the angles and rates (rad, rad/s). The deviation of the
+    /// angles changes by up to `change` (rad) over an optimisation period `h` (s).
+    fn new(angle: f64, rate: f64, change: f64, h: f64) -> Self {
+        // ∂ω/∂(α, β) is ∂W[·] x, which changes by ∂²W[x, ·] x + ∂W[·] a; its second derivative is
+        // ∂³W[x, x, ·] x + ∂²W[a, ·] x + 2 ∂²W[x, ·] a, and that of ω is 2 Ẇ a + ∂²W[x, x] x +
+        // ∂W[a] x.
+        let quarter = 0.25 * change * h;
+        let curved = 0.125 * h * h;
+        let two = curved * SQRT_2 * angle;
+        // |o₁² − o₂²| = |o₁ − o₂| (o₁ + o₂).
+        let squares = 0.125 * CURVATURE * change * (2.0 * angle + change) * h;
+        Self {
+            constant: rate,
+            by_angles: angle,
+            by_size: 0.5 * CURVATURE * angle * angle,
+            within: [
+                quarter * TURN_OF_RATES + squares,
+                3.0 * (curved * TURN + two * CURVATURE),
+                quarter * CURVATURE,
+                curved * CURVATURE + two * DRIFT_BY_ANGLES_TWICE,
+            ],
+        }
     }
 
     /// Returns the loss at a stage with ‖∂ω/∂(α, β)‖ = `by_angles` and ‖x̃_ω‖ = `size`, rad/s.
@@ -564,28 +691,48 @@ impl RateLoss {
     pub(super) fn at(&self, by_angles: f64, size: f64) -> f64 {
         self.constant + by_angles * self.by_angles + size * self.by_size
     }
+
+    /// Returns the largest amount by which ‖ω̃‖ and the loss together exceed, within an optimisation
+    /// period with ‖x̃_ω‖ ≤ x and a held acceleration ‖a‖ ≤ a, the straight line between their
+    /// values at both ends, rad/s.
+    ///
+    /// Each factor exceeds its own line by up to h²/8 times its second derivative. Where one factor
+    /// of a product grows and the other falls, the product of two lines exceeds the line between its
+    /// ends by up to a quarter of the product of both changes.
+    #[inline]
+    pub(super) fn within(&self, x: f64, a: f64) -> f64 {
+        let [of_a, xa, xx, xxx] = self.within;
+        a * (of_a + xa * x) + x * x * (xx + xxx * x)
+    }
 }
 
 /// Loss of the moment limit by a deviation, N m: m(x̃ + ô, a + K ô) = m(x̃, a) + I W K ô +
-/// ∂m ô + terms of second order in ô.
+/// ∂m ô + terms of second order in ô. All of it belongs to the middle of a feedback period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MomentLoss {
+    /// Deviation of the angles, rad.
     angle: f64,
+    /// Deviation of the rates, rad/s.
     rate: f64,
+    /// Half width of the box part of K ô, rad/s².
     feedback: f64,
     bearing: f64,
     constant: f64,
     by_acceleration: f64,
     by_size: f64,
     by_size_squared: f64,
+    /// h²/8 times the coefficients of ‖a‖², ‖a‖, ‖x_ω‖ ‖a‖, ‖x_ω‖² ‖a‖, and of ‖x_ω‖ to the powers
+    /// 2, 3 and 4 in the second derivative of the moment and its loss.
+    curved: [f64; 7],
 }
 
 impl MomentLoss {
     /// Computes the loss of a deviation; `bearing` is [`Tightening::bearing`].
-    fn new(dynamics: &Dynamics, deviation: &Deviation, bearing: f64) -> Self {
+    /// The optimisation period is `h` (s).
+    fn new(dynamics: &Dynamics, deviation: &Deviation, bearing: f64, h: f64) -> Self {
         let Deviation {
-            seen_angle: angle,
-            seen_rate: rate,
+            middle_angle: angle,
+            middle_rate: rate,
             feedback,
             feedback_norm,
             feedback_moment,
@@ -596,7 +743,13 @@ impl MomentLoss {
         // The second derivatives are those of I W a, and of I Ẇ x + ω × I ω by rates, by both, and
         // by angles.
         let by_rates_twice = (largest * dynamics.geometry.drift + 0.5 * spread) * rate * rate;
+        let [aa, xxa, xxxx] = std::array::from_fn(|i| {
+            dynamics.curvature[i] + angle * dynamics.curvature_by_angles[i]
+        });
+        let [xa, xxx] = dynamics.curvature_by_rates.map(|c| rate * c);
+        let [of_a, xx] = dynamics.curvature_of_bearing.map(|c| feedback * c);
         Self {
+            curved: [aa, of_a, xa, xxa, xx, xxx, xxxx].map(|c| 0.125 * h * h * c),
             angle,
             rate,
             feedback,
@@ -611,18 +764,74 @@ impl MomentLoss {
         }
     }
 
-    /// Returns the loss at a stage, N m. `feedback` holds the largest ‖I W s‖ over the corners of
-    /// the unit box there and a bound on its growth with the angles (kg m², kg m²/rad), `slopes`
-    /// holds ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖, and `sizes` holds ‖x̃_ω‖ and ‖a‖.
+    /// Returns the loss at a point of the plan, N m. `bearing` is the largest ‖I W s‖ over the
+    /// corners s of the unit box, at the vehicle's angles (kg m²), `slopes` holds ‖∂m/∂(α, β)‖ and
+    /// ‖∂m/∂x_ω‖, and `sizes` holds ‖x̃_ω‖ and ‖a‖.
     #[inline]
-    pub(super) fn at(&self, feedback: (f64, f64), slopes: (f64, f64), sizes: (f64, f64)) -> f64 {
+    pub(super) fn at(&self, bearing: f64, slopes: (f64, f64), sizes: (f64, f64)) -> f64 {
         let (x, a) = (sizes.0 + self.rate, sizes.1);
-        self.feedback * (feedback.0 + feedback.1 * self.angle).min(self.bearing)
+        self.feedback * bearing
             + self.constant
             + slopes.0 * self.angle
             + slopes.1 * self.rate
             + self.by_acceleration * a
             + (self.by_size + self.by_size_squared * x) * x
+    }
+}
+
+/// One end of an interval of the plan, with the acceleration that is held in it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct End {
+    /// Norm of the moment, ‖m̃‖, N m.
+    pub moment: f64,
+    /// Largest ‖I W s‖ over the corners s of the unit box, kg m².
+    pub bearing: f64,
+    /// Norms of ∂m/∂(α, β) and of ∂m/∂x_ω.
+    pub slopes: (f64, f64),
+    /// Norm of the rates, ‖x̃_ω‖, rad/s.
+    pub size: f64,
+}
+
+/// Acceleration in an interval of the plan, and its feedback periods.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
+    /// Norm of the held acceleration, ‖a‖, rad/s².
+    pub acceleration: f64,
+    /// Number of feedback periods in it.
+    pub ratio: usize,
+    /// Share of the loss that counts.
+    pub share: f64,
+}
+
+impl MomentLoss {
+    /// Returns a bound on ‖m‖ at the middles of all feedback periods of an interval, for any
+    /// deviation, N m.
+    ///
+    /// ‖m̃‖ and every factor of the loss lie below the straight line between their values at both
+    /// ends, or exceed it by at most h²/8 times their second derivative; so does their sum. The
+    /// first middle is half a feedback period after the beginning, the last one as much before the
+    /// end.
+    #[inline]
+    pub(super) fn largest_moment(&self, dynamics: &Dynamics, ends: &[End; 2], held: Held) -> f64 {
+        let Held { acceleration: a, ratio, share } = held;
+        let [from, to] = ends;
+        let shift = 0.5 / ratio as f64;
+        let on_the_line = |from: f64, to: f64| {
+            let (low, high) = if from < to { (from, to) } else { (to, from) };
+            high - shift * (high - low)
+        };
+        let [apart, to_apart] =
+            [from, to].map(|end| end.moment + share * self.at(0.0, end.slopes, (end.size, a)));
+        let feedback = share * self.feedback;
+        // The deviation turns the vehicle, but no attitude needs more than `bearing`.
+        let turned = feedback * dynamics.largest * TURN * 3.0_f64.sqrt() * self.angle;
+        let along =
+            on_the_line(apart + feedback * from.bearing, to_apart + feedback * to.bearing) + turned;
+        let anywhere = on_the_line(apart, to_apart) + feedback * self.bearing;
+        let x = from.size.max(to.size);
+        let [aa, of_a, xa, xxa, xx, xxx, xxxx] = self.curved;
+        let curved = a * (aa * a + of_a + x * (xa + x * xxa)) + x * x * (xx + x * (xxx + x * xxxx));
+        along.min(anywhere) + curved
     }
 }
 
@@ -648,6 +857,21 @@ impl Dynamics {
     pub(super) fn moment_curvature(&self, x: f64, a: f64) -> f64 {
         let [aa, xxa, xxxx] = self.curvature;
         aa * a * a + x * x * (xxa * a + xxxx * x * x)
+    }
+
+    /// Returns bounds on the second time derivatives of ∂m/∂(α, β) and ∂m/∂x_ω (Frobenius) and of
+    /// the largest ‖I W s‖ over the corners s of the unit box, of a nominal motion with a held and
+    /// these sizes.
+    fn slope_curvatures(&self, x: f64, a: f64) -> [f64; 3] {
+        let [aa, xxa, xxxx] = self.curvature_by_angles;
+        let [xa, xxx] = self.curvature_by_rates;
+        let [of_a, xx] = self.curvature_of_bearing;
+        let square = x * x;
+        [
+            aa * a * a + square * (xxa * a + xxxx * square),
+            x * (xa * a + xxx * square),
+            of_a * a + xx * square,
+        ]
     }
 
     /// Returns a bound on ‖d²ω/dt²‖ of a nominal motion with a held and these sizes, rad/s³:

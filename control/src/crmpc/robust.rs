@@ -2,9 +2,9 @@
 //! error dynamics do (docs/guarantee.md).
 
 use super::design::Design;
-use super::guarantee::{self, Dynamics};
+use super::guarantee::{Dynamics, End, Held};
 use super::settings::Settings;
-use crate::linearise::{self, BodyMotion, InverseKinematics, Linear, Linearisation};
+use crate::linearise::{BodyMotion, InverseKinematics, Linear, Linearisation};
 use crate::mpc::Motion;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -122,40 +122,36 @@ impl Robust {
     /// Returns the bounds on ‖ω̃‖ and ‖m̃‖ of stage `k` about the linearised motion there.
     pub(super) fn bounds_at(&self, k: usize, at: &Linearisation, here: &Point) -> (f64, f64) {
         let moment = if k < self.settings.horizon {
-            self.moment_bound_about(k, &at.moment, here, self.moment_after(here))
+            let ends = [end(&at.moment, here.size), self.end_after(here)];
+            self.moment_bound(k, &ends, here.pull)
         } else {
             f64::INFINITY
         };
         (self.rate_bound(k, at.rates.by_angles.norm(), here, here), moment)
     }
 
-    /// Returns ‖m̃‖ at the end of an interval that begins at `here`, with a held, N m.
-    fn moment_after(&self, here: &Point) -> f64 {
+    /// Returns the end of the interval that begins at `here`.
+    fn end_after(&self, here: &Point) -> End {
         let Settings { body, period_optimisation: h, .. } = &self.settings;
         let Point { angles, rates, acceleration: a, .. } = here;
-        let angles = angles + (rates + a * (0.5 * h)) * *h;
-        linearise::moment(body, &angles, &(rates + a * *h), a).norm()
+        let (angles, rates) = (angles + (rates + a * (0.5 * h)) * *h, rates + a * *h);
+        end(&InverseKinematics::at(&angles).linearise(body, &rates, a).moment, rates.norm())
     }
 
     /// Returns the bounds of interval `k` about the motion, with the norms.
     pub(super) fn interval(&self, k: usize, here: &Point, next: &Point) -> Interval {
         let body = &self.settings.body;
-        let at = here.turned().linearise(body, &here.rates, &here.acceleration).moment;
-        let after = next.motion(body);
-        let moment_after = after.moment(&here.acceleration).norm();
+        let a = &here.acceleration;
+        let before = here.turned().linearise(body, &here.rates, a).moment;
+        let after = next.turned().linearise(body, &next.rates, a);
+        let ends = [end(&before, here.size), end(&after.moment, next.size)];
+        let by_angles = after.rates.by_angles.norm();
         Interval {
-            rate: after.rates.norm(),
-            rate_bound: self.rate_bound(k + 1, norm_of_columns(&after.rates_by_angles), next, here),
-            moment: at.value.norm(),
-            moment_bound: self.moment_bound_about(k, &at, here, moment_after),
+            rate: after.rates.value.norm(),
+            rate_bound: self.rate_bound(k + 1, by_angles, next, here),
+            moment: ends[0].moment,
+            moment_bound: self.moment_bound(k, &ends, here.pull),
         }
-    }
-
-    /// Returns [`Self::moment_bound`] about a linearised moment.
-    fn moment_bound_about(&self, k: usize, at: &Linear, here: &Point, after: f64) -> f64 {
-        let feedback = largest_over_box(&at.by_acceleration);
-        let slopes = (at.by_angles.norm(), at.by_rates.norm());
-        self.moment_bound(k, at.value.norm(), after, feedback, slopes, here)
     }
 
     /// Returns the feedback ticks from the beginning of the nominal motion to prediction step `k`.
@@ -163,8 +159,30 @@ impl Robust {
         self.age + k * self.design.ratio
     }
 
-    pub(super) fn deviation(&self, k: usize) -> &guarantee::Deviation {
-        self.design.tightening.at(self.tick(k))
+    /// Returns whether |β| stays within its bound throughout interval `k`, whatever the error
+    /// dynamics do.
+    ///
+    /// Within the interval β̃ is a parabola, and the deviation lies below the straight line between
+    /// its values at both ends plus the bulge, so that the largest value of the sum is exact.
+    ///
+    /// `here` holds β̃ and its derivative at the beginning, `a` is its second derivative, and `end`
+    /// is β̃ at the end.
+    pub(super) fn keeps_sideslip(&self, k: usize, here: [f64; 2], a: f64, end: f64) -> bool {
+        let Settings { period_optimisation: h, sideslip_domain, .. } = self.settings;
+        let tightening = &self.design.tightening;
+        let [from, to] = [k, k + 1].map(|k| tightening.at(self.tick(k)).angle);
+        let slope = (to - from) / h;
+        let largest = |sign: f64| {
+            let (rate, a) = (sign * here[1] + slope, sign * a);
+            let (before, after) = (sign * here[0] + from, sign * end + to);
+            let at_top = if a < 0.0 && rate > 0.0 && rate < -a * h {
+                before - 0.5 * rate * rate / a
+            } else {
+                before
+            };
+            at_top.max(after)
+        };
+        largest(1.0).max(largest(-1.0)) + tightening.angle_bulge(self.tick(k)) <= sideslip_domain
     }
 
     /// Returns the bound on ‖ω̃‖ at prediction step k for which ‖ω‖ keeps its limit there and in
@@ -181,8 +199,8 @@ impl Robust {
         let typical = limit_moment / self.design.largest_inertia;
         let a = here.pull.max(before.pull).max(typical);
         let size = here.size + 2.0 * h * a;
-        let curved = 0.125 * h * h * Dynamics::rate_curvature(size, a);
-        let loss = self.design.tightening.rate_loss(self.tick(k)).at(by_angles, here.size) + curved;
+        let loss = self.design.tightening.rate_loss(self.tick(k));
+        let loss = loss.at(by_angles, here.size) + loss.within(size, a);
         let bound = limit_rate - reserve - self.share * loss;
         // This uses ‖x̃_ω‖ ≤ sec β ‖ω̃‖.
         if k == horizon {
@@ -192,28 +210,13 @@ impl Robust {
         }
     }
 
-    /// Returns the bound on ‖m̃‖ at the start of prediction interval k for which ‖m‖ keeps its
-    /// limit at each of its feedback ticks. With a held, ‖m̃‖ moves from `value` to `after` within
-    /// the interval. `feedback` is the largest ‖I R⁻¹ s‖ over the corners s of the shape, and
-    /// `slopes` are ‖∂m/∂(α, β)‖ and ‖∂m/∂x_ω‖.
-    pub(super) fn moment_bound(
-        &self,
-        k: usize,
-        value: f64,
-        after: f64,
-        feedback: f64,
-        slopes: (f64, f64),
-        here: &Point,
-    ) -> f64 {
-        let Settings { limit_moment, period_optimisation: h, .. } = self.settings;
-        let a = here.pull;
-        let size = here.size + h * a;
-        let by_angles = self.design.largest_inertia * guarantee::TURN * 3.0_f64.sqrt();
+    /// Returns the bound on ‖m̃‖ at the start of prediction interval k, between these ends and with
+    /// an acceleration of this norm, for which ‖m‖ keeps its limit at each of its feedback ticks.
+    pub(super) fn moment_bound(&self, k: usize, ends: &[End; 2], acceleration: f64) -> f64 {
+        let held = Held { acceleration, ratio: self.design.ratio, share: self.share };
         let loss = self.design.tightening.moment_loss(self.tick(k));
-        let loss = loss.at((feedback, by_angles), slopes, (size, a));
-        let within =
-            (after - value).max(0.0) + 0.125 * h * h * self.dynamics.moment_curvature(size, a);
-        limit_moment - self.reserves().1 - self.share * loss - within
+        let needed = loss.largest_moment(&self.dynamics, ends, held);
+        self.settings.limit_moment - self.reserves().1 - (needed - ends[0].moment)
     }
 
     /// Returns the margins of the first interval.
@@ -225,6 +228,16 @@ impl Robust {
             rate: left(rate_bound, rate, limit_rate),
             moment: left(moment_bound, moment, limit_moment),
         }
+    }
+}
+
+/// Returns the end of an interval with this linearised moment and ‖x̃_ω‖ = `size`.
+fn end(moment: &Linear, size: f64) -> End {
+    End {
+        moment: moment.value.norm(),
+        bearing: largest_over_box(&moment.by_acceleration),
+        slopes: (moment.by_angles.norm(), moment.by_rates.norm()),
+        size,
     }
 }
 

@@ -120,9 +120,13 @@ impl Sets {
         let [first, second, last] = [0, 1, n].map(|k| self.point(motion, k));
         let rates = first.motion(&self.body);
         let bound = robust.rate_bound(0, norm_of_columns(&rates.rates_by_angles), &first, &second);
-        let inside = (0..=n).all(|k| {
-            let angle = self.references[k].angles.y + motion.states[k][0].y;
-            angle.abs() + robust.deviation(k).angle <= robust.settings.sideslip_domain
+        let sideslip = |k: usize| {
+            let (reference, [angles, rates]) = (&self.references[k], &motion.states[k]);
+            [reference.angles.y + angles.y, reference.rates.y + rates.y]
+        };
+        let inside = (0..n).all(|k| {
+            let a = self.references[k].accelerations.y + motion.inputs[k].y;
+            robust.keeps_sideslip(k, sideslip(k), a, sideslip(k + 1)[0])
         });
         if !inside || rates.rates.norm() > bound + robust.reserves().0 {
             return None;

@@ -442,7 +442,7 @@ impl Flight {
             }
         }
         let largest = shown.rate.max(shown.moment).max(shown.sideslip);
-        shown.broken = !(largest <= 1.0 + SLACK);
+        shown.broken = largest > 1.0 + SLACK;
         Shown {
             fallbacks: memory.inner.report.fallbacks,
             in_force: in_force as f64 / ticks as f64,

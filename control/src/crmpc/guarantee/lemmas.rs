@@ -2,8 +2,8 @@
 
 use super::super::settings::Settings;
 use super::{
-    BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Dynamics, Parts, TURN, TURN_OF_RATES,
-    bearing, gyroscopic,
+    BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Dynamics, FOURTH, Parts, TURN,
+    TURN_OF_RATES, bearing, gyroscopic,
 };
 use std::f64::consts::SQRT_2;
 
@@ -21,6 +21,7 @@ pub struct Lemmas {
     pub turn_by_angles: f64,
     pub drift_mixed: f64,
     pub drift_by_angles_twice: f64,
+    pub fourth: f64,
     /// Bounds of ∂(ω × I ω)/∂ω, and of I⁻¹ times that derivative.
     pub gyroscopic: (f64, f64),
     pub largest: f64,
@@ -70,6 +71,7 @@ impl Lemmas {
             turn_by_angles: TURN_OF_RATES,
             drift_mixed: DRIFT_MIXED,
             drift_by_angles_twice: DRIFT_BY_ANGLES_TWICE,
+            fourth: FOURTH,
             gyroscopic: gyroscopic(s),
             largest,
             smallest,
@@ -99,5 +101,11 @@ impl Lemmas {
     /// Returns bounds on ‖d²m/dt²‖ and ‖d²ω/dt²‖ of a nominal motion with a held.
     pub fn curvatures(&self, x: f64, a: f64) -> [f64; 2] {
         [self.dynamics.moment_curvature(x, a), Dynamics::rate_curvature(x, a)]
+    }
+
+    /// Returns bounds on the norms (Frobenius) of d²/dt² ∂m/∂(α, β) and d²/dt² ∂m/∂x_ω, and on
+    /// the second derivative of the largest ‖I W s‖, of a nominal motion with a held.
+    pub fn slope_curvatures(&self, x: f64, a: f64) -> [f64; 3] {
+        self.dynamics.slope_curvatures(x, a)
     }
 }
