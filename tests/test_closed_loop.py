@@ -65,6 +65,7 @@ def test_oracle_stepping_by_hand_gives_the_orchestrators_trajectory(fmu, experim
 
 def test_oracle_jacobi_by_hand_adds_one_communication_step_of_delay(fmu, orchestrate, tmp_path):
     text = merged(EXPERIMENTS / "crmpc-robust.toml")
+    text = text.replace("[components.controller.parameters]", "[components.controller.parameters]\ndelay = 0.04")
     jacobi = tmp_path / "jacobi.toml"
     jacobi.write_text(text.replace('coupling = "sequential"', 'coupling = "jacobi"'))
     finished, out = orchestrate(jacobi)

@@ -112,13 +112,15 @@ def test_outputs_are_held_after_a_step_until_an_input_is_set(fmu, name):
     values = dict(zip(ANGLES + RATES, [0.13, 0.16, -0.5, 0.01, -0.02, 0.0]))
     later = dict(zip(ANGLES + RATES, [0.12, 0.15, -0.4, 0.02, -0.01, 0.01]))
     with Unit(fmu(name)).start(inputs=values) as unit:
+        period = unit.get(["period.feedback"])[0] if "period.feedback" in unit.fmu.variables else STEP
         first = unit.get(MOMENT)
-        unit.step(0.0, STEP)
+        unit.step(0.0, period)
         assert unit.get(MOMENT) == first, "the moment that acted over the step"
         saved = unit.save()
         unit.set(values)
         due = unit.get(MOMENT)
-        assert due != first or name == "FBL", "an equal value counts as set, and the next tick is due"
+        # The laws of these two give the same moment at the next tick for the same measurement.
+        assert due != first or name in ("DLMPC", "FBL"), "an equal value counts as set, so that the next tick is due"
         unit.set(later)
         assert unit.get(MOMENT) != due
         unit.restore(saved)
@@ -127,7 +129,7 @@ def test_outputs_are_held_after_a_step_until_an_input_is_set(fmu, name):
         expected = unit.get(MOMENT)
         unit.restore(saved)
         unit.set(later)
-        unit.step(STEP, STEP)
+        unit.step(period, period)
         assert unit.get(MOMENT) == expected, "what is read after the step is what was asked for before"
         unit.reset()
         unit.start(inputs=values)

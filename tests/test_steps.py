@@ -26,8 +26,9 @@ def held(k: int) -> dict:
 def sampled(unit: Unit) -> list:
     """Returns the exact outputs that change at ticks only, and the reference, which depends on
     time."""
-    # In a longer step some ticks have old inputs, which the guarantee's status says.
-    other = ("reference", "guarantee", "solver.time")
+    # In a longer step some ticks have old inputs: the guarantee's status says so, and they tell
+    # nothing of the loop's delay.
+    other = ("reference", "guarantee", "loopDelay", "solver.time")
     names = [n for n in unit.fmu.names("output") if not n.startswith(other)]
     return unit.get(names), unit.get(REFERENCE)
 
