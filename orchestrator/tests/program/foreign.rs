@@ -258,7 +258,7 @@ fn values_that_are_none_end_the_run() {
             1,
             "{flag}: {errors}"
         );
-        assert!(errors.contains("first at t = 2 s, "), "{flag}: {errors}");
+        assert!(errors.contains("first at t = 1 s, "), "{flag}: {errors}");
         let (code, _, errors) = bench.run(&["--quiet", "--on-invalid", "allow"]);
         assert_eq!((code, errors.contains(what)), (0, false), "{flag}");
     }

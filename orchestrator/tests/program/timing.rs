@@ -12,10 +12,10 @@ use zip::write::SimpleFileOptions;
 fn a_run_in_real_time_takes_its_time() {
     let bench = Bench::new();
     let begin = Instant::now();
-    let (code, summary, errors) = bench.run(&["--stop", "1", "--real-time"]);
+    let (code, summary, errors) = bench.run(&["--stop", "2", "--real-time", "2"]);
     assert_eq!(code, 0, "{errors}");
     assert!(begin.elapsed() >= Duration::from_secs(1));
-    assert!(summary.contains("real time         factor 1: 0 of 4 deadlines missed"), "{summary}");
+    assert!(summary.contains("real time         factor 2: 0 of 4 deadlines missed"), "{summary}");
     assert!(summary.contains("realtime.svg"), "{summary}");
     let real_time = &bench.json("out/loop/metrics.json")["real_time"];
     assert!(real_time["elapsed_s"].as_f64().unwrap() >= 1.0);

@@ -81,6 +81,7 @@ void *fmi2Instantiate(const char *name, int type, const char *guid, const char *
 
 int fmi2Reset(Unit *unit) {
     if (RESETS) start(unit, unit->callbacks);
+    unit->runs = unit->is_set = 0;
     return OK;
 }
 
