@@ -270,7 +270,7 @@ impl<C: Controller> Controller for Delayed<C> {
         if let Some(newest) = memory.under_way.last_mut() {
             *newest = *applied;
         }
-        memory.loop_delay.limit(applied);
+        self.loop_delay.limit(&mut memory.loop_delay, applied);
         self.inner.limited(&mut memory.inner, applied);
     }
 }

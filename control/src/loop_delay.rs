@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
 use vehicle::math::exp;
 
-/// Number of whole periods of delay, beyond those that were told, that are told apart.
+/// Number of periods by which a delay may differ from the one that was told to be found.
 const FURTHER: usize = 4;
 /// Time after which a period counts by 1/e, s.
 const FORGETTING: f64 = 15.0;
@@ -27,8 +27,6 @@ const FORGETTING: f64 = 15.0;
 const EVIDENCE: f64 = 20.0;
 /// Smallest number of periods for an estimate.
 const PERIODS: f64 = 20.0;
-/// Parts of a period to which a delay is estimated.
-const PARTS: usize = 4;
 /// Size of what the best delay leaves of a period, relative to the root mean square, beyond which
 /// the period counts less.
 const USUAL: f64 = 3.0;
@@ -36,7 +34,7 @@ const USUAL: f64 = 3.0;
 /// Estimate of the delay, with the sums from which it follows.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LoopDelay {
-    /// Commands, the newest first, N m.
+    /// Accelerations I⁻¹ m of the commands, the newest first, rad/s².
     commands: Vec<Vector3<f64>>,
     /// Measured rates at the last tick, rad/s, and acceleration over the period before it, rad/s².
     rates: Option<Vector3<f64>>,
@@ -82,16 +80,26 @@ pub struct LoopDelaySettings {
 }
 
 impl LoopDelaySettings {
+    /// Returns the least delay that is compared with the one that was told, in periods.
+    fn first(&self) -> usize {
+        ((self.told / self.period) as usize).saturating_sub(FURTHER)
+    }
+
     /// Returns the number of delays of whole periods that are compared.
     fn candidates(&self) -> usize {
-        (self.told / self.period).ceil() as usize + FURTHER
+        (self.told / self.period).ceil() as usize + FURTHER - self.first()
+    }
+
+    /// Returns the number of commands that are remembered.
+    fn remembered(&self) -> usize {
+        self.first() + self.candidates() + 1
     }
 
     /// Returns the memory for the first tick.
     pub fn memory(&self) -> LoopDelay {
         let candidates = self.candidates();
         LoopDelay {
-            commands: Vec::with_capacity(candidates + 2),
+            commands: Vec::with_capacity(self.remembered()),
             of_acceleration: Fit::new(candidates),
             of_change: Fit::new(candidates),
             ..LoopDelay::default()
@@ -101,7 +109,7 @@ impl LoopDelaySettings {
     /// Returns whether a restored memory has the right shape.
     pub fn fits(&self, memory: &LoopDelay) -> bool {
         let candidates = self.candidates();
-        memory.commands.len() <= candidates + 2
+        memory.commands.len() <= self.remembered()
             && [&memory.of_acceleration, &memory.of_change]
                 .iter()
                 .all(|fit| fit.sums.len() == candidates)
@@ -121,7 +129,7 @@ impl LoopDelaySettings {
         });
         let last = std::mem::replace(&mut memory.acceleration, acceleration);
         // Before the first commands, importers differ in what acts.
-        let is_full = memory.commands.len() == self.candidates() + 2;
+        let is_full = memory.commands.len() == self.remembered();
         if let (true, Some(now), Some(last)) = (is_full, acceleration, last) {
             self.weigh(memory, &now, &last);
         }
@@ -130,28 +138,36 @@ impl LoopDelaySettings {
     /// Takes the command of the tick that was observed last, N m.
     pub fn remember(&self, memory: &mut LoopDelay, command: &Vector3<f64>) {
         let commands = &mut memory.commands;
-        if commands.len() < self.candidates() + 2 {
-            commands.push(*command);
+        if commands.len() < self.remembered() {
+            commands.push(Vector3::zeros());
         }
         commands.rotate_right(1);
-        commands[0] = *command;
+        commands[0] = self.body.inverse * command;
+    }
+
+    /// Replaces the newest command by the moment that a limit leaves of it, N m.
+    pub fn limit(&self, memory: &mut LoopDelay, applied: &Vector3<f64>) {
+        if let Some(newest) = memory.commands.first_mut() {
+            *newest = self.body.inverse * applied;
+        }
     }
 
     /// Adds the period with the acceleration `now`, after one with the acceleration `last`, rad/s².
     fn weigh(&self, memory: &mut LoopDelay, now: &Vector3<f64>, last: &Vector3<f64>) {
         let kept = exp(-self.period / FORGETTING);
         let LoopDelay { commands, of_acceleration, of_change, .. } = memory;
-        let inverse = &self.body.inverse;
-        of_acceleration.add(kept, |j| now - inverse * commands[j]);
-        of_change.add(kept, |j| now - last - inverse * (commands[j] - commands[j + 1]));
+        let (commands, change) = (&commands[self.first()..], now - last);
+        of_acceleration.add(kept, |j| now - commands[j]);
+        of_change.add(kept, |j| change - (commands[j] - commands[j + 1]));
         let (best, best_of_change) = (of_acceleration.least(), of_change.least());
         let (fit, (place, _)) = if best.1 <= best_of_change.1 {
             (of_acceleration, best)
         } else {
             (of_change, best_of_change)
         };
-        let told = self.told / self.period;
-        memory.estimate = fit.tells(place, told).then_some(place * self.period);
+        let told = self.told / self.period - self.first() as f64;
+        let delay = (self.first() as f64 + place) * self.period;
+        memory.estimate = fit.tells(place, told).then_some(delay);
         memory.is_other = memory.estimate.is_some() && (place - told).abs() > 0.5;
     }
 }
@@ -178,14 +194,19 @@ impl Fit {
         self.count = kept * self.count + weight;
     }
 
-    /// Returns the number of periods of delay that leaves least, and the mean square of a component
+    /// Returns the number of periods of delay, from the first on, that leaves least, and the mean square of a component
     /// of what it leaves, (rad/s²)².
     fn least(&mut self) -> (f64, f64) {
-        let parts = 0..=(self.sums.len() - 1) * PARTS;
-        let places = parts.map(|part| part as f64 / PARTS as f64);
-        let all = places.map(|place| (place, self.unexplained(place)));
-        let (place, least) =
-            all.fold((0.0, f64::INFINITY), |least, one| if one.1 < least.1 { one } else { least });
+        let (mut place, mut least) = (0.0, f64::INFINITY);
+        for (j, pair) in self.sums.windows(2).enumerate() {
+            let (here, both, next) = (pair[0].square, pair[0].product, pair[1].square);
+            let curvature = here - 2.0 * both + next;
+            let f = if curvature > 0.0 { ((here - both) / curvature).clamp(0.0, 1.0) } else { 0.0 };
+            let left = self.unexplained(j as f64 + f);
+            if left < least {
+                (place, least) = (j as f64 + f, left);
+            }
+        }
         let mean = least / (3.0 * self.count);
         if self.count >= PERIODS {
             self.scale = mean;
@@ -246,14 +267,5 @@ impl Clone for LoopDelay {
         self.of_change.clone_from(of_change);
         (self.rates, self.acceleration) = (*rates, *acceleration);
         (self.estimate, self.is_other) = (*estimate, *is_other);
-    }
-}
-
-impl LoopDelay {
-    /// Replaces the newest command by the moment that a limit leaves of it, N m.
-    pub fn limit(&mut self, applied: &Vector3<f64>) {
-        if let Some(newest) = self.commands.first_mut() {
-            *newest = *applied;
-        }
     }
 }

@@ -138,8 +138,8 @@ pub fn run(settings: &Settings, inertia_scale: f64, disturbance: Disturbance) ->
         },
     );
     let in_force = f64::from(in_force) / f64::from(ticks);
-    let Memory { ended, report, .. } = memory;
-    (outcome, Kept { fallbacks: report.fallbacks, in_force, broken, withdrawn: ended })
+    let Memory { supervision, report, .. } = memory;
+    (outcome, Kept { fallbacks: report.fallbacks, in_force, broken, withdrawn: supervision.ended })
 }
 
 /// Definition of a run: a name for messages, the vehicle's inertia and the disturbance.
