@@ -132,6 +132,7 @@ def test_published_limits_hold(fmu):
                 for k in range(40):
                     if k == 20:
                         unit.set(inputs(-moment, pressure))
+                    unit.step(k * PERIOD, PERIOD)
                     surfaces, jets = np.array(unit.get(SURFACE)), np.array(unit.get(JET))
                     duty = np.array(unit.get(DUTY))
                     assert np.all(surfaces >= MIN - 1e-15) and np.all(surfaces <= MAX + 1e-15)
@@ -140,7 +141,6 @@ def test_published_limits_hold(fmu):
                     total = np.array(unit.get(ACHIEVED)) + unit.get(RESIDUAL)
                     assert total == pytest.approx(moment if k < 20 else -moment, rel=1e-9, abs=1e-6)
                     before = surfaces
-                    unit.step(k * PERIOD, PERIOD)
 
 
 def pulses(unit, step: float, seconds: float) -> np.ndarray:

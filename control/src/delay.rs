@@ -190,7 +190,12 @@ impl<C: Controller> Delayed<C> {
             return Err(DesignError::Delay { value: action, longest: LONGEST });
         }
         let predictor = Predictor::new(body, latency.total(), period)?;
-        let loop_delay = LoopDelaySettings { body, period, told: latency.total() };
+        let loop_delay = LoopDelaySettings {
+            body,
+            period,
+            told: latency.total(),
+            is_filtered: measurement > 0.0,
+        };
         Ok(Self { inner, predictor, latency, loop_delay, moment_limit })
     }
 

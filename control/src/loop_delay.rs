@@ -4,13 +4,15 @@
 //! from it. The vehicle shows it: its angular acceleration over a period is I⁻¹ (m − ω × I ω) with
 //! the moment m that acts then, and a disturbance. For a delay of (j + f) τ, m is the mean
 //! (1 − f) m_{k−1−j} + f m_{k−2−j} of two commands. The estimate is the delay that leaves least
-//! unexplained, by least squares: of the acceleration, if the disturbance is like noise, or of its
-//! change from period to period, if it seldom changes. Periods that no delay explains, such as those
-//! in which the disturbance jumps, count less.
+//! unexplained, by least squares: of the acceleration, if the disturbance is like noise, of its change
+//! from period to period, if it seldom changes, or of the change of that, if it changes smoothly. A
+//! factor that the inertia is wrong by is found beside it. Periods that no delay explains, such as
+//! those in which the disturbance jumps, count less.
 //!
 //! This is a prediction-error method (L. Ljung, System Identification, 1999, section 13.4), which
 //! may be used in a closed loop: at the right delay, what is left is new, and no earlier command is
-//! related to it.
+//! related to it. That is not so for noise of the measurements, to which the next command responds
+//! while the noise itself looks like an acceleration.
 
 use crate::controller::Measurement;
 use nalgebra::Vector3;
@@ -25,32 +27,49 @@ const FORGETTING: f64 = 15.0;
 /// Smallest evidence for an estimate: what another delay leaves unexplained beyond what the
 /// estimated one does, relative to the mean square of a component.
 const EVIDENCE: f64 = 20.0;
-/// Smallest number of periods for an estimate.
-const PERIODS: f64 = 20.0;
+/// Smallest number of periods for an estimate, and number from one estimate to the next.
+const PERIODS: u32 = 20;
+const PAUSE: u32 = 5;
+/// Parts of a period to which a delay is estimated.
+const PARTS: usize = 4;
 /// Size of what the best delay leaves of a period, relative to the root mean square, beyond which
 /// the period counts less.
 const USUAL: f64 = 3.0;
+/// Acceleration below which nothing is evidence, because the model is not exact, rad/s².
+const FLOOR: f64 = 1e-3;
+/// Largest factor that the inertia may be wrong by.
+const GAIN: f64 = 1.25;
 
 /// Estimate of the delay, with the sums from which it follows.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LoopDelay {
     /// Accelerations I⁻¹ m of the commands, the newest first, rad/s².
     commands: Vec<Vector3<f64>>,
-    /// Measured rates at the last tick, rad/s, and acceleration over the period before it, rad/s².
+    /// Measured rates at the last tick, rad/s.
     rates: Option<Vector3<f64>>,
-    acceleration: Option<Vector3<f64>>,
-    /// What is left of the acceleration, and of its change.
-    of_acceleration: Fit,
-    of_change: Fit,
+    /// Accelerations over the last periods, the newest first, rad/s², and their number.
+    accelerations: [Vector3<f64>; ORDERS],
+    known: usize,
+    /// Fits of the acceleration, of its change, and of the change of that.
+    fits: [Fit; ORDERS],
+    /// Number of periods in the fits.
+    periods: u32,
     /// Estimated delay, s, if the motion tells it.
     pub estimate: Option<f64>,
     /// Whether it differs from the delay that was told by more than half a period.
     pub is_other: bool,
 }
 
-/// Sums over the periods of what each whole number of periods of delay leaves unexplained.
+/// Number of fits: of differences of order 0, 1 and 2.
+const ORDERS: usize = 3;
+
+/// Sums over the periods from which it follows what a delay leaves unexplained of y, the
+/// acceleration or a difference of it.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Fit {
+    /// Sum of y · y, (rad/s²)².
+    square: f64,
+    /// Sums for each whole number of periods of delay.
     sums: Vec<Sums>,
     /// Sum of the periods' weights.
     count: f64,
@@ -58,13 +77,15 @@ struct Fit {
     scale: f64,
 }
 
-/// Sums of products of r, which a delay of a whole number of periods leaves, and r⁺, which one
-/// period more leaves, (rad/s²)².
+/// Sums of products of y, of the same u of the command after a whole number of periods of delay, and
+/// of u⁺ after one period more, (rad/s²)².
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Sums {
-    /// Sum of r · r.
+    /// Sum of y · u.
+    explained: f64,
+    /// Sum of u · u.
     square: f64,
-    /// Sum of r · r⁺.
+    /// Sum of u · u⁺.
     product: f64,
 }
 
@@ -77,6 +98,9 @@ pub struct LoopDelaySettings {
     pub period: f64,
     /// Delay that was told, s.
     pub told: f64,
+    /// Whether measurements are old when they arrive. They come through a filter then, and their
+    /// noise would be taken for a response: no estimate is made.
+    pub is_filtered: bool,
 }
 
 impl LoopDelaySettings {
@@ -87,51 +111,46 @@ impl LoopDelaySettings {
 
     /// Returns the number of delays of whole periods that are compared.
     fn candidates(&self) -> usize {
-        (self.told / self.period).ceil() as usize + FURTHER - self.first()
+        (self.told / self.period).ceil() as usize + FURTHER + 1 - self.first()
     }
 
     /// Returns the number of commands that are remembered.
     fn remembered(&self) -> usize {
-        self.first() + self.candidates() + 1
+        self.first() + self.candidates() + ORDERS - 1
     }
 
     /// Returns the memory for the first tick.
     pub fn memory(&self) -> LoopDelay {
-        let candidates = self.candidates();
         LoopDelay {
             commands: Vec::with_capacity(self.remembered()),
-            of_acceleration: Fit::new(candidates),
-            of_change: Fit::new(candidates),
+            fits: std::array::from_fn(|_| Fit::new(self.candidates())),
             ..LoopDelay::default()
         }
     }
 
     /// Returns whether a restored memory has the right shape.
     pub fn fits(&self, memory: &LoopDelay) -> bool {
-        let candidates = self.candidates();
         memory.commands.len() <= self.remembered()
-            && [&memory.of_acceleration, &memory.of_change]
-                .iter()
-                .all(|fit| fit.sums.len() == candidates)
+            && memory.known <= ORDERS
+            && memory.fits.iter().all(|fit| fit.sums.len() == self.candidates())
     }
 
     /// Takes the measured rates of a tick, before its command is known.
     pub fn observe(&self, memory: &mut LoopDelay, measured: &Measurement) {
-        if measured.stale || measured.achieved_moment.is_some() {
-            (memory.rates, memory.acceleration) = (None, None);
+        if self.is_filtered || measured.stale || measured.achieved_moment.is_some() {
+            (memory.rates, memory.known) = (None, 0);
             return;
         }
-        let before = memory.rates.replace(measured.rates);
-        let acceleration = before.map(|before| {
-            let Self { body, period, .. } = self;
-            let mean = (before + measured.rates) * 0.5;
-            (measured.rates - before) / *period + body.inverse * mean.cross(&(body.inertia * mean))
-        });
-        let last = std::mem::replace(&mut memory.acceleration, acceleration);
+        let Some(before) = memory.rates.replace(measured.rates) else { return };
+        let Self { body, period, .. } = self;
+        let mean = (before + measured.rates) * 0.5;
+        memory.accelerations.rotate_right(1);
+        memory.accelerations[0] =
+            (measured.rates - before) / *period + body.inverse * mean.cross(&(body.inertia * mean));
+        memory.known = ORDERS.min(memory.known + 1);
         // Before the first commands, importers differ in what acts.
-        let is_full = memory.commands.len() == self.remembered();
-        if let (true, Some(now), Some(last)) = (is_full, acceleration, last) {
-            self.weigh(memory, &now, &last);
+        if memory.known == ORDERS && memory.commands.len() == self.remembered() {
+            self.weigh(memory);
         }
     }
 
@@ -152,23 +171,43 @@ impl LoopDelaySettings {
         }
     }
 
-    /// Adds the period with the acceleration `now`, after one with the acceleration `last`, rad/s².
-    fn weigh(&self, memory: &mut LoopDelay, now: &Vector3<f64>, last: &Vector3<f64>) {
+    /// Adds the last period to the fits, and makes the estimate anew from time to time.
+    fn weigh(&self, memory: &mut LoopDelay) {
         let kept = exp(-self.period / FORGETTING);
-        let LoopDelay { commands, of_acceleration, of_change, .. } = memory;
-        let (commands, change) = (&commands[self.first()..], now - last);
-        of_acceleration.add(kept, |j| now - commands[j]);
-        of_change.add(kept, |j| change - (commands[j] - commands[j + 1]));
-        let (best, best_of_change) = (of_acceleration.least(), of_change.least());
-        let (fit, (place, _)) = if best.1 <= best_of_change.1 {
-            (of_acceleration, best)
-        } else {
-            (of_change, best_of_change)
-        };
+        let commands = &memory.commands[self.first()..];
+        let best = memory.fits.iter().map(|fit| fit.scale).fold(f64::INFINITY, f64::min);
+        for (order, fit) in memory.fits.iter_mut().enumerate() {
+            let y = difference(order, &memory.accelerations);
+            let weight = fit.add(kept, &y, |j| difference(order, &commands[j..]));
+            if weight < 1.0 && fit.scale <= best {
+                // A jump within a period shows in the next one too, when the law responds to it.
+                memory.known = 0;
+            }
+        }
+        memory.periods = memory.periods.saturating_add(1);
+        if memory.periods >= PERIODS && memory.periods.is_multiple_of(PAUSE) {
+            self.estimate(memory);
+        }
+    }
+
+    fn estimate(&self, memory: &mut LoopDelay) {
+        let places = memory.fits.each_mut().map(Fit::least);
         let told = self.told / self.period - self.first() as f64;
+        let best =
+            memory.fits.iter().zip(places).min_by(|(a, _), (b, _)| a.scale.total_cmp(&b.scale));
+        let Some((fit, place)) = best else { return };
         let delay = (self.first() as f64 + place) * self.period;
         memory.estimate = fit.tells(place, told).then_some(delay);
         memory.is_other = memory.estimate.is_some() && (place - told).abs() > 0.5;
+    }
+}
+
+/// Returns the difference of this order of the values, the newest of which come first.
+fn difference(order: usize, values: &[Vector3<f64>]) -> Vector3<f64> {
+    match order {
+        0 => values[0],
+        1 => values[0] - values[1],
+        _ => values[0] - values[1] * 2.0 + values[2],
     }
 }
 
@@ -177,66 +216,62 @@ impl Fit {
         Self { sums: vec![Sums::default(); candidates], ..Self::default() }
     }
 
-    /// Adds a period; `left` returns what `j` periods of delay leave of it. Earlier periods are
-    /// `kept` by this share.
-    fn add(&mut self, kept: f64, left: impl Fn(usize) -> Vector3<f64>) {
+    /// Adds a period with `y`; `command` returns u for a number of periods of delay. Earlier periods
+    /// are `kept` by this share. Returns the weight of the period, which is below 1 if no delay
+    /// explains it.
+    fn add(&mut self, kept: f64, y: &Vector3<f64>, command: impl Fn(usize) -> Vector3<f64>) -> f64 {
         let last = self.sums.len() - 1;
-        let least = (0..=last).map(|j| left(j).norm_squared()).fold(f64::INFINITY, f64::min);
+        let left = |j| (y - command(j)).norm_squared();
+        let least = (0..=last).map(left).fold(f64::INFINITY, f64::min);
         let usual = USUAL * USUAL * 3.0 * self.scale;
         let weight = if self.scale > 0.0 && least > usual { usual / least } else { 1.0 };
-        let mut here = left(0);
+        let mut here = command(0);
         for (j, sums) in self.sums.iter_mut().enumerate() {
-            let next = left((j + 1).min(last));
+            let next = command((j + 1).min(last));
+            sums.explained = kept * sums.explained + weight * y.dot(&here);
             sums.square = kept * sums.square + weight * here.norm_squared();
             sums.product = kept * sums.product + weight * here.dot(&next);
             here = next;
         }
+        self.square = kept * self.square + weight * y.norm_squared();
         self.count = kept * self.count + weight;
+        weight
     }
 
-    /// Returns the number of periods of delay, from the first on, that leaves least, and the mean square of a component
-    /// of what it leaves, (rad/s²)².
-    fn least(&mut self) -> (f64, f64) {
-        let (mut place, mut least) = (0.0, f64::INFINITY);
-        for (j, pair) in self.sums.windows(2).enumerate() {
-            let (here, both, next) = (pair[0].square, pair[0].product, pair[1].square);
-            let curvature = here - 2.0 * both + next;
-            let f = if curvature > 0.0 { ((here - both) / curvature).clamp(0.0, 1.0) } else { 0.0 };
-            let left = self.unexplained(j as f64 + f);
-            if left < least {
-                (place, least) = (j as f64 + f, left);
-            }
-        }
-        let mean = least / (3.0 * self.count);
-        if self.count >= PERIODS {
-            self.scale = mean;
-        }
-        (place, mean)
+    /// Returns the number of periods of delay, from the first on, that leaves least.
+    fn least(&mut self) -> f64 {
+        let places = (0..=(self.sums.len() - 1) * PARTS).map(|part| part as f64 / PARTS as f64);
+        let all = places.map(|place| (place, self.unexplained(place)));
+        let (place, least) =
+            all.fold((0.0, f64::INFINITY), |least, one| if one.1 < least.1 { one } else { least });
+        self.scale = (least / (3.0 * self.count)).max(FLOOR * FLOOR);
+        place
     }
 
     /// Returns whether the evidence suffices to prefer `place`, which leaves least, to the delay
     /// that was `told`, or to any other by a period; all in periods.
     fn tells(&self, place: f64, told: f64) -> bool {
         let least = self.unexplained(place);
-        let against =
-            |other: f64| (self.unexplained(other) - least) * 3.0 * self.count > EVIDENCE * least;
-        if self.count < PERIODS {
-            return false;
-        }
+        let against = |other: f64| self.unexplained(other) - least > EVIDENCE * self.scale;
         if (place - told).abs() > 0.5 {
             return against(told);
         }
         against(place + 1.0) && (place < 1.0 || against(place - 1.0))
     }
 
-    /// Returns the sum of the squares that a delay of this many periods leaves, (rad/s²)².
+    /// Returns the sum of the squares that a delay of this many periods leaves, with the factor of
+    /// the inertia that fits best, (rad/s²)².
     fn unexplained(&self, place: f64) -> f64 {
         let j = (place as usize).min(self.sums.len() - 2);
         let f = (place - j as f64).min(1.0);
         let (here, next) = (&self.sums[j], &self.sums[j + 1]);
-        (1.0 - f) * (1.0 - f) * here.square
+        let explained = (1.0 - f) * here.explained + f * next.explained;
+        let square = (1.0 - f) * (1.0 - f) * here.square
             + 2.0 * f * (1.0 - f) * here.product
-            + f * f * next.square
+            + f * f * next.square;
+        let gain = if square > 0.0 { explained / square } else { 1.0 };
+        let gain = gain.clamp(1.0 / GAIN, GAIN);
+        self.square - gain * (2.0 * explained - gain * square)
     }
 }
 
@@ -247,7 +282,7 @@ impl Clone for Fit {
 
     fn clone_from(&mut self, source: &Self) {
         self.sums.clone_from(&source.sums);
-        (self.count, self.scale) = (source.count, source.scale);
+        (self.square, self.count, self.scale) = (source.square, source.count, source.scale);
     }
 }
 
@@ -260,12 +295,13 @@ impl Clone for LoopDelay {
 
     // The derived version would allocate at every tick.
     fn clone_from(&mut self, source: &Self) {
-        let Self { commands, rates, acceleration, of_acceleration, of_change, estimate, is_other } =
+        let Self { commands, rates, accelerations, known, fits, periods, estimate, is_other } =
             source;
         self.commands.clone_from(commands);
-        self.of_acceleration.clone_from(of_acceleration);
-        self.of_change.clone_from(of_change);
-        (self.rates, self.acceleration) = (*rates, *acceleration);
-        (self.estimate, self.is_other) = (*estimate, *is_other);
+        for (fit, source) in self.fits.iter_mut().zip(fits) {
+            fit.clone_from(source);
+        }
+        (self.rates, self.accelerations, self.known) = (*rates, *accelerations, *known);
+        (self.periods, self.estimate, self.is_other) = (*periods, *estimate, *is_other);
     }
 }

@@ -10,10 +10,21 @@
 
 use crate::experiment::Coupling;
 use crate::settings::{Setting, SettingValue};
-use crate::wiring::{Part, Port, Reading, Wire};
+use crate::wiring::{Part, Port, Wire};
 use fmu_import::description::Kind;
 use fmu_import::quantity::rounded;
 use std::collections::BTreeSet;
+
+/// Time at which an output is read for a round of steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reading {
+    /// The output is that of the communication point, before the inputs are set.
+    #[default]
+    BeforeStep,
+    /// The output responds to the inputs, and can only be read after the step for which they are
+    /// set: FMI 2.0.5, section 4.2.1, forbids reading between setting and stepping.
+    AfterStep,
+}
 
 /// A feedback loop through components, with its delay.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -75,11 +86,21 @@ pub fn readings_of_probes(parts: &[Part], wires: &[Wire], probes: &[Port]) -> Ve
     probes.iter().map(|port| (*port, reading(port))).collect()
 }
 
-/// Returns how an output depends on those of its unit's inputs that are connected; `None` if there
-/// are none.
+/// Returns how an output depends on its unit's inputs: on those that are connected, and where it
+/// depends on none of them, as an output that changes at instants only does on the others. `None`
+/// says that it depends on none.
 fn strongest_passage(parts: &[Part], wires: &[Wire], output: Port) -> Option<Passage> {
+    let description = parts[output.component].description;
     let connected = wires.iter().filter(|wire| wire.to.component == output.component);
-    connected.map(|wire| passage(parts, output.component, wire.to.variable, output.variable)).max()
+    let strongest = connected
+        .map(|wire| passage(parts, output.component, wire.to.variable, output.variable))
+        .max();
+    let is_sampled = description.variables[output.variable].variability == "discrete";
+    let known = description.dependencies.get(&output.variable);
+    let responds = known.is_some_and(|known| {
+        known.iter().any(|&input| description.variables[input].causality == "input")
+    });
+    if is_sampled && responds { Some(Passage::Direct) } else { strongest }
 }
 
 /// Finds all feedback loops, each once. `parts` are in the experiment's order, `every` are their

@@ -13,6 +13,7 @@ mod transfer;
 pub use transfer::Member;
 
 use crate::clock::Clock;
+use crate::delay::Reading;
 use crate::error::Error;
 use crate::experiment::Coupling;
 use crate::interrupt::Interrupt;
@@ -20,7 +21,7 @@ use crate::pacing::Settings;
 use crate::pacing::pacer::Pacer;
 use crate::pacing::timer::{Monotonic, Timer};
 use crate::stopwatch::{Spent, Stopwatch};
-use crate::wiring::{Port, Reading, Wire};
+use crate::wiring::{Port, Wire};
 use fmu_import::unit::{CoSimulationUnit, Outcome, UnitFailure};
 use fmu_import::warnings;
 use std::rc::Rc;

@@ -2,7 +2,7 @@
 //! and then the units are initialized and stepped.
 
 use crate::clock::Clock;
-use crate::delay::{self, FeedbackLoop};
+use crate::delay::{self, FeedbackLoop, Reading};
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::interrupt::Interrupt;
@@ -178,6 +178,14 @@ impl System {
         let is_integer = matches!(terms[..], [Term { value, minus: None }]
             if !matches!(self.kind(self.probes[value]), Kind::Real { .. }));
         Ok(Resolved { terms, norm: signal.norm, over, factor, unit, is_integer })
+    }
+
+    /// Returns whether a sample's value at this index responds to the inputs of its communication
+    /// point. At the stop time no step begins, and the value is that of the step before.
+    pub fn is_response(&self, place: usize) -> bool {
+        let readings =
+            delay::readings_of_probes(&self.parts(), &self.wires, &self.probes[place..=place]);
+        readings.iter().any(|(_, reading)| *reading == Reading::AfterStep)
     }
 
     /// Returns the indices, among a sample's values, of the computing times, which differ from run

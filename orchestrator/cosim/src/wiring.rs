@@ -47,17 +47,6 @@ pub struct Wire {
     pub scaling: Scaling,
 }
 
-/// Time at which an output is read for a round of steps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Reading {
-    /// The output is that of the communication point, before the inputs are set.
-    #[default]
-    BeforeStep,
-    /// The output responds to the inputs, and can only be read after the step for which they are
-    /// set: FMI 2.0.5, section 4.2.1, forbids reading between setting and stepping.
-    AfterStep,
-}
-
 /// A column of the results, which records one variable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Column {

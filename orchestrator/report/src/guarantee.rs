@@ -159,10 +159,12 @@ pub(crate) fn told<'a>(margins: impl Iterator<Item = (Option<f64>, &'a str)>) ->
 impl Observer for Course {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
         let values = sample.values;
-        self.ticks += 1;
+        // At the stop time the status is that of the step before, which covers the state there.
+        let begins = u64::from(!sample.last);
+        self.ticks += begins;
         self.status = self.signals.status.as_ref().map(|status| values[status.place]);
         if self.is_in_force(values) {
-            self.ticks_in_force += 1;
+            self.ticks_in_force += begins;
             for (smallest, (_, place)) in self.margins.iter_mut().zip(&self.signals.margins) {
                 *smallest = smallest.iter().copied().chain([values[*place]]).reduce(smaller);
             }

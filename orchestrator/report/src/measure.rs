@@ -218,7 +218,14 @@ pub(crate) fn asked(
     if is_missing && measure.optional || system.lost_by_exchange(paths()) {
         return Ok(None);
     }
-    Gauge::new(measure, signals, system).map(Some)
+    // At the stop time, responses to inputs are those of the step before.
+    let mut responds = false;
+    for path in signals.iter().flat_map(Signal::paths) {
+        let place = system.probe(path)?.place;
+        responds |= system.is_response(place);
+    }
+    let steps = measure.steps || responds && measure.kind != Kind::Integral;
+    Gauge::new(&Measure { steps, ..measure.clone() }, signals, system).map(Some)
 }
 
 #[cfg(test)]

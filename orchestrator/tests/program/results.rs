@@ -62,7 +62,7 @@ none = { kind = "mean", signals = "none", optional = true }
     let number = |name: &str| metrics[name].as_f64().unwrap();
     let mean_square = (0.25 + 0.5625 + 1.265625) / 3.0;
     assert!((number("mean_square") - f64::sqrt(mean_square)).abs() < 1e-15);
-    assert_eq!((number("largest"), number("ratio")), (1.125, (3.0 * 0.5 + 1.0 / 3.0) / 4.0));
+    assert_eq!((number("largest"), number("ratio")), (1.125, 0.5));
     assert!(metrics.as_object().unwrap()["none"].is_null());
     assert!(summary.contains("  RMS               0.8323"), "{summary}");
     assert!(summary.contains("within its limit 1.125"), "{summary}");
@@ -200,15 +200,15 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
             summary.lines().find(|line| line.starts_with("  guarantee ")).unwrap().to_string();
         (line, bench.json("out/loop/metrics.json"))
     };
-    // The input is 1, 1.5, 2.25, which is kept at the stop time; the margins are 1 - input/largest, and half of that.
+    // The input is 1, 1.5, 2.25, in three steps; the margins are 1 - input/largest, and half of that.
     let (line, metrics) = guarantee("2");
     assert_eq!(
         line,
-        "  guarantee         in force at 50.0 % of the ticks, lost at t = 2 s (exceeded)"
+        "  guarantee         in force at 66.7 % of the ticks, lost at t = 2 s (exceeded)"
     );
     assert_eq!(
         (&metrics["guarantee_share"], &metrics["guarantee_lost_at"]),
-        (&0.5.into(), &2.0.into())
+        (&(2.0 / 3.0).into(), &2.0.into())
     );
     assert_eq!(metrics["guarantee_rate_margin_min"], 0.25);
     assert_eq!(metrics["guarantee_moment_margin_min"], 0.125);

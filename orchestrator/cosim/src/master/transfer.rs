@@ -1,6 +1,7 @@
 //! Values on their way from unit to unit, which are read with one call per unit and type.
 
-use crate::wiring::{Port, Reading, Wire};
+use crate::delay::Reading;
+use crate::wiring::{Port, Wire};
 use fmu_import::description::Carrier;
 use fmu_import::quantity::Scaling;
 use fmu_import::unit::{CoSimulationUnit, Outcome};
