@@ -2,12 +2,13 @@
 //!
 //! ```text
 //! cargo run --release -p reentry-control --example certificate -- ARGUMENTS
-//!     cost
+//!     cost [COMMON TENSOR]
 //!     edge PERIOD FIRST COUNT
 //! ```
 //!
 //! `cost` flies the scenario of Chai 2022 with white noise and with constant disturbances, and
-//! prints EMS, kept plans and computing times. `edge` flies COUNT flights, with the seeds from FIRST
+//! prints EMS, kept plans and computing times; COMMON and TENSOR are the bounds on the inertia error
+//! as a common factor and of the tensor. `edge` flies COUNT flights, with the seeds from FIRST
 //! on, that begin just inside the set of certified states, optimising every PERIOD seconds. A line
 //! shows each broken promise with its seed.
 
@@ -37,7 +38,14 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |i: usize| arguments.get(i).and_then(|text| text.parse::<f64>().ok());
     match arguments.first().map(String::as_str) {
-        Some("cost") => cost(),
+        Some("cost") => {
+            let published = settings(Constraints::Robust);
+            cost(&Settings {
+                inertia_error: number(1).unwrap_or(published.inertia_error),
+                tensor_error: number(2).unwrap_or(published.tensor_error),
+                ..published
+            });
+        }
         Some("edge") => {
             let [Some(period), Some(first), Some(count)] = [1, 2, 3].map(number) else { usage() };
             edge(period, first as u64, count as u64);
@@ -47,21 +55,20 @@ fn main() {
 }
 
 fn usage() -> ! {
-    eprintln!("usage: certificate cost | certificate edge PERIOD FIRST COUNT");
+    eprintln!("usage: certificate cost [COMMON TENSOR] | certificate edge PERIOD FIRST COUNT");
     std::process::exit(2);
 }
 
-fn cost() {
+fn cost(settings: &Settings) {
     for (name, cases) in [("white noise", white(1..=20, 0.04)), ("corners", constant())] {
-        let settings = settings(Constraints::Robust);
         let mut cost = Cost::default();
         for case in &cases {
             // Each flight is repeated, and the shortest time of each optimisation counts.
             let first = cost.times.len();
-            add(&mut cost, &settings, case);
+            add(&mut cost, settings, case);
             for _ in 1..REPETITIONS {
                 let mut again = Cost::default();
-                add(&mut again, &settings, case);
+                add(&mut again, settings, case);
                 for (time, again) in cost.times[first..].iter_mut().zip(again.times) {
                     *time = time.min(again);
                 }

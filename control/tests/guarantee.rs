@@ -58,6 +58,24 @@ fn assert_kept(flights: &[Flight]) {
     }
 }
 
+#[test]
+fn guarantee_is_kept_with_an_error_of_the_tensor_of_inertia() {
+    let settings = Settings {
+        inertia_error: 0.0,
+        tensor_error: 0.05,
+        delay: 0.04,
+        ..settings(Constraints::Robust)
+    };
+    let with_error = |(seed, flight): (u64, Flight)| Flight {
+        inertia_scale: 1.0,
+        tensor_error: Flight::tensor_of(settings.tensor_error, &mut Random::new(seed)),
+        ..flight
+    };
+    let flights = [(); 2].map(|()| flights(&settings, &[Sight::Exact])).concat();
+    let flights: Vec<Flight> = (1..).zip(flights).map(with_error).collect();
+    assert_kept(&flights);
+}
+
 fn soft() -> Settings {
     Settings { feedback: Gain { k1: -2.0, k2: -4.0 }, ..settings(Constraints::Robust) }
 }

@@ -160,6 +160,7 @@ impl Law for CrmpcLaw {
     const FIELDS: &'static Fields = &[
         ("observer.time_constant", "observer.timeConstant"),
         ("inertia_error", "inertia.error"),
+        ("tensor_error", "inertia.tensorError"),
         ("angle_error", "estimation.angleError"),
         ("rate_error", "estimation.rateError"),
         ("sideslip_domain", "guarantee.sideslip"),
@@ -291,15 +292,21 @@ fn bounds(table: Controller) -> Controller {
         "disturbance.bound",
         "Bound on each component of the disturbance of the angles' second derivatives that the sets are tightened for",
     );
-    let inertia =
-        parameter("inertia.error", "Relative inertia error that the robust set is tightened for");
+    let inertia = parameter(
+        "inertia.error",
+        "Relative error of the inertia, as a common factor of the tensor, that the robust set is tightened for",
+    );
+    let tensor = parameter(
+        "inertia.tensorError",
+        "Relative error of the tensor of inertia, in all six entries, that the robust set is tightened for besides the common factor",
+    );
     let angle_error = parameter(
         "estimation.angleError",
-        "Bound on the error of each angle given that the robust set is tightened for; it changes no faster than estimation.rateError",
+        "Bound on the error of each angle given that the robust set is tightened for; the error may take any value within it at each tick",
     );
     let rate_error = parameter(
         "estimation.rateError",
-        "Bound on the error of the derivative of each angle, as it follows from what is given, that the robust set is tightened for",
+        "Bound on the error of the derivative of each angle, as it follows from what is given, that the robust set is tightened for; the error may take any value within it at each tick",
     );
     let sideslip = parameter(
         "bound.sideslip",
@@ -318,6 +325,7 @@ fn bounds(table: Controller) -> Controller {
             &mut m.law.settings.disturbance_bound
         })
         .real(inertia.real().min(0.0).max(0.9).nominal(0.05), |m| &mut m.law.settings.inertia_error)
+        .real(tensor.real().min(0.0).max(0.9).nominal(0.05), |m| &mut m.law.settings.tensor_error)
         .real(sideslip.real().unit(unit::angle()).min(0.0).max(1.5).nominal(0.2), |m| {
             &mut m.law.settings.sideslip_bound
         })

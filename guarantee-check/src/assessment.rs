@@ -19,8 +19,10 @@ struct Drive {
     norm: Interval,
     norm_of_two: Interval,
     turning: Interval,
-    /// Relative error of the moment due to the inertia error.
-    inertia: Interval,
+    /// Moments that the inertia error amounts to: along the acting one, and in any direction.
+    inertia: [Interval; 2],
+    /// Largest ‖I^½ D I^−½‖ of a symmetric D with ‖D‖ ≤ 1.
+    root_condition: Interval,
 }
 
 fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
@@ -28,10 +30,17 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
     let [tau, delay, disturbance] = [s.period_feedback, s.delay, s.disturbance_bound].map(number);
     let [by_rates, by_angles, jerk] = [lemmas.by_rates, lemmas.by_angles, lemmas.jerk].map(number);
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
-    let inertia = number(s.inertia_error) / (Interval::ONE - number(s.inertia_error));
     let [limit, smallest, largest, r] =
         [s.limit_moment, lemmas.smallest, lemmas.largest, lemmas.r].map(number);
-    let of_inertia = inertia * limit * r / smallest;
+    let (common, tensor) = (number(s.inertia_error), number(s.tensor_error));
+    let of_tensor = tensor / (Interval::ONE - tensor);
+    let spin = number(0.5) * (largest - smallest) * number(s.limit_rate).square();
+    let spin_of_error = largest * number(s.limit_rate).square();
+    let inertia = [
+        common * limit / (Interval::ONE - common),
+        of_tensor * limit / (Interval::ONE - common) + of_tensor * spin + of_tensor * spin_of_error,
+    ];
+    let of_inertia = (inertia[0] + inertia[1]) * r / smallest;
     let all = root3 * disturbance + of_inertia;
     let elapsed = delay + tau;
     let growth = ((by_rates + by_angles * elapsed) * elapsed).exp();
@@ -62,6 +71,7 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
         norm_of_two: root2 * disturbance + of_inertia + mismatch,
         turning: largest / smallest * number(lemmas.turn) * r * number(lemmas.rate),
         inertia,
+        root_condition: (largest / smallest).sqrt(),
     }
 }
 
@@ -123,9 +133,8 @@ fn deviation(
         of_rates(5),
         reach[6] * number(s.disturbance_bound) + errors[6],
         reach[6] * drive.mismatch + swing[6],
-        drive.inertia
-            * number(s.limit_moment)
-            * (reach[6] + drive.turning * (reach[7] + delay * reach[6])),
+        (drive.inertia[0] + drive.root_condition * drive.inertia[1]) * reach[6]
+            + (drive.inertia[0] + drive.inertia[1]) * drive.turning * (reach[7] + delay * reach[6]),
     ]
 }
 

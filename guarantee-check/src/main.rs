@@ -29,9 +29,12 @@ struct Arguments {
     /// Bound on the disturbance of each axis, deg/s².
     #[arg(long)]
     disturbance_deg: Option<f64>,
-    /// Relative error of the inertia.
+    /// Relative error of the inertia that is a common factor of the tensor.
     #[arg(long)]
     inertia_error: Option<f64>,
+    /// Relative error of the tensor of inertia in all six entries.
+    #[arg(long)]
+    tensor_error: Option<f64>,
     /// Bound on the error of each measured angle, deg.
     #[arg(long)]
     angle_error_deg: Option<f64>,
@@ -58,6 +61,7 @@ impl Arguments {
         s.delay = self.delay.unwrap_or(s.delay);
         s.disturbance_bound = degrees(self.disturbance_deg, s.disturbance_bound);
         s.inertia_error = self.inertia_error.unwrap_or(s.inertia_error);
+        s.tensor_error = self.tensor_error.unwrap_or(s.tensor_error);
         s.angle_error = degrees(self.angle_error_deg, s.angle_error);
         s.rate_error = degrees(self.rate_error_deg, s.rate_error);
         s.sideslip_domain = degrees(self.sideslip_deg, s.sideslip_domain);

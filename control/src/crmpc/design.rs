@@ -226,15 +226,9 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
     if s.horizon == 0 {
         return Err(DesignError::NotPositive { name: "horizon", value: 0.0 });
     }
-    if !(0.0..1.0).contains(&s.inertia_error) {
-        return Err(DesignError::OutOfRange {
-            name: "inertia_error",
-            value: s.inertia_error,
-            low: 0.0,
-            high: 1.0,
-        });
-    }
     let ranges = [
+        ("inertia_error", s.inertia_error, 1.0),
+        ("tensor_error", s.tensor_error, 1.0),
         ("angle_error", s.angle_error, 1.0),
         ("rate_error", s.rate_error, 1.0),
         ("delay", s.delay, 1.0),

@@ -493,8 +493,14 @@ pub(super) fn counting(s: &Settings, share: f64) -> Settings {
 
 /// The parts that drive the deviation, separated by the way in which they add up.
 struct Parts {
-    /// Relative error ι/(1 − ι) of the moment: I⁻¹ becomes I⁻¹/(1 ± ι).
-    inertia: f64,
+    /// Moment that the inertia error amounts to while the largest moment acts, N m, along that
+    /// moment.
+    along_moment: f64,
+    /// The same in any direction, from an error of the tensor.
+    any_moment: f64,
+    /// Square root of the condition number of I, by which the latter grows if it is expressed as a
+    /// moment.
+    root_condition: f64,
     /// Mismatch of the cancellation alone, rad/s².
     mismatch: f64,
     /// Shift of the angle per time, see [`Dynamics::swing`].
@@ -514,8 +520,16 @@ struct Parts {
 impl Parts {
     fn new(s: &Settings, dynamics: &Dynamics) -> Self {
         let Dynamics { geometry, smallest, largest, rate, .. } = dynamics;
-        let inertia = s.inertia_error / (1.0 - s.inertia_error);
-        let of_inertia = inertia * s.limit_moment * geometry.r / smallest;
+        // The inertia is I_v = (1 + c) I^½ (1 + E) I^½. With D = 1 − (1 + E)⁻¹, I_v⁻¹ (m − ω × I_v ω)
+        // differs from I⁻¹ (m − ω × I ω) by −c/(1 + c) I⁻¹ m, by I^−½ D I^−½ (ω × I ω − m/(1 + c)),
+        // and by I^−½ (1 + E)⁻¹ I^−½ (ω × I^½ E I^½ ω). For the last one, ‖ω × S ω‖ is at most half
+        // the range of the eigenvalues of S.
+        let common = s.inertia_error / (1.0 - s.inertia_error);
+        let tensor = s.tensor_error / (1.0 - s.tensor_error);
+        let gyroscopic = (0.5 * (largest - smallest) + largest) * powi(s.limit_rate, 2);
+        let along_moment = common * s.limit_moment;
+        let any_moment = tensor * (s.limit_moment / (1.0 - s.inertia_error) + gyroscopic);
+        let of_inertia = (along_moment + any_moment) * geometry.r / smallest;
         let root3 = 3.0_f64.sqrt();
         let drive = root3 * s.disturbance_bound + of_inertia;
         let (mismatch, varying) =
@@ -527,7 +541,9 @@ impl Parts {
         // Bound of ‖I (W − W′) R′ I⁻¹‖ for angles that lie `age` apart, per unit of `age`.
         let turning = largest / smallest * TURN * geometry.r * rate;
         Self {
-            inertia,
+            along_moment,
+            any_moment,
+            root_condition: (largest / smallest).sqrt(),
             mismatch,
             swing,
             between: dynamics.between(s),
@@ -572,9 +588,11 @@ impl Parts {
                 + swing.middle_rate,
             feedback: reach.feedback * s.disturbance_bound + errors.feedback,
             feedback_norm: reach.feedback * self.mismatch + swing.feedback,
-            feedback_moment: self.inertia
-                * s.limit_moment
-                * (reach.feedback + self.turning * (reach.feedback_age + s.delay * reach.feedback)),
+            feedback_moment: (self.along_moment + self.root_condition * self.any_moment)
+                * reach.feedback
+                + (self.along_moment + self.any_moment)
+                    * self.turning
+                    * (reach.feedback_age + s.delay * reach.feedback),
         }
     }
 }

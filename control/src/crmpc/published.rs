@@ -124,6 +124,7 @@ impl Settings {
             tube: gains.tube,
             disturbance_bound: scenario.disturbance.bound,
             inertia_error: bounds.inertia_error,
+            tensor_error: 0.0,
             angle_error: 0.0,
             rate_error: 0.0,
             delay: 0.0,

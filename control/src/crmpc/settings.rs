@@ -86,10 +86,13 @@ pub struct Settings {
     pub tube: Gain,
     /// Disturbance bound Δ̄ per component of x_ω, rad/s².
     pub disturbance_bound: f64,
-    /// Relative inertia error that the robust set tolerates.
+    /// Relative inertia error that the robust set tolerates if it is a common factor of the tensor.
     pub inertia_error: f64,
-    /// Bound on the error of each measured angle, rad. The error changes no faster than
-    /// `rate_error`.
+    /// Bound on ‖I^−½ (I_v − I) I^−½‖, the relative error of the tensor of inertia in all six entries
+    /// that the robust set tolerates besides the common factor.
+    pub tensor_error: f64,
+    /// Bound on the error of each measured angle, rad. The error may take any value within it at
+    /// each tick.
     pub angle_error: f64,
     /// Bound on the error of each measured component of x_ω, rad/s. The error may take any value
     /// within it at each tick.

@@ -10,7 +10,7 @@ use control::error::DesignError;
 use control::error_dynamics::Gain;
 use control::estimation::{self, Alignment, Estimator, mems_corrections};
 use control::{Controller, Measurement};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use vehicle::dynamics::RigidBody;
 use vehicle::integrator::rk4;
 use vehicle::kinematics::{self, Kinematics};
@@ -180,6 +180,9 @@ pub struct Flight {
     pub settings: Settings,
     /// Ratio of the vehicle's inertia to the one that the controller uses.
     pub inertia_scale: f64,
+    /// Relative error E of the vehicle's tensor of inertia, which is I^½ (1 + E) I^½ times the
+    /// ratio.
+    pub tensor_error: Matrix3<f64>,
     /// Angles Θ at the start, rad.
     pub angles: Vector3<f64>,
     /// Body rates ω at the start, rad/s.
@@ -253,6 +256,7 @@ impl Flight {
         Self {
             settings: *settings,
             inertia_scale: 1.0,
+            tensor_error: Matrix3::zeros(),
             angles: scenario.initial_angles,
             rates: scenario.initial_rates,
             reference: scenario.reference,
@@ -278,6 +282,9 @@ impl Flight {
             1 => 1.0 + settings.inertia_error,
             _ => 1.0 + settings.inertia_error * random.between(-1.0, 1.0),
         };
+        if settings.tensor_error > 0.0 {
+            flight.tensor_error = Self::tensor_of(settings.tensor_error, random);
+        }
         flight.disturbance = Course::random(random);
         flight.hold = if random.below(2) == 0 { 0.04 } else { 0.01 };
         match random.below(3) {
@@ -366,6 +373,14 @@ impl Flight {
         Some(flight)
     }
 
+    /// Draws a symmetric matrix in any directions, whose eigenvalues are of this size.
+    pub fn tensor_of(size: f64, random: &mut Random) -> Matrix3<f64> {
+        let turned = Rotation3::new(random.direction(1.0) * random.between(0.0, 3.1)).into_inner();
+        let error = turned * Matrix3::from_diagonal(&(random.corner() * size)) * turned.transpose();
+        // Rounding must leave the tensor symmetric.
+        0.5 * (error + error.transpose())
+    }
+
     fn random_sine(random: &mut Random) -> Profile {
         let mean =
             degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([5.0, 2.0, 20.0]));
@@ -373,6 +388,18 @@ impl Flight {
         let sideslip = if random.below(12) == 0 { 3.0 } else { 0.0 };
         let amplitude = random.vector().component_mul(&degrees([3.0, sideslip, 6.0]));
         Profile::sine(mean, amplitude, random.between(0.1, 0.8), random.between(0.0, 6.3))
+    }
+
+    /// Returns the vehicle's inertia if this is the one of the controller, kg m².
+    fn inertia(&self, inertia: &Matrix3<f64>) -> Matrix3<f64> {
+        if self.tensor_error == Matrix3::zeros() {
+            return inertia * self.inertia_scale;
+        }
+        let mut root = inertia.symmetric_eigen();
+        root.eigenvalues.apply(|value| *value = value.sqrt());
+        let root = root.recompose();
+        let inertia = root * (Matrix3::identity() + self.tensor_error) * root * self.inertia_scale;
+        0.5 * (inertia + inertia.transpose())
     }
 
     /// Runs the flight and returns its results.
@@ -470,7 +497,7 @@ impl Vehicle {
     fn new(flight: &Flight) -> Self {
         let Settings { body, delay, .. } = &flight.settings;
         Self {
-            body: RigidBody::new(body.inertia * flight.inertia_scale).unwrap(),
+            body: RigidBody::new(flight.inertia(&body.inertia)).unwrap(),
             state: plant::state(&flight.angles, &flight.rates),
             commanded: Vector3::zeros(),
             transport: Transport::new(delay - flight.age).unwrap(),
