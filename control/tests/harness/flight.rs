@@ -711,6 +711,7 @@ pub fn random_settings(seed: u64) -> Settings {
         limit_rate: published.limit_rate * random.between(0.5, 2.0),
         limit_moment: published.limit_moment * random.between(0.5, 3.0),
         initial_state: initial_states[random.below(3)],
+        tensor_error: half(random, 0.08),
         ..published
     }
 }
