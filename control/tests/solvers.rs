@@ -114,6 +114,7 @@ impl Solvers {
             state_balls: true,
             terminal: shape.terminal,
             start,
+            margin: 0.5,
             scale: [0.1, 0.1],
             standstill: 1e-6,
         };
@@ -377,13 +378,7 @@ impl Bounded<2> for Spoilt {
         true
     }
 
-    fn balls(
-        &self,
-        k: usize,
-        state: &State<2>,
-        input: &Vector3<f64>,
-        _: Option<(f64, f64)>,
-    ) -> Balls<2> {
+    fn balls(&self, k: usize, state: &State<2>, input: &Vector3<f64>, _: (f64, f64)) -> Balls<2> {
         let mut balls = self.sets.balls(k, state, input);
         if self.computed.get() == 1 {
             balls.input.value *= f64::NAN;
@@ -398,7 +393,7 @@ impl Bounded<2> for Spoilt {
         input: &Vector3<f64>,
         bounds: (f64, f64),
     ) -> (f64, f64) {
-        let Balls { state, input } = self.balls(k, state, input, Some(bounds));
+        let Balls { state, input } = self.balls(k, state, input, bounds);
         (state.value.norm_squared(), input.value.norm_squared())
     }
 
@@ -431,6 +426,7 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
         state_balls: true,
         terminal: false,
         start: None,
+        margin: 0.5,
         scale: [0.1, 0.1],
         standstill: 1e-6,
     };

@@ -166,6 +166,8 @@ pub struct Crmpc {
     // Scratch memory of one optimisation.
     affine: Vec<State<2>>,
     previous: Motion<2>,
+    /// Shift of the reference's angles by the observer, rad.
+    shift: Vector3<f64>,
 }
 
 /// Largest share of the rate limit to which the terminal law steers if there is no optimum.
@@ -178,6 +180,10 @@ const HALVINGS: usize = 6;
 /// Largest change of any state (rad, rad/s) between passes at which the first optimisation has
 /// converged.
 const STANDSTILL: f64 = 1e-8;
+/// Share by which a window of the horizon is wider than the violated intervals, at each end. With
+/// the robust set most intervals of a window are near their bounds, and an iteration costs more.
+const MARGIN: f64 = 0.25;
+const MARGIN_OF_THE_PAPER: f64 = 0.5;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
 const ANGLE_SCALE: f64 = 0.1;
 /// Smallest disturbance bound for which the invariant set is computed, rad/s², so that the set has
@@ -213,6 +219,10 @@ impl Crmpc {
             // With the robust set the horizon ends in a bound on the rates (docs/guarantee.md).
             terminal: settings.constraints == Constraints::Paper,
             start,
+            margin: match settings.constraints {
+                Constraints::Robust => MARGIN,
+                Constraints::Paper => MARGIN_OF_THE_PAPER,
+            },
             scale: [ANGLE_SCALE, settings.limit_rate],
             standstill: STANDSTILL,
         };
@@ -225,6 +235,7 @@ impl Crmpc {
             optimiser,
             affine: vec![[Vector3::zeros(); 2]; n],
             previous: Motion::new(n),
+            shift: Vector3::zeros(),
         })
     }
 
@@ -252,9 +263,9 @@ impl Crmpc {
         let (clock, was_assured) = (Instant::now(), memory.assured());
         self.optimiser.begin();
         // Without guarantee the command compensates for the disturbance instead.
-        let shift =
+        self.shift =
             if memory.assured() { memory.observed.shift(&self.settings) } else { Vector3::zeros() };
-        self.preview(time, reference, shift);
+        self.preview(time, reference);
         let first = !memory.started;
         let anew = if first {
             memory.plan.resize(self.settings.horizon);
@@ -454,6 +465,9 @@ impl Crmpc {
         let error = error(start, &self.sets.references[0]);
         let previous = (!first).then(|| {
             memory.plan.errors(&self.sets.references, &mut self.previous);
+            // The optimum moves with the shifted reference.
+            let moved = self.shift - memory.plan.shift;
+            self.previous.states.iter_mut().for_each(|[angles, _]| *angles += moved);
             (&self.previous, &memory.plan.multipliers[..])
         });
         self.optimiser.optimise(&self.sets, &error, &self.affine, previous)
@@ -464,6 +478,7 @@ impl Crmpc {
         let start = (self.settings.initial_state != InitialState::Tube).then_some(*start);
         let motion = self.optimiser.motion();
         memory.plan.follow(motion, start, &self.sets.references, self.settings.period_optimisation);
+        memory.plan.shift = self.shift;
         memory.plan.multipliers.clear();
         memory.plan.multipliers.extend(self.optimiser.multipliers());
     }
@@ -478,11 +493,11 @@ impl Crmpc {
 
     /// Computes the references at the prediction times, with shifted angles, and d_k = A x_r,k + B
     /// Θ̈_r,k − x_r,k+1.
-    fn preview(&mut self, time: f64, reference: ReferenceAt, shift: Vector3<f64>) {
+    fn preview(&mut self, time: f64, reference: ReferenceAt) {
         let h = self.settings.period_optimisation;
         for (k, slot) in self.sets.references.iter_mut().enumerate() {
             *slot = reference(time + k as f64 * h);
-            slot.angles += shift;
+            slot.angles += self.shift;
         }
         for (d, pair) in self.affine.iter_mut().zip(self.sets.references.windows(2)) {
             let moved =

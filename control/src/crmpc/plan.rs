@@ -17,6 +17,8 @@ pub struct Plan {
     pub multipliers: Vec<[f64; 2]>,
     /// Braking rate κ of β̈ = −κ β̇ beyond the horizon, 1/s; used with the robust set.
     pub braking: f64,
+    /// Shift of the reference's angles by the observer when the plan was made, rad.
+    pub shift: Vector3<f64>,
 }
 
 impl Clone for Plan {
@@ -26,6 +28,7 @@ impl Clone for Plan {
             accelerations: self.accelerations.clone(),
             multipliers: self.multipliers.clone(),
             braking: self.braking,
+            shift: self.shift,
         }
     }
 
@@ -35,6 +38,7 @@ impl Clone for Plan {
         self.accelerations.clone_from(&source.accelerations);
         self.multipliers.clone_from(&source.multipliers);
         self.braking = source.braking;
+        self.shift = source.shift;
     }
 }
 
@@ -46,6 +50,7 @@ impl Plan {
             accelerations: vec![Vector3::zeros(); horizon],
             multipliers: vec![[0.0; 2]; horizon],
             braking: 0.0,
+            shift: Vector3::zeros(),
         }
     }
 

@@ -4,7 +4,7 @@
 use super::design::Design;
 use super::guarantee::{Dynamics, End, Held};
 use super::settings::Settings;
-use crate::linearise::{BodyMotion, InverseKinematics, Linear, Linearisation};
+use crate::linearise::{BodyMotion, InverseKinematics, Linear};
 use crate::mpc::Motion;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -117,25 +117,6 @@ impl Robust {
     pub(super) fn nonempty(&self, (rate, moment): (f64, f64)) -> (f64, f64) {
         let Settings { limit_rate, limit_moment, .. } = self.settings;
         (rate.max(EMPTY * limit_rate), moment.max(EMPTY * limit_moment))
-    }
-
-    /// Returns the bounds on ‖ω̃‖ and ‖m̃‖ of stage `k` about the linearised motion there.
-    pub(super) fn bounds_at(&self, k: usize, at: &Linearisation, here: &Point) -> (f64, f64) {
-        let moment = if k < self.settings.horizon {
-            let ends = [end(&at.moment, here.size), self.end_after(here)];
-            self.moment_bound(k, &ends, here.pull)
-        } else {
-            f64::INFINITY
-        };
-        (self.rate_bound(k, at.rates.by_angles.norm(), here, here), moment)
-    }
-
-    /// Returns the end of the interval that begins at `here`.
-    fn end_after(&self, here: &Point) -> End {
-        let Settings { body, period_optimisation: h, .. } = &self.settings;
-        let Point { angles, rates, acceleration: a, .. } = here;
-        let (angles, rates) = (angles + (rates + a * (0.5 * h)) * *h, rates + a * *h);
-        end(&InverseKinematics::at(&angles).linearise(body, &rates, a).moment, rates.norm())
     }
 
     /// Returns the bounds of interval `k` about the motion, with the norms.

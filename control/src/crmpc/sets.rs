@@ -7,6 +7,7 @@ use super::robust::{Margins, Point, Robust, norm_of_columns};
 use super::settings::{Constraints, Settings};
 use crate::error::DesignError;
 use crate::linearise::{self, InverseKinematics, Linear};
+use crate::mpc::balls::At;
 use crate::mpc::{self, Ball, Balls, Bounded, Motion, State};
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
@@ -221,15 +222,14 @@ impl Bounded<2> for Sets {
         k: usize,
         state: &State<2>,
         input: &Vector3<f64>,
-        bounds: Option<(f64, f64)>,
+        bounds: (f64, f64),
     ) -> Balls<2> {
         let [angles, rates, a] = self.nominal(k, state, input);
         let kinematics = InverseKinematics::at(&angles);
         let at = kinematics.linearise(&self.body, &rates, &a);
         match &self.kind {
             Kind::Robust(robust) => {
-                let about = || robust.bounds_at(k, &at, &Point::new(angles, rates, a));
-                let (rate, moment) = robust.nonempty(bounds.unwrap_or_else(about));
+                let (rate, moment) = robust.nonempty(bounds);
                 Balls { state: ball(&at.rates, rate), input: ball(&at.moment, moment) }
             }
             Kind::Paper { x_tube, u_tube, .. } => Balls {
@@ -285,6 +285,17 @@ impl Bounded<2> for Sets {
             bounds.set(k, (interval.rate_bound, interval.moment_bound));
             here = next;
         }
+    }
+
+    fn bounds_between(&self, k: usize, here: At<2>, next: At<2>) -> Option<(f64, f64)> {
+        let Kind::Robust(robust) = &self.kind else { return None };
+        let point = |k: usize, (state, input): At<2>| {
+            let [angles, rates, a] = self.nominal(k, state, input);
+            let last = k == robust.settings.horizon;
+            Point::new(angles, rates, if last { Vector3::zeros() } else { a })
+        };
+        let interval = robust.interval(k, &point(k, here), &point(k + 1, next));
+        Some((interval.rate_bound, interval.moment_bound))
     }
 
     fn depends_on_motion(&self) -> bool {

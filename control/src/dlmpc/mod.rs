@@ -169,6 +169,8 @@ struct RateLimit {
 const STANDSTILL: f64 = 1e-7;
 /// Relative tolerance in the check of the exact constraint, for rounding.
 const CHECK_SLACK: f64 = 1e-9;
+/// Share by which a window of the horizon is wider than the violated intervals, at each end.
+const MARGIN: f64 = 0.5;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
 const ANGLE_SCALE: f64 = 0.1;
 
@@ -187,13 +189,7 @@ impl Bounded<1> for RateLimit {
         false
     }
 
-    fn balls(
-        &self,
-        k: usize,
-        state: &State<1>,
-        input: &Vector3<f64>,
-        _: Option<(f64, f64)>,
-    ) -> Balls<1> {
+    fn balls(&self, k: usize, state: &State<1>, input: &Vector3<f64>, _: (f64, f64)) -> Balls<1> {
         let reference = &self.references[k];
         let command = reference.rates + input;
         let kinematics = InverseKinematics::at(&(reference.angles + state[0]));
@@ -248,6 +244,7 @@ impl Dlmpc {
             state_balls: false,
             terminal: false,
             start: None,
+            margin: MARGIN,
             scale: [ANGLE_SCALE],
             standstill: STANDSTILL,
         };

@@ -45,13 +45,20 @@ pub struct Balls<const O: usize> {
     pub input: Ball<O>,
 }
 
+/// State E_k and input v_k of a stage.
+pub type At<'a, const O: usize> = (&'a State<O>, &'a Vector3<f64>);
+
 /// The ball constraints of a problem, one state ball and one input ball for each stage.
 pub trait Constraints<const O: usize> {
-    /// Returns whether the sizes of the balls follow the evaluated motion. The derivatives of the
-    /// sizes are left out.
+    /// Returns whether the sizes of the balls follow the iterates of a search; otherwise they are
+    /// held. Their derivatives are left out.
     fn follows(&self) -> bool {
         false
     }
+
+    /// Sets the sizes of the input ball of stage `k` and of the state ball of the next stage to those
+    /// about these two stages, if they depend on the motion. Until then they are held.
+    fn renew(&self, _k: usize, _here: At<O>, _next: At<O>) {}
 
     /// Returns whether the states have balls of their own.
     fn has_state_balls(&self) -> bool;

@@ -1,9 +1,10 @@
 //! The bounds of the balls. They are a value that a pure function computes from a motion and that
 //! the optimiser holds, or they follow the iterates of the solver.
 
-use super::balls::{Balls, Constraints};
+use super::balls::{At, Balls, Constraints};
 use super::problem::{Motion, State};
 use nalgebra::Vector3;
+use std::cell::Cell;
 use std::ops::Range;
 
 /// Largest norms that the balls allow at each stage.
@@ -26,20 +27,34 @@ impl Bounds {
         (self.state[k + 1], self.input[k]) = (state, input);
     }
 
-    /// Returns the bounds of stage `k`; the last stage has no input.
-    fn at(&self, k: usize) -> (f64, f64) {
-        (self.state[k], self.input.get(k).copied().unwrap_or(f64::INFINITY))
+    /// Returns the bounds as cells, which a search may renew.
+    pub(super) fn cells(&mut self) -> Cells<'_> {
+        let Self { state, input } = self;
+        Cells {
+            state: Cell::from_mut(state.as_mut_slice()).as_slice_of_cells(),
+            input: Cell::from_mut(input.as_mut_slice()).as_slice_of_cells(),
+        }
     }
 }
 
-/// The motion about which the bounds are computed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum About {
-    /// A fixed motion.
-    #[default]
-    Motion,
-    /// The iterates of the solver. The derivatives of the bounds are left out.
-    Iterates,
+/// Bounds that a search may renew.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cells<'a> {
+    state: &'a [Cell<f64>],
+    input: &'a [Cell<f64>],
+}
+
+impl Cells<'_> {
+    /// Returns the bounds of stage `k`; the last stage has no input.
+    fn at(&self, k: usize) -> (f64, f64) {
+        (self.state[k].get(), self.input.get(k).map_or(f64::INFINITY, Cell::get))
+    }
+
+    /// Sets the bounds of interval `k`: on the state at its end, and on its input.
+    fn set(&self, k: usize, (state, input): (f64, f64)) {
+        self.state[k + 1].set(state);
+        self.input[k].set(input);
+    }
 }
 
 /// The constraints of a controller: balls whose bounds are a function of the motion.
@@ -47,14 +62,14 @@ pub trait Bounded<const O: usize> {
     /// Returns whether the states have balls of their own.
     fn has_state_balls(&self) -> bool;
 
-    /// Returns the balls of stage `k` at (E_k, v_k) with their derivatives. The bounds on state and
-    /// input are the given ones, or those about (E_k, v_k) itself (`None`).
+    /// Returns the balls of stage `k` at (E_k, v_k) with these bounds on state and input, and with
+    /// their derivatives.
     fn balls(
         &self,
         k: usize,
         state: &State<O>,
         input: &Vector3<f64>,
-        bounds: Option<(f64, f64)>,
+        bounds: (f64, f64),
     ) -> Balls<O>;
 
     /// Returns only the two values ‖y‖², of the state ball and of the input ball.
@@ -83,13 +98,19 @@ pub trait Bounded<const O: usize> {
     /// state at its end. Bounds that do not depend on the motion need no implementation.
     fn bounds_about(&self, _motion: &Motion<O>, _of: Range<usize>, _bounds: &mut Bounds) {}
 
+    /// Returns the bounds of interval `k` about the stages at its ends: for the state at its end, and
+    /// for its input. `None` if they do not depend on the motion.
+    fn bounds_between(&self, _k: usize, _here: At<O>, _next: At<O>) -> Option<(f64, f64)> {
+        None
+    }
+
     /// Returns whether the bounds depend on the motion.
     fn depends_on_motion(&self) -> bool {
         false
     }
 
-    /// Returns whether the bounds of a first optimisation follow its iterates. The solver then
-    /// satisfies the balls only as closely as the derivatives that are left out permit.
+    /// Returns whether the bounds of a first optimisation follow its iterates to the end. The solver
+    /// then satisfies the balls only as closely as the derivatives that are left out permit.
     fn follows_at_first(&self) -> bool {
         self.depends_on_motion()
     }
@@ -110,14 +131,21 @@ pub trait Bounded<const O: usize> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Within<'a, B> {
     pub bounded: &'a B,
-    pub bounds: &'a Bounds,
-    pub about: About,
+    pub bounds: Cells<'a>,
+    pub follows: bool,
     pub first: usize,
 }
 
 impl<const O: usize, B: Bounded<O>> Constraints<O> for Within<'_, B> {
     fn follows(&self) -> bool {
-        self.about == About::Iterates
+        self.follows
+    }
+
+    fn renew(&self, k: usize, here: At<O>, next: At<O>) {
+        let k = self.first + k;
+        if let Some(bounds) = self.bounded.bounds_between(k, here, next) {
+            self.bounds.set(k, bounds);
+        }
     }
 
     fn has_state_balls(&self) -> bool {
@@ -126,8 +154,7 @@ impl<const O: usize, B: Bounded<O>> Constraints<O> for Within<'_, B> {
 
     fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> Balls<O> {
         let k = self.first + k;
-        let fixed = (self.about == About::Motion).then(|| self.bounds.at(k));
-        self.bounded.balls(k, state, input, fixed)
+        self.bounded.balls(k, state, input, self.bounds.at(k))
     }
 
     fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> (f64, f64) {

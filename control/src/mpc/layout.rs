@@ -19,6 +19,9 @@ pub struct Layout<const O: usize> {
     pub terminal: bool,
     /// Normals of the set of admissible initial states; `None` if the initial state is given.
     pub start: Option<[Vec<SVector<f64, O>>; 3]>,
+    /// Intervals that a window adds before and after the violated ones, as a share of these, beside
+    /// the fixed number. A wider window is more expensive, and grows less often.
+    pub margin: f64,
     /// Typical sizes of the errors and their derivatives.
     pub scale: [f64; O],
     /// Largest change of any error between passes at which the first optimisation has converged.
@@ -50,7 +53,8 @@ impl<const O: usize> Layout<O> {
             (None, true) => n..n,
             (violated, false) => violated?,
         };
-        Some(self.widen(&violated, MARGIN + violated.len() / 2))
+        let share = (violated.len() as f64 * self.margin) as usize;
+        Some(self.widen(&violated, MARGIN + share))
     }
 
     /// Returns whether it pays to solve for these intervals alone, which may be at most three

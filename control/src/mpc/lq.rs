@@ -171,20 +171,12 @@ impl<const O: usize> Unconstrained<O> {
         (v, std::array::from_fn(|i| next[i] + affine[i]))
     }
 
-    /// Lets stages `first` to `last` of `motion` follow `plan` with the gains of the optimum,
-    /// starting from the state of `motion` at `first`.
-    pub fn track(
-        &self,
-        first: usize,
-        last: usize,
-        plan: &Motion<O>,
-        affine: &[State<O>],
-        motion: &mut Motion<O>,
-    ) {
-        for k in first..last {
+    /// Lets `motion` follow `plan` with the gains of the optimum, from its own first state on.
+    pub fn track(&self, plan: &Motion<O>, affine: &[State<O>], motion: &mut Motion<O>) {
+        for (k, gain) in self.gains.iter().enumerate() {
             let (state, planned) = (motion.states[k], plan.states[k]);
             let v = (0..O).fold(plan.inputs[k], |sum, i| {
-                sum + self.gains[k].feedback[i].component_mul(&(state[i] - planned[i]))
+                sum + gain.feedback[i].component_mul(&(state[i] - planned[i]))
             });
             motion.inputs[k] = v;
             let next = self.chain.advance(&state, &v);
@@ -357,7 +349,7 @@ pub(super) mod tests {
         let elsewhere: State<O> = std::array::from_fn(|i| start::<O>()[i] * 1.5);
         let (mut tracked, mut optimum) = (motion.clone(), motion.clone());
         tracked.states[0] = elsewhere;
-        lq.track(0, N, &motion, &affine(), &mut tracked);
+        lq.track(&motion, &affine(), &mut tracked);
         lq.solve(&elsewhere, &affine(), &mut optimum);
         assert!(tracked.distance(&optimum) < 1e-12);
     }

@@ -1,7 +1,7 @@
 //! One optimisation: the shortcuts, then the interior point method over the whole horizon, then the
 //! cone solver.
 
-use super::bounds::{About, Bounded};
+use super::bounds::Bounded;
 use super::certificate::Certificate;
 use super::optimiser::{Optimiser, Report, Sample};
 use super::problem::{Motion, State};
@@ -50,7 +50,7 @@ impl<const O: usize> Optimiser<O> {
             }
             // From here on the bounds are those about the motion that the search has left.
             self.about.clone_from(&self.solution.motion);
-            (search.about, search.pass) = (About::Motion, 0);
+            (search.follows, search.pass) = (false, 0);
         }
         let by_any = |this: &mut Self, sample: &Sample<O, B>, search: &mut Search| {
             this.by_riccati(sample, search).or_else(|| this.by_cone(sample, search))

@@ -2,7 +2,7 @@
 //! optimum and the problem is solved again until the optimum satisfies the bounds about itself.
 
 use super::balls::Frozen;
-use super::bounds::{About, Bounded, Bounds, Within};
+use super::bounds::{Bounded, Bounds, Within};
 use super::budget::Budget;
 use super::certificate::Certificate;
 use super::conic::ConicSolver;
@@ -133,7 +133,7 @@ impl<const O: usize> Optimiser<O> {
         }
         if search.warm && !self.is_exhausted() {
             // The first guess was misleading.
-            search.warm = false;
+            self.begin_cold(sample, search);
             return self.by_riccati(sample, search);
         }
         search.hopeless = outcome.hopeless() && !search.warm;
@@ -153,7 +153,7 @@ impl<const O: usize> Optimiser<O> {
         let limits = self.budget.of_the_cone()?;
         search.window = None;
         sample.bounded.bounds_about(&self.about, 0..self.layout.horizon, &mut self.bounds);
-        self.frozen.set(&within(sample, &self.bounds), &self.about, 0);
+        self.frozen.set(&within(sample, &mut self.bounds), &self.about, 0);
         let problem = problem(&self.layout, sample, &self.frozen);
         let outcome = self.cone.solve(&problem, &mut self.solution, limits);
         search.iterations += outcome.iterations();
@@ -179,7 +179,7 @@ impl<const O: usize> Optimiser<O> {
         } = self;
         let (bounded, first) = (sample.bounded, range.start);
         bounded.bounds_about(about, range.clone(), bounds);
-        let within = Within { bounded, bounds, about: search.about, first };
+        let within = Within { bounded, bounds: bounds.cells(), follows: search.follows, first };
         let (weight, slope) = unconstrained.to_go(range.end);
         let radius = bounded.terminal_radius().filter(|_| range.end == layout.horizon);
         let mut problem = problem(layout, sample, &within);
@@ -190,10 +190,10 @@ impl<const O: usize> Optimiser<O> {
         problem.affine = &sample.affine[range];
         problem.end = End { weight, slope, radius };
         let outcome = if self.settings.nonlinearity == Nonlinearity::Exact {
-            // Beyond the window, bounds are known if they follow the iterates or never change.
-            let is_known = search.about == About::Iterates || !bounded.depends_on_motion();
+            // A warm search knows its window; bounds about a motion rarely hold beyond it.
+            let extends = !search.warm || !bounded.depends_on_motion();
             let rest = Rest { unconstrained: &*unconstrained, affine: sample.affine };
-            let rest = Some(&rest).filter(|_| is_known && radius.is_none());
+            let rest = Some(&rest).filter(|_| extends && radius.is_none());
             riccati.solve(&problem, solution, first, search.warm, budget, rest)
         } else {
             frozen.set(&within, about, first);
@@ -259,18 +259,22 @@ impl<const O: usize> Optimiser<O> {
     /// Returns the residuals of the present motion. `is_checked` says that the intervals without
     /// multipliers are known to satisfy their constraints.
     pub(super) fn certificate<B: Bounded<O>>(
-        &self,
+        &mut self,
         sample: &Sample<O, B>,
         is_checked: bool,
     ) -> Certificate {
-        let within = within(sample, &self.bounds);
-        Certificate::of(&problem(&self.layout, sample, &within), &self.solution, is_checked)
+        let Self { layout, bounds, solution, .. } = self;
+        let within = within(sample, bounds);
+        Certificate::of(&problem(layout, sample, &within), solution, is_checked)
     }
 }
 
 /// Returns the constraints of all stages with fixed bounds.
-fn within<'a, const O: usize, B>(sample: &Sample<'a, O, B>, bounds: &'a Bounds) -> Within<'a, B> {
-    Within { bounded: sample.bounded, bounds, about: About::Motion, first: 0 }
+fn within<'a, const O: usize, B>(
+    sample: &Sample<'a, O, B>,
+    bounds: &'a mut Bounds,
+) -> Within<'a, B> {
+    Within { bounded: sample.bounded, bounds: bounds.cells(), follows: false, first: 0 }
 }
 
 /// Returns the problem of the whole horizon.

@@ -1,7 +1,7 @@
-//! Passes of an optimisation. Each has the bounds (and linearised balls) about a fixed motion, or
-//! about the iterates: first about the previous plan, then about the optimum of the last pass.
+//! Passes of an optimisation. Each begins with the bounds (and linearised balls) about a motion:
+//! first about the first guess, then about the optimum of the last pass.
 
-use super::bounds::{About, Bounded};
+use super::bounds::Bounded;
 use super::layout::MARGIN;
 use super::optimiser::{Optimiser, Sample};
 use super::problem::Solution;
@@ -12,6 +12,10 @@ use std::mem::replace;
 
 /// A multiplier counts as active above this share of the largest one.
 const ACTIVE: f64 = 1e-3;
+/// The previous plan is no guess if the optimum without balls violates intervals this far beyond
+/// the last active one. A jump of the reference has then entered the horizon. Bounds that do not
+/// depend on the motion need no such rule: the search then recovers faster than it begins anew.
+const NEWS: usize = 10;
 /// Largest number of passes until an optimum satisfies the bounds about itself.
 const SETTLING_PASSES: usize = 8;
 /// Largest number of passes until a first optimisation with linearised balls stands still.
@@ -29,26 +33,34 @@ impl<const O: usize> Optimiser<O> {
         if search.hopeless {
             return;
         }
+        self.begin_cold(sample, search);
         let Some((previous, active)) = sample.previous else {
             self.about.clone_from(&self.solution.motion);
-            if self.settings.is_exact_riccati() && sample.bounded.follows_at_first() {
-                search.about = About::Iterates;
-            }
             return;
         };
-        self.about.clone_from(previous);
+        self.about.states[0] = *sample.start;
+        if is_given {
+            self.unconstrained.track(previous, sample.affine, &mut self.about);
+        } else {
+            self.about.clone_from(previous);
+            self.about.states[0] = *sample.start;
+        }
         // Where the terminal ball is active, each sample has one more stage to reach it, and
         // successive plans differ too much for a warm start.
         if self.settings.method == Method::Riccati && is_given && search.outside.is_none() {
             self.start_warm(sample, active, search);
         }
-        self.about.states[0] = *sample.start;
     }
 
-    /// Takes the previous plan and its multipliers as first guess if some of them are active in the
-    /// range to be solved. A window is extended by the active stages just beyond its end, as it
-    /// would otherwise have to grow.
-    fn start_warm<B>(&mut self, sample: &Sample<O, B>, active: &[[f64; 2]], search: &mut Search) {
+    /// Takes the previous plan, tracked from the new start, and its multipliers as first guess if
+    /// some of them are active in the range to be solved. A window is extended by the active stages
+    /// just beyond its end, as it would otherwise have to grow.
+    fn start_warm<B: Bounded<O>>(
+        &mut self,
+        sample: &Sample<O, B>,
+        active: &[[f64; 2]],
+        search: &mut Search,
+    ) {
         let n = self.layout.horizon;
         let mut range = search.window.clone().unwrap_or(0..n);
         let more_than = |least: f64| move |&[state, input]: &[f64; 2]| state.max(input) > least;
@@ -57,6 +69,11 @@ impl<const O: usize> Optimiser<O> {
         }
         let largest = active.iter().flatten().copied().fold(0.0, f64::max);
         let is_active = more_than(ACTIVE * largest);
+        let last = active.iter().rposition(&is_active).unwrap_or(0);
+        let is_news = search.violated.as_ref().is_some_and(|range| range.end > last + NEWS);
+        if is_news && sample.bounded.depends_on_motion() {
+            return;
+        }
         while let Some(last) =
             active[range.end..(range.end + MARGIN).min(n)].iter().rposition(is_active)
         {
@@ -65,20 +82,26 @@ impl<const O: usize> Optimiser<O> {
         if let Some(window) = &mut search.window {
             window.end = range.end;
         }
-        // The motion must satisfy the chain over the whole range to be solved.
         if !self.layout.is_worth_a_window(&range) {
             search.window = None;
             range = 0..n;
         }
-        let Self { unconstrained, about, solution, .. } = self;
-        let Solution { motion, multipliers } = solution;
-        motion.states[range.start] =
-            if range.start == 0 { *sample.start } else { about.states[range.start] };
-        unconstrained.track(range.start, range.end, about, sample.affine, motion);
+        let Solution { motion, multipliers } = &mut self.solution;
+        motion.clone_from(&self.about);
         for k in range {
             [multipliers.state[k], multipliers.input[k]] = active[k];
         }
-        search.warm = true;
+        (search.warm, search.follows) = (true, false);
+    }
+
+    /// Lets the next search begin without the multipliers of a similar problem. Its guess may be far
+    /// away, so that bounds that depend on the motion follow the iterates.
+    pub(super) fn begin_cold<B: Bounded<O>>(&self, sample: &Sample<O, B>, search: &mut Search) {
+        let follows = match sample.previous {
+            None => sample.bounded.follows_at_first(),
+            Some(_) => sample.bounded.depends_on_motion(),
+        };
+        (search.warm, search.follows) = (false, follows && self.settings.is_exact_riccati());
     }
 
     /// Repeats `way` with the bounds (and linearised balls) about its last optimum until one is
@@ -111,7 +134,7 @@ impl<const O: usize> Optimiser<O> {
             about.clone_from(motion);
             return moved < layout.standstill || search.pass == FIRST_PASSES;
         }
-        if replace(&mut search.about, About::Motion) == About::Iterates {
+        if replace(&mut search.follows, false) {
             sample.bounded.bounds_about(motion, 0..layout.horizon, bounds);
         }
         // The intervals outside a window have already been checked.

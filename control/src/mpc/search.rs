@@ -1,6 +1,5 @@
 //! Progress of the search for the optimum.
 
-use super::bounds::About;
 use std::ops::Range;
 
 /// Progress of the search for the optimum.
@@ -9,14 +8,16 @@ use std::ops::Range;
 pub(super) struct Search {
     /// Radius of the terminal ball, if the optimum without balls ends outside it.
     pub outside: Option<f64>,
+    /// Range from the first to the last interval that the optimum without balls violates.
+    pub violated: Option<Range<usize>>,
     /// Window of the horizon to solve for, if it is not the whole horizon.
     pub window: Option<Range<usize>>,
     /// Whether the first guess has been chosen.
     pub begun: bool,
     /// Whether the arrival cost has been computed.
     pub arrived: bool,
-    /// Motion about which the bounds of the present pass are computed.
-    pub about: About,
+    /// Whether the bounds of the present pass follow the iterates.
+    pub follows: bool,
     /// Number of passes so far; the bounds are computed anew for each.
     pub pass: usize,
     /// Whether the multipliers come from a similar problem.

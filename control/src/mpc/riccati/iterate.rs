@@ -22,6 +22,8 @@ pub struct Riccati<const O: usize> {
     pub(super) faces: Vec<Face<O>>,
     /// Weight P and slope p of the first stage.
     pub(super) first: (Blocks<O>, State<O>),
+    /// Number of intervals of the whole horizon before the present problem.
+    pub(super) before: usize,
     /// Number of intervals of the present problem.
     pub(super) horizon: usize,
     pub(super) max_iterations: u32,
@@ -35,6 +37,7 @@ impl<const O: usize> Riccati<O> {
             terminal: Pair::default(),
             faces: Vec::with_capacity(2 * faces),
             first: ([[Matrix3::zeros(); O]; O], zero_state()),
+            before: 0,
             horizon,
             max_iterations,
         }

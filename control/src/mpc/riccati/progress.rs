@@ -4,7 +4,7 @@ use super::residuals::Residuals;
 use crate::mpc::problem::Outcome;
 
 /// Residual of the balls below which a motion counts as the optimum.
-const FEASIBILITY: f64 = 1e-9;
+const FEASIBILITY: f64 = 1e-7;
 /// Feasibility tolerance for bounds that follow the motion. As their derivatives are left out, the
 /// residual then only shrinks by a constant factor per iteration.
 const FEASIBILITY_FOLLOWING: f64 = 1e-5;

@@ -4,7 +4,7 @@ use super::iterate::Riccati;
 use super::pair::Pair;
 use super::stage::add;
 use crate::mpc::balls::Constraints;
-use crate::mpc::problem::{Problem, Start, State, apply, dot, zero_state};
+use crate::mpc::problem::{Chain, Problem, Start, State, apply, dot, zero_state};
 use nalgebra::Vector3;
 
 /// Relative residuals below which a motion counts as the optimum.
@@ -60,8 +60,20 @@ impl<const O: usize> Riccati<O> {
                 scale = scale.max(own.amax()).max(future.amax());
             },
         );
-        if !matches!(problem.start, Start::Fixed(_)) {
-            largest = self.first.1.iter().fold(largest, |largest, p| largest.max(p.amax()));
+        match problem.start {
+            Start::Fixed(_) => (),
+            Start::Within(..) => {
+                largest = self.first.1.iter().fold(largest, |largest, p| largest.max(p.amax()));
+            }
+            // A slope in E_0 remains as a slope in the inputs before; for a double integrator it is
+            // largest in the first or the last of them.
+            Start::Arrival(..) => {
+                let way = self.before.saturating_sub(1) as f64 * problem.chain.step;
+                let first = Chain::new(way).adjoint(&self.first.1);
+                for costate in [&self.first.1, &first] {
+                    largest = largest.max(problem.chain.input_adjoint(costate).amax());
+                }
+            }
         }
         Residuals {
             stationarity: largest / scale,

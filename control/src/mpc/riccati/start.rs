@@ -31,7 +31,7 @@ impl<const O: usize> Riccati<O> {
         first: usize,
         warm: bool,
     ) {
-        self.horizon = problem.affine.len();
+        (self.before, self.horizon) = (first, problem.affine.len());
         let Solution { motion, multipliers } = solution;
         for (stage, state) in self.stages[..=self.horizon].iter_mut().zip(&motion.states[first..]) {
             stage.state = *state;

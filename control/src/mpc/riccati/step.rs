@@ -43,6 +43,15 @@ impl<const O: usize> Riccati<O> {
             pair.slack += alpha * pair.d_slack;
             pair.multiplier += alpha * pair.d_multiplier;
         });
+        if problem.constraints.follows() {
+            for (k, pair) in self.stages[..=self.horizon].windows(2).enumerate() {
+                let [here, next] = pair else { continue };
+                if here.input_pair.watched || next.state_pair.watched {
+                    let (here, next) = ((&here.state, &here.input), (&next.state, &next.input));
+                    problem.constraints.renew(k, here, next);
+                }
+            }
+        }
         self.evaluate(problem);
     }
 

@@ -42,7 +42,7 @@ fn in_windows<const O: usize, B: Bounded<O>>(
             // If no motion satisfies the balls within the window, none does over the horizon,
             // unless the first guess was misleading.
             search.hopeless = outcome.hopeless() && !search.warm;
-            search.warm = false;
+            optimiser.begin_cold(sample, search);
             return None;
         }
         window.end = window.start + optimiser.riccati.horizon();

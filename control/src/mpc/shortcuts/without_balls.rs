@@ -19,6 +19,7 @@ impl<const O: usize, B: Bounded<O>> Shortcut<O, B> for WithoutBalls {
         // The optimiser has begun with this motion.
         let violated = optimiser.violated(sample, &(0..0));
         search.settled = violated.is_none();
+        search.violated.clone_from(&violated);
         search.window = optimiser.layout.window(violated, false);
         search.settled.then_some(Status::Unconstrained)
     }
