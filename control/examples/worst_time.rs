@@ -6,7 +6,11 @@
 //!     search LAW FIRST COUNT EVALUATIONS [SIZE]
 //!     list LAW FIRST COUNT
 //!     one LAW SEED [SIZE]
+//!     jumps LAW FIRST COUNT
 //! ```
+//!
+//! LAW is `robust`, `delayed` (the robust set in a loop with a declared delay of 0.04 s), `paper`,
+//! `dlmpc` or `all`.
 //!
 //! A case is a reference, a start, and a second state to which the vehicle is kicked one
 //! optimisation later. Its errors are up to 15 deg and its rates up to 4.5 deg/s, both times SIZE.
@@ -14,24 +18,33 @@
 //! that follows. `random` draws COUNT cases from seed FIRST on, and `search` starts COUNT searches
 //! by CMA-ES for the most iterations. Each optimisation is repeated from the same memory, and the
 //! smallest time counts. `list` prints the cases with the most iterations for
-//! control/tests/data/worst_draws.csv. `one` runs a single case once, for a profiler.
+//! control/tests/data/worst_draws.csv. `one` runs a single case once, for a profiler. `jumps` flies
+//! COUNT short flights of `robust` or `delayed` into whose horizon a jump of the reference enters
+//! while the previous plan is followed.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
 
 use cmaes::{CMAESOptions, DVector};
 use control::crmpc::Constraints;
+use control::delay::Latency;
 use control::report::{Report, Status};
-use control::{Crmpc, Dlmpc, dlmpc};
+use control::{Crmpc, Delayed, Dlmpc, dlmpc};
 use harness::draws::{Case, UNKNOWNS};
-use harness::flight::Random;
-use harness::{Optimising, in_parallel, settings};
+use harness::flight::{Flight, Random};
+use harness::{FEEDBACK, Optimising, in_parallel, settings};
 use std::collections::BTreeMap;
+use vehicle::profile::Profile;
 
 /// Number of repetitions of each optimisation.
 const REPETITIONS: usize = 5;
 /// Number of cases that are listed for each law.
 const LISTED: usize = 40;
+/// Delay of the loop `delayed`, s.
+const DELAY: f64 = 0.04;
+/// Time in a flight of `jumps` at which the jump enters the horizon, and its duration, s.
+const ENTERS: f64 = 1.0;
+const DURATION: f64 = 2.0;
 /// Names of the three optimisations of a case.
 const SITUATIONS: [&str; 3] = ["cold", "after a kick", "the next one"];
 
@@ -48,12 +61,20 @@ fn main() {
         settings.solver.time_budget = budget;
         Dlmpc::new(settings).unwrap()
     };
-    for law in ["robust", "paper", "dlmpc"] {
+    for law in ["robust", "delayed", "paper", "dlmpc"] {
         if text(1) != law && text(1) != "all" {
             continue;
         }
         match law {
+            "robust" | "delayed" if text(0) == "jumps" => jumps(law, number),
             "robust" => go(law, text(0), number, |budget| crmpc(Constraints::Robust, budget)),
+            "delayed" => go(law, text(0), number, |budget| {
+                let mut settings = settings(Constraints::Robust);
+                (settings.solver.time_budget, settings.delay) = (budget, DELAY);
+                let law = Crmpc::new(settings).unwrap();
+                let latency = Latency::of_action(DELAY);
+                Delayed::new(law, settings.body, FEEDBACK, latency, settings.limit_moment).unwrap()
+            }),
             "paper" => go(law, text(0), number, |budget| crmpc(Constraints::Paper, budget)),
             // The tuned settings have the same outer layer.
             _ => go(law, text(0), number, |budget| dlmpc(dlmpc::Settings::published(), budget)),
@@ -113,6 +134,53 @@ fn go<C: Optimising>(
                 println!("{name}, {title}: {report:?}");
             }
         }
+    }
+}
+
+/// Flies from random states along a reference that jumps by a random step.
+fn jumps(name: &str, number: impl Fn(usize) -> Option<f64>) {
+    let (first, count) = (number(2).unwrap_or(0.0) as u64, number(3).unwrap_or(1.0) as u64);
+    let mut settings = settings(Constraints::Robust);
+    settings.delay = if name == "delayed" { DELAY } else { 0.0 };
+    let jump = ENTERS + settings.horizon as f64 * settings.period_optimisation;
+    let mut all: [Vec<(u64, Report)>; 3] = Default::default();
+    for seed in first..first + count {
+        let mut flight = Flight::random(&settings, seed);
+        let random = &mut Random::new(seed);
+        let degrees = |values: [f64; 3]| nalgebra::Vector3::from(values.map(f64::to_radians));
+        let before = flight.reference.at(flight.reference_start).angles;
+        let step = random.vector().component_mul(&degrees([10.0, 5.0, 30.0]));
+        (flight.reference, flight.reference_start) =
+            (Profile::step(before, before + step, jump), 0.0);
+        flight.duration = DURATION;
+        let mut best: Vec<(f64, Report)> = Vec::new();
+        for repetition in 0..REPETITIONS {
+            let (mut solves, mut place) = (0, 0);
+            flight.fly_seen(|memory, tick, _, _| {
+                if memory.report.solves == solves {
+                    return;
+                }
+                solves = memory.report.solves;
+                if repetition == 0 {
+                    best.push((tick as f64 * settings.period_feedback, memory.report));
+                } else {
+                    let time = &mut best[place].1.time;
+                    *time = time.min(memory.report.time);
+                }
+                place += 1;
+            });
+        }
+        for (time, report) in best {
+            // The reference is seen from the time on at which the command acts.
+            let seen = time + settings.delay + 1e-9 - ENTERS;
+            let situation =
+                usize::from(seen >= 0.0) + usize::from(seen >= settings.period_optimisation);
+            all[situation].push((seed, report));
+        }
+    }
+    for (title, own) in ["before a jump enters", "as it enters", "afterwards"].iter().zip(all) {
+        let (seeds, reports): (Vec<u64>, Vec<Report>) = own.into_iter().unzip();
+        print(&format!("{name}, {title}"), &seeds, &reports);
     }
 }
 

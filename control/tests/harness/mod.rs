@@ -11,7 +11,7 @@ use control::closed_loop::{Summary, fly};
 use control::crmpc::{Constraints, Memory, Settings, Standing, Status};
 use control::lqr::LqrSettings;
 use control::report::Report;
-use control::{Controller, Crmpc, Dlmpc, Lqr, Measurement, dlmpc};
+use control::{Controller, Crmpc, Delayed, Dlmpc, Lqr, Measurement, dlmpc};
 use nalgebra::Vector3;
 use vehicle::disturbance::{Disturbance, Kind};
 use vehicle::scenario::Scenario;
@@ -45,6 +45,16 @@ impl Optimising for Crmpc {
     }
     fn ratio(&self) -> u64 {
         self.design().ratio as u64
+    }
+}
+
+impl Optimising for Delayed<Crmpc> {
+    /// Returns the report of the last optimisation.
+    fn report(memory: &Self::Memory) -> Report {
+        memory.inner.report
+    }
+    fn ratio(&self) -> u64 {
+        self.inner().ratio()
     }
 }
 
