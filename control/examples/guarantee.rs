@@ -15,9 +15,15 @@ fn main() {
     println!(
         "    K        delay   errors, deg and deg/s   largest bound, deg/s2   left of the moment at 2 deg/s2"
     );
-    for (k1, k2) in
-        [(-5.0, -5.0), (-4.0, -4.5), (-3.0, -4.0), (-2.0, -4.0), (-2.0, -3.0), (-1.0, -2.0)]
-    {
+    for (k1, k2) in [
+        (-5.0, -5.0),
+        (-4.0, -4.5),
+        (-3.0, -4.0),
+        (-2.0, -4.0),
+        (-1.5, -4.0),
+        (-2.0, -3.0),
+        (-1.0, -2.0),
+    ] {
         for delay in [0.0, 0.04, 0.117] {
             for error_deg in [0.0, 0.05, 0.1, 0.2] {
                 let error = f64::to_radians(error_deg);
