@@ -101,9 +101,10 @@ fn fly(settings: &Settings, kind: &str, case: u64) -> (Vec<Optimisation>, Shown)
             (Course::Square(0.16 * 2.0_f64.powi((case / 4) as i32), corner(case % 4)), 0.01)
         }
         "adversaries" => {
-            let sign = if case / 2 % 2 == 0 { 1.0 } else { -1.0 };
-            let course = if case % 2 == 0 { Course::AlongRate } else { Course::AlongMoment };
-            (course(sign), if case / 4 % 2 == 0 { 0.01 } else { 0.04 })
+            let sign = if (case / 2).is_multiple_of(2) { 1.0 } else { -1.0 };
+            let course =
+                if case.is_multiple_of(2) { Course::AlongRate } else { Course::AlongMoment };
+            (course(sign), if (case / 4).is_multiple_of(2) { 0.01 } else { 0.04 })
         }
         _ => panic!("'{kind}' is not white, corners, square or adversaries"),
     };

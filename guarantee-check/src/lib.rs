@@ -10,14 +10,20 @@
 //! invariant set of the initial state `tube`, or the optimisation.
 
 pub mod assessment;
+pub mod draws;
 pub mod dual;
 pub mod dynamics;
+pub mod flights;
 mod identity;
 pub mod interval;
 pub mod kinematics;
 pub mod lemmas;
+pub mod plan;
 pub mod search;
+#[cfg(feature = "shipped")]
+pub mod shipped;
 pub mod sums;
+pub mod tally;
 
 use control::DesignError;
 use control::crmpc::{Design, Lemmas, Settings};

@@ -10,18 +10,20 @@ use control::crmpc::{Settings, held_terminal_weight, terminal_weight};
 use control::error_dynamics::{Gain, SampledError};
 use nalgebra::{Matrix2, Vector2};
 
-type Matrix = [[Interval; 2]; 2];
-type Pair = [Interval; 2];
+/// Matrix of one axis, by rows.
+pub(crate) type Matrix = [[Interval; 2]; 2];
+/// Row or column of one axis: angle and rate.
+pub(crate) type Pair = [Interval; 2];
 
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
+pub(crate) fn product(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
 }
 
-fn applied(a: &Matrix, x: &Pair) -> Pair {
+pub(crate) fn applied(a: &Matrix, x: &Pair) -> Pair {
     a.map(|row| along(&row, x))
 }
 
-fn along(row: &Pair, x: &Pair) -> Interval {
+pub(crate) fn along(row: &Pair, x: &Pair) -> Interval {
     row[0] * x[0] + row[1] * x[1]
 }
 
@@ -30,13 +32,13 @@ fn transposed(a: &Matrix) -> Matrix {
 }
 
 /// Largest row sum of the absolute values.
-fn norm(a: &Matrix) -> Interval {
+pub(crate) fn norm(a: &Matrix) -> Interval {
     (a[0][0].abs() + a[0][1].abs()).max(a[1][0].abs() + a[1][1].abs())
 }
 
 /// Integral ∫ |c₀ + c₁ u| du from `low` over `width`. Where the sign changes, the two triangles
 /// have the area (a² + b²)/(|a| + |b|) times half the width.
-fn integral_of_size([c1, c0]: &Pair, low: Interval, width: Interval) -> Interval {
+pub(crate) fn integral_of_size([c1, c0]: &Pair, low: Interval, width: Interval) -> Interval {
     let (a, b) = (*c0 + *c1 * low, *c0 + *c1 * (low + width));
     let half = Interval::from(0.5) * width;
     let all = (a.abs() + b.abs()) * half;
@@ -99,8 +101,13 @@ impl Axis {
         })
     }
 
+    /// Number of periods after which every vector has been halved `times` times.
+    pub(crate) fn halved(&self, times: usize) -> usize {
+        times * self.powers.len()
+    }
+
     /// Returns the powers Φⁿ for n < `count`.
-    fn transitions(&self, count: usize) -> impl Iterator<Item = Matrix> + '_ {
+    pub(crate) fn transitions(&self, count: usize) -> impl Iterator<Item = Matrix> + '_ {
         let mut block = [[Interval::ONE, Interval::ZERO], [Interval::ZERO, Interval::ONE]];
         (0..count).map(move |n| {
             let within = n % self.powers.len();
@@ -112,7 +119,7 @@ impl Axis {
     }
 
     /// Upper bounds of Σ ‖Φⁿ‖ and of Σ (n − `from`) ‖Φⁿ‖ over all n ≥ `from`.
-    fn tails(&self, from: usize) -> (Interval, Interval) {
+    pub(crate) fn tails(&self, from: usize) -> (Interval, Interval) {
         let at = self.transitions(from + 1).last().map_or(Interval::ALL, |power| norm(&power));
         let of_block = self.powers.iter().fold(Interval::ZERO, |sum, power| sum + norm(power));
         let first = at * of_block;

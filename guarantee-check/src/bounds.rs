@@ -1,0 +1,113 @@
+//! The check of the bounds behind the guarantee for settings of the command line.
+
+use clap::Args;
+use control::crmpc::{Constraints, Settings};
+use control::error_dynamics::Gain;
+use guarantee_check::Report;
+use guarantee_check::lemmas::Finding;
+use vehicle::dynamics::Inertia;
+
+/// Settings whose bounds are checked.
+#[derive(Args)]
+pub(crate) struct Bounds {
+    /// K of the feedback law on the angle, 1/s².
+    #[arg(long)]
+    k1: Option<f64>,
+    /// K of the feedback law on the rate, 1/s.
+    #[arg(long)]
+    k2: Option<f64>,
+    /// Time from a measurement to its moment, s.
+    #[arg(long)]
+    delay: Option<f64>,
+    /// Bound on the disturbance of each axis, deg/s².
+    #[arg(long)]
+    disturbance_deg: Option<f64>,
+    /// Relative error of the inertia that is a common factor of the tensor.
+    #[arg(long)]
+    inertia_error: Option<f64>,
+    /// Relative error of the tensor of inertia in all six entries.
+    #[arg(long)]
+    tensor_error: Option<f64>,
+    /// Bound on the error of each measured angle, deg.
+    #[arg(long)]
+    angle_error_deg: Option<f64>,
+    /// Bound on the error of each measured rate, deg/s.
+    #[arg(long)]
+    rate_error_deg: Option<f64>,
+    /// Sideslip angle of the domain, deg.
+    #[arg(long)]
+    sideslip_deg: Option<f64>,
+    /// Ixx, Iyy, Izz, Ixz in kg m².
+    #[arg(long, num_args = 4)]
+    inertia: Option<Vec<f64>>,
+    /// Relative width of the enclosures that is aimed for.
+    #[arg(long, default_value_t = 1e-3)]
+    gap: f64,
+}
+
+impl Bounds {
+    /// Checks the bounds and prints them. The result is whether all of them hold.
+    ///
+    /// # Errors
+    /// Says why the settings are refused.
+    pub(crate) fn run(&self) -> Result<bool, String> {
+        let report = Report::new(&self.settings()?, self.gap).map_err(|error| error.to_string())?;
+        for (title, findings) in report.sections() {
+            section(title, findings);
+        }
+        for (axis, printed) in report.printed_terminal.iter().enumerate() {
+            println!(
+                "The same with the printed G, axis {}: [{:.6}, {:.6}]",
+                axis + 1,
+                printed.low,
+                printed.high
+            );
+        }
+        println!("\nThe horizon may end with ‖x‖ ≤ {:.6} rad/s.", report.terminal_rate);
+        let verdict = if report.holds() { "Every" } else { "NOT every" };
+        let shown = if report.holds() { "holds" } else { "is shown to hold" };
+        println!("{verdict} bound {shown}.");
+        Ok(report.holds())
+    }
+
+    fn settings(&self) -> Result<Settings, String> {
+        let mut s = Settings::new(Constraints::Robust);
+        let degrees = |value: Option<f64>, otherwise: f64| value.map_or(otherwise, f64::to_radians);
+        s.feedback =
+            Gain { k1: self.k1.unwrap_or(s.feedback.k1), k2: self.k2.unwrap_or(s.feedback.k2) };
+        s.delay = self.delay.unwrap_or(s.delay);
+        s.disturbance_bound = degrees(self.disturbance_deg, s.disturbance_bound);
+        s.inertia_error = self.inertia_error.unwrap_or(s.inertia_error);
+        s.tensor_error = self.tensor_error.unwrap_or(s.tensor_error);
+        s.angle_error = degrees(self.angle_error_deg, s.angle_error);
+        s.rate_error = degrees(self.rate_error_deg, s.rate_error);
+        s.sideslip_domain = degrees(self.sideslip_deg, s.sideslip_domain);
+        if let Some(&[ixx, iyy, izz, ixz]) = self.inertia.as_deref() {
+            let inertia = Inertia { Ixx: ixx, Iyy: iyy, Izz: izz, Ixz: ixz };
+            s.body = inertia.body(1.0).map_err(|error| error.to_string())?;
+        }
+        Ok(s)
+    }
+}
+
+/// Prints the findings of one section.
+fn section(title: &str, findings: &[Finding]) {
+    println!(
+        "\n{title}\n{:52} {:>15} {:>33} {:>10}",
+        "", "bound b", "smallest true bound within", "margin"
+    );
+    for finding in findings {
+        let verdict = match (finding.holds(), finding.fails()) {
+            (true, _) => "",
+            (_, true) => "  FALSE",
+            _ => "  NOT SHOWN",
+        };
+        let (low, high) = (finding.truth.low, finding.truth.high);
+        println!(
+            "{:52} {:15.8e} [{low:15.8e}, {high:15.8e}] {:8.3} %{verdict}",
+            finding.statement,
+            finding.bound,
+            100.0 * finding.margin()
+        );
+    }
+}

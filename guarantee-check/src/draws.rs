@@ -1,0 +1,85 @@
+//! Settings that the design accepts, drawn over everything that a user may set.
+
+use crate::flights::Random;
+use control::DesignError;
+use control::crmpc::{Constraints, Design, InitialState, Settings};
+use control::error_dynamics::Gain;
+
+/// What a draw varies besides the share of the largest disturbance that is accepted.
+const KINDS: u64 = 8;
+
+/// Returns the settings of draw `seed`, or `None` if the design accepts nothing near them.
+pub fn accepted(seed: u64) -> Option<Settings> {
+    let random = &mut Random::new(seed);
+    let mut settings = drawn(seed % KINDS, random);
+    for _ in 0..3 {
+        match Design::new(&settings) {
+            Ok(design) if design.counted >= 1.0 => return Some(settings),
+            Err(DesignError::NoGuarantee { disturbance: Some(bound), .. }) => {
+                // Near the largest value little is left of the moment, and more plans are kept.
+                settings.disturbance_bound = bound * random.between(0.5, 1.0);
+            }
+            _ => return None,
+        }
+    }
+    None
+}
+
+fn drawn(kind: u64, random: &mut Random) -> Settings {
+    let published = Settings::new(Constraints::Robust);
+    match kind {
+        0 => published,
+        1 => Settings { delay: 0.04, ..published },
+        2 => Settings { delay: random.between(0.0, 0.15), ..published },
+        3 => Settings { initial_state: InitialState::Nominal, ..published },
+        4 => Settings { initial_state: InitialState::Tube, ..published },
+        5 => erroneous(random, &published),
+        6 => slow(random, &published),
+        _ => anything(random, &published),
+    }
+}
+
+/// Errors of the measurement, which need a soft gain if they are large.
+fn erroneous(random: &mut Random, published: &Settings) -> Settings {
+    let soft = random.below(2) == 0;
+    let size = if soft { 0.25_f64 } else { 0.03 }.to_radians();
+    let feedback = if soft { Gain { k1: -0.5, k2: -1.5 } } else { published.feedback };
+    Settings {
+        feedback,
+        angle_error: random.between(0.0, size),
+        rate_error: random.between(0.0, size),
+        delay: 0.04 * random.below(2) as f64,
+        ..*published
+    }
+}
+
+/// Optimisation periods of 0.08 to 1 s, with a terminal law that is stable if it is held that long.
+fn slow(random: &mut Random, published: &Settings) -> Settings {
+    let (ratio, k1, k2) = [(2, -5.0, -5.0), (10, -1.0, -2.5), (15, -0.5, -1.6), (25, -0.3, -1.2)]
+        [random.below(4) as usize];
+    Settings {
+        period_optimisation: f64::from(ratio) * published.period_feedback,
+        horizon: 500 / ratio as usize,
+        terminal: Gain { k1, k2 },
+        ..*published
+    }
+}
+
+fn anything(random: &mut Random, published: &Settings) -> Settings {
+    let period_feedback = [0.02, 0.04, 0.05, 0.1][random.below(4) as usize];
+    let states = [InitialState::Measured, InitialState::Nominal, InitialState::Tube];
+    let longest = (0.3 / period_feedback) as u64;
+    Settings {
+        feedback: Gain { k1: -random.between(0.5, 8.0), k2: -random.between(1.0, 8.0) },
+        delay: random.between(0.0, 0.1),
+        inertia_error: random.between(0.0, 0.1),
+        horizon: 20 + random.below(81) as usize,
+        period_feedback,
+        period_optimisation: period_feedback * (1 + random.below(longest)) as f64,
+        limit_rate: published.limit_rate * random.between(0.5, 2.0),
+        limit_moment: published.limit_moment * random.between(0.5, 3.0),
+        sideslip_domain: random.between(10.0, 35.0).to_radians(),
+        initial_state: states[random.below(3) as usize],
+        ..*published
+    }
+}

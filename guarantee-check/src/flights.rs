@@ -1,0 +1,299 @@
+//! Flights whose accepted plans are recorded for the check: any start, reference, disturbance,
+//! inertia and measurement error within the assumptions of the guarantee.
+
+use control::crmpc::{Crmpc, Plan, Settings};
+use control::delay::{Delayed, Latency};
+use control::error::DesignError;
+use control::{Controller, Measurement};
+use nalgebra::{Vector3, Vector6};
+use vehicle::dynamics::RigidBody;
+use vehicle::integrator::rk4;
+use vehicle::kinematics::{self, Kinematics};
+use vehicle::plant::{self, Load, State};
+use vehicle::profile::Profile;
+use vehicle::scenario::Scenario;
+use vehicle::transport::Transport;
+
+/// A plan that the controller accepted, as it follows it from an optimisation on.
+#[derive(Clone, Debug)]
+pub struct Recorded {
+    /// Nominal motion over the horizon, with its braking rate.
+    pub plan: Plan,
+    /// Feedback ticks from the beginning of the nominal motion to the beginning of the plan.
+    pub age: usize,
+    /// Time of the optimisation, s.
+    pub time: f64,
+    /// Deviation of the predicted state from the plan's first state, rad and rad/s.
+    pub deviation: Vector6<f64>,
+    /// Whether the previous plan was kept.
+    pub kept: bool,
+}
+
+/// Pseudo-random numbers (SplitMix64), the same on every platform.
+#[derive(Clone, Debug)]
+pub struct Random(u64);
+
+impl Random {
+    /// Starts the sequence of a seed.
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15))
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// Returns a number between `low` and `high`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Returns one of the numbers below `count`.
+    pub fn below(&mut self, count: u64) -> u64 {
+        self.next() % count
+    }
+
+    fn vector(&mut self) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| self.between(-1.0, 1.0))
+    }
+
+    fn corner(&mut self) -> Vector3<f64> {
+        self.vector().map(sign)
+    }
+}
+
+fn sign(value: f64) -> f64 {
+    if value < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// How a bounded vector changes over time, relative to its bound.
+#[derive(Clone, Copy, Debug)]
+enum Course {
+    White,
+    Corner(Vector3<f64>),
+    Switching(f64),
+    AlongRate(f64),
+    AlongMoment(f64),
+}
+
+impl Course {
+    fn random(random: &mut Random) -> Self {
+        let direction = sign(random.between(-1.0, 1.0));
+        match random.below(5) {
+            0 => Self::White,
+            1 => Self::Corner(random.corner()),
+            2 => Self::Switching(random.between(0.1, 3.0)),
+            3 => Self::AlongRate(direction),
+            _ => Self::AlongMoment(direction),
+        }
+    }
+}
+
+/// A flight from a random start.
+pub struct Flight {
+    settings: Settings,
+    body: RigidBody,
+    start: State,
+    reference: Profile,
+    begin: f64,
+    disturbance: Course,
+    errors: Course,
+    random: Random,
+    duration: f64,
+}
+
+/// Integration step, and time over which the disturbance is held, at most, s.
+const STEP: f64 = 0.02;
+
+impl Flight {
+    /// Draws a flight of `duration` (s).
+    ///
+    /// # Errors
+    /// Reports an inertia that no body can have.
+    pub fn random(settings: &Settings, seed: u64, duration: f64) -> Result<Self, String> {
+        let mut random = Random::new(seed);
+        let scenario = Scenario::crmpc2022();
+        let scale = match random.below(3) {
+            0 => 1.0 - settings.inertia_error,
+            1 => 1.0 + settings.inertia_error,
+            _ => 1.0 + settings.inertia_error * random.between(-1.0, 1.0),
+        };
+        let body = RigidBody::new(settings.body.inertia * scale).ok_or("no such inertia")?;
+        let begin = random.between(0.0, 50.0);
+        let reference = match random.below(3) {
+            0 => scenario.reference.clone(),
+            1 => sine(&mut random),
+            _ => {
+                let [before, after] = [0, 1].map(|_| steady(&mut random));
+                Profile::step(before, after, begin + random.between(0.0, duration))
+            }
+        };
+        let first = reference.at(begin).angles;
+        let mut angles = first + random.vector().component_mul(&degrees([10.0, 8.0, 12.0]));
+        if random.below(4) == 0 {
+            // Near the edge of the domain, and on the way to it.
+            let edge = settings.sideslip_domain * random.between(0.9, 1.0);
+            angles.y = sign(random.between(-1.0, 1.0)) * edge;
+        }
+        let direction = random.vector().normalize();
+        let rates = direction * settings.limit_rate * random.between(0.0, 0.95);
+        Ok(Self {
+            settings: *settings,
+            body,
+            start: plant::state(&angles, &rates),
+            reference,
+            begin,
+            disturbance: Course::random(&mut random),
+            errors: Course::random(&mut random),
+            random,
+            duration,
+        })
+    }
+
+    /// The same flight from other angles (rad) and body rates (rad/s), towards constant angles
+    /// (rad).
+    #[must_use]
+    pub fn between(
+        self,
+        angles: &Vector3<f64>,
+        rates: &Vector3<f64>,
+        towards: Vector3<f64>,
+    ) -> Self {
+        Self { start: plant::state(angles, rates), reference: Profile::constant(towards), ..self }
+    }
+
+    /// Flies, and hands every plan that the controller accepts under guarantee to `observe`.
+    ///
+    /// # Errors
+    /// Reports settings that no controller can be designed for.
+    pub fn record(mut self, mut observe: impl FnMut(&Recorded)) -> Result<(), DesignError> {
+        let s = self.settings;
+        let law = Crmpc::new(s)?;
+        let ratio = law.design().ratio as u64;
+        let latency = Latency::of_action(s.delay);
+        let mut controller = Delayed::new(law, s.body, s.period_feedback, latency, s.limit_moment)?;
+        let mut memory = controller.memory();
+        let mut transport = Transport::new(s.delay).unwrap_or_default();
+        let (profile, begin) = (self.reference.clone(), self.begin);
+        let reference = |time: f64| profile.at(begin + time);
+        let mut state = self.start;
+        let mut acting = Vector3::zeros();
+        for tick in 0..(self.duration / s.period_feedback).round() as u64 {
+            let time = tick as f64 * s.period_feedback;
+            let measured = self.measure(&state, &acting, time);
+            let predicted = controller.predictor().predict(&memory.under_way, &measured);
+            let moment = controller.update(&mut memory, tick, time, &measured, &reference);
+            if tick % ratio == 0 && memory.inner.assured() {
+                observe(&recorded(&memory.inner, &predicted, time));
+            }
+            match &mut transport {
+                Some(transport) => drop(transport.command(time, moment)),
+                None => acting = moment,
+            }
+            state = self.advance(state, time, &mut acting, transport.as_ref());
+            let sideslip = plant::angles(&state).y.abs();
+            if sideslip.is_nan() || sideslip > 1.2 {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Measures the state with errors of angles and x_ω within their bounds.
+    fn measure(&mut self, state: &State, moment: &Vector3<f64>, time: f64) -> Measurement {
+        let (angles, rates) = (plant::angles(state), plant::rates(state));
+        let Settings { angle_error, rate_error, .. } = self.settings;
+        let course = self.errors;
+        let error = self.value(course, state, moment, time);
+        let seen = angles + error * angle_error;
+        let angle_rates = kinematics::r(&angles) * rates + error * rate_error;
+        let rates = kinematics::r_inverse(&seen) * angle_rates;
+        Measurement { angles: seen, rates, ..Measurement::default() }
+    }
+
+    fn value(
+        &mut self,
+        course: Course,
+        state: &State,
+        moment: &Vector3<f64>,
+        time: f64,
+    ) -> Vector3<f64> {
+        let r = kinematics::r(&plant::angles(state));
+        match course {
+            Course::White => self.random.vector(),
+            Course::Corner(corner) => corner,
+            Course::Switching(period) => {
+                let place = (time / period).floor() as u64;
+                Random::new(place ^ (period.to_bits() >> 20)).corner()
+            }
+            Course::AlongRate(direction) => (r * plant::rates(state)).map(sign) * direction,
+            Course::AlongMoment(direction) => {
+                (r * self.body.inverse * moment).map(sign) * direction
+            }
+        }
+    }
+
+    /// Integrates the motion over one feedback period.
+    fn advance(
+        &mut self,
+        mut state: State,
+        time: f64,
+        acting: &mut Vector3<f64>,
+        transport: Option<&Transport>,
+    ) -> State {
+        let (mut now, end) = (time, time + self.settings.period_feedback);
+        while now < end - 1e-12 {
+            let mut until = (now + STEP).min(end);
+            if let Some(transport) = transport {
+                *acting = transport.moment(now + 1e-12);
+                let arrival = transport.next_arrival(now + 1e-12).unwrap_or(until);
+                if arrival > now + 1e-9 {
+                    until = until.min(arrival);
+                }
+            }
+            let course = self.disturbance;
+            let delta = self.value(course, &state, acting, now) * self.settings.disturbance_bound;
+            let load = Load { moment: *acting, delta, ..Load::default() };
+            let mut f = |_: f64, state: &State| {
+                plant::derivative(&self.body, Kinematics::Printed, state, &load)
+            };
+            state = rk4(&mut f, now, &state, until - now);
+            now = until;
+        }
+        state
+    }
+}
+
+fn recorded(memory: &control::crmpc::Memory, predicted: &Measurement, time: f64) -> Recorded {
+    let rates = kinematics::r(&predicted.angles) * predicted.rates;
+    let mut deviation = -memory.plan.states[0];
+    for i in 0..3 {
+        deviation[i] += predicted.angles[i];
+        deviation[3 + i] += rates[i];
+    }
+    Recorded {
+        plan: memory.plan.clone(),
+        age: memory.age as usize,
+        time,
+        deviation,
+        kept: memory.report.status == control::crmpc::Status::Kept,
+    }
+}
+
+fn degrees(values: [f64; 3]) -> Vector3<f64> {
+    Vector3::from(values).map(f64::to_radians)
+}
+
+fn steady(random: &mut Random) -> Vector3<f64> {
+    degrees([10.0, 0.0, -30.0]) + random.vector().component_mul(&degrees([8.0, 6.0, 15.0]))
+}
+
+fn sine(random: &mut Random) -> Profile {
+    let amplitude = random.vector().component_mul(&degrees([4.0, 3.0, 8.0]));
+    let (frequency, phase) = (random.between(0.1, 0.8), random.between(0.0, 6.3));
+    Profile::sine(steady(random), amplitude, frequency, phase)
+}

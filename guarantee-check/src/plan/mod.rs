@@ -1,0 +1,289 @@
+//! Check of a recorded plan: a bound on everything that the vehicle can do while the plan is
+//! followed, until the plan has braked to rest.
+//!
+//! It is derived from assumptions 1 to 4 of docs/guarantee.md and from nothing else that the
+//! certificate uses. No number of the controller's design enters, only the settings, the plan and
+//! its age. docs/guarantee-check.md gives the derivation.
+
+mod body;
+mod causes;
+mod jet;
+mod law;
+mod reach;
+mod rest;
+mod smoothness;
+
+use crate::interval::Interval;
+use body::Body;
+use control::crmpc::{Constraints, Design, InitialState, Plan, Settings};
+use control::error_dynamics::InvariantSet;
+use law::Range;
+use nalgebra::Vector6;
+use reach::{Deviation, Reach};
+
+/// The least that a plan leaves of each limit, as shares of the limits; negative where the check
+/// does not confirm the limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Left {
+    /// Share left of the sideslip angle's domain.
+    pub sideslip: f64,
+    /// Share left of the limit on ‖ω‖.
+    pub rate: f64,
+    /// Share left of the limit on ‖m‖.
+    pub moment: f64,
+}
+
+impl Left {
+    const ALL: Self = Self { sideslip: 1.0, rate: 1.0, moment: 1.0 };
+
+    /// Whether all three limits are confirmed.
+    pub fn confirmed(&self) -> bool {
+        self.sideslip >= 0.0 && self.rate >= 0.0 && self.moment >= 0.0
+    }
+
+    /// Returns the smaller of each share.
+    #[must_use]
+    pub fn min(&self, other: &Self) -> Self {
+        Self {
+            sideslip: self.sideslip.min(other.sideslip),
+            rate: self.rate.min(other.rate),
+            moment: self.moment.min(other.moment),
+        }
+    }
+}
+
+/// Result of the check of a plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// The least that is left of each limit.
+    pub left: Left,
+    /// Time from the beginning of the plan at which each least value occurs, s; infinite beyond the
+    /// horizon.
+    pub at: [f64; 3],
+    /// Whether the states of the plan follow from its accelerations.
+    pub consistent: bool,
+}
+
+impl Verdict {
+    /// Whether the plan is confirmed.
+    pub fn confirmed(&self) -> bool {
+        self.consistent && self.left.confirmed()
+    }
+
+    fn record(&mut self, time: f64, left: &Left) {
+        let lower = |place: &mut f64, least: &mut f64, value: f64| {
+            // A value that is not a number is no confirmation.
+            if value.is_nan() || value < *least {
+                (*place, *least) = (time, if value.is_nan() { f64::NEG_INFINITY } else { value });
+            }
+        };
+        lower(&mut self.at[0], &mut self.left.sideslip, left.sideslip);
+        lower(&mut self.at[1], &mut self.left.rate, left.rate);
+        lower(&mut self.at[2], &mut self.left.moment, left.moment);
+    }
+}
+
+/// Check of plans for one set of settings.
+pub struct PlanCheck {
+    settings: Settings,
+    body: Body,
+    reach: Reach,
+    /// Number of feedback ticks per optimisation.
+    ratio: usize,
+    /// Set in which the deviation of each axis begins, with its size; only for `tube`.
+    start: Option<(InvariantSet, f64)>,
+}
+
+/// Number of times that a range of angles is halved before a moment counts as too large.
+const HALVINGS: u32 = 6;
+/// Largest difference of a plan's state from the one that its accelerations lead to.
+const ROUNDING: f64 = 1e-12;
+
+impl PlanCheck {
+    /// Prepares the check.
+    ///
+    /// # Errors
+    /// Says why no bound is available for these settings: for the paper's set, for an error of the
+    /// whole tensor of inertia, and where the feedback is too slow.
+    pub fn new(settings: &Settings) -> Result<Self, String> {
+        if settings.constraints != Constraints::Robust {
+            return Err("only the robust set is checked".into());
+        }
+        if settings.tensor_error > 0.0 {
+            return Err("an error of the whole tensor of inertia is not covered".into());
+        }
+        let body = Body::new(settings).ok_or("the body is not symmetric about its x-z plane")?;
+        let start = match settings.initial_state {
+            InitialState::Measured | InitialState::Nominal => None,
+            InitialState::Tube => Some(start_set(settings)?),
+        };
+        let borrowed = start.as_ref().map(|(set, size)| (set, *size));
+        let reach = Reach::new(settings, borrowed)
+            .ok_or("the feedback is too slow, or its delay too long, for a bound")?;
+        let ratio = (settings.period_optimisation / settings.period_feedback).round() as usize;
+        Ok(Self { settings: *settings, body, reach, ratio, start })
+    }
+
+    /// Checks a plan whose nominal motion began `age` feedback ticks before the plan.
+    pub fn check(&self, plan: &Plan, age: usize) -> Verdict {
+        let mut verdict =
+            Verdict { left: Left::ALL, at: [0.0; 3], consistent: self.is_consistent(plan) };
+        for k in 0..plan.accelerations.len() {
+            let stage = Stage::new(&self.settings, plan, k);
+            let tick = age + k * self.ratio;
+            let of_moment = self.moment(&stage, tick);
+            for j in 0..self.ratio {
+                let time = (k * self.ratio + j) as f64 * self.settings.period_feedback;
+                let motion = self.motion(&stage, j, tick + j);
+                verdict.record(time, &Left { moment: of_moment, ..motion });
+            }
+        }
+        verdict.record(f64::INFINITY, &self.rest(plan));
+        verdict
+    }
+
+    /// Whether a deviation of the predicted state from the plan's first state lies in the set in
+    /// which `tube` lets a nominal motion begin. It is always true otherwise.
+    pub fn may_begin(&self, deviation: &Vector6<f64>) -> bool {
+        let Some((set, size)) = &self.start else { return true };
+        let inside = |axis: usize| {
+            let value = nalgebra::Vector2::new(deviation[axis], deviation[3 + axis]);
+            set.normals().iter().all(|normal| normal.dot(&value).abs() <= size * (1.0 + 1e-9))
+        };
+        (0..3).all(inside)
+    }
+
+    fn is_consistent(&self, plan: &Plan) -> bool {
+        let h = self.settings.period_optimisation;
+        let whole = plan.states.len() == plan.accelerations.len() + 1;
+        let next = |k: usize| {
+            let (from, to, a) = (&plan.states[k], &plan.states[k + 1], &plan.accelerations[k]);
+            (0..3).all(|i| {
+                let angle = from[i] + h * (from[3 + i] + 0.5 * h * a[i]);
+                let rate = from[3 + i] + h * a[i];
+                (angle - to[i]).abs() <= ROUNDING * (1.0 + to[i].abs())
+                    && (rate - to[3 + i]).abs() <= ROUNDING
+            })
+        };
+        whole && (0..plan.accelerations.len()).all(next)
+    }
+
+    /// Bounds sideslip and body rates from feedback tick `j` of a stage until the next.
+    fn motion(&self, stage: &Stage, j: usize, tick: usize) -> Left {
+        let ends = [0, 1].map(|i| (stage.at((j + i) as f64), self.reach.at(tick + i)));
+        let here = ends[0].1.angle.max(ends[1].1.angle);
+        let off = here.component() + self.reach.bulge.component();
+        let swept = stage.sideslip(j).abs();
+        // The plan's rates are straight lines, and the deviation is convex but for the swing, so
+        // that ‖ω‖ is largest at an end.
+        let near = (swept - off).low.max(0.0);
+        let cosine = body::sin_cos(Interval::from(near)).1;
+        let rate = ends.map(|(state, deviation)| {
+            let size = |i: usize| state[3 + i].abs() + deviation.rate.half;
+            let squares = (cosine * size(0)).square() + size(1).square() + size(2).square();
+            squares.sqrt() + deviation.rate.ball + self.reach.swing
+        });
+        let size = swept + off;
+        let Settings { sideslip_domain, limit_rate, .. } = self.settings;
+        Left {
+            sideslip: (sideslip_domain - size.high) / sideslip_domain,
+            rate: (limit_rate - rate[0].high.max(rate[1].high)) / limit_rate,
+            moment: 1.0,
+        }
+    }
+
+    /// Bounds the commands of a stage; the result is the least share left of the limit.
+    fn moment(&self, stage: &Stage, tick: usize) -> f64 {
+        let ranges = (0..self.ratio).map(|j| Self::range(stage, j, self.reach.at(tick + j)));
+        let Some(all) = ranges.clone().reduce(|a, b| a.hull(&b)) else { return f64::NAN };
+        let remainder = law::remainder(&self.body, &all);
+        let limit = self.settings.limit_moment;
+        let largest = ranges.enumerate().map(|(j, range)| {
+            let added = self.added(self.reach.at(tick + j));
+            let bound = (Interval::from(law::largest(&self.body, &range)) + remainder + added).high;
+            if bound <= limit {
+                return bound;
+            }
+            let rest = (Interval::from(limit) - added).low;
+            (Interval::from(law::divided(&self.body, &range, rest, HALVINGS)) + added).high
+        });
+        self.left_of_moment(largest.fold(0.0, f64::max))
+    }
+
+    fn left_of_moment(&self, moment: f64) -> f64 {
+        (self.settings.limit_moment - moment) / self.settings.limit_moment
+    }
+
+    /// Moment by the parts of K ô that are not in a box, N m: ‖I W k‖ ≤ λ_max(I) ‖k‖.
+    fn added(&self, deviation: &Deviation) -> Interval {
+        let [x, z, y] = self.body.principal();
+        x.max(y).max(z) * deviation.feedback.ball + deviation.inertia
+    }
+
+    /// Range in which the law evaluates the moment of feedback tick `j` of a stage.
+    fn range(stage: &Stage, j: usize, deviation: &Deviation) -> Range {
+        let state = stage.at(j as f64 + 0.5);
+        let Deviation { law_angle, law_rate, feedback, .. } = deviation;
+        let radius = |i: usize| if i < 2 { law_angle.half } else { law_rate.half };
+        Range {
+            centre: [state[0], state[1], state[3], state[4], state[5]],
+            radii: std::array::from_fn(radius),
+            balls: [law_angle.ball, law_rate.ball],
+            acceleration: stage.acceleration,
+            feedback: [feedback.half; 3],
+        }
+    }
+}
+
+/// The set in which `tube` lets the deviation of an axis begin, and its size: this defines the
+/// constraint of the optimisation, and is no bound.
+fn start_set(settings: &Settings) -> Result<(InvariantSet, f64), String> {
+    let design = Design::new(settings).map_err(|error| error.to_string())?;
+    let set = design.invariant.ok_or("no set exists in which a nominal motion may begin")?;
+    Ok((set, (design.counted * settings.disturbance_bound).max(1e-5)))
+}
+
+/// One interval of the plan, with its acceleration held.
+struct Stage {
+    state: [Interval; 6],
+    acceleration: [Interval; 3],
+    period: Interval,
+}
+
+impl Stage {
+    fn new(settings: &Settings, plan: &Plan, k: usize) -> Self {
+        Self {
+            state: std::array::from_fn(|i| Interval::from(plan.states[k][i])),
+            acceleration: std::array::from_fn(|i| Interval::from(plan.accelerations[k][i])),
+            period: Interval::from(settings.period_feedback),
+        }
+    }
+
+    /// State after this many feedback periods.
+    fn at(&self, periods: f64) -> [Interval; 6] {
+        let t = Interval::from(periods) * self.period;
+        let half = Interval::from(0.5);
+        std::array::from_fn(|i| {
+            if i < 3 {
+                self.state[i] + t * (self.state[3 + i] + half * t * self.acceleration[i])
+            } else {
+                self.state[i] + t * self.acceleration[i - 3]
+            }
+        })
+    }
+
+    /// All sideslip angles from feedback tick `j` until the next, with the vertex of the parabola.
+    fn sideslip(&self, j: usize) -> Interval {
+        let [from, to] = [j, j + 1].map(|j| self.at(j as f64));
+        let mut all = from[1].hull(to[1]);
+        let (rate, a) = (from[4], self.acceleration[1]);
+        if (rate * to[4]).low <= 0.0 && !a.contains(0.0) {
+            let vertex = from[1] - Interval::from(0.5) * rate.square() / a;
+            all = all.hull(vertex);
+        }
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,360 @@
+//! How far the vehicle can be from a nominal motion, tick by tick.
+//!
+//! Let the command of tick k act over [T_k, T_k + τ), computed from a measurement of t_k = T_k − d.
+//! o is the vehicle's deviation from the nominal motion, ô that of the predicted state, and
+//! ô_k = o(T_k) − q_k, where q_k is the error of the prediction. With Φ = A + Γ K
+//!
+//! o(T_k+1) = Φ o(T_k) − Γ K q_k + ∫ [T_k+1 − v; 1] w(v) dv,
+//!
+//! w = Δ + ν + F(x, m) − F(mid-period, m): disturbance, the effect ν of the inertia error, and the
+//! mismatch. q_k holds what Δ and ν did since t_k, −A_d e_k for the measurement's error e_k, and a
+//! part φ_k because F differs along the two motions. The linear parts are summed exactly; mismatch
+//! and φ are bounded as vectors.
+
+use super::body::Body;
+use super::causes::{Causes, Mismatch};
+use super::smoothness::{Growth, Smoothness};
+use crate::interval::Interval;
+use crate::sums::{Axis, Matrix, Pair, integral_of_size, product};
+use control::crmpc::Settings;
+use control::error_dynamics::InvariantSet;
+use nalgebra::Vector2;
+use std::collections::VecDeque;
+
+/// Bound on a vector with three components: its part in a box of this half width, and the norm of
+/// the remaining part.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    pub(super) half: Interval,
+    pub(super) ball: Interval,
+}
+
+impl Extent {
+    const NONE: Self = Self { half: Interval::ZERO, ball: Interval::ZERO };
+
+    pub(super) fn max(self, other: Self) -> Self {
+        Self { half: self.half.max(other.half), ball: self.ball.max(other.ball) }
+    }
+
+    fn more(self, half: Interval, ball: Interval) -> Self {
+        Self { half: upper(self.half + half), ball: upper(self.ball + ball) }
+    }
+
+    /// Bound on one component.
+    pub(super) fn component(self) -> Interval {
+        self.half + self.ball
+    }
+}
+
+/// Keeps the upper end of a bound.
+fn upper(value: Interval) -> Interval {
+    Interval::point(value.high)
+}
+
+/// Deviations at one tick: of the vehicle when the command begins to act, and of what the law
+/// computes from the predicted state.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Deviation {
+    /// Angles (rad) and rates (rad/s) of the vehicle.
+    pub(super) angle: Extent,
+    pub(super) rate: Extent,
+    /// Angles (rad) and rates (rad/s) at the predicted middle of the period.
+    pub(super) law_angle: Extent,
+    pub(super) law_rate: Extent,
+    /// Acceleration K ô, rad/s², without the part that compensates ν.
+    pub(super) feedback: Extent,
+    /// Moment that this part requires, N m.
+    pub(super) inertia: Interval,
+}
+
+impl Deviation {
+    pub(super) fn max(&self, other: &Self) -> Self {
+        Self {
+            angle: self.angle.max(other.angle),
+            rate: self.rate.max(other.rate),
+            law_angle: self.law_angle.max(other.law_angle),
+            law_rate: self.law_rate.max(other.law_rate),
+            feedback: self.feedback.max(other.feedback),
+            inertia: self.inertia.max(other.inertia),
+        }
+    }
+}
+
+fn number(value: f64) -> Interval {
+    Interval::from(value)
+}
+
+/// Sums over the responses of one row r to everything that drives the deviation, by the number of
+/// periods since the nominal motion began.
+struct Response {
+    /// ∫ |r Φⁱ [u; 1]| du over all unit pulses that have been seen.
+    seen: Vec<Interval>,
+    /// Parts by measurement errors: of earlier ticks, and of the first.
+    erred: Vec<Interval>,
+    /// Part by mismatch and φ.
+    mismatched: Vec<Interval>,
+    /// Part by the mismatch, if it is summed along the predictions.
+    revised: Vec<Interval>,
+    /// Part by φ of the first tick, which is the vehicle's own deviation there.
+    begun: Vec<Interval>,
+    /// Part by the moment of the inertia error, relative to its bound.
+    inertia: Vec<Interval>,
+}
+
+/// The tube of deviations around any nominal motion of one set of settings.
+pub(super) struct Reach {
+    deviations: Vec<Deviation>,
+    forever: Deviation,
+    /// Largest distance of an angle from the chord between two ticks, rad.
+    pub(super) bulge: Extent,
+    /// Largest additional deviation of the rates between two ticks, rad/s.
+    pub(super) swing: Interval,
+}
+
+struct Builder<'a> {
+    s: &'a Settings,
+    axis: Axis,
+    causes: Causes,
+    /// Growth of the moment that compensates ν.
+    growth: Growth,
+    /// Matrices of the errors: Γ K A_d, A A_d and A_d.
+    errors: [Matrix; 3],
+    /// Number of periods after which no response is followed one by one.
+    steps: usize,
+}
+
+/// Number of times that the largest response is halved before responses are bounded together.
+const HALVINGS: usize = 34;
+/// Largest number of periods that are followed one by one.
+const LONGEST: usize = 20_000;
+
+impl Reach {
+    /// Computes the tube; `start` is the set in which the deviation of each axis may begin, per
+    /// unit of the disturbance bound. `None` if the settings leave no bound.
+    pub(super) fn new(s: &Settings, start: Option<(&InvariantSet, f64)>) -> Option<Self> {
+        Builder::new(s)?.build(start)
+    }
+
+    /// Returns the deviations `tick` feedback ticks after the nominal motion began.
+    pub(super) fn at(&self, tick: usize) -> &Deviation {
+        self.deviations.get(tick).unwrap_or(&self.forever)
+    }
+
+    /// Returns the deviation that is never exceeded.
+    pub(super) fn forever(&self) -> &Deviation {
+        &self.forever
+    }
+}
+
+impl<'a> Builder<'a> {
+    fn new(s: &'a Settings) -> Option<Self> {
+        let axis = Axis::new(s.feedback, s.period_feedback, s.delay)?;
+        let causes = Causes::new(s)?;
+        let (zero, one, d, tau) =
+            (Interval::ZERO, Interval::ONE, number(s.delay), number(s.period_feedback));
+        let transition = |h: Interval| [[one, h], [zero, one]];
+        let (k, half) = ([s.feedback.k1, s.feedback.k2].map(number), number(0.5));
+        let gamma = [half * tau.square(), tau];
+        let fed = gamma.map(|g| k.map(|k| g * k));
+        let delayed = transition(d);
+        let errors = [product(&fed, &delayed), product(&transition(tau), &delayed), delayed];
+        let steps = Some(axis.halved(HALVINGS)).filter(|&steps| steps <= LONGEST)?;
+        let growth = Growth::new(&Body::new(s)?, causes.sideslip);
+        Some(Self { s, axis, causes, growth, errors, steps })
+    }
+
+    /// Growth of a compensated moment while the vehicle turns for `age`, faster than its limit
+    /// before the nominal motion began, and the angles are measured with errors.
+    fn grown(&self, age: Interval) -> Interval {
+        let early = self.causes.smoothness.turning * number(self.s.delay).square();
+        let jump = number(2.0).sqrt() * self.causes.errors[0] + early;
+        let rate = number(self.s.limit_rate) + self.causes.later.apart[0];
+        self.growth.after(rate * age + jump)
+    }
+
+    fn respond(&self, row: Pair) -> Response {
+        let (zero, tau, d) = (Interval::ZERO, number(self.s.period_feedback), number(self.s.delay));
+        let mut sums = [zero; 4];
+        let mut all = Response {
+            seen: vec![zero],
+            erred: vec![zero],
+            mismatched: vec![zero],
+            revised: vec![zero],
+            begun: vec![],
+            inertia: vec![zero],
+        };
+        let mut excess = VecDeque::new();
+        let mut earlier = zero;
+        for (i, power) in self.axis.transitions(self.steps).enumerate() {
+            let reached = [0, 1].map(|j| row[0] * power[0][j] + row[1] * power[1][j]);
+            let wave = integral_of_size(&reached, d, tau);
+            let small = self.mismatched(&reached, &self.causes.later);
+            let first = self.mismatched(&reached, &self.causes.first.0);
+            excess.push_back([0, 1].map(|j| first[j] - small[j]));
+            if excess.len() > self.causes.first.1 {
+                excess.pop_front();
+            }
+            let age = number(i as f64) * tau + d + tau + number(0.5) * tau;
+            all.begun.push(self.unseen(&reached));
+            let inertia = wave * self.grown(age);
+            sums = [sums[0] + wave, sums[1] + small[0], sums[2] + inertia, sums[3] + small[1]];
+            all.seen.push(sums[0]);
+            let more = |j: usize| excess.iter().fold(zero, |sum, part| sum + part[j]);
+            all.mismatched.push(sums[1] + more(0));
+            all.revised.push(sums[3] + more(1));
+            all.inertia.push(sums[2]);
+            all.erred.push(earlier + self.erred(&reached, 1));
+            earlier = earlier + self.erred(&reached, 0);
+        }
+        let tail = self.axis.tails(self.steps).0 * (row[0].abs() + row[1].abs());
+        self.end(&mut all, tail, earlier);
+        all
+    }
+
+    /// Adds what follows when every response has faded, bounded by the sum `tail` of its size.
+    fn end(&self, all: &mut Response, tail: Interval, earlier: Interval) {
+        let tau = number(self.s.period_feedback);
+        let end = number(self.s.delay) + tau;
+        let last = |values: &[Interval]| values.last().copied().unwrap_or(Interval::ALL);
+        let one = [Interval::ONE, Interval::ONE];
+        let more = tail * end.max(Interval::ONE);
+        let seen = last(&all.seen) + more * tau;
+        let small = self.mismatched(&one, &self.causes.first.0);
+        let revised = last(&all.revised) + more * small[1];
+        let small = last(&all.mismatched) + more * small[0];
+        let inertia = last(&all.inertia) + more * tau * self.grown(number(1e9));
+        let erred = earlier + more * (self.erred(&one, 0) + self.erred(&one, 1));
+        all.seen.push(seen);
+        all.mismatched.push(small);
+        all.revised.push(revised);
+        all.inertia.push(inertia);
+        all.erred.push(erred);
+        let begun = tail * self.unseen(&one);
+        all.begun.extend([begun, begun]);
+    }
+
+    /// Effect of the errors through one of the matrices.
+    fn erred(&self, row: &Pair, matrix: usize) -> Interval {
+        let m = &self.errors[matrix];
+        let by = |j: usize| (row[0] * m[0][j] + row[1] * m[1][j]).abs() * self.causes.errors[j];
+        by(0) + by(1)
+    }
+
+    /// Effect of the mismatch of one tick, summed along the true motion with φ, and along the
+    /// predictions. The part of F that is odd about the middle of the period shifts the angle only.
+    fn mismatched(&self, row: &Pair, of: &Mismatch) -> [Interval; 2] {
+        let tau = number(self.s.period_feedback);
+        let Causes { smoothness, middle, .. } = &self.causes;
+        let cube = tau.square() * tau;
+        let at = |u: Interval| (row[0] * u + row[1]).abs();
+        let most = at(Interval::ZERO).max(at(tau));
+        let late = at(Interval::ZERO).max(at(tau + number(self.s.delay)));
+        let half = number(0.5) * tau;
+        let k = [self.s.feedback.k1, self.s.feedback.k2].map(|k| number(k).abs());
+        let fed = (row[0] * half * tau + row[1] * tau).abs()
+            * (k[0] * of.unseen[0] + k[1] * of.unseen[1]);
+        let swing = most * smoothness.bend * cube / number(24.0)
+            + at(half) * tau * *middle
+            + row[0].abs() * smoothness.slope * cube / number(12.0);
+        [most * of.drifted + fed + swing, late * of.revised + swing]
+    }
+
+    fn build(&self, start: Option<(&InvariantSet, f64)>) -> Option<Reach> {
+        let (tau, half, eighth) = (number(self.s.period_feedback), number(0.5), number(0.125));
+        let [k1, k2] = [self.s.feedback.k1, self.s.feedback.k2].map(number);
+        let (zero, one) = (Interval::ZERO, Interval::ONE);
+        let rows = [
+            [one, zero],
+            [zero, one],
+            [one + eighth * tau.square() * k1, half * tau + eighth * tau.square() * k2],
+            [half * tau * k1, one + half * tau * k2],
+            [k1, k2],
+        ];
+        let responses = rows.map(|row| self.respond(row));
+        let starts = rows.map(|row| self.starts(row, start));
+        let unseen = [half * number(self.s.delay).square(), number(self.s.delay)];
+        let at = |n: usize| self.deviation(n, &rows, &responses, &starts, &unseen);
+        let deviations: Vec<Deviation> = (0..=self.steps).map(at).collect();
+        let forever = deviations.iter().fold(at(self.steps + 1), |most, at| most.max(at));
+        let accelerated = forever.feedback.more(zero, self.causes.inertia * last(&responses[4]));
+        let bulge = Extent::NONE.more(
+            eighth * tau.square() * accelerated.half,
+            eighth * tau.square() * accelerated.ball,
+        );
+        let Smoothness { slope, bend, .. } = self.causes.smoothness;
+        let swing = eighth * tau.square() * (slope + bend * tau);
+        forever.rate.ball.high.is_finite().then_some(Reach { deviations, forever, bulge, swing })
+    }
+
+    /// Support of the start set along r Φⁿ for each n.
+    fn starts(&self, row: Pair, start: Option<(&InvariantSet, f64)>) -> Vec<Interval> {
+        let Some((set, size)) = start else { return vec![Interval::ZERO; self.steps + 2] };
+        let support = |power: &Matrix| {
+            let [x, y] = [0, 1].map(|j| row[0] * power[0][j] + row[1] * power[1][j]);
+            // The slack covers rounding of the row and of the sum.
+            let along = set.support(&Vector2::new(x.middle(), y.middle()));
+            number(along * size * (1.0 + 1e-9) + 1e-15)
+        };
+        let powers = self.axis.transitions(self.steps + 1);
+        let mut all: Vec<Interval> = powers.map(|power| support(&power)).collect();
+        let largest = set.support(&Vector2::x()).max(set.support(&Vector2::y()));
+        let tail = self.axis.tails(self.steps).0 * (row[0].abs() + row[1].abs());
+        all.push(tail * number(largest * size));
+        all
+    }
+
+    fn deviation(
+        &self,
+        n: usize,
+        rows: &[Pair; 5],
+        responses: &[Response; 5],
+        starts: &[Vec<Interval>; 5],
+        unseen: &Pair,
+    ) -> Deviation {
+        let Causes { disturbance, inertia, .. } = &self.causes;
+        let half = |i: usize| {
+            let Response { seen, erred, .. } = &responses[i];
+            *disturbance * seen[n] + erred[n] + starts[i][n]
+        };
+        let own = |i: usize| {
+            let Response { seen, mismatched, revised, begun, .. } = &responses[i];
+            let erred = if n == 0 { self.erred(&rows[i], 2) } else { Interval::ZERO };
+            let along = mismatched[n] + begun[n];
+            let small = along.min(revised[n] + self.unseen(&rows[i]));
+            let pulses = seen[n] + unseen[i];
+            let half = half(i) + *disturbance * unseen[i] + erred;
+            Extent { half: upper(half), ball: upper(*inertia * pulses + small) }
+        };
+        let law = |i: usize, compensated: bool| {
+            let Response { seen, mismatched, revised, begun, .. } = &responses[i];
+            // The first predicted state is known exactly.
+            let (mut half, mut small) = (half(i), Interval::ZERO);
+            if n > 0 {
+                half = half + self.erred(&rows[i], 2);
+                small = (mismatched[n] + begun[n] + self.unseen(&rows[i])).min(revised[n]);
+            }
+            let inertia = if compensated { *inertia * seen[n] } else { Interval::ZERO };
+            Extent { half: upper(half), ball: upper(inertia + small) }
+        };
+        let moment = number(self.s.inertia_error) / (Interval::ONE - number(self.s.inertia_error))
+            * number(self.s.limit_moment);
+        Deviation {
+            angle: own(0),
+            rate: own(1),
+            law_angle: law(2, true),
+            law_rate: law(3, true),
+            feedback: law(4, false),
+            inertia: upper(moment * responses[4].inertia[n]),
+        }
+    }
+
+    /// Size of φ along a row.
+    fn unseen(&self, row: &Pair) -> Interval {
+        let [angle, rate] = self.causes.first.0.unseen;
+        row[0].abs() * angle + row[1].abs() * rate
+    }
+}
+
+fn last(response: &Response) -> Interval {
+    response.seen.last().copied().unwrap_or(Interval::ALL)
+}

@@ -1,0 +1,94 @@
+//! The check of plans that are recorded with drawn settings.
+
+use clap::Args;
+use control::crmpc::Settings;
+use guarantee_check::draws;
+use guarantee_check::tally::{Tally, check_flights};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// Plans of random flights.
+#[derive(Args)]
+pub(crate) struct Plans {
+    /// Number of draws of settings.
+    #[arg(long, default_value_t = 100)]
+    draws: u64,
+    /// Number of flights per draw.
+    #[arg(long, default_value_t = 8)]
+    flights: u64,
+    /// Duration of each flight, s.
+    #[arg(long, default_value_t = 10.0)]
+    duration: f64,
+    /// Seed of the first draw.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Number of threads.
+    #[arg(long, default_value_t = 1)]
+    threads: u64,
+}
+
+impl Plans {
+    /// Checks the plans and prints the outcomes. The result is whether all were confirmed.
+    pub(crate) fn run(&self) -> Result<bool, String> {
+        let (next, total) = (AtomicU64::new(self.seed), Mutex::new(Tally::default()));
+        let work = || -> Result<(), String> {
+            loop {
+                let seed = next.fetch_add(1, Ordering::Relaxed);
+                if seed >= self.seed + self.draws {
+                    return Ok(());
+                }
+                let Some(settings) = draws::accepted(seed) else { continue };
+                let tally = self.fly(&settings, seed)?;
+                if !tally.confirmed() {
+                    println!("draw {seed}: {settings:?}");
+                    report("", &tally);
+                }
+                total.lock().unwrap_or_else(PoisonError::into_inner).add(tally);
+            }
+        };
+        let outcomes: Vec<Result<(), String>> = std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..self.threads).map(|_| scope.spawn(work)).collect();
+            let joined = threads.into_iter().map(std::thread::ScopedJoinHandle::join);
+            joined
+                .map(|outcome| outcome.unwrap_or_else(|_| Err("a thread failed".into())))
+                .collect()
+        });
+        outcomes.into_iter().collect::<Result<(), String>>()?;
+        let total = total.into_inner().unwrap_or_else(PoisonError::into_inner);
+        report("all draws", &total);
+        // A draw may leave no accepted plan.
+        Ok(total.confirmed())
+    }
+
+    fn fly(&self, settings: &Settings, draw: u64) -> Result<Tally, String> {
+        let first = draw * self.flights;
+        check_flights(settings, first..first + self.flights, self.duration)
+            .map_err(|error| format!("draw {draw}: {error}"))
+    }
+}
+
+/// Prints the outcomes of some plans.
+pub(crate) fn report(title: &str, tally: &Tally) {
+    println!(
+        "{title}: {} plans ({} kept, {} older than one optimisation), {} not confirmed",
+        tally.plans, tally.kept, tally.aged, tally.not_confirmed
+    );
+    if tally.outside > 0 {
+        println!("  {} begin outside of the set of `tube`", tally.outside);
+    }
+    if let Some(left) = &tally.left {
+        println!(
+            "  least left: sideslip {:.3} %, rate {:.3} %, moment {:.3} %",
+            100.0 * left.sideslip,
+            100.0 * left.rate,
+            100.0 * left.moment
+        );
+    }
+    for refuted in &tally.refuted {
+        let (recorded, verdict) = (&refuted.recorded, &refuted.verdict);
+        println!(
+            "  NOT CONFIRMED: flight {}, {:.2} s, age {}: {verdict:?}",
+            refuted.seed, recorded.time, recorded.age
+        );
+    }
+}

@@ -1,0 +1,95 @@
+//! Checks the plans of many flights and counts the outcomes.
+
+use crate::flights::{Flight, Recorded};
+use crate::plan::{Left, PlanCheck, Verdict};
+use control::crmpc::Settings;
+
+/// A plan that was not confirmed.
+#[derive(Clone, Debug)]
+pub struct Refuted {
+    /// Seed of the flight.
+    pub seed: u64,
+    /// The plan, with its age and time.
+    pub recorded: Recorded,
+    /// Result of its check.
+    pub verdict: Verdict,
+}
+
+/// Outcomes of the checks of many plans.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    /// Number of plans that were checked.
+    pub plans: u64,
+    /// Number of these that are previous plans which were kept.
+    pub kept: u64,
+    /// Number of plans whose nominal motion began at an earlier optimisation.
+    pub aged: u64,
+    /// Number of plans of `tube` that begin outside of the set in which they may.
+    pub outside: u64,
+    /// The least that any plan leaves of each limit; `None` without plans.
+    pub left: Option<Left>,
+    /// Number of plans that were not confirmed.
+    pub not_confirmed: u64,
+    /// The first few plans that were not confirmed.
+    pub refuted: Vec<Refuted>,
+}
+
+/// Number of refuted plans that are kept for the report.
+const SHOWN: usize = 10;
+
+impl Tally {
+    /// Adds the outcomes of another tally.
+    pub fn add(&mut self, other: Self) {
+        self.plans += other.plans;
+        self.kept += other.kept;
+        self.aged += other.aged;
+        self.outside += other.outside;
+        self.not_confirmed += other.not_confirmed;
+        self.refuted.extend(other.refuted);
+        self.refuted.truncate(SHOWN);
+        let both = |a: Left, b: Left| a.min(&b);
+        self.left = match (self.left, other.left) {
+            (Some(a), Some(b)) => Some(both(a, b)),
+            (a, b) => a.or(b),
+        };
+    }
+
+    /// Whether plans were checked, and all of them confirmed.
+    pub fn confirmed(&self) -> bool {
+        self.plans > 0 && self.not_confirmed == 0 && self.outside == 0
+    }
+
+    fn record(&mut self, seed: u64, recorded: &Recorded, check: &PlanCheck) {
+        let verdict = check.check(&recorded.plan, recorded.age);
+        self.plans += 1;
+        self.kept += u64::from(recorded.kept);
+        self.aged += u64::from(recorded.age > 0);
+        self.outside += u64::from(recorded.age == 0 && !check.may_begin(&recorded.deviation));
+        self.left = Some(self.left.map_or(verdict.left, |left| left.min(&verdict.left)));
+        if !verdict.confirmed() {
+            self.not_confirmed += 1;
+            if self.refuted.len() < SHOWN {
+                self.refuted.push(Refuted { seed, recorded: recorded.clone(), verdict });
+            }
+        }
+    }
+}
+
+/// Flies the flights with these seeds for `duration` (s) each, and checks every plan.
+///
+/// # Errors
+/// Says why the settings cannot be flown or checked.
+pub fn check_flights(
+    settings: &Settings,
+    seeds: impl Iterator<Item = u64>,
+    duration: f64,
+) -> Result<Tally, String> {
+    let check = PlanCheck::new(settings)?;
+    let mut tally = Tally::default();
+    for seed in seeds {
+        let flight = Flight::random(settings, seed, duration)?;
+        let observe = |recorded: &Recorded| tally.record(seed, recorded, &check);
+        flight.record(observe).map_err(|error| error.to_string())?;
+    }
+    Ok(tally)
+}
