@@ -7,10 +7,10 @@
 //! ```
 //!
 //! `cost` flies the scenario of Chai 2022 with white noise and with constant disturbances, and
-//! prints EMS, kept plans and computing times; COMMON and TENSOR are the bounds on the inertia error
-//! as a common factor and of the tensor. `edge` flies COUNT flights, with the seeds from FIRST
-//! on, that begin just inside the set of certified states, optimising every PERIOD seconds. A line
-//! shows each broken promise with its seed.
+//! prints EMS, kept plans and computing times; COMMON and TENSOR are the bounds on the inertia
+//! error as a common factor and of the tensor. `edge` flies COUNT flights, with the seeds from
+//! FIRST on, that begin just inside the set of certified states, optimising every PERIOD seconds. A
+//! line shows each broken promise with its seed.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;

@@ -2,7 +2,8 @@
 //! computing times:
 //!
 //! ```text
-//! cargo run --release -p reentry-control --example loop_times -- KIND FIRST COUNT [REPETITIONS [K1 K2 [DELAYS]]]
+//! cargo run --release -p reentry-control --example loop_times -- ARGUMENTS
+//!     KIND FIRST COUNT [REPETITIONS [K1 K2 [DELAYS]]]
 //! ```
 //!
 //! Each flight is that of Chai 2022 (50 s, inertia + 5 %) with seed or case FIRST to FIRST +

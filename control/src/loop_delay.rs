@@ -2,12 +2,12 @@
 //!
 //! In many tools nobody knows how long a loop takes from a measurement to the moment that results
 //! from it. The vehicle shows it: its angular acceleration over a period is I⁻¹ (m − ω × I ω) with
-//! the moment m that acts then, and a disturbance. For a delay of (j + f) τ, m is the mean
-//! (1 − f) m_{k−1−j} + f m_{k−2−j} of two commands. The estimate is the delay that leaves least
-//! unexplained, by least squares: of the acceleration, if the disturbance is like noise, of its change
-//! from period to period, if it seldom changes, or of the change of that, if it changes smoothly. A
-//! factor that the inertia is wrong by is found beside it. Periods that no delay explains, such as
-//! those in which the disturbance jumps, count less.
+//! the moment m that acts then, and a disturbance. For a delay of (j + f) τ, m is the mean (1 − f)
+//! m_{k−1−j} + f m_{k−2−j} of two commands. The estimate is the delay that leaves least
+//! unexplained, by least squares: of the acceleration, if the disturbance is like noise, of its
+//! change from period to period, if it seldom changes, or of the change of that, if it changes
+//! smoothly. A factor that the inertia is wrong by is found beside it. Periods that no delay
+//! explains, such as those in which the disturbance jumps, count less.
 //!
 //! This is a prediction-error method (L. Ljung, System Identification, 1999, section 13.4), which
 //! may be used in a closed loop: at the right delay, what is left is new, and no earlier command is
@@ -77,8 +77,8 @@ struct Fit {
     scale: f64,
 }
 
-/// Sums of products of y, of the same u of the command after a whole number of periods of delay, and
-/// of u⁺ after one period more, (rad/s²)².
+/// Sums of products of y, of the same u of the command after a whole number of periods of delay,
+/// and of u⁺ after one period more, (rad/s²)².
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Sums {
     /// Sum of y · u.
@@ -216,9 +216,9 @@ impl Fit {
         Self { sums: vec![Sums::default(); candidates], ..Self::default() }
     }
 
-    /// Adds a period with `y`; `command` returns u for a number of periods of delay. Earlier periods
-    /// are `kept` by this share. Returns the weight of the period, which is below 1 if no delay
-    /// explains it.
+    /// Adds a period with `y`; `command` returns u for a number of periods of delay. Earlier
+    /// periods are `kept` by this share. Returns the weight of the period, which is below 1 if no
+    /// delay explains it.
     fn add(&mut self, kept: f64, y: &Vector3<f64>, command: impl Fn(usize) -> Vector3<f64>) -> f64 {
         let last = self.sums.len() - 1;
         let left = |j| (y - command(j)).norm_squared();

@@ -65,8 +65,8 @@ pub struct Axis {
 }
 
 /// Bounds on the effect of a drive by the end of some period: angle, rate, both as the law sees
-/// them, both as it predicts them for the middle of the period, feedback, and the feedback times its
-/// age.
+/// them, both as it predicts them for the middle of the period, feedback, and the feedback times
+/// its age.
 pub type Bounds = [Interval; 8];
 
 /// Largest b that is allowed: stable dynamics that fade more slowly are refused.

@@ -520,10 +520,10 @@ struct Parts {
 impl Parts {
     fn new(s: &Settings, dynamics: &Dynamics) -> Self {
         let Dynamics { geometry, smallest, largest, rate, .. } = dynamics;
-        // The inertia is I_v = (1 + c) I^½ (1 + E) I^½. With D = 1 − (1 + E)⁻¹, I_v⁻¹ (m − ω × I_v ω)
-        // differs from I⁻¹ (m − ω × I ω) by −c/(1 + c) I⁻¹ m, by I^−½ D I^−½ (ω × I ω − m/(1 + c)),
-        // and by I^−½ (1 + E)⁻¹ I^−½ (ω × I^½ E I^½ ω). For the last one, ‖ω × S ω‖ is at most half
-        // the range of the eigenvalues of S.
+        // The inertia is I_v = (1 + c) I^½ (1 + E) I^½. With D = 1 − (1 + E)⁻¹, I_v⁻¹ (m − ω × I_v
+        // ω) differs from I⁻¹ (m − ω × I ω) by −c/(1 + c) I⁻¹ m, by I^−½ D I^−½ (ω × I ω − m/(1 +
+        // c)), and by I^−½ (1 + E)⁻¹ I^−½ (ω × I^½ E I^½ ω). For the last one, ‖ω × S ω‖ is at most
+        // half the range of the eigenvalues of S.
         let common = s.inertia_error / (1.0 - s.inertia_error);
         let tensor = s.tensor_error / (1.0 - s.tensor_error);
         let gyroscopic = (0.5 * (largest - smallest) + largest) * powi(s.limit_rate, 2);
@@ -710,13 +710,13 @@ impl RateLoss {
         self.constant + by_angles * self.by_angles + size * self.by_size
     }
 
-    /// Returns the largest amount by which ‖ω̃‖ and the loss together exceed, within an optimisation
-    /// period with ‖x̃_ω‖ ≤ x and a held acceleration ‖a‖ ≤ a, the straight line between their
-    /// values at both ends, rad/s.
+    /// Returns the largest amount by which ‖ω̃‖ and the loss together exceed, within an
+    /// optimisation period with ‖x̃_ω‖ ≤ x and a held acceleration ‖a‖ ≤ a, the straight line
+    /// between their values at both ends, rad/s.
     ///
     /// Each factor exceeds its own line by up to h²/8 times its second derivative. Where one factor
-    /// of a product grows and the other falls, the product of two lines exceeds the line between its
-    /// ends by up to a quarter of the product of both changes.
+    /// of a product grows and the other falls, the product of two lines exceeds the line between
+    /// its ends by up to a quarter of the product of both changes.
     #[inline]
     pub(super) fn within(&self, x: f64, a: f64) -> f64 {
         let [of_a, xa, xx, xxx] = self.within;

@@ -690,8 +690,8 @@ impl Crmpc {
         linearise::moment(&self.settings.body, &angles, &(rates + commanded * half), commanded)
     }
 
-    /// Returns what contradicts the assumptions at a tick. As long as no plan was certified, a motion
-    /// beyond the limits, or away from the plan, contradicts nothing.
+    /// Returns what contradicts the assumptions at a tick. As long as no plan was certified, a
+    /// motion beyond the limits, or away from the plan, contradicts nothing.
     fn contradiction(
         &self,
         memory: &Memory,

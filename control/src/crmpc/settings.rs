@@ -88,8 +88,8 @@ pub struct Settings {
     pub disturbance_bound: f64,
     /// Relative inertia error that the robust set tolerates if it is a common factor of the tensor.
     pub inertia_error: f64,
-    /// Bound on ‖I^−½ (I_v − I) I^−½‖, the relative error of the tensor of inertia in all six entries
-    /// that the robust set tolerates besides the common factor.
+    /// Bound on ‖I^−½ (I_v − I) I^−½‖, the relative error of the tensor of inertia in all six
+    /// entries that the robust set tolerates besides the common factor.
     pub tensor_error: f64,
     /// Bound on the error of each measured angle, rad. The error may take any value within it at
     /// each tick.

@@ -1,7 +1,7 @@
 //! Supervision of the guarantee: what a controller says of it, tick by tick.
 //!
-//! The theorem needs a certified plan and true assumptions. The plan is judged where it is made. The
-//! assumptions are judged here, by what contradicts them: once one has been contradicted, the
+//! The theorem needs a certified plan and true assumptions. The plan is judged where it is made.
+//! The assumptions are judged here, by what contradicts them: once one has been contradicted, the
 //! guarantee is in force again only after nothing has contradicted them for a while.
 
 use super::Standing;
@@ -16,8 +16,8 @@ pub enum Contradiction {
     /// Nothing does.
     #[default]
     None,
-    /// The inputs were set before the tick, because the communication step is longer than the period
-    /// of the feedback law, or no part of it.
+    /// The inputs were set before the tick, because the communication step is longer than the
+    /// period of the feedback law, or no part of it.
     Step,
     /// The motion shows another delay of the loop than the one that was told.
     Delay,
@@ -44,8 +44,8 @@ pub struct Supervision {
 }
 
 impl Supervision {
-    /// Takes the `standing` of the plan and what contradicts the assumptions at a tick, one `period`
-    /// (s) after the last.
+    /// Takes the `standing` of the plan and what contradicts the assumptions at a tick, one
+    /// `period` (s) after the last.
     pub(super) fn judge(&mut self, standing: Standing, found: Contradiction, period: f64) {
         let was_assured = self.status.is_assured();
         if found == Contradiction::None {

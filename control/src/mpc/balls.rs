@@ -56,8 +56,8 @@ pub trait Constraints<const O: usize> {
         false
     }
 
-    /// Sets the sizes of the input ball of stage `k` and of the state ball of the next stage to those
-    /// about these two stages, if they depend on the motion. Until then they are held.
+    /// Sets the sizes of the input ball of stage `k` and of the state ball of the next stage to
+    /// those about these two stages, if they depend on the motion. Until then they are held.
     fn renew(&self, _k: usize, _here: At<O>, _next: At<O>) {}
 
     /// Returns whether the states have balls of their own.

@@ -98,8 +98,8 @@ pub trait Bounded<const O: usize> {
     /// state at its end. Bounds that do not depend on the motion need no implementation.
     fn bounds_about(&self, _motion: &Motion<O>, _of: Range<usize>, _bounds: &mut Bounds) {}
 
-    /// Returns the bounds of interval `k` about the stages at its ends: for the state at its end, and
-    /// for its input. `None` if they do not depend on the motion.
+    /// Returns the bounds of interval `k` about the stages at its ends: for the state at its end,
+    /// and for its input. `None` if they do not depend on the motion.
     fn bounds_between(&self, _k: usize, _here: At<O>, _next: At<O>) -> Option<(f64, f64)> {
         None
     }
@@ -109,8 +109,8 @@ pub trait Bounded<const O: usize> {
         false
     }
 
-    /// Returns whether the bounds of a first optimisation follow its iterates to the end. The solver
-    /// then satisfies the balls only as closely as the derivatives that are left out permit.
+    /// Returns whether the bounds of a first optimisation follow its iterates to the end. The
+    /// solver then satisfies the balls only as closely as the derivatives that are left out permit.
     fn follows_at_first(&self) -> bool {
         self.depends_on_motion()
     }

@@ -94,8 +94,8 @@ impl<const O: usize> Optimiser<O> {
         (search.warm, search.follows) = (true, false);
     }
 
-    /// Lets the next search begin without the multipliers of a similar problem. Its guess may be far
-    /// away, so that bounds that depend on the motion follow the iterates.
+    /// Lets the next search begin without the multipliers of a similar problem. Its guess may be
+    /// far away, so that bounds that depend on the motion follow the iterates.
     pub(super) fn begin_cold<B: Bounded<O>>(&self, sample: &Sample<O, B>, search: &mut Search) {
         let follows = match sample.previous {
             None => sample.bounded.follows_at_first(),

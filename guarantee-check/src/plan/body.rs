@@ -5,7 +5,8 @@
 //!
 //! m = J (V a + D) − ω × J ω,  ω = V x,  D = [s x₂ z, −c x₂ z, c x₁ (s x₁ + x₃)],  z = 2 s x₁ + x₃,
 //!
-//! where D = T Ẇ x. The norm of m is that in the body's axes. J depends on 2α through U and P alone.
+//! where D = T Ẇ x. The norm of m is that in the body's axes. J depends on 2α through U and P
+//! alone.
 
 use super::jet::Jet;
 use crate::dual::{Dual, Number};

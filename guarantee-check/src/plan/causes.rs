@@ -1,5 +1,5 @@
-//! What drives the vehicle off a nominal motion: Δ, the inertia error, the errors of measurement, and
-//! the change of F between where the law evaluates it and where the vehicle is.
+//! What drives the vehicle off a nominal motion: Δ, the inertia error, the errors of measurement,
+//! and the change of F between where the law evaluates it and where the vehicle is.
 
 use super::body::{Body, sin_cos};
 use super::smoothness::Smoothness;
@@ -32,7 +32,8 @@ pub(super) struct Causes {
     /// exceed their limit, and the number of such ticks.
     pub(super) first: (Mismatch, usize),
     pub(super) smoothness: Smoothness,
-    /// Difference of F at the predicted middle of the period from the intended acceleration, rad/s².
+    /// Difference of F at the predicted middle of the period from the intended acceleration,
+    /// rad/s².
     pub(super) middle: Interval,
     /// Largest sideslip of the vehicle and of all predictions, rad.
     pub(super) sideslip: f64,

@@ -73,8 +73,8 @@ pub(super) fn remainder(body: &Body, range: &Range) -> Interval {
 }
 
 impl Range {
-    /// The two halves of the range along the wider of the two angles, in which all deviations of the
-    /// angles are parts of the box.
+    /// The two halves of the range along the wider of the two angles, in which all deviations of
+    /// the angles are parts of the box.
     fn halves(&self) -> [Self; 2] {
         let reach = self.reach();
         let wider = usize::from(reach[1].high > reach[0].high);

@@ -1,12 +1,13 @@
-//! How fast the vehicle's acceleration changes within the domain, derived from R and the body rates.
+//! How fast the vehicle's acceleration changes within the domain, derived from R and the body
+//! rates.
 //!
 //! With γ = I⁻¹ (m − ω × I ω) = ω̇ and R = V⁻¹ T the acceleration without disturbance is
 //!
 //! F = h + R γ,  h = [x₂ (2 s x₁ + x₃)/c, −c x₁ (s x₁ + x₃), 0],  c² x₁² + x₂² + x₃² = ‖ω‖².
 //!
-//! Along a motion with m held, F′ = R″ ω + 2 R′ γ + R γ′ and F″ = R‴ ω + 3 R″ γ + 3 R′ γ′ + R γ″, as
-//! ẋ = (R ω)′. The derivatives of R are those of V⁻¹ [p, t, q] = [t − p tan β, q, −(c p + s t)] by β,
-//! and by α those of T, which has the norm 1.
+//! Along a motion with m held, F′ = R″ ω + 2 R′ γ + R γ′ and F″ = R‴ ω + 3 R″ γ + 3 R′ γ′ + R γ″,
+//! as ẋ = (R ω)′. The derivatives of R are those of V⁻¹ [p, t, q] = [t − p tan β, q, −(c p + s t)]
+//! by β, and by α those of T, which has the norm 1.
 
 use super::body::{Body, sin_cos};
 use crate::interval::Interval;
@@ -128,7 +129,8 @@ struct Spin {
 }
 
 impl Spin {
-    /// In principal axes the components are (I_k − I_j)/I_i times ω_j ω_k, or times a_j b_k + a_k b_j.
+    /// In principal axes the components are (I_k − I_j)/I_i times ω_j ω_k, or times a_j b_k + a_k
+    /// b_j.
     fn new(body: &Body) -> Self {
         let [x, z, y] = body.principal();
         let ratios = [(z - y) / x, (x - z) / y, (y - x) / z].map(Interval::abs);
@@ -139,8 +141,8 @@ impl Spin {
     }
 }
 
-/// Bounds on ‖h‖ and ‖∂h/∂β‖ relative to ‖ω‖². With y = [c x₁, x₂, x₃] and t = tan β the entries are
-/// y₂ (2 t y₁ + y₃)/c and −y₁ (t y₁ + y₃).
+/// Bounds on ‖h‖ and ‖∂h/∂β‖ relative to ‖ω‖². With y = [c x₁, x₂, x₃] and t = tan β the entries
+/// are y₂ (2 t y₁ + y₃)/c and −y₁ (t y₁ + y₃).
 fn drift(kinematics: &Kinematics) -> (Interval, Interval) {
     let Kinematics { sine: s, cosine: c, tangent: t, .. } = kinematics;
     let (half, one, two) = (number(0.5), Interval::ONE, number(2.0));
@@ -191,8 +193,8 @@ fn slope_at(s: Interval, c: Interval, &[y1, x2, x3]: &[Interval; 3]) -> Interval
     largest / (y1.square() + x2.square() + x3.square())
 }
 
-/// How fast the moment that compensates an earlier one of 1 N m can grow while the vehicle turns, as
-/// multiples of ‖ω‖.
+/// How fast the moment that compensates an earlier one of 1 N m can grow while the vehicle turns,
+/// as multiples of ‖ω‖.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Growth {
     /// Bound on ‖I Ẇ R I⁻¹‖, the rate of the exponential growth of ‖I W R₀ I⁻¹‖.

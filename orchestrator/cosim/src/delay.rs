@@ -72,8 +72,8 @@ pub fn readings_of_wires(
 }
 
 /// Returns when each variable that an observer asks for is read, so that it shows at a
-/// communication point what belongs to it: an input, and an output that is declared to be direct, is
-/// read after the step that begins there.
+/// communication point what belongs to it: an input, and an output that is declared to be direct,
+/// is read after the step that begins there.
 pub fn readings_of_probes(parts: &[Part], wires: &[Wire], probes: &[Port]) -> Vec<(Port, Reading)> {
     let reading = |port: &Port| {
         let variable = &parts[port.component].description.variables[port.variable];

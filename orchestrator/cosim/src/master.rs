@@ -1,12 +1,12 @@
 //! The master algorithm, which sets the units' inputs, steps the units, and reads their outputs.
 //!
 //! Every unit sees the calls set, doStep and get in this order, as FMI 2.0.5, section 4.2.1, asks:
-//! nothing is read between setting and stepping. At tick k, every unit that stands at t_k is set and
-//! stepped. With sequential coupling this is done unit by unit, so that outputs which respond to
-//! inputs, such as the moment of a controller, are handed on at once: they are read after the step
-//! for which the inputs were set. All other outputs are those that were read when the unit came to
-//! t_k, even if it has been stepped since. So nothing shows of a unit's future, and a unit that steps
-//! at every n-th tick only is stepped when its interval begins.
+//! nothing is read between setting and stepping. At tick k, every unit that stands at t_k is set
+//! and stepped. With sequential coupling this is done unit by unit, so that outputs which respond
+//! to inputs, such as the moment of a controller, are handed on at once: they are read after the
+//! step for which the inputs were set. All other outputs are those that were read when the unit
+//! came to t_k, even if it has been stepped since. So nothing shows of a unit's future, and a unit
+//! that steps at every n-th tick only is stepped when its interval begins.
 
 mod transfer;
 

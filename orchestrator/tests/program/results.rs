@@ -200,7 +200,8 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
             summary.lines().find(|line| line.starts_with("  guarantee ")).unwrap().to_string();
         (line, bench.json("out/loop/metrics.json"))
     };
-    // The input is 1, 1.5, 2.25, in three steps; the margins are 1 - input/largest, and half of that.
+    // The input is 1, 1.5, 2.25, in three steps; the margins are 1 - input/largest, and half of
+    // that.
     let (line, metrics) = guarantee("2");
     assert_eq!(
         line,

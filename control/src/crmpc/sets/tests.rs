@@ -283,7 +283,8 @@ fn assert_stages_need_no_more_than_their_limits(count: usize) {
         let (worst, near) = worst_of_random_stages(count, samples, period);
         println!("{count} stages of {period} s: largest needs {worst:?}, near a limit {near:?}");
         assert!(worst.iter().all(|need| *need <= 1.0 + 1e-12), "{period} s: {worst:?}");
-        // Each limit ends the certificate of some stages. With long periods it is mostly the moment.
+        // Each limit ends the certificate of some stages. With long periods it is mostly the
+        // moment.
         let seldom = near.iter().copied().fold(f64::INFINITY, f64::min);
         assert!(seldom > 1e-3 || period > 0.3, "{period} s: {near:?}");
     }
