@@ -27,7 +27,9 @@ const FORGETTING: f64 = 15.0;
 /// Smallest evidence for an estimate: what another delay leaves unexplained beyond what the
 /// estimated one does, relative to the mean square of a component.
 const EVIDENCE: f64 = 20.0;
-/// Smallest number of periods for an estimate, and number from one estimate to the next.
+/// Shortest motion for an estimate, s, and in periods; number of periods from one estimate to the
+/// next.
+const MOTION: f64 = 1.0;
 const PERIODS: u32 = 20;
 const PAUSE: u32 = 5;
 /// Parts of a period to which a delay is estimated.
@@ -185,7 +187,9 @@ impl LoopDelaySettings {
             }
         }
         memory.periods = memory.periods.saturating_add(1);
-        if memory.periods >= PERIODS && memory.periods.is_multiple_of(PAUSE) {
+        let suffices =
+            memory.periods >= PERIODS && f64::from(memory.periods) * self.period >= MOTION;
+        if suffices && memory.periods.is_multiple_of(PAUSE) {
             self.estimate(memory);
         }
     }
@@ -193,8 +197,10 @@ impl LoopDelaySettings {
     fn estimate(&self, memory: &mut LoopDelay) {
         let places = memory.fits.each_mut().map(Fit::least);
         let told = self.told / self.period - self.first() as f64;
-        let best =
-            memory.fits.iter().zip(places).min_by(|(a, _), (b, _)| a.scale.total_cmp(&b.scale));
+        // Where several leave next to nothing, the highest difference is the least misled by a
+        // smooth disturbance.
+        let best = memory.fits.iter().zip(places).rev();
+        let best = best.min_by(|(a, _), (b, _)| a.scale.total_cmp(&b.scale));
         let Some((fit, place)) = best else { return };
         let delay = (self.first() as f64 + place) * self.period;
         memory.estimate = fit.tells(place, told).then_some(delay);
