@@ -87,8 +87,8 @@ pub fn readings_of_probes(parts: &[Part], wires: &[Wire], probes: &[Port]) -> Ve
 }
 
 /// Returns how an output depends on its unit's inputs: on those that are connected, and where it
-/// depends on none of them, as an output that changes at instants only does on the others. `None`
-/// says that it depends on none.
+/// depends on none of them, on the others, if it changes at instants only and feeds another unit.
+/// `None` says that it depends on none.
 fn strongest_passage(parts: &[Part], wires: &[Wire], output: Port) -> Option<Passage> {
     let description = parts[output.component].description;
     let connected = wires.iter().filter(|wire| wire.to.component == output.component);
@@ -100,7 +100,8 @@ fn strongest_passage(parts: &[Part], wires: &[Wire], output: Port) -> Option<Pas
     let responds = known.is_some_and(|known| {
         known.iter().any(|&input| description.variables[input].causality == "input")
     });
-    if is_sampled && responds { Some(Passage::Direct) } else { strongest }
+    let feeds = wires.iter().any(|wire| wire.from == output);
+    if is_sampled && responds && feeds { Some(Passage::Direct) } else { strongest }
 }
 
 /// Finds all feedback loops, each once. `parts` are in the experiment's order, `every` are their

@@ -108,6 +108,9 @@ pub struct Resolved {
     pub unit: String,
     /// Whether the signal is a single variable that is not a real number.
     pub is_integer: bool,
+    /// Whether a variable of it responds to the inputs of the communication point, so that it is
+    /// that of the step before at the stop time.
+    pub responds: bool,
 }
 
 impl Resolved {
@@ -123,7 +126,15 @@ impl Resolved {
 
     fn of(term: Term<usize>) -> Self {
         let terms = vec![term];
-        Self { terms, norm: false, over: None, factor: 1.0, unit: String::new(), is_integer: false }
+        Self {
+            terms,
+            norm: false,
+            over: None,
+            factor: 1.0,
+            unit: String::new(),
+            is_integer: false,
+            responds: false,
+        }
     }
 
     /// Computes the value of the signal in a sample, in the signal's unit.
@@ -183,6 +194,7 @@ mod tests {
             factor: 10.0,
             unit: "mm".into(),
             is_integer: false,
+            responds: false,
         };
         assert_eq!(signal.value(&[5.0, 2.0, 4.0]), 50.0);
         signal.over = Some(1);

@@ -177,12 +177,15 @@ impl System {
         }
         let is_integer = matches!(terms[..], [Term { value, minus: None }]
             if !matches!(self.kind(self.probes[value]), Kind::Real { .. }));
-        Ok(Resolved { terms, norm: signal.norm, over, factor, unit, is_integer })
+        let responds = terms
+            .iter()
+            .flat_map(|term: &Term<usize>| [Some(term.value), term.minus])
+            .flatten()
+            .any(|place| self.is_response(place));
+        Ok(Resolved { terms, norm: signal.norm, over, factor, unit, is_integer, responds })
     }
 
-    /// Returns whether a sample's value at this index responds to the inputs of its communication
-    /// point. At the stop time no step begins, and the value is that of the step before.
-    pub fn is_response(&self, place: usize) -> bool {
+    fn is_response(&self, place: usize) -> bool {
         let readings =
             delay::readings_of_probes(&self.parts(), &self.wires, &self.probes[place..=place]);
         readings.iter().any(|(_, reading)| *reading == Reading::AfterStep)

@@ -216,7 +216,8 @@ mod tests {
             [1.0, 1.0, 0.5, 0.5, 0.0, 0.0],
             [0.0, 4.0, 0.0, 0.0, 0.0, 0.0],
         ]);
-        assert_eq!(course.share(), Some(0.5));
+        // At the last row no step begins.
+        assert_eq!(course.share(), Some(0.6));
         assert_eq!(course.lost, Some(Loss { time: 1.5, status: Some(5.0) }));
         assert_eq!(course.status(), Some(5.0));
         assert_eq!(course.margins, [Some(0.2), Some(0.1)]);

@@ -49,11 +49,15 @@ impl Gauge {
         if let Some(fault) = measure.fault() {
             return Err(fault);
         }
-        let signals =
+        let signals: Vec<Resolved> =
             signals.iter().map(|signal| system.resolve(signal)).collect::<Result<_, _>>()?;
         common_unit(&signals)?;
+        // At the stop time, responses to inputs are those of the step before; only an integral
+        // needs them there.
+        let responds = signals.iter().any(|signal| signal.responds);
+        let steps = measure.steps || responds && measure.kind != Kind::Integral;
         let each = measure.each.as_ref().map(|path| system.probe(path)).transpose()?;
-        let mut gauge = Self::of(measure, signals);
+        let mut gauge = Self::of(&Measure { steps, ..measure.clone() }, signals);
         gauge.each = each.map(|probed| (probed.place, 0.0));
         if measure.kind == Kind::P99 {
             // This is enough room for a usual run; a longer run allocates more.
@@ -218,14 +222,7 @@ pub(crate) fn asked(
     if is_missing && measure.optional || system.lost_by_exchange(paths()) {
         return Ok(None);
     }
-    // At the stop time, responses to inputs are those of the step before.
-    let mut responds = false;
-    for path in signals.iter().flat_map(Signal::paths) {
-        let place = system.probe(path)?.place;
-        responds |= system.is_response(place);
-    }
-    let steps = measure.steps || responds && measure.kind != Kind::Integral;
-    Gauge::new(&Measure { steps, ..measure.clone() }, signals, system).map(Some)
+    Gauge::new(measure, signals, system).map(Some)
 }
 
 #[cfg(test)]

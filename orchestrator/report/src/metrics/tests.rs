@@ -142,7 +142,7 @@ fn the_guarantee_is_among_the_metrics() {
     let metrics = meters.metrics();
     let numbers = ["share", "lost_at", "rate_margin_min", "moment_margin_min", "broken"];
     let numbers = numbers.map(|name| metrics.number(&format!("guarantee_{name}")));
-    assert_eq!(numbers, [0.5, 2.0, 0.25, 0.125, 1.0].map(Some));
+    assert_eq!(numbers, [2.0 / 3.0, 2.0, 0.25, 0.125, 1.0].map(Some));
     assert_eq!(metrics.text("guarantee_status"), Some("exceeded"));
     assert!(
         Metrics::names(&Observe { guarantee: Some(asked), ..Observe::default() })

@@ -324,6 +324,9 @@ struct Bounded<'a> {
 
 impl Observer for Bounded<'_> {
     fn observe(&mut self, sample: &Sample) -> Result<(), Single> {
+        if sample.last && self.signals.iter().any(|signal| signal.responds) {
+            return Ok(());
+        }
         let magnitudes = self.signals.iter().map(|signal| signal.value(sample.values).abs());
         let largest = magnitudes.fold(0.0, larger);
         self.inside.see(largest, self.bound);
@@ -367,7 +370,9 @@ impl Observer for Watch {
         }
         self.time.push(sample.time);
         for ((_, resolved), values) in self.resolved.iter().zip(self.signals.values_mut()) {
-            values.push(resolved.value(sample.values));
+            // At the stop time, a signal with responses keeps its value of the step before.
+            let kept = values.last().copied().filter(|_| sample.last && resolved.responds);
+            values.push(kept.unwrap_or_else(|| resolved.value(sample.values)));
         }
         Ok(())
     }
