@@ -6,8 +6,10 @@
 //! calls true is true for the exact numbers, apart from errors in this program or the compiler. The
 //! formulas are written anew; only the bounds come from the controller.
 //!
-//! The crate does not check the steps of the proof that lead from one inequality to the next, the
-//! invariant set of the initial state `tube`, or the optimisation.
+//! These checks do not cover the steps of the proof that lead from one inequality to the next, the
+//! invariant set of the initial state `tube`, or the optimisation. [`plan`] covers the certificate
+//! as a whole: it bounds what can happen under a recorded plan without any of the controller's
+//! bounds (docs/guarantee-check.md).
 
 pub mod assessment;
 pub mod draws;
