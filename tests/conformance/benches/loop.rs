@@ -2,8 +2,8 @@
 //! loop of Chai 2022 through their libraries (white noise, inertia + 5 %).
 //!
 //! The loop contains only the work that every master must do, 1250 times: set the controller's
-//! inputs, step it, read its moment, set the plant's moment and step the plant. Instantiation and initialization
-//! are not timed, and nothing is recorded.
+//! inputs, step it, read its moment, set the plant's moment and step the plant. Instantiation and
+//! initialization are not timed, and nothing is recorded.
 
 use conformance::interface::CO_SIMULATION;
 use conformance::{Instance, Unit, c, unit};
