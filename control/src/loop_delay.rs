@@ -255,10 +255,15 @@ impl Fit {
     }
 
     /// Returns whether the evidence suffices to prefer `place`, which leaves least, to the delay
-    /// that was `told`, or to any other by a period; all in periods.
+    /// that was `told`, or to any other by a period; all in periods. The commands must explain
+    /// something at all: they do not act on a vehicle that rests.
     fn tells(&self, place: f64, told: f64) -> bool {
         let least = self.unexplained(place);
-        let against = |other: f64| self.unexplained(other) - least > EVIDENCE * self.scale;
+        let is_evidence = |left: f64| left - least > EVIDENCE * self.scale;
+        let against = |other: f64| is_evidence(self.unexplained(other));
+        if !is_evidence(self.square) {
+            return false;
+        }
         if (place - told).abs() > 0.5 {
             return against(told);
         }

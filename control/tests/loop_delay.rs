@@ -78,3 +78,20 @@ fn oracle_a_delay_that_was_told_is_not_doubted() {
         }
     }
 }
+
+/// A unit that only serves for its reference has no motion to look at.
+#[test]
+fn oracle_commands_that_do_not_act_tell_no_delay() {
+    let scenario = Scenario::crmpc2022();
+    let settings = Settings::new(Constraints::Robust);
+    let (body, limit) = (settings.body, f64::INFINITY);
+    let law = Crmpc::new(settings).unwrap();
+    let mut law = Delayed::new(law, body, PERIOD, Latency::of_action(0.0), limit).unwrap();
+    let mut memory = law.memory();
+    for tick in 0..1500 {
+        let time = tick as f64 * PERIOD;
+        let reference = |time: f64| scenario.reference.at(time);
+        law.update(&mut memory, tick, time, &Measurement::default(), &reference);
+        assert!(!memory.loop_delay.is_other, "{time} s");
+    }
+}

@@ -108,6 +108,7 @@ class ClosedLoop:
         own = split(parameters or {}, has_controller=controller is not None)
         self._step = float(step)
         self._is_open = True
+        self._failure: UnitError | None = None
         self._has_controller = controller is not None
         self._parameters = own
         self._plant = Unit(unit_path(plant), own["plant"])
@@ -182,12 +183,24 @@ class ClosedLoop:
             UnitError: A unit refused the moment or the step. `reset` makes the loop usable again.
         """
         self._check_open()
+        if self._failure is not None:
+            unit, call = self._failure.unit, self._failure.call
+            raise UnitError(unit, call, "the loop ended when this unit failed: reset the loop")
         if moment is None and not self._has_controller:
             raise TypeError("step needs a moment, because the loop has no controller")
         if moment is not None:
             if self._has_controller:
                 raise TypeError(f"the moment comes from {self._controller.name}: leave it out")
             self._moment = vector(moment).tolist()
+        try:
+            self._advance()
+        except UnitError as failure:
+            # The units stand at different times now.
+            self._failure = failure
+            raise
+        return self._state
+
+    def _advance(self) -> None:
         for unit, name, value in self._pending:
             unit.set({name: value}, "input")
         self._pending.clear()
@@ -201,7 +214,6 @@ class ClosedLoop:
         self._plant.step(now, self._step)
         self._tick += 1
         self._measured, self._state = self._read()
-        return self._state
 
     def run(
         self,
@@ -316,6 +328,7 @@ class ClosedLoop:
             self._plant.values(own["plant"], "parameter")
             self._controller.values(own["controller"], "parameter")
             self._parameters = own
+        self._failure = None
         self._plant.reset(self._parameters["plant"])
         self._controller.reset(self._parameters["controller"])
         self._initialize()
