@@ -54,6 +54,16 @@ pub enum DesignError {
         /// Largest accepted delay, s.
         delay: Option<f64>,
     },
+    /// The delay could be negative, or a command could begin to act after the next one should.
+    #[error(
+        "`delay_error` = {value} s, but it can be at most {largest} s here: neither more than the delay nor more than a period of the feedback law"
+    )]
+    DelayError {
+        /// Value of the setting, s.
+        value: f64,
+        /// Largest value that is accepted, s.
+        largest: f64,
+    },
     /// A gain violates Lemma 2 or 3 of Chai 2022.
     #[error(
         "`{name}.k1` and `{name}.k2` need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)"

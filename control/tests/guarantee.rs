@@ -76,6 +76,23 @@ fn guarantee_is_kept_with_an_error_of_the_tensor_of_inertia() {
     assert_kept(&flights);
 }
 
+#[test]
+fn guarantee_is_kept_with_a_delay_that_is_known_within_an_interval() {
+    let settings = Settings {
+        delay: 0.04,
+        delay_error: 0.01,
+        disturbance_bound: f64::to_radians(1.9),
+        feedback: Gain { k1: -1.5, k2: -4.0 },
+        ..settings(Constraints::Robust)
+    };
+    let late = [-0.01, -0.006, 0.004, 0.01];
+    let flights = late.map(|late| {
+        let flights = flights(&settings, &[Sight::Exact]);
+        flights.into_iter().map(move |flight| Flight { late, ..flight }).collect::<Vec<_>>()
+    });
+    assert_kept(&flights.concat());
+}
+
 fn soft() -> Settings {
     Settings { feedback: Gain { k1: -2.0, k2: -4.0 }, ..settings(Constraints::Robust) }
 }

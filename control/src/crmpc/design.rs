@@ -232,9 +232,16 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
         ("angle_error", s.angle_error, 1.0),
         ("rate_error", s.rate_error, 1.0),
         ("delay", s.delay, 1.0),
+        ("delay_error", s.delay_error, 1.0),
         ("sideslip_domain", s.sideslip_domain, 0.8),
         ("disturbance_bound", s.disturbance_bound, f64::MAX),
     ];
+    if s.delay_error > s.delay.min(s.period_feedback) {
+        return Err(DesignError::DelayError {
+            value: s.delay_error,
+            largest: s.delay.min(s.period_feedback),
+        });
+    }
     for (name, value, high) in ranges {
         if !(0.0..high).contains(&value) {
             return Err(DesignError::OutOfRange { name, value, low: 0.0, high });

@@ -199,6 +199,8 @@ pub struct Flight {
     pub sight: Sight,
     /// Age of the measurements, s, which is a part of the delay of the settings.
     pub age: f64,
+    /// Amount by which commands act later than the settings say, s.
+    pub late: f64,
     /// Seed of all random numbers of the flight.
     pub seed: u64,
     /// Duration of the flight, s.
@@ -265,6 +267,7 @@ impl Flight {
             hold: 0.04,
             sight: Sight::Exact,
             age: 0.0,
+            late: 0.0,
             seed: 0,
             duration: scenario.duration,
         }
@@ -282,6 +285,10 @@ impl Flight {
             1 => 1.0 + settings.inertia_error,
             _ => 1.0 + settings.inertia_error * random.between(-1.0, 1.0),
         };
+        if settings.delay_error > 0.0 {
+            flight.late =
+                settings.delay_error * [-1.0, 1.0, random.between(-1.0, 1.0)][random.below(3)];
+        }
         if settings.tensor_error > 0.0 {
             flight.tensor_error = Self::tensor_of(settings.tensor_error, random);
         }
@@ -500,7 +507,7 @@ impl Vehicle {
             body: RigidBody::new(flight.inertia(&body.inertia)).unwrap(),
             state: plant::state(&flight.angles, &flight.rates),
             commanded: Vector3::zeros(),
-            transport: Transport::new(delay - flight.age).unwrap(),
+            transport: Transport::new(delay - flight.age + flight.late).unwrap(),
         }
     }
 
