@@ -123,7 +123,7 @@ const CONTRADICTIONS: Enumeration<Contradiction> = Enumeration {
         (
             Contradiction::Delay,
             "delay",
-            "the delay of the loop: loopDelay differs from delay + measurement.age",
+            "the delay of the loop: loopDelay differs from delay + measurement.age by more than delayError",
         ),
         (
             Contradiction::Disturbance,
@@ -161,6 +161,7 @@ impl Law for CrmpcLaw {
         ("observer.time_constant", "observer.timeConstant"),
         ("inertia_error", "inertia.error"),
         ("tensor_error", "inertia.tensorError"),
+        ("delay_error", "delayError"),
         ("angle_error", "estimation.angleError"),
         ("rate_error", "estimation.rateError"),
         ("sideslip_domain", "guarantee.sideslip"),
@@ -215,7 +216,7 @@ impl Law for CrmpcLaw {
                     "the guarantee is no longer in force: inputs were set before the tick at which they are used; step with period.feedback or a whole part of it"
                 }
                 Contradiction::Delay => {
-                    "the guarantee is no longer in force: the loop has another delay than delay and measurement.age say"
+                    "the guarantee is no longer in force: the loop has another delay than delay, delayError and measurement.age say"
                 }
                 Contradiction::Disturbance => {
                     "the guarantee is no longer in force: the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError explain"
@@ -300,6 +301,10 @@ fn bounds(table: Controller) -> Controller {
         "inertia.tensorError",
         "Relative error of the tensor of inertia, in all six entries, that the robust set is tightened for besides the common factor",
     );
+    let delay_error = parameter(
+        "delayError",
+        "Largest difference between the delay of the loop, which must not change, and delay + measurement.age, that the robust set is tightened for",
+    );
     let angle_error = parameter(
         "estimation.angleError",
         "Bound on the error of each angle given that the robust set is tightened for; the error may take any value within it at each tick",
@@ -326,6 +331,9 @@ fn bounds(table: Controller) -> Controller {
         })
         .real(inertia.real().min(0.0).max(0.9).nominal(0.05), |m| &mut m.law.settings.inertia_error)
         .real(tensor.real().min(0.0).max(0.9).nominal(0.05), |m| &mut m.law.settings.tensor_error)
+        .real(delay_error.real().unit(unit::time()).min(0.0).max(1.0).nominal(0.01), |m| {
+            &mut m.law.settings.delay_error
+        })
         .real(sideslip.real().unit(unit::angle()).min(0.0).max(1.5).nominal(0.2), |m| {
             &mut m.law.settings.sideslip_bound
         })

@@ -2,7 +2,7 @@
 //! the `robust` set.
 
 use super::guarantee::{self, Assessment, Tightening};
-use super::settings::{Constraints, Guarantee, Settings};
+use super::settings::{Constraints, Guarantee, InitialState, Settings};
 use crate::delay;
 use crate::error::DesignError;
 use crate::error_dynamics::{Gain, InvariantSet, Reach, SampledError};
@@ -236,6 +236,9 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
         ("sideslip_domain", s.sideslip_domain, 0.8),
         ("disturbance_bound", s.disturbance_bound, f64::MAX),
     ];
+    if s.delay_error > 0.0 && s.initial_state == InitialState::Tube {
+        return Err(DesignError::DelayErrorWithTube);
+    }
     if s.delay_error > s.delay.min(s.period_feedback) {
         return Err(DesignError::DelayError {
             value: s.delay_error,

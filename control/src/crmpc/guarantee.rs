@@ -439,7 +439,7 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
                 let pulse = parts.pulse(s, &reach, errors, &shifts, &pulses);
                 pulse_of.push(pulse.norm());
                 let deviation = parts.deviation(s, &reach, errors, &shifts);
-                deviation.plus(&parts.by_pulses(s, &pulse, &pulses))
+                deviation.plus(&pulse.deviation(s, &pulses))
             })
             .collect()
         }
@@ -710,14 +710,16 @@ impl Parts {
             of_ball: s.delay_error * (all * of_ball + besides),
         }
     }
+}
 
-    /// Returns the deviation that a pulse at each tick causes. `pulses` is per unit of it.
-    fn by_pulses(&self, s: &Settings, pulse: &Pulse, pulses: &Reach) -> Deviation {
-        let Pulse { of_box, of_ball } = *pulse;
+impl Pulse {
+    /// Returns the deviation that this pulse at each tick causes. `pulses` is per unit of it.
+    fn deviation(&self, s: &Settings, pulses: &Reach) -> Deviation {
+        let Self { of_box, of_ball } = *self;
         if of_box == 0.0 && of_ball == 0.0 {
             return Deviation::default();
         }
-        let (of_two, norm) = (SQRT_2 * of_box + of_ball, pulse.norm());
+        let (of_two, norm) = (SQRT_2 * of_box + of_ball, self.norm());
         let tau = s.period_feedback;
         Deviation {
             // The last terms are those between two ticks.
@@ -1150,6 +1152,10 @@ pub(super) fn refusal(s: &Settings, assessment: &Assessment) -> DesignError {
         }),
         delay: (s.delay > 0.0)
             .then(|| largest(s.delay, |delay| Settings { delay, ..*s }))
+            .flatten()
+            .filter(|&delay| delay > s.delay_error),
+        delay_error: (s.delay_error > 0.0)
+            .then(|| largest(s.delay_error, |delay_error| Settings { delay_error, ..*s }))
             .flatten(),
         errors: errors.map(|share| (share * s.angle_error, share * s.rate_error)),
     }

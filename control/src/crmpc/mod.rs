@@ -478,8 +478,8 @@ impl Crmpc {
     fn credible(&self, memory: &Memory) -> bool {
         let Tightening { observable, switching, growth, .. } = &self.design.tightening;
         let by_pulses =
-            |switching: &Box<Switching>| switching.observed(memory.commands.filtered()) * growth;
-        let explained = observable + switching.as_ref().map_or(0.0, by_pulses);
+            |switching: &Switching| switching.observed(memory.commands.filtered()) * growth;
+        let explained = observable + switching.as_deref().map_or(0.0, by_pulses);
         memory.observed.disturbance.amax() <= explained
     }
 
@@ -708,6 +708,10 @@ impl Controller for Crmpc {
         }
         memory.supervision.judge(memory.standing, found, self.settings.period_feedback);
         moment
+    }
+
+    fn delay_error(&self) -> f64 {
+        self.settings.delay_error
     }
 
     /// The paper's sets leave the limit to the optimisation. Without a solution, and with the

@@ -703,7 +703,7 @@ pub fn random_settings(seed: u64) -> Settings {
     let published = Settings::new(Constraints::Robust);
     let period_feedback = [0.02, 0.04, 0.05, 0.1][random.below(4)];
     let initial_states = [InitialState::Measured, InitialState::Nominal, InitialState::Tube];
-    Settings {
+    let mut settings = Settings {
         feedback: Gain { k1: random.between(-10.0, -0.5), k2: random.between(-10.0, -1.0) },
         delay: half(random, 0.15),
         angle_error: half(random, 0.2).to_radians(),
@@ -720,7 +720,11 @@ pub fn random_settings(seed: u64) -> Settings {
         initial_state: initial_states[random.below(3)],
         tensor_error: half(random, 0.08),
         ..published
+    };
+    if settings.initial_state != InitialState::Tube && settings.feedback.eigenvalues().is_some() {
+        settings.delay_error = half(random, 0.5) * settings.delay.min(period_feedback);
     }
+    settings
 }
 
 /// Flies the settings for 15 s if the design accepts them, and otherwise tries each bound that its
@@ -729,7 +733,7 @@ pub fn tried(settings: &Settings, seed: u64) -> Tried {
     let Err(error) = Crmpc::new(*settings) else {
         return Tried::Flown(Flight { duration: 15.0, ..Flight::random(settings, seed) }.fly());
     };
-    let DesignError::NoGuarantee { disturbance, errors, delay, .. } = error else {
+    let DesignError::NoGuarantee { disturbance, errors, delay, delay_error, .. } = error else {
         return Tried::Invalid(error.to_string());
     };
     // The bounds are rounded as the message prints them.
@@ -743,6 +747,7 @@ pub fn tried(settings: &Settings, seed: u64) -> Tried {
             ..*settings
         }),
         delay.map(|delay| Settings { delay: down(delay), ..*settings }),
+        delay_error.map(|error| Settings { delay_error: down(error), ..*settings }),
     ];
     let named: Vec<Settings> = with.into_iter().flatten().collect();
     let refusal = |settings: &Settings| Crmpc::new(*settings).err();
