@@ -259,8 +259,8 @@ impl Fit {
     }
 
     /// Returns whether the evidence suffices to prefer `place`, which leaves least, to the delay
-    /// that was `told` with some slack, or to any other by a period; all in periods. The commands must explain
-    /// something at all: they do not act on a vehicle that rests.
+    /// that was `told` with some slack, or to any other by a period; all in periods. The commands
+    /// must explain something at all: they do not act on a vehicle that rests.
     fn tells(&self, place: f64, (told, slack): (f64, f64)) -> bool {
         let least = self.unexplained(place);
         let is_evidence = |left: f64| left - least > EVIDENCE * self.scale;

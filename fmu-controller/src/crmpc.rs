@@ -162,6 +162,7 @@ impl Law for CrmpcLaw {
         ("inertia_error", "inertia.error"),
         ("tensor_error", "inertia.tensorError"),
         ("delay_error", "delayError"),
+        ("initial_state", "initialState"),
         ("angle_error", "estimation.angleError"),
         ("rate_error", "estimation.rateError"),
         ("sideslip_domain", "guarantee.sideslip"),

@@ -236,6 +236,11 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
         ("sideslip_domain", s.sideslip_domain, 0.8),
         ("disturbance_bound", s.disturbance_bound, f64::MAX),
     ];
+    for (name, value, high) in ranges {
+        if !(0.0..high).contains(&value) {
+            return Err(DesignError::OutOfRange { name, value, low: 0.0, high });
+        }
+    }
     if s.delay_error > 0.0 && s.initial_state == InitialState::Tube {
         return Err(DesignError::DelayErrorWithTube);
     }
@@ -244,11 +249,6 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
             value: s.delay_error,
             largest: s.delay.min(s.period_feedback),
         });
-    }
-    for (name, value, high) in ranges {
-        if !(0.0..high).contains(&value) {
-            return Err(DesignError::OutOfRange { name, value, low: 0.0, high });
-        }
     }
     let ratio = (s.period_optimisation / s.period_feedback).round();
     if ratio < 1.0

@@ -763,7 +763,8 @@ fn left(
 /// Returns the rate κ (1/s) at which the sideslip has to brake beyond a horizon that ends with the
 /// angle `sideslip` and the rates `rates`. While braking, β travels by |β̇|/κ, and all limits must
 /// hold. `carried` is the deviation that the plan's changes of acceleration leave at the end of the
-/// horizon, and `last` the size of the acceleration before it. The result is `None` if that is impossible.
+/// horizon, and `last` the size of the acceleration before it. The result is `None` if that is
+/// impossible.
 pub(super) fn braking(
     s: &Settings,
     dynamics: &Dynamics,
