@@ -26,6 +26,10 @@ pub struct CrmpcLaw {
     shown: Shown,
 }
 
+/// Share of the moment limit below which the plan has so little left that optimisations become
+/// several times longer (`control`'s example `loop_times` with other disturbance bounds).
+const LITTLE_MOMENT: f64 = 0.1;
+
 /// Values that the outputs show.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Shown {
@@ -34,6 +38,7 @@ struct Shown {
     in_force: bool,
     supervision: Supervision,
     margins: Margins,
+    moment_left: f64,
     disturbance: Vector3<f64>,
     report: Report,
 }
@@ -203,6 +208,7 @@ impl Law for CrmpcLaw {
                 rate: shown(memory.margins.rate),
                 moment: shown(memory.margins.moment),
             },
+            moment_left: shown(memory.moment_left),
             disturbance: shown_vector(&memory.observed.disturbance),
             report: solver::shown_report(&memory.report),
         };
@@ -234,6 +240,13 @@ impl Law for CrmpcLaw {
             (Standing::None, Standing::Uncertified) => Some(
                 "the guarantee is not in force: no plan keeps its conditions from the present state",
             ),
+            (Standing::None, Standing::Pending | Standing::InForce)
+                if after.moment_left < LITTLE_MOMENT =>
+            {
+                Some(
+                    "the settings leave less than a tenth of limit.moment to the plan, see guarantee.momentLeft: optimisations take several times as long; a smaller disturbance.bound or delay leaves more",
+                )
+            }
             (Standing::None, Standing::Refused) => Some(
                 "constraints = robust cannot be guaranteed with these settings; it runs as best effort",
             ),
@@ -402,6 +415,10 @@ fn outputs(table: Controller) -> Controller {
         );
         sampled(&format!("guarantee.{name}"), &text).real()
     };
+    let left = sampled(
+        "guarantee.momentLeft",
+        "Share of the moment limit that the reserve for disturbances, errors and delay leaves to the plan at rest",
+    );
     let observed = |axis: &str, meaning: &str| {
         let text = format!("Observed disturbance of the second derivative of the {meaning}");
         sampled(&format!("disturbanceEstimate.{axis}"), &text)
@@ -426,7 +443,8 @@ fn outputs(table: Controller) -> Controller {
             |m| &mut m.law.shown.supervision.contradiction,
         )
         .real(margin("rateMargin", "rate limit"), |m| &mut m.law.shown.margins.rate)
-        .real(margin("momentMargin", "moment limit"), |m| &mut m.law.shown.margins.moment);
+        .real(margin("momentMargin", "moment limit"), |m| &mut m.law.shown.margins.moment)
+        .real(left.real(), |m| &mut m.law.shown.moment_left);
     let table = vector(table, ANGLES, observed, |m| &mut m.law.shown.disturbance);
     solver::outputs(table, |law| &mut law.shown.report)
 }

@@ -63,6 +63,9 @@ pub struct Memory {
     pub supervision: Supervision,
     /// Margins to the limits that the plan in force leaves in its first interval.
     pub margins: Margins,
+    /// Share of the moment limit that the design leaves to the plan at rest, see
+    /// [`Assessment::moment_left`]; zero with the paper's set.
+    pub moment_left: f64,
     /// Feedback ticks from the beginning of the nominal motion to the beginning of the plan in
     /// force.
     pub age: u32,
@@ -127,6 +130,7 @@ impl Clone for Memory {
             nominal,
             standing,
             margins,
+            moment_left,
             age,
             pending,
             supervision,
@@ -139,6 +143,7 @@ impl Clone for Memory {
         self.nominal = *nominal;
         self.standing = *standing;
         self.margins = *margins;
+        self.moment_left = *moment_left;
         self.age = *age;
         self.pending = *pending;
         self.supervision = *supervision;
@@ -631,8 +636,10 @@ impl Controller for Crmpc {
     type Memory = Memory;
 
     fn memory(&self) -> Memory {
+        let robust = self.settings.constraints == Constraints::Robust;
         Memory {
             plan: Plan::new(self.settings.horizon),
+            moment_left: if robust { self.design.assessment.moment_left } else { 0.0 },
             commands: Commands::new(&self.settings),
             ..Memory::default()
         }
