@@ -430,16 +430,22 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     let mut at: Vec<Deviation> = match s.initial_state {
         InitialState::Measured | InitialState::Nominal => {
             let [of_angles, of_rates] = error.errors(steps);
-            let all = error
-                .reach(steps)
-                .into_iter()
-                .zip(of_angles.iter().zip(&of_rates))
-                .zip(error.shifts(steps).into_iter().zip(error.pulses(steps)));
-            all.map(|((reach, errors), (shifts, pulses))| {
-                let pulse = parts.pulse(s, &reach, errors, &shifts, &pulses);
-                pulse_of.push(pulse.norm());
-                let deviation = parts.deviation(s, &reach, errors, &shifts);
-                deviation.plus(&pulse.deviation(s, &pulses))
+            let (reach, shifts) = (error.reach(steps), error.shifts(steps));
+            let causes = || reach.iter().zip(of_angles.iter().zip(&of_rates)).zip(&shifts);
+            let pulses = error.pulses(steps);
+            let all = causes().zip(&pulses);
+            let jumps: Vec<Pulse> = all
+                .map(|(((reach, errors), shifts), pulses)| {
+                    parts.pulse(s, reach, errors, shifts, pulses)
+                })
+                .collect();
+            pulse_of.extend(jumps.iter().map(Pulse::norm));
+            // Between two ticks the pulse of the next one may show already; pulses only grow.
+            let largest = pulse_of.last().copied().unwrap_or_default();
+            let all = causes().zip(jumps.iter().zip(&pulses));
+            all.map(|(((reach, errors), shifts), (jump, pulses))| {
+                let deviation = parts.deviation(s, reach, errors, shifts);
+                deviation.plus(&jump.deviation(s, pulses, largest))
             })
             .collect()
         }
@@ -499,7 +505,6 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     let observable = (s.disturbance_bound + parts.norm - 3.0_f64.sqrt() * s.disturbance_bound
         + 2.0 * predicted / s.observer.time_constant)
         * dynamics.growth(s.delay + s.period_feedback);
-    // Pulses only grow with the number of ticks.
     let tightening = Tightening {
         switching,
         pulse: pulse_of,
@@ -713,8 +718,9 @@ impl Parts {
 }
 
 impl Pulse {
-    /// Returns the deviation that this pulse at each tick causes. `pulses` is per unit of it.
-    fn deviation(&self, s: &Settings, pulses: &Reach) -> Deviation {
+    /// Returns the deviation that this pulse at each tick causes. `pulses` is per unit of it, and
+    /// `largest` bounds the jump of the rates at any tick, rad/s.
+    fn deviation(&self, s: &Settings, pulses: &Reach, largest: f64) -> Deviation {
         let Self { of_box, of_ball } = *self;
         if of_box == 0.0 && of_ball == 0.0 {
             return Deviation::default();
@@ -724,9 +730,9 @@ impl Pulse {
         Deviation {
             // The last terms are those between two ticks.
             angle: pulses.angle * of_two
-                + 0.25 * tau * norm
+                + 0.25 * tau * largest
                 + 0.125 * tau * tau * pulses.feedback * norm,
-            rate: pulses.rate * norm + norm,
+            rate: pulses.rate * norm + largest,
             seen_angle: pulses.seen_angle * of_two,
             seen_rate: pulses.seen_rate * norm,
             middle_angle: pulses.middle_angle * of_two,

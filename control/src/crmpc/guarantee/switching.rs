@@ -59,6 +59,9 @@ struct Mode {
     first: f64,
 }
 
+/// Size of a transition that has faded to rounding.
+const FADED: f64 = 1e-14;
+
 /// Number of commands that may have begun to act too late for a measurement to show it, when the
 /// command that follows from the measurement begins to act.
 pub(in crate::crmpc) fn unseen(s: &Settings) -> usize {
@@ -130,12 +133,12 @@ impl Switching {
         }
         let stage: Matrix3<f64> = power * tick;
         let (mut ever, mut power) = (within, stage);
-        while power.amax() > 1e-3 && power.amax() < 1e3 {
+        while power.amax() > FADED && power.amax() < 1.0 / FADED {
             ever = ever.sup(&(power * within));
             power *= stage;
         }
         let unbounded = Vector3::repeat(f64::INFINITY);
-        let limit = if power.amax() <= 1e-3 {
+        let limit = if power.amax() <= FADED {
             let inverse = (Matrix3::identity() - stage).try_inverse();
             inverse.map_or(unbounded, |inverse| within * inverse.column(2) * by_change)
         } else {
