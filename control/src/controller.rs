@@ -20,6 +20,20 @@ pub struct Measurement {
     pub stale: bool,
     /// Whether the motion shows another delay of the loop than the one that was told.
     pub has_other_delay: bool,
+    /// Whether the acceleration over the last period is larger than [`Controller::explained`].
+    pub is_unexplained: bool,
+}
+
+/// What the assumptions of a law explain of the angular acceleration, beyond that of the moment that
+/// acts after the delay that was told.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Explained {
+    /// Largest part in each component of ẋ_ω, whatever the moment, rad/s².
+    pub disturbance: f64,
+    /// Largest part relative to the acceleration by the moment.
+    pub share: f64,
+    /// Largest difference of the delay from the one that was told, s.
+    pub delay_error: f64,
 }
 
 /// The reference as a function of time (s), so that a controller with preview can also ask for the
@@ -102,10 +116,10 @@ pub trait Controller {
         f64::INFINITY
     }
 
-    /// Returns by how much the delay of the loop may differ from the one that was told without
-    /// being another one, s.
-    fn delay_error(&self) -> f64 {
-        0.0
+    /// Returns what the law's assumptions explain of the motion. Another delay than the one that was
+    /// told is only said to be there if they do not.
+    fn explained(&self) -> Explained {
+        Explained::default()
     }
 
     /// Tells the law that its last command exceeded the limit, and which moment (N m) is applied in

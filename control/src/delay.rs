@@ -194,7 +194,7 @@ impl<C: Controller> Delayed<C> {
             body,
             period,
             told: latency.total(),
-            told_error: inner.delay_error(),
+            explained: inner.explained(),
             is_filtered: measurement > 0.0,
         };
         Ok(Self { inner, predictor, latency, loop_delay, moment_limit })
@@ -249,7 +249,11 @@ impl<C: Controller> Controller for Delayed<C> {
     ) -> Vector3<f64> {
         let Memory { inner, under_way, loop_delay } = memory;
         self.loop_delay.observe(loop_delay, measured);
-        let measured = Measurement { has_other_delay: loop_delay.is_other, ..*measured };
+        let measured = Measurement {
+            has_other_delay: loop_delay.is_other,
+            is_unexplained: loop_delay.is_unexplained,
+            ..*measured
+        };
         if self.predictor.count == 0 {
             let moment = self.inner.command(inner, tick, time, &measured, reference);
             self.loop_delay.remember(loop_delay, &moment);

@@ -12,12 +12,15 @@
 //! This is a prediction-error method (L. Ljung, System Identification, 1999, section 13.4), which
 //! may be used in a closed loop: at the right delay, what is left is new, and no earlier command is
 //! related to it. That is not so for noise of the measurements, to which the next command responds
-//! while the noise itself looks like an acceleration.
+//! while the noise itself looks like an acceleration, nor for a disturbance that repeats itself.
+//! Where a law says what its assumptions explain, another delay is therefore only said to be there
+//! if the motion shows more than that with the delay that was told.
 
-use crate::controller::Measurement;
+use crate::controller::{Explained, Measurement};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
+use vehicle::kinematics;
 use vehicle::math::exp;
 
 /// Number of periods by which a delay may differ from the one that was told to be found.
@@ -56,10 +59,14 @@ pub struct LoopDelay {
     fits: [Fit; ORDERS],
     /// Number of periods in the fits.
     periods: u32,
+    /// Number of further periods in which an acceleration that nothing explains still counts.
+    unexplained: u32,
+    /// Whether the law's assumptions do not explain the acceleration over the last period.
+    pub is_unexplained: bool,
     /// Estimated delay, s, if the motion tells it.
     pub estimate: Option<f64>,
     /// Whether it differs from the delay that was told by more than half a period and what was said
-    /// of its error.
+    /// of its error, and the law's assumptions do not explain the motion with the latter.
     pub is_other: bool,
 }
 
@@ -101,8 +108,8 @@ pub struct LoopDelaySettings {
     pub period: f64,
     /// Delay that was told, s.
     pub told: f64,
-    /// Amount by which the true delay may differ from it, s.
-    pub told_error: f64,
+    /// What the law's assumptions explain of the acceleration with that delay.
+    pub explained: Explained,
     /// Whether measurements are old when they arrive. They come through a filter then, and their
     /// noise would be taken for a response: no estimate is made.
     pub is_filtered: bool,
@@ -142,6 +149,7 @@ impl LoopDelaySettings {
 
     /// Takes the measured rates of a tick, before its command is known.
     pub fn observe(&self, memory: &mut LoopDelay, measured: &Measurement) {
+        memory.is_unexplained = false;
         if self.is_filtered || measured.stale || measured.achieved_moment.is_some() {
             (memory.rates, memory.known) = (None, 0);
             return;
@@ -155,8 +163,38 @@ impl LoopDelaySettings {
         memory.known = ORDERS.min(memory.known + 1);
         // Before the first commands, importers differ in what acts.
         if memory.known == ORDERS && memory.commands.len() == self.remembered() {
+            memory.is_unexplained = !self.explains(memory, &measured.angles);
+            memory.unexplained = if memory.is_unexplained {
+                (FORGETTING / period) as u32
+            } else {
+                memory.unexplained.saturating_sub(1)
+            };
             self.weigh(memory);
         }
+    }
+
+    /// Returns whether the law's assumptions explain the acceleration over the last period with
+    /// some delay that is not another one than was told.
+    fn explains(&self, memory: &LoopDelay, angles: &Vector3<f64>) -> bool {
+        let Explained { disturbance, share, delay_error } = self.explained;
+        let r = kinematics::r(angles);
+        let last = (self.candidates() - 1) as f64;
+        let explains = |delay: f64| {
+            let place = (delay / self.period - self.first() as f64).clamp(0.0, last);
+            let command = self.command(memory, place);
+            let (left, command) = (r * (memory.accelerations[0] - command), r * command);
+            (0..3).all(|i| left[i].abs() <= disturbance + share * command[i].abs() + FLOOR)
+        };
+        [0.0, -delay_error, delay_error].into_iter().any(|error| explains(self.told + error))
+    }
+
+    /// Returns the acceleration by the moment that acts over the last period if the delay is the
+    /// first one and this many periods, rad/s².
+    fn command(&self, memory: &LoopDelay, place: f64) -> Vector3<f64> {
+        let commands = &memory.commands[self.first()..];
+        let j = (place as usize).min(self.candidates() - 2);
+        let f = place - j as f64;
+        commands[j] * (1.0 - f) + commands[j + 1] * f
     }
 
     /// Takes the command of the tick that was observed last, N m.
@@ -200,7 +238,7 @@ impl LoopDelaySettings {
     fn estimate(&self, memory: &mut LoopDelay) {
         let places = memory.fits.each_mut().map(Fit::least);
         let told = self.told / self.period - self.first() as f64;
-        let slack = 0.5 + self.told_error / self.period;
+        let slack = 0.5 + self.explained.delay_error / self.period;
         // Where several leave next to nothing, the highest difference is the least misled by a
         // smooth disturbance.
         let best = memory.fits.iter().zip(places).rev();
@@ -208,7 +246,8 @@ impl LoopDelaySettings {
         let Some((fit, place)) = best else { return };
         let delay = (self.first() as f64 + place) * self.period;
         memory.estimate = fit.tells(place, (told, slack)).then_some(delay);
-        memory.is_other = memory.estimate.is_some() && (place - told).abs() > slack;
+        let is_other = memory.estimate.is_some() && (place - told).abs() > slack;
+        memory.is_other = is_other && memory.unexplained > 0;
     }
 }
 
@@ -310,13 +349,25 @@ impl Clone for LoopDelay {
 
     // The derived version would allocate at every tick.
     fn clone_from(&mut self, source: &Self) {
-        let Self { commands, rates, accelerations, known, fits, periods, estimate, is_other } =
-            source;
+        let Self {
+            commands,
+            rates,
+            accelerations,
+            known,
+            fits,
+            periods,
+            unexplained,
+            is_unexplained,
+            estimate,
+            is_other,
+        } = source;
         self.commands.clone_from(commands);
         for (fit, source) in self.fits.iter_mut().zip(fits) {
             fit.clone_from(source);
         }
         (self.rates, self.accelerations, self.known) = (*rates, *accelerations, *known);
-        (self.periods, self.estimate, self.is_other) = (*periods, *estimate, *is_other);
+        (self.periods, self.unexplained) = (*periods, *unexplained);
+        self.is_unexplained = *is_unexplained;
+        (self.estimate, self.is_other) = (*estimate, *is_other);
     }
 }

@@ -12,6 +12,7 @@ pub(super) use switching::unseen;
 pub use switching::{Carried, Switching};
 
 use super::settings::{InitialState, Settings};
+use crate::controller::Explained;
 use crate::error::DesignError;
 use crate::error_dynamics::{Reach, SampledError};
 use nalgebra::Vector3;
@@ -95,6 +96,8 @@ pub struct Tightening {
     /// Largest component of an explained disturbance estimate, rad/s²: Δ̄, the part of the inertia
     /// error, the mismatch and the errors of the rates.
     pub observable: f64,
+    /// What the assumptions explain of the mean acceleration over a period.
+    pub explained: Explained,
     /// What an unknown part of the delay adds; `None` if the delay is exact.
     pub switching: Option<Box<Switching>>,
     /// Largest jump of the rates that a change of K ô causes, rad/s, by feedback ticks.
@@ -426,43 +429,7 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     let dynamics = Dynamics::new(s);
     let parts = Parts::new(s, &dynamics);
     let switching = Switching::new(s, &error, &parts)?.map(Box::new);
-    let mut pulse_of = Vec::new();
-    let mut at: Vec<Deviation> = match s.initial_state {
-        InitialState::Measured | InitialState::Nominal => {
-            let [of_angles, of_rates] = error.errors(steps);
-            let (reach, shifts) = (error.reach(steps), error.shifts(steps));
-            let causes = || reach.iter().zip(of_angles.iter().zip(&of_rates)).zip(&shifts);
-            let pulses = error.pulses(steps);
-            let all = causes().zip(&pulses);
-            let jumps: Vec<Pulse> = all
-                .map(|(((reach, errors), shifts), pulses)| {
-                    parts.pulse(s, reach, errors, shifts, pulses)
-                })
-                .collect();
-            pulse_of.extend(jumps.iter().map(Pulse::norm));
-            // Between two ticks the pulse of the next one may show already; pulses only grow.
-            let largest = pulse_of.last().copied().unwrap_or_default();
-            let all = causes().zip(jumps.iter().zip(&pulses));
-            all.map(|(((reach, errors), shifts), (jump, pulses))| {
-                let deviation = parts.deviation(s, reach, errors, shifts);
-                deviation.plus(&jump.deviation(s, pulses, largest))
-            })
-            .collect()
-        }
-        InitialState::Tube => {
-            // The deviation is fully grown from the start, because the plan may begin anywhere in
-            // the set that Δ cannot drive the deviation out of.
-            let last = |all: Vec<Reach>| all.last().copied().unwrap_or_default();
-            let set = error
-                .invariant_set(lateral(s))
-                .ok_or(DesignError::NotReal { name: "feedback" })?
-                .reach();
-            let reach = last(error.reach(steps)).or(&set);
-            let [of_angles, of_rates] = error.errors(steps).map(last);
-            pulse_of.push(0.0);
-            vec![parts.deviation(s, &reach, (&of_angles, &of_rates), &last(error.shifts(steps)))]
-        }
-    };
+    let (mut at, pulse) = deviations(s, &error, &parts, steps)?;
     let last = at.len() - 1;
     // Errors of the measurement may drive the vehicle further at first than later on.
     at[last] = at.iter().fold(Deviation::default(), |largest, at| largest.or(at));
@@ -507,8 +474,15 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
         * dynamics.growth(s.delay + s.period_feedback);
     let tightening = Tightening {
         switching,
-        pulse: pulse_of,
+        pulse,
         growth: dynamics.growth(s.delay + s.period_feedback),
+        explained: Explained {
+            disturbance: s.disturbance_bound
+                + parts.any_moment * dynamics.geometry.r / dynamics.smallest
+                + 2.0 * s.rate_error / s.period_feedback,
+            share: s.inertia_error / (1.0 - s.inertia_error),
+            delay_error: s.delay_error,
+        },
         angle_bulge,
         moment,
         rate,
@@ -520,6 +494,52 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     };
     let assessment = assess(s, &dynamics, &tightening);
     Ok((tightening, assessment))
+}
+
+/// Returns the deviation at each tick, and the jump of the rates by a change of K ô there, see
+/// [`Tightening::pulse`].
+fn deviations(
+    s: &Settings,
+    error: &SampledError,
+    parts: &Parts,
+    steps: usize,
+) -> Result<(Vec<Deviation>, Vec<f64>), DesignError> {
+    Ok(match s.initial_state {
+        InitialState::Measured | InitialState::Nominal => {
+            let [of_angles, of_rates] = error.errors(steps);
+            let (reach, shifts) = (error.reach(steps), error.shifts(steps));
+            let causes = || reach.iter().zip(of_angles.iter().zip(&of_rates)).zip(&shifts);
+            let pulses = error.pulses(steps);
+            let all = causes().zip(&pulses);
+            let jumps: Vec<Pulse> = all
+                .map(|(((reach, errors), shifts), pulses)| {
+                    parts.pulse(s, reach, errors, shifts, pulses)
+                })
+                .collect();
+            let norms: Vec<f64> = jumps.iter().map(Pulse::norm).collect();
+            // Between two ticks the pulse of the next one may show already; pulses only grow.
+            let largest = norms.last().copied().unwrap_or_default();
+            let all = causes().zip(jumps.iter().zip(&pulses));
+            let all = all.map(|(((reach, errors), shifts), (jump, pulses))| {
+                let deviation = parts.deviation(s, reach, errors, shifts);
+                deviation.plus(&jump.deviation(s, pulses, largest))
+            });
+            (all.collect(), norms)
+        }
+        InitialState::Tube => {
+            // The deviation is fully grown from the start, because the plan may begin anywhere in
+            // the set that Δ cannot drive the deviation out of.
+            let last = |all: Vec<Reach>| all.last().copied().unwrap_or_default();
+            let set = error
+                .invariant_set(lateral(s))
+                .ok_or(DesignError::NotReal { name: "feedback" })?
+                .reach();
+            let reach = last(error.reach(steps)).or(&set);
+            let [of_angles, of_rates] = error.errors(steps).map(last);
+            let shifts = last(error.shifts(steps));
+            (vec![parts.deviation(s, &reach, (&of_angles, &of_rates), &shifts)], vec![0.0])
+        }
+    })
 }
 
 /// Returns the largest shift of the angle by a disturbance that changes within a period, beyond the

@@ -33,7 +33,7 @@ pub use sets::Bounds;
 pub use settings::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
 pub use supervision::{Contradiction, Supervision};
 
-use crate::controller::{Controller, Measurement, ReferenceAt};
+use crate::controller::{Controller, Explained, Measurement, ReferenceAt};
 use crate::error::DesignError;
 use crate::error_dynamics::InvariantSet;
 use crate::linearise;
@@ -717,8 +717,11 @@ impl Controller for Crmpc {
         moment
     }
 
-    fn delay_error(&self) -> f64 {
-        self.settings.delay_error
+    fn explained(&self) -> Explained {
+        match self.settings.constraints {
+            Constraints::Robust => self.design.tightening.explained,
+            Constraints::Paper => Explained::default(),
+        }
     }
 
     /// The paper's sets leave the limit to the optimisation. Without a solution, and with the
@@ -766,7 +769,7 @@ impl Crmpc {
             Contradiction::Step
         } else if measured.has_other_delay {
             Contradiction::Delay
-        } else if !self.credible(memory) {
+        } else if measured.is_unexplained || !self.credible(memory) {
             Contradiction::Disturbance
         } else if certified && !explained {
             Contradiction::Deviation

@@ -21,8 +21,8 @@ pub enum Contradiction {
     Step,
     /// The motion shows another delay of the loop than the one that was told.
     Delay,
-    /// The observed disturbance is larger than the bounds of disturbance, inertia and measurement
-    /// errors explain.
+    /// The observed disturbance, or the acceleration over a period, is larger than the bounds of
+    /// disturbance, inertia and measurement errors explain with the delay that was told.
     Disturbance,
     /// The vehicle is further from the plan than all assumptions together explain.
     Deviation,
