@@ -19,8 +19,8 @@ const SECONDS: f64 = 50.0;
 /// Periods of the square waves, s. Those up to some optimisation periods are the hardest.
 const SQUARE_PERIODS: [f64; 12] = [0.08, 0.12, 0.16, 0.2, 0.24, 0.4, 0.6, 0.8, 1.2, 2.0, 5.0, 11.0];
 
-/// Returns the time at which another delay is found, s, that at which the assumptions do not explain
-/// the motion, s, and the estimate at the end, s.
+/// Returns the time at which another delay is found, s, that at which the assumptions do not
+/// explain the motion, s, and the estimate at the end, s.
 fn fly<C: Controller>(
     law: Result<C, DesignError>,
     scenario: &Scenario,

@@ -24,8 +24,8 @@ pub struct Measurement {
     pub is_unexplained: bool,
 }
 
-/// What the assumptions of a law explain of the angular acceleration, beyond that of the moment that
-/// acts after the delay that was told.
+/// What the assumptions of a law explain of the angular acceleration, beyond that of the moment
+/// that acts after the delay that was told.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Explained {
     /// Largest part in each component of ẋ_ω, whatever the moment, rad/s².
@@ -116,8 +116,8 @@ pub trait Controller {
         f64::INFINITY
     }
 
-    /// Returns what the law's assumptions explain of the motion. Another delay than the one that was
-    /// told is only said to be there if they do not.
+    /// Returns what the law's assumptions explain of the motion. Another delay than the one that
+    /// was told is only said to be there if they do not.
     fn explained(&self) -> Explained {
         Explained::default()
     }
