@@ -61,7 +61,7 @@ pub(crate) fn resolve(
 ) -> Result<Vec<Setting>, Error> {
     let part = parts[index];
     let component = &experiment.components[part.name];
-    let mut settings = Vec::new();
+    let (mut settings, mut left_out) = (Vec::new(), Vec::new());
     for (name, written) in &component.parameters {
         let span = written.span();
         let path = format!("{}.{name}", part.name);
@@ -74,16 +74,21 @@ pub(crate) fn resolve(
             }
         };
         if component.is_exchanged && !is_assigned && part.description.find(name).is_none() {
-            warn_once(format!(
-                "{path}: {} has no such parameter, it is left out",
-                part.description.model_name
-            ));
+            left_out.push(name.as_str());
             continue;
         }
         let position = position(name, index, part, wires, is_assigned).map_err(&refuse)?;
         let variable = &part.description.variables[position];
         let value = value(written.get_ref(), variable, part).map_err(refuse)?;
         settings.push(Setting { name: name.clone(), reference: variable.reference, value });
+    }
+    if !left_out.is_empty() {
+        warn_once(format!(
+            "{} as \"{}\" does not have these parameters, which are left out: {}",
+            part.description.model_name,
+            part.name,
+            left_out.join(", ")
+        ));
     }
     Ok(settings)
 }

@@ -343,6 +343,7 @@ fn shortest_patterns<'a>(open: &[&str], all: &(impl Iterator<Item = &'a str> + C
 /// text.
 pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Column>, Error> {
     let mut columns: Vec<Column> = Vec::new();
+    let mut missing = Vec::new();
     let mut seen: HashSet<Port> = HashSet::new();
     for text in &experiment.record.variables {
         let reference = Reference::new(text, parts, &experiment.source)?;
@@ -370,10 +371,7 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
         }
         if meant == 0 && columns.len() == before {
             if experiment.components[part.name].is_exchanged {
-                warn_once(format!(
-                    "{}: {} has none, nothing is recorded",
-                    reference.text, part.description.model_name
-                ));
+                missing.push(text.get_ref().as_str());
                 continue;
             }
             let known: Vec<&str> =
@@ -384,6 +382,12 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
                 part.name, reference.rest
             )));
         }
+    }
+    if !missing.is_empty() {
+        warn_once(format!(
+            "these are not recorded, because the units that take part do not have them: {}",
+            missing.join(", ")
+        ));
     }
     Ok(columns)
 }

@@ -63,6 +63,11 @@ impl Experiment {
             let file = Path::new(fmu).is_file().then(|| std::path::absolute(fmu).ok()).flatten();
             let file =
                 file.map_or_else(|| fmu.to_string(), |file| file.to_string_lossy().into_owned());
+            let (new, old) = (stem(&file), stem(component.fmu.get_ref()));
+            if new != old {
+                // The title of the file is about another unit.
+                self.title = format!("{new} in place of {old}: {}", self.title);
+            }
             (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
         }
         for assignment in &overrides.set {
@@ -93,4 +98,9 @@ impl Experiment {
         }
         Ok(())
     }
+}
+
+/// Returns the name of a unit's file without folder and ending.
+fn stem(path: &str) -> String {
+    Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
