@@ -142,7 +142,7 @@ def test_a_bad_experiment_is_refused_with_the_culprit(orchestrate, tmp_path, old
 
 
 def test_a_unit_that_fails_ends_the_run(orchestrate, tmp_path):
-    path = changed(tmp_path, '"feedback.k1" = -2.0', '"feedback.k1" = -5000.0')
+    path = changed(tmp_path, '"feedback.k1" = -1.5', '"feedback.k1" = -5000.0')
     finished, _ = orchestrate(path)
     assert finished.returncode == 1, finished.stderr
     assert "controller" in finished.stderr and "spectral radius" in finished.stderr

@@ -183,6 +183,27 @@ def test_a_delay_that_nobody_told_is_found(fmu, name):
             assert ("another delay" in controller.messages()) == differs
 
 
+@pytest.mark.parametrize("adversary", ADVERSARIES)
+@pytest.mark.parametrize("delay", [0.031, 0.05])
+def test_a_delay_within_its_interval_ends_nothing(fmu, adversary, delay):
+    bound = math.radians(1.9)
+    plant = {"disturbance.seed": 12, "disturbance.bound": bound, **ADVERSARIES[adversary]}
+    settings = {"delay": STEP, "delayError": 0.01, "disturbance.bound": bound}
+    rows, in_force = fly(fmu, settings, plant | {"actuation.delay": delay})
+    assert np.mean(in_force) >= 0.99 and in_force[2:].all()
+    assert np.degrees(np.linalg.norm(rows[:, 3:6], axis=1)).max() <= 5.0
+    assert np.linalg.norm(rows[:, 6:9], axis=1).max() <= 1.356e5
+
+
+def test_little_moment_is_said(fmu):
+    for delay, little in [(0.04, False), (0.08, True)]:
+        with Unit(fmu("CRMPC"), {"delay": delay}).start() as controller:
+            controller.step(0.0, STEP)
+            (left,) = controller.get(["guarantee.momentLeft"])
+            assert (0.0 < left < 0.1) == little and left < 0.2
+            assert ("guarantee.momentLeft" in controller.messages()) == little
+
+
 def test_moments_of_both_couplings_belong_to_the_step_that_begins(fmu):
     rows = [[*range(6), 10.0 * k, 0.0, 0.0] for k in range(3)]
     assert [row[6] for row in of_step(rows)] == [10.0, 20.0, 20.0]

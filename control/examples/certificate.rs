@@ -4,21 +4,25 @@
 //! cargo run --release -p reentry-control --example certificate -- ARGUMENTS
 //!     cost [COMMON TENSOR]
 //!     edge PERIOD FIRST COUNT
+//!     late FIRST COUNT
 //! ```
 //!
 //! `cost` flies the scenario of Chai 2022 with white noise and with constant disturbances, and
 //! prints EMS, kept plans and computing times; COMMON and TENSOR are the bounds on the inertia
 //! error as a common factor and of the tensor. `edge` flies COUNT flights, with the seeds from
-//! FIRST on, that begin just inside the set of certified states, optimising every PERIOD seconds. A
-//! line shows each broken promise with its seed.
+//! FIRST on, that begin just inside the set of certified states, optimising every PERIOD seconds.
+//! `late` flies COUNT flights whose commands act up to 0.01 s earlier or later than after the 0.04
+//! s that the controller is told. A line shows each broken promise with its seed.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
 
 use control::Crmpc;
 use control::crmpc::{Constraints, Memory, Settings, Standing, Status};
+use control::error_dynamics::Gain;
 use harness::flight::{Flight, optimised_every};
 use harness::{Case, constant, in_parallel, settings, simulate, white};
+use std::ops::Range;
 
 /// Sums over the runs of one kind of disturbance.
 #[derive(Default)]
@@ -50,12 +54,18 @@ fn main() {
             let [Some(period), Some(first), Some(count)] = [1, 2, 3].map(number) else { usage() };
             edge(period, first as u64, count as u64);
         }
+        Some("late") => {
+            let [Some(first), Some(count)] = [1, 2].map(number) else { usage() };
+            late(first as u64, count as u64);
+        }
         _ => usage(),
     }
 }
 
 fn usage() -> ! {
-    eprintln!("usage: certificate cost [COMMON TENSOR] | certificate edge PERIOD FIRST COUNT");
+    eprintln!(
+        "usage: certificate cost [COMMON TENSOR] | edge PERIOD FIRST COUNT | late FIRST COUNT"
+    );
     std::process::exit(2);
 }
 
@@ -115,10 +125,32 @@ fn add(cost: &mut Cost, settings: &Settings, case: &Case) {
 
 fn edge(period: f64, first: u64, count: u64) {
     let settings = optimised_every(period);
-    let seeds: Vec<u64> = (first..first + count).collect();
-    let shown = in_parallel(&seeds, |&seed| {
-        Flight::at_the_edge(&settings, seed).map(|flight| flight.fly())
+    let flight = |seed: u64| Flight::at_the_edge(&settings, seed);
+    fly(&format!("period {period} s"), first..first + count, flight);
+}
+
+/// Half of the flights begin at the edge, the others anywhere.
+fn late(first: u64, count: u64) {
+    let published = settings(Constraints::Robust);
+    let settings = Settings {
+        delay: 0.04,
+        delay_error: 0.01,
+        disturbance_bound: f64::to_radians(1.9),
+        feedback: Gain { k1: -1.5, k2: -4.0 },
+        ..published
+    };
+    fly("0.04 ± 0.01 s", first..first + count, |seed| {
+        if seed % 2 == 0 {
+            Flight::at_the_edge(&settings, seed)
+        } else {
+            Some(Flight::random(&settings, seed))
+        }
     });
+}
+
+fn fly(name: &str, seeds: Range<u64>, flight: impl Fn(u64) -> Option<Flight> + Sync) {
+    let seeds: Vec<u64> = seeds.collect();
+    let shown = in_parallel(&seeds, |&seed| flight(seed).map(|flight| flight.fly()));
     let (mut flown, mut broken, mut withdrawn, mut lost, mut in_force) = (0, 0, 0, 0, 0.0);
     let mut largest = [0.0_f64; 3];
     for (seed, shown) in seeds.iter().zip(shown) {
@@ -138,7 +170,7 @@ fn edge(period: f64, first: u64, count: u64) {
     }
     let [sideslip, rate, moment] = largest;
     println!(
-        "period {period} s: {flown} flights, {broken} broke a bound, {withdrawn} withdrawn, {lost} lost, in force {:.2} %; largest share of the bound on the sideslip {sideslip:.6}, rate {rate:.6}, moment {moment:.6}",
+        "{name}: {flown} flights, {broken} broke a bound, {withdrawn} withdrawn, {lost} lost, in force {:.2} %; largest share of the bound on the sideslip {sideslip:.6}, rate {rate:.6}, moment {moment:.6}",
         100.0 * in_force / f64::from(flown)
     );
 }

@@ -1,5 +1,5 @@
 //! Disturbance bounds that the robust set can guarantee for the published vehicle and limits, by
-//! gains, delay and measurement errors:
+//! gains, delay, its uncertainty, and measurement errors:
 //!
 //! ```text
 //! cargo run --release -p reentry-control --example guarantee
@@ -13,7 +13,7 @@ use control::error_dynamics::Gain;
 
 fn main() {
     println!(
-        "    K        delay   errors, deg and deg/s   largest bound, deg/s2   left of the moment at 2 deg/s2"
+        "    K        delay, s         errors, deg and deg/s   largest bound, deg/s2   left of the moment at 2 deg/s2"
     );
     for (k1, k2) in [
         (-5.0, -5.0),
@@ -37,6 +37,18 @@ fn main() {
                 };
                 print(&settings, error_deg);
             }
+            for delay_error in [0.005, 0.01, 0.02] {
+                let settings = Settings {
+                    feedback: Gain { k1, k2 },
+                    delay,
+                    delay_error,
+                    guarantee: Guarantee::BestEffort,
+                    ..Settings::new(Constraints::Robust)
+                };
+                if delay > 0.0 {
+                    print(&settings, 0.0);
+                }
+            }
         }
     }
 }
@@ -51,9 +63,9 @@ fn print(settings: &Settings, error_deg: f64) {
         let middle = 0.5 * (low + high);
         if holds(middle) { low = middle } else { high = middle }
     }
-    let Settings { feedback: Gain { k1, k2 }, delay, .. } = settings;
+    let Settings { feedback: Gain { k1, k2 }, delay, delay_error, .. } = settings;
     println!(
-        "[{k1:4}, {k2:4}] {delay:6.3} {error_deg:16.2} {:26.3} {:30.1} %",
+        "[{k1:4}, {k2:4}] {delay:6.3} ± {delay_error:5.3} {error_deg:16.2} {:26.3} {:30.1} %",
         low.to_degrees(),
         100.0 * left
     );

@@ -3,14 +3,15 @@
 //!
 //! ```text
 //! cargo run --release -p reentry-control --example loop_times -- ARGUMENTS
-//!     KIND FIRST COUNT [REPETITIONS [K1 K2 [DELAYS]]]
+//!     KIND FIRST COUNT [REPETITIONS [K1 K2 [DELAYS [BOUND]]]]
 //! ```
 //!
 //! Each flight is that of Chai 2022 (50 s, inertia + 5 %) with seed or case FIRST to FIRST +
 //! COUNT − 1 of the disturbances KIND: `white`, `corners` (constant), `square` or `adversaries`.
 //! The loops of a case take turns, REPETITIONS times (5 by default), and each optimisation counts
 //! with the smallest of its times, because other load on the machine can only add to them. DELAYS
-//! are given in s, separated by commas; `0,0.04` by default. The counts of iterations repeat
+//! are given in s, separated by commas; `0,0.04` by default. BOUND is the disturbance bound, in
+//! deg/s², 2 by default. The counts of iterations repeat
 //! exactly, the times do not: compare the loops of one run.
 
 #[path = "../tests/harness/mod.rs"]
@@ -49,7 +50,7 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |i: usize| arguments.get(i).and_then(|text| text.parse::<f64>().ok());
     let (Some(kind), Some(first), Some(count)) = (arguments.first(), number(1), number(2)) else {
-        eprintln!("usage: loop_times KIND FIRST COUNT [REPETITIONS [K1 K2 [DELAYS]]]");
+        eprintln!("usage: loop_times KIND FIRST COUNT [REPETITIONS [K1 K2 [DELAYS [BOUND]]]]");
         std::process::exit(2);
     };
     let repetitions = number(3).map_or(REPETITIONS, |count| count as usize);
@@ -62,6 +63,9 @@ fn main() {
     let mut settings = Settings::new(Constraints::Robust);
     if let (Some(k1), Some(k2)) = (number(4), number(5)) {
         settings.feedback = Gain { k1, k2 };
+    }
+    if let Some(bound) = number(7) {
+        settings.disturbance_bound = bound.to_radians();
     }
     let mut all: Vec<Flown> = delays.iter().map(|_| Flown::default()).collect();
     for case in first as u64..(first + count) as u64 {

@@ -49,7 +49,7 @@ fn write_samples(
         change(&mut settings.solver);
         Crmpc::new(settings).unwrap()
     };
-    let mut ways = [
+    let mut ways = vec![
         ("shortcuts, riccati", with(|_| ())),
         ("riccati", with(|solver| solver.shortcuts = false)),
         ("cone", with(|solver| (solver.shortcuts, solver.method) = (false, Method::Cone))),

@@ -51,12 +51,12 @@ const MANY: u32 = 20;
 const ESTIMATED: (f64, f64) = (0.25, 0.25);
 
 const LOOPS: [Loop; 10] = [
-    bare("ideal", (-2.0, -4.0), 0.0),
-    Loop { budget: 0.1, ..bare("ideal-budget-0.1-ms", (-2.0, -4.0), 0.0) },
+    bare("ideal", (-1.5, -4.0), 0.0),
+    Loop { budget: 0.1, ..bare("ideal-budget-0.1-ms", (-1.5, -4.0), 0.0) },
     bare("ideal-printed-gain", (-5.0, -5.0), 0.0),
-    bare("delay-0.04", (-2.0, -4.0), 0.04),
-    bare("delay-0.117", (-2.0, -4.0), 0.117),
-    erroneous("small-errors", (-2.0, -4.0), 0.0, (0.02, 0.02)),
+    bare("delay-0.04", (-1.5, -4.0), 0.04),
+    bare("delay-0.117", (-1.5, -4.0), 0.117),
+    erroneous("small-errors", (-1.5, -4.0), 0.0, (0.02, 0.02)),
     erroneous("errors", (-1.0, -2.0), 0.0, ESTIMATED),
     erroneous("errors-delay-0.04", (-0.5, -1.5), 0.04, ESTIMATED),
     Loop { estimator: true, ..erroneous("estimator", (-0.5, -1.5), 0.04, ESTIMATED) },

@@ -102,6 +102,12 @@ pub trait Controller {
         f64::INFINITY
     }
 
+    /// Returns by how much the delay of the loop may differ from the one that was told without
+    /// being another one, s.
+    fn delay_error(&self) -> f64 {
+        0.0
+    }
+
     /// Tells the law that its last command exceeded the limit, and which moment (N m) is applied in
     /// its place.
     fn limited(&mut self, _memory: &mut Self::Memory, _applied: &Vector3<f64>) {}

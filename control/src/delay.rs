@@ -194,6 +194,7 @@ impl<C: Controller> Delayed<C> {
             body,
             period,
             told: latency.total(),
+            told_error: inner.delay_error(),
             is_filtered: measurement > 0.0,
         };
         Ok(Self { inner, predictor, latency, loop_delay, moment_limit })

@@ -53,7 +53,22 @@ pub enum DesignError {
         errors: Option<(f64, f64)>,
         /// Largest accepted delay, s.
         delay: Option<f64>,
+        /// Largest accepted error of the delay, s.
+        delay_error: Option<f64>,
     },
+    /// The delay could be negative, or a command could begin to act after the next one should.
+    #[error(
+        "`delay_error` = {value} s, but it can be at most {largest} s here: neither more than the delay nor more than a period of the feedback law"
+    )]
+    DelayError {
+        /// Value of the setting, s.
+        value: f64,
+        /// Largest value that is accepted, s.
+        largest: f64,
+    },
+    /// Changes of the plan's acceleration are carried along from a measured state only.
+    #[error("`initial_state` = tube needs an exact delay, `delay_error` = 0")]
+    DelayErrorWithTube,
     /// A gain violates Lemma 2 or 3 of Chai 2022.
     #[error(
         "`{name}.k1` and `{name}.k2` need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)"
@@ -206,6 +221,7 @@ fn no_guarantee(error: &DesignError) -> String {
         disturbance,
         errors,
         delay,
+        delay_error,
     } = error
     else {
         return String::new();
@@ -245,6 +261,9 @@ fn no_guarantee(error: &DesignError) -> String {
     }
     if let Some(delay) = delay {
         accepted.push(format!("`delay` = {:.4} s", down(*delay)));
+    }
+    if let Some(error) = delay_error {
+        accepted.push(format!("`delay_error` = {:.4} s", down(*error)));
     }
     format!(
         "{}; with all else as it is, what would be accepted is at most {}; `guarantee` = bestEffort runs all the same, without guarantee",

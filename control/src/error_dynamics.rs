@@ -41,6 +41,11 @@ pub fn transition(h: f64) -> Matrix2<f64> {
     Matrix2::new(1.0, h, 0.0, 1.0)
 }
 
+/// Returns the largest |c₀ + c₁ u| over `within`.
+fn largest_size(c0: f64, c1: f64, within: (f64, f64)) -> f64 {
+    (c0 + c1 * within.0).abs().max((c0 + c1 * within.1).abs())
+}
+
 /// Returns ∫ |c₀ + c₁ u| du over `within`.
 fn integral_of_size(c0: f64, c1: f64, within: (f64, f64)) -> f64 {
     let primitive = |u: f64| c0 * u + 0.5 * c1 * u * u;
@@ -80,6 +85,8 @@ pub struct Reach {
     pub feedback: f64,
     /// Sum of the parts of the feedback, each multiplied by the time since it was caused, s.
     pub feedback_age: f64,
+    /// Largest change of K o from one tick to the next, dimensionless.
+    pub change: f64,
 }
 
 impl Reach {
@@ -99,6 +106,7 @@ impl Reach {
             middle_rate: of(self.middle_rate, other.middle_rate),
             feedback: of(self.feedback, other.feedback),
             feedback_age: of(self.feedback_age, other.feedback_age),
+            change: of(self.change, other.change),
         }
     }
 
@@ -196,7 +204,9 @@ impl InvariantSet {
             middle_angle: middle(0),
             middle_rate: middle(1),
             feedback: self.support(&self.gain.row().transpose()),
+            // No use is made of these.
             feedback_age: 0.0,
+            change: 0.0,
         }
     }
 }
@@ -245,14 +255,35 @@ impl SampledError {
             rate: self.latency,
             ..Reach::default()
         };
+        self.sums(steps, unseen, integral_of_size)
+    }
+
+    /// Returns the largest effect of pulses of Δ, by which the rate jumps by at most 1 in any time
+    /// as long as a period, within 0, 1, …, `steps` periods from o = 0. The units are those for a
+    /// jump of the rate in rad/s: s for an angle, 1 for a rate, and 1/s for K o.
+    pub fn pulses(&self, steps: usize) -> Vec<Reach> {
+        // A latency that is a whole number of periods may be inexact by rounding.
+        let unseen = (self.latency / self.period - 1e-9).ceil().max(0.0);
+        let unseen = Reach { angle: unseen * self.latency, rate: unseen, ..Reach::default() };
+        self.sums(steps, unseen, largest_size)
+    }
+
+    /// Returns the sums of the responses to what acted in each period. `size` takes the size of a
+    /// response c₀ + c₁ u over the times u at which it is seen first.
+    fn sums(
+        &self,
+        steps: usize,
+        unseen: Reach,
+        size: fn(f64, f64, (f64, f64)) -> f64,
+    ) -> Vec<Reach> {
         let within = (self.latency, self.latency + self.period);
         let mut reach = unseen;
         let mut all = Vec::with_capacity(steps + 1);
         all.push(reach);
-        let mut power = Matrix2::identity();
+        let (mut power, mut before) = (Matrix2::identity(), Matrix2::zeros());
         for n in 0..steps {
             // By now [u; 1] has become Φⁿ [u; 1].
-            let size = |row: RowVector2<f64>| integral_of_size(row.y, row.x, within);
+            let size = |row: RowVector2<f64>| size(row.y, row.x, within);
             let (angle, rate) = (size(power.row(0).into()), size(power.row(1).into()));
             let feedback = size(self.gain.row() * power);
             let middle = self.to_middle * power;
@@ -265,8 +296,10 @@ impl SampledError {
                 middle_rate: reach.middle_rate + size(middle.row(1).into()),
                 feedback: reach.feedback + feedback,
                 feedback_age: reach.feedback_age + feedback * (within.1 + n as f64 * self.period),
+                change: reach.change + size(self.gain.row() * (power - before)),
             };
             all.push(reach);
+            before = power;
             power = self.phi * power;
         }
         all
@@ -347,6 +380,7 @@ impl SampledError {
                 middle_rate: seen[3],
                 feedback: seen[4],
                 feedback_age: 0.0,
+                change: 2.0 * seen[4],
             });
             first = phi * first;
         }
@@ -359,13 +393,12 @@ impl SampledError {
     pub fn changes(&self, steps: usize) -> Vec<Reach> {
         let Self { gain, period, latency, phi, to_middle, .. } = *self;
         let mut sum = Reach::default();
-        let mut power = Matrix2::identity();
+        let (mut power, mut before) = (Matrix2::identity(), Matrix2::zeros());
         let mut all = vec![sum];
         for _ in 0..steps {
             // A change at the time u before the tick has become Φⁿ [u; 1].
-            let most = |row: RowVector2<f64>| {
-                period * row.y.abs().max((row.y + row.x * (latency + period)).abs())
-            };
+            let most =
+                |row: RowVector2<f64>| period * largest_size(row.y, row.x, (0.0, latency + period));
             let middle = to_middle * power;
             let (angle, rate) = (most(power.row(0).into()), most(power.row(1).into()));
             sum = sum.plus(&Reach {
@@ -377,7 +410,9 @@ impl SampledError {
                 middle_rate: most(middle.row(1).into()),
                 feedback: most(gain.row() * power),
                 feedback_age: 0.0,
+                change: most(gain.row() * (power - before)),
             });
+            before = power;
             all.push(sum);
             power = phi * power;
         }
@@ -402,6 +437,7 @@ impl SampledError {
                 middle_rate: reach.middle_rate + middle.y.abs(),
                 feedback: reach.feedback + (self.gain.row() * shift).x.abs(),
                 feedback_age: 0.0,
+                change: 2.0 * (reach.feedback + (self.gain.row() * shift).x.abs()),
             };
             all.push(reach);
             shift = self.phi * shift;
@@ -416,13 +452,7 @@ impl SampledError {
     /// A Δ that changes within the period acts as its mean does, and also shifts the angle by no
     /// more than τ²/4.
     pub fn invariant_set(&self, lateral: f64) -> Option<InvariantSet> {
-        let (trace, det) = (self.phi.trace(), self.phi.determinant());
-        let discriminant = 0.25 * trace * trace - det;
-        if discriminant <= 0.0 || self.spectral_radius() > LARGEST_RADIUS {
-            return None;
-        }
-        let eigenvalues = [0.5 * trace + discriminant.sqrt(), 0.5 * trace - discriminant.sqrt()];
-        let vectors = eigenvalues.map(|lambda| Vector2::new(self.phi.m12, lambda - self.phi.m11));
+        let (eigenvalues, vectors) = self.modes()?;
         let basis = Matrix2::from_columns(&vectors).try_inverse()?;
 
         let mut generators = Vec::with_capacity(EXPLICIT + 2);
@@ -440,6 +470,17 @@ impl SampledError {
         }
         let Self { gain, latency, to_middle, .. } = *self;
         Some(InvariantSet { generators, gain, latency, to_middle })
+    }
+
+    /// Returns the eigenvalues of Φ and their eigenvectors, if they are real, distinct and stable.
+    pub fn modes(&self) -> Option<([f64; 2], [Vector2<f64>; 2])> {
+        let (trace, det) = (self.phi.trace(), self.phi.determinant());
+        let discriminant = 0.25 * trace * trace - det;
+        if discriminant <= 0.0 || self.spectral_radius() > LARGEST_RADIUS {
+            return None;
+        }
+        let values = [0.5 * trace + discriminant.sqrt(), 0.5 * trace - discriminant.sqrt()];
+        Some((values, values.map(|lambda| Vector2::new(self.phi.m12, lambda - self.phi.m11))))
     }
 
     /// Returns the sampling period, s.

@@ -58,7 +58,8 @@ pub struct LoopDelay {
     periods: u32,
     /// Estimated delay, s, if the motion tells it.
     pub estimate: Option<f64>,
-    /// Whether it differs from the delay that was told by more than half a period.
+    /// Whether it differs from the delay that was told by more than half a period and what was said
+    /// of its error.
     pub is_other: bool,
 }
 
@@ -100,6 +101,8 @@ pub struct LoopDelaySettings {
     pub period: f64,
     /// Delay that was told, s.
     pub told: f64,
+    /// Amount by which the true delay may differ from it, s.
+    pub told_error: f64,
     /// Whether measurements are old when they arrive. They come through a filter then, and their
     /// noise would be taken for a response: no estimate is made.
     pub is_filtered: bool,
@@ -197,14 +200,15 @@ impl LoopDelaySettings {
     fn estimate(&self, memory: &mut LoopDelay) {
         let places = memory.fits.each_mut().map(Fit::least);
         let told = self.told / self.period - self.first() as f64;
+        let slack = 0.5 + self.told_error / self.period;
         // Where several leave next to nothing, the highest difference is the least misled by a
         // smooth disturbance.
         let best = memory.fits.iter().zip(places).rev();
         let best = best.min_by(|(a, _), (b, _)| a.scale.total_cmp(&b.scale));
         let Some((fit, place)) = best else { return };
         let delay = (self.first() as f64 + place) * self.period;
-        memory.estimate = fit.tells(place, told).then_some(delay);
-        memory.is_other = memory.estimate.is_some() && (place - told).abs() > 0.5;
+        memory.estimate = fit.tells(place, (told, slack)).then_some(delay);
+        memory.is_other = memory.estimate.is_some() && (place - told).abs() > slack;
     }
 }
 
@@ -255,16 +259,16 @@ impl Fit {
     }
 
     /// Returns whether the evidence suffices to prefer `place`, which leaves least, to the delay
-    /// that was `told`, or to any other by a period; all in periods. The commands must explain
-    /// something at all: they do not act on a vehicle that rests.
-    fn tells(&self, place: f64, told: f64) -> bool {
+    /// that was `told` with some slack, or to any other by a period; all in periods. The commands
+    /// must explain something at all: they do not act on a vehicle that rests.
+    fn tells(&self, place: f64, (told, slack): (f64, f64)) -> bool {
         let least = self.unexplained(place);
         let is_evidence = |left: f64| left - least > EVIDENCE * self.scale;
         let against = |other: f64| is_evidence(self.unexplained(other));
         if !is_evidence(self.square) {
             return false;
         }
-        if (place - told).abs() > 0.5 {
+        if (place - told).abs() > slack {
             return against(told);
         }
         against(place + 1.0) && (place < 1.0 || against(place - 1.0))

@@ -251,7 +251,8 @@ fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins(
 #[test]
 fn every_way_to_the_optimum_shows_that_it_is_one() {
     // The measure is the residual of the conditions of optimality, with the constraints as
-    // functions of the motion.
+    // functions of the motion. Where the bounds follow the motion, as in the robust set, the solver
+    // stops at an excess of 1e-5 of a ball (docs/solver.md).
     for constraints in [Constraints::Robust, Constraints::Paper] {
         let mut controller = controller(constraints);
         let mut seen = Vec::new();
@@ -259,6 +260,7 @@ fn every_way_to_the_optimum_shows_that_it_is_one() {
             let Report { status, residual, .. } = sample.update(&mut controller).0.report;
             let largest = match status {
                 Status::Unconstrained | Status::TerminalBall => 1e-9,
+                _ if constraints == Constraints::Robust => 1e-5,
                 _ => 2e-6,
             };
             assert!(residual <= largest, "tick {}: {status:?} {residual}", sample.tick);
@@ -471,8 +473,8 @@ fn run_failing(during: Range<u64>) -> (harness::Outcome, [u32; 2], Memory) {
 #[test]
 fn a_solver_that_fails_for_a_while_costs_no_limit() {
     // The failures are in the manoeuvre at the start, with the jump of the reference ahead, and
-    // about the jump.
-    for during in [10..50, 200..300, 575..660] {
+    // about the jump, from before tick 570, the last one at which a plan is at its limits.
+    for during in [10..50, 200..300, 550..660] {
         let (outcome, [inside, outside], memory) = run_failing(during.clone());
         assert!(
             inside > 0 && outside == 0,

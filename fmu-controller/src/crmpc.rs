@@ -26,6 +26,10 @@ pub struct CrmpcLaw {
     shown: Shown,
 }
 
+/// Share of the moment limit below which the plan has so little left that optimisations become
+/// several times longer (`control`'s example `loop_times` with other disturbance bounds).
+const LITTLE_MOMENT: f64 = 0.1;
+
 /// Values that the outputs show.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Shown {
@@ -34,6 +38,7 @@ struct Shown {
     in_force: bool,
     supervision: Supervision,
     margins: Margins,
+    moment_left: f64,
     disturbance: Vector3<f64>,
     report: Report,
 }
@@ -123,7 +128,7 @@ const CONTRADICTIONS: Enumeration<Contradiction> = Enumeration {
         (
             Contradiction::Delay,
             "delay",
-            "the delay of the loop: loopDelay differs from delay + measurement.age",
+            "the delay of the loop: loopDelay differs from delay + measurement.age by more than delayError",
         ),
         (
             Contradiction::Disturbance,
@@ -161,6 +166,8 @@ impl Law for CrmpcLaw {
         ("observer.time_constant", "observer.timeConstant"),
         ("inertia_error", "inertia.error"),
         ("tensor_error", "inertia.tensorError"),
+        ("delay_error", "delayError"),
+        ("initial_state", "initialState"),
         ("angle_error", "estimation.angleError"),
         ("rate_error", "estimation.rateError"),
         ("sideslip_domain", "guarantee.sideslip"),
@@ -201,6 +208,7 @@ impl Law for CrmpcLaw {
                 rate: shown(memory.margins.rate),
                 moment: shown(memory.margins.moment),
             },
+            moment_left: shown(memory.moment_left),
             disturbance: shown_vector(&memory.observed.disturbance),
             report: solver::shown_report(&memory.report),
         };
@@ -215,7 +223,7 @@ impl Law for CrmpcLaw {
                     "the guarantee is no longer in force: inputs were set before the tick at which they are used; step with period.feedback or a whole part of it"
                 }
                 Contradiction::Delay => {
-                    "the guarantee is no longer in force: the loop has another delay than delay and measurement.age say"
+                    "the guarantee is no longer in force: the loop has another delay than delay, delayError and measurement.age say"
                 }
                 Contradiction::Disturbance => {
                     "the guarantee is no longer in force: the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError explain"
@@ -232,6 +240,13 @@ impl Law for CrmpcLaw {
             (Standing::None, Standing::Uncertified) => Some(
                 "the guarantee is not in force: no plan keeps its conditions from the present state",
             ),
+            (Standing::None, Standing::Pending | Standing::InForce)
+                if after.moment_left < LITTLE_MOMENT =>
+            {
+                Some(
+                    "the settings leave less than a tenth of limit.moment to the plan, see guarantee.momentLeft: optimisations take several times as long; a smaller disturbance.bound or delay leaves more",
+                )
+            }
             (Standing::None, Standing::Refused) => Some(
                 "constraints = robust cannot be guaranteed with these settings; it runs as best effort",
             ),
@@ -300,6 +315,10 @@ fn bounds(table: Controller) -> Controller {
         "inertia.tensorError",
         "Relative error of the tensor of inertia, in all six entries, that the robust set is tightened for besides the common factor",
     );
+    let delay_error = parameter(
+        "delayError",
+        "Largest difference between the delay of the loop, which must not change, and delay + measurement.age, that the robust set is tightened for",
+    );
     let angle_error = parameter(
         "estimation.angleError",
         "Bound on the error of each angle given that the robust set is tightened for; the error may take any value within it at each tick",
@@ -326,6 +345,9 @@ fn bounds(table: Controller) -> Controller {
         })
         .real(inertia.real().min(0.0).max(0.9).nominal(0.05), |m| &mut m.law.settings.inertia_error)
         .real(tensor.real().min(0.0).max(0.9).nominal(0.05), |m| &mut m.law.settings.tensor_error)
+        .real(delay_error.real().unit(unit::time()).min(0.0).max(1.0).nominal(0.01), |m| {
+            &mut m.law.settings.delay_error
+        })
         .real(sideslip.real().unit(unit::angle()).min(0.0).max(1.5).nominal(0.2), |m| {
             &mut m.law.settings.sideslip_bound
         })
@@ -393,6 +415,10 @@ fn outputs(table: Controller) -> Controller {
         );
         sampled(&format!("guarantee.{name}"), &text).real()
     };
+    let left = sampled(
+        "guarantee.momentLeft",
+        "Share of the moment limit that the reserve for disturbances, errors and delay leaves to the plan at rest",
+    );
     let observed = |axis: &str, meaning: &str| {
         let text = format!("Observed disturbance of the second derivative of the {meaning}");
         sampled(&format!("disturbanceEstimate.{axis}"), &text)
@@ -417,7 +443,8 @@ fn outputs(table: Controller) -> Controller {
             |m| &mut m.law.shown.supervision.contradiction,
         )
         .real(margin("rateMargin", "rate limit"), |m| &mut m.law.shown.margins.rate)
-        .real(margin("momentMargin", "moment limit"), |m| &mut m.law.shown.margins.moment);
+        .real(margin("momentMargin", "moment limit"), |m| &mut m.law.shown.margins.moment)
+        .real(left.real(), |m| &mut m.law.shown.moment_left);
     let table = vector(table, ANGLES, observed, |m| &mut m.law.shown.disturbance);
     solver::outputs(table, |law| &mut law.shown.report)
 }

@@ -2,7 +2,7 @@
 //! the `robust` set.
 
 use super::guarantee::{self, Assessment, Tightening};
-use super::settings::{Constraints, Guarantee, Settings};
+use super::settings::{Constraints, Guarantee, InitialState, Settings};
 use crate::delay;
 use crate::error::DesignError;
 use crate::error_dynamics::{Gain, InvariantSet, Reach, SampledError};
@@ -232,6 +232,7 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
         ("angle_error", s.angle_error, 1.0),
         ("rate_error", s.rate_error, 1.0),
         ("delay", s.delay, 1.0),
+        ("delay_error", s.delay_error, 1.0),
         ("sideslip_domain", s.sideslip_domain, 0.8),
         ("disturbance_bound", s.disturbance_bound, f64::MAX),
     ];
@@ -239,6 +240,15 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
         if !(0.0..high).contains(&value) {
             return Err(DesignError::OutOfRange { name, value, low: 0.0, high });
         }
+    }
+    if s.delay_error > 0.0 && s.initial_state == InitialState::Tube {
+        return Err(DesignError::DelayErrorWithTube);
+    }
+    if s.delay_error > s.delay.min(s.period_feedback) {
+        return Err(DesignError::DelayError {
+            value: s.delay_error,
+            largest: s.delay.min(s.period_feedback),
+        });
     }
     let ratio = (s.period_optimisation / s.period_feedback).round();
     if ratio < 1.0

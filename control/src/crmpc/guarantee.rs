@@ -5,8 +5,11 @@
 //! code explain the numbers of its lemmas.
 
 mod lemmas;
+mod switching;
 
 pub use lemmas::Lemmas;
+pub(super) use switching::unseen;
+pub use switching::{Carried, Switching};
 
 use super::settings::{InitialState, Settings};
 use crate::error::DesignError;
@@ -43,16 +46,26 @@ pub struct Deviation {
 impl Deviation {
     /// Returns the larger value of each component.
     fn or(&self, other: &Self) -> Self {
+        self.with(other, f64::max)
+    }
+
+    /// Returns the sum of each component and its counterpart.
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Self {
+        self.with(other, |own, other| own + other)
+    }
+
+    fn with(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
         Self {
-            angle: self.angle.max(other.angle),
-            rate: self.rate.max(other.rate),
-            seen_angle: self.seen_angle.max(other.seen_angle),
-            seen_rate: self.seen_rate.max(other.seen_rate),
-            middle_angle: self.middle_angle.max(other.middle_angle),
-            middle_rate: self.middle_rate.max(other.middle_rate),
-            feedback: self.feedback.max(other.feedback),
-            feedback_norm: self.feedback_norm.max(other.feedback_norm),
-            feedback_moment: self.feedback_moment.max(other.feedback_moment),
+            angle: of(self.angle, other.angle),
+            rate: of(self.rate, other.rate),
+            seen_angle: of(self.seen_angle, other.seen_angle),
+            seen_rate: of(self.seen_rate, other.seen_rate),
+            middle_angle: of(self.middle_angle, other.middle_angle),
+            middle_rate: of(self.middle_rate, other.middle_rate),
+            feedback: of(self.feedback, other.feedback),
+            feedback_norm: of(self.feedback_norm, other.feedback_norm),
+            feedback_moment: of(self.feedback_moment, other.feedback_moment),
         }
     }
 }
@@ -82,6 +95,12 @@ pub struct Tightening {
     /// Largest component of an explained disturbance estimate, rad/s²: Δ̄, the part of the inertia
     /// error, the mismatch and the errors of the rates.
     pub observable: f64,
+    /// What an unknown part of the delay adds; `None` if the delay is exact.
+    pub switching: Option<Box<Switching>>,
+    /// Largest jump of the rates that a change of K ô causes, rad/s, by feedback ticks.
+    pulse: Vec<f64>,
+    /// Growth of a disturbance in what is observed of it.
+    pub growth: f64,
 }
 
 impl Tightening {
@@ -109,6 +128,17 @@ impl Tightening {
     /// between its values at both ends of the optimisation period that begins at `tick`, rad.
     pub(super) fn angle_bulge(&self, tick: usize) -> f64 {
         self.angle_bulge[self.place(tick)]
+    }
+
+    /// Returns the largest jump of the rates that a change of K ô at `tick` causes if the command
+    /// begins to act earlier or later than assumed, rad/s.
+    pub(super) fn pulse(&self, tick: usize) -> f64 {
+        self.pulse[self.place(tick)]
+    }
+
+    /// Returns the largest deviation at the `ratio` ticks from `tick` on.
+    pub(super) fn within(&self, tick: usize, ratio: usize) -> Deviation {
+        (tick..tick + ratio).fold(Deviation::default(), |largest, n| largest.or(self.at(n)))
     }
 
     /// Returns the deviation that is never exceeded.
@@ -282,12 +312,19 @@ impl Dynamics {
         let vehicle = self.vehicle;
         let end = s.delay + s.period_feedback;
         let drive = Drive::new(s, self);
-        let f = self.apart(&drive, end) * self.growth(end);
+        // Commands that begin early or late make the rates jump.
+        let jump = 2.0 * s.delay_error * s.limit_moment * self.geometry.r
+            / ((1.0 - s.inertia_error) * (1.0 - s.tensor_error) * self.smallest);
+        let count = if jump > 0.0 { (end / s.period_feedback).ceil() + 1.0 } else { 0.0 };
+        let jumps = jump * count;
+        let by_jumps = (self.by_rates + self.by_angles * end) * jumps;
+        let f = (self.apart(&drive, end) + by_jumps) * self.growth(end);
         let beside = 0.25 * self.slope * powi(s.period_feedback, 2);
-        let rates = drive.rate_error + (drive.all + f) * end + beside;
+        let rates = drive.rate_error + (drive.all + f) * end + beside + jumps;
         let angles = drive.angle_error
             + (drive.rate_error_of_two + (0.5 * drive.of_two + 0.5 * f) * end) * end
-            + beside * s.period_feedback;
+            + beside * s.period_feedback
+            + jumps * end;
         Domain {
             rate: vehicle.rate + rates + TURN * angles * self.geometry.r * vehicle.rate,
             sideslip: vehicle.sideslip + angles,
@@ -581,6 +618,8 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     let ratio = (s.period_optimisation / s.period_feedback).round().max(1.0) as usize;
     let dynamics = Dynamics::new(s);
     let parts = Parts::new(s, &dynamics);
+    let switching = Switching::new(s, &error, &parts)?.map(Box::new);
+    let mut pulse_of = Vec::new();
     let disturbance = error.reach(steps);
     let [of_angles, of_rates] = error.errors(steps);
     let changes = parts.early[0].count(&error.changes(steps));
@@ -597,7 +636,16 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     };
     let mut at: Vec<Deviation> = match s.initial_state {
         InitialState::Measured | InitialState::Nominal => {
-            (0..=steps).map(|n| parts.deviation(s, &reaches(n))).collect()
+            let pulses = error.pulses(steps);
+            let jumps: Vec<Pulse> =
+                (0..=steps).map(|n| parts.pulse(s, &reaches(n), &pulses[n])).collect();
+            pulse_of.extend(jumps.iter().map(Pulse::norm));
+            // Between two ticks the pulse of the next one may show already; pulses only grow.
+            let largest = pulse_of.last().copied().unwrap_or_default();
+            let deviation = |n: usize| {
+                parts.deviation(s, &reaches(n)).plus(&jumps[n].deviation(s, &pulses[n], largest))
+            };
+            (0..=steps).map(deviation).collect()
         }
         InitialState::Tube => {
             // The deviation is fully grown from the start, because the plan may begin anywhere in
@@ -606,6 +654,7 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
                 .invariant_set(lateral(s))
                 .ok_or(DesignError::NotReal { name: "feedback" })?
                 .reach();
+            pulse_of.push(0.0);
             // The first ticks of a motion count at any time.
             let grown = (0..=steps).map(|n| {
                 let all = reaches(n);
@@ -657,6 +706,9 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
         + parts.mismatch.mean * parts.early[0].excess
         + 2.0 * predicted / s.observer.time_constant;
     let tightening = Tightening {
+        switching,
+        pulse: pulse_of,
+        growth: dynamics.growth(s.delay + s.period_feedback),
         angle_bulge,
         moment,
         rate,
@@ -682,6 +734,7 @@ pub(super) fn counting(s: &Settings, share: f64) -> Settings {
         disturbance_bound: share * s.disturbance_bound,
         angle_error: share * s.angle_error,
         rate_error: share * s.rate_error,
+        delay_error: share * s.delay_error,
         ..*s
     }
 }
@@ -713,6 +766,26 @@ struct Parts {
     turned_early: f64,
     /// Moment by which the inertia error amounts to more before the nominal motion began, N m.
     early_moment: f64,
+    /// Factors by which the inertia error makes the change of acceleration by a moment larger, if
+    /// it is a common factor, and in all.
+    pulse_common: f64,
+    pulse_inertia: f64,
+    /// Jump of the rates by the mismatch that a pulse causes, relative to the pulse.
+    pulse_mismatch: f64,
+    /// Change of the acceleration from one command to the next while the vehicle turns, rad/s².
+    turn: f64,
+}
+
+/// Jump of the rates at a tick, rad/s: in each component, and as a norm beyond that.
+struct Pulse {
+    of_box: f64,
+    of_ball: f64,
+}
+
+impl Pulse {
+    fn norm(&self) -> f64 {
+        3.0_f64.sqrt() * self.of_box + self.of_ball
+    }
 }
 
 impl Parts {
@@ -744,10 +817,23 @@ impl Parts {
         let any_before = inertia_moments(s, &before).1;
         // Bound of ‖I (W − W′) R′ I⁻¹‖ per unit of the angle between both attitudes.
         let by_turn = largest / smallest * TURN * before.geometry.r;
+        let common = s.inertia_error / (1.0 - s.inertia_error);
+        let tensor = s.tensor_error / (1.0 - s.tensor_error);
+        let root_condition = (largest / smallest).sqrt();
+        // Until a prediction includes a pulse, the motion differs from its prediction.
+        let elapsed = s.delay + s.period_feedback;
+        let pulse_mismatch =
+            (before.by_rates + 0.5 * before.by_angles * elapsed) * elapsed * before.growth(elapsed);
         Self {
+            pulse_common: 1.0 + common,
+            pulse_inertia: (1.0 + common) * (1.0 + tensor * root_condition * before.geometry.r),
+            pulse_mismatch,
+            // F at the instant of switching differs from the acceleration that either command
+            // intends for the middle of its period.
+            turn: 2.0 * s.delay_error * before.slope + 2.0 * mismatch.peak,
             along_moment,
             any_moment,
-            root_condition: (largest / smallest).sqrt(),
+            root_condition,
             drive,
             mismatch,
             early,
@@ -762,19 +848,21 @@ impl Parts {
         }
     }
 
+    /// Returns the effect of what differs in F, which may have any direction.
+    fn mismatched(&self, reach: &Reaches) -> Reach {
+        let Mismatch { mean, mispredicted, .. } = self.mismatch;
+        let Reaches { changes, mispredictions, shifts, .. } = reach;
+        let of_errors = mispredictions.times(mispredicted);
+        changes.times(mean).plus(&of_errors).plus(&shifts.times(self.swing))
+    }
+
     /// Returns the deviation.
     fn deviation(&self, s: &Settings, reach: &Reaches) -> Deviation {
         let root3 = 3.0_f64.sqrt();
-        let errors =
-            reach.errors[0].times(s.angle_error).plus(&reach.errors[1].times(s.rate_error));
-        let Mismatch { mean, peak, unseen_rate, mispredicted } = self.mismatch;
+        let errors = reach.of_errors(s);
+        let Mismatch { peak, unseen_rate, .. } = self.mismatch;
         let Drive { all, of_two, .. } = self.drive;
-        // What differs in F has any direction.
-        let ball = reach
-            .changes
-            .times(mean)
-            .plus(&reach.mispredictions.times(mispredicted))
-            .plus(&reach.shifts.times(self.swing));
+        let ball = self.mismatched(reach);
         let early_feedback = reach.early_feedback;
         let reach = &reach.disturbance;
         let tau = s.period_feedback;
@@ -819,55 +907,187 @@ struct Reaches {
     shifts: Reach,
 }
 
+impl Reaches {
+    /// Returns the effect of the errors of measurement.
+    fn of_errors(&self, s: &Settings) -> Reach {
+        self.errors[0].times(s.angle_error).plus(&self.errors[1].times(s.rate_error))
+    }
+}
+
+impl Parts {
+    /// Returns the jump of the rates at each tick, because a command changes by K (ô⁺ − ô) and
+    /// begins to act at another time than assumed. The arguments are those of
+    /// [`Self::deviation`], with the effect of `pulses` (per rad/s at each tick) beside them.
+    ///
+    /// Each pulse changes the later commands too. The sum of all is that of a geometric series
+    /// (small gain).
+    fn pulse(&self, s: &Settings, reaches: &Reaches, pulses: &Reach) -> Pulse {
+        if s.delay_error == 0.0 {
+            return Pulse { of_box: 0.0, of_ball: 0.0 };
+        }
+        let root3 = 3.0_f64.sqrt();
+        let all = self.pulse_inertia * (1.0 + self.pulse_mismatch);
+        let again = s.delay_error * pulses.change;
+        if again * all >= 1.0 {
+            return Pulse { of_box: f64::INFINITY, of_ball: f64::INFINITY };
+        }
+        let (errors, reach) = (reaches.of_errors(s), &reaches.disturbance);
+        let of_box = (reach.change * s.disturbance_bound + errors.change)
+            / (1.0 - again * self.pulse_common);
+        // The parts that do not keep to the axes are added as norms.
+        let besides = (all - self.pulse_common) * root3 * of_box + all * self.turn;
+        let ball = reach.change * self.drive.of_inertia
+            + self.mismatched(reaches).change
+            + again * besides;
+        let of_ball = ball / (1.0 - again * all);
+        Pulse {
+            of_box: s.delay_error * self.pulse_common * of_box,
+            of_ball: s.delay_error * (all * of_ball + besides),
+        }
+    }
+}
+
+impl Pulse {
+    /// Returns the deviation that this pulse at each tick causes. `pulses` is per unit of it, and
+    /// `largest` bounds the jump of the rates at any tick, rad/s.
+    fn deviation(&self, s: &Settings, pulses: &Reach, largest: f64) -> Deviation {
+        let Self { of_box, of_ball } = *self;
+        if of_box == 0.0 && of_ball == 0.0 {
+            return Deviation::default();
+        }
+        let (of_two, norm) = (SQRT_2 * of_box + of_ball, self.norm());
+        let tau = s.period_feedback;
+        Deviation {
+            // The last terms are those between two ticks.
+            angle: pulses.angle * of_two
+                + 0.25 * tau * largest
+                + 0.125 * tau * tau * pulses.feedback * norm,
+            rate: pulses.rate * norm + largest,
+            seen_angle: pulses.seen_angle * of_two,
+            seen_rate: pulses.seen_rate * norm,
+            middle_angle: pulses.middle_angle * of_two,
+            middle_rate: pulses.middle_rate * norm,
+            feedback: pulses.feedback * of_box,
+            feedback_norm: pulses.feedback * of_ball,
+            feedback_moment: 0.0,
+        }
+    }
+}
+
 /// Returns what is left of the limits (rad/s, N m) beyond a motion with ‖x̃_ω‖ ≤ `x` and ‖a‖ ≤ `a`,
-/// with the deviation that is never exceeded, at any attitude.
-fn left(s: &Settings, dynamics: &Dynamics, tightening: &Tightening, x: f64, a: f64) -> (f64, f64) {
-    let Deviation { angle, rate, .. } = *tightening.forever();
+/// with the deviation that is never exceeded and `more` of it, at any attitude.
+fn left(
+    s: &Settings,
+    dynamics: &Dynamics,
+    tightening: &Tightening,
+    more: Option<&Deviation>,
+    (x, a): (f64, f64),
+) -> (f64, f64) {
+    let mut deviation = *tightening.forever();
+    let mut of_moment = *tightening.moment_loss(usize::MAX);
+    if let Some(more) = more {
+        deviation = deviation.plus(more);
+        of_moment =
+            MomentLoss::new(dynamics, &deviation, tightening.bearing, s.period_optimisation);
+    }
+    let Deviation { angle, rate, .. } = deviation;
     let of_rates = s.limit_rate - RateLoss::new(angle, rate, 0.0, 0.0).at(TURN_OF_RATES * x, x);
-    let loss =
-        tightening.moment_loss(usize::MAX).at(tightening.bearing, dynamics.slopes(x, a), (x, a));
+    let loss = of_moment.at(tightening.bearing, dynamics.slopes(x, a), (x, a));
     (of_rates - x, s.limit_moment - loss - dynamics.nominal_moment(x, a))
 }
 
 /// Returns the rate κ (1/s) at which the sideslip has to brake beyond a horizon that ends with the
 /// angle `sideslip` and the rates `rates`. While braking, β travels by |β̇|/κ, and all limits must
-/// hold. The result is `None` if that is impossible.
+/// hold. `carried` is the deviation that the plan's changes of acceleration leave at the end of the
+/// horizon, and `last` the size of the acceleration before it. The result is `None` if that is
+/// impossible.
 pub(super) fn braking(
     s: &Settings,
     dynamics: &Dynamics,
     tightening: &Tightening,
     sideslip: f64,
     rates: &Vector3<f64>,
+    (carried, last): (&Carried, f64),
 ) -> Option<f64> {
-    let room = s.sideslip_domain - tightening.forever().angle - sideslip.abs();
-    let by_room = if rates.y == 0.0 { 0.0 } else { rates.y.abs() / room };
-    // A κ beyond 1/h would reverse the motion.
-    if room < 0.0 || by_room * s.period_optimisation > 1.0 {
-        return None;
+    let with = |more: Option<&Deviation>| {
+        let angle = tightening.forever().angle + more.map_or(0.0, |more| more.angle);
+        let room = s.sideslip_domain - angle - sideslip.abs();
+        let by_room = if rates.y == 0.0 { 0.0 } else { rates.y.abs() / room };
+        // A κ beyond 1/h would reverse the motion.
+        (room >= 0.0 && by_room * s.period_optimisation <= 1.0).then_some(by_room.max(BRAKING))
+    };
+    let mut braking = with(None)?;
+    let mut more = None;
+    if let Some(switching) = &tightening.switching {
+        let most = 2.0 * braking;
+        let left = while_braking(s, switching, carried, last, (rates, most));
+        braking = with(Some(&left)).filter(|&braking| braking <= most)?;
+        more = Some(left);
     }
-    let braking = by_room.max(BRAKING);
-    let acceleration = rates.component_mul(&Vector3::new(BRAKING, braking, BRAKING));
-    let (rate, moment) = left(s, dynamics, tightening, rates.norm(), acceleration.norm());
+    let sizes = (rates.norm(), braked(rates, braking).norm());
+    let (rate, moment) = left(s, dynamics, tightening, more.as_ref(), sizes);
     (rate >= 0.0 && moment >= 0.0).then_some(braking)
+}
+
+/// Returns the acceleration, but for its sign, of a motion that brakes.
+fn braked(rates: &Vector3<f64>, braking: f64) -> Vector3<f64> {
+    rates.component_mul(&Vector3::new(BRAKING, braking, BRAKING))
+}
+
+/// Returns what changes of the acceleration add to the deviation while a motion with these `rates`
+/// at first brakes by no more than the rate `most` (1/s). The first change is that from the
+/// acceleration of size `last`. From step to step the acceleration changes by less than κ h of
+/// itself.
+fn while_braking(
+    s: &Settings,
+    switching: &Switching,
+    carried: &Carried,
+    last: f64,
+    (rates, most): (&Vector3<f64>, f64),
+) -> Deviation {
+    let a = braked(rates, most).norm();
+    let first = switching.begin(carried, last + a);
+    switching.forever(&first, most * s.period_optimisation * a)
+}
+
+/// Returns the largest ‖x̃_ω‖ at the end of the horizon from which the motion can brake if the
+/// delay is not exact, rad/s. The other arguments are those of [`while_braking`].
+pub(super) fn terminal_rate(
+    s: &Settings,
+    dynamics: &Dynamics,
+    tightening: &Tightening,
+    switching: &Switching,
+    (carried, last, rates): (&Carried, f64, &Vector3<f64>),
+) -> f64 {
+    let more = while_braking(s, switching, carried, last, (rates, 2.0 * BRAKING));
+    largest_rate(s, |x| left(s, dynamics, tightening, Some(&more), (x, BRAKING * x)))
+}
+
+/// Returns the largest ‖x̃_ω‖ (rad/s) for which something is `left` of both limits.
+fn largest_rate(s: &Settings, left: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let is_left = |x: f64| {
+        let (rate, moment) = left(x);
+        rate > 0.0 && moment > 0.0
+    };
+    let (mut low, mut high) = (0.0, s.limit_rate);
+    if is_left(0.0) {
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if is_left(middle) { low = middle } else { high = middle }
+        }
+    }
+    low
 }
 
 /// Computes what is left of the limits at rest and for the motion beyond the horizon, at any
 /// attitude.
 fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessment {
-    let left = |x: f64| left(s, dynamics, tightening, x, BRAKING * x);
+    let left = |x: f64| left(s, dynamics, tightening, None, (x, BRAKING * x));
     let (rate, moment) = left(0.0);
-    let (mut low, mut high) = (0.0, s.limit_rate);
-    if rate > 0.0 && moment > 0.0 {
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            let (rate, moment) = left(middle);
-            if rate > 0.0 && moment > 0.0 { low = middle } else { high = middle }
-        }
-    }
     Assessment {
         rate_left: rate / s.limit_rate,
         moment_left: moment / s.limit_moment,
-        terminal_rate: low,
+        terminal_rate: largest_rate(s, left),
     }
 }
 
@@ -900,6 +1120,8 @@ pub(super) struct RateLoss {
     by_size: f64,
     /// Coefficients of ‖a‖, ‖x_ω‖ ‖a‖, ‖x_ω‖² and ‖x_ω‖³ in [`Self::within`].
     within: [f64; 4],
+    /// Change of the angles' deviation over an optimisation period, rad.
+    change: f64,
 }
 
 impl RateLoss {
@@ -915,6 +1137,7 @@ impl RateLoss {
         // |o₁² − o₂²| = |o₁ − o₂| (o₁ + o₂).
         let squares = 0.125 * CURVATURE * change * (2.0 * angle + change) * h;
         Self {
+            change,
             constant: rate,
             by_angles: angle,
             by_size: 0.5 * CURVATURE * angle * angle,
@@ -925,6 +1148,11 @@ impl RateLoss {
                 curved * CURVATURE + two * DRIFT_BY_ANGLES_TWICE,
             ],
         }
+    }
+
+    /// Returns the loss of this deviation and some more of the angles and rates (rad, rad/s).
+    pub(super) fn with(&self, (angle, rate): (f64, f64), h: f64) -> Self {
+        Self::new(self.by_angles + angle, self.constant + rate, self.change + angle, h)
     }
 
     /// Returns the loss at a stage with ‖∂ω/∂(α, β)‖ = `by_angles` and ‖x̃_ω‖ = `size`, rad/s.
@@ -970,7 +1198,7 @@ pub(super) struct MomentLoss {
 impl MomentLoss {
     /// Computes the loss of a deviation; `bearing` is [`Tightening::bearing`].
     /// The optimisation period is `h` (s).
-    fn new(dynamics: &Dynamics, deviation: &Deviation, bearing: f64, h: f64) -> Self {
+    pub(super) fn new(dynamics: &Dynamics, deviation: &Deviation, bearing: f64, h: f64) -> Self {
         let Deviation {
             middle_angle: angle,
             middle_rate: rate,
@@ -1162,6 +1390,10 @@ pub(super) fn refusal(s: &Settings, assessment: &Assessment) -> DesignError {
         }),
         delay: (s.delay > 0.0)
             .then(|| largest(s.delay, |delay| Settings { delay, ..*s }))
+            .flatten()
+            .filter(|&delay| delay > s.delay_error),
+        delay_error: (s.delay_error > 0.0)
+            .then(|| largest(s.delay_error, |delay_error| Settings { delay_error, ..*s }))
             .flatten(),
         errors: errors.map(|share| (share * s.angle_error, share * s.rate_error)),
     }

@@ -5,6 +5,7 @@
 //! exact double integrator. The error E = x̃ − x_r is formed afterwards, so that a jump of the
 //! reference is seen in the preview and never enters the dynamics.
 
+mod commands;
 mod design;
 mod few_stages;
 mod guarantee;
@@ -17,14 +18,15 @@ mod settings;
 mod supervision;
 
 pub use crate::report::{Report, Status};
+pub use commands::Commands;
 pub use design::{
     Design, PaperConstants, held_terminal_weight, step_response_peak, terminal_weight,
 };
 #[doc(hidden)]
 pub use guarantee::Lemmas;
-pub use guarantee::{Assessment, Deviation, Geometry, Tightening};
+pub use guarantee::{Assessment, Carried, Deviation, Geometry, Switching, Tightening};
 pub use observer::Observed;
-pub use plan::Plan;
+pub use plan::{Onset, Plan};
 pub use published::Published;
 pub use robust::Margins;
 pub use sets::Bounds;
@@ -61,6 +63,9 @@ pub struct Memory {
     pub supervision: Supervision,
     /// Margins to the limits that the plan in force leaves in its first interval.
     pub margins: Margins,
+    /// Share of the moment limit that the design leaves to the plan at rest, see
+    /// [`Assessment::moment_left`]; zero with the paper's set.
+    pub moment_left: f64,
     /// Feedback ticks from the beginning of the nominal motion to the beginning of the plan in
     /// force.
     pub age: u32,
@@ -68,6 +73,8 @@ pub struct Memory {
     pub pending: u32,
     /// Estimate of the disturbance with its filter state.
     pub observed: Observed,
+    /// Recent changes of the command, if the delay is not exact.
+    pub commands: Commands,
 }
 
 /// Status of the guarantee of the robust set at a tick. While it is in force, ‖ω‖ and ‖m‖ keep
@@ -123,10 +130,12 @@ impl Clone for Memory {
             nominal,
             standing,
             margins,
+            moment_left,
             age,
             pending,
             supervision,
             observed,
+            commands,
         } = source;
         self.plan.clone_from(plan);
         self.started = *started;
@@ -134,10 +143,12 @@ impl Clone for Memory {
         self.nominal = *nominal;
         self.standing = *standing;
         self.margins = *margins;
+        self.moment_left = *moment_left;
         self.age = *age;
         self.pending = *pending;
         self.supervision = *supervision;
         self.observed = *observed;
+        self.commands.clone_from(commands);
     }
 }
 
@@ -290,9 +301,8 @@ impl Crmpc {
     fn is_left_behind(&mut self, memory: &mut Memory, measured: &Vector6<f64>) -> bool {
         let (angles, rates) = split(&(measured - memory.plan.states[0]));
         let gain = self.settings.feedback;
-        self.sets.begin(memory.age as usize, 1.0);
         let left = self.design.counted >= 1.0
-            && !self.explains(0, &angles, &rates, &(angles * gain.k1 + rates * gain.k2));
+            && !self.explains(memory, 0, &angles, &rates, &(angles * gain.k1 + rates * gain.k2));
         if memory.assured() && left {
             memory.standing = Standing::Exceeded;
         }
@@ -321,6 +331,30 @@ impl Crmpc {
         self.keep(memory, &start, (Status::Fallback, report.iterations))
     }
 
+    /// Returns what a nominal motion follows on that begins at the measured state.
+    fn onset_anew(&self, memory: &Memory, measured: &Vector6<f64>) -> Onset {
+        let Some(switching) = &self.design.tightening.switching else { return Onset::default() };
+        let at_rest = || {
+            let (angles, rates) = split(measured);
+            self.settings.body.drift(&angles, &rates)
+        };
+        let allowed = memory.plan.begins_with(switching).z
+            + self.design.tightening.pulse(memory.age as usize);
+        Onset {
+            carried: switching.unseen(memory.commands.changes()),
+            before: memory.observed.commanded().unwrap_or_else(at_rest),
+            allowed: if memory.assured() { allowed } else { f64::INFINITY },
+        }
+    }
+
+    /// Returns what the present plan follows on, if it goes on.
+    fn onset_going_on(&self, memory: &Memory) -> Onset {
+        let Plan { onset, .. } = &memory.plan;
+        let Some(switching) = &self.design.tightening.switching else { return *onset };
+        let allowed = switching.pulse_of_command(memory.plan.first_change());
+        Onset { allowed: if memory.assured() { allowed } else { f64::INFINITY }, ..*onset }
+    }
+
     /// Finds a plan that satisfies the conditions of the theorem (docs/guarantee.md). The first
     /// choice is the optimum from the measured state, the second the optimum from the state that
     /// the previous plan predicted. The last is the previous plan itself, which satisfies the
@@ -336,15 +370,16 @@ impl Crmpc {
         if !self.credible(memory) {
             return self.violate_least(memory, measured, 0);
         }
-        let goes_on = (memory.plan.states[0], memory.age);
+        let anew_from = (*measured, 0, self.onset_anew(memory, measured));
+        let goes_on = (memory.plan.states[0], memory.age, self.onset_going_on(memory));
         let starts = match self.settings.initial_state {
             InitialState::Nominal if assured => [Some(goes_on), None],
-            InitialState::Measured if assured => [Some((*measured, 0)), Some(goes_on)],
-            _ => [Some((*measured, 0)), None],
+            InitialState::Measured if assured => [Some(anew_from), Some(goes_on)],
+            _ => [Some(anew_from), None],
         };
         let mut iterations = 0;
-        for (start, age) in starts.into_iter().flatten() {
-            self.sets.begin(age as usize, 1.0);
+        for (start, age, onset) in starts.into_iter().flatten() {
+            self.sets.begin(age as usize, 1.0, &onset);
             let (report, certified) = self.certified(memory, &start, anew);
             iterations += report.iterations;
             let solved = report.status != Status::Fallback;
@@ -353,7 +388,7 @@ impl Crmpc {
             let taken = !assured || self.settings.solver.nonlinearity == Nonlinearity::Frozen;
             if certified.is_some() || solved && taken {
                 self.follow_optimum(memory, &start);
-                memory.age = age;
+                (memory.age, memory.plan.onset) = (age, onset);
                 self.take_over(memory, certified);
                 return mpc::Report { iterations, ..report };
             }
@@ -384,7 +419,7 @@ impl Crmpc {
     /// Moves the certified plan towards the optimum without constraints as far as that is
     /// certified, so that a plan that is kept repeatedly still leads to the reference.
     fn go_towards_the_optimum(&mut self, memory: &mut Memory) {
-        self.sets.begin(memory.age as usize, 1.0);
+        self.sets.begin(memory.age as usize, 1.0, &self.onset_going_on(memory));
         memory.plan.errors(&self.sets.references, &mut self.previous);
         self.optimiser.without_constraints(&self.previous.states[0], &self.affine);
         for _ in 0..HALVINGS {
@@ -422,13 +457,14 @@ impl Crmpc {
         tried: u32,
     ) -> mpc::Report {
         memory.standing = self.without_guarantee(memory);
-        memory.age = 0;
+        let onset = self.onset_anew(memory, measured);
+        (memory.age, memory.plan.onset) = (0, onset);
         let mut iterations = tried;
         for share in LESS {
             if self.optimiser.is_exhausted() {
                 break;
             }
-            self.sets.begin(0, share);
+            self.sets.begin(0, share, &onset);
             let report = self.solve(memory, measured, true);
             iterations += report.iterations;
             if report.status != Status::Fallback {
@@ -445,7 +481,11 @@ impl Crmpc {
 
     /// Returns whether the assumptions explain the observed disturbance.
     fn credible(&self, memory: &Memory) -> bool {
-        memory.observed.disturbance.amax() <= self.design.tightening.observable
+        let Tightening { observable, switching, growth, .. } = &self.design.tightening;
+        let by_pulses =
+            |switching: &Switching| switching.observed(memory.commands.filtered()) * growth;
+        let explained = observable + switching.as_deref().map_or(0.0, by_pulses);
+        memory.observed.disturbance.amax() <= explained
     }
 
     /// Returns the reason why a plan is not certified.
@@ -511,6 +551,10 @@ impl Crmpc {
     fn shift(&self, plan: &mut Plan) {
         let n = self.settings.horizon;
         let last = *plan.states.last().unwrap_or(&Vector6::zeros());
+        if let Some(switching) = &self.design.tightening.switching {
+            plan.onset.carried = switching.next(&plan.begins_with(switching));
+            plan.onset.before = plan.accelerations[0];
+        }
         plan.states.rotate_left(1);
         plan.accelerations.rotate_left(1);
         plan.multipliers.rotate_left(1);
@@ -592,13 +636,22 @@ impl Controller for Crmpc {
     type Memory = Memory;
 
     fn memory(&self) -> Memory {
-        Memory { plan: Plan::new(self.settings.horizon), ..Memory::default() }
+        let robust = self.settings.constraints == Constraints::Robust;
+        Memory {
+            plan: Plan::new(self.settings.horizon),
+            moment_left: if robust { self.design.assessment.moment_left } else { 0.0 },
+            commands: Commands::new(&self.settings),
+            ..Memory::default()
+        }
     }
 
     fn fits(&self, memory: &Memory) -> bool {
         let (n, Plan { states, accelerations, multipliers, .. }) =
             (self.settings.horizon, &memory.plan);
-        states.len() == n + 1 && accelerations.len() == n && multipliers.len() == n
+        states.len() == n + 1
+            && accelerations.len() == n
+            && multipliers.len() == n
+            && memory.commands.fits(&self.settings)
     }
 
     fn command(
@@ -613,6 +666,9 @@ impl Controller for Crmpc {
         let within = tick % self.design.ratio as u64;
         memory.pending = memory.pending.saturating_sub(1);
         memory.observed.observe(&self.settings, &angle_rates);
+        if let Some(switching) = &self.design.tightening.switching {
+            memory.commands.observe(&self.settings, switching, &memory.observed);
+        }
         let mut left_behind = false;
         if within == 0 {
             let state = join(&measured.angles, &angle_rates);
@@ -646,7 +702,8 @@ impl Controller for Crmpc {
             // The guarantee is judged by the moment before the limit.
             let kept = moment.norm() <= limit_moment * (1.0 + 1e-9)
                 && measured.rates.norm() <= self.rate_shown();
-            let explained = self.explains(within, &off_angles, &off_rates, &(commanded - a));
+            let explained =
+                self.explains(memory, within, &off_angles, &off_rates, &(commanded - a));
             if memory.assured() && !(explained && self.credible(memory) && kept) {
                 memory.standing = Standing::Exceeded;
             }
@@ -658,6 +715,10 @@ impl Controller for Crmpc {
         }
         memory.supervision.judge(memory.standing, found, self.settings.period_feedback);
         moment
+    }
+
+    fn delay_error(&self) -> f64 {
+        self.settings.delay_error
     }
 
     /// The paper's sets leave the limit to the optimisation. Without a solution, and with the
@@ -720,12 +781,14 @@ impl Crmpc {
     /// nominal state, and this K ô, `tick` ticks after the optimisation.
     fn explains(
         &self,
+        memory: &Memory,
         tick: u64,
         angles: &Vector3<f64>,
         rates: &Vector3<f64>,
         feedback: &Vector3<f64>,
     ) -> bool {
-        let Some(bounds) = self.sets.explained(tick as usize) else { return false };
+        let (plan, age) = (&memory.plan, memory.age as usize);
+        let Some(bounds) = self.sets.explained(plan, age, tick as usize) else { return false };
         let slack = 1.0 + 1e-9;
         let r = 1.0 / cos(self.settings.sideslip_domain);
         let ball = bounds.feedback_norm + bounds.feedback_moment * r / self.design.smallest_inertia;

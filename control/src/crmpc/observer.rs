@@ -42,6 +42,16 @@ impl Observed {
         self.last = Some([*state[0], *state[1], *commanded]);
     }
 
+    /// Returns the acceleration commanded at the last tick, rad/s²; `None` before the first.
+    pub(super) fn commanded(&self) -> Option<Vector3<f64>> {
+        self.last.map(|[_, _, commanded]| commanded)
+    }
+
+    /// Returns the acceleration at the last tick without moment, rad/s²; `None` before the first.
+    pub(super) fn without_moment(&self, body: &RigidBody) -> Option<Vector3<f64>> {
+        self.last.map(|[angles, rates, _]| body.drift(&angles, &rates))
+    }
+
     /// Replaces the stored command by the acceleration that `applied` (N m) gives.
     pub(super) fn limit(&mut self, body: &RigidBody, applied: &Vector3<f64>) {
         if let Some([angles, rates, commanded]) = &mut self.last {

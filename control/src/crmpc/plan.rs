@@ -1,5 +1,6 @@
 //! The plan: a nominal motion over the horizon.
 
+use super::guarantee::{Carried, Switching};
 use crate::mpc::Motion;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,20 @@ pub struct Plan {
     pub braking: f64,
     /// Shift of the reference's angles by the observer when the plan was made, rad.
     pub shift: Vector3<f64>,
+    /// What was commanded before the plan, if the delay is not exact.
+    pub onset: Onset,
+}
+
+/// What a plan's beginning follows on, where commands begin to act earlier or later than assumed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Onset {
+    /// Deviation that earlier changes of the acceleration have left, see [`Carried`].
+    pub carried: Carried,
+    /// Acceleration commanded before the plan, rad/s².
+    pub before: Vector3<f64>,
+    /// Jump of the rates by the plan's first command for which the plan before leaves room, rad/s;
+    /// infinite if no plan was in force.
+    pub allowed: f64,
 }
 
 impl Clone for Plan {
@@ -29,6 +44,7 @@ impl Clone for Plan {
             multipliers: self.multipliers.clone(),
             braking: self.braking,
             shift: self.shift,
+            onset: self.onset,
         }
     }
 
@@ -39,6 +55,7 @@ impl Clone for Plan {
         self.multipliers.clone_from(&source.multipliers);
         self.braking = source.braking;
         self.shift = source.shift;
+        self.onset = source.onset;
     }
 }
 
@@ -51,6 +68,7 @@ impl Plan {
             multipliers: vec![[0.0; 2]; horizon],
             braking: 0.0,
             shift: Vector3::zeros(),
+            onset: Onset::default(),
         }
     }
 
@@ -58,6 +76,16 @@ impl Plan {
         self.states.resize(horizon + 1, Vector6::zeros());
         self.accelerations.resize(horizon, Vector3::zeros());
         self.multipliers.resize(horizon, [0.0; 2]);
+    }
+
+    /// Returns what changes of the acceleration have left when the plan's first command acts.
+    pub(super) fn begins_with(&self, switching: &Switching) -> Carried {
+        switching.begin(&self.onset.carried, self.first_change())
+    }
+
+    /// Returns the change of acceleration with which the plan begins, rad/s².
+    pub(super) fn first_change(&self) -> f64 {
+        self.accelerations.first().map_or(0.0, |a| (a - self.onset.before).norm())
     }
 
     /// Computes the errors E = x̃ − x_r and v = a − Θ̈_r of the plan.

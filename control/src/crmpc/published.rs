@@ -128,6 +128,7 @@ impl Settings {
             angle_error: 0.0,
             rate_error: 0.0,
             delay: 0.0,
+            delay_error: 0.0,
             sideslip_domain: guarantee.sideslip_deg.to_radians(),
             guarantee: Guarantee::Required,
             observer: ObserverSettings {

@@ -2,13 +2,14 @@
 //! error dynamics do (docs/guarantee.md).
 
 use super::design::Design;
-use super::guarantee::{Dynamics, End, Held};
+use super::guarantee::{self, Carried, Dynamics, End, Held, MomentLoss, Switching};
+use super::plan::Onset;
 use super::settings::Settings;
 use crate::linearise::{BodyMotion, InverseKinematics, Linear};
 use crate::mpc::Motion;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-use std::cell::OnceCell;
+use std::cell::{OnceCell, RefCell};
 use vehicle::dynamics::RigidBody;
 use vehicle::math::cos;
 use vehicle::reference::Reference;
@@ -23,6 +24,11 @@ pub(super) struct Robust {
     pub age: usize,
     /// Applied share of the tightening; below 1 only for best effort.
     pub share: f64,
+    /// What the motion follows on.
+    pub onset: Onset,
+    /// What changes of the acceleration leave at the stages of the motion that was carried along
+    /// last; empty if the delay is exact.
+    carried: RefCell<Vec<Carried>>,
 }
 
 /// Share of the limits that the bounds of the robust set leave free, and that the check of a motion
@@ -104,8 +110,62 @@ impl Point {
 
 impl Robust {
     pub(super) fn new(settings: &Settings, design: &Design) -> Self {
-        let dynamics = Dynamics::new(settings);
-        Self { settings: *settings, design: design.clone(), dynamics, age: 0, share: 1.0 }
+        Self {
+            settings: *settings,
+            design: design.clone(),
+            dynamics: Dynamics::new(settings),
+            age: 0,
+            share: 1.0,
+            onset: Onset::default(),
+            carried: RefCell::new(Vec::with_capacity(settings.horizon + 1)),
+        }
+    }
+
+    /// Returns what an unknown part of the delay adds, with what is carried along at stage `k`.
+    fn switching(&self, k: usize) -> Option<(&Switching, Carried)> {
+        let switching = self.design.tightening.switching.as_deref()?;
+        Some((switching, self.carried.borrow().get(k).copied().unwrap_or_default()))
+    }
+
+    /// Carries along what the changes of these accelerations of the stages leave (rad/s²).
+    pub(super) fn carry(&self, accelerations: impl Iterator<Item = Vector3<f64>>) {
+        let Some(switching) = &self.design.tightening.switching else { return };
+        let mut all = self.carried.borrow_mut();
+        all.clear();
+        let (mut carried, mut before) = (self.onset.carried, self.onset.before);
+        for a in accelerations {
+            carried = switching.begin(&carried, (a - before).norm());
+            all.push(carried);
+            (carried, before) = (switching.next(&carried), a);
+        }
+        all.push(carried);
+    }
+
+    /// Returns what is carried along at the end of the horizon.
+    pub(super) fn carried_to_the_end(&self) -> Carried {
+        self.carried.borrow().last().copied().unwrap_or_default()
+    }
+
+    /// Returns whether the limits hold also in the last instants before the motion, in which its
+    /// first command already acts if the delay is shorter than assumed. `size` is ‖ω̃‖ at the first
+    /// stage and `bound` its bound, `sideslip` is β̃ there.
+    ///
+    /// Either the plan before left room for such a command, or the motion does not come near the
+    /// limits in that time.
+    pub(super) fn keeps_before(&self, first: &Point, (size, bound): (f64, f64)) -> bool {
+        let Some((switching, carried)) = self.switching(0) else { return true };
+        let Onset { before, allowed, .. } = self.onset;
+        let change = (first.acceleration - before).norm();
+        if switching.pulse_of_command(change) <= allowed {
+            return true;
+        }
+        let tightening = &self.design.tightening;
+        let Settings { delay_error, sideslip_domain, .. } = self.settings;
+        let of_angle = tightening.at(self.age).angle + switching.deviation(&carried).angle;
+        let Dynamics { geometry, rate, .. } = &self.dynamics;
+        let most = first.pull.max(before.norm()) + tightening.norm + switching.turn();
+        size + delay_error * (most + geometry.drift * rate * rate) <= bound
+            && first.angles.y.abs() + of_angle + delay_error * rate <= sideslip_domain
     }
 
     /// Returns the parts of the rate limit and of the moment limit that the bounds leave free.
@@ -151,7 +211,11 @@ impl Robust {
     pub(super) fn keeps_sideslip(&self, k: usize, here: [f64; 2], a: f64, end: f64) -> bool {
         let Settings { period_optimisation: h, sideslip_domain, .. } = self.settings;
         let tightening = &self.design.tightening;
-        let [from, to] = [k, k + 1].map(|k| tightening.at(self.tick(k)).angle);
+        let more = self.switching(k).map_or(0.0, |(switching, carried)| {
+            let next = self.carried.borrow().get(k + 1).copied().unwrap_or_default();
+            switching.deviation(&carried).angle + switching.early(&next).0
+        });
+        let [from, to] = [k, k + 1].map(|k| tightening.at(self.tick(k)).angle + more);
         let slope = (to - from) / h;
         let largest = |sign: f64| {
             let (rate, a) = (sign * here[1] + slope, sign * a);
@@ -180,22 +244,65 @@ impl Robust {
         let typical = limit_moment / self.design.largest_inertia;
         let a = here.pull.max(before.pull).max(typical);
         let size = here.size + 2.0 * h * a;
-        let loss = self.design.tightening.rate_loss(self.tick(k));
+        let mut loss = *self.design.tightening.rate_loss(self.tick(k));
+        if let Some(more) = self.more_of_the_deviation(k, here, before) {
+            loss = loss.with(more, h);
+        }
         let loss = loss.at(by_angles, here.size) + loss.within(size, a);
         let bound = limit_rate - reserve - self.share * loss;
         // This uses ‖x̃_ω‖ ≤ sec β ‖ω̃‖.
         if k == horizon {
-            bound.min(self.design.assessment.terminal_rate * cos(here.angles.y) - reserve)
+            let terminal_rate = self.terminal_rate(here, before);
+            bound.min(terminal_rate * cos(here.angles.y) - reserve)
         } else {
             bound
         }
+    }
+
+    /// Returns the largest ‖x̃_ω‖ at the end of the horizon, rad/s.
+    fn terminal_rate(&self, end: &Point, before: &Point) -> f64 {
+        let Self { settings, dynamics, design, .. } = self;
+        let Some((switching, carried)) = self.switching(settings.horizon) else {
+            return design.assessment.terminal_rate;
+        };
+        let from = (&carried, before.pull, &end.rates);
+        guarantee::terminal_rate(settings, dynamics, &design.tightening, switching, from)
+    }
+
+    /// Returns what the plan's changes of acceleration add to the deviation of angles and rates
+    /// (rad, rad/s) at prediction step k and in the intervals before and after, if the delay is
+    /// not exact.
+    fn more_of_the_deviation(&self, k: usize, here: &Point, before: &Point) -> Option<(f64, f64)> {
+        let (switching, mut carried) = self.switching(k)?;
+        let Settings { horizon, period_optimisation: h, .. } = self.settings;
+        if k == horizon {
+            // The motion brakes from here on, with less than 1/h.
+            carried = switching.begin(&carried, before.pull + here.size / h);
+        }
+        let after = switching.deviation(&carried);
+        let Some(before) = k.checked_sub(1).and_then(|k| self.switching(k)) else {
+            return Some((after.angle, after.rate));
+        };
+        let (in_between, early) = (switching.deviation(&before.1), switching.early(&carried));
+        let largest = |after: f64, before: f64, early: f64| after.max(before + early);
+        Some((
+            largest(after.angle, in_between.angle, early.0),
+            largest(after.rate, in_between.rate, early.1),
+        ))
     }
 
     /// Returns the bound on ‖m̃‖ at the start of prediction interval k, between these ends and with
     /// an acceleration of this norm, for which ‖m‖ keeps its limit at each of its feedback ticks.
     pub(super) fn moment_bound(&self, k: usize, ends: &[End; 2], acceleration: f64) -> f64 {
         let held = Held { acceleration, ratio: self.design.ratio, share: self.share };
-        let loss = self.design.tightening.moment_loss(self.tick(k));
+        let tightening = &self.design.tightening;
+        let mut loss = *tightening.moment_loss(self.tick(k));
+        if let Some((switching, carried)) = self.switching(k) {
+            let deviation = tightening.within(self.tick(k), self.design.ratio);
+            let deviation = deviation.plus(&switching.deviation(&carried));
+            let h = self.settings.period_optimisation;
+            loss = MomentLoss::new(&self.dynamics, &deviation, tightening.bearing, h);
+        }
         let needed = loss.largest_moment(&self.dynamics, ends, held);
         self.settings.limit_moment - self.reserves().1 - (needed - ends[0].moment)
     }

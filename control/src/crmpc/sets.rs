@@ -2,7 +2,8 @@
 
 use super::design::Design;
 use super::few_stages::Anchor;
-use super::guarantee;
+use super::guarantee::{self, Deviation};
+use super::plan::{Onset, Plan};
 use super::robust::{Margins, Point, Robust, norm_of_columns};
 use super::settings::{Constraints, Settings};
 use crate::error::DesignError;
@@ -96,10 +97,18 @@ impl Sets {
     }
 
     /// Prepares the robust set for a nominal motion that began at the measured state `age` feedback
-    /// ticks ago, with the given share of the tightening.
-    pub(super) fn begin(&mut self, age: usize, share: f64) {
+    /// ticks ago and follows on `onset`, with the given share of the tightening.
+    pub(super) fn begin(&mut self, age: usize, share: f64, onset: &Onset) {
         if let Kind::Robust(robust) = &mut self.kind {
-            (robust.age, robust.share) = (age, share);
+            (robust.age, robust.share, robust.onset) = (age, share, *onset);
+        }
+    }
+
+    /// Carries along what the motion's changes of acceleration leave.
+    fn carry(&self, motion: &Motion<2>) {
+        if let Kind::Robust(robust) = &self.kind {
+            let stages = motion.inputs.iter().zip(&self.references);
+            robust.carry(stages.map(|(input, reference)| input + reference.accelerations));
         }
     }
 
@@ -116,6 +125,7 @@ impl Sets {
         {
             return None;
         }
+        self.carry(motion);
         // The first state, which no optimisation can change, and the last one, beyond which the
         // motion brakes, are checked separately.
         let [first, second, last] = [0, 1, n].map(|k| self.point(motion, k));
@@ -129,28 +139,38 @@ impl Sets {
             let a = self.references[k].accelerations.y + motion.inputs[k].y;
             robust.keeps_sideslip(k, sideslip(k), a, sideslip(k + 1)[0])
         });
-        if !inside || rates.rates.norm() > bound + robust.reserves().0 {
+        let (size, bound) = (rates.rates.norm(), bound + robust.reserves().0);
+        if !inside || size > bound || !robust.keeps_before(&first, (size, bound)) {
             return None;
         }
         let Robust { settings, dynamics, design, .. } = &**robust;
-        let braking =
-            guarantee::braking(settings, dynamics, &design.tightening, last.angles.y, &last.rates)?;
+        let before = self.references[n - 1].accelerations + motion.inputs[n - 1];
+        let braking = guarantee::braking(
+            settings,
+            dynamics,
+            &design.tightening,
+            last.angles.y,
+            &last.rates,
+            (&robust.carried_to_the_end(), before.norm()),
+        )?;
         Some(Certified { margins: robust.margins(&first, &second), braking })
     }
 
     /// Returns the [`Margins`] of a motion; they are zero unless the set is the robust one.
     pub(super) fn margins(&self, motion: &Motion<2>) -> Margins {
         let Kind::Robust(robust) = &self.kind else { return Margins::default() };
+        self.carry(motion);
         robust.margins(&self.point(motion, 0), &self.point(motion, 1))
     }
 
-    /// Returns the largest deviations that the assumptions explain `tick` ticks after the present
-    /// optimisation; `None` with the paper's set.
-    pub(super) fn explained(&self, tick: usize) -> Option<&guarantee::Deviation> {
-        match &self.kind {
-            Kind::Robust(robust) => Some(robust.design.tightening.at(robust.age + tick)),
-            Kind::Paper { .. } => None,
-        }
+    /// Returns the largest deviations that the assumptions explain `tick` ticks after the beginning
+    /// of `plan`, whose nominal motion began `age` ticks before it; `None` with the paper's set.
+    pub(super) fn explained(&self, plan: &Plan, age: usize, tick: usize) -> Option<Deviation> {
+        let Kind::Robust(robust) = &self.kind else { return None };
+        let tightening = &robust.design.tightening;
+        let explained = *tightening.at(age + tick);
+        let Some(switching) = &tightening.switching else { return Some(explained) };
+        Some(explained.plus(&switching.deviation(&plan.begins_with(switching))))
     }
 
     /// Returns (Θ̃, x̃_ω, a) for an error and its input at stage `k`.
@@ -172,6 +192,7 @@ impl Sets {
         of: Range<usize>,
         mut keep: impl FnMut(usize, (f64, f64)),
     ) -> Option<Range<usize>> {
+        self.carry(motion);
         let mut violates = |k: usize, here: &Point, next: &Point, anchor: &mut Option<Anchor>| {
             match &self.kind {
                 Kind::Robust(robust) => {
@@ -278,6 +299,7 @@ impl Bounded<2> for Sets {
 
     fn bounds_about(&self, motion: &Motion<2>, of: Range<usize>, bounds: &mut mpc::Bounds) {
         let Kind::Robust(robust) = &self.kind else { return };
+        self.carry(motion);
         let mut here = self.point(motion, of.start);
         for k in of {
             let next = self.point(motion, k + 1);

@@ -100,6 +100,9 @@ pub struct Settings {
     /// Time from a measurement until the resulting moment acts, s. The law receives the state
     /// predicted for that instant.
     pub delay: f64,
+    /// Largest amount by which the true delay, a constant that nobody knows, differs from `delay`,
+    /// s; the robust set is tightened for it.
+    pub delay_error: f64,
     /// Largest |β| for which the robust set gives its guarantee, rad.
     pub sideslip_domain: f64,
     /// Reaction to settings for which the design of the robust set does not hold.

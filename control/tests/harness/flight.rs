@@ -199,6 +199,8 @@ pub struct Flight {
     pub sight: Sight,
     /// Age of the measurements, s, which is a part of the delay of the settings.
     pub age: f64,
+    /// Amount by which commands act later than the settings say, s.
+    pub late: f64,
     /// Seed of all random numbers of the flight.
     pub seed: u64,
     /// Duration of the flight, s.
@@ -265,6 +267,7 @@ impl Flight {
             hold: 0.04,
             sight: Sight::Exact,
             age: 0.0,
+            late: 0.0,
             seed: 0,
             duration: scenario.duration,
         }
@@ -282,6 +285,10 @@ impl Flight {
             1 => 1.0 + settings.inertia_error,
             _ => 1.0 + settings.inertia_error * random.between(-1.0, 1.0),
         };
+        if settings.delay_error > 0.0 {
+            flight.late =
+                settings.delay_error * [-1.0, 1.0, random.between(-1.0, 1.0)][random.below(3)];
+        }
         if settings.tensor_error > 0.0 {
             flight.tensor_error = Self::tensor_of(settings.tensor_error, random);
         }
@@ -500,7 +507,7 @@ impl Vehicle {
             body: RigidBody::new(flight.inertia(&body.inertia)).unwrap(),
             state: plant::state(&flight.angles, &flight.rates),
             commanded: Vector3::zeros(),
-            transport: Transport::new(delay - flight.age).unwrap(),
+            transport: Transport::new(delay - flight.age + flight.late).unwrap(),
         }
     }
 
@@ -696,7 +703,7 @@ pub fn random_settings(seed: u64) -> Settings {
     let published = Settings::new(Constraints::Robust);
     let period_feedback = [0.02, 0.04, 0.05, 0.1][random.below(4)];
     let initial_states = [InitialState::Measured, InitialState::Nominal, InitialState::Tube];
-    Settings {
+    let mut settings = Settings {
         feedback: Gain { k1: random.between(-10.0, -0.5), k2: random.between(-10.0, -1.0) },
         delay: half(random, 0.15),
         angle_error: half(random, 0.2).to_radians(),
@@ -713,7 +720,11 @@ pub fn random_settings(seed: u64) -> Settings {
         initial_state: initial_states[random.below(3)],
         tensor_error: half(random, 0.08),
         ..published
+    };
+    if settings.initial_state != InitialState::Tube && settings.feedback.eigenvalues().is_some() {
+        settings.delay_error = half(random, 0.5) * settings.delay.min(period_feedback);
     }
+    settings
 }
 
 /// Flies the settings for 15 s if the design accepts them, and otherwise tries each bound that its
@@ -722,7 +733,7 @@ pub fn tried(settings: &Settings, seed: u64) -> Tried {
     let Err(error) = Crmpc::new(*settings) else {
         return Tried::Flown(Flight { duration: 15.0, ..Flight::random(settings, seed) }.fly());
     };
-    let DesignError::NoGuarantee { disturbance, errors, delay, .. } = error else {
+    let DesignError::NoGuarantee { disturbance, errors, delay, delay_error, .. } = error else {
         return Tried::Invalid(error.to_string());
     };
     // The bounds are rounded as the message prints them.
@@ -736,6 +747,7 @@ pub fn tried(settings: &Settings, seed: u64) -> Tried {
             ..*settings
         }),
         delay.map(|delay| Settings { delay: down(delay), ..*settings }),
+        delay_error.map(|error| Settings { delay_error: down(error), ..*settings }),
     ];
     let named: Vec<Settings> = with.into_iter().flatten().collect();
     let refusal = |settings: &Settings| Crmpc::new(*settings).err();

@@ -36,6 +36,17 @@ fn all() -> Vec<String> {
             |unit| unit.law.settings.angle_error = 1.0,
             |unit| unit.law.settings.rate_error = 1.0,
             |unit| unit.law.settings.rate_error = 0.01,
+            |unit| unit.law.settings.delay_error = -0.01,
+            |unit| unit.law.settings.delay_error = 0.01,
+            |unit| {
+                unit.parameters.latency.action = 0.04;
+                unit.law.settings.delay_error = 0.03;
+            },
+            |unit| {
+                unit.parameters.latency.action = 0.04;
+                unit.law.settings.delay_error = 0.01;
+                unit.law.settings.initial_state = InitialState::Tube;
+            },
             |unit| unit.law.settings.sideslip_domain = 0.9,
             |unit| unit.law.settings.disturbance_bound = -1.0,
             |unit| unit.law.settings.feedback = Gain { k1: -700.0, k2: -50.0 },
@@ -148,5 +159,8 @@ fn all() -> Vec<String> {
 fn refusals_name_variables() {
     let expected: Vec<&str> = include_str!("messages.txt").lines().collect();
     let found = all();
+    for (found, expected) in found.iter().zip(&expected) {
+        assert_eq!(found, expected);
+    }
     assert_eq!(found, expected);
 }

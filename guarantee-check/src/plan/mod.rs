@@ -104,13 +104,16 @@ impl PlanCheck {
     ///
     /// # Errors
     /// Says why no bound is available for these settings: for the paper's set, for an error of the
-    /// whole tensor of inertia, and where the feedback is too slow.
+    /// whole tensor of inertia or of the delay, and where the feedback is too slow.
     pub fn new(settings: &Settings) -> Result<Self, String> {
         if settings.constraints != Constraints::Robust {
             return Err("only the robust set is checked".into());
         }
         if settings.tensor_error > 0.0 {
             return Err("an error of the whole tensor of inertia is not covered".into());
+        }
+        if settings.delay_error > 0.0 {
+            return Err("a delay that is known within an interval is not covered".into());
         }
         let body = Body::new(settings).ok_or("the body is not symmetric about its x-z plane")?;
         let start = match settings.initial_state {

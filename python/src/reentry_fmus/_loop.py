@@ -13,7 +13,7 @@ import pandas as pd
 
 from ._data import hint, unit_path
 from ._table import Units, check_units, convert
-from ._unit import Unit, Value
+from ._unit import Unit, UnitError, Value
 
 Vector = npt.NDArray[np.float64]
 
