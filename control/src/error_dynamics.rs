@@ -110,6 +110,12 @@ impl Reach {
         }
     }
 
+    /// Returns the difference of each bound and its counterpart.
+    #[must_use]
+    pub fn minus(&self, other: &Self) -> Self {
+        self.with(other, |own, other| own - other)
+    }
+
     /// Returns the larger of each bound and its counterpart.
     #[must_use]
     pub fn or(&self, other: &Self) -> Self {
@@ -135,6 +141,26 @@ pub struct SampledError {
     gamma: Vector2<f64>,
     /// Transition under the feedback from the beginning of a period to its middle.
     to_middle: Matrix2<f64>,
+}
+
+/// The first ticks of a nominal motion, before which the prediction has begun, and by which share
+/// of itself an effect is larger there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Early {
+    /// Number of these ticks.
+    pub ticks: usize,
+    /// Share by which the effect is larger.
+    pub excess: f64,
+}
+
+impl Early {
+    /// Counts the larger effects in sums over 0, 1, … ticks, of which the first ticks are the
+    /// oldest parts.
+    #[must_use]
+    pub fn count(&self, sums: &[Reach]) -> Vec<Reach> {
+        let oldest = |n: usize| sums[n].minus(&sums[n - n.min(self.ticks)]);
+        (0..sums.len()).map(|n| sums[n].plus(&oldest(n).times(self.excess))).collect()
+    }
 }
 
 /// Number of impulse responses that an invariant set holds one by one; the remaining ones are
@@ -297,43 +323,98 @@ impl SampledError {
     /// 0, 1, …, `steps` periods, per unit of their bound. The errors may take any value within the
     /// bound at every tick. The motion begins at the measured state.
     pub fn errors(&self, steps: usize) -> [Vec<Reach>; 2] {
+        let always = Early { ticks: 0, excess: 0.0 };
         [Vector2::new(1.0, 0.0), Vector2::new(self.latency, 1.0)]
-            .map(|newest| self.errors_along(newest, steps))
+            .map(|newest| self.errors_along(newest, steps, always))
+    }
+
+    /// Returns the largest effect, within 0, 1, …, `steps` periods, of changes of the predicted
+    /// rate, which the vehicle does not make, by up to 1 in all at any time between each
+    /// measurement and its command, in s, 1 and 1/s.
+    pub fn mispredictions(&self, steps: usize, early: Early) -> Vec<Reach> {
+        // The sums are convex in the direction, so that the largest one belongs to an end.
+        let [last, first] =
+            [0.0, self.latency].map(|u| self.errors_along(Vector2::new(u, 1.0), steps, early));
+        last.iter().zip(&first).map(|(a, b)| a.or(b)).collect()
     }
 
     /// With an error e of the measurement the predicted state is wrong by `newest` = A_d e, where
     /// A_d is the transition over `latency`. Then ô_n = A_d e_n + Σ_{0<j<n} Φ^{n−1−j} Γ K A_d e_j −
     /// Φ^{n−1} A A_d e_0, and the vehicle itself deviates by o_n = ô_n − A_d e_n.
-    fn errors_along(&self, newest: Vector2<f64>, steps: usize) -> Vec<Reach> {
+    fn errors_along(&self, newest: Vector2<f64>, steps: usize, early: Early) -> Vec<Reach> {
         let Self { gain, period, phi, gamma, to_middle, .. } = *self;
-        let feedback = |deviation: &Vector2<f64>| (gain.row() * deviation).x.abs();
-        let (mut sum, mut sum_middle, mut sum_feedback) = (Vector2::zeros(), Vector2::zeros(), 0.0);
+        // Angle, rate, both in the middle of the period, and feedback.
+        let sizes = |x: &Vector2<f64>| {
+            let middle = to_middle * x;
+            [x.x, x.y, middle.x, middle.y, (gain.row() * x).x].map(f64::abs)
+        };
+        let sum_of = |a: [f64; 5], b: [f64; 5]| std::array::from_fn(|i| a[i] + b[i]);
         let mut older = gamma * (gain.row() * newest).x;
         let mut first = -(transition(period) * newest);
+        let weight = |j: usize| if j < early.ticks { 1.0 + early.excess } else { 1.0 };
+        // Sums of the sizes of the older responses.
+        let mut sums = vec![[0.0; 5]];
         let mut all = Vec::with_capacity(steps + 1);
-        all.push(Reach { angle: newest.x, rate: newest.y, ..Reach::default() });
+        let begin = newest.abs() * weight(0);
+        all.push(Reach { angle: begin.x, rate: begin.y, ..Reach::default() });
         for n in 1..=steps {
             if n > 1 {
-                sum += older.abs();
-                sum_middle += (to_middle * older).abs();
-                sum_feedback += feedback(&older);
+                let next = sum_of(sums[n - 2], sizes(&older));
+                sums.push(next);
                 older = phi * older;
             }
-            let own = sum + first.abs();
-            let seen = own + newest;
-            let middle = sum_middle + (to_middle * first).abs() + (to_middle * newest).abs();
+            // The errors j = 1, …, `early.ticks` − 1 have become the oldest of these responses.
+            let oldest = sums[(n - 1) - (n - 1).min(early.ticks.saturating_sub(1))];
+            let sum: [f64; 5] = std::array::from_fn(|i| {
+                let sum = sums[n - 1][i];
+                sum + early.excess * (sum - oldest[i])
+            });
+            let own = sum_of(sum, sizes(&first).map(|size| weight(0) * size));
+            let seen = sum_of(own, sizes(&newest).map(|size| weight(n) * size));
             all.push(Reach {
-                angle: own.x,
-                rate: own.y,
-                seen_angle: seen.x,
-                seen_rate: seen.y,
-                middle_angle: middle.x,
-                middle_rate: middle.y,
-                feedback: sum_feedback + feedback(&first) + feedback(&newest),
+                angle: own[0],
+                rate: own[1],
+                seen_angle: seen[0],
+                seen_rate: seen[1],
+                middle_angle: seen[2],
+                middle_rate: seen[3],
+                feedback: seen[4],
                 feedback_age: 0.0,
-                change: 2.0 * (sum_feedback + feedback(&first) + feedback(&newest)),
+                change: 2.0 * seen[4],
             });
             first = phi * first;
+        }
+        all
+    }
+
+    /// Returns the largest effect, within 0, 1, …, `steps` periods, of changes of the rate by up
+    /// to the period in all before each tick, at any time since the measurement before that of the
+    /// tick's command. The units are those of [`Self::reach`].
+    pub fn changes(&self, steps: usize) -> Vec<Reach> {
+        let Self { gain, period, latency, phi, to_middle, .. } = *self;
+        let mut sum = Reach::default();
+        let (mut power, mut before) = (Matrix2::identity(), Matrix2::zeros());
+        let mut all = vec![sum];
+        for _ in 0..steps {
+            // A change at the time u before the tick has become Φⁿ [u; 1].
+            let most =
+                |row: RowVector2<f64>| period * largest_size(row.y, row.x, (0.0, latency + period));
+            let middle = to_middle * power;
+            let (angle, rate) = (most(power.row(0).into()), most(power.row(1).into()));
+            sum = sum.plus(&Reach {
+                angle,
+                rate,
+                seen_angle: angle,
+                seen_rate: rate,
+                middle_angle: most(middle.row(0).into()),
+                middle_rate: most(middle.row(1).into()),
+                feedback: most(gain.row() * power),
+                feedback_age: 0.0,
+                change: most(gain.row() * (power - before)),
+            });
+            before = power;
+            all.push(sum);
+            power = phi * power;
         }
         all
     }
@@ -565,6 +646,65 @@ mod tests {
                     .collect()
             });
             assert_agree(&error.reach(steps as usize), &expected, 2e-4);
+        }
+    }
+
+    #[test]
+    fn oracle_changes_and_mispredictions_add_up_as_in_a_simulation() {
+        let error = SampledError::delayed(Gain { k1: -2.0, k2: -4.0 }, 0.04, 0.117);
+        let (steps, tau) = (12_usize, error.period);
+        for ticks in [0, 1, 3] {
+            let early = Early { ticks, excess: 0.3 };
+            let weight = |j: usize| if j < ticks { 1.3 } else { 1.0 };
+            let sized = |own: Vector2<f64>, seen: Vector2<f64>| {
+                let (middle, k) = (in_the_middle(&error, &seen), error.gain.row());
+                [own.x, own.y, seen.x, seen.y, middle.x, middle.y, (k * seen).x]
+            };
+            // Source j is a change before tick j + 1.
+            let [old, new] = [0.117 + tau, 0.0].map(|u| {
+                superposed(steps, steps, |j| {
+                    let mut seen = Vector2::zeros();
+                    (0..=steps)
+                        .map(|n| {
+                            seen = error.phi * seen;
+                            if n == j + 1 {
+                                seen = Vector2::new(u, 1.0) * tau * weight(j);
+                            }
+                            sized(seen, seen)
+                        })
+                        .collect()
+                })
+            });
+            let changes = early.count(&error.changes(steps));
+            for n in 0..=steps {
+                for (of, value) in [(1, changes[n].rate), (6, changes[n].feedback)] {
+                    let (old, new) = (old[n][of], new[n][of]);
+                    let (low, high) = (old.max(new) - 1e-12, old + new + 1e-12);
+                    assert!(low <= value && value <= high, "{n}: {old} {new} {value}");
+                }
+            }
+            // Source j is the part of the prediction of tick j that is wrong.
+            let [old, new] = [0.117, 0.0].map(|u| {
+                superposed(steps, steps + 1, |j| {
+                    let off =
+                        |n: usize| Vector2::new(u, 1.0) * if n == j { weight(j) } else { 0.0 };
+                    let mut deviation = -off(0);
+                    (0..=steps)
+                        .map(|n| {
+                            let seen = deviation + off(n);
+                            let values = sized(deviation, seen);
+                            deviation = transition(tau) * deviation + error.gamma * values[6];
+                            values
+                        })
+                        .collect()
+                })
+            });
+            let largest: Vec<[f64; 7]> = old
+                .iter()
+                .zip(&new)
+                .map(|(a, b)| std::array::from_fn(|i| f64::max(a[i], b[i])))
+                .collect();
+            assert_agree(&error.mispredictions(steps, early), &largest, 1e-12);
         }
     }
 

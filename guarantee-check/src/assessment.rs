@@ -5,51 +5,87 @@ use crate::interval::Interval;
 use crate::lemmas::{Finding, ROUNDING};
 use crate::sums::{Axis, Bounds};
 use control::crmpc::{Deviation, InitialState, Lemmas, Settings, Tightening};
-use control::error_dynamics::SampledError;
+use control::error_dynamics::{Early, SampledError};
 
-/// Quantities that drive the deviation from the nominal motion.
+/// What drives the motion off its prediction but for the mismatch.
 struct Drive {
-    mismatch: Interval,
-    varying: Interval,
-    swing: Interval,
-    /// Deviation of the rates between two ticks.
-    between: Interval,
-    /// Largest difference of the mismatch from its mean.
-    variation: Interval,
-    norm: Interval,
-    norm_of_two: Interval,
-    turning: Interval,
+    all: Interval,
+    of_two: Interval,
+    of_inertia: Interval,
+    /// Errors of all rates, of two of them, and of two angles.
+    errors: [Interval; 3],
     /// Moments that the inertia error amounts to: along the acting one, and in any direction.
     inertia: [Interval; 2],
+}
+
+/// How F differs from the acceleration that the law intended.
+struct Mismatch {
+    mean: Interval,
+    peak: Interval,
+    unseen_rate: Interval,
+    mispredicted: Interval,
+    /// Bound on ‖dF/dt‖, and the shift of the angle by it over a period.
+    slope: Interval,
+    swing: Interval,
+    /// Largest ‖ω‖ and |β| of predictions.
+    domain: [Interval; 2],
+}
+
+/// Quantities that drive the deviation from the nominal motion.
+struct Driven {
+    drive: Drive,
+    mismatch: Mismatch,
+    early: [Early; 3],
+    /// Deviation of the rates between two ticks.
+    between: Interval,
+    turning: Interval,
+    turned: [Interval; 2],
+    early_moment: Interval,
     /// Largest ‖I^½ D I^−½‖ of a symmetric D with ‖D‖ ≤ 1.
     root_condition: Interval,
+    /// Largest ‖ω‖ and |β| of the vehicle before the nominal motion began.
+    vehicle_before: [Interval; 2],
+    domain_before: [Interval; 2],
 }
 
 fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
     let number = Interval::from;
-    let [tau, delay, disturbance] = [s.period_feedback, s.delay, s.disturbance_bound].map(number);
-    let [by_rates, by_angles, jerk] = [lemmas.by_rates, lemmas.by_angles, lemmas.jerk].map(number);
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
-    let [limit, smallest, largest, r] =
-        [s.limit_moment, lemmas.smallest, lemmas.largest, lemmas.r].map(number);
+    let [limit, smallest, largest, disturbance] =
+        [s.limit_moment, lemmas.smallest, lemmas.largest, s.disturbance_bound].map(number);
     let (common, tensor) = (number(s.inertia_error), number(s.tensor_error));
+    let (rate, sideslip) = lemmas.vehicle;
+    let square = number(rate).square();
     let of_tensor = tensor / (Interval::ONE - tensor);
-    let spin = number(0.5) * (largest - smallest) * number(s.limit_rate).square();
-    let spin_of_error = largest * number(s.limit_rate).square();
+    let spin = number(0.5) * (largest - smallest) * square;
     let inertia = [
         common * limit / (Interval::ONE - common),
-        of_tensor * limit / (Interval::ONE - common) + of_tensor * spin + of_tensor * spin_of_error,
+        of_tensor * (limit / (Interval::ONE - common) + spin + largest * square),
     ];
-    let of_inertia = (inertia[0] + inertia[1]) * r / smallest;
-    let all = root3 * disturbance + of_inertia;
-    let elapsed = delay + tau;
-    let growth = ((by_rates + by_angles * elapsed) * elapsed).exp();
-    let (angle_error, rate_error) = (root2 * number(s.angle_error), root3 * number(s.rate_error));
-    let half = number(0.5);
-    let off_rate = (all * (elapsed - half * tau) + rate_error) * growth;
-    let off_angle = (half * all * elapsed.square() + angle_error + rate_error * elapsed) * growth;
+    let cosine = number(sideslip).sin_cos().1;
+    let of_inertia = (inertia[0] + inertia[1]) / (cosine * smallest);
+    Drive {
+        all: root3 * disturbance + of_inertia,
+        of_two: root2 * disturbance + of_inertia,
+        of_inertia,
+        errors: [
+            root3 * number(s.rate_error),
+            root2 * number(s.rate_error),
+            root2 * number(s.angle_error),
+        ],
+        inertia,
+    }
+}
+
+fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
+    let number = Interval::from;
+    let (half, sixth) = (number(0.5), Interval::ONE / number(6.0));
+    let [tau, d] = [s.period_feedback, s.delay].map(number);
+    let [by_rates, by_angles, jerk] = [lemmas.by_rates, lemmas.by_angles, lemmas.jerk].map(number);
+    let Drive { all, of_two, errors: [rates, rates_of_two, angles], .. } = *drive;
+    let end = d + tau;
+    let growth = ((by_rates + by_angles * end) * end).exp();
     let square = tau.square();
-    let varying = by_rates * all * tau * growth + jerk * square / number(8.0);
     let slope = by_rates * number(lemmas.acceleration) + by_angles * number(lemmas.rate);
     // Where the motion is in the middle of the period, beside its prediction with a constant
     // acceleration: F there drives it off in turn, which sums up to a geometric series.
@@ -57,21 +93,82 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
     let beside = slope
         * (by_rates * square / number(8.0) + by_angles * square * tau / number(24.0))
         / (Interval::ONE - in_turn);
-    let mismatch =
-        by_rates * off_rate + by_angles * off_angle + jerk * square / number(24.0) + beside;
-    let swing = slope * square / number(12.0) + number(0.125) * tau * varying;
-    Drive {
-        mismatch,
-        varying,
-        swing,
-        between: slope * square / number(8.0)
-            + jerk * square * tau / (number(36.0) * number(12.0).sqrt()),
-        variation: varying + half * tau * slope,
-        norm: all + mismatch,
-        norm_of_two: root2 * disturbance + of_inertia + mismatch,
-        turning: largest / smallest * number(lemmas.turn) * r * number(lemmas.rate),
-        inertia,
+    // Integrals over [0, τ], and over [τ, d + τ], of the distances of rates and angles that the
+    // drive causes. Up to τ it acts, and from then on both are predictions.
+    let of_rates = half * all * square + all * tau * d;
+    let of_angles = of_two * (sixth * square * tau + half * square * d + half * tau * d.square());
+    let ((inner, _), (outer, _)) = (lemmas.vehicle, lemmas.domain);
+    let halfway = half * (number(inner) + number(outer)) / number(outer);
+    let revised = halfway * by_rates * of_rates + by_angles * of_angles;
+    let erred =
+        by_rates * rates * tau + by_angles * (angles * tau + rates_of_two * tau * (d + half * tau));
+    let apart = by_rates * (all * end + rates)
+        + by_angles * (half * of_two * end.square() + angles + rates_of_two * end);
+    let f = apart * growth;
+    let off = number(0.25) * slope * square;
+    let far = [
+        rates + (all + f) * end + off,
+        angles + rates_of_two * end + half * (of_two + f) * end.square() + off * tau,
+    ];
+    let (vehicle_rate, vehicle_sideslip) = lemmas.vehicle;
+    let turned = number(lemmas.turn) * far[1] * number(lemmas.r) * number(vehicle_rate);
+    Mismatch {
+        mean: (revised + erred) * growth / tau + jerk * square / number(24.0) + beside,
+        peak: f + beside + jerk * square / number(8.0) + half * slope * tau,
+        unseen_rate: (half * by_rates * all * d.square()
+            + sixth * by_angles * of_two * d.square() * d)
+            * growth,
+        mispredicted: (by_rates * rates * d
+            + by_angles * (angles * d + half * rates_of_two * d.square()))
+            * growth,
+        slope,
+        swing: slope * square / number(12.0),
+        domain: [number(vehicle_rate) + far[0] + turned, number(vehicle_sideslip) + far[1]],
+    }
+}
+
+fn driven(s: &Settings, lemmas: &Lemmas, before: &Lemmas) -> Driven {
+    let number = Interval::from;
+    let (half, tau, d) = (number(0.5), number(s.period_feedback), number(s.delay));
+    let [smallest, largest] = [lemmas.smallest, lemmas.largest].map(number);
+    let (drive, larger) = (self::drive(s, lemmas), self::drive(s, before));
+    let mut mismatch = self::mismatch(s, lemmas, &drive);
+    let first = self::mismatch(s, before, &larger);
+    let more = (larger.of_inertia - drive.of_inertia).max(Interval::ZERO);
+    let ticks = (s.delay / s.period_feedback).ceil() as usize;
+    let early = |first: Interval, later: Interval| Early {
+        ticks,
+        excess: if later.low > 0.0 { (first / later - Interval::ONE).high.max(0.0) } else { 0.0 },
+    };
+    let early = [
+        early(first.mean + more, mismatch.mean),
+        early(first.mispredicted, mismatch.mispredicted),
+        early(first.swing, mismatch.swing),
+    ];
+    (mismatch.peak, mismatch.unseen_rate) = (first.peak + more, first.unseen_rate + more * d);
+    let by_turn = largest / smallest * number(lemmas.turn) * number(before.r);
+    let (rate, _) = before.vehicle;
+    let spin =
+        (number(s.limit_moment) + half * (largest - smallest) * number(rate).square()) / smallest;
+    Driven {
+        early,
+        between: first.slope * tau.square() / number(8.0)
+            + number(before.jerk) * tau.square() * tau / (number(36.0) * number(12.0).sqrt()),
+        turning: by_turn * number(lemmas.rate),
+        turned: [
+            by_turn * drive.errors[2],
+            by_turn * (number(before.rate) - number(lemmas.rate)) * d,
+        ],
+        early_moment: (larger.inertia[1] - drive.inertia[1]) * largest / smallest
+            * number(before.r),
         root_condition: (largest / smallest).sqrt(),
+        vehicle_before: [
+            number(s.limit_rate) + (spin + larger.all) * d,
+            number(s.sideslip_domain) + number(rate) * d,
+        ],
+        domain_before: first.domain,
+        drive,
+        mismatch,
     }
 }
 
@@ -103,38 +200,51 @@ fn values(deviation: &Deviation) -> [f64; 9] {
     ]
 }
 
-fn deviation(
-    s: &Settings,
-    drive: &Drive,
-    reach: &Bounds,
-    errors: [&Bounds; 2],
-    shifts: &Bounds,
-) -> Deviations {
+/// Bounds at one tick on the effects of Δ, of the errors of angle and rate, and of the others.
+struct Effects<'a> {
+    reach: &'a Bounds,
+    /// Part of the feedback by what happened before the nominal motion began.
+    early_feedback: Interval,
+    errors: [&'a Bounds; 2],
+    changes: &'a Bounds,
+    mispredictions: &'a Bounds,
+    shifts: &'a Bounds,
+}
+
+fn deviation(s: &Settings, driven: &Driven, effects: &Effects) -> Deviations {
     let number = Interval::from;
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
     let [rate_error, angle_error, tau, delay] =
         [s.rate_error, s.angle_error, s.period_feedback, s.delay].map(number);
+    let Effects { reach, early_feedback, errors, changes, mispredictions, shifts } = effects;
+    let Driven { drive, mismatch, .. } = driven;
     let errors: Bounds =
         std::array::from_fn(|i| errors[0][i] * angle_error + errors[1][i] * rate_error);
-    let swing = shifts.map(|shift| shift * drive.swing);
-    let between = tau.square() / number(8.0)
-        * (drive.norm * (Interval::ONE + reach[6])
-            + root3 * errors[6]
-            + swing[6]
-            + drive.variation);
-    let of_angles = |i: usize| reach[i] * drive.norm_of_two + root2 * errors[i] + swing[i];
-    let of_rates = |i: usize| reach[i] * drive.norm + root3 * errors[i] + swing[i];
+    let ball: Bounds = std::array::from_fn(|i| {
+        changes[i] * mismatch.mean
+            + mispredictions[i] * mismatch.mispredicted
+            + shifts[i] * mismatch.swing
+    });
+    let accelerated =
+        drive.all * (Interval::ONE + reach[6]) + root3 * errors[6] + ball[6] + mismatch.peak;
+    let of_angles = |i: usize| reach[i] * drive.of_two + root2 * errors[i] + ball[i];
+    let of_rates = |i: usize| reach[i] * drive.all + root3 * errors[i] + ball[i];
+    let any_and_along = drive.inertia[0] + drive.inertia[1];
     [
-        of_angles(0) + between,
-        of_rates(1) + drive.between,
+        of_angles(0) + mismatch.unseen_rate * delay + tau.square() / number(8.0) * accelerated,
+        of_rates(1) + mismatch.unseen_rate + driven.between,
         of_angles(2),
         of_rates(3),
         of_angles(4),
         of_rates(5),
         reach[6] * number(s.disturbance_bound) + errors[6],
-        reach[6] * drive.mismatch + swing[6],
-        (drive.inertia[0] + drive.root_condition * drive.inertia[1]) * reach[6]
-            + (drive.inertia[0] + drive.inertia[1]) * drive.turning * (reach[7] + delay * reach[6]),
+        ball[6],
+        (drive.inertia[0] + driven.root_condition * drive.inertia[1]) * reach[6]
+            + any_and_along
+                * (driven.turning * (reach[7] + number(0.5) * tau * reach[6])
+                    + driven.turned[0] * reach[6]
+                    + driven.turned[1] * *early_feedback)
+            + driven.early_moment * *early_feedback,
     ]
 }
 
@@ -194,22 +304,46 @@ pub fn check(
     let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
     let steps = error.settling()?;
     let axis = Axis::new(s.feedback, s.period_feedback, s.delay)?;
-    let drive = drive(s, lemmas);
-    let (reach, errors, shifts) = (axis.reach(steps), axis.errors(steps), axis.shifts(steps));
-    let all: Vec<Deviations> = (0..reach.len())
-        .map(|n| deviation(s, &drive, &reach[n], [&errors[0][n], &errors[1][n]], &shifts[n]))
-        .collect();
+    let before = Lemmas::before(s);
+    let driven = driven(s, lemmas, &before);
+    let (reach, errors) = (axis.reach(steps), axis.errors(steps));
+    let changes = axis.changes(steps, driven.early[0]);
+    let mispredictions = axis.mispredictions(steps, driven.early[1]);
+    let shifts = axis.shifts(steps, driven.early[2]);
+    let effects = |n: usize| Effects {
+        reach: &reach[n],
+        early_feedback: reach[n][6] - reach[n - n.min(driven.early[0].ticks)][6],
+        errors: [&errors[0][n], &errors[1][n]],
+        changes: &changes[n],
+        mispredictions: &mispredictions[n],
+        shifts: &shifts[n],
+    };
+    let all: Vec<Deviations> =
+        (0..reach.len()).map(|n| deviation(s, &driven, &effects(n))).collect();
     let forever = all.last()?;
 
     let mut findings = Vec::new();
     let mut note = |statement: &str, bound: f64, truth: Interval| {
         findings.push(Finding { statement: statement.into(), bound, truth });
     };
-    note("mismatch of the cancellation, mean of a period", lemmas.mismatch, drive.mismatch);
-    note("variation of the mismatch within a period", lemmas.varying, drive.varying);
-    note("swing of the cancelled drift", lemmas.swing, drive.swing);
-    note("‖drive‖", lemmas.norm, drive.norm);
-    note("‖drive‖ of two axes", lemmas.norm_of_two, drive.norm_of_two);
+    let Driven { mismatch, .. } = &driven;
+    note("mismatch of the cancellation, mean of a period", lemmas.mismatch, mismatch.mean);
+    note("mismatch at any time", lemmas.peak, mismatch.peak);
+    note("mismatch since a measurement", lemmas.unseen_rate, mismatch.unseen_rate);
+    note("mismatch of a prediction by errors", lemmas.mispredicted, mismatch.mispredicted);
+    note("swing of the cancelled drift", lemmas.swing, mismatch.swing);
+    note("‖drive‖", lemmas.norm, driven.drive.all + mismatch.mean);
+    let ((rate, sideslip), [of_rate, of_sideslip]) = (lemmas.domain, mismatch.domain);
+    note("‖ω‖ of predictions", rate, of_rate);
+    note("|β| of predictions", sideslip, of_sideslip);
+    if s.delay > 0.0 {
+        let ((rate, sideslip), [of_rate, of_sideslip]) = (before.vehicle, driven.vehicle_before);
+        note("‖ω‖ before the motion began", rate, of_rate);
+        note("|β| before the motion began", sideslip, of_sideslip);
+        let ((rate, sideslip), [of_rate, of_sideslip]) = (before.domain, driven.domain_before);
+        note("‖ω‖ of predictions before", rate, of_rate);
+        note("|β| of predictions before", sideslip, of_sideslip);
+    }
     let limit = error.reach(steps).pop()?;
     let sums = [limit.angle, limit.rate, limit.feedback, limit.feedback_age];
     let last = reach.last()?;

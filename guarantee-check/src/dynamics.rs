@@ -8,7 +8,7 @@
 use crate::dual::Number;
 use crate::interval::Interval;
 use crate::kinematics::{Turn, Vector, cross, scaled, sum, times, turned};
-use crate::lemmas::{Finding, Suprema};
+use crate::lemmas::{Finding, Suprema, over_the_domain};
 use control::crmpc::{Lemmas, Settings};
 use std::f64::consts::PI;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -414,9 +414,10 @@ fn from_lemmas(
     ]
 }
 
-/// Checks the bounds of F and m. Bounds that depend on the sizes of x and a are checked at the
+/// Checks the bounds of F and m over their domain. Bounds that depend on the sizes of x and a are checked at the
 /// sizes with which the horizon may end, and at the largest ones.
 pub fn check(s: &Settings, lemmas: &Lemmas, sup: &Suprema, terminal_rate: f64) -> Vec<Finding> {
+    let s = &over_the_domain(s, lemmas);
     let sizes = (terminal_rate, lemmas.braking * terminal_rate);
     let curved = (lemmas.rate, lemmas.acceleration);
     let [moment_by_angles, moment_by_rates, moment] = lemmas.moment(sizes.0, sizes.1);

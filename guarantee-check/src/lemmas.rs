@@ -174,9 +174,16 @@ fn gyroscopic<const N: usize>(
     })
 }
 
-/// Checks the bounds of the geometry and of the inertia. The search aims for enclosures of the
+/// Returns settings whose limits are the domain of the bounds.
+pub(crate) fn over_the_domain(s: &Settings, lemmas: &Lemmas) -> Settings {
+    let (limit_rate, sideslip_domain) = lemmas.domain;
+    Settings { limit_rate, sideslip_domain, ..*s }
+}
+
+/// Checks the bounds of the geometry and of the inertia over their domain. The search aims for enclosures of the
 /// relative width `gap`.
 pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema) {
+    let s = &over_the_domain(s, lemmas);
     let u = half_angles(s.sideslip_domain);
     let mut search = Search { u, gap, boxes: 4_000_000, findings: Vec::new() };
     let [drift, curvature, turn, mixed, twice, fourth] = geometry(&mut search, lemmas);

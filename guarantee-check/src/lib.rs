@@ -58,11 +58,19 @@ impl Report {
     pub fn new(settings: &Settings, gap: f64) -> Result<Self, DesignError> {
         let design = Design::new(settings)?;
         let bounds = Lemmas::new(settings);
-        let (lemmas, suprema) = lemmas::check(settings, &bounds, gap);
+        let (mut lemmas, suprema) = lemmas::check(settings, &bounds, gap);
         let terminal_rate = design.assessment.terminal_rate;
+        let mut dynamics = dynamics::check(settings, &bounds, &suprema, terminal_rate);
+        if settings.delay > 0.0 {
+            // The larger domain before the nominal motion began.
+            let before = Lemmas::before(settings);
+            let (more, suprema) = lemmas::check(settings, &before, gap);
+            lemmas.extend(more);
+            dynamics.extend(dynamics::check(settings, &before, &suprema, terminal_rate));
+        }
         Ok(Self {
             lemmas,
-            dynamics: dynamics::check(settings, &bounds, &suprema, terminal_rate),
+            dynamics,
             assessment: assessment::check(settings, &bounds, &design.tightening, terminal_rate),
             terminal: assessment::check_terminal_weight(settings),
             printed_terminal: sums::terminal_decrease(settings).map(|[_, printed]| printed),

@@ -7,7 +7,7 @@
 
 use crate::interval::Interval;
 use control::crmpc::{Settings, held_terminal_weight, terminal_weight};
-use control::error_dynamics::{Gain, SampledError};
+use control::error_dynamics::{Early, Gain, SampledError};
 use nalgebra::{Matrix2, Vector2};
 
 /// Matrix of one axis, by rows.
@@ -199,51 +199,102 @@ impl Axis {
     /// [`Self::reach`].
     pub fn errors(&self, steps: usize) -> [Vec<Bounds>; 2] {
         [[Interval::ONE, Interval::ZERO], [self.latency, Interval::ONE]]
-            .map(|newest| self.errors_along(&newest, steps))
+            .map(|newest| self.errors_along(&newest, steps, NEVER))
+    }
+
+    /// Bounds on the effect of parts of the predictions that are wrong by changes of the rate by
+    /// up to 1 in all, between each measurement and its tick.
+    pub fn mispredictions(&self, steps: usize, early: Early) -> Vec<Bounds> {
+        let [last, first] = [Interval::ZERO, self.latency]
+            .map(|u| self.errors_along(&[u, Interval::ONE], steps, early));
+        let largest = |a: &Bounds, b: &Bounds| std::array::from_fn(|i| a[i].max(b[i]));
+        last.iter().zip(&first).map(|(a, b)| largest(a, b)).collect()
     }
 
     /// Bounds on the effect of errors along one direction: at every tick the predicted state is off
-    /// by up to `newest`.
-    fn errors_along(&self, newest: &Pair, steps: usize) -> Vec<Bounds> {
+    /// by up to `newest`, and by more at the first ticks.
+    fn errors_along(&self, newest: &Pair, steps: usize, early: Early) -> Vec<Bounds> {
         let half = Interval::from(0.5) * self.period.square();
         let held = along(&self.gain, newest);
         let sums = self.series(&[half * held, self.period * held], steps);
+        let excess = Interval::from(early.excess);
+        let weight =
+            |tick: usize| if tick < early.ticks { Interval::ONE + excess } else { Interval::ONE };
         // The first error contributes −Φⁿ⁻¹ A A_d e₀.
         let first = [newest[0] + self.period * newest[1], newest[1]];
         let newest_sizes = self.sizes(newest);
-        let bounds = |sum: &[Interval; 5], first: &[Interval; 5]| {
-            let own: [Interval; 5] = std::array::from_fn(|i| sum[i] + first[i]);
-            let seen: [Interval; 5] = std::array::from_fn(|i| own[i] + newest_sizes[i]);
+        let bounds = |tick: usize, first: &[Interval; 5]| {
+            // The other early errors are the oldest parts of the sum.
+            let parts = tick - 1;
+            let (sum, young) =
+                (&sums[parts], &sums[parts - parts.min(early.ticks.saturating_sub(1))]);
+            let own: [Interval; 5] = std::array::from_fn(|i| {
+                sum[i] + excess * (sum[i] - young[i]) + weight(0) * first[i]
+            });
+            let seen: [Interval; 5] =
+                std::array::from_fn(|i| own[i] + weight(tick) * newest_sizes[i]);
             [own[0], own[1], seen[0], seen[1], seen[2], seen[3], seen[4], Interval::ZERO]
         };
         let mut all = Vec::with_capacity(steps + 2);
         let mut begin = [Interval::ZERO; 8];
-        [begin[0], begin[1]] = *newest;
+        [begin[0], begin[1]] = newest.map(|size| weight(0) * size);
         all.push(begin);
         let mut largest = [Interval::ZERO; 5];
         for (n, power) in self.transitions(steps).enumerate() {
             let sizes = self.sizes(&applied(&power, &first));
-            all.push(bounds(&sums[n], &sizes));
+            all.push(bounds(n + 1, &sizes));
             largest = sizes;
         }
         // After the last period no power of Φ makes the first error larger than this, because
         // ‖Φᵐᵇ⁺ʳ‖ ≤ ‖Φʳ‖.
         let after = self.powers.iter().fold(Interval::ZERO, |most, power| most.max(norm(power)));
         let faded = self.sizes_within(after * largest[0].max(largest[1]));
-        all.push(bounds(&sums[steps + 1], &faded));
+        all.push(bounds(steps + 2, &faded));
         all
+    }
+
+    /// Bounds on the effect of changes of the rate by up to the period in all before each tick, at
+    /// any time since the measurement before that of the tick, as in [`Self::reach`].
+    pub fn changes(&self, steps: usize, early: Early) -> Vec<Bounds> {
+        let end = self.latency + self.period;
+        // Each part may have another time, so that its largest size counts.
+        let mut sum = [Interval::ZERO; 5];
+        let mut all = vec![sum];
+        for power in self.transitions(steps) {
+            let [last, first] = [Interval::ZERO, end]
+                .map(|u| self.sizes(&applied(&power, &[u * self.period, self.period])));
+            sum = std::array::from_fn(|i| sum[i] + last[i].max(first[i]));
+            all.push(sum);
+        }
+        let tail = self.tails(steps).0 * self.period * end.max(Interval::ONE);
+        let more = self.sizes_within(tail);
+        all.push(std::array::from_fn(|i| sum[i] + Interval::new(0.0, more[i].high)));
+        counted(early, &all.iter().map(spread).collect::<Vec<Bounds>>())
     }
 
     /// Bounds on the effect of shifts of the angle by up to the period at every tick, as in
     /// [`Self::reach`].
-    pub fn shifts(&self, steps: usize) -> Vec<Bounds> {
+    pub fn shifts(&self, steps: usize, early: Early) -> Vec<Bounds> {
         let sums = self.series(&[self.period, Interval::ZERO], steps);
-        sums.into_iter()
-            .map(|[angle, rate, of_angle, of_rate, feedback]| {
-                [angle, rate, angle, rate, of_angle, of_rate, feedback, Interval::ZERO]
-            })
-            .collect()
+        counted(early, &sums.iter().map(spread).collect::<Vec<Bounds>>())
     }
+}
+
+/// Bounds of causes that every measurement has seen.
+fn spread([angle, rate, of_angle, of_rate, feedback]: &[Interval; 5]) -> Bounds {
+    [*angle, *rate, *angle, *rate, *of_angle, *of_rate, *feedback, Interval::ZERO]
+}
+
+const NEVER: Early = Early { ticks: 0, excess: 0.0 };
+
+/// Counts effects that are larger for the first ticks of a nominal motion.
+fn counted(early: Early, sums: &[Bounds]) -> Vec<Bounds> {
+    let excess = Interval::from(early.excess);
+    let at = |n: usize| -> Bounds {
+        let young = &sums[n - n.min(early.ticks)];
+        std::array::from_fn(|i| sums[n][i] + excess * (sums[n][i] - young[i]))
+    };
+    (0..sums.len()).map(at).collect()
 }
 
 /// Largest eigenvalue of Φᵀ G Φ − G + h (P + K̃ᵀ Q K̃) for each axis with the sampled terminal law:

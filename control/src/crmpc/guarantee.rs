@@ -14,10 +14,10 @@ pub use switching::{Carried, Switching};
 use super::settings::{InitialState, Settings};
 use crate::controller::Explained;
 use crate::error::DesignError;
-use crate::error_dynamics::{Reach, SampledError};
+use crate::error_dynamics::{Early, Reach, SampledError};
 use nalgebra::Vector3;
 use std::f64::consts::SQRT_2;
-use vehicle::math::{exp, powi, sin, sin_cos};
+use vehicle::math::{cos, exp, powi, sin, sin_cos};
 
 /// Largest deviation of the vehicle from the plan at a feedback tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -181,6 +181,10 @@ const DRIFT_BY_ANGLES_TWICE: f64 = 8.0;
 const FOURTH: f64 = 25.0;
 /// Largest z for which 1/(1 − z) ≤ exp(2 z) is used; it is true up to 0.79.
 const LARGEST_IN_TURN: f64 = 0.75;
+/// Number of domains that are tried until one contains its predictions.
+const DOMAINS: usize = 50;
+/// Widest sideslip angle of a domain, rad.
+const WIDEST: f64 = 0.95;
 /// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; for the sideslip
 /// it is the smallest rate. See [`braking`].
 pub(super) const BRAKING: f64 = 0.01;
@@ -204,10 +208,22 @@ impl Geometry {
     }
 }
 
-/// Bounds on the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain ‖ω‖ ≤
-/// ω̄, ‖m‖ ≤ M̄, |β| ≤ β̄.
+/// Part of the state space in which the dynamics are bounded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Domain {
+    /// Bound on ‖ω‖, rad/s.
+    pub rate: f64,
+    /// Bound on |β|, rad.
+    pub sideslip: f64,
+}
+
+/// Bounds on the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain, with
+/// ‖m‖ ≤ M̄. The domain contains the vehicle's states, and their predictions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Dynamics {
+    /// States of the vehicle itself.
+    vehicle: Domain,
+    pub domain: Domain,
     pub geometry: Geometry,
     /// Largest and smallest moment of inertia, kg m².
     pub largest: f64,
@@ -238,23 +254,103 @@ pub(super) struct Dynamics {
 }
 
 impl Dynamics {
+    /// Computes the bounds for all states within the limits.
     pub(super) fn new(s: &Settings) -> Self {
+        Self::around(s, Domain { rate: s.limit_rate, sideslip: s.sideslip_domain })
+    }
+
+    /// Returns the bounds for the delay before the nominal motion began. From then on the limits
+    /// hold; before, rates and sideslip exceeded them by no more than they change over the delay.
+    fn before(&self, s: &Settings) -> Self {
+        let Self { smallest, largest, .. } = *self;
+        let mut vehicle = Domain { rate: s.limit_rate, sideslip: s.sideslip_domain };
+        for _ in 0..DOMAINS {
+            let dynamics = Self::around(s, vehicle);
+            let spin = s.limit_moment / smallest
+                + 0.5 * (largest - smallest) / smallest * powi(vehicle.rate, 2);
+            let rate = s.limit_rate + (spin + Drive::new(s, &dynamics).all) * s.delay;
+            let sideslip = s.sideslip_domain + vehicle.rate * s.delay;
+            if rate <= vehicle.rate && sideslip <= vehicle.sideslip || !dynamics.is_bounded() {
+                return dynamics;
+            }
+            vehicle = Domain { rate: rate * (1.0 + 1e-4), sideslip: sideslip * (1.0 + 1e-4) };
+        }
+        self.unbounded()
+    }
+
+    /// Computes the bounds in the smallest domain that contains `vehicle` and the predictions of
+    /// its states.
+    fn around(s: &Settings, vehicle: Domain) -> Self {
+        let mut domain = vehicle;
+        for _ in 0..DOMAINS {
+            let dynamics = Self { vehicle, ..Self::within(s, domain) };
+            let needed = dynamics.predicted(s);
+            if needed.rate <= domain.rate && needed.sideslip <= domain.sideslip {
+                return dynamics;
+            }
+            // A little more than needed is found sooner.
+            let more = |value: f64, least: f64| least + (1.0 + 1e-3) * (value - least);
+            domain = Domain {
+                rate: more(needed.rate, vehicle.rate),
+                sideslip: more(needed.sideslip, vehicle.sideslip),
+            };
+            if domain.sideslip.is_nan() || domain.sideslip > WIDEST {
+                break;
+            }
+        }
+        Self::within(s, vehicle).unbounded()
+    }
+
+    fn unbounded(self) -> Self {
+        Self { by_rates: f64::INFINITY, ..self }
+    }
+
+    fn is_bounded(&self) -> bool {
+        self.by_rates.is_finite()
+    }
+
+    /// Returns the domain of the states of `vehicle`, of their predictions, and of the states that
+    /// the law computes for the middle of the period.
+    fn predicted(&self, s: &Settings) -> Domain {
+        let vehicle = self.vehicle;
+        let end = s.delay + s.period_feedback;
+        let drive = Drive::new(s, self);
+        // Commands that begin early or late make the rates jump.
+        let jump = 2.0 * s.delay_error * s.limit_moment * self.geometry.r
+            / ((1.0 - s.inertia_error) * (1.0 - s.tensor_error) * self.smallest);
+        let count = if jump > 0.0 { (end / s.period_feedback).ceil() + 1.0 } else { 0.0 };
+        let jumps = jump * count;
+        let by_jumps = (self.by_rates + self.by_angles * end) * jumps;
+        let f = (self.apart(&drive, end) + by_jumps) * self.growth(end);
+        let beside = 0.25 * self.slope * powi(s.period_feedback, 2);
+        let rates = drive.rate_error + (drive.all + f) * end + beside + jumps;
+        let angles = drive.angle_error
+            + (drive.rate_error_of_two + (0.5 * drive.of_two + 0.5 * f) * end) * end
+            + beside * s.period_feedback
+            + jumps * end;
+        Domain {
+            rate: vehicle.rate + rates + TURN * angles * self.geometry.r * vehicle.rate,
+            sideslip: vehicle.sideslip + angles,
+        }
+    }
+
+    fn within(s: &Settings, domain: Domain) -> Self {
         let eigenvalues = s.body.inertia.symmetric_eigenvalues();
         let (smallest, largest) = (eigenvalues.min(), eigenvalues.max());
-        let geometry = Geometry::new(s.sideslip_domain);
+        let geometry = Geometry::new(domain.sideslip);
         let Geometry { drift, drift_by_rates, r } = geometry;
         let spread = (largest - smallest) / smallest;
-        let rate = r * s.limit_rate;
+        let rate = r * domain.rate;
         let (gyroscopic, spinning) = gyroscopic(s);
         // Gyroscopic term: ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
-        let spin = s.limit_moment / smallest + 0.5 * spread * powi(s.limit_rate, 2);
+        let spin = s.limit_moment / smallest + 0.5 * spread * powi(domain.rate, 2);
         let acceleration = r * (spin + drift * rate * rate);
-        let by_rates = r * (drift_by_rates * rate + spinning * s.limit_rate);
+        let by_rates = r * (drift_by_rates * rate + spinning * domain.rate);
         // The derivative of R is ∂R = −R ∂W R; that of Ẇ x by the angles takes second derivatives
         // of W.
         let of_r = TURN * r * r;
         let by_angles = of_r * (spin + drift * rate * rate)
-            + r * (CURVATURE * rate * rate + spinning * s.limit_rate * TURN * rate);
+            + r * (CURVATURE * rate * rate + spinning * domain.rate * TURN * rate);
         // F_xx [a, a] + 2 F_xθ [a, x] + F_θθ [x, x] + F_θ a + F_x ȧ with a = F and ȧ = F_x a + F_θ
         // x. The second derivatives follow from the first ones with one more derivative of R or W.
         let second = 2.0 * (by_rates / rate);
@@ -300,6 +396,8 @@ impl Dynamics {
         ];
         let curvature_of_bearing = [root3 * largest * TURN, root3 * largest * CURVATURE];
         Self {
+            vehicle: domain,
+            domain,
             geometry,
             largest,
             smallest,
@@ -317,22 +415,48 @@ impl Dynamics {
         }
     }
 
-    /// Returns two measures of how F differs from the acceleration that the law intended: the mean
-    /// over a period, and the variation within one, both rad/s². The motion is driven off its
-    /// prediction by `drive` (rad/s²) and began with errors of the angles and rates (rad, rad/s).
-    /// The part in [`Self::swing`] is not included.
-    fn mismatch(&self, s: &Settings, drive: f64, angle_error: f64, rate_error: f64) -> (f64, f64) {
-        let tau = s.period_feedback;
-        let elapsed = s.delay + tau;
-        let growth = self.growth(elapsed);
-        let off_rate = (drive * (elapsed - 0.5 * tau) + rate_error) * growth;
-        let off_angle =
-            (0.5 * drive * elapsed * elapsed + angle_error + rate_error * elapsed) * growth;
-        let mean = self.by_rates * off_rate
-            + self.by_angles * off_angle
-            + self.jerk * tau * tau / 24.0
-            + self.middle(tau) * growth;
-        (mean, self.by_rates * drive * tau * growth + self.jerk * tau * tau / 8.0)
+    /// Returns the largest difference of F along a motion and its prediction a time t (s) after the
+    /// measurement, relative to [`Self::growth`], rad/s².
+    fn apart(&self, drive: &Drive, t: f64) -> f64 {
+        self.by_rates * (drive.all * t + drive.rate_error)
+            + self.by_angles
+                * (0.5 * drive.of_two * t * t + drive.angle_error + drive.rate_error_of_two * t)
+    }
+
+    /// Returns how F differs from the acceleration that the law intended, see [`Mismatch`].
+    fn mismatch(&self, s: &Settings, drive: &Drive) -> Mismatch {
+        let (d, tau) = (s.delay, s.period_feedback);
+        let end = d + tau;
+        let growth = self.growth(end);
+        if !self.is_bounded() {
+            return Mismatch::UNBOUNDED;
+        }
+        let Drive { all, of_two, rate_error, rate_error_of_two, angle_error, .. } = *drive;
+        let Self { by_rates, by_angles, .. } = *self;
+        // The drive takes the motion away from its prediction until the next measurement, and from
+        // then on that prediction from the next one. The distances grow with time, so that on
+        // average over time, and over the straight line between two motions, the domain exceeds
+        // that of the vehicle by half as much. The bound on ∂F/∂x_ω is proportional to that on ‖ω‖.
+        let halfway = 0.5 + 0.5 * self.vehicle.rate / self.domain.rate;
+        let revised = halfway * by_rates * all * (d + 0.5 * tau)
+            + by_angles * of_two * (tau * tau / 6.0 + 0.5 * d * end);
+        let erred =
+            by_rates * rate_error + by_angles * (angle_error + rate_error_of_two * (d + 0.5 * tau));
+        let itself = self.jerk * tau * tau / 24.0 + self.middle(tau) * growth;
+        let peak = self.apart(drive, end) * growth
+            + self.middle(tau) * growth
+            + self.jerk * tau * tau / 8.0
+            + 0.5 * self.slope * tau;
+        Mismatch {
+            mean: (revised + erred) * growth + itself,
+            peak,
+            unseen_rate: (0.5 * by_rates * all * d * d + by_angles * of_two * d * d * d / 6.0)
+                * growth,
+            mispredicted: (by_rates * rate_error
+                + by_angles * (angle_error + 0.5 * rate_error_of_two * d))
+                * d
+                * growth,
+        }
     }
 
     /// The law predicts the middle of the period with a constant acceleration. As F changes until
@@ -368,6 +492,75 @@ impl Dynamics {
         let tau = s.period_feedback;
         self.slope * tau * tau / 8.0 + self.jerk * powi(tau, 3) / 120.0
     }
+}
+
+/// Everything that drives the motion off its prediction but for the mismatch.
+#[derive(Clone, Copy, Debug)]
+struct Drive {
+    /// Bound on the norm of Δ and the effect of the inertia error, rad/s², and on that of two axes.
+    all: f64,
+    of_two: f64,
+    /// Bound on the norm of the effect of the inertia error, rad/s².
+    of_inertia: f64,
+    /// Bounds on the norm of the error of the measured rates, rad/s, and of two of them.
+    rate_error: f64,
+    rate_error_of_two: f64,
+    /// Bound on the norm of the error of two measured angles, rad.
+    angle_error: f64,
+}
+
+impl Drive {
+    fn new(s: &Settings, dynamics: &Dynamics) -> Self {
+        let root3 = 3.0_f64.sqrt();
+        let (along, any) = inertia_moments(s, dynamics);
+        // ‖R‖ = sec β at the vehicle's own attitude.
+        let of_inertia = (along + any) / (cos(dynamics.vehicle.sideslip) * dynamics.smallest);
+        Self {
+            of_inertia,
+            all: root3 * s.disturbance_bound + of_inertia,
+            of_two: SQRT_2 * s.disturbance_bound + of_inertia,
+            rate_error: root3 * s.rate_error,
+            rate_error_of_two: SQRT_2 * s.rate_error,
+            angle_error: SQRT_2 * s.angle_error,
+        }
+    }
+}
+
+/// How F differs from the acceleration that the law intended, besides [`Dynamics::swing`].
+#[derive(Clone, Copy, Debug)]
+struct Mismatch {
+    /// Sum of all differences that belong to one tick, per period, rad/s².
+    mean: f64,
+    /// Largest difference at any time, rad/s².
+    peak: f64,
+    /// Change of the rates by it between a measurement and its tick, rad/s.
+    unseen_rate: f64,
+    /// Change of the predicted rates by it because of errors of the measurement, rad/s.
+    mispredicted: f64,
+}
+
+impl Mismatch {
+    const UNBOUNDED: Self = Self {
+        mean: f64::INFINITY,
+        peak: f64::INFINITY,
+        unseen_rate: f64::INFINITY,
+        mispredicted: f64::INFINITY,
+    };
+}
+
+/// Returns the moments that the inertia error amounts to while the largest moment acts, N m: along
+/// that moment, and in any direction.
+///
+/// The inertia is I_v = (1 + c) I^½ (1 + E) I^½. With D = 1 − (1 + E)⁻¹, I_v⁻¹ (m − ω × I_v ω)
+/// differs from I⁻¹ (m − ω × I ω) by −c/(1 + c) I⁻¹ m, by I^−½ D I^−½ (ω × I ω − m/(1 + c)), and by
+/// I^−½ (1 + E)⁻¹ I^−½ (ω × I^½ E I^½ ω). For the last one, ‖ω × S ω‖ is at most half the range of
+/// the eigenvalues of S.
+fn inertia_moments(s: &Settings, dynamics: &Dynamics) -> (f64, f64) {
+    let Dynamics { smallest, largest, vehicle, .. } = dynamics;
+    let common = s.inertia_error / (1.0 - s.inertia_error);
+    let tensor = s.tensor_error / (1.0 - s.tensor_error);
+    let gyroscopic = (0.5 * (largest - smallest) + largest) * powi(vehicle.rate, 2);
+    (common * s.limit_moment, tensor * (s.limit_moment / (1.0 - s.inertia_error) + gyroscopic))
 }
 
 /// Returns bounds on ‖∂(ω × I ω)/∂ω‖ / ‖ω‖ and on the same ratio for I⁻¹ (ω × I ω). In principal
@@ -433,7 +626,7 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     let last = at.len() - 1;
     // Errors of the measurement may drive the vehicle further at first than later on.
     at[last] = at.iter().fold(Deviation::default(), |largest, at| largest.or(at));
-    let bearing = bearing(s);
+    let bearing = bearing(s, dynamics.domain.sideslip);
     let moment = (0..at.len()).map(|n| {
         let within =
             (n..n + ratio).fold(Deviation::default(), |largest, n| largest.or(&at[n.min(last)]));
@@ -468,10 +661,10 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
     // The observer uses predicted rates, and each prediction has its own error. The first-order
     // filter amplifies the differences of these errors by no more than this.
     let predicted =
-        3.0_f64.sqrt() * s.rate_error + dynamics.by_angles * s.delay * SQRT_2 * s.angle_error;
-    let observable = (s.disturbance_bound + parts.norm - 3.0_f64.sqrt() * s.disturbance_bound
-        + 2.0 * predicted / s.observer.time_constant)
-        * dynamics.growth(s.delay + s.period_feedback);
+        3.0_f64.sqrt() * s.rate_error + parts.mismatch.mispredicted * (1.0 + parts.early[1].excess);
+    let observable = s.disturbance_bound + parts.norm - 3.0_f64.sqrt() * s.disturbance_bound
+        + parts.mismatch.mean * parts.early[0].excess
+        + 2.0 * predicted / s.observer.time_constant;
     let tightening = Tightening {
         switching,
         pulse,
@@ -488,7 +681,7 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignEr
         rate,
         bearing,
         norm: parts.norm,
-        mismatch: parts.mismatch,
+        mismatch: parts.mismatch.mean,
         observable,
         at,
     };
@@ -504,40 +697,46 @@ fn deviations(
     parts: &Parts,
     steps: usize,
 ) -> Result<(Vec<Deviation>, Vec<f64>), DesignError> {
+    let disturbance = error.reach(steps);
+    let [of_angles, of_rates] = error.errors(steps);
+    let changes = parts.early[0].count(&error.changes(steps));
+    let mispredictions = error.mispredictions(steps, parts.early[1]);
+    let shifts = parts.early[2].count(&error.shifts(steps));
+    let reaches = |n: usize| Reaches {
+        disturbance: disturbance[n],
+        early_feedback: disturbance[n].feedback
+            - disturbance[n - n.min(parts.early[0].ticks)].feedback,
+        errors: [of_angles[n], of_rates[n]],
+        changes: changes[n],
+        mispredictions: mispredictions[n],
+        shifts: shifts[n],
+    };
     Ok(match s.initial_state {
         InitialState::Measured | InitialState::Nominal => {
-            let [of_angles, of_rates] = error.errors(steps);
-            let (reach, shifts) = (error.reach(steps), error.shifts(steps));
-            let causes = || reach.iter().zip(of_angles.iter().zip(&of_rates)).zip(&shifts);
             let pulses = error.pulses(steps);
-            let all = causes().zip(&pulses);
-            let jumps: Vec<Pulse> = all
-                .map(|(((reach, errors), shifts), pulses)| {
-                    parts.pulse(s, reach, errors, shifts, pulses)
-                })
-                .collect();
+            let jumps: Vec<Pulse> =
+                (0..=steps).map(|n| parts.pulse(s, &reaches(n), &pulses[n])).collect();
             let norms: Vec<f64> = jumps.iter().map(Pulse::norm).collect();
             // Between two ticks the pulse of the next one may show already; pulses only grow.
             let largest = norms.last().copied().unwrap_or_default();
-            let all = causes().zip(jumps.iter().zip(&pulses));
-            let all = all.map(|(((reach, errors), shifts), (jump, pulses))| {
-                let deviation = parts.deviation(s, reach, errors, shifts);
-                deviation.plus(&jump.deviation(s, pulses, largest))
-            });
-            (all.collect(), norms)
+            let deviation = |n: usize| {
+                parts.deviation(s, &reaches(n)).plus(&jumps[n].deviation(s, &pulses[n], largest))
+            };
+            ((0..=steps).map(deviation).collect(), norms)
         }
         InitialState::Tube => {
             // The deviation is fully grown from the start, because the plan may begin anywhere in
             // the set that Δ cannot drive the deviation out of.
-            let last = |all: Vec<Reach>| all.last().copied().unwrap_or_default();
             let set = error
                 .invariant_set(lateral(s))
                 .ok_or(DesignError::NotReal { name: "feedback" })?
                 .reach();
-            let reach = last(error.reach(steps)).or(&set);
-            let [of_angles, of_rates] = error.errors(steps).map(last);
-            let shifts = last(error.shifts(steps));
-            (vec![parts.deviation(s, &reach, (&of_angles, &of_rates), &shifts)], vec![0.0])
+            // The first ticks of a motion count at any time.
+            let grown = (0..=steps).map(|n| {
+                let all = reaches(n);
+                parts.deviation(s, &Reaches { disturbance: disturbance[steps].or(&set), ..all })
+            });
+            (vec![grown.fold(Deviation::default(), |largest, at| largest.or(&at))], vec![0.0])
         }
     })
 }
@@ -561,28 +760,31 @@ pub(super) fn counting(s: &Settings, share: f64) -> Settings {
 
 /// The parts that drive the deviation, separated by the way in which they add up.
 struct Parts {
-    /// Moment that the inertia error amounts to while the largest moment acts, N m, along that
-    /// moment.
+    /// Moments of [`inertia_moments`], N m.
     along_moment: f64,
-    /// The same in any direction, from an error of the tensor.
     any_moment: f64,
     /// Square root of the condition number of I, by which the latter grows if it is expressed as a
     /// moment.
     root_condition: f64,
-    /// Mismatch of the cancellation alone, rad/s².
-    mismatch: f64,
+    drive: Drive,
+    mismatch: Mismatch,
+    /// Effects before the nominal motion began, see [`Early`]: on the mean of the mismatch, on the
+    /// predictions, and on the shift of the angle.
+    early: [Early; 3],
     /// Shift of the angle per time, see [`Dynamics::swing`].
     swing: f64,
     /// Deviation of the rates between two ticks, see [`Dynamics::between`], rad/s.
     between: f64,
-    /// Largest amount by which the mismatch exceeds its mean within a period, rad/s².
-    variation: f64,
     /// Bound on the norm of all parts together, rad/s².
     norm: f64,
-    /// Bound on the norm of all parts in two of the axes, rad/s².
-    norm_of_two: f64,
     /// Growth rate of the moment that the inertia error requires while the vehicle turns, 1/s.
     turning: f64,
+    /// Share by which it is larger because the attitude is measured with an error.
+    turned: f64,
+    /// Share by which it is larger because the vehicle was faster before the nominal motion began.
+    turned_early: f64,
+    /// Moment by which the inertia error amounts to more before the nominal motion began, N m.
+    early_moment: f64,
     /// Factors by which the inertia error makes the change of acceleration by a moment larger, if
     /// it is a common factor, and in all.
     pulse_common: f64,
@@ -607,93 +809,127 @@ impl Pulse {
 
 impl Parts {
     fn new(s: &Settings, dynamics: &Dynamics) -> Self {
-        let Dynamics { geometry, smallest, largest, rate, .. } = dynamics;
-        // The inertia is I_v = (1 + c) I^½ (1 + E) I^½. With D = 1 − (1 + E)⁻¹, I_v⁻¹ (m − ω × I_v
-        // ω) differs from I⁻¹ (m − ω × I ω) by −c/(1 + c) I⁻¹ m, by I^−½ D I^−½ (ω × I ω − m/(1 +
-        // c)), and by I^−½ (1 + E)⁻¹ I^−½ (ω × I^½ E I^½ ω). For the last one, ‖ω × S ω‖ is at most
-        // half the range of the eigenvalues of S.
+        let Dynamics { smallest, largest, rate, .. } = dynamics;
+        let before = dynamics.before(s);
+        let (drive, larger) = (Drive::new(s, dynamics), Drive::new(s, &before));
+        let first = before.mismatch(s, &larger);
+        let mut mismatch = dynamics.mismatch(s, &drive);
+        if !first.mean.is_finite() {
+            mismatch = Mismatch::UNBOUNDED;
+        }
+        // The inertia error has a larger effect, too.
+        let more = larger.of_inertia - drive.of_inertia;
+        mismatch.peak = first.peak + more;
+        mismatch.unseen_rate = first.unseen_rate + more * s.delay;
+        let ticks = (s.delay / s.period_feedback).ceil() as usize;
+        let early = |first: f64, later: f64| Early {
+            ticks,
+            excess: if first > later { first / later - 1.0 } else { 0.0 },
+        };
+        let swing = dynamics.swing(s);
+        let early = [
+            early(first.mean + more, mismatch.mean),
+            early(first.mispredicted, mismatch.mispredicted),
+            early(before.swing(s), swing),
+        ];
+        let (along_moment, any_moment) = inertia_moments(s, dynamics);
+        let any_before = inertia_moments(s, &before).1;
+        // Bound of ‖I (W − W′) R′ I⁻¹‖ per unit of the angle between both attitudes.
+        let by_turn = largest / smallest * TURN * before.geometry.r;
         let common = s.inertia_error / (1.0 - s.inertia_error);
         let tensor = s.tensor_error / (1.0 - s.tensor_error);
-        let gyroscopic = (0.5 * (largest - smallest) + largest) * powi(s.limit_rate, 2);
-        let along_moment = common * s.limit_moment;
-        let any_moment = tensor * (s.limit_moment / (1.0 - s.inertia_error) + gyroscopic);
-        let of_inertia = (along_moment + any_moment) * geometry.r / smallest;
-        let root3 = 3.0_f64.sqrt();
-        let drive = root3 * s.disturbance_bound + of_inertia;
-        let (mismatch, varying) =
-            dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error);
-        // |∫ g (e − ē)| ≤ ¼ τ ½ (range of g) (range of e) for the response g to a
-        // pulse, which is linear within a period.
-        let swing = dynamics.swing(s) + 0.125 * s.period_feedback * varying;
-        let variation = varying + 0.5 * s.period_feedback * dynamics.slope;
-        // Bound of ‖I (W − W′) R′ I⁻¹‖ for angles that lie `age` apart, per unit of `age`.
-        let turning = largest / smallest * TURN * geometry.r * rate;
         let root_condition = (largest / smallest).sqrt();
         // Until a prediction includes a pulse, the motion differs from its prediction.
         let elapsed = s.delay + s.period_feedback;
-        let pulse_mismatch = (dynamics.by_rates + 0.5 * dynamics.by_angles * elapsed)
-            * elapsed
-            * dynamics.growth(elapsed);
+        let pulse_mismatch =
+            (before.by_rates + 0.5 * before.by_angles * elapsed) * elapsed * before.growth(elapsed);
         Self {
             pulse_common: 1.0 + common,
-            pulse_inertia: (1.0 + common) * (1.0 + tensor * root_condition * geometry.r),
+            pulse_inertia: (1.0 + common) * (1.0 + tensor * root_condition * before.geometry.r),
             pulse_mismatch,
             // F at the instant of switching differs from the acceleration that either command
             // intends for the middle of its period.
-            turn: (s.period_feedback + 2.0 * s.delay_error) * dynamics.slope + 2.0 * mismatch,
+            turn: 2.0 * s.delay_error * before.slope + 2.0 * mismatch.peak,
             along_moment,
             any_moment,
             root_condition,
+            drive,
             mismatch,
+            early,
             swing,
-            between: dynamics.between(s),
-            variation,
-            norm: drive + mismatch,
-            norm_of_two: SQRT_2 * s.disturbance_bound + of_inertia + mismatch,
-            turning,
+            between: before.between(s),
+            norm: drive.all + mismatch.mean,
+            turning: by_turn * rate,
+            turned: by_turn * drive.angle_error,
+            turned_early: by_turn * (before.rate - rate) * s.delay,
+            // No turn makes a moment larger than ‖I‖ ‖R‖ ‖I⁻¹‖ does.
+            early_moment: (any_before - any_moment) * largest / smallest * before.geometry.r,
         }
     }
 
-    /// Returns the deviation. `reach` is per unit of disturbance, `errors` per unit of the errors
-    /// of angle and rate, and `shifts` per unit of the rate at which angles are shifted.
-    fn deviation(
-        &self,
-        s: &Settings,
-        reach: &Reach,
-        errors: (&Reach, &Reach),
-        shifts: &Reach,
-    ) -> Deviation {
+    /// Returns the effect of what differs in F, which may have any direction.
+    fn mismatched(&self, reach: &Reaches) -> Reach {
+        let Mismatch { mean, mispredicted, .. } = self.mismatch;
+        let Reaches { changes, mispredictions, shifts, .. } = reach;
+        let of_errors = mispredictions.times(mispredicted);
+        changes.times(mean).plus(&of_errors).plus(&shifts.times(self.swing))
+    }
+
+    /// Returns the deviation.
+    fn deviation(&self, s: &Settings, reach: &Reaches) -> Deviation {
         let root3 = 3.0_f64.sqrt();
-        let errors = errors.0.times(s.angle_error).plus(&errors.1.times(s.rate_error));
-        let swing = shifts.times(self.swing);
+        let errors = reach.of_errors(s);
+        let Mismatch { peak, unseen_rate, .. } = self.mismatch;
+        let Drive { all, of_two, .. } = self.drive;
+        let ball = self.mismatched(reach);
+        let early_feedback = reach.early_feedback;
+        let reach = &reach.disturbance;
         let tau = s.period_feedback;
         // Between two ticks an angle departs from the straight line by no more than this.
-        let between = tau * tau / 8.0
-            * (self.norm * (1.0 + reach.feedback)
-                + root3 * errors.feedback
-                + swing.feedback
-                + self.variation);
+        let accelerated =
+            all * (1.0 + reach.feedback) + root3 * errors.feedback + ball.feedback + peak;
         Deviation {
-            angle: reach.angle * self.norm_of_two + SQRT_2 * errors.angle + swing.angle + between,
-            rate: reach.rate * self.norm + root3 * errors.rate + swing.rate + self.between,
-            seen_angle: reach.seen_angle * self.norm_of_two
-                + SQRT_2 * errors.seen_angle
-                + swing.seen_angle,
-            seen_rate: reach.seen_rate * self.norm + root3 * errors.seen_rate + swing.seen_rate,
-            middle_angle: reach.middle_angle * self.norm_of_two
+            angle: reach.angle * of_two
+                + SQRT_2 * errors.angle
+                + ball.angle
+                + unseen_rate * s.delay
+                + tau * tau / 8.0 * accelerated,
+            rate: reach.rate * all + root3 * errors.rate + ball.rate + unseen_rate + self.between,
+            seen_angle: reach.seen_angle * of_two + SQRT_2 * errors.seen_angle + ball.seen_angle,
+            seen_rate: reach.seen_rate * all + root3 * errors.seen_rate + ball.seen_rate,
+            middle_angle: reach.middle_angle * of_two
                 + SQRT_2 * errors.middle_angle
-                + swing.middle_angle,
-            middle_rate: reach.middle_rate * self.norm
-                + root3 * errors.middle_rate
-                + swing.middle_rate,
+                + ball.middle_angle,
+            middle_rate: reach.middle_rate * all + root3 * errors.middle_rate + ball.middle_rate,
             feedback: reach.feedback * s.disturbance_bound + errors.feedback,
-            feedback_norm: reach.feedback * self.mismatch + swing.feedback,
+            feedback_norm: ball.feedback,
             feedback_moment: (self.along_moment + self.root_condition * self.any_moment)
                 * reach.feedback
                 + (self.along_moment + self.any_moment)
-                    * self.turning
-                    * (reach.feedback_age + s.delay * reach.feedback),
+                    * (self.turning * (reach.feedback_age + 0.5 * tau * reach.feedback)
+                        + self.turned * reach.feedback
+                        + self.turned_early * early_feedback)
+                + self.early_moment * early_feedback,
         }
+    }
+}
+
+/// Largest effects at one tick, per unit of their causes: of the disturbance, of the errors of
+/// angle and rate, and the others as [`SampledError`] names them.
+struct Reaches {
+    disturbance: Reach,
+    /// Part of its feedback by what happened before the nominal motion began.
+    early_feedback: f64,
+    errors: [Reach; 2],
+    changes: Reach,
+    mispredictions: Reach,
+    shifts: Reach,
+}
+
+impl Reaches {
+    /// Returns the effect of the errors of measurement.
+    fn of_errors(&self, s: &Settings) -> Reach {
+        self.errors[0].times(s.angle_error).plus(&self.errors[1].times(s.rate_error))
     }
 }
 
@@ -704,14 +940,7 @@ impl Parts {
     ///
     /// Each pulse changes the later commands too. The sum of all is that of a geometric series
     /// (small gain).
-    fn pulse(
-        &self,
-        s: &Settings,
-        reach: &Reach,
-        errors: (&Reach, &Reach),
-        shifts: &Reach,
-        pulses: &Reach,
-    ) -> Pulse {
+    fn pulse(&self, s: &Settings, reaches: &Reaches, pulses: &Reach) -> Pulse {
         if s.delay_error == 0.0 {
             return Pulse { of_box: 0.0, of_ball: 0.0 };
         }
@@ -721,13 +950,13 @@ impl Parts {
         if again * all >= 1.0 {
             return Pulse { of_box: f64::INFINITY, of_ball: f64::INFINITY };
         }
-        let errors = errors.0.times(s.angle_error).plus(&errors.1.times(s.rate_error));
+        let (errors, reach) = (reaches.of_errors(s), &reaches.disturbance);
         let of_box = (reach.change * s.disturbance_bound + errors.change)
             / (1.0 - again * self.pulse_common);
         // The parts that do not keep to the axes are added as norms.
         let besides = (all - self.pulse_common) * root3 * of_box + all * self.turn;
-        let ball = reach.change * (self.norm - root3 * s.disturbance_bound)
-            + shifts.change * self.swing
+        let ball = reach.change * self.drive.of_inertia
+            + self.mismatched(reaches).change
             + again * besides;
         let of_ball = ball / (1.0 - again * all);
         Pulse {
@@ -883,10 +1112,11 @@ fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessm
 
 use crate::linearise::TURN_BY_ANGLES as TURN_OF_RATES;
 
-/// Returns the largest ‖I W s‖ over the corners s of the unit box at any α and |β| ≤ β̄, kg m².
+/// Returns the largest ‖I W s‖ over the corners s of the unit box at any α and |β| ≤ `sideslip`,
+/// kg m².
 /// With the larger eigenvalue λ of I² in the plane of symmetry, ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy²
 /// y_y² for y = W s. α turns y in that plane, and y_x² + y_z² = cos²β (s₁ sin β + s₃)² + s₂².
-fn bearing(s: &Settings) -> f64 {
+fn bearing(s: &Settings, sideslip: f64) -> f64 {
     let square = s.body.inertia * s.body.inertia;
     let any = s.body.inertia.symmetric_eigenvalues().max() * 3.0_f64.sqrt();
     if square[(0, 1)] != 0.0 || square[(1, 2)] != 0.0 {
@@ -895,7 +1125,7 @@ fn bearing(s: &Settings) -> f64 {
     let (xx, zz, xz, yy) = (square[(0, 0)], square[(2, 2)], square[(0, 2)], square[(1, 1)]);
     let plane = 0.5 * (xx + zz) + (0.25 * powi(xx - zz, 2) + xz * xz).sqrt();
     // The maximum of (1 − x²) (1 + x)² is at one half.
-    let sine = sin(s.sideslip_domain).min(0.5);
+    let sine = sin(sideslip).min(0.5);
     let across = 1.0 + (1.0 - sine * sine) * powi(1.0 + sine, 2);
     (3.0 * yy + (plane - yy).max(0.0) * across).sqrt().min(any)
 }

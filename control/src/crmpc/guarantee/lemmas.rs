@@ -5,7 +5,7 @@ use super::{
     BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Dynamics, FOURTH, Parts, TURN,
     TURN_OF_RATES, bearing, gyroscopic,
 };
-use std::f64::consts::SQRT_2;
+use crate::error_dynamics::Early;
 
 /// Every bound that the proof uses, as this crate computes it. The lines that compute the bounds
 /// explain them.
@@ -13,6 +13,9 @@ use std::f64::consts::SQRT_2;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Lemmas {
+    /// Largest ‖ω‖ (rad/s) and |β| (rad) of the vehicle, and of the domain of the bounds.
+    pub vehicle: (f64, f64),
+    pub domain: (f64, f64),
     pub drift: f64,
     pub drift_by_rates: f64,
     pub r: f64,
@@ -32,13 +35,17 @@ pub struct Lemmas {
     pub by_angles: f64,
     pub jerk: f64,
     pub mismatch: f64,
-    pub varying: f64,
-    /// Size of the swing, including the part of `varying`.
+    pub peak: f64,
+    pub unseen_rate: f64,
+    pub mispredicted: f64,
+    pub early: [Early; 3],
     pub swing: f64,
     pub bearing: f64,
     pub norm: f64,
-    pub norm_of_two: f64,
     pub turning: f64,
+    pub turned: f64,
+    pub turned_early: f64,
+    pub early_moment: f64,
     pub braking: f64,
     dynamics: Dynamics,
 }
@@ -46,7 +53,15 @@ pub struct Lemmas {
 impl Lemmas {
     /// Computes the bounds for the settings `s`.
     pub fn new(s: &Settings) -> Self {
-        let dynamics = Dynamics::new(s);
+        Self::of(s, Dynamics::new(s))
+    }
+
+    /// Computes the bounds for the time before the nominal motion began.
+    pub fn before(s: &Settings) -> Self {
+        Self::of(s, Dynamics::new(s).before(s))
+    }
+
+    fn of(s: &Settings, dynamics: Dynamics) -> Self {
         let parts = Parts::new(s, &dynamics);
         let Dynamics {
             geometry,
@@ -59,10 +74,9 @@ impl Lemmas {
             jerk,
             ..
         } = dynamics;
-        let root3 = 3.0_f64.sqrt();
-        let drive = parts.norm - parts.mismatch;
-        let varying = dynamics.mismatch(s, drive, SQRT_2 * s.angle_error, root3 * s.rate_error).1;
         Self {
+            vehicle: (dynamics.vehicle.rate, dynamics.vehicle.sideslip),
+            domain: (dynamics.domain.rate, dynamics.domain.sideslip),
             drift: geometry.drift,
             drift_by_rates: geometry.drift_by_rates,
             r: geometry.r,
@@ -80,13 +94,18 @@ impl Lemmas {
             by_rates,
             by_angles,
             jerk,
-            mismatch: parts.mismatch,
-            varying,
+            mismatch: parts.mismatch.mean,
+            peak: parts.mismatch.peak,
+            unseen_rate: parts.mismatch.unseen_rate,
+            mispredicted: parts.mismatch.mispredicted,
+            early: parts.early,
             swing: parts.swing,
-            bearing: bearing(s),
+            bearing: bearing(s, dynamics.domain.sideslip),
             norm: parts.norm,
-            norm_of_two: parts.norm_of_two,
             turning: parts.turning,
+            turned: parts.turned,
+            turned_early: parts.turned_early,
+            early_moment: parts.early_moment,
             braking: BRAKING,
             dynamics,
         }
