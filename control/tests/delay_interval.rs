@@ -16,7 +16,8 @@ fn settings(delay: i32, error: i32) -> Settings {
         delay: f64::from(delay) * part,
         delay_error: f64::from(error) * part,
         feedback: Gain { k1: -1.5, k2: -4.0 },
-        disturbance_bound: 0.005,
+        inertia_error: 0.0,
+        disturbance_bound: 0.003,
         ..published
     }
 }

@@ -414,8 +414,8 @@ fn from_lemmas(
     ]
 }
 
-/// Checks the bounds of F and m over their domain. Bounds that depend on the sizes of x and a are checked at the
-/// sizes with which the horizon may end, and at the largest ones.
+/// Checks the bounds of F and m over their domain. Bounds that depend on the sizes of x and a are
+/// checked at the sizes with which the horizon may end, and at the largest ones.
 pub fn check(s: &Settings, lemmas: &Lemmas, sup: &Suprema, terminal_rate: f64) -> Vec<Finding> {
     let s = &over_the_domain(s, lemmas);
     let sizes = (terminal_rate, lemmas.braking * terminal_rate);

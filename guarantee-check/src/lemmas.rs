@@ -180,8 +180,8 @@ pub(crate) fn over_the_domain(s: &Settings, lemmas: &Lemmas) -> Settings {
     Settings { limit_rate, sideslip_domain, ..*s }
 }
 
-/// Checks the bounds of the geometry and of the inertia over their domain. The search aims for enclosures of the
-/// relative width `gap`.
+/// Checks the bounds of the geometry and of the inertia over their domain. The search aims for
+/// enclosures of the relative width `gap`.
 pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema) {
     let s = &over_the_domain(s, lemmas);
     let u = half_angles(s.sideslip_domain);

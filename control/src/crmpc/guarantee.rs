@@ -472,6 +472,33 @@ impl Dynamics {
         self.slope * (self.by_rates * square / 8.0 + self.by_angles * square * tau / 24.0)
     }
 
+    /// Returns by how much the change of acceleration from one command to the next, at any instant
+    /// within the error of the delay about the tick, differs from the change that the law intends:
+    /// an amount (rad/s²), and a share of the change.
+    ///
+    /// The law gives the accelerations a′ = F(y, m) at the states y that it predicts for the
+    /// middles of two periods. F with the older moment differs between these two states, which lie
+    /// one period of the motion apart, and by what the newer measurement adds. The attitude at the
+    /// instant differs from the predicted one.
+    fn between_commands(&self, s: &Settings, drive: &Drive) -> (f64, f64) {
+        let (tau, error) = (s.period_feedback, s.delay_error);
+        let end = s.delay + tau + error;
+        let growth = self.growth(end);
+        let Drive { all, of_two, rate_error, rate_error_of_two, angle_error, .. } = *drive;
+        let rates = self.acceleration * tau
+            + 0.25 * self.slope * tau * tau
+            + (all * tau + 2.0 * rate_error) * growth;
+        let angles = self.rate * tau
+            + 0.25 * self.acceleration * tau * tau
+            + (of_two * tau * end + 2.0 * angle_error + 2.0 * rate_error_of_two * end) * growth;
+        let apart = self.rate * (0.5 * tau + error)
+            + (angle_error + (rate_error_of_two + 0.5 * of_two * end) * end) * growth;
+        (
+            self.by_rates * rates + self.by_angles * angles,
+            TURN * self.geometry.r * self.geometry.r * apart,
+        )
+    }
+
     /// Returns the ratio of the distance of two motions after a time (s) to the distance that the
     /// drive alone would cause. The mismatch itself also drives them apart (Gronwall's inequality).
     fn growth(&self, elapsed: f64) -> f64 {
@@ -789,6 +816,9 @@ struct Parts {
     /// it is a common factor, and in all.
     pulse_common: f64,
     pulse_inertia: f64,
+    /// Jump of the rates at the next command because of a pulse, relative to the pulse; it is
+    /// included in `pulse_inertia`.
+    pulse_revised: f64,
     /// Jump of the rates by the mismatch that a pulse causes, relative to the pulse.
     pulse_mismatch: f64,
     /// Change of the acceleration from one command to the next while the vehicle turns, rad/s².
@@ -843,13 +873,20 @@ impl Parts {
         let elapsed = s.delay + s.period_feedback;
         let pulse_mismatch =
             (before.by_rates + 0.5 * before.by_angles * elapsed) * elapsed * before.growth(elapsed);
+        let (turn, attitude) = before.between_commands(s, &larger);
+        let pulse_inertia =
+            (1.0 + common) * (1.0 + tensor * root_condition * before.geometry.r) * (1.0 + attitude);
+        // The pulse before is a part of the motion between two commands, too.
+        let pulse_revised = s.delay_error
+            * pulse_inertia
+            * (before.by_rates + before.by_angles * elapsed)
+            * before.growth(elapsed);
         Self {
             pulse_common: 1.0 + common,
-            pulse_inertia: (1.0 + common) * (1.0 + tensor * root_condition * before.geometry.r),
+            pulse_inertia: pulse_inertia / (1.0 - pulse_revised),
+            pulse_revised,
             pulse_mismatch,
-            // F at the instant of switching differs from the acceleration that either command
-            // intends for the middle of its period.
-            turn: 2.0 * s.delay_error * before.slope + 2.0 * mismatch.peak,
+            turn,
             along_moment,
             any_moment,
             root_condition,

@@ -108,7 +108,8 @@ impl Switching {
         let (size, fast) = (values.map(f64::abs), values[0].abs().min(values[1].abs()));
         // The mismatch that a pulse causes shows later than the pulse itself.
         let later = parts.pulse_mismatch / powi(fast, late + 1);
-        let by_change = s.delay_error * parts.pulse_inertia * (1.0 + later);
+        let revised = (1.0 - parts.pulse_revised) / (1.0 - parts.pulse_revised / fast);
+        let by_change = s.delay_error * parts.pulse_inertia * revised * (1.0 + later);
         // A change that is seen late changes K ô late.
         let again = by_change / powi(fast, late);
         let [slow_mode, fast_mode] = &modes;
