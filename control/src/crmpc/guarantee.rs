@@ -315,11 +315,12 @@ impl Dynamics {
         let vehicle = self.vehicle;
         let end = s.delay + s.period_feedback;
         let drive = Drive::new(s, self);
-        // Commands that begin early or late make the rates jump.
-        let jump = 2.0 * s.delay_error * s.limit_moment * self.geometry.r
+        // The moment that acts is the assumed one, shifted by up to the error of the delay. The
+        // integrals of both over any time therefore differ by no more than this much at both ends,
+        // and R changes little in the meantime.
+        let turned = 1.0 + TURN * self.geometry.r * self.rate * end;
+        let jumps = 2.0 * s.delay_error * s.limit_moment * self.geometry.r * turned
             / ((1.0 - s.inertia_error) * (1.0 - s.tensor_error) * self.smallest);
-        let count = if jump > 0.0 { (end / s.period_feedback).ceil() + 1.0 } else { 0.0 };
-        let jumps = jump * count;
         let by_jumps = (self.by_rates + self.by_angles * end) * jumps;
         let f = (self.apart(&drive, end) + by_jumps) * self.growth(end);
         let beside = 0.25 * self.slope * powi(s.period_feedback, 2);
