@@ -9,7 +9,7 @@ mod switching;
 
 pub use lemmas::Lemmas;
 pub(super) use switching::unseen;
-pub use switching::{Carried, Switching};
+pub use switching::{Carried, Onset, Switching};
 
 use super::settings::{InitialState, Settings};
 use crate::controller::Explained;

@@ -24,9 +24,9 @@ pub use design::{
 };
 #[doc(hidden)]
 pub use guarantee::Lemmas;
-pub use guarantee::{Assessment, Carried, Deviation, Geometry, Switching, Tightening};
+pub use guarantee::{Assessment, Carried, Deviation, Geometry, Onset, Switching, Tightening};
 pub use observer::Observed;
-pub use plan::{Onset, Plan};
+pub use plan::Plan;
 pub use published::Published;
 pub use robust::Margins;
 pub use sets::Bounds;
@@ -790,8 +790,12 @@ impl Crmpc {
         rates: &Vector3<f64>,
         feedback: &Vector3<f64>,
     ) -> bool {
-        let (plan, age) = (&memory.plan, memory.age as usize);
-        let Some(bounds) = self.sets.explained(plan, age, tick as usize) else { return false };
+        let carried = self.design.tightening.switching.as_ref();
+        let carried = carried.map(|switching| memory.plan.begins_with(switching));
+        let tick = memory.age as usize + tick as usize;
+        let Some(bounds) = self.sets.explained(tick, &carried.unwrap_or_default()) else {
+            return false;
+        };
         let slack = 1.0 + 1e-9;
         let r = 1.0 / cos(self.settings.sideslip_domain);
         let ball = bounds.feedback_norm + bounds.feedback_moment * r / self.design.smallest_inertia;

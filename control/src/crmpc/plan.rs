@@ -1,6 +1,6 @@
 //! The plan: a nominal motion over the horizon.
 
-use super::guarantee::{Carried, Switching};
+use super::guarantee::{Carried, Onset, Switching};
 use crate::mpc::Motion;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -22,18 +22,6 @@ pub struct Plan {
     pub shift: Vector3<f64>,
     /// What was commanded before the plan, if the delay is not exact.
     pub onset: Onset,
-}
-
-/// What a plan's beginning follows on, where commands begin to act earlier or later than assumed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Onset {
-    /// Deviation that earlier changes of the acceleration have left, see [`Carried`].
-    pub carried: Carried,
-    /// Acceleration commanded before the plan, rad/s².
-    pub before: Vector3<f64>,
-    /// Jump of the rates by the plan's first command for which the plan before leaves room, rad/s;
-    /// infinite if no plan was in force.
-    pub allowed: f64,
 }
 
 impl Clone for Plan {

@@ -2,8 +2,7 @@
 //! error dynamics do (docs/guarantee.md).
 
 use super::design::Design;
-use super::guarantee::{self, Carried, Dynamics, End, Held, MomentLoss, Switching};
-use super::plan::Onset;
+use super::guarantee::{self, Carried, Dynamics, End, Held, MomentLoss, Onset, Switching};
 use super::settings::Settings;
 use crate::linearise::{BodyMotion, InverseKinematics, Linear};
 use crate::mpc::Motion;

@@ -2,8 +2,7 @@
 
 use super::design::Design;
 use super::few_stages::Anchor;
-use super::guarantee::{self, Deviation};
-use super::plan::{Onset, Plan};
+use super::guarantee::{self, Carried, Deviation, Onset};
 use super::robust::{Margins, Point, Robust, norm_of_columns};
 use super::settings::{Constraints, Settings};
 use crate::error::DesignError;
@@ -163,14 +162,14 @@ impl Sets {
         robust.margins(&self.point(motion, 0), &self.point(motion, 1))
     }
 
-    /// Returns the largest deviations that the assumptions explain `tick` ticks after the beginning
-    /// of `plan`, whose nominal motion began `age` ticks before it; `None` with the paper's set.
-    pub(super) fn explained(&self, plan: &Plan, age: usize, tick: usize) -> Option<Deviation> {
+    /// Returns the largest deviations that the assumptions explain `tick` ticks after a nominal
+    /// motion began, in a stage that begins with `carried`; `None` with the paper's set.
+    pub(super) fn explained(&self, tick: usize, carried: &Carried) -> Option<Deviation> {
         let Kind::Robust(robust) = &self.kind else { return None };
         let tightening = &robust.design.tightening;
-        let explained = *tightening.at(age + tick);
+        let explained = *tightening.at(tick);
         let Some(switching) = &tightening.switching else { return Some(explained) };
-        Some(explained.plus(&switching.deviation(&plan.begins_with(switching))))
+        Some(explained.plus(&switching.deviation(carried)))
     }
 
     /// Returns (Θ̃, x̃_ω, a) for an error and its input at stage `k`.

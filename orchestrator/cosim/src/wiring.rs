@@ -342,8 +342,7 @@ fn shortest_patterns<'a>(open: &[&str], all: &(impl Iterator<Item = &'a str> + C
 /// Returns an error if a name does not exist, a pattern stands for nothing, or a variable is a
 /// text.
 pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Column>, Error> {
-    let mut columns: Vec<Column> = Vec::new();
-    let mut missing = Vec::new();
+    let (mut columns, mut missing) = (Vec::<Column>::new(), Vec::new());
     let mut seen: HashSet<Port> = HashSet::new();
     for text in &experiment.record.variables {
         let reference = Reference::new(text, parts, &experiment.source)?;

@@ -13,12 +13,25 @@ use crate::delay::ticks;
 use crate::error::DesignError;
 use crate::error_dynamics::{SampledError, response, transition};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 use vehicle::math::{exp, powi};
 
 /// Bound on the part of the deviation that the plan's own changes of acceleration cause, at a tick,
 /// rad/s: its components along the slower and the faster eigenvector of Φ as the law sees them, and
 /// the pulse of the command that begins at the tick.
 pub type Carried = Vector3<f64>;
+
+/// What a plan's beginning follows on, where commands begin to act earlier or later than assumed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Onset {
+    /// Deviation that earlier changes of the acceleration have left, see [`Carried`].
+    pub carried: Carried,
+    /// Acceleration commanded before the plan, rad/s².
+    pub before: Vector3<f64>,
+    /// Jump of the rates by the plan's first command for which the plan before leaves room, rad/s;
+    /// infinite if no plan was in force.
+    pub allowed: f64,
+}
 
 /// How the deviation by pulses is carried along.
 #[derive(Clone, Debug, PartialEq)]
