@@ -438,7 +438,12 @@ impl Dynamics {
         // then on that prediction from the next one. The distances grow with time, so that on
         // average over time, and over the straight line between two motions, the domain exceeds
         // that of the vehicle by half as much. The bound on ∂F/∂x_ω is proportional to that on ‖ω‖.
-        let halfway = 0.5 + 0.5 * self.vehicle.rate / self.domain.rate;
+        // The jumps by commands that begin early or late come at any time.
+        let halfway = if s.delay_error > 0.0 {
+            1.0
+        } else {
+            0.5 + 0.5 * self.vehicle.rate / self.domain.rate
+        };
         let revised = halfway * by_rates * all * (d + 0.5 * tau)
             + by_angles * of_two * (tau * tau / 6.0 + 0.5 * d * end);
         let erred =
