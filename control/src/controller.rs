@@ -26,7 +26,7 @@ pub struct Measurement {
 
 /// What the assumptions of a law explain of the angular acceleration, beyond that of the moment
 /// that acts after the delay that was told.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Explained {
     /// Largest part in each component of ẋ_ω, whatever the moment, rad/s².
     pub disturbance: f64,
@@ -116,10 +116,10 @@ pub trait Controller {
         f64::INFINITY
     }
 
-    /// Returns what the law's assumptions explain of the motion. Another delay than the one that
-    /// was told is only said to be there if they do not.
-    fn explained(&self) -> Explained {
-        Explained::default()
+    /// Returns what the law's assumptions explain of the motion, if it has any. Another delay than
+    /// the one that was told is then only said to be there if they do not explain the motion.
+    fn explained(&self) -> Option<Explained> {
+        None
     }
 
     /// Tells the law that its last command exceeded the limit, and which moment (N m) is applied in

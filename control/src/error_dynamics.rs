@@ -260,12 +260,14 @@ impl SampledError {
 
     /// Returns the largest effect of pulses of Δ, by which the rate jumps by at most 1 in any time
     /// as long as a period, within 0, 1, …, `steps` periods from o = 0. The units are those for a
-    /// jump of the rate in rad/s: s for an angle, 1 for a rate, and 1/s for K o.
+    /// jump of the rate in rad/s: s for an angle, 1 for a rate, and 1/s for K o. A pulse may also
+    /// show later than at once, by what it changes in the mismatch, so that it counts with its
+    /// largest response over the whole time until it is seen.
     pub fn pulses(&self, steps: usize) -> Vec<Reach> {
         // A latency that is a whole number of periods may be inexact by rounding.
         let unseen = (self.latency / self.period - 1e-9).ceil().max(0.0);
         let unseen = Reach { angle: unseen * self.latency, rate: unseen, ..Reach::default() };
-        self.sums(steps, unseen, largest_size)
+        self.sums(steps, unseen, |c0, c1, (_, end)| largest_size(c0, c1, (0.0, end)))
     }
 
     /// Returns the sums of the responses to what acted in each period. `size` takes the size of a

@@ -108,8 +108,8 @@ pub struct LoopDelaySettings {
     pub period: f64,
     /// Delay that was told, s.
     pub told: f64,
-    /// What the law's assumptions explain of the acceleration with that delay.
-    pub explained: Explained,
+    /// What the law's assumptions explain of the acceleration with that delay, if it has any.
+    pub explained: Option<Explained>,
     /// Whether measurements are old when they arrive. They come through a filter then, and their
     /// noise would be taken for a response: no estimate is made.
     pub is_filtered: bool,
@@ -163,7 +163,9 @@ impl LoopDelaySettings {
         memory.known = ORDERS.min(memory.known + 1);
         // Before the first commands, importers differ in what acts.
         if memory.known == ORDERS && memory.commands.len() == self.remembered() {
-            memory.is_unexplained = !self.explains(memory, &measured.angles);
+            memory.is_unexplained = self
+                .explained
+                .is_some_and(|explained| !self.explains(explained, memory, &measured.angles));
             memory.unexplained = if memory.is_unexplained {
                 (FORGETTING / period) as u32
             } else {
@@ -175,8 +177,8 @@ impl LoopDelaySettings {
 
     /// Returns whether the law's assumptions explain the acceleration over the last period with
     /// some delay that is not another one than was told.
-    fn explains(&self, memory: &LoopDelay, angles: &Vector3<f64>) -> bool {
-        let Explained { disturbance, share, delay_error } = self.explained;
+    fn explains(&self, explained: Explained, memory: &LoopDelay, angles: &Vector3<f64>) -> bool {
+        let Explained { disturbance, share, delay_error } = explained;
         let r = kinematics::r(angles);
         let last = (self.candidates() - 1) as f64;
         let explains = |delay: f64| {
@@ -238,7 +240,8 @@ impl LoopDelaySettings {
     fn estimate(&self, memory: &mut LoopDelay) {
         let places = memory.fits.each_mut().map(Fit::least);
         let told = self.told / self.period - self.first() as f64;
-        let slack = 0.5 + self.explained.delay_error / self.period;
+        let error = self.explained.map_or(0.0, |explained| explained.delay_error);
+        let slack = 0.5 + error / self.period;
         // Where several leave next to nothing, the highest difference is the least misled by a
         // smooth disturbance.
         let best = memory.fits.iter().zip(places).rev();
@@ -247,7 +250,7 @@ impl LoopDelaySettings {
         let delay = (self.first() as f64 + place) * self.period;
         memory.estimate = fit.tells(place, (told, slack)).then_some(delay);
         let is_other = memory.estimate.is_some() && (place - told).abs() > slack;
-        memory.is_other = is_other && memory.unexplained > 0;
+        memory.is_other = is_other && (self.explained.is_none() || memory.unexplained > 0);
     }
 }
 

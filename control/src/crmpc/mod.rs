@@ -717,11 +717,9 @@ impl Controller for Crmpc {
         moment
     }
 
-    fn explained(&self) -> Explained {
-        match self.settings.constraints {
-            Constraints::Robust => self.design.tightening.explained,
-            Constraints::Paper => Explained::default(),
-        }
+    fn explained(&self) -> Option<Explained> {
+        let is_robust = self.settings.constraints == Constraints::Robust;
+        is_robust.then_some(self.design.tightening.explained)
     }
 
     /// The paper's sets leave the limit to the optimisation. Without a solution, and with the

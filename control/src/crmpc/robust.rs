@@ -243,10 +243,9 @@ impl Robust {
         let typical = limit_moment / self.design.largest_inertia;
         let a = here.pull.max(before.pull).max(typical);
         let size = here.size + 2.0 * h * a;
-        let mut loss = *self.design.tightening.rate_loss(self.tick(k));
-        if let Some(more) = self.more_of_the_deviation(k, here, before) {
-            loss = loss.with(more, h);
-        }
+        let loss = self.design.tightening.rate_loss(self.tick(k));
+        let more = self.more_of_the_deviation(k, here, before).map(|more| loss.with(more, h));
+        let loss = more.as_ref().unwrap_or(loss);
         let loss = loss.at(by_angles, here.size) + loss.within(size, a);
         let bound = limit_rate - reserve - self.share * loss;
         // This uses ‖x̃_ω‖ ≤ sec β ‖ω̃‖.
@@ -295,13 +294,13 @@ impl Robust {
     pub(super) fn moment_bound(&self, k: usize, ends: &[End; 2], acceleration: f64) -> f64 {
         let held = Held { acceleration, ratio: self.design.ratio, share: self.share };
         let tightening = &self.design.tightening;
-        let mut loss = *tightening.moment_loss(self.tick(k));
-        if let Some((switching, carried)) = self.switching(k) {
+        let more = self.switching(k).map(|(switching, carried)| {
             let deviation = tightening.within(self.tick(k), self.design.ratio);
             let deviation = deviation.plus(&switching.deviation(&carried));
             let h = self.settings.period_optimisation;
-            loss = MomentLoss::new(&self.dynamics, &deviation, tightening.bearing, h);
-        }
+            MomentLoss::new(&self.dynamics, &deviation, tightening.bearing, h)
+        });
+        let loss = more.as_ref().unwrap_or_else(|| tightening.moment_loss(self.tick(k)));
         let needed = loss.largest_moment(&self.dynamics, ends, held);
         self.settings.limit_moment - self.reserves().1 - (needed - ends[0].moment)
     }
