@@ -226,7 +226,7 @@ impl Law for CrmpcLaw {
                     "the guarantee is no longer in force: the loop has another delay than delay, delayError and measurement.age say"
                 }
                 Contradiction::Disturbance => {
-                    "the guarantee is no longer in force: the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError explain"
+                    "the guarantee is no longer in force: the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError explain with the delay that was told"
                 }
                 Contradiction::Limit => {
                     "the guarantee is no longer in force: a limit is exceeded although it was guaranteed"
