@@ -164,7 +164,7 @@ fn fly(name: &str, seeds: Range<u64>, flight: impl Fn(u64) -> Option<Flight> + S
         for (largest, value) in largest.iter_mut().zip(values) {
             *largest = largest.max(value);
         }
-        if shown.broken || shown.withdrawn.is_some() {
+        if shown.broken || shown.withdrawn.is_some() || shown.lost {
             println!("seed {seed}: {shown:?}");
         }
     }
