@@ -2,16 +2,30 @@
 
 use control::error::DesignError;
 use control::sliding::{
-    BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc,
+    BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, SecondOrderForm, Settings,
+    Tvsmc,
 };
 use controller_export::table::{self, ANGLES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
-use fmi2_export::Table;
 use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
+use fmi2_export::{Enumeration, Table};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+static FORMS: Enumeration<SecondOrderForm> = Enumeration {
+    name: "SecondOrderForm",
+    description: "Signs of the second-order reaching law",
+    items: &[
+        (SecondOrderForm::Corrected, "corrected", "the sliding variables come to zero"),
+        (
+            SecondOrderForm::Printed,
+            "printed",
+            "plus k3 and sgn twice, as (43) and (45) are printed; the attitude is lost",
+        ),
+    ],
+};
 
 /// The parts in which the time-varying sliding modes differ.
 pub trait Variant: Sized + Send + Sync + 'static {
@@ -250,6 +264,9 @@ impl Variant for SotvsmcDo {
         let table =
             table::gains(table, (&n4, &t4), Some(&angle), |law| &mut law.settings.reaching.k4);
         let m = parameter("reaching.m", "Exponent m of the reaching law, above 2").real().min(2.0);
-        table.real(m, |m| &mut m.law.settings.reaching.m)
+        let form = parameter("reaching.form", "Signs of the reaching law");
+        table
+            .real(m, |m| &mut m.law.settings.reaching.m)
+            .enumeration(form, &FORMS, |m| &mut m.law.settings.reaching.form)
     }
 }

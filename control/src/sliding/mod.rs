@@ -15,7 +15,7 @@ mod surface;
 pub use boundary_layer::{BoundaryLayer, FiniteTimeLayer, saturated};
 pub use fbl::{Fbl, FblSettings};
 pub use observer::{Estimate, Observer};
-pub use second_order::SecondOrder;
+pub use second_order::{SecondOrder, SecondOrderForm};
 pub use settings::Settings;
 pub use surface::{Anchor, Surface, TrackingError};
 
