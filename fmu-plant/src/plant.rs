@@ -23,8 +23,10 @@ pub struct ReentryPlant {
     /// Simulated plant, which exists from initialization on. Every step takes it out and puts it
     /// back: the box spares moving all of it.
     pub(crate) plant: Option<Box<Plant>>,
-    /// Dynamic pressure of the flight, Pa.
+    /// Dynamic pressure of the flight, Pa: that in force, and with the air of the standard
+    /// atmosphere.
     pub(crate) dynamic_pressure: f64,
+    pub(crate) standard_pressure: f64,
     /// Whether the unit runs in model exchange: held quantities then change at events only, and not
     /// when time passes a tick or an input is set.
     pub(crate) event_driven: bool,
@@ -44,6 +46,7 @@ pub(crate) struct Output {
     pub(crate) deflection_rates: Surfaces,
     pub(crate) indicators: Surfaces,
     pub(crate) dynamic_pressure: f64,
+    pub(crate) standard_pressure: f64,
     pub(crate) measured: Sample,
 }
 

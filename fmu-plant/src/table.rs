@@ -64,7 +64,7 @@ fn all() -> Plant {
     let table = table.real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| {
         &mut m.parameters.step
     });
-    disturbance_table(delay(sensors::all(kinematics(actuation(table)))))
+    standard_pressure(disturbance_table(delay(sensors::all(kinematics(actuation(table))))))
 }
 
 /// Returns the description of the unit for FMI.
@@ -244,6 +244,19 @@ fn actuated(mut table: Plant) -> Plant {
     table
         .real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| {
             &mut m.output.dynamic_pressure
+        })
+        .role(Unknown::DynamicPressure)
+}
+
+/// Adds the dynamic pressure that an on-board computer knows.
+fn standard_pressure(table: Plant) -> Plant {
+    let pressure = output(
+        "flight.standardDynamicPressure",
+        "Dynamic pressure with the air of the standard atmosphere, without density.scale",
+    );
+    table
+        .real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| {
+            &mut m.output.standard_pressure
         })
         .role(Unknown::DynamicPressure)
 }

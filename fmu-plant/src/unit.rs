@@ -36,6 +36,7 @@ impl Model for ReentryPlant {
             output: Output::default(),
             plant: None,
             dynamic_pressure: 0.0,
+            standard_pressure: 0.0,
             event_driven: false,
         }
     }
@@ -43,6 +44,7 @@ impl Model for ReentryPlant {
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         let failed = |error: vehicle::Error| Failure::Error(by_variable(&error, table::FIELDS));
         self.dynamic_pressure = self.parameters.dynamic_pressure().map_err(failed)?;
+        self.standard_pressure = self.parameters.flight.dynamic_pressure().map_err(failed)?;
         let config = self.parameters.config().map_err(failed)?;
         self.plant = Some(Box::new(Plant::new(&config, context.start_time).map_err(failed)?));
         self.event_driven = false;
@@ -77,6 +79,7 @@ impl Model for ReentryPlant {
                 .time_left(&held)
                 .map(|left| if left.is_finite() { left } else { AT_REST }),
             dynamic_pressure: self.dynamic_pressure,
+            standard_pressure: self.standard_pressure,
             measured: if self.event_driven {
                 plant.measured_since_held(time, &self.input)
             } else {
