@@ -1,5 +1,7 @@
 //! Numbers that are computed from a run's signals during the run.
 
+mod spectrum;
+
 use cosim::error::Error;
 use cosim::experiment::{Kind, Measure, Observe};
 use cosim::master::{Observer, Sample};
@@ -28,6 +30,12 @@ pub(crate) struct Gauge {
     pulses: u64,
     /// Values of the first signal, which are kept only for a percentile.
     samples: Vec<f64>,
+    /// Values of all signals, sample by sample, which are kept only for their spectrum, and the
+    /// time of the first one.
+    courses: Vec<f64>,
+    began: f64,
+    variation: f64,
+    rises: u64,
     /// Time of the first sample after which all signals have stayed within the band.
     settled: Option<f64>,
     /// Time of the last sample.
@@ -80,6 +88,10 @@ impl Gauge {
             largest: 0.0,
             pulses: 0,
             samples: Vec::new(),
+            courses: Vec::new(),
+            began: 0.0,
+            variation: 0.0,
+            rises: 0,
             settled: None,
             last: 0.0,
             left: None,
@@ -115,6 +127,14 @@ impl Gauge {
             }
             Kind::Pulses => Some(self.pulses as f64),
             Kind::Leaving => self.left,
+            Kind::Rises => Some(self.rises as f64),
+            Kind::Variation => Some(factor * self.variation),
+            Kind::RmsAbove => {
+                let step = (self.last - self.began) / (count - 1.0);
+                let frequency = self.measure.frequency.unwrap_or(0.0);
+                let signals = self.first.len();
+                spectrum::rms_above(&self.courses, signals, step, frequency).map(|rms| factor * rms)
+            }
         }
     }
 
@@ -130,7 +150,8 @@ impl Gauge {
     /// Returns whether the number is always whole.
     pub(crate) fn counts(&self) -> bool {
         let is_integer = self.signals.first().is_some_and(|signal| signal.is_integer);
-        self.measure.kind == Kind::Pulses || self.measure.kind == Kind::Last && is_integer
+        let is_count = matches!(self.measure.kind, Kind::Pulses | Kind::Rises);
+        is_count || self.measure.kind == Kind::Last && is_integer
     }
 
     /// Returns the single values of a percentile, in the order of time.
@@ -146,6 +167,16 @@ impl Gauge {
         if self.count == 0 {
             self.first = values.to_vec();
             self.before = vec![0.0; values.len()];
+            self.began = time;
+        } else {
+            let changes = values.iter().zip(&self.before).map(|(now, before)| (now - before).abs());
+            self.variation += changes.sum::<f64>();
+            let rise = values.first().zip(self.before.first()).map(|(now, before)| now - before);
+            let least = self.measure.bound.unwrap_or(0.0);
+            self.rises += u64::from(rise.is_some_and(|rise| rise > least));
+        }
+        if self.measure.kind == Kind::RmsAbove {
+            self.courses.extend(values);
         }
         // By the trapezoidal rule. At the first sample, the values before it are zero and no time
         // has passed.
@@ -164,9 +195,12 @@ impl Gauge {
             self.samples.extend(values.first());
         }
         self.largest = values.iter().map(|value| value.abs()).fold(self.largest, larger);
-        let band = self.measure.band.unwrap_or(0.0);
+        let band = |first: &f64| match (self.measure.bound, self.measure.band) {
+            (Some(bound), _) => bound,
+            (None, band) => band.unwrap_or(0.0) * first.abs(),
+        };
         let inside =
-            values.iter().zip(&self.first).all(|(value, first)| value.abs() <= band * first.abs());
+            values.iter().zip(&self.first).all(|(value, first)| value.abs() <= band(first));
         self.settled = if inside { self.settled.or(Some(time)) } else { None };
         if self.measure.bound.is_some_and(|bound| values.iter().any(|value| value.abs() > bound)) {
             self.left = self.left.or(Some(time));
@@ -279,6 +313,10 @@ mod tests {
         assert_eq!(held(Kind::Settling, None, Some(0.02), 1.0, &rows), Some(4.0));
         assert_eq!(held(Kind::Settling, None, Some(0.02), 1.1, &rows), None);
         assert_eq!(measured(Kind::Rms, Some([7.0, 8.0]), None, &rows), None);
+        assert_eq!(measured(Kind::Rises, None, None, &rows), Some(2.0));
+        // 7 + 2.9 + 0.3 + 0.55 + 0.15, and 1 + 0.6 + 0.585 + 0.015 + 0.01
+        let variation = measured(Kind::Variation, None, None, &rows).unwrap();
+        assert!((variation - 13.11).abs() < 1e-12, "{variation}");
         assert_eq!(measured(Kind::Leaving, Some([1.0, 5.0]), Some(0.5), &rows), Some(1.0));
         assert_eq!(measured(Kind::Leaving, Some([2.0, 5.0]), Some(0.7), &rows), None);
     }
@@ -294,6 +332,11 @@ mod tests {
         assert!(fault("kind = \"leaving\"").unwrap().contains("bound"));
         assert!(fault("kind = \"largest\"\nbound = 1.0").unwrap().contains("bound"));
         assert_eq!(fault("kind = \"leaving\"\nbound = 1.0"), None);
+        assert_eq!(fault("kind = \"settling\"\nbound = 0.1"), None);
+        assert!(fault("kind = \"settling\"\nbound = 0.1\nband = 0.1").unwrap().contains("either"));
+        assert!(fault("kind = \"rms-above\"").unwrap().contains("frequency"));
+        assert!(fault("kind = \"rms\"\nfrequency = 5.0").unwrap().contains("frequency"));
+        assert_eq!(fault("kind = \"rms-above\"\nfrequency = 5.0"), None);
     }
 
     /// Computes a measure of the first of two variables from rows of both.
@@ -311,6 +354,8 @@ mod tests {
     #[test]
     fn oracle_which_points_are_taken_by_hand() {
         let rows = [[3.0, 1.0], [100.0, 1.0], [4.0, 2.0], [50.0, 2.0]];
+        assert_eq!(taken("kind = \"settling\"\nbound = 60.0", &rows), Some(2.0));
+        assert_eq!(taken("kind = \"rises\"\nbound = 50.0", &rows), Some(1.0));
         assert_eq!(taken("kind = \"rms\"\nevery = 2", &rows), Some(12.5_f64.sqrt()));
         assert_eq!(taken("kind = \"mean\"\nsteps = true", &rows), Some(107.0 / 3.0));
         // A sample at which the count has not grown is not used.

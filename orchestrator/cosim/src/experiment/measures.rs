@@ -85,9 +85,13 @@ pub struct Measure {
     /// For `settling`, the least time for which the signals must have been seen within the band, s.
     #[serde(default)]
     pub hold: f64,
-    /// For `leaving`, the magnitude that a signal must exceed.
+    /// For `leaving`, the magnitude that a signal must exceed. For `settling`, in place of `band`,
+    /// the magnitude within which every signal must stay. For `rises`, the least rise that counts.
     #[serde(default)]
     pub bound: Option<f64>,
+    /// For `rms-above`, the frequency above which the signals count, Hz.
+    #[serde(default)]
+    pub frequency: Option<f64>,
 }
 
 /// Quantity that a measure computes from its signals.
@@ -107,13 +111,21 @@ pub enum Kind {
     Largest,
     /// Last value of the first signal.
     Last,
-    /// Time from which on every signal stays within `band` times its first magnitude, s. There is
-    /// no value if a signal never does.
+    /// Time from which on every signal stays within `band` times its first magnitude, or within
+    /// `bound`, s. There is no value if a signal never does.
     Settling,
     /// Number of times that any signal rises above one half.
     Pulses,
     /// Time at which any signal first exceeds `bound`, s. There is no value if none ever does.
     Leaving,
+    /// Number of times that the first signal is greater than at the communication point before, by
+    /// more than `bound`, which is 0 by default.
+    Rises,
+    /// Total variation: sum over the signals of the magnitudes of all changes.
+    Variation,
+    /// Root mean square of what the signals contain above `frequency`, over all signals, by the
+    /// discrete Fourier transform with a Hann window.
+    RmsAbove,
 }
 
 /// A unit that is a multiple of another unit.
@@ -246,16 +258,20 @@ impl Measure {
             "over must be [from, to] with from below to"
         } else if is(Kind::Leaving) && !self.bound.is_some_and(|bound| bound > 0.0) {
             "leaving wants a bound above 0"
-        } else if !is(Kind::Leaving) && self.bound.is_some() {
-            "bound is for leaving only"
-        } else if is(Kind::Settling)
-            && !(self.band.is_some_and(|band| band > 0.0) && self.hold >= 0.0)
+        } else if !matches!(self.kind, Kind::Leaving | Kind::Settling | Kind::Rises)
+            && self.bound.is_some()
         {
-            "settling wants a band above 0, and a hold not below"
+            "bound is for leaving, settling and rises only"
+        } else if is(Kind::Settling)
+            && !(self.band.xor(self.bound).is_some_and(|band| band > 0.0) && self.hold >= 0.0)
+        {
+            "settling wants either a band or a bound above 0, and a hold not below"
         } else if !is(Kind::Settling) && self.band.is_some() {
             "band is for settling only"
         } else if !is(Kind::Settling) && self.hold != 0.0 {
             "hold is for settling only"
+        } else if is(Kind::RmsAbove) != self.frequency.is_some_and(|frequency| frequency > 0.0) {
+            "rms-above, and nothing else, wants a frequency above 0"
         } else {
             return None;
         };

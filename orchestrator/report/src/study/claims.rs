@@ -2,8 +2,9 @@
 
 use super::comparisons::{Check, Claim, Relation};
 use super::definition::Study;
-use super::results::{Numbers, Results, is_reference, resolve};
+use super::results::{Metric, Numbers, Results, is_reference, resolve};
 use super::values::Quantity;
+use cosim::experiment::Kind;
 use serde::Serialize;
 
 /// Verdict on a claim of the paper.
@@ -128,22 +129,32 @@ pub fn judge(claim: &Claim, results: &Results) -> Result<Judged, String> {
 }
 
 fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
-    let left = results.of_members(&check.left)?;
+    let left = never_is_infinite(&check.left, results, results.of_members(&check.left)?);
     let right = results.quantity(&check.right)?;
+    let right = match &check.right {
+        Quantity::Named(name) => never_is_infinite(name, results, right),
+        Quantity::Number(_) => right,
+    };
     let by = check.by.as_ref().map(|by| results.study.values.number(by)).transpose()?;
-    let numbers = |side: &[Option<f64>]| Numbers(side.iter().copied().flatten().collect());
+    let numbers = |side: &[Option<f64>]| {
+        Numbers(side.iter().copied().flatten().filter(|number| number.is_finite()).collect())
+    };
     // If one side has no number at all, there is nothing to compare.
-    let is_empty = numbers(&left).0.is_empty() || numbers(&right).0.is_empty();
+    let is_empty = [&left, &right].iter().any(|side| side.iter().flatten().next().is_none());
     let pairs = if is_empty { 0 } else { left.len().max(right.len()) };
     let at = |side: &[Option<f64>], k: usize| side[k % side.len()];
-    let difference = (0..pairs).filter_map(|k| Some(at(&left, k)? / at(&right, k)? - 1.0));
-    let difference: Vec<f64> = difference.collect();
+    let compared: Vec<(f64, f64)> =
+        (0..pairs).filter_map(|k| Some((at(&left, k)?, at(&right, k)?))).collect();
+    let difference = compared.iter().map(|(left, right)| left / right - 1.0);
+    let difference = difference.filter(|difference| difference.is_finite()).collect();
     let margin = by.unwrap_or(0.0);
-    let holds = |difference: &&f64| match check.relation {
-        Relation::Below => **difference <= -margin,
-        Relation::Above => **difference >= margin,
+    let holds = |&&(left, right): &&(f64, f64)| match check.relation {
+        Relation::Below => left < right - margin * right.abs(),
+        Relation::Above => left > right + margin * right.abs(),
+        Relation::AtMost => left <= right - margin * right.abs(),
+        Relation::AtLeast => left >= right + margin * right.abs(),
     };
-    let held = difference.iter().filter(holds).count();
+    let held = compared.iter().filter(holds).count();
     Ok(Checked {
         left: numbers(&left),
         right: numbers(&right),
@@ -152,6 +163,24 @@ fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
         pairs,
         held,
     })
+}
+
+/// Replaces the missing time of what never settles by infinity, so that it can be compared.
+fn never_is_infinite(
+    reference: &str,
+    results: &Results,
+    numbers: Vec<Option<f64>>,
+) -> Vec<Option<f64>> {
+    let settles = |id: &str| {
+        let measure = results.study.measures.iter().find(|measure| measure.id == id);
+        measure.is_some_and(|measure| measure.kind == Kind::Settling)
+    };
+    match resolve(results.study, reference) {
+        Ok((_, Metric::Measure(id))) if settles(&id) => {
+            numbers.into_iter().map(|number| number.or(Some(f64::INFINITY))).collect()
+        }
+        _ => numbers,
+    }
 }
 
 #[cfg(test)]
@@ -167,6 +196,39 @@ mod tests {
         let one = Numbers(vec![1.0]);
         let difference = Numbers(vec![0.0; all]);
         Checked { left: one.clone(), right: one, difference, by: None, pairs: all, held }
+    }
+
+    #[test]
+    fn equal_numbers_are_neither_below_nor_above() {
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments/two-loop-smc/study.toml");
+        let study = Study::load(&path).unwrap();
+        let check = study.claims[0].checks[0].clone();
+        let (place, _) = resolve(&study, &check.left).unwrap();
+        let held = |relation, value: f64, right: f64, by: Option<f64>| {
+            let mut runs = vec![RunResult::default(); study.runs.len()];
+            runs[place].members = vec![Member {
+                value: None,
+                metrics: Metrics::default(),
+                within: BTreeMap::new(),
+                measures: BTreeMap::from([("late".to_string(), Some(value))]),
+            }];
+            let (right, by) = (Quantity::Number(right), by.map(Quantity::Number));
+            let check = Check { relation, right, by, ..check.clone() };
+            compare(&check, &Results { study: &study, runs }).unwrap().held == 1
+        };
+        use Relation::{Above, AtLeast, AtMost, Below};
+        assert_eq!(
+            [Below, Above, AtMost, AtLeast].map(|r| held(r, 2.0, 2.0, None)),
+            [false, false, true, true]
+        );
+        // Also against zero, where a fraction of the right number says nothing.
+        assert_eq!(
+            [Below, Above, AtMost, AtLeast].map(|r| held(r, 0.0, 0.0, None)),
+            [false, false, true, true]
+        );
+        assert!(held(Below, 0.4, 1.0, Some(0.5)) && !held(Below, 0.6, 1.0, Some(0.5)));
+        assert!(held(Above, 1.6, 1.0, Some(0.5)) && !held(Above, 1.4, 1.0, Some(0.5)));
     }
 
     #[test]

@@ -120,9 +120,13 @@ pub struct Check {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Relation {
-    /// The left number is below the right one, or equal to it.
+    /// The left number is below the right one.
     #[default]
     Below,
-    /// The left number is above the right one, or equal to it.
+    /// The left number is above the right one.
     Above,
+    /// The left number is below the right one, or equal to it.
+    AtMost,
+    /// The left number is above the right one, or equal to it.
+    AtLeast,
 }

@@ -40,6 +40,10 @@ struct Candidate {
     /// Parameters that the candidate does not have. They are left out if an experiment sets them.
     #[serde(default)]
     without: Vec<String>,
+    /// Measures of the candidate in all scenarios, in addition to those of the scenario.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    measures: Vec<Spanned<String>>,
 }
 
 /// An experiment in which all candidates are run, with what is computed for its runs.
@@ -103,7 +107,7 @@ impl Grid {
                     vary: None,
                     timed: scenario.timed,
                     within: scenario.within.clone(),
-                    measures: scenario.measures.clone(),
+                    measures: [&scenario.measures[..], &candidate.measures].concat(),
                     observe: experiment.observe.clone(),
                 });
             }

@@ -205,10 +205,22 @@ fn because(check: &Check, checked: &Checked) -> Markup {
         return html! { span.verdict { (checked.verdict().text()) } " " (check.label) ": there is no such number" };
     }
     let asked = match (check.relation, checked.by) {
-        (Relation::Below, None) => "not above".to_string(),
-        (Relation::Above, None) => "not below".to_string(),
-        (Relation::Below, Some(by)) => format!("at least {}\u{a0}% below", shown(100.0 * by)),
-        (Relation::Above, Some(by)) => format!("at least {}\u{a0}% above", shown(100.0 * by)),
+        (Relation::Below, None) => "below".to_string(),
+        (Relation::Above, None) => "above".to_string(),
+        (Relation::AtMost, None) => "not above".to_string(),
+        (Relation::AtLeast, None) => "not below".to_string(),
+        (Relation::Below | Relation::AtMost, Some(by)) if by < 0.0 => {
+            format!("at most {}\u{a0}% above", shown(-100.0 * by))
+        }
+        (Relation::Above | Relation::AtLeast, Some(by)) if by < 0.0 => {
+            format!("at most {}\u{a0}% below", shown(-100.0 * by))
+        }
+        (Relation::Below | Relation::AtMost, Some(by)) => {
+            format!("at least {}\u{a0}% below", shown(100.0 * by))
+        }
+        (Relation::Above | Relation::AtLeast, Some(by)) => {
+            format!("at least {}\u{a0}% above", shown(100.0 * by))
+        }
     };
     let mut count = if all > 1 { format!(", in {held} of {all} runs") } else { String::new() };
     let missing = all - checked.difference.0.len();

@@ -5,7 +5,7 @@ use super::definition::Study;
 use super::runs::Run;
 use crate::error::Error;
 use crate::measure::{Gauge, larger};
-use crate::metrics::{Meters, Metrics};
+use crate::metrics::{Meters, Metrics, Value as Metric};
 use cosim::check::check;
 use cosim::error::Error as Single;
 use cosim::experiment::{Experiment, Observe};
@@ -223,66 +223,106 @@ impl<'a> Preparation<'a> {
     ) -> Result<Outcome, Single> {
         let mut outcome = Outcome::default();
         for number in range {
-            let mut system = self.system(number, opened)?;
-            let mut series = Watch::new(&self.wanted.series, self, &mut system)?;
-            let mut bounds = Vec::new();
-            for (within, signals) in self.study.bounds_of(self.run) {
-                let signals = signals.iter().map(|signal| self.resolve(signal, &mut system));
-                let signals = signals.collect::<Result<_, _>>()?;
-                let bound = self.study.number(&within.bound)?;
-                bounds.push(Bounded {
-                    id: &within.id,
-                    signals,
-                    bound,
-                    inside: Compared::default(),
-                });
+            let mut flown = self.fly(number, opened, interrupt)?;
+            // Computing times are only meaningful if the run has the machine for itself, and what
+            // interrupts a run can only lengthen them.
+            for _ in 1..if self.is_timed(number) { REPETITIONS } else { 1 } {
+                let again = self.fly(number, opened, interrupt)?;
+                flown.keep_least_times(&again, &self.experiment.observe);
             }
-            let mut gauges = Vec::new();
-            for (measure, signals) in self.study.measures_of(self.run) {
-                let gauge = Gauge::new(measure, signals, &mut system);
-                gauges.push((measure.id.clone(), gauge.map_err(|message| self.fault(&message))?));
-            }
-            let mut meters = Meters::new(&mut system)?;
-            let mut master = system.start(interrupt)?;
-            if number == 0 {
-                outcome.parameters = system.parameters(&mut master)?;
-            }
-            // Computing times are only meaningful if the run has the machine for itself.
-            if self.run.timed && number == 0 {
-                master.measure_time();
-            }
-            let mut observers: Vec<&mut dyn Observer> = vec![&mut meters, &mut series];
-            observers.extend(bounds.iter_mut().map(|bound| bound as &mut dyn Observer));
-            observers.extend(gauges.iter_mut().map(|(_, gauge)| gauge as &mut dyn Observer));
-            master.run(&mut observers)?;
-
-            let value = self.run.vary.as_ref().map(|vary| vary.first + number.cast_signed());
-            let step_us =
-                master.step_seconds().map(|(name, seconds)| (name.into(), seconds * 1e6)).collect();
-            let metrics = Metrics { step_us, ..meters.metrics() };
-            let within =
-                bounds.into_iter().map(|bound| (bound.id.to_string(), bound.inside)).collect();
-            let measures = gauges.into_iter().map(|(id, gauge)| (id, gauge.value())).collect();
-            outcome.members.push(Member { value, metrics, within, measures });
-            for (signal, values) in &series.signals {
+            for (signal, values) in &flown.series.signals {
                 if self.wanted.spread.contains(signal) {
                     widen(&mut outcome.spread, signal, values);
                 }
             }
+            outcome.members.push(flown.member);
             if number == 0 {
-                outcome.series = Some(Series {
-                    time: series.time,
-                    signals: series.signals,
-                    units: series
-                        .resolved
-                        .iter()
-                        .map(|(s, r)| (s.clone(), r.unit.clone()))
-                        .collect(),
-                    samples: meters.samples(),
-                });
+                outcome.parameters = flown.parameters;
+                outcome.series = Some(flown.series);
             }
         }
         Ok(outcome)
+    }
+
+    fn is_timed(&self, number: u32) -> bool {
+        self.run.timed && number == 0
+    }
+
+    /// Runs one member.
+    fn fly(
+        &self,
+        number: u32,
+        opened: &mut Opened,
+        interrupt: &Interrupt,
+    ) -> Result<Flown, Single> {
+        let mut system = self.system(number, opened)?;
+        let mut series = Watch::new(&self.wanted.series, self, &mut system)?;
+        let mut bounds = Vec::new();
+        for (within, signals) in self.study.bounds_of(self.run) {
+            let signals = signals.iter().map(|signal| self.resolve(signal, &mut system));
+            let signals = signals.collect::<Result<_, _>>()?;
+            let bound = self.study.number(&within.bound)?;
+            bounds.push(Bounded { id: &within.id, signals, bound, inside: Compared::default() });
+        }
+        let mut gauges = Vec::new();
+        for (measure, signals) in self.study.measures_of(self.run) {
+            let gauge = Gauge::new(measure, signals, &mut system);
+            gauges.push((measure.id.clone(), gauge.map_err(|message| self.fault(&message))?));
+        }
+        let mut meters = Meters::new(&mut system)?;
+        let mut master = system.start(interrupt)?;
+        let parameters =
+            if number == 0 { system.parameters(&mut master)? } else { Parameters::default() };
+        if self.is_timed(number) {
+            master.measure_time();
+        }
+        let mut observers: Vec<&mut dyn Observer> = vec![&mut meters, &mut series];
+        observers.extend(bounds.iter_mut().map(|bound| bound as &mut dyn Observer));
+        observers.extend(gauges.iter_mut().map(|(_, gauge)| gauge as &mut dyn Observer));
+        master.run(&mut observers)?;
+
+        let value = self.run.vary.as_ref().map(|vary| vary.first + number.cast_signed());
+        let step_us =
+            master.step_seconds().map(|(name, seconds)| (name.into(), seconds * 1e6)).collect();
+        let metrics = Metrics { step_us, ..meters.metrics() };
+        let within = bounds.into_iter().map(|bound| (bound.id.to_string(), bound.inside)).collect();
+        let measures = gauges.into_iter().map(|(id, gauge)| (id, gauge.value())).collect();
+        let units = series.resolved.iter().map(|(s, r)| (s.clone(), r.unit.clone())).collect();
+        let series =
+            Series { time: series.time, signals: series.signals, units, samples: meters.samples() };
+        Ok(Flown { member: Member { value, metrics, within, measures }, series, parameters })
+    }
+}
+
+/// Number of times that a timed run is made; the least of each computing time counts.
+const REPETITIONS: u32 = 5;
+
+/// What one member gave.
+struct Flown {
+    member: Member,
+    series: Series,
+    parameters: Parameters,
+}
+
+impl Flown {
+    /// Keeps the smaller one of each computing time of two runs that are otherwise the same.
+    fn keep_least_times(&mut self, other: &Self, observe: &Observe) {
+        let (own, theirs) = (&mut self.member.metrics, &other.member.metrics);
+        for (name, value) in &mut own.asked {
+            let is_timing = observe.metrics.get(name).is_some_and(|measure| measure.timing);
+            if let (true, Some(Metric::Number(own)), Some(Some(Metric::Number(theirs)))) =
+                (is_timing, value, theirs.asked.get(name))
+            {
+                *own = own.min(*theirs);
+            }
+        }
+        for (name, own) in &mut own.step_us {
+            *own = theirs.step_us.get(name).map_or(*own, |theirs| own.min(*theirs));
+        }
+        for (name, own) in &mut self.series.samples {
+            let theirs = other.series.samples.get(name).into_iter().flatten();
+            own.iter_mut().zip(theirs).for_each(|(own, theirs)| *own = own.min(*theirs));
+        }
     }
 }
 
