@@ -2,9 +2,18 @@
 proofs and formulas that no unit computes. Angles are in rad, all other values in SI units.
 """
 
+import sys
+
 import numpy as np
 import pytest
+
+from conftest import ROOT
 from nlp import DEG, DISTURBANCE, INERTIA, MOMENT_LIMIT, RATE_LIMIT, printed_sets
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 H = 1e-6
 WU_INERTIA = {"x": 588791.0, "y": 1303212.0, "z": 1534164.0, "zx": 24242.0}
@@ -52,7 +61,7 @@ def test_published_eigenvalues_of_the_inverse_and_of_omega():
         np.testing.assert_allclose(np.linalg.eigvalsh(cross(rates).T @ cross(rates)), [0.0, size, size], atol=1e-15)
 
 
-def test_published_a1_is_diagonal_where_it_is_not():
+def test_oracle_a1_is_not_diagonal_as_printed():
     change = r_dot(0.3, 0.1, np.array([0.05, -0.04, 0.0]))
     product = change @ change.T
     aside = np.abs(product - np.diag(np.diag(product))).max()
@@ -278,3 +287,32 @@ def test_oracle_condition_46_makes_the_matrices_of_50_positive():
             kept += 1
             assert np.linalg.eigvalsh(gamma_1(*gains, m))[0] > 0.0
     assert kept > 300
+
+
+# The data files, number by number as the papers print them
+
+
+def data(path: str) -> dict:
+    return tomllib.loads((ROOT / path).read_text(encoding="utf-8"))
+
+
+def test_published_data_of_the_vehicles():
+    chai, wu, jia = (data(f"vehicle/data/{name}.toml") for name in ("crmpc-2022", "tvsmc-2015", "two-loop-smc"))
+    axes = ("Ixx", "Iyy", "Izz", "Ixz", "scale")
+    assert [chai["inertia"][axis] for axis in axes] == [588791.0, 1303212.0, 1534163.0, 24242.0, 1.05]
+    assert [wu["inertia"][axis] for axis in axes] == [588791.0, 1303212.0, 1534164.0, 24242.0, 1.05]
+    assert [jia["inertia"][axis] for axis in axes] == [554486.0, 1136949.0, 1376852.0, 23002.0, 1.0]
+    assert chai["initial"]["angles_deg"] == [7.5, 10.0, -30.0] and wu["initial"]["angles_deg"] == [32.0, 2.0, 58.0]
+    assert chai["initial"]["rates_deg_s"] == wu["initial"]["rates_deg_s"] == [0.0, 0.0, 0.0]
+    assert jia["disturbance"]["sine"]["wave"] == [{"frequency": 1.0, "amplitude": [1e5, 1e5, 1e5]}]
+
+
+def test_published_settings_of_the_controllers():
+    crmpc, dlmpc, wu = (data(f"control/data/{name}.toml") for name in ("crmpc-2022", "dlmpc-2022", "tvsmc-2015"))
+    assert crmpc["weights"] == {"p": [50.0] * 6, "q": [10.0] * 3}
+    assert crmpc["gains"]["feedback"] == crmpc["gains"]["terminal"] == {"k1": -5.0, "k2": -5.0}
+    assert crmpc["schedule"]["horizon"] * crmpc["schedule"]["period_optimisation"] == pytest.approx(20.0)
+    assert dlmpc["outer"]["horizon"] * dlmpc["outer"]["period"] == pytest.approx(20.0)
+    assert (dlmpc["outer"]["period"], dlmpc["inner"]["period"]) == (0.2, 0.04)
+    assert dlmpc["inner"]["published"] == {"q": 5.0, "p": 5.0, "gamma": 0.15, "rho": 0.7}
+    assert wu["period"] == 0.01
