@@ -56,9 +56,9 @@ HEAD = """\
 This page has a row for each numbered equation, assumption, definition, lemma, theorem, remark,
 figure and table of the three papers, and for each claim of their text. A row names the place, says
 in our words what stands there, in which setup it was judged, with which verdict, and which test or
-run shows it. [results.md](results.md) has the measured results as a report, and
-[errata.md](errata.md) the misprints. Papers and symbols: [errata.md](errata.md),
-[symbols.md](symbols.md).
+run shows it; an item that was judged in several setups has several rows. [results.md](results.md)
+has the measured results as a report, [errata.md](errata.md) the misprints and the full references,
+[symbols.md](symbols.md) the symbols.
 
 Setups: *closed form* is a test against a formula, differences or another solver. *Ideal
 measurement* and *sensors and estimator* are the scenario of Chai 2022. *Direct moments* act as
