@@ -1,0 +1,182 @@
+"""Writes docs/claims.md from docs/claims/*.toml: claims.py [--check]
+
+Each file holds one paper: `paper`, its `study`, how much is `printed` of what is numbered, and sections
+of items. An item has
+
+    place     where the paper has it, in its own numbering
+    says      what it says
+    setup     in what it was judged; none where nothing was run
+    verdict   one of VERDICTS
+    number    a value that belongs to the verdict
+    shown     names of the tests that show it
+    study     figures (by id), tables (by title) and claims (by their words) of the study that show it
+    page      pages that say more
+    reason    why it is not judged, does not hold, or holds in part
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections import Counter
+from pathlib import Path
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+ROOT = Path(__file__).resolve().parent.parent
+DATA = ROOT / "docs" / "claims"
+PAGE = ROOT / "docs" / "claims.md"
+STUDIES = ROOT / "orchestrator" / "experiments"
+PAPERS = ["chai-2022", "wu-2015", "jia"]
+
+VERDICTS = {
+    "holds": "the test or run shows it",
+    "holds in part": "it holds under a condition that the row names",
+    "does not hold": "the test or run shows the contrary",
+    "reproduced": "the printed numbers come out again",
+    "redrawn": "the run draws the figure; the paper's own curves were not at hand, so nothing was compared digit by digit",
+    "implemented": "the code computes it, or has the value, as printed",
+    "implemented, corrected": "the code computes it otherwise than printed; [errata.md](errata.md) has the details of what the code uses",
+    "background": "a definition, a step or a remark of which nothing is computed",
+    "not judged": "nothing shows it; the row says why",
+}
+NEED_REASON = {"holds in part", "does not hold", "not judged"}
+NEED_NO_EVIDENCE = {"background", "not judged"}
+KINDS = ["equation", "statement", "figure", "table", "claim"]
+KEYS = {"place", "says", "setup", "verdict", "number", "shown", "study", "page", "reason"}
+
+HEAD = """\
+# Every item of the papers, and what became of it
+
+<!-- Written by scripts/claims.py from docs/claims: change that, not this page. -->
+
+This page has a row for each numbered equation, assumption, definition, lemma, theorem, remark,
+figure and table of the three papers, and for each claim of their text. A row names the place, says
+in our words what stands there, in which setup it was judged, with which verdict, and which test or
+run shows it; an item that was judged in several setups has several rows. [results.md](results.md)
+has the measured results as a report, [errata.md](errata.md) the misprints and the full references,
+[symbols.md](symbols.md) the symbols.
+
+Setups: *closed form* is a test against a formula, differences or another solver. *Ideal
+measurement* and *sensors and estimator* are the scenario of Chai 2022. *Direct moments* act as
+commanded; with *surfaces, jets* they go through the allocation, *all biases* being an inertia of
++ 5 %, and air and surfaces 10 % weaker, unless the row says more. Numbers are those of the tests'
+bounds, of [results.md](results.md) or of [errata.md](errata.md).
+"""
+
+
+def papers() -> dict[str, dict]:
+    """The data of all papers by the names of their files."""
+    return {name: tomllib.loads((DATA / f"{name}.toml").read_text(encoding="utf-8")) for name in PAPERS}
+
+
+def items(paper: dict) -> list[dict]:
+    return [item for section in paper["section"] for item in section["item"]]
+
+
+def kind(place: str) -> str:
+    """What an item is by its place: what the paper numbers, or a claim of its text."""
+    if re.fullmatch(r"\(\d+[a-z]?\)", place):
+        return "equation"
+    if re.fullmatch(r"(Assumption|Definition|Lemma|Remark|Theorem) \d+", place):
+        return "statement"
+    return "figure" if re.fullmatch(r"Fig\. \d+", place) else "table" if place.startswith("Table ") else "claim"
+
+
+def spelled_out(entry: dict) -> list[dict]:
+    """An entry of a study, once for each line of its `each`."""
+    lines = entry.get("each", [{}])
+    assert isinstance(lines, list), f"{entry.get('id')}: lists by name are not spelled out here"
+    filled = lambda text, line: re.sub(r"\{(\w+)\}", lambda key: str(line.get(key[1], key[0])), text)
+    return [{key: filled(text, line) for key, text in entry.items() if isinstance(text, str)} for line in lines]
+
+
+def study(name: str) -> dict[str, list[str]]:
+    """What items can refer to: ids of the figures, titles of the tables and words of the claims."""
+    text = tomllib.loads((STUDIES / name / "study.toml").read_text(encoding="utf-8"))
+    return {
+        "figure": [one["id"] for figure in text["figure"] for one in spelled_out(figure)],
+        "table": [table["title"] for table in text.get("table", [])],
+        "claim": [claim["says"] for claim in text["claim"]],
+    }
+
+
+def matches(reference: str, found: dict[str, list[str]]) -> list[tuple[str, str]]:
+    """The entries of a study that a reference means: a figure's id, or how a title or claim begins."""
+    exact = [("figure", name) for name in found["figure"] if name == reference]
+    begins = [(what, name) for what in ("table", "claim") for name in found[what] if name.startswith(reference)]
+    return exact + begins
+
+
+def cell(text: str) -> str:
+    return text.replace("|", r"\|") or "–"
+
+
+def evidence(item: dict, name: str, found: dict[str, list[str]]) -> str:
+    parts = [f"`{test}`" for test in item.get("shown", [])]
+    entries = []
+    for reference in item.get("study", []):
+        what, entry = matches(reference, found)[0]
+        entries.append({"figure": f"figure `{entry}`", "table": f"table “{entry}”", "claim": f"“{entry}”"}[what])
+    if entries:
+        parts.append(f"[{name}](../orchestrator/experiments/{name}/study.toml): {'; '.join(entries)}")
+    parts += [f"[{page.split('#')[0]}]({page})" for page in item.get("page", [])]
+    return ", ".join(parts)
+
+
+def verdict(item: dict) -> str:
+    return f"**{item['verdict']}**" + (f": {item['reason']}" if "reason" in item else "")
+
+
+def table(header: list[str], rows: list[list[str]]) -> list[str]:
+    lines = [header, ["---"] * len(header), *rows]
+    return ["| " + " | ".join(line) + " |" for line in lines]
+
+
+def page() -> str:
+    data = papers()
+    lines = [HEAD.rstrip(), ""]
+    lines += table(["verdict", "meaning"], [[f"**{name}**", meaning] for name, meaning in VERDICTS.items()])
+    lines += ["", "## How many", ""]
+    for heading, names, of in [("verdict", list(VERDICTS), lambda item: item["verdict"]), ("kind", KINDS, lambda item: kind(item["place"]))]:
+        counts = {key: Counter(of(item) for item in items(paper)) for key, paper in data.items()}
+        rows = [[name, *(str(counts[key][name]) for key in data), str(sum(counts[key][name] for key in data))] for name in names]
+        totals = [sum(counts[key].values()) for key in data]
+        rows.append(["all", *map(str, totals), str(sum(totals))])
+        lines += [*table([heading, *(paper["paper"] for paper in data.values()), "all"], rows), ""]
+    for paper in data.values():
+        found = study(paper["study"])
+        lines += [f"## {paper['paper']}", ""]
+        for section in paper["section"]:
+            lines += [f"### {section['title']}", ""]
+            rows = [
+                [
+                    cell(item["place"]),
+                    cell(item["says"]),
+                    cell(item.get("setup", "")),
+                    cell(verdict(item)),
+                    cell(item.get("number", "")),
+                    cell(evidence(item, paper["study"], found)),
+                ]
+                for item in section["item"]
+            ]
+            lines += [*table(["place", "says", "setup", "verdict", "number", "shown by"], rows), ""]
+    return "\n".join(lines)
+
+
+def main() -> int:
+    written = page()
+    if "--check" in sys.argv[1:]:
+        if PAGE.read_text(encoding="utf-8") == written:
+            return 0
+        print("docs/claims.md is out of date: run scripts/claims.py", file=sys.stderr)
+        return 1
+    PAGE.write_text(written, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

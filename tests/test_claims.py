@@ -1,0 +1,97 @@
+"""docs/claims.md has a row for every item of the papers, and each verdict names a test or run that
+exists."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+
+import named
+from conftest import ROOT
+
+sys.path.append(str(ROOT / "scripts"))
+import claims
+
+PAPERS = claims.papers()
+ITEMS = [(name, item) for name, paper in PAPERS.items() for item in claims.items(paper)]
+STUDIES = {name: claims.study(paper["study"]) for name, paper in PAPERS.items()}
+
+
+def label(pair) -> str:
+    name, item = pair
+    return f"{name} {item['place']}"
+
+
+def places(paper: dict, kind: str) -> set[str]:
+    return {item["place"] for item in claims.items(paper) if claims.kind(item["place"]) == kind}
+
+
+def numbers(paper: dict, kind: str) -> set[int]:
+    return {int(re.search(r"\d+", place)[0]) for place in places(paper, kind)}
+
+
+def test_the_page_is_up_to_date():
+    command = [sys.executable, ROOT / "scripts" / "claims.py", "--check"]
+    checked = subprocess.run(command, capture_output=True, text=True)
+    assert checked.returncode == 0, checked.stderr
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_everything_that_a_paper_numbers_has_a_row(name):
+    paper = PAPERS[name]
+    printed = paper["printed"]
+    assert numbers(paper, "equation") == set(range(1, printed["equations"] + 1))
+    assert numbers(paper, "figure") == set(range(1, printed["figures"] + 1))
+    assert places(paper, "table") == set(printed["tables"])
+    assert places(paper, "statement") == set(printed["statements"])
+
+
+def test_there_are_as_many_items_as_were_counted():
+    # A row that goes missing shows here. Numbers are those of the papers as printed.
+    counted = {"chai-2022": (32, 7, 1, 13), "wu-2015": (66, 11, 2, 12), "jia": (11, 10, 0, 0)}
+    for name, paper in PAPERS.items():
+        printed = paper["printed"]
+        assert (printed["equations"], printed["figures"], len(printed["tables"]), len(printed["statements"])) == counted[name]
+    least = {"chai-2022": 143, "wu-2015": 136, "jia": 41}
+    assert all(len(claims.items(paper)) >= least[name] for name, paper in PAPERS.items())
+
+
+@pytest.mark.parametrize(("name", "item"), ITEMS, ids=map(label, ITEMS))
+def test_an_item_is_complete_and_what_shows_it_exists(name, item):
+    assert item.keys() <= claims.KEYS and {"place", "says", "verdict"} <= item.keys()
+    assert item["verdict"] in claims.VERDICTS
+    assert ("reason" in item) == (item["verdict"] in claims.NEED_REASON)
+    assert item["verdict"] in claims.NEED_NO_EVIDENCE or item.get("shown") or item.get("study"), "nothing shows it"
+    for test in item.get("shown", []):
+        assert named.exists(test), f"there is no test {test}"
+    for reference in item.get("study", []):
+        assert len(claims.matches(reference, STUDIES[name])) == 1, reference
+    for page in item.get("page", []):
+        file, _, heading = page.partition("#")
+        text = (ROOT / "docs" / file).read_text(encoding="utf-8")
+        headings = [re.sub(r"[^\w\- ]", "", line.lstrip("# ").lower()).replace(" ", "-") for line in text.splitlines() if line.startswith("#")]
+        assert not heading or heading in headings, page
+
+
+def test_no_item_is_there_twice():
+    seen = [(name, item["place"], item["says"], item.get("setup")) for name, item in ITEMS]
+    assert len(set(seen)) == len(seen)
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_every_claim_and_figure_of_a_study_belongs_to_an_item(name):
+    found = STUDIES[name]
+    referred = {match for item in claims.items(PAPERS[name]) for reference in item.get("study", []) for match in claims.matches(reference, found)}
+    missing = [says for says in found["claim"] if ("claim", says) not in referred]
+    missing += [figure for figure in found["figure"] if figure.startswith("fig-") and ("figure", figure) not in referred]
+    assert not missing
+
+
+def test_every_correction_of_an_equation_is_among_the_errata():
+    errata = (ROOT / "docs" / "errata.md").read_text(encoding="utf-8").split("\n## ")
+    by_study = {re.search(r"\(([\w-]+)\)\n", part)[1]: part for part in errata[1:]}
+    for name, item in ITEMS:
+        if item["verdict"] == "implemented, corrected" and claims.kind(item["place"]) == "equation":
+            number = re.search(r"\d+", item["place"])[0]
+            assert re.search(rf"\({number}[ab]?\)", by_study[PAPERS[name]["study"]]), (name, item["place"])
