@@ -76,10 +76,14 @@ impl FiniteTimeLayer {
         self.slope(&Vector3::from(self.epsilon)).max()
     }
 
+    /// Returns f = 2^(−(b+1)/2) of one axis (from 0) at the edge |s| = ε of the layer.
+    pub(crate) fn edge_factor(&self, axis: usize) -> f64 {
+        exp2(-(self.b[axis] + 1.0) / 2.0)
+    }
+
     /// Returns ρ 2^(−(b+1)/2), s/ε and b of one axis.
     fn scaled(&self, i: usize, s: f64) -> (f64, f64, f64) {
-        let b = self.b[i];
-        (self.rho[i] * exp2(-(b + 1.0) / 2.0), s / self.epsilon[i], b)
+        (self.rho[i] * self.edge_factor(i), s / self.epsilon[i], self.b[i])
     }
 }
 
