@@ -135,9 +135,9 @@ impl TwoLoopSettings {
         self.body.inverse.abs() * Vector3::from(self.disturbance)
     }
 
-    /// Returns the gains that ρ_n must exceed, 2^((b+1)/2) |I⁻¹ M_d|, rad/s². With them the reaching
-    /// law is as strong as the disturbance at the edge |s_n| = ε of its layer, so that s_n does not
-    /// leave it.
+    /// Returns the gains that ρ_n must exceed, 2^((b+1)/2) |I⁻¹ M_d|, rad/s². With them the
+    /// reaching law is as strong as the disturbance at the edge |s_n| = ε of its layer, so that
+    /// s_n does not leave it.
     pub fn needed_reaching(&self) -> Vector3<f64> {
         let acceleration = self.disturbance_acceleration();
         Vector3::from_fn(|i, _| acceleration[i] / self.inner.layer.edge_factor(i))

@@ -12,7 +12,8 @@ pub fn saturated(s: f64, h: f64) -> f64 {
     (s / h).clamp(-1.0, 1.0)
 }
 
-/// The reaching law ṡ = −η sat(s) of Wu 2015, (34) and (35).
+/// The reaching law ṡ = −η sat(s) of Wu 2015, (34) and (35). The finite time that (42) promises
+/// holds up to the layer only; within, s decays as exp(−η t/h).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoundaryLayer {
