@@ -1,6 +1,6 @@
 //! The theory of Wu 2015 in numbers: its lemmas and theorems with the implemented laws put into
 //! them, and the misprints that show where its bounds do not hold. A bound on a random draw is at
-//! most twice the largest value of a thousand draws.
+//! most twice the largest value of ten thousand draws.
 
 use control::sliding::{
     BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, Settings, Surface,
@@ -129,10 +129,10 @@ proptest! {
         };
         let anchor = surface.anchor(0.0, &at(0.0));
         let size = (e0.abs() + rate0.abs()) / (c - lambda).abs();
-        prop_assert!((at(0.0).angles.x - e0).abs() < 2e-15 * size);
-        prop_assert!(surface.sliding(&anchor, t, &at(t)).amax() < 3e-15 * size);
+        prop_assert!((at(0.0).angles.x - e0).abs() < 3e-15 * size);
+        prop_assert!(surface.sliding(&anchor, t, &at(t)).amax() < 8e-15 * size);
         let b = surface.equivalent(&anchor, t, &at(t), &Vector3::zeros());
-        prop_assert!((b - error(t)[2]).amax() < 2e-14 * size);
+        prop_assert!((b - error(t)[2]).amax() < 5e-14 * size);
     }
 
     #[test]
@@ -373,7 +373,7 @@ fn exponent_53(m: f64) -> f64 {
 /// Gains that condition (46) may or may not accept, one for each axis.
 fn any_gains() -> impl Strategy<Value = SecondOrder> {
     let gain = || proptest::array::uniform3(0.05..0.6);
-    (gain(), proptest::array::uniform3(0.05..0.3), gain(), gain(), 2.1..6.0)
+    (gain(), proptest::array::uniform3(0.01..0.3), gain(), gain(), 2.1..6.0)
         .prop_map(|(k1, k2, k3, k4, m)| SecondOrder { k1, k2, k3, k4, m })
 }
 
@@ -395,7 +395,7 @@ proptest! {
             let gamma = Axis { law, axis }.gamma_1();
             let expected = (law.k1[axis] / law.m).powi(3) * (law.m - 1.0) * law.condition_46(axis);
             let scale = gamma.norm().powi(3);
-            prop_assert!((gamma.determinant() - expected).abs() < 1.8e-16 * scale);
+            prop_assert!((gamma.determinant() - expected).abs() < 2e-16 * scale);
             // Its other two minors are positive, so (46) decides whether Γ₁ is positive definite.
             prop_assert_eq!(gamma.cholesky().is_some(), law.condition_46(axis) > 0.0);
         }
@@ -407,7 +407,7 @@ proptest! {
             let of = Axis { law, axis };
             let (xi, eigenvalues) = (of.xi(s, tau), of.lambda().symmetric_eigenvalues());
             let v2 = of.v2(s, tau);
-            prop_assert!((xi.dot(&(of.lambda() * xi)) / v2 - 1.0).abs() < 1.3e-15);
+            prop_assert!((xi.dot(&(of.lambda() * xi)) / v2 - 1.0).abs() < 1.5e-15);
             prop_assert!(eigenvalues.min() > 0.0);
             prop_assert!(v2 >= eigenvalues.min() * xi.norm_squared() * (1.0 - 1e-13));
             prop_assert!(v2 <= eigenvalues.max() * xi.norm_squared() * (1.0 + 1e-13));
@@ -419,21 +419,26 @@ proptest! {
         for (axis, (s, tau)) in states.into_iter().enumerate() {
             let of = Axis { law, axis };
             let (found, right, printed) = (of.v2_rate(s, tau), of.by_49(s, tau, -1.0), of.by_49(s, tau, 1.0));
-            prop_assert!((found - right).abs() < 5e-9 * right.abs(), "{found} {right}");
+            prop_assert!((found - right).abs() < 2e-8 * right.abs(), "{found} {right}");
             let xi = of.xi(s, tau);
             prop_assert!(printed - found > 1.999 * xi.dot(&(of.gamma_2() * xi)));
         }
     }
 
     #[test]
-    fn oracle_v2_decreases_as_54_says_with_the_least_chi(law in gains(), states in states()) {
+    fn oracle_v2_decreases_as_54_says_with_the_least_chi(
+        law in gains(),
+        states in states(),
+        off in prop_oneof![Just(vec![0]), Just(vec![1, 2]), Just(vec![0, 1, 2])],
+    ) {
         let axes = [0, 1, 2].map(|axis| Axis { law, axis });
         let chi = [0, 1, 2].map(|i| axes[i].chi());
         let least = |of: fn(&(f64, f64)) -> f64| chi.iter().map(of).fold(f64::INFINITY, f64::min);
         let (chi_1, chi_2) = (least(|chi| chi.0), least(|chi| chi.1));
         prop_assert!(chi_1 > 0.0 && chi_2 > 0.0);
+        // The other axes are at rest.
         let sum = |of: &dyn Fn(&Axis, f64, f64) -> f64| -> f64 {
-            axes.iter().zip(states).map(|(axis, (s, tau))| of(axis, s, tau)).sum()
+            off.iter().map(|&i: &usize| of(&axes[i], states[i].0, states[i].1)).sum()
         };
         let (v2, rate) = (sum(&Axis::v2), sum(&Axis::v2_rate));
         // (55), for which Lemma 9 puts the power of the sum in place of the sum of powers.
@@ -507,15 +512,17 @@ proptest! {
         // If s and its noise ε are stretched by κ³ and time by κ, the estimates are stretched by
         // κ³, κ² and κ, that is by ε, ε^(2/3) and ε^(1/3). What holds for one noise with
         // constants μ therefore holds for every noise, and the same if all is scaled, L included.
+        // Differences are of 1e-15, but the square root in (24) can make 1e-9 of a rounding error
+        // near its zero. A power that is wrong by 0.003 shows at 1e-6.
         let (plain, stretched) = (estimates(1.0, 1.0, &noise), estimates(stretch, size, &noise));
         for (plain, stretched) in plain.iter().zip(&stretched) {
-            for (plain, stretched, power, rounding) in [
-                (plain.sliding, stretched.sliding, 3, 1.4e-17),
-                (plain.disturbance, stretched.disturbance, 2, 4e-16),
-                (plain.disturbance_rate, stretched.disturbance_rate, 1, 7e-17),
+            for (plain, stretched, power) in [
+                (plain.sliding, stretched.sliding, 3),
+                (plain.disturbance, stretched.disturbance, 2),
+                (plain.disturbance_rate, stretched.disturbance_rate, 1),
             ] {
                 let back = stretched.x / (size * stretch.powi(power));
-                prop_assert!((back - plain.x).abs() < rounding, "{back} {}", plain.x);
+                prop_assert!((back - plain.x).abs() < 1e-9, "{back} {}", plain.x);
             }
         }
     }
