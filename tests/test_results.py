@@ -77,8 +77,11 @@ def test_all_members_must_agree_to_the_digit():
 
 
 def test_with_fewer_members_only_what_must_be_so_is_compared():
-    mean = hole([1.0, 2.0], 20, digits=1)
-    assert mean.agrees("1.6") and not mean.agrees("1.7") and not mean.agrees("1.3")
+    mean = hole([1.0, 2.0], 20, digits=2)
+    assert mean.agrees("1.60") and not mean.agrees("1.68") and not mean.agrees("1.35")
+    # 34.7 % rounds to 35 %, and may be 32 % or 38 % over more members.
+    share = hole([0.347, 0.347], 20, percent=True)
+    assert share.agrees("32 %") and share.agrees("38 %") and not share.agrees("30 %")
     largest = hole([1.0, 2.0], 20, digits=1, over="largest")
     assert largest.agrees("9.9") and not largest.agrees("1.9")
     least = hole([1.0, 2.0], 20, digits=1, over="least")
@@ -93,9 +96,15 @@ def test_times_must_agree_within_a_factor_of_ten():
 
 
 def test_verdicts_count_the_checks_that_hold():
-    check = lambda held, of=1: {"held": held, "of": of}
-    assert pages.verdict({"verdict": "holds-partly", "checks": [check(1), check(0)]}).text == "in part (1 of 2 checks)"
-    assert pages.verdict({"verdict": "does-not-hold", "checks": [check(0)]}).differences("holds") == ["'holds', the runs give 'does not hold'"]
+    check = lambda held: {"held": held, "of": 1}
+    partly = {"verdict": "holds-partly", "checks": [check(1), check(0)]}
+    whole, fewer = study({"lqr": [{}]}, {}), study({"lqr": [{}]}, {"lqr": 20})
+    assert pages.Verdict(whole, partly).text == "in part (1 of 2 checks)"
+    assert pages.Verdict(whole, partly).differences("in part (2 of 2 checks)")
+    assert not pages.Verdict(fewer, partly).differences("in part (2 of 2 checks)")
+    said = pages.Verdict(fewer, partly).differences("holds")
+    assert said == ["'holds', the runs give 'in part (1 of 2 checks)'"]
+    assert not pages.Verdict(whole, partly, time=True).differences("holds")
 
 
 def test_a_page_is_not_written_from_fewer_members():
