@@ -194,16 +194,20 @@ pub enum DesignError {
         /// Left-hand side of the condition.
         value: f64,
     },
-    /// The reaching law of Jia et al. is weaker than the disturbance.
+    /// The reaching law of Jia et al. is weaker than the disturbance at the edge of its layer.
     #[error(
-        "`inner.layer.rho`[{index}] = {rho} must exceed |I⁻¹ M_d| = {needed:.4} rad/s²; raise it or lower `disturbance`"
+        "`inner.layer.rho`[{index}] = {rho} must exceed {needed:.4} rad/s², which is 2^((b+1)/2) |I⁻¹ M_d| with b = {b} and |I⁻¹ M_d| = {acceleration:.4} rad/s²; raise it, or lower `inner.layer.b` or `disturbance`"
     )]
     WeakReaching {
         /// Axis, from 1: roll, pitch, yaw.
         index: usize,
         /// Gain ρ_n of the reaching law, rad/s².
         rho: f64,
-        /// Acceleration that ρ_n must exceed, rad/s².
+        /// Power b of the finite-time factor.
+        b: f64,
+        /// Bound on the acceleration by the disturbance, rad/s².
+        acceleration: f64,
+        /// Value that ρ_n must exceed, rad/s².
         needed: f64,
     },
     /// The solver refuses the problem.

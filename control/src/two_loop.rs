@@ -135,6 +135,14 @@ impl TwoLoopSettings {
         self.body.inverse.abs() * Vector3::from(self.disturbance)
     }
 
+    /// Returns the gains that ρ_n must exceed, 2^((b+1)/2) |I⁻¹ M_d|, rad/s². With them the
+    /// reaching law is as strong as the disturbance at the edge |s_n| = ε of its layer, so that
+    /// s_n does not leave it.
+    pub fn needed_reaching(&self) -> Vector3<f64> {
+        let acceleration = self.disturbance_acceleration();
+        Vector3::from_fn(|i, _| acceleration[i] / self.inner.layer.edge_factor(i))
+    }
+
     fn check(&self) -> Result<(), DesignError> {
         let Self { period, filter, outer, inner, disturbance, threshold, .. } = self;
         all_positive("period", &[*period])?;
@@ -157,10 +165,17 @@ impl TwoLoopSettings {
         outer.check(names, *period)?;
         let names = ["inner.k", "inner.layer.rho", "inner.layer.epsilon", "inner.layer.b"];
         inner.check(names, *period)?;
-        let acceleration = self.disturbance_acceleration();
-        for (axis, (&rho, &needed)) in inner.layer.rho.iter().zip(&acceleration).enumerate() {
-            if rho <= needed {
-                return Err(DesignError::WeakReaching { index: axis + 1, rho, needed });
+        let (acceleration, needed) = (self.disturbance_acceleration(), self.needed_reaching());
+        for axis in 0..3 {
+            let FiniteTimeLayer { rho, b, .. } = inner.layer;
+            if rho[axis] <= needed[axis] {
+                return Err(DesignError::WeakReaching {
+                    index: axis + 1,
+                    rho: rho[axis],
+                    b: b[axis],
+                    acceleration: acceleration[axis],
+                    needed: needed[axis],
+                });
             }
         }
         Ok(())
@@ -288,7 +303,7 @@ impl TwoLoopSmc {
     /// Checks the settings of the controller.
     ///
     /// # Errors
-    /// Returns an error that names the setting at fault, including ρ_n ≤ |I⁻¹ M_d|.
+    /// Returns an error that names the setting at fault, including ρ_n ≤ 2^((b+1)/2) |I⁻¹ M_d|.
     pub fn new(settings: TwoLoopSettings) -> Result<Self, DesignError> {
         settings.check()?;
         Ok(Self { settings })

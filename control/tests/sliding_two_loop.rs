@@ -25,6 +25,8 @@ struct Outcome {
     moments: Vector3<f64>,
     /// Largest component of the outer and of the inner integral.
     integrals: (f64, f64),
+    /// Largest |s_n|/ε of any axis.
+    inner_sliding: f64,
 }
 
 fn run(
@@ -41,8 +43,14 @@ fn run(
     let mut plant = Plant::new(&scenario.config(period), 0.0).unwrap();
     let reference = |time: f64| scenario.reference.at(time);
     let moments = Vector3::zeros();
-    let mut outcome =
-        Outcome { rest: 0.0, settling: 0.0, moment: 0.0, moments, integrals: (0.0, 0.0) };
+    let mut outcome = Outcome {
+        rest: 0.0,
+        settling: 0.0,
+        moment: 0.0,
+        moments,
+        integrals: (0.0, 0.0),
+        inner_sliding: 0.0,
+    };
     let mut achieved_moment = None;
     for tick in 0..(scenario.duration / period).round() as u64 {
         let time = tick as f64 * period;
@@ -67,6 +75,9 @@ fn run(
         let (outer, inner) = &mut outcome.integrals;
         *outer = outer.max(memory.inner.outer_integral.amax());
         *inner = inner.max(memory.inner.inner_integral.amax());
+        let epsilon = Vector3::from(settings.inner.layer.epsilon);
+        let inner_sliding = memory.inner.inner_sliding.component_div(&epsilon).amax();
+        outcome.inner_sliding = outcome.inner_sliding.max(inner_sliding);
         plant.advance(time, (tick + 1) as f64 * period, moment).unwrap();
     }
     outcome
@@ -270,14 +281,47 @@ fn published_disturbance_needs_this_much_reaching() {
     assert!((needed - Vector3::new(0.183, 0.088, 0.076)).amax() < 6e-4, "{needed}");
 }
 
+/// Returns our settings with ρ_n at `share` of the least gain that is accepted.
+fn reaching_at(share: f64) -> TwoLoopSettings {
+    let mut settings = TwoLoopSettings::ours();
+    settings.inner.layer.rho = (settings.needed_reaching() * share).into();
+    settings
+}
+
+#[test]
+fn oracle_least_reaching_gain_balances_the_disturbance_at_the_edge_of_the_layer() {
+    let settings = reaching_at(1.0);
+    let layer = settings.inner.layer;
+    let edge = layer.value(&Vector3::from(layer.epsilon));
+    assert!((edge - settings.disturbance_acceleration()).amax() < 1e-15, "{edge}");
+    assert!(TwoLoopSmc::new(reaching_at(1.0 - 1e-12)).is_err());
+    assert!(TwoLoopSmc::new(reaching_at(1.0 + 1e-12)).is_ok());
+}
+
+#[test]
+fn the_inner_sliding_variable_stays_in_its_layer_from_the_least_accepted_gain_on() {
+    let above = direct(&reaching_at(1.001));
+    assert!(above.inner_sliding <= 1.0, "{above:?}");
+    assert!(above.inner_sliding > 0.99, "the gain is the least that does: {above:?}");
+    // A gain of 0.25 rad/s² exceeds the acceleration of the disturbance, 0.183 rad/s², but not its
+    // 1.68-fold. It is accepted if the controller is told of 81 % of the disturbance only.
+    let mut weak = TwoLoopSettings::ours();
+    weak.inner.layer.rho = [0.25; 3];
+    assert!(TwoLoopSmc::new(weak).is_err());
+    weak.disturbance = weak.disturbance.map(|moment| 0.81 * moment);
+    let below = direct(&weak);
+    assert!((below.inner_sliding - 1.43).abs() < 0.01, "{below:?}");
+}
+
 #[test]
 fn settings_that_cannot_work_are_refused_by_name() {
     let ours = TwoLoopSettings::ours();
     let refusal = |settings: TwoLoopSettings| TwoLoopSmc::new(settings).unwrap_err().to_string();
     let mut weak = ours;
-    weak.inner.layer.rho[0] = 0.18;
+    weak.inner.layer.rho[0] = 0.3;
     let text = refusal(weak);
-    assert!(text.contains("`inner.layer.rho`[1] = 0.18") && text.contains("0.183"), "{text}");
+    assert!(text.contains("`inner.layer.rho`[1] = 0.3 must exceed 0.3086"), "{text}");
+    assert!(text.contains("|I⁻¹ M_d| = 0.1835"), "{text}");
     let mut flat = ours;
     flat.outer.layer.b[1] = 1.0;
     let text = refusal(flat);

@@ -5,7 +5,7 @@ A nonlinear programme (CasADi, IPOPT) over the exact double integrator of the an
 the acceleration a of the angles, held for a given time. The objective is EMS itself, summed at the
 communication points t_k = 0.04 k before each step as in metrics.json (docs/symbols.md). The
 constraints are imposed where an input begins to be held, and nowhere between. IPOPT finds a local
-optimum. Nothing here comes from the project's code except the raw data in nlp.py. Angles are in
+optimum; a convex relaxation bounds what any motion can reach from below. Nothing here comes from the project's code except the raw data in nlp.py. Angles are in
 rad, all other values in SI units, EMS in deg.
 """
 
@@ -55,15 +55,54 @@ def outer_bounds() -> tuple[float, float]:
     return r0 * nlp.RATE_LIMIT, r0 * nlp.MOMENT_LIMIT / np.linalg.eigvalsh(nlp.INERTIA)[0]
 
 
-def constrained(sets: str) -> ca.Function:
+# Largest |beta| of the motions that the relaxation bounds: that behind the paper's r-bar0.
+SIDESLIP = 10.0 * nlp.DEG
+
+
+def drift_bound(rate_bound: float) -> float:
+    """A bound on the norm of F = R-dot omega - R I^-1 (omega x I omega) for |x_omega| <= rate_bound
+    and |beta| <= SIDESLIP.
+
+    |omega| <= |x_omega|, as |R^-1| = 1. R-dot omega is R_alpha omega alpha-dot + R_beta omega
+    beta-dot, and (alpha-dot, beta-dot) is no longer than x_omega.
+    """
+    tan, cos, sin = np.tan(SIDESLIP), np.cos(SIDESLIP), np.sin(SIDESLIP)
+    by_alpha = max(1.0, np.hypot(tan, cos))
+    by_beta = np.linalg.norm([[-1.0 / cos**2, 0.0], [sin, -cos]], 2)
+    # The gyroscopic acceleration of a unit rate: its largest value over a fine grid of directions,
+    # with 1 % for what lies between.
+    theta, phi = np.meshgrid(np.linspace(0.0, np.pi, 721), np.linspace(0.0, np.pi, 721))
+    unit = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]).reshape(3, -1)
+    turned = np.linalg.solve(nlp.INERTIA, np.cross(unit, nlp.INERTIA @ unit, axis=0))
+    gyroscopic = 1.01 * np.linalg.norm(turned, axis=0).max()
+    return rate_bound**2 * (np.hypot(by_alpha, by_beta) + gyroscopic / cos)
+
+
+def relaxed_bounds(sets: str) -> tuple[float, float]:
+    """Bounds on the norms of x_omega and of the acceleration a = u + F that every motion within the
+    sets keeps while |beta| <= SIDESLIP. With them the problem is convex, so that its optimum is a
+    lower bound on the EMS of all these motions."""
+    constants = nlp.printed_sets()
+    secant = 1.0 / np.cos(SIDESLIP)
+    limits = secant * nlp.RATE_LIMIT, secant * nlp.MOMENT_LIMIT / np.linalg.eigvalsh(nlp.INERTIA)[0]
+    rate, action = {"printed": outer_bounds(), "paper": (constants.x_tube, constants.u_tube), "limits": limits}[sets]
+    return rate, action + drift_bound(rate)
+
+
+def constrained(sets: str, relaxed: bool = False) -> ca.Function:
     """The function (state, a) -> squared norms of the rate and of the input, each over its squared
     bound.
 
     `printed` puts x_omega and u within (6). `paper` puts them within the tightened sets (21), where
     the `paper` set keeps the nominal motion. `limits` puts omega and m within the limits
-    themselves.
+    themselves. If `relaxed`, the rate x_omega and the acceleration are bounded instead, which makes
+    the problem convex.
     """
     state, a = ca.SX.sym("state", 6), ca.SX.sym("a", 3)
+    if relaxed:
+        rate_bound, acceleration_bound = relaxed_bounds(sets)
+        outputs = [ca.sumsqr(state[3:]) / rate_bound**2, ca.sumsqr(a) / acceleration_bound**2]
+        return ca.Function("constrained", [state, a], [ca.vertcat(*outputs)])
     angles, rates = state[:3], state[3:]
     u = a - nlp.drift_function()(angles, rates)
     if sets == "limits":
@@ -89,12 +128,13 @@ def optimum(
     duration: float = DURATION,
     sampling: float = SAMPLING,
     guess: Motion | None = None,
+    relaxed: bool = False,
 ) -> Motion:
     """The motion of least EMS, sampled every `sampling` seconds, from rest at the paper's initial
     state.
 
     `hold` and `duration` are whole multiples of `sampling`. `guess`, with a longer hold,
-    warm-starts the solver.
+    warm-starts the solver. If `relaxed`, the result is a lower bound (see relaxed_bounds).
     """
     n, ratio = round(duration / hold), round(hold / sampling)
     x, a = ca.MX.sym("x", 6, n + 1), ca.MX.sym("a", 3, n)
@@ -103,7 +143,7 @@ def optimum(
     for j in range(ratio):
         angles = advance(x[:, :-1], a, j * sampling)[:3, :]
         cost += ca.sumsqr((angles - ca.DM(theta_r[:, j::ratio])) / nlp.DEG) / theta_r.shape[1]
-    inequalities = ca.vec(constrained(sets).map(n)(x[:, :-1], a))
+    inequalities = ca.vec(constrained(sets, relaxed).map(n)(x[:, :-1], a))
     equal = [x[:, 0] - ca.DM(INITIAL_STATE), ca.vec(x[:, 1:] - advance(x[:, :-1], a, hold))]
     equalities = ca.vertcat(*equal)
 

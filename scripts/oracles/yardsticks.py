@@ -43,7 +43,7 @@ class Value:
 
 
 def least_ems(name: str, sets: str, note: str = "", **options) -> tuple[Value, clairvoyant.Motion]:
-    """Computes the clairvoyant lower bound of EMS. `options` are those of clairvoyant.optimum."""
+    """Computes the least EMS that was found. `options` are those of clairvoyant.optimum."""
     motion = clairvoyant.optimum(sets, **options)
     hold = options.get("hold", clairvoyant.COARSE)
     duration = options.get("duration", clairvoyant.DURATION)
@@ -64,6 +64,17 @@ def coarse_bounds() -> tuple[list[Value], dict[str, clairvoyant.Motion]]:
     for seconds in RUN_LENGTHS:
         values.append(least_ems(f"paper.{seconds}s", "paper", duration=float(seconds))[0])
     return values, motions
+
+
+def lower_bounds() -> list[Value]:
+    """Computes what no motion can go below, by the convex relaxation, with the input held for one
+    communication step."""
+    values = []
+    for sets in SETS:
+        ems = clairvoyant.optimum(sets, hold=clairvoyant.FINE, relaxed=True).ems
+        what = f"no motion has a smaller EMS in 50 s with |beta| <= 10 deg: convex relaxation, a held {clairvoyant.FINE:g} s; {SETS[sets]}"
+        values.append(Value(f"ems.relaxed.{sets}", ems, "deg", what))
+    return values
 
 
 def fine_bounds(motions: dict[str, clairvoyant.Motion]) -> list[Value]:
@@ -127,7 +138,7 @@ def toml(values: list[Value]) -> str:
 
 def main() -> None:
     coarse, motions = coarse_bounds()
-    Path(sys.argv[1]).write_text(toml(coarse + fine_bounds(motions) + tubes()), encoding="utf-8")
+    Path(sys.argv[1]).write_text(toml(coarse + fine_bounds(motions) + lower_bounds() + tubes()), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -239,6 +239,24 @@ mod tests {
     }
 
     #[test]
+    fn published_thrust_and_moments_in_either_unit() {
+        // (64) is printed without a unit; N m is assumed. The thrust is 800 lbf and the moment
+        // limit of Chai 2022 10⁵ ft lbf, which speaks for ft lbf.
+        let (lbf, ft_lbf) = (4.448_221_615_260_5, 1.355_817_948_331_4);
+        let effectors = Effectors::published();
+        let limit = crate::Scenario::crmpc2022().limit_moment;
+        let mut duty = Jets::zeros();
+        duty[0] = 1.0;
+        let yaw = effectors.moment_of_jets(&duty).z;
+        assert!((effectors.jet_force / lbf - 800.0).abs() < 0.1);
+        assert!((limit / ft_lbf - 1e5).abs() < 14.0);
+        for (unit, lever, share) in [(1.0, 5.59, 0.147), (ft_lbf, 7.58, 0.199)] {
+            assert!((yaw * unit / effectors.jet_force - lever).abs() < 5e-3);
+            assert!((yaw * unit / limit - share).abs() < 5e-4);
+        }
+    }
+
+    #[test]
     fn jets_are_mirror_images_up_to_8_newton_metres_but_the_fourth() {
         let mirrored = |jets: &Effectors, (left, right): (usize, usize)| {
             let [a, b] = [left, right].map(|jet| jets.jet_moments.column(jet - 1).into_owned());

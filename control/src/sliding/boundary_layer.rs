@@ -12,7 +12,8 @@ pub fn saturated(s: f64, h: f64) -> f64 {
     (s / h).clamp(-1.0, 1.0)
 }
 
-/// The reaching law ṡ = −η sat(s) of Wu 2015, (34) and (35).
+/// The reaching law ṡ = −η sat(s) of Wu 2015, (34) and (35). The finite time that (42) promises
+/// holds up to the layer only; within, s decays as exp(−η t/h).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoundaryLayer {
@@ -76,10 +77,14 @@ impl FiniteTimeLayer {
         self.slope(&Vector3::from(self.epsilon)).max()
     }
 
+    /// Returns f = 2^(−(b+1)/2) of one axis (from 0) at the edge |s| = ε of the layer.
+    pub(crate) fn edge_factor(&self, axis: usize) -> f64 {
+        exp2(-(self.b[axis] + 1.0) / 2.0)
+    }
+
     /// Returns ρ 2^(−(b+1)/2), s/ε and b of one axis.
     fn scaled(&self, i: usize, s: f64) -> (f64, f64, f64) {
-        let b = self.b[i];
-        (self.rho[i] * exp2(-(b + 1.0) / 2.0), s / self.epsilon[i], b)
+        (self.rho[i] * self.edge_factor(i), s / self.epsilon[i], self.b[i])
     }
 }
 

@@ -3,7 +3,8 @@
 //!
 //! All of them linearise Θ̈ = K M + B + Δv by M = K⁻¹ (v − B), (15), with K = R I⁻¹ and B = Ṙ ω − R
 //! I⁻¹ (ω × I ω), and choose v. The printed Δv lacks a derivative and has R I⁻¹ where R belongs,
-//! (12). This does not matter here, because Δv is estimated as a whole.
+//! (12), and its F is wrong in four entries, (13). This does not matter here, because Δv is
+//! estimated as a whole.
 
 mod boundary_layer;
 mod fbl;

@@ -12,7 +12,8 @@ use vehicle::math::cbrt;
 pub struct Observer {
     /// Gains λ₀, λ₁, λ₂, which are γ₁, γ₂, γ₃ in Table 1.
     pub lambda: [f64; 3],
-    /// Diagonal of L: bounds on the second derivative of the lumped uncertainty, rad/s⁴.
+    /// Diagonal of L: bounds on the second derivative of the lumped uncertainty, rad/s⁴. The
+    /// estimates can follow up to λ₂ L, and those of Table 1 need to.
     pub l: [f64; 3],
 }
 

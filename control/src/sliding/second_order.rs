@@ -12,8 +12,8 @@ pub enum SecondOrderForm {
     /// τ̇ = −k₃ sig^((m−2)/m)(s) − k₄ s, and sgn once, inside sig (44).
     #[default]
     Corrected,
-    /// τ̇ = +k₃ sig^((m−2)/m)(s) sgn(s) − k₄ s, and the term of k₁ with a second sgn too, as (43) and
-    /// (45) are printed: the powers are even functions of s. The attitude is lost with it.
+    /// τ̇ = +k₃ sig^((m−2)/m)(s) sgn(s) − k₄ s, and the term of k₁ with a second sgn too, as (43)
+    /// and (45) are printed: the powers are even functions of s. The attitude is lost with it.
     Printed,
 }
 

@@ -200,6 +200,7 @@ mod tests {
 
     #[test]
     fn equal_numbers_are_neither_below_nor_above() {
+        use Relation::{Above, AtLeast, AtMost, Below};
         let path =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments/two-loop-smc/study.toml");
         let study = Study::load(&path).unwrap();
@@ -217,7 +218,6 @@ mod tests {
             let check = Check { relation, right, by, ..check.clone() };
             compare(&check, &Results { study: &study, runs }).unwrap().held == 1
         };
-        use Relation::{Above, AtLeast, AtMost, Below};
         assert_eq!(
             [Below, Above, AtMost, AtLeast].map(|r| held(r, 2.0, 2.0, None)),
             [false, false, true, true]

@@ -1,11 +1,14 @@
 //! One part of the work of a study: a run for some values of its parameter, from reading the
 //! experiment to the results that are kept.
 
+mod flown;
+
+use self::flown::{Flown, REPETITIONS};
 use super::definition::Study;
 use super::runs::Run;
 use crate::error::Error;
 use crate::measure::{Gauge, larger};
-use crate::metrics::{Meters, Metrics, Value as Metric};
+use crate::metrics::{Meters, Metrics};
 use cosim::check::check;
 use cosim::error::Error as Single;
 use cosim::experiment::{Experiment, Observe};
@@ -291,38 +294,6 @@ impl<'a> Preparation<'a> {
         let series =
             Series { time: series.time, signals: series.signals, units, samples: meters.samples() };
         Ok(Flown { member: Member { value, metrics, within, measures }, series, parameters })
-    }
-}
-
-/// Number of times that a timed run is made; the least of each computing time counts.
-const REPETITIONS: u32 = 5;
-
-/// What one member gave.
-struct Flown {
-    member: Member,
-    series: Series,
-    parameters: Parameters,
-}
-
-impl Flown {
-    /// Keeps the smaller one of each computing time of two runs that are otherwise the same.
-    fn keep_least_times(&mut self, other: &Self, observe: &Observe) {
-        let (own, theirs) = (&mut self.member.metrics, &other.member.metrics);
-        for (name, value) in &mut own.asked {
-            let is_timing = observe.metrics.get(name).is_some_and(|measure| measure.timing);
-            if let (true, Some(Metric::Number(own)), Some(Some(Metric::Number(theirs)))) =
-                (is_timing, value, theirs.asked.get(name))
-            {
-                *own = own.min(*theirs);
-            }
-        }
-        for (name, own) in &mut own.step_us {
-            *own = theirs.step_us.get(name).map_or(*own, |theirs| own.min(*theirs));
-        }
-        for (name, own) in &mut self.series.samples {
-            let theirs = other.series.samples.get(name).into_iter().flatten();
-            own.iter_mut().zip(theirs).for_each(|(own, theirs)| *own = own.min(*theirs));
-        }
     }
 }
 
