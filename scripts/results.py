@@ -93,8 +93,9 @@ class Study:
         return found
 
     def value(self, name: str) -> float:
-        (found,) = [value["value"] for value in self.results["values"] if value["id"] == name]
-        return found
+        found = [value["value"] for value in self.results["values"] if value["id"] == name]
+        assert len(found) == 1, f"the study has {len(found)} values {name}"
+        return found[0]
 
     def claim(self, words: str) -> dict:
         found = [claim for claim in self.results["claims"] if claim["says"].startswith(words)]
