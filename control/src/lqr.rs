@@ -116,7 +116,39 @@ impl Controller for Lqr {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::crmpc::{Constraints, Settings};
     use nalgebra::{Matrix2, Vector2};
+    use vehicle::reference::Reference;
+
+    #[test]
+    fn oracle_the_error_obeys_the_gains() {
+        // Under the commanded moment Θ̈ = Θ̈_r + k₁ e + k₂ ė, also where the reference moves.
+        let Settings { body, p, q, period_feedback: period, .. } =
+            Settings::new(Constraints::Paper);
+        let settings = LqrSettings { body, p, q, period };
+        let mut law = Lqr::new(settings).unwrap();
+        let reference = Reference {
+            angles: Vector3::new(0.2, 0.01, -0.5),
+            rates: Vector3::new(0.03, -0.02, 0.04),
+            accelerations: Vector3::new(-0.01, 0.02, 0.005),
+        };
+        let measured = Measurement {
+            angles: Vector3::new(0.15, 0.05, -0.6),
+            rates: Vector3::new(0.02, 0.01, -0.03),
+            ..Measurement::default()
+        };
+        let moment = law.command(&mut (), 0, 0.0, &measured, &|_| reference);
+        let rates = kinematics::r(&measured.angles) * measured.rates;
+        let acceleration = body.angular_acceleration(&measured.rates, &moment);
+        let found: Vector3<f64> = kinematics::r_dot(&measured.angles, &rates) * measured.rates
+            + kinematics::r(&measured.angles) * acceleration;
+        for (i, Gain { k1, k2 }) in law.gains().into_iter().enumerate() {
+            let wanted = reference.accelerations[i]
+                + k1 * (measured.angles[i] - reference.angles[i])
+                + k2 * (rates[i] - reference.rates[i]);
+            assert!((found[i] - wanted).abs() < 1e-14, "{i}: {} {wanted}", found[i]);
+        }
+    }
 
     #[test]
     fn oracle_gain_satisfies_the_riccati_equation() {

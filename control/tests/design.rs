@@ -362,8 +362,10 @@ mod properties {
 
 #[test]
 fn oracle_invariant_set_holds_what_can_be_reached_and_is_less_than_half_larger() {
-    for (k, period, _) in PUBLISHED_CASES {
-        let error = SampledError::new(gain(k), period);
+    let delays = [0.0, 0.03, 0.1];
+    let cases = PUBLISHED_CASES.into_iter().flat_map(|case| delays.map(|delay| (case, delay)));
+    for ((k, period, _), delay) in cases {
+        let error = SampledError::delayed(gain(k), period, delay);
         let set = error.invariant_set(0.25 * period * period).unwrap().reach();
         let least = error.reach_forever().unwrap();
         let pairs =
@@ -372,6 +374,19 @@ fn oracle_invariant_set_holds_what_can_be_reached_and_is_less_than_half_larger()
             assert!(of_set >= least * (1.0 - 1e-12), "K {k}, period {period}: {of_set} {least}");
             assert!(of_set < 1.5 * least, "K {k}, period {period}: {of_set} {least}");
         }
+    }
+}
+
+#[test]
+fn oracle_terminal_weight_satisfies_15_with_equality_for_unequal_gains() {
+    // With the published K̃ both gains are the same, so that they could be exchanged.
+    for (k1, k2) in [(-5.0, -2.0), (-1.5, -4.0), (-0.3, -1.1)] {
+        let (gain, p, q) = (Gain { k1, k2 }, Vector2::new(50.0, 30.0), 10.0);
+        let g = terminal_weight(gain, p, q);
+        let a = Matrix2::new(0.0, 1.0, k1, k2);
+        let load = Matrix2::from_diagonal(&p) + gain.row().transpose() * gain.row() * q;
+        let residual = a.transpose() * g + g * a + load;
+        assert!(residual.norm() < 1e-12 * load.norm(), "K {k1}, {k2}: {residual}");
     }
 }
 
