@@ -1,7 +1,7 @@
 """Writes docs/claims.md from docs/claims/*.toml: claims.py [--check]
 
-Each file holds one paper: `paper`, its `study`, how much is `printed` of what is numbered, and sections
-of items. An item has
+Each file holds one paper: `paper`, its `studies`, how much is `printed` of what is numbered, and
+sections of items. An item has
 
     place     where the paper has it, in its own numbering
     says      what it says
@@ -9,7 +9,9 @@ of items. An item has
     verdict   one of VERDICTS
     number    a value that belongs to the verdict
     shown     names of the tests that show it
-    study     figures (by id), tables (by title) and claims (by their words) of the study that show it
+    study     figures (by id), tables and overviews (by title) and claims (by their words) of the studies
+              that show it. What a claim has before a colon is its setup; words without one mean the
+              claim in every setup.
     page      pages that say more
     reason    why it is not judged, does not hold, or holds in part
 """
@@ -86,43 +88,98 @@ def kind(place: str) -> str:
     return "figure" if re.fullmatch(r"Fig\. \d+", place) else "table" if place.startswith("Table ") else "claim"
 
 
-def spelled_out(entry: dict) -> list[dict]:
-    """An entry of a study, once for each line of its `each`."""
-    lines = entry.get("each", [{}])
-    assert isinstance(lines, list), f"{entry.get('id')}: lists by name are not spelled out here"
-    filled = lambda text, line: re.sub(r"\{(\w+)\}", lambda key: str(line.get(key[1], key[0])), text)
-    return [{key: filled(text, line) for key, text in entry.items() if isinstance(text, str)} for line in lines]
+def overlay(table: dict, below: dict) -> dict:
+    """A table with what it lacks from the one below. Tables merge, all else counts as a whole."""
+    both = {key: overlay(table[key], below[key]) for key in table.keys() & below.keys() if isinstance(table[key], dict) and isinstance(below[key], dict)}
+    return {**below, **table, **both}
 
 
-def study(name: str) -> dict[str, list[str]]:
-    """What items can refer to: ids of the figures, titles of the tables and words of the claims."""
-    text = tomllib.loads((STUDIES / name / "study.toml").read_text(encoding="utf-8"))
+def extended(file: Path) -> dict:
+    """A study with all that it extends."""
+    text = tomllib.loads(file.read_text(encoding="utf-8"))
+    below: dict = {}
+    for base in listed(text.get("extends", [])):
+        below = overlay(extended(file.parent / base), below)
+    return overlay(text, below)
+
+
+def listed(value: str | list) -> list:
+    return value if isinstance(value, list) else [value]
+
+
+def filled(value, row: dict):
+    """A value in which names in braces are replaced by those of the row."""
+    if isinstance(value, dict):
+        return {key: filled(inner, row) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [filled(inner, row) for inner in value]
+    if not isinstance(value, str):
+        return value
+    whole = re.fullmatch(r"\{(\w+)\}", value)
+    if whole and whole[1] in row:
+        return row[whole[1]]
+    return re.sub(r"\{(\w+)\}", lambda name: str(row.get(name[1], name[0])), value)
+
+
+def spelled_out(entry: dict, study: dict, outer: dict | None = None) -> list[dict]:
+    """What an entry of a study stands for: one for each row of its `each` and template of its `use`."""
+    rows = entry.get("each", [{}])
+    made = []
+    for line in study["lists"][rows] if isinstance(rows, str) else rows:
+        row = {**(outer or {}), **line}
+        own = filled({key: value for key, value in entry.items() if key not in ("use", "each")}, row)
+        for name in listed(filled(entry["use"], row)) if "use" in entry else []:
+            made += spelled_out(overlay(own, filled(study["templates"][name], row)), study, row)
+        made += [] if "use" in entry else [own]
+    return made
+
+
+Found = dict[str, dict[str, list[str]]]
+
+
+def found(names: list[str]) -> Found:
+    """What items can refer to in each study: ids of figures, titles of tables and overviews, words of
+    claims."""
+    marks = {"figure": "id", "table": "title", "overview": "title", "claim": "says"}
+    studies = {name: extended(STUDIES / name / "study.toml") for name in names}
     return {
-        "figure": [one["id"] for figure in text["figure"] for one in spelled_out(figure)],
-        "table": [table["title"] for table in text.get("table", [])],
-        "claim": [claim["says"] for claim in text["claim"]],
+        name: {what: [one[mark] for entry in study.get(what, []) for one in spelled_out(entry, study)] for what, mark in marks.items()}
+        for name, study in studies.items()
     }
 
 
-def matches(reference: str, found: dict[str, list[str]]) -> list[tuple[str, str]]:
-    """The entries of a study that a reference means: a figure's id, or how a title or claim begins."""
-    exact = [("figure", name) for name in found["figure"] if name == reference]
-    begins = [(what, name) for what in ("table", "claim") for name in found[what] if name.startswith(reference)]
-    return exact + begins
+def words(claim: str) -> str:
+    """A claim without the setup before its colon."""
+    return re.sub(r"^(?:Direct|Surfaces and jets)[^:]*: ", "", claim)
+
+
+def matches(reference: str, studies: Found) -> list[tuple[str, str, str]]:
+    """The entries of the studies that a reference means, with study and kind: a figure's id, or how a
+    title or a claim begins, with or without its setup."""
+    means = {
+        "figure": lambda name: name == reference,
+        "table": lambda name: name.startswith(reference),
+        "overview": lambda name: name.startswith(reference),
+        "claim": lambda name: name.startswith(reference) or words(name).startswith(reference),
+    }
+    return [(study, what, name) for study, entries in studies.items() for what, means_it in means.items() for name in entries[what] if means_it(name)]
 
 
 def cell(text: str) -> str:
     return text.replace("|", r"\|") or "–"
 
 
-def evidence(item: dict, name: str, found: dict[str, list[str]]) -> str:
+def evidence(item: dict, studies: Found) -> str:
     parts = [f"`{test}`" for test in item.get("shown", [])]
-    entries = []
-    for reference in item.get("study", []):
-        what, entry = matches(reference, found)[0]
-        entries.append({"figure": f"figure `{entry}`", "table": f"table “{entry}”", "claim": f"“{entry}”"}[what])
-    if entries:
-        parts.append(f"[{name}](../orchestrator/experiments/{name}/study.toml): {'; '.join(entries)}")
+    hits = [matches(reference, studies) for reference in item.get("study", [])]
+    for study in studies:
+        entries = []
+        for here in ([hit for hit in group if hit[0] == study] for group in hits):
+            if len(here) > 1:
+                entries.append(f"“{words(here[0][2])}” in every setup")
+            entries += [f"figure `{name}`" if what == "figure" else f"“{name}”" if what == "claim" else f"{what} “{name}”" for _, what, name in here if len(here) == 1]
+        if entries:
+            parts.append(f"[{study}](../orchestrator/experiments/{study}/study.toml): {'; '.join(entries)}")
     parts += [f"[{page.split('#')[0]}]({page})" for page in item.get("page", [])]
     return ", ".join(parts)
 
@@ -148,7 +205,7 @@ def page() -> str:
         rows.append(["all", *map(str, totals), str(sum(totals))])
         lines += [*table([heading, *(paper["paper"] for paper in data.values()), "all"], rows), ""]
     for paper in data.values():
-        found = study(paper["study"])
+        studies = found(paper["studies"])
         lines += [f"## {paper['paper']}", ""]
         for section in paper["section"]:
             lines += [f"### {section['title']}", ""]
@@ -159,7 +216,7 @@ def page() -> str:
                     cell(item.get("setup", "")),
                     cell(verdict(item)),
                     cell(item.get("number", "")),
-                    cell(evidence(item, paper["study"], found)),
+                    cell(evidence(item, studies)),
                 ]
                 for item in section["item"]
             ]
