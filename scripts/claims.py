@@ -10,8 +10,7 @@ sections of items. An item has
     number    a value that belongs to the verdict
     shown     names of the tests that show it
     study     figures (by id), tables and overviews (by title) and claims (by their words) of the studies
-              that show it. What a claim has before a colon is its setup; words without one mean the
-              claim in every setup.
+              that show it. "SETUP…: WORDS" means a claim in all setups that begin so.
     page      pages that say more
     reason    why it is not judged, does not hold, or holds in part
 """
@@ -64,9 +63,13 @@ has the measured results as a report, [errata.md](errata.md) the misprints and t
 
 Setups: *closed form* is a test against a formula, differences or another solver. *Ideal
 measurement* and *sensors and estimator* are the scenario of Chai 2022. *Direct moments* act as
-commanded; with *surfaces, jets* they go through the allocation, *all biases* being an inertia of
-+ 5 %, and air and surfaces 10 % weaker, unless the row says more. Numbers are those of the tests'
-bounds, of [results.md](results.md) or of [errata.md](errata.md).
+commanded; with *surfaces, jets* they go through the allocation. The *eight corners* are those of
+Wu's biases, inertia ± 5 %, air ± 10 % and coefficients ± 10 %, whose signs are not printed; *all
+biases* are an inertia of + 5 %, and air and surfaces 10 % weaker. The laws of Wu have their signs
+put right, unless the row says *as printed*; *our additions* are that the observer is told the
+achieved moment, and that the surface is laid anew while the actuators fall short. What the paper
+simulates is surfaces and jets without them. Numbers are those of the tests' bounds, of the studies'
+reports, of [results.md](results.md) or of [errata.md](errata.md).
 """
 
 
@@ -149,18 +152,19 @@ def found(names: list[str]) -> Found:
 
 
 def words(claim: str) -> str:
-    """A claim without the setup before its colon."""
+    """A claim without the setup before its colon, as Wu's have it."""
     return re.sub(r"^(?:Direct|Surfaces and jets)[^:]*: ", "", claim)
 
 
 def matches(reference: str, studies: Found) -> list[tuple[str, str, str]]:
     """The entries of the studies that a reference means, with study and kind: a figure's id, or how a
-    title or a claim begins, with or without its setup."""
+    title or a claim begins. "SETUP…: WORDS" means a claim in all setups that begin so."""
+    setup, several, rest = reference.partition("…: ")
     means = {
         "figure": lambda name: name == reference,
         "table": lambda name: name.startswith(reference),
         "overview": lambda name: name.startswith(reference),
-        "claim": lambda name: name.startswith(reference) or words(name).startswith(reference),
+        "claim": lambda name: name.startswith(setup) and (not several or words(name).startswith(rest)),
     }
     return [(study, what, name) for study, entries in studies.items() for what, means_it in means.items() for name in entries[what] if means_it(name)]
 
@@ -171,15 +175,14 @@ def cell(text: str) -> str:
 
 def evidence(item: dict, studies: Found) -> str:
     parts = [f"`{test}`" for test in item.get("shown", [])]
-    hits = [matches(reference, studies) for reference in item.get("study", [])]
     for study in studies:
-        entries = []
-        for here in ([hit for hit in group if hit[0] == study] for group in hits):
-            if len(here) > 1:
-                entries.append(f"“{words(here[0][2])}” in every setup")
-            entries += [f"figure `{name}`" if what == "figure" else f"“{name}”" if what == "claim" else f"{what} “{name}”" for _, what, name in here if len(here) == 1]
-        if entries:
-            parts.append(f"[{study}](../orchestrator/experiments/{study}/study.toml): {'; '.join(entries)}")
+        entries: dict[str, list[str]] = {}
+        for _, what, name in (hit for reference in item.get("study", []) for hit in matches(reference, studies) if hit[0] == study):
+            shown = {"figure": f"figure `{name}`", "claim": f"“{words(name)}”"}.get(what, f"{what} “{name}”")
+            entries.setdefault(shown, []).extend([name.removesuffix(f": {words(name)}")] if words(name) != name else [])
+        told = [shown + (f" ({'; '.join(setups)})" if setups else "") for shown, setups in entries.items()]
+        if told:
+            parts.append(f"[{study}](../orchestrator/experiments/{study}/study.toml): {'; '.join(told)}")
     parts += [f"[{page.split('#')[0]}]({page})" for page in item.get("page", [])]
     return ", ".join(parts)
 

@@ -105,12 +105,14 @@ def test_an_entry_stands_for_all_rows_and_templates():
     assert made[3]["inner"] == {"x": 0, "y": 2}
 
 
-def test_words_mean_a_claim_in_every_setup_and_a_setup_means_itself():
+def test_a_reference_means_one_setup_or_all_that_begin_so():
     entries = {"figure": ["fig-3"], "table": [], "overview": [], "claim": ["Direct: they rest.", "Direct, as printed: they rest.", "They: rest."]}
     means = lambda reference: [name for _, _, name in claims.matches(reference, {"s": entries})]
-    assert means("they rest") == ["Direct: they rest.", "Direct, as printed: they rest."]
     assert means("Direct: they") == ["Direct: they rest."]
-    assert means("They") == ["They: rest."] and means("fig-3") == ["fig-3"] and means("fig") == means("rest") == []
+    assert means("Direct…: they") == ["Direct: they rest.", "Direct, as printed: they rest."]
+    assert means("Direct, a…: they") == ["Direct, as printed: they rest."]
+    assert means("They") == ["They: rest."] and means("fig-3") == ["fig-3"]
+    assert means("they") == means("fig") == means("Direct…: rest") == []
 
 
 def test_every_correction_of_an_equation_is_among_the_errata():
