@@ -1,5 +1,5 @@
-"""`orchestrator reproduce crmpc-2022`: the report of Chai 2022, section 5.2, with few members of
-each run."""
+"""`orchestrator reproduce`: the report of Chai 2022, section 5.2, with few members of each run, the
+other studies as they are, and what docs/results.md and other pages say of them."""
 
 import json
 import os
@@ -7,12 +7,16 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import time
 import tomllib
 
 import pytest
 
-from conftest import EXPERIMENTS, TARGET, merged, program
+from conftest import EXPERIMENTS, ROOT, TARGET, merged, program
+
+sys.path.append(str(ROOT / "scripts"))
+import results as pages
 
 MEMBERS = 2
 
@@ -151,9 +155,10 @@ def test_prediction_makes_up_for_a_delay(results):
 
 def test_oracle_crmpc_comes_near_the_clairvoyant_optimum_of_its_sets(results):
     bounds = {value["id"]: value["value"] for value in results["values"]}
+    # Of 20 seeds the worst is 5.3 % above the bound. The untightened sets are larger, so their lower
+    # bound is lower.
     for ems in metric(results, "crmpc-paper", "ems_deg"):
-        assert bounds["ems.clairvoyant.paper"] < ems <= 1.12 * bounds["ems.clairvoyant.paper"]
-        # The untightened sets are larger, so their lower bound is lower.
+        assert bounds["ems.clairvoyant.paper"] < ems <= 1.06 * bounds["ems.clairvoyant.paper"]
         assert ems <= 1.12 * bounds["ems.clairvoyant.printed"]
     for run in ["crmpc-robust", "dlmpc", "dlmpc-tuned"]:
         assert min(metric(results, run, "ems_deg")) > bounds["ems.clairvoyant.limits"]
@@ -323,7 +328,7 @@ def test_a_changed_experiment_is_run_again(report, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "culprit"),
     [
-        ('experiment = "{id}.toml" }', 'experiment = "{id}q.toml" }', "run crmpc-paper"),
+        ('experiment = "{id}.toml", measures', 'experiment = "{id}q.toml", measures', "run crmpc-paper"),
         ('runs = ["lqr", "dlmpc"', 'runs = ["lqq", "dlmpc"', 'did you mean "lqr"'),
         ('signal = "estimator.attitude.{angle} ', 'signal = "estimator.attitude.{angle}a ', 'did you mean "estimator.attitude.alpha"'),
         ('paper = "ems.dlmpc"', 'paper = "ems.dlmp"', 'did you mean "ems.dlmpc"'),
@@ -367,36 +372,69 @@ def wu(tmp_path_factory):
     return folder / "out", reproduced("tvsmc-2015", folder)
 
 
+# The verdicts on the claims of Wu 2015 at the printed biases: with moments that act directly, with
+# surfaces and jets, and with our additions.
+HOLDS, PARTLY, FAILS = "holds", "holds-partly", "does-not-hold"
+VERDICTS_OF_WU = {
+    "sliding modes are more robust than feedback linearisation.": (HOLDS, HOLDS, HOLDS),
+    "the errors of feedback linearisation do not vanish.": (HOLDS, HOLDS, HOLDS),
+    "with the observer, errors are smaller than without, and than those of feedback linearisation.": (HOLDS, PARTLY, HOLDS),
+    "all angles reach their commands within 4 s under both laws with an observer.": (HOLDS, FAILS, HOLDS),
+    "the errors of SOTVSMC/DO are much smaller than those of BTVSMC/DO.": (HOLDS, HOLDS, PARTLY),
+    "the sliding variables of BTVSMC do not converge to zero.": (HOLDS, HOLDS, HOLDS),
+    "the time-varying surface has no reaching phase: the sliding variables begin at zero.": (HOLDS, HOLDS, HOLDS),
+    "under the laws with an observer they move away from zero and are back after about 4 s.": (HOLDS, FAILS, PARTLY),
+    "the sliding variables of BTVSMC/DO stay inside the boundary layer.": (HOLDS, FAILS, HOLDS),
+    "the sliding variables of SOTVSMC/DO converge to zero more precisely than those of BTVSMC/DO.": (HOLDS, HOLDS, FAILS),
+    "the observer estimates the sliding variables effectively.": (HOLDS, PARTLY, HOLDS),
+    "the sliding modes do not chatter.": (HOLDS, PARTLY, HOLDS),
+    "the rudders stay at zero.": (None, HOLDS, HOLDS),
+    "all limits of the actuators are satisfied.": (None, HOLDS, HOLDS),
+    "the jets make up for saturated surfaces with high accuracy.": (None, PARTLY, PARTLY),
+}
+
+
+def test_verdicts_on_the_claims_of_wu_2015(wu):
+    setups = ["Direct", "Surfaces and jets", "Surfaces and jets, with our additions"]
+    expected = {
+        f"{setup}: {words}": verdict
+        for words, verdicts in VERDICTS_OF_WU.items()
+        for setup, verdict in zip(setups, verdicts, strict=True)
+        if verdict
+    }
+    assert {claim["says"]: claim["verdict"] for claim in wu[1]["claims"]} == expected
+
+
 def test_the_claims_of_wu_2015_hold_with_moments_acting_directly(wu):
     _, results = wu
-    assert [claim["verdict"] for claim in results["claims"]] == ["holds"] * 4
     measures = {run: results["runs"][run]["members"][0]["measures"] for run in results["runs"]}
     # docs/errata.md states these RMS values of alpha, beta, sigma over 10 to 20 s, in deg.
     for run, expected in [("fbl", (0.205, 0.076, 0.493)), ("btvsmc", (0.047, 0.017, 0.112))]:
         ours = [measures[run][f"rms-{axis}"] for axis in ("alpha", "beta", "sigma")]
         assert ours == pytest.approx(expected, abs=5.1e-4)
         assert measures[run]["settling"] is None
+    # 2.95 s and 1.5e-4 deg are measured.
     for run in ["btvsmc-do", "sotvsmc-do"]:
         assert measures[run]["settling"] <= 4.0
-    assert max(measures["btvsmc-do"][f"rms-{axis}"] for axis in ("alpha", "beta", "sigma")) <= 5e-4
+    assert max(measures["btvsmc-do"][f"rms-{axis}"] for axis in ("alpha", "beta", "sigma")) <= 3e-4
 
 
 def test_wu_2015_with_control_allocation(wu):
     _, results = wu
     measures = {run: results["runs"][run]["members"][0]["measures"] for run in results["runs"]}
-    # These runs have surfaces at 10 deg/s and all biases; the jets give any commanded thrust, or
-    # PWPF switches them.
+    # These runs have surfaces at 10 deg/s, all biases and both additions; the jets give any commanded
+    # thrust, or PWPF switches them. The paper says 4 s; 3.71 s and 0.0098 deg are measured.
     for run in ["duty-btvsmc-do", "duty-sotvsmc-do", "optimal-btvsmc-do", "optimal-sotvsmc-do"]:
-        assert measures[run]["settling"] <= 4.5 and measures[run]["largest-error"] <= 0.05
+        assert measures[run]["settling"] <= 4.0 and measures[run]["largest-error"] <= 0.015
         rudders = results["runs"][run]["members"][0]["within"]["rudders"]
         assert rudders["inside"] == rudders["samples"]
     # With PWPF every controller keeps the attitude.
     stable = {run: m["largest-error"] for run, m in measures.items() if run.startswith("optimal-")}
     assert len(stable) == 8 and max(stable.values()) < 1.3
     assert all(measures[run]["pulses"] > 0 for run in stable)
-    # With the selector of Jia et al. the laws with an observer are as precise.
+    # With the selector of Jia et al. the laws with an observer are nearly as precise: 0.0135 deg.
     blended = {run: m["largest-error"] for run, m in measures.items() if run.startswith("blending-")}
-    assert max(blended[f"blending-{law}-do"] for law in ("btvsmc", "sotvsmc")) <= 0.05
+    assert max(blended[f"blending-{law}-do"] for law in ("btvsmc", "sotvsmc")) <= 0.02
 
 
 def test_published_parameters_of_wu_2015_are_those_of_the_units(wu):
@@ -422,7 +460,7 @@ def test_every_controller_flies_every_scenario(tmp_path):
         assert ("pulses" in member["measures"]) == ("allocated" in name)
     # In its own scenario the two-loop law leaves the smallest error.
     errors = {name: m["measures"]["rms-late"] for name, m in members.items() if re.match("jia-(?!alloc)", name)}
-    assert min(errors, key=errors.get) == "jia-two-loop" and errors["jia-two-loop"] < 0.3
+    assert min(errors, key=errors.get) == "jia-two-loop" and errors["jia-two-loop"] < 0.1
 
 
 @pytest.mark.parametrize(
@@ -443,3 +481,33 @@ def test_a_grid_with_a_mistake_is_refused_before_anything_runs(tmp_path, old, ne
     finished = reproduce(study, out)
     assert finished.returncode == 2 and culprit in finished.stderr, finished.stderr
     assert not out.exists()
+
+
+# --- docs/results.md --------------------------------------------------------------------------------
+
+
+def differences(folder) -> list[str]:
+    return pages.problems(pages.read([folder], pages.data()))
+
+
+def test_pages_agree_with_the_study_of_chai_2022(report):
+    assert differences(report[1]) == []
+
+
+def test_pages_agree_with_the_study_of_wu_2015(wu):
+    assert differences(wu[0]) == []
+
+
+@pytest.mark.parametrize("study", ["tvsmc-2015-biases", "two-loop-smc"])
+def test_pages_agree_with_the_study(study, tmp_path):
+    reproduced(study, tmp_path)
+    assert differences(tmp_path / "out") == []
+
+
+def test_the_page_says_how_many_members_the_runs_have(results):
+    """Runs that the page takes for single ones are so, and all others have several seeds."""
+    study = pages.Study(results, pages.data()["members"]["crmpc-2022"])
+    for run, result in results["runs"].items():
+        assert len(result["members"]) == min(study.expected(run), MEMBERS), run
+    text = (EXPERIMENTS / "study.toml").read_text()
+    assert {int(count) for count in re.findall(r"first = 1, count = (\d+)", text)} == set(study.members.values())

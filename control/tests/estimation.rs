@@ -114,17 +114,17 @@ fn a_calibration_flight_cut_short_is_refused() {
     assert!(found.angle_to(&wanted) < 2f64.to_radians(), "and the attitude is found with it");
 }
 
-/// The requirements with the MEMS set are 0.2 deg at rest, 0.5 deg in motion and 0.1 deg/s, for the
-/// norm of the three angles and for each rate.
+/// With the MEMS set the errors are within 0.15 deg and 0.1 deg/s, for the norm of the three angles
+/// and for each rate, at rest and in motion. The seeds are not those that set the filter.
 #[test]
 fn oracle_errors_with_the_mems_set_are_within_what_is_required() {
     let settings = *CALIBRATED;
-    for seed in 1..=5 {
-        for (name, motion, limit) in [("rest", rest(50.0), 0.2), ("motion", scenario(seed), 0.5)] {
+    for seed in 101..=105 {
+        for (name, motion) in [("rest", rest(50.0)), ("motion", scenario(seed))] {
             let lines = lines(&motion, &mems(seed));
             let estimates = estimates(&settings, &lines);
             let [angles, rates] = errors(&motion, &estimates, 0.0);
-            assert!(angles.norm() < limit, "{name}, seed {seed}: {angles}");
+            assert!(angles.norm() < 0.15, "{name}, seed {seed}: {angles}");
             assert!(rates.max() < 0.1, "{name}, seed {seed}: {rates}");
             assert!(estimates[1..].iter().all(|estimate| estimate.health == Health::Ok));
         }
@@ -148,13 +148,13 @@ fn oracle_without_errors_a_steady_turn_is_followed_exactly() {
     let lines = lines(&motion, &ideal());
     for (name, settings, limit) in [
         ("without filter", sharp(), 1e-6),
-        ("with filter and prediction", Settings { sensor_delay: 0.0, ..Settings::default() }, 2e-2),
+        ("with filter and prediction", Settings { sensor_delay: 0.0, ..Settings::default() }, 2e-4),
     ] {
         let settings = Settings { frozen_samples: 0, ..settings };
         let estimates = estimates(&settings, &lines);
         let [angles, rates] = errors(&motion, &estimates, 5.0);
         assert!(angles.norm() < limit, "{name}: {angles} deg");
-        assert!(rates.norm() < 1e-2 * limit.max(1e-4), "{name}: {rates} deg/s");
+        assert!(rates.norm() < limit.min(1.1e-4), "{name}: {rates} deg/s");
     }
 }
 
@@ -198,7 +198,7 @@ fn dropped_samples_are_bridged_counted_and_flagged() {
     let lines = lines(&motion, &config);
     let estimates = estimates(&settings, &lines);
     let [angles, rates] = errors(&motion, &estimates, 0.0);
-    assert!(angles.norm() < 0.5 && rates.max() < 0.15, "{angles} {rates}");
+    assert!(angles.norm() < 0.17 && rates.max() < 0.15, "{angles} {rates}");
     let dropped = estimates[estimates.len() - 1].dropped;
     assert!((1400..1600).contains(&dropped), "{dropped}");
     let bridged = estimates.iter().filter(|estimate| estimate.health == Health::Bridging).count();
@@ -218,12 +218,12 @@ fn after_a_long_silence_the_attitude_is_lost_and_found_again() {
     assert_eq!(health_at(&estimates, 12.0), Health::Lost);
     assert_eq!(health_at(&estimates, 13.1), Health::Ok);
     let [angles, _] = errors(&motion[1300..1500], &estimates[1300..1500], 13.5);
-    assert!(angles.norm() < 0.5, "{angles}");
+    assert!(angles.norm() < 0.28, "{angles}");
     let bridged = |time: f64| {
         let k = (time / PERIOD).round() as usize;
         (estimates[k].angles - motion[k].angles).norm().to_degrees()
     };
-    assert!(bridged(10.2) < 0.5, "{}", bridged(10.2));
+    assert!(bridged(10.2) < 0.16, "{}", bridged(10.2));
 }
 
 #[test]
@@ -238,7 +238,7 @@ fn a_frozen_sensor_is_left_out() {
         assert_eq!(health_at(&estimates, 10.2), Health::Frozen);
         assert_eq!(health_at(&estimates, 10.5), Health::Ok);
         let [angles, _] = errors(&motion, &estimates, 10.0);
-        assert!(angles.norm() < 0.5, "sensor {sensor}: {angles}");
+        assert!(angles.norm() < 0.15, "sensor {sensor}: {angles}");
     }
 }
 
@@ -253,10 +253,10 @@ fn the_gyroscopes_bias_is_learned_and_seen_at_rest() {
     let motion = rest(120.0);
     let lines = lines(&motion, &config);
     let learned = estimates(&settings, &lines)[motion.len() - 1].gyroscope_bias;
-    assert!((learned - bias).amax() < 0.02f64.to_radians(), "{}", learned.map(f64::to_degrees));
+    assert!((learned - bias).amax() < 0.0017f64.to_radians(), "{}", learned.map(f64::to_degrees));
     let estimates = estimates(&seen, &lines);
     let at_rest = estimates[600].gyroscope_bias;
-    assert!((at_rest - bias).amax() < 0.01f64.to_radians(), "{}", at_rest.map(f64::to_degrees));
+    assert!((at_rest - bias).amax() < 0.007f64.to_radians(), "{}", at_rest.map(f64::to_degrees));
 }
 
 #[test]

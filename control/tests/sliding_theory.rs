@@ -3,8 +3,8 @@
 //! most twice the largest value of ten thousand draws.
 
 use control::sliding::{
-    BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, Settings, Surface,
-    TrackingError, Tvsmc,
+    BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, SecondOrderForm, Settings,
+    Surface, TrackingError, Tvsmc,
 };
 use control::{Controller, Measurement};
 use nalgebra::{Matrix3, Vector3};
@@ -373,8 +373,9 @@ fn exponent_53(m: f64) -> f64 {
 /// Gains that condition (46) may or may not accept, one for each axis.
 fn any_gains() -> impl Strategy<Value = SecondOrder> {
     let gain = || proptest::array::uniform3(0.05..0.6);
-    (gain(), proptest::array::uniform3(0.01..0.3), gain(), gain(), 2.1..6.0)
-        .prop_map(|(k1, k2, k3, k4, m)| SecondOrder { k1, k2, k3, k4, m })
+    (gain(), proptest::array::uniform3(0.01..0.3), gain(), gain(), 2.1..6.0).prop_map(
+        |(k1, k2, k3, k4, m)| SecondOrder { form: SecondOrderForm::Corrected, k1, k2, k3, k4, m },
+    )
 }
 
 /// Gains that are accepted.

@@ -187,7 +187,7 @@ fn never_is_infinite(
 mod tests {
     use super::*;
     use crate::metrics::Metrics;
-    use crate::study::part::Member;
+    use crate::study::outcome::Member;
     use crate::study::results::RunResult;
     use std::collections::BTreeMap;
     use std::path::Path;

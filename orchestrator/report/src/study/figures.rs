@@ -1,7 +1,7 @@
 //! Draws the figures of a study from the results of its runs.
 
 use super::drawings::{Across, Axis, Figure, Panel, Through};
-use super::part::Series;
+use super::outcome::Series;
 use super::results::{Metric, Results, RunResult};
 use super::runs::Run;
 use crate::figure::{self, Color, Curve, Legend, Shape};

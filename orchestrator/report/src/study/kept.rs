@@ -1,6 +1,7 @@
 //! Files in which the finished parts of a study are kept, so that they need not be run again.
 
-use super::part::{Outcome, Part};
+use super::outcome::Outcome;
+use super::part::Part;
 use cosim::files::digest;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -55,7 +56,7 @@ pub(super) fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
 mod tests {
     use super::*;
     use crate::metrics::Metrics;
-    use crate::study::part::Member;
+    use crate::study::outcome::Member;
     use cosim::system::Parameters;
     use std::collections::BTreeMap;
     use tracing::subscriber::{NoSubscriber, with_default};

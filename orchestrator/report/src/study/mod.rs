@@ -12,6 +12,7 @@ mod figures;
 mod grid;
 mod kept;
 mod load;
+mod outcome;
 mod output;
 mod page;
 mod part;

@@ -1,23 +1,20 @@
 //! One part of the work of a study: a run for some values of its parameter, from reading the
 //! experiment to the results that are kept.
 
-mod flown;
-
-use self::flown::{Flown, REPETITIONS};
 use super::definition::Study;
+use super::outcome::{Compared, Flown, Member, Outcome, REPETITIONS, Series, Spread};
 use super::runs::Run;
 use crate::error::Error;
 use crate::measure::{Gauge, larger};
 use crate::metrics::{Meters, Metrics};
 use cosim::check::check;
 use cosim::error::Error as Single;
-use cosim::experiment::{Experiment, Observe};
+use cosim::experiment::Experiment;
 use cosim::interrupt::Interrupt;
 use cosim::master::{Observer, Sample};
 use cosim::signal::{Resolved, Signal};
 use cosim::system::Parameters;
 use cosim::system::{Opened, System};
-use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -30,84 +27,6 @@ pub(super) struct Part {
     pub run: usize,
     /// Members of the run that belong to this part.
     pub range: Range<u32>,
-}
-
-/// Results that are kept of a part.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
-    /// Results of each member, one for each value of the parameter.
-    pub members: Vec<Member>,
-    /// Signals of the run's first member, if it belongs to this part.
-    pub series: Option<Series>,
-    /// Parameters of all components in the first member, if it belongs to this part.
-    #[serde(default)]
-    pub parameters: Parameters,
-    /// Smallest and largest value of each signal over the members, at each communication point.
-    pub spread: BTreeMap<Signal, Spread>,
-}
-
-/// Results that are kept of one member of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Member {
-    /// Value of the parameter, if one is varied.
-    pub value: Option<i32>,
-    /// Figures of merit of the member.
-    pub metrics: Metrics,
-    /// Comparisons of signals with bounds, by id.
-    pub within: BTreeMap<String, Compared>,
-    /// Measures that the study defines, by id; null if a measure has no value.
-    pub measures: BTreeMap<String, Option<f64>>,
-}
-
-impl Member {
-    /// Returns whether this member has the same results as another one, apart from computing times.
-    pub fn moves_as(&self, other: &Self, asked: &Observe) -> bool {
-        let timeless = |metrics: &Metrics| {
-            let mut metrics = Metrics { step_us: BTreeMap::new(), ..metrics.clone() };
-            metrics
-                .asked
-                .retain(|name, _| asked.metrics.get(name).is_none_or(|measure| !measure.timing));
-            metrics
-        };
-        timeless(&self.metrics) == timeless(&other.metrics)
-            && self.within == other.within
-            && self.measures == other.measures
-    }
-}
-
-/// Comparison of signals with a bound.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Compared {
-    /// Number of samples in which all signals were within the bound.
-    pub inside: u64,
-    /// Number of all samples that were compared.
-    pub samples: u64,
-    /// Largest magnitude of any signal.
-    pub largest: f64,
-    /// Largest magnitude as a multiple of the bound.
-    pub ratio: f64,
-}
-
-/// Time series of signals.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Series {
-    /// Simulated times of the communication points, s.
-    pub time: Vec<f64>,
-    /// Values at these times, in the unit in which they are shown.
-    pub signals: BTreeMap<Signal, Vec<f64>>,
-    /// Unit in which each signal is shown.
-    pub units: BTreeMap<Signal, String>,
-    /// Single values of the metrics that keep them, by name.
-    pub samples: BTreeMap<String, Vec<f64>>,
-}
-
-/// Smallest and largest value at each communication point.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Spread {
-    /// Smallest value at each communication point.
-    pub low: Vec<f64>,
-    /// Largest value at each communication point.
-    pub high: Vec<f64>,
 }
 
 /// Tolerance with which bounds count as met, because of rounding.
@@ -302,18 +221,6 @@ fn widen(spread: &mut BTreeMap<Signal, Spread>, signal: &Signal, values: &[f64])
         .entry(signal.clone())
         .or_insert_with(|| Spread { low: values.to_vec(), high: values.to_vec() });
     own.widen(values, values);
-}
-
-impl Spread {
-    /// Extends the band so that it also covers these values.
-    pub fn widen(&mut self, low: &[f64], high: &[f64]) {
-        for (own, value) in self.low.iter_mut().zip(low) {
-            *own = own.min(*value);
-        }
-        for (own, value) in self.high.iter_mut().zip(high) {
-            *own = own.max(*value);
-        }
-    }
 }
 
 impl Compared {

@@ -7,8 +7,9 @@
 use super::claims;
 use super::definition::Study;
 use super::kept::{Kept, kept};
+use super::outcome::Outcome;
 use super::output::{Judgement, notes, write};
-use super::part::{Outcome, Part, Preparation};
+use super::part::{Part, Preparation};
 use super::results::{Results, RunResult, resolve};
 use crate::error::Error;
 use crate::folder::Folder;

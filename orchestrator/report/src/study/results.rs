@@ -1,7 +1,7 @@
 //! Results of a study's runs, and the references of the form `run.metric` to them.
 
 use super::definition::Study;
-use super::part::{Member, Outcome, Series, Spread};
+use super::outcome::{Member, Outcome, Series, Spread};
 use super::runs::Run;
 use super::values::Quantity;
 use crate::metrics::Metrics;
