@@ -147,14 +147,8 @@ fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
         (0..pairs).filter_map(|k| Some((at(&left, k)?, at(&right, k)?))).collect();
     let difference = compared.iter().map(|(left, right)| left / right - 1.0);
     let difference = difference.filter(|difference| difference.is_finite()).collect();
-    let margin = by.unwrap_or(0.0);
-    let holds = |&&(left, right): &&(f64, f64)| match check.relation {
-        Relation::Below => left < right - margin * right.abs(),
-        Relation::Above => left > right + margin * right.abs(),
-        Relation::AtMost => left <= right - margin * right.abs(),
-        Relation::AtLeast => left >= right + margin * right.abs(),
-    };
-    let held = compared.iter().filter(holds).count();
+    let held = compared.iter().filter(|(left, right)| stand(check.relation, *left, *right, by));
+    let held = held.count();
     Ok(Checked {
         left: numbers(&left),
         right: numbers(&right),
@@ -163,6 +157,18 @@ fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
         pairs,
         held,
     })
+}
+
+/// Returns whether two numbers stand in a relation, with `by` as the least difference. What never
+/// settles is later than all that does, and neither below nor at most what never settles either.
+fn stand(relation: Relation, left: f64, right: f64, by: Option<f64>) -> bool {
+    let margin = if right.is_finite() { by.unwrap_or(0.0) * right.abs() } else { 0.0 };
+    match relation {
+        Relation::Below => left < right - margin,
+        Relation::Above => left > right + margin,
+        Relation::AtMost => left.is_finite() && left <= right - margin,
+        Relation::AtLeast => left >= right + margin,
+    }
 }
 
 /// Replaces the missing time of what never settles by infinity, so that it can be compared.
@@ -229,6 +235,18 @@ mod tests {
         );
         assert!(held(Below, 0.4, 1.0, Some(0.5)) && !held(Below, 0.6, 1.0, Some(0.5)));
         assert!(held(Above, 1.6, 1.0, Some(0.5)) && !held(Above, 1.4, 1.0, Some(0.5)));
+    }
+
+    #[test]
+    fn what_never_settles_is_later_than_all_that_does() {
+        use Relation::{Above, AtMost, Below};
+        let never = f64::INFINITY;
+        for by in [None, Some(0.1)] {
+            assert!(stand(Below, 3.0, never, by) && stand(AtMost, 3.0, never, by));
+            assert!(!stand(Below, never, 3.0, by) && !stand(AtMost, never, 3.0, by));
+            assert!(stand(Above, never, 3.0, by) && !stand(Above, 3.0, never, by));
+            assert!(!stand(Below, never, never, by) && !stand(AtMost, never, never, by));
+        }
     }
 
     #[test]

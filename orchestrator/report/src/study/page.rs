@@ -224,13 +224,17 @@ fn because(check: &Check, checked: &Checked) -> Markup {
     };
     let mut count = if all > 1 { format!(", in {held} of {all} runs") } else { String::new() };
     let missing = all - checked.difference.0.len();
-    if missing > 0 {
+    if all > 1 && missing > 0 {
         let _ = write!(count, ", of which {missing} have no such number");
     }
+    // Only a time after which something settles can be without a number here.
+    let side = |side: &Numbers| if side.0.is_empty() { "never".into() } else { several(side) };
+    let is_compared = !checked.difference.0.is_empty();
     html! {
         span class=(class(checked.verdict())) { (checked.verdict().text()) } " "
-        (check.label) ": " (several(&checked.left)) " against " (several(&checked.right))
-        " (" (percent(&checked.difference)) "; asked: " (asked) (count) ")"
+        (check.label) ": " (side(&checked.left)) " against " (side(&checked.right)) " ("
+        @if is_compared { (percent(&checked.difference)) "; " }
+        "asked: " (asked) (count) ")"
     }
 }
 
