@@ -22,7 +22,7 @@ static FORMS: Enumeration<SecondOrderForm> = Enumeration {
         (
             SecondOrderForm::Printed,
             "printed",
-            "plus k3 and sgn twice, as (43) and (45) are printed; the attitude is lost",
+            "plus k3 and sgn twice, as (43) and (45) are printed; they do not",
         ),
     ],
 };
