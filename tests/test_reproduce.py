@@ -313,6 +313,50 @@ right = 1.0
     assert re.search(r"lqr: the attitude is lost in 3 of 3 runs, at t = \S+ s or later", finished.stdout)
 
 
+@pytest.mark.parametrize(
+    ("key", "other"),
+    [("every", "every = 2"), ("unit", 'unit = { name = "mdeg", factor = 1e3 }'), ("over", "over = [1.0, 2.0]"), ("kind", 'kind = "largest"')],
+)
+def test_a_changed_measure_is_computed_again(tmp_path, key, other):
+    study = tmp_path / "study"
+    study.mkdir()
+    (study / "lqr.toml").write_text(merged(EXPERIMENTS / "lqr.toml"))
+
+    def written(*keys: str) -> str:
+        kind = [] if key == "kind" and keys else ['kind = "rms"']
+        return "\n".join(
+            [
+                'title = "one run"',
+                'paper = "none"',
+                'summary = "none"',
+                "values = []",
+                "[signals]",
+                'alpha = ["plant.attitude.alpha"]',
+                "[[measure]]",
+                'id = "m"',
+                'signals = "alpha"',
+                *kind,
+                *keys,
+                "[[run]]",
+                'id = "lqr"',
+                'label = "LQR"',
+                'color = "#000000"',
+                'experiment = "lqr.toml"',
+                'measures = ["m"]',
+            ]
+        )
+
+    values = []
+    for text in (written(), written(other)):
+        (study / "study.toml").write_text(text)
+        finished = reproduce(study, tmp_path / "out")
+        assert finished.returncode == 0, finished.stderr
+        assert "1 run now" in finished.stdout
+        (member,) = json.loads((tmp_path / "out" / "results.json").read_text())["runs"]["lqr"]["members"]
+        values.append(member["measures"]["m"])
+    assert values[0] != values[1]
+
+
 def test_a_changed_experiment_is_run_again(report, tmp_path):
     study, out = copied("crmpc-2022", tmp_path), tmp_path / "out"
     shutil.copytree(report[1] / "runs", out / "runs")

@@ -279,13 +279,8 @@ fn keys(
             .bounds_of(run)
             .map(|(within, signals)| Ok(json!([within.id, signals, study.number(&within.bound)?])))
             .collect::<Result<Vec<_>, Error>>()?;
-        let measures: Vec<Value> = study
-            .measures_of(run)
-            .map(|(measure, signals)| {
-                let kind = format!("{:?}", measure.kind);
-                json!([measure.id, kind, signals, measure.over, measure.band, measure.hold])
-            })
-            .collect();
+        let measures: Vec<Value> =
+            study.measures_of(run).map(|measure_and_signals| json!(measure_and_signals)).collect();
         let all = json!({
             "format": FORMAT,
             "program": program,
