@@ -427,7 +427,7 @@ VERDICTS_OF_WU = {
     "the errors of SOTVSMC/DO are much smaller than those of BTVSMC/DO.": (HOLDS, HOLDS, PARTLY),
     "the sliding variables of BTVSMC do not converge to zero.": (HOLDS, HOLDS, HOLDS),
     "the time-varying surface has no reaching phase: the sliding variables begin at zero.": (HOLDS, HOLDS, HOLDS),
-    "under the laws with an observer they move away from zero and are back after about 4 s.": (HOLDS, FAILS, PARTLY),
+    "under the laws with an observer they move away from zero and are back after about 4 s.": (HOLDS, FAILS, FAILS),
     "the sliding variables of BTVSMC/DO stay inside the boundary layer.": (HOLDS, FAILS, HOLDS),
     "the sliding variables of SOTVSMC/DO converge to zero more precisely than those of BTVSMC/DO.": (HOLDS, HOLDS, FAILS),
     "the observer estimates the sliding variables effectively.": (HOLDS, PARTLY, HOLDS),
