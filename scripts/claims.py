@@ -17,7 +17,9 @@ sections of items. An item has
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
@@ -91,50 +93,16 @@ def kind(place: str) -> str:
     return "figure" if re.fullmatch(r"Fig\. \d+", place) else "table" if place.startswith("Table ") else "claim"
 
 
-def overlay(table: dict, below: dict) -> dict:
-    """A table with what it lacks from the one below. Tables merge, all else counts as a whole."""
-    both = {key: overlay(table[key], below[key]) for key in table.keys() & below.keys() if isinstance(table[key], dict) and isinstance(below[key], dict)}
-    return {**below, **table, **both}
-
-
-def extended(file: Path) -> dict:
-    """A study with all that it extends."""
-    text = tomllib.loads(file.read_text(encoding="utf-8"))
-    below: dict = {}
-    for base in listed(text.get("extends", [])):
-        below = overlay(extended(file.parent / base), below)
-    return overlay(text, below)
-
-
-def listed(value: str | list) -> list:
-    return value if isinstance(value, list) else [value]
-
-
-def filled(value, row: dict):
-    """A value in which names in braces are replaced by those of the row."""
-    if isinstance(value, dict):
-        return {key: filled(inner, row) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [filled(inner, row) for inner in value]
-    if not isinstance(value, str):
-        return value
-    whole = re.fullmatch(r"\{(\w+)\}", value)
-    if whole and whole[1] in row:
-        return row[whole[1]]
-    return re.sub(r"\{(\w+)\}", lambda name: str(row.get(name[1], name[0])), value)
-
-
-def spelled_out(entry: dict, study: dict, outer: dict | None = None) -> list[dict]:
-    """What an entry of a study stands for: one for each row of its `each` and template of its `use`."""
-    rows = entry.get("each", [{}])
-    made = []
-    for line in study["lists"][rows] if isinstance(rows, str) else rows:
-        row = {**(outer or {}), **line}
-        own = filled({key: value for key, value in entry.items() if key not in ("use", "each")}, row)
-        for name in listed(filled(entry["use"], row)) if "use" in entry else []:
-            made += spelled_out(overlay(own, filled(study["templates"][name], row)), study, row)
-        made += [] if "use" in entry else [own]
-    return made
+def spelled_out(study: str) -> dict:
+    """A study with all that it extends and with its templates, by the orchestrator."""
+    target = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
+    programs = [target / profile / "orchestrator" for profile in ("release", "debug")]
+    built = [program for program in programs if program.is_file()]
+    if not built:
+        sys.exit("error: the orchestrator has not been built: run scripts/build-fmus")
+    program = max(built, key=lambda file: file.stat().st_mtime)
+    shown = subprocess.run([program, "show", STUDIES / study / "study.toml"], check=True, capture_output=True, text=True, encoding="utf-8")
+    return tomllib.loads(shown.stdout)
 
 
 Found = dict[str, dict[str, list[str]]]
@@ -144,11 +112,8 @@ def found(names: list[str]) -> Found:
     """What items can refer to in each study: ids of figures, titles of tables and overviews, words of
     claims."""
     marks = {"figure": "id", "table": "title", "overview": "title", "claim": "says"}
-    studies = {name: extended(STUDIES / name / "study.toml") for name in names}
-    return {
-        name: {what: [one[mark] for entry in study.get(what, []) for one in spelled_out(entry, study)] for what, mark in marks.items()}
-        for name, study in studies.items()
-    }
+    studies = {name: spelled_out(name) for name in names}
+    return {name: {what: [entry[mark] for entry in study.get(what, [])] for what, mark in marks.items()} for name, study in studies.items()}
 
 
 def words(claim: str) -> str:

@@ -91,20 +91,6 @@ def test_every_claim_and_figure_of_the_studies_belongs_to_an_item(name):
     assert len(owed) >= 10
 
 
-def test_an_entry_stands_for_all_rows_and_templates():
-    study = {
-        "lists": {"laws": [{"law": "A", "n": 1}, {"law": "B", "n": 2}]},
-        "templates": {
-            "both": {"use": ["one", "two"]},
-            "one": {"says": "{setup}: one of {law}", "inner": {"x": 1, "y": "{n}"}},
-            "two": {"each": [{"m": "3"}, {"m": "4"}], "says": "two of {law}{m}"},
-        },
-    }
-    made = claims.spelled_out({"use": "both", "each": "laws", "setup": "S", "inner": {"x": 0}}, study, {"setup": "S"})
-    assert [one["says"] for one in made] == ["S: one of A", "two of A3", "two of A4", "S: one of B", "two of B3", "two of B4"]
-    assert made[3]["inner"] == {"x": 0, "y": 2}
-
-
 def test_a_reference_means_one_setup_or_all_that_begin_so():
     entries = {"figure": ["fig-3"], "table": [], "overview": [], "claim": ["Direct: they rest.", "Direct, as printed: they rest.", "They: rest."]}
     means = lambda reference: [name for _, _, name in claims.matches(reference, {"s": entries})]

@@ -170,11 +170,10 @@ enum Command {
         #[arg(long, conflicts_with_all = ["json", "pattern", "causality"])]
         check: bool,
     },
-    /// Print an experiment with everything that it extends merged into one text, which runs as the
-    /// experiment does.
+    /// Print an experiment or a study with all that it extends, templates and lists spelled out.
     Show {
-        /// Experiment to print: a file, or the name of an experiment that `list` shows.
-        experiment: PathBuf,
+        /// What to print: a file, or a name that `list` shows.
+        name: PathBuf,
     },
     /// Print the JSON Schema of a kind of file, with which editors complete and check such files.
     Schema {
@@ -328,7 +327,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Inspect { fmu, filter, json, check: false } => {
             inspect::inspect(&fmu, &filter, json, out)
         }
-        Command::Show { experiment } => show(&experiment, out),
+        Command::Show { name } => show(&name, out),
         Command::Schema { kind } => Ok(out.write_all(schema::text(kind).as_bytes())?),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Arguments::command(), "orchestrator", out);
@@ -391,8 +390,11 @@ fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
     }
 }
 
-/// Prints an experiment with everything that it extends.
-fn show(experiment: &Path, out: &mut impl Write) -> Result<(), Failure> {
-    let experiment = Experiment::load(&search::experiment(experiment)?)?;
-    Ok(out.write_all(experiment.source.whole().as_bytes())?)
+/// Prints an experiment or a study with everything that it extends.
+fn show(name: &Path, out: &mut impl Write) -> Result<(), Failure> {
+    let text = match reproduce::find(name) {
+        Ok(path) if path.ends_with("study.toml") => Study::spelled_out(&path)?,
+        _ => Experiment::load(&search::experiment(name)?)?.source.whole().into(),
+    };
+    Ok(out.write_all(text.as_bytes())?)
 }

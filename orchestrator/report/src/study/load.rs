@@ -69,6 +69,22 @@ impl Study {
         Ok(study)
     }
 
+    /// Returns the text of a study with all that it extends, and with every template and list
+    /// spelled out.
+    ///
+    /// # Errors
+    /// Returns an error if a file cannot be read, is not TOML, or names a template or list that
+    /// does not exist.
+    pub fn spelled_out(path: &Path) -> Result<String, Error> {
+        let source = Source::load(path)?;
+        let study: toml::Table = source.read_with(|mut table| {
+            template::expand(table.get_mut())
+                .map_err(|(span, message)| source.error(&span, message))?;
+            source.take(table)
+        })?;
+        Ok(study.to_string())
+    }
+
     /// Notes what the experiments ask for. An experiment that cannot be read is reported later,
     /// when it is to be run.
     fn learn_metrics(&mut self) {
