@@ -17,6 +17,7 @@ use vehicle::platform::Surroundings;
 use vehicle::sensor_data::SensorData;
 use vehicle::sensors::{self, Line};
 use vehicle::triad::Triad;
+use vehicle::turntable;
 
 /// Default of the longest integration step, s.
 const STEP: f64 = 0.01;
@@ -76,7 +77,11 @@ pub(crate) static ACTUATIONS: Enumeration<Actuation> = Enumeration {
     name: "Actuation",
     description: "How the control moment comes about",
     items: &[
-        (Actuation::Moment, "moment", "the input moment acts, after actuation.delay"),
+        (
+            Actuation::Moment,
+            "moment",
+            "the input moment acts, after actuation.delay, rounded to actuation.resolution",
+        ),
         (
             Actuation::SurfacesAndJets,
             "surfacesAndJets",
@@ -132,6 +137,7 @@ pub(crate) struct Parameters {
     pub(crate) earth_rate: f64,
     pub(crate) actuation: Actuation,
     pub(crate) moment_delay: f64,
+    pub(crate) moment_resolution: f64,
     pub(crate) flight: Flight,
     pub(crate) density_scale: f64,
     pub(crate) aerodynamics_scale: f64,
@@ -141,6 +147,7 @@ pub(crate) struct Parameters {
     pub(crate) triads: [Triad; 3],
     pub(crate) line: Line,
     pub(crate) sensor_seed: u64,
+    pub(crate) turntable: turntable::Config,
     pub(crate) surroundings: Surroundings,
     pub(crate) calibrates: bool,
     pub(crate) sequence: Sequence,
@@ -180,6 +187,7 @@ impl Default for Parameters {
             earth_rate: 0.0,
             actuation: Actuation::default(),
             moment_delay: 0.0,
+            moment_resolution: 0.0,
             flight: tvsmc.flight.unwrap_or(Flight { altitude: 0.0, mach: 0.0 }),
             density_scale: 1.0,
             aerodynamics_scale: 1.0,
@@ -189,6 +197,7 @@ impl Default for Parameters {
             triads: sensors.mems,
             line,
             sensor_seed: 1,
+            turntable: turntable::Config::default(),
             surroundings: sensors.surroundings,
             calibrates: false,
             sequence: sensors.calibration,
@@ -268,9 +277,11 @@ impl Parameters {
             earth_rate: self.earth_rate,
             actuators: self.actuators()?,
             moment_delay: self.moment_delay,
+            moment_resolution: self.moment_resolution,
             calibration: self.calibrates.then_some(self.sequence),
             surroundings: self.surroundings,
             sensors: self.sensors(),
+            turntable: self.turntable,
             step: self.step,
         })
     }

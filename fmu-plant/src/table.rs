@@ -32,6 +32,7 @@ pub(crate) const FIELDS: &Fields = &[
     ("step", "integrator.step"),
     ("earth_rate", "trajectory.earthRate"),
     ("moment_delay", "actuation.delay"),
+    ("moment_resolution", "actuation.resolution"),
     ("actuators.aerodynamics_scale", "aerodynamics.scale"),
     ("disturbance.square_period", "disturbance.square.period"),
     ("disturbance.table.rows[].time", "disturbance.table.time[]"),
@@ -64,7 +65,7 @@ fn all() -> Plant {
     let table = table.real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| {
         &mut m.parameters.step
     });
-    standard_pressure(disturbance_table(delay(sensors::all(kinematics(actuation(table))))))
+    standard_pressure(disturbance_table(converted(sensors::all(kinematics(actuation(table))))))
 }
 
 /// Returns the description of the unit for FMI.
@@ -375,12 +376,16 @@ fn actuation(table: Plant) -> Plant {
         .boolean(symmetric, |m| &mut m.parameters.jet_symmetric)
 }
 
-fn delay(table: Plant) -> Plant {
+fn converted(table: Plant) -> Plant {
     let text = "Time after which the input moment acts, held over each step; co-simulation with actuation = moment only";
     let delay = parameter("actuation.delay", text).real().unit(unit::time());
-    table.real(delay.min(0.0).max(transport::LONGEST).nominal(0.1), |m| {
-        &mut m.parameters.moment_delay
-    })
+    let text = "Step of the converter that rounds the input moment, held over each step; 0 for none; co-simulation with actuation = moment only";
+    let resolution = parameter("actuation.resolution", text).real().unit(unit::moment());
+    table
+        .real(delay.min(0.0).max(transport::LONGEST).nominal(0.1), |m| {
+            &mut m.parameters.moment_delay
+        })
+        .real(resolution.min(0.0).nominal(10.0), |m| &mut m.parameters.moment_resolution)
 }
 
 fn inertia(table: Plant) -> Plant {

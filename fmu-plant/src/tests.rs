@@ -831,7 +831,7 @@ fn oracle_input_derivatives_are_integrated() {
 
 #[test]
 fn refusals_name_variables() {
-    let changes: [fn(&mut ReentryPlant); 40] = [
+    let changes: [fn(&mut ReentryPlant); 46] = [
         |unit| unit.parameters.inertia.Ixx = 0.0,
         |unit| unit.parameters.inertia.Ixz = 2e6,
         |unit| unit.parameters.inertia.Iyy = 1e7,
@@ -844,6 +844,11 @@ fn refusals_name_variables() {
         |unit| {
             unit.parameters.actuation = Actuation::SurfacesAndJets;
             unit.parameters.moment_delay = 0.1;
+        },
+        |unit| unit.parameters.moment_resolution = -1.0,
+        |unit| {
+            unit.parameters.actuation = Actuation::SurfacesAndJets;
+            unit.parameters.moment_resolution = 8.0;
         },
         |unit| {
             unit.parameters.actuation = Actuation::SurfacesAndJets;
@@ -884,6 +889,13 @@ fn refusals_name_variables() {
         |unit| unit.parameters.triads[2].resolution = -1.0,
         |unit| unit.parameters.triads[0].matrix.fill(f64::NAN),
         |unit| unit.parameters.triads[1].bias.fill(f64::NAN),
+        |unit| unit.parameters.triads[1].drift.fill(f64::NAN),
+        |unit| unit.parameters.turntable.bandwidth = -1.0,
+        |unit| unit.parameters.turntable.rate = -1.0,
+        |unit| {
+            unit.parameters.sensor_set = 0;
+            unit.parameters.turntable.bandwidth = 10.0;
+        },
     ];
     let refusal = |set: &fn(&mut ReentryPlant)| {
         let mut unit = ReentryPlant::new();
@@ -1039,6 +1051,9 @@ fn a_delay_is_refused_by_name_where_it_cannot_work() {
     assert!(delayed(0.0).new_discrete_states(0.0).is_ok());
     let ramp = text(delayed(0.1).step(0.0, 0.04, &Ramp(1e5), &mut |_| {}).unwrap_err());
     assert!(ramp.contains("actuation.delay") && ramp.contains("derivatives"), "{ramp}");
+    let mut converted = started(|unit| unit.parameters.moment_resolution = 8.0);
+    let in_model_exchange = text(converted.new_discrete_states(0.0).unwrap_err());
+    assert!(in_model_exchange.contains("actuation.resolution = 8 N m"), "{in_model_exchange}");
     let mut actuated = ReentryPlant::new();
     actuated.parameters.moment_delay = 0.1;
     actuate(&mut actuated);

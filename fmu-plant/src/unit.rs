@@ -159,11 +159,16 @@ impl Model for ReentryPlant {
 
     fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure> {
         self.ready()?;
-        let delay = self.parameters.moment_delay;
-        if delay > 0.0 {
-            return Err(Failure::Error(format!(
-                "actuation.delay = {delay} s works in co-simulation only: set it to 0 for model exchange"
-            )));
+        let parameters = &self.parameters;
+        for (name, value, unit) in [
+            ("delay", parameters.moment_delay, "s"),
+            ("resolution", parameters.moment_resolution, "N m"),
+        ] {
+            if value > 0.0 {
+                return Err(Failure::Error(format!(
+                    "actuation.{name} = {value} {unit} works in co-simulation only: set it to 0 for model exchange"
+                )));
+            }
         }
         self.event_driven = true;
         let Some(plant) = &mut self.plant else { return Ok(EventInfo::default()) };

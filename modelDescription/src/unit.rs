@@ -68,9 +68,17 @@ pub fn length() -> Unit {
 pub fn acceleration() -> Unit {
     unit("m/s2", [0, 1, -2, 0], None)
 }
+/// Unit of the rate of an acceleration, m/s³.
+pub fn acceleration_rate() -> Unit {
+    unit("m/s3", [0, 1, -3, 0], None)
+}
 /// Unit of a magnetic flux density, T.
 pub fn flux_density() -> Unit {
     Unit { ampere: -1, ..unit("T", [1, 0, -2, 0], None) }
+}
+/// Unit of the rate of a magnetic flux density, T/s.
+pub fn flux_density_rate() -> Unit {
+    Unit { ampere: -1, ..unit("T/s", [1, 0, -3, 0], None) }
 }
 /// Unit of a time, s.
 pub fn time() -> Unit {

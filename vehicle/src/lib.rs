@@ -27,6 +27,7 @@ pub mod table;
 pub mod time;
 pub mod transport;
 pub mod triad;
+pub mod turntable;
 
 pub use error::Error;
 pub use plant::Plant;

@@ -17,6 +17,7 @@ use crate::platform::Surroundings;
 use crate::sensors::{self, Sensors};
 use crate::time::{check_resolution, tolerance};
 use crate::transport::Transport;
+use crate::turntable::{self, Turntable};
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -150,6 +151,9 @@ pub struct Config {
     /// Time (s, from 0 to [`crate::transport::LONGEST`]) after which the input moment acts; it is
     /// zero with actuators. A delayed moment is taken at the beginning of each communication step.
     pub moment_delay: f64,
+    /// Step (N m) of the converter that the input moment passes; 0 for none. A converted moment is
+    /// held over each communication step.
+    pub moment_resolution: f64,
     /// Prescribed motion that starts at the initial angles and replaces the dynamics.
     pub calibration: Option<Sequence>,
     /// Gravity and magnetic field that the sensors measure.
@@ -157,6 +161,8 @@ pub struct Config {
     /// Configuration of sampled sensors; without it the plant outputs the readings of ideal
     /// sensors.
     pub sensors: Option<sensors::Config>,
+    /// Servo of the turntable on which sampled sensors stand.
+    pub turntable: turntable::Config,
     /// Longest step of the integration, s.
     pub step: f64,
 }
@@ -203,9 +209,11 @@ pub struct Plant {
     disturbance: Disturbance,
     actuators: Option<Actuators>,
     transport: Option<Transport>,
+    moment_resolution: f64,
     calibration: Option<Calibration>,
     surroundings: Surroundings,
     sensors: Option<Sensors>,
+    turntable: Option<Turntable>,
     step: f64,
     start_time: f64,
     held: Option<Held>,
@@ -252,6 +260,24 @@ impl Plant {
             );
             return refuse("moment_delay", problem);
         }
+        let resolution = config.moment_resolution;
+        if !(resolution >= 0.0 && resolution.is_finite()) {
+            return refuse("moment_resolution", format!("= {resolution} N m must not be negative"));
+        }
+        if config.actuators.is_some() && resolution > 0.0 {
+            let problem = format!(
+                "= {resolution} N m rounds an input moment, and there is none with actuators"
+            );
+            return refuse("moment_resolution", problem);
+        }
+        let turntable = Turntable::new(&config.turntable)?;
+        if turntable.is_some() && config.sensors.is_none() {
+            let problem = format!(
+                "= {} Hz carries sampled sensors, and there are none",
+                config.turntable.bandwidth
+            );
+            return refuse("turntable.bandwidth", problem);
+        }
         config.disturbance.check()?;
         let held = config.disturbance.intervals(start_time).map(|(_, length)| length);
         for period in held.into_iter().chain([config.step]) {
@@ -271,6 +297,7 @@ impl Plant {
             disturbance: config.disturbance.clone(),
             actuators: config.actuators.as_ref().map(Actuators::new).transpose()?,
             transport,
+            moment_resolution: resolution,
             calibration: config.calibration.map(|sequence| Calibration { sequence, initial }),
             surroundings: config.surroundings,
             sensors: config
@@ -278,6 +305,7 @@ impl Plant {
                 .as_ref()
                 .map(|sensors| Sensors::new(sensors, start_time))
                 .transpose()?,
+            turntable,
             step: config.step,
             start_time,
             held: None,
@@ -301,6 +329,7 @@ impl Plant {
             && self.same_configuration(built)
             && self.sensors.as_ref().is_none_or(|sensors| sensors.fits(time, failed))
             && self.transport.as_ref().is_none_or(|transport| transport.fits(time, failed))
+            && self.turntable.as_ref().is_none_or(|turntable| turntable.fits(time, failed))
     }
 
     fn same_configuration(&self, other: &Self) -> bool {
@@ -308,14 +337,20 @@ impl Plant {
             (Some(one), Some(other)) => one.same_configuration(other),
             (one, other) => one.is_none() && other.is_none(),
         };
+        let turntables = match (&self.turntable, &other.turntable) {
+            (Some(one), Some(other)) => one.same_configuration(other),
+            (one, other) => one.is_none() && other.is_none(),
+        };
         let transport = self.transport.as_ref().map(Transport::delay);
         sensors
+            && turntables
             && transport == other.transport.as_ref().map(Transport::delay)
             && self.body == other.body
             && self.kinematics == other.kinematics
             && self.earth_rate == other.earth_rate
             && self.disturbance == other.disturbance
             && self.actuators == other.actuators
+            && self.moment_resolution == other.moment_resolution
             && self.calibration == other.calibration
             && self.surroundings == other.surroundings
             && self.step == other.step
@@ -464,9 +499,17 @@ impl Plant {
         elapsed: f64,
     ) -> Vector3<f64> {
         self.actuators.as_ref().map_or_else(
-            || delayed.unwrap_or(input.moment),
+            || self.converted(&delayed.unwrap_or(input.moment)),
             |all| all.moment(drive, &(self.deflections + all.rates(drive) * elapsed)),
         )
+    }
+
+    /// Moment (N m) behind the converter.
+    fn converted(&self, moment: &Vector3<f64>) -> Vector3<f64> {
+        match self.moment_resolution {
+            0.0 => *moment,
+            step => moment.map(|component| (component / step).round() * step),
+        }
     }
 
     /// Control moment (N m) that acts at present.
@@ -484,7 +527,8 @@ impl Plant {
     pub fn applied_moment_by_moment_and_deflections(
         &self,
     ) -> (Matrix3<f64>, SMatrix<f64, 3, SURFACES>) {
-        let at_once = if self.transport.is_some() { Matrix3::zeros() } else { Matrix3::identity() };
+        let held = self.transport.is_some() || self.moment_resolution > 0.0;
+        let at_once = if held { Matrix3::zeros() } else { Matrix3::identity() };
         self.actuators.as_ref().map_or((at_once, SMatrix::zeros()), |all| {
             (Matrix3::zeros(), *all.moment_by_deflections())
         })
@@ -545,6 +589,38 @@ impl Plant {
         (partials, input.trajectory.turn_rate_by_fields(self.earth_rate))
     }
 
+    /// Checks that a moment that is delayed or converted is held over a communication step.
+    ///
+    /// # Errors
+    /// Reports a moment that is not held.
+    fn check_held(
+        &self,
+        from: f64,
+        to: f64,
+        input: &mut impl FnMut(f64) -> Input,
+    ) -> Result<(), Error> {
+        let (name, done) = if let Some(transport) = &self.transport {
+            ("moment_delay", format!("{} s delays", transport.delay()))
+        } else if self.moment_resolution > 0.0 {
+            ("moment_resolution", format!("{} N m rounds", self.moment_resolution))
+        } else {
+            return Ok(());
+        };
+        // Inputs have derivatives up to order three, and a cubic with four equal values is
+        // constant.
+        let begin = input(from).moment;
+        let mut parts = [1.0 / 3.0, 2.0 / 3.0, 1.0].into_iter();
+        // What is not finite is reported as such where it is used.
+        let finite = begin.iter().all(|value| value.is_finite());
+        if !finite || parts.all(|part| input(from + part * (to - from)).moment == begin) {
+            return Ok(());
+        }
+        let problem = format!(
+            "= {done} a moment that is held over each communication step; give its inputs no derivatives"
+        );
+        Err(Error::of(name, problem))
+    }
+
     /// Moves the plant from `from` to `to` (s) under a constant control moment (N m).
     ///
     /// # Errors
@@ -571,13 +647,10 @@ impl Plant {
         command: &Command,
         mut input: impl FnMut(f64) -> Input,
     ) -> Result<(), Error> {
-        if let Some(transport) = self.transport.as_mut().filter(|_| from < to) {
-            let begin = input(from).moment;
-            transport.command(from, begin)?;
-            // Inputs have derivatives up to order three, and a cubic with four equal values is
-            // constant.
-            for part in [1.0 / 3.0, 2.0 / 3.0, 1.0] {
-                transport.check_held(&begin, &input(from + part * (to - from)).moment)?;
+        if from < to {
+            self.check_held(from, to, &mut input)?;
+            if let Some(transport) = &mut self.transport {
+                transport.command(from, input(from).moment)?;
             }
         }
         let mut time = from;

@@ -10,6 +10,7 @@ use crate::kinematics::Kinematics;
 use crate::plant::{self, Config};
 use crate::platform::Surroundings;
 use crate::profile::{Course, Profile, Segment, Wave};
+use crate::turntable;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
@@ -103,9 +104,11 @@ impl Scenario {
             earth_rate: 0.0,
             actuators: None,
             moment_delay: 0.0,
+            moment_resolution: 0.0,
             calibration: None,
             surroundings: Surroundings::default(),
             sensors: None,
+            turntable: turntable::Config::default(),
             step,
         }
     }

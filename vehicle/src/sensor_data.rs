@@ -160,6 +160,8 @@ impl Sensor {
                 .matrix
                 .map_or_else(Matrix3::identity, |rows| Matrix3::from(rows).transpose()),
             bias: self.bias * unit,
+            // Data sheets give none over the length of a flight.
+            drift: Vector3::zeros(),
             noise: self.noise * unit,
             bandwidth: self.bandwidth,
             range: self.range * unit,

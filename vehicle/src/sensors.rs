@@ -40,6 +40,15 @@ pub struct Line {
     pub drop_window: Window,
 }
 
+/// Instant at which a sample is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Instant {
+    /// Number of the tick, counted from 0.
+    pub tick: i64,
+    /// Time by the clock of the line, s.
+    pub time: f64,
+}
+
 /// Sample of the three sensors as it arrives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
@@ -54,17 +63,15 @@ pub struct Sample {
 /// Sample that was taken, whether or not it has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Taken {
-    tick: i64,
-    /// Time at which it was taken, by the clock of the line, s.
-    time: f64,
+    at: Instant,
     memories: [Memory; 3],
     dropped: bool,
 }
 
 impl Taken {
     fn sample(&self) -> Sample {
-        let number = i32::try_from(self.tick + 1).unwrap_or(i32::MAX);
-        Sample { number, time: self.time, readings: self.memories.map(|memory| memory.value) }
+        let number = i32::try_from(self.at.tick + 1).unwrap_or(i32::MAX);
+        Sample { number, time: self.at.time, readings: self.memories.map(|memory| memory.value) }
     }
 }
 
@@ -151,7 +158,8 @@ impl Sensors {
     /// lies in the future. A step that has `failed` may have gone beyond `time`.
     pub(crate) fn fits(&self, time: f64, failed: bool) -> bool {
         let latest = if failed { i64::MAX / 2 } else { self.tick_at(time) };
-        let past = |taken: &Taken| (0..=latest).contains(&taken.tick) && taken.time.is_finite();
+        let past =
+            |taken: &Taken| (0..=latest).contains(&taken.at.tick) && taken.at.time.is_finite();
         check_resolution(time, self.config.line.period).is_ok()
             && self.before.iter().chain(&self.last).chain(self.line.iter().flatten()).all(past)
             && self.arrived.time.is_finite()
@@ -178,27 +186,36 @@ impl Sensors {
         ((time - delay - self.start + tick_tolerance(time, period)) / period).floor() as i64
     }
 
-    /// Sample that is due at `time` (s), or `None` if the sample of the present tick was taken at
-    /// an earlier time.
-    fn due(&self, time: f64, felt: &Readings) -> Option<Taken> {
+    /// Instant of the sample that is due at `time` (s), or `None` if the sample of the present tick
+    /// was taken at an earlier time.
+    pub fn due(&self, time: f64) -> Option<Instant> {
         let tick = self.tick_at(time);
         let tolerance = tick_tolerance(time, self.config.line.period);
-        let before = match self.last {
-            Some(last) if last.tick == tick && time <= last.time + tolerance => self.before,
-            Some(last) if last.tick >= tick => return None,
-            last => last,
+        let taken = self.last.is_some_and(|last| {
+            last.at.tick > tick || last.at.tick == tick && time > last.at.time + tolerance
+        });
+        // An importer may have missed the time of the tick; the sample is then taken late.
+        let nominal = tick_time(tick, self.start, self.config.line.period);
+        let time = if time > nominal + tolerance { time } else { nominal };
+        (!taken).then_some(Instant { tick, time })
+    }
+
+    /// Sample that is taken at an instant.
+    fn sampled(&self, at: Instant, felt: &Readings) -> Taken {
+        let before = if self.last.is_some_and(|last| last.at.tick == at.tick) {
+            self.before
+        } else {
+            self.last
         };
         let Config { triads, line, .. } = &self.config;
-        // An importer may have missed the time of the tick; the sample is then taken late.
-        let nominal = tick_time(tick, self.start, line.period);
-        let taken = if time > nominal + tolerance { time } else { nominal };
-        let (noise, chance) = self.config.draw(tick);
+        let (noise, chance) = self.config.draw(at.tick);
         let memories = std::array::from_fn(|i| {
-            let before = before.as_ref().map(|before| (&before.memories[i], taken - before.time));
-            triads[i].sample(taken, &felt[i], &noise[i], before)
+            let before =
+                before.as_ref().map(|before| (&before.memories[i], at.time - before.at.time));
+            triads[i].drifted(at.time - self.start).sample(at.time, &felt[i], &noise[i], before)
         });
-        let dropped = line.drop_window.holds(taken) && chance < line.drop_probability;
-        Some(Taken { tick, time: taken, memories, dropped })
+        let dropped = line.drop_window.holds(at.time) && chance < line.drop_probability;
+        Taken { at, memories, dropped }
     }
 
     fn slot(&self, tick: i64) -> usize {
@@ -208,9 +225,9 @@ impl Sensors {
     /// Newest of the samples taken that has arrived by `time` (s).
     fn newest(&self, time: f64) -> Sample {
         let Some(last) = self.last else { return self.arrived };
-        let newest = self.tick_arrived(time).min(last.tick);
+        let newest = self.tick_arrived(time).min(last.at.tick);
         let on_the_line = (0..=newest).rev().take(self.line.len()).find_map(|tick| {
-            self.line[self.slot(tick)].filter(|taken| taken.tick == tick && !taken.dropped)
+            self.line[self.slot(tick)].filter(|taken| taken.at.tick == tick && !taken.dropped)
         });
         on_the_line.map_or(self.arrived, |taken| taken.sample())
     }
@@ -219,12 +236,13 @@ impl Sensors {
     /// A call repeated at the same tick replaces the sample.
     pub fn take(&mut self, time: f64, felt: &Readings) {
         self.arrived = self.newest(time);
-        if let Some(taken) = self.due(time, felt) {
-            if self.last.is_none_or(|last| last.tick != taken.tick) {
+        if let Some(at) = self.due(time) {
+            let taken = self.sampled(at, felt);
+            if self.last.is_none_or(|last| last.at.tick != at.tick) {
                 self.before = self.last;
             }
             self.last = Some(taken);
-            let slot = self.slot(taken.tick);
+            let slot = self.slot(at.tick);
             self.line[slot] = Some(taken);
             self.arrived = self.newest(time);
         }
@@ -238,8 +256,9 @@ impl Sensors {
     /// Newest sample that would have arrived after a call of [`Sensors::take`] at `time` (s).
     pub fn shown(&self, time: f64, felt: &Readings) -> Sample {
         let due = self
-            .due(time, felt)
-            .filter(|taken| taken.tick <= self.tick_arrived(time) && !taken.dropped);
-        due.map_or_else(|| self.newest(time), |taken| taken.sample())
+            .due(time)
+            .filter(|at| at.tick <= self.tick_arrived(time))
+            .map(|at| self.sampled(at, felt));
+        due.filter(|taken| !taken.dropped).map_or_else(|| self.newest(time), |taken| taken.sample())
     }
 }

@@ -103,22 +103,6 @@ impl Transport {
         Ok(())
     }
 
-    /// Checks that the moment is held over a communication step, given its value at the beginning
-    /// and one at a later time in the step.
-    ///
-    /// # Errors
-    /// Reports a moment that is not held.
-    pub fn check_held(&self, begin: &Vector3<f64>, later: &Vector3<f64>) -> Result<(), Error> {
-        if begin == later {
-            return Ok(());
-        }
-        let problem = format!(
-            "= {} s delays a moment that is held over each communication step; give its inputs no derivatives",
-            self.delay
-        );
-        Err(Error::of(NAME, problem))
-    }
-
     /// Moment (N m) that acts at `time` (s).
     pub fn moment(&self, time: f64) -> Vector3<f64> {
         self.arrived(time)

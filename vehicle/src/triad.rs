@@ -1,6 +1,6 @@
 //! One sensor with three axes and its errors, in the order in which they act on the measured
-//! quantity: scale, misalignment and bias; bandwidth; white noise; range; resolution of the
-//! converter.
+//! quantity: scale, misalignment and bias, which may drift; bandwidth; white noise; range;
+//! resolution of the converter.
 
 use crate::error::Error;
 use crate::math::exp;
@@ -16,6 +16,8 @@ pub struct Triad {
     pub matrix: Matrix3<f64>,
     /// Bias of each axis; for a magnetometer it includes hard iron.
     pub bias: Vector3<f64>,
+    /// Change of the bias in a second, per axis.
+    pub drift: Vector3<f64>,
     /// Standard deviation of the white noise on each sample.
     pub noise: f64,
     /// Frequency at which a first-order low-pass filter attenuates by 3 dB, Hz; 0 for no filter.
@@ -51,6 +53,7 @@ impl Default for Triad {
         Self {
             matrix: Matrix3::identity(),
             bias: Vector3::zeros(),
+            drift: Vector3::zeros(),
             noise: 0.0,
             bandwidth: 0.0,
             range: 0.0,
@@ -88,6 +91,7 @@ impl Triad {
         for (name, finite) in [
             ("matrix", self.matrix.iter().all(|value| value.is_finite())),
             ("bias", self.bias.iter().all(|value| value.is_finite())),
+            ("drift", self.drift.iter().all(|value| value.is_finite())),
         ] {
             if !finite {
                 return Err(Error::of(
@@ -97,6 +101,12 @@ impl Triad {
             }
         }
         Ok(())
+    }
+
+    /// Returns the sensor with the bias that it has drifted to after the time `elapsed` (s).
+    #[must_use]
+    pub fn drifted(&self, elapsed: f64) -> Self {
+        Self { bias: self.bias + self.drift * elapsed, ..*self }
     }
 
     /// Takes the sample at `time` (s), which is the given time (s) after the one in `before`, if

@@ -9,7 +9,8 @@ use vehicle::kinematics::{Kinematics, Trajectory};
 use vehicle::plant::{
     Config, Input, Load, Partials, Plant, State, derivative, partial_derivatives,
 };
-use vehicle::{Error, Scenario};
+use vehicle::sensor_data::SensorData;
+use vehicle::{Error, Scenario, sensors, turntable};
 
 fn config() -> Config {
     Scenario::crmpc2022().config(0.01)
@@ -660,4 +661,91 @@ fn a_delay_that_cannot_work_is_refused_by_name() {
     }
     let error = plant.advance(0.0, 0.04, Vector3::repeat(f64::NAN)).unwrap_err();
     assert!(matches!(error, Error::NotFinite { what: "moment", .. }), "{error}");
+}
+
+#[test]
+fn oracle_a_converted_moment_acts_as_the_rounded_one_does() {
+    let step = 700.0;
+    let converted_config = Config { moment_resolution: step, ..config() };
+    let delayed_config = Config { moment_delay: 0.05, ..config() };
+    let delayed_converted_config = Config { moment_delay: 0.05, ..converted_config.clone() };
+    for (with, without) in
+        [(converted_config, config()), (delayed_converted_config, delayed_config)]
+    {
+        let [mut converted, mut rounded] =
+            [&with, &without].map(|config| Plant::new(config, 0.0).unwrap());
+        for k in 0..50 {
+            let (from, to) = (0.04 * f64::from(k), 0.04 * f64::from(k + 1));
+            converted.advance(from, to, moment(k)).unwrap();
+            rounded.advance(from, to, (moment(k) / step).map(f64::round) * step).unwrap();
+            assert_eq!(converted.state, rounded.state, "{k}");
+        }
+        let held = converted.in_force(2.0, &moment(50).into(), &Command::default());
+        let applied = converted.applied_moment(&moment(50).into(), &held) / step;
+        assert!((applied - applied.map(f64::round)).amax() < 1e-12 && applied.amax() > 1.0);
+    }
+}
+
+#[test]
+fn a_converter_that_cannot_work_is_refused_by_name() {
+    for moment_resolution in [-1.0, f64::NAN] {
+        let text =
+            Plant::new(&Config { moment_resolution, ..config() }, 0.0).unwrap_err().to_string();
+        assert!(text.contains("moment_resolution"), "{text}");
+    }
+    let with_actuators =
+        Config { moment_resolution: 1.0, ..actuated(State::zeros(), JetMode::OnOff) };
+    let text = Plant::new(&with_actuators, 0.0).unwrap_err().to_string();
+    assert!(text.contains("moment_resolution") && text.contains("actuators"), "{text}");
+    let mut plant = Plant::new(&Config { moment_resolution: 1.0, ..config() }, 0.0).unwrap();
+    let ramp = |time: f64| Vector3::new(0.0, 1e4 * time, 0.0).into();
+    let text = plant.advance_with(0.0, 0.04, &Command::default(), ramp).unwrap_err().to_string();
+    assert!(text.contains("moment_resolution") && text.contains("derivatives"), "{text}");
+    let error = plant.advance(0.0, 0.04, Vector3::repeat(f64::NAN)).unwrap_err();
+    assert!(matches!(error, Error::NotFinite { what: "moment", .. }), "{error}");
+}
+
+/// A plant whose sensors stand on a slow turntable.
+fn on_a_turntable() -> Config {
+    let data = SensorData::embedded();
+    Config {
+        sensors: Some(sensors::Config { triads: data.ideal, line: data.line, seed: 1 }),
+        surroundings: data.surroundings,
+        turntable: turntable::Config { bandwidth: 2.0, rate: 0.05, resolution: 1e-3 },
+        ..config()
+    }
+}
+
+#[test]
+fn samples_on_a_turntable_do_not_depend_on_the_communication_step() {
+    let [mut long, mut short] = [0, 1].map(|_| Plant::new(&on_a_turntable(), 0.0).unwrap());
+    let mut on_the_vehicle =
+        Plant::new(&Config { turntable: turntable::Config::default(), ..on_a_turntable() }, 0.0)
+            .unwrap();
+    for k in 0..25 {
+        let time = 0.04 * f64::from(k);
+        for plant in [&mut long, &mut on_the_vehicle] {
+            plant.advance(time, time + 0.04, moment(k)).unwrap();
+        }
+        for i in 0..8 {
+            let from = time + 0.005 * f64::from(i);
+            short.advance(from, from + 0.005, moment(k)).unwrap();
+        }
+        let input = moment(k).into();
+        let [at_long, at_short, at_vehicle] =
+            [&long, &short, &on_the_vehicle].map(|plant| plant.measured(time + 0.04, &input));
+        assert_eq!(at_long.number, at_short.number);
+        for i in 0..3 {
+            let scale = at_long.readings[i].amax();
+            assert!((at_long.readings[i] - at_short.readings[i]).amax() <= 1e-9 * scale, "{k} {i}");
+        }
+        assert_ne!(at_long.readings, at_vehicle.readings, "{k}");
+    }
+}
+
+#[test]
+fn a_turntable_needs_sampled_sensors() {
+    let config = Config { sensors: None, ..on_a_turntable() };
+    let text = Plant::new(&config, 0.0).unwrap_err().to_string();
+    assert!(text.contains("`turntable.bandwidth` = 2 Hz"), "{text}");
 }

@@ -55,6 +55,19 @@ fn the_embedded_data_can_be_used_and_ideal_sensors_have_no_errors() {
 }
 
 #[test]
+fn oracle_the_bias_drifts_linearly_from_the_start() {
+    let drift = Vector3::new(0.5, -0.25, 0.0);
+    let mut sensors = with(|config| {
+        config.triads[1].bias = Vector3::new(1.0, 2.0, 3.0);
+        config.triads[1].drift = drift;
+    });
+    for (k, sample) in run(&mut sensors, 1000, |_| all(0.0)).iter().enumerate() {
+        let expected = Vector3::new(1.0, 2.0, 3.0) + drift * (k as f64 * PERIOD);
+        assert_eq!(sample.readings, [Vector3::zeros(), expected, Vector3::zeros()], "{k}");
+    }
+}
+
+#[test]
 fn published_data_sheet_values_of_the_mems_set() {
     // InvenSense DS-000189 1.3, sections 3.1 to 3.3
     let data = SensorData::embedded();
@@ -340,7 +353,7 @@ fn a_sample_whose_tick_was_missed_is_taken_late_and_says_so() {
 #[test]
 fn impossible_sensors_are_refused_by_name() {
     type Change = fn(&mut Config);
-    let refused: [(&str, Change); 11] = [
+    let refused: [(&str, Change); 12] = [
         ("sensors.line.period", |config| config.line.period = 0.0),
         ("sensors.line.period", |config| config.line.period = f64::NAN),
         ("sensors.line.delay", |config| config.line.delay = -1e-3),
@@ -351,6 +364,7 @@ fn impossible_sensors_are_refused_by_name() {
         ("sensors.triads[2].resolution", |config| config.triads[2].resolution = -1e-9),
         ("sensors.triads[0].bandwidth", |config| config.triads[0].bandwidth = f64::NAN),
         ("sensors.triads[1].bias", |config| config.triads[1].bias.y = f64::NAN),
+        ("sensors.triads[1].drift", |config| config.triads[1].drift.z = f64::INFINITY),
         ("sensors.triads[2].matrix", |config| config.triads[2].matrix[(0, 1)] = f64::INFINITY),
     ];
     for (name, change) in refused {

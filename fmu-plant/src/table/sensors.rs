@@ -11,6 +11,8 @@ struct Sensor {
     /// Name of the quantity that the sensor measures.
     quantity: &'static str,
     unit: fn() -> Unit,
+    /// Unit of the quantity's rate of change.
+    rate_unit: fn() -> Unit,
     nominal: f64,
     /// Effects that the sensor's matrix contains, as text for the description.
     matrix: &'static str,
@@ -22,6 +24,7 @@ const SENSORS: [Sensor; 3] = [
         name: "gyroscope",
         quantity: "angular rate",
         unit: unit::angular_rate,
+        rate_unit: unit::angular_acceleration,
         nominal: 0.05,
         matrix: "scale and misalignment",
         bias: "bias",
@@ -30,6 +33,7 @@ const SENSORS: [Sensor; 3] = [
         name: "accelerometer",
         quantity: "specific force",
         unit: unit::acceleration,
+        rate_unit: unit::acceleration_rate,
         nominal: 10.0,
         matrix: "scale and misalignment",
         bias: "bias",
@@ -38,6 +42,7 @@ const SENSORS: [Sensor; 3] = [
         name: "magnetometer",
         quantity: "magnetic field",
         unit: unit::flux_density,
+        rate_unit: unit::flux_density_rate,
         nominal: 5e-5,
         matrix: "scale, misalignment and soft iron",
         bias: "bias and hard iron",
@@ -48,7 +53,7 @@ pub(super) fn all(table: Plant) -> Plant {
     let table = line(measured(table));
     let table =
         SENSORS.iter().enumerate().fold(table, |table, (i, sensor)| errors(table, i, sensor));
-    calibration(surroundings(table))
+    turntable(calibration(surroundings(table)))
 }
 
 fn measured(mut table: Plant) -> Plant {
@@ -132,13 +137,19 @@ fn errors(mut table: Plant, i: usize, sensor: &Sensor) -> Plant {
     let bias = |axis: &str, _: &str| {
         own(&format!("bias.{axis}"), &format!("{} along {axis}", sensor.bias))
     };
+    let drift = |axis: &str, _: &str| {
+        let text = format!("change of the bias along {axis} in a second");
+        let real = declare(&format!("drift.{axis}"), &text).real();
+        real.unit((sensor.rate_unit)()).nominal(1e-3 * sensor.nominal)
+    };
     let noise = own("noise", "standard deviation of white noise on a sample");
     let bandwidth = declare("bandwidth", "bandwidth of first order, 3 dB; 0 for none").real();
     let range = own("range", "range either way; 0 for no limit");
     let resolution = own("resolution", "step of the converter; 0 for none");
     let start = declare("freeze.start", "time from which it repeats its last value");
     let end = declare("freeze.end", "time at which it no longer repeats its last value");
-    vector(table, AXES, bias, none, move |m| &mut m.parameters.triads[i].bias)
+    let table = vector(table, AXES, bias, none, move |m| &mut m.parameters.triads[i].bias);
+    vector(table, AXES, drift, none, move |m| &mut m.parameters.triads[i].drift)
         .real(noise.min(0.0), move |m| &mut m.parameters.triads[i].noise)
         .real(bandwidth.unit(unit::frequency()).min(0.0).nominal(50.0), move |m| {
             &mut m.parameters.triads[i].bandwidth
@@ -190,4 +201,27 @@ fn calibration(table: Plant) -> Plant {
             rate("calibration.beta.frequency", "Angular frequency of the sideslip in the sequence"),
             |m| &mut m.parameters.sequence.beta_frequency,
         )
+}
+
+fn turntable(table: Plant) -> Plant {
+    let bandwidth = parameter(
+        "turntable.bandwidth",
+        "Bandwidth of first order of the turntable that carries the sampled sensors; 0 for sensors on the vehicle",
+    );
+    let rate =
+        parameter("turntable.rate", "Largest rate of the turntable's angles; 0 for no limit");
+    let resolution = parameter(
+        "turntable.resolution",
+        "Step of the converter that commands the turntable's angles; 0 for none",
+    );
+    table
+        .real(bandwidth.real().unit(unit::frequency()).min(0.0).nominal(10.0), |m| {
+            &mut m.parameters.turntable.bandwidth
+        })
+        .real(rate.real().unit(unit::angular_rate()).min(0.0).nominal(1.0), |m| {
+            &mut m.parameters.turntable.rate
+        })
+        .real(resolution.real().unit(unit::angle()).min(0.0).nominal(1e-3), |m| {
+            &mut m.parameters.turntable.resolution
+        })
 }

@@ -10,10 +10,13 @@ use nalgebra::SMatrix;
 impl Plant {
     /// Takes the sample that is due at `time` (s), if there is one.
     pub(super) fn sense(&mut self, time: f64, input: &Input) {
-        if let Some(mut sensors) = self.sensors.take() {
-            sensors.take(time, &self.felt(time, input));
-            self.sensors = Some(sensors);
+        let Some(mut sensors) = self.sensors.take() else { return };
+        sensors.take(time, &self.felt_by(&sensors, time, input));
+        if let (Some(mut turntable), Some(at)) = (self.turntable, sensors.due(time)) {
+            turntable.follow(at, &self.pose(time, input));
+            self.turntable = Some(turntable);
         }
+        self.sensors = Some(sensors);
     }
 
     fn pose(&self, time: f64, input: &Input) -> Pose {
@@ -37,12 +40,24 @@ impl Plant {
         self.pose(time, input).felt(&self.surroundings)
     }
 
+    /// What sampled sensors feel at `time` (s) without their errors: on the turntable, if there is
+    /// one, and what happens at their next sample.
+    fn felt_by(&self, sensors: &Sensors, time: f64, input: &Input) -> Readings {
+        let vehicle = self.pose(time, input);
+        let pose = match (&self.turntable, sensors.due(time)) {
+            (Some(turntable), Some(at)) => turntable.pose(at, &vehicle, &self.turn_rate(input)),
+            _ => vehicle,
+        };
+        pose.felt(&self.surroundings)
+    }
+
     /// Newest sample that the sensors output at `time` (s), including one that is due then but not
     /// yet taken. Without sampled sensors it holds the readings of ideal ones and the number 0.
     pub fn measured(&self, time: f64, input: &Input) -> Sample {
-        let felt = self.felt(time, input);
-        let truth = Sample { number: 0, time, readings: felt };
-        self.sensors.as_ref().map_or(truth, |sensors| sensors.shown(time, &felt))
+        match &self.sensors {
+            Some(sensors) => sensors.shown(time, &self.felt_by(sensors, time, input)),
+            None => Sample { number: 0, time, readings: self.felt(time, input) },
+        }
     }
 
     /// Sample that the sensors output at `time` (s) after the last call of [`Plant::hold`].

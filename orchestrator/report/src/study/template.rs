@@ -31,7 +31,7 @@ use toml::de::{DeArray, DeTable, DeValue};
 pub(super) type Fault = (Range<usize>, String);
 
 /// Largest depth to which templates may use each other. A greater depth must be a circle.
-const DEPTH: usize = 8;
+const DEPTH: usize = 32;
 
 /// Replaces each table that uses a template, or that stands for the rows of a list, by the tables
 /// that it stands for.
