@@ -228,11 +228,12 @@ fn oracle_square_and_constant_as_tables_bit_for_bit() {
     };
     // The jumps k · period / 2 of the square wave and the table's repetition · period + time are
     // the same numbers if period / 2 is a short binary fraction, and otherwise rounded differently.
-    for (mut kind, mut table, bound) in [
-        (of(Kind::Square, 1.5), tabulated(1.5, &[(0.0, 1.0), (0.75, -1.0)]), 0.0),
-        (of(Kind::Square, 0.7), tabulated(0.7, &[(0.0, 1.0), (0.35, -1.0)]), 1e-14),
-        (of(Kind::Constant, 1.0), tabulated(0.0, &[(0.0, 1.0)]), 0.0),
+    for (kind, square_period, period, rows, bound) in [
+        (Kind::Square, 1.5, 1.5, vec![(0.0, 1.0), (0.75, -1.0)], 0.0),
+        (Kind::Square, 0.7, 0.7, vec![(0.0, 1.0), (0.35, -1.0)], 1e-14),
+        (Kind::Constant, 1.0, 0.0, vec![(0.0, 1.0)], 0.0),
     ] {
+        let (mut kind, mut table) = (of(kind, square_period), tabulated(period, &rows));
         for k in 0..125 {
             let [from, to] = [0.04 * f64::from(k), 0.04 * f64::from(k + 1)];
             kind.advance(from, to, moment(k / 5)).unwrap();

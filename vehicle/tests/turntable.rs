@@ -26,15 +26,15 @@ fn vehicle(angles: Vector3<f64>) -> Pose {
     }
 }
 
-fn tick(k: usize) -> Instant {
-    Instant { tick: k as i64, time: k as f64 * PERIOD }
+fn tick(k: u32) -> Instant {
+    Instant { tick: k.into(), time: f64::from(k) * PERIOD }
 }
 
 /// Pose of a turntable after samples of the vehicle's angles.
 fn followed(config: Config, samples: &[Vector3<f64>]) -> Pose {
     let mut table = table(config);
     let mut pose = vehicle(samples[0]);
-    for (k, &angles) in samples.iter().enumerate() {
+    for (k, &angles) in (0..).zip(samples) {
         let at = tick(k);
         pose = table.pose(at, &vehicle(angles), &Vector3::zeros());
         table.follow(at, &vehicle(angles));
@@ -123,7 +123,7 @@ fn a_sample_that_is_taken_again_replaces_the_last_one() {
     let mut once = table(SERVO);
     let mut again = table(SERVO);
     for k in 0..20 {
-        let pose = vehicle(Vector3::repeat(0.02 * (k * k) as f64));
+        let pose = vehicle(Vector3::repeat(0.02 * f64::from(k * k)));
         again.follow(tick(k), &vehicle(Vector3::repeat(9.0)));
         for table in [&mut once, &mut again] {
             table.follow(tick(k), &pose);
