@@ -162,6 +162,7 @@ def experiment(orchestrate):
 
 def pytest_addoption(parser):
     parser.addoption("--write-importers", action="store_true", help="write the table of docs/importers.md anew")
+    parser.addoption("--all", action="store_true", help="run what `scripts/test --all` tests as well")
 
 
 def pytest_configure(config):
@@ -170,6 +171,7 @@ def pytest_configure(config):
         "importer(tool, use, unit, plant, within, to): a row of docs/importers.md. The unit is that of the parameter `name`, unless "
         "it is given, and with `plant` ReentryPlant too. Results are `within` a share of the largest value `to` a reference.",
     )
+    config.addinivalue_line("markers", "everything: needs what only `scripts/test --all` builds")
     config.addinivalue_line("markers", "whole_matrix: looks at the outcomes of all tests marked `importer`, so runs last")
     config.stash[importers.FINDINGS] = importers.Findings(NAMES)
 
@@ -193,6 +195,10 @@ def pytest_xdist_make_scheduler(config, log):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
+    if not config.getoption("--all"):
+        for item in items:
+            if "everything" in item.keywords:
+                item.add_marker(pytest.mark.skip(reason="scripts/test --all runs this"))
     config.stash[importers.FINDINGS].expect(items)
     rank = {name: place for place, name in enumerate(LONGEST)}
     # The test that looks at the outcomes of others runs behind them.

@@ -18,10 +18,10 @@ import pytest
 
 from conftest import NAMES, ROOT, TARGET, library, program
 
-pytestmark = pytest.mark.skipif(
-    (platform.system(), platform.machine()) != ("Linux", "x86_64"),
-    reason="made on Linux x86_64 only",
-)
+pytestmark = [
+    pytest.mark.everything,
+    pytest.mark.skipif((platform.system(), platform.machine()) != ("Linux", "x86_64"), reason="made on Linux x86_64 only"),
+]
 VERSION = re.search(r'(?m)^version = "(.+)"', (ROOT / "Cargo.toml").read_text())[1]
 EPOCH = 1_700_000_000
 ELF = b"\x7fELF\x02\x01\x01" + bytes(9) + b"\x03\x00"
