@@ -1,6 +1,6 @@
 //! Observer that estimates the disturbance from the rates.
 
-use super::settings::{Constraints, InitialState, Settings};
+use super::settings::{InitialState, Settings};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
@@ -25,9 +25,6 @@ impl Observed {
     /// acceleration is the mean of Δ over the period. It is filtered by a first-order lag and
     /// limited to twice the bound of Δ.
     pub(super) fn observe(&mut self, s: &Settings, rates: &Vector3<f64>) {
-        if s.constraints != Constraints::Robust {
-            return;
-        }
         if let Some([_, before, commanded]) = self.last {
             let residual = (rates - before) / s.period_feedback - commanded;
             let weight = -exp_m1(-s.period_feedback / s.observer.time_constant);
@@ -64,10 +61,7 @@ impl Observed {
     /// beside the nominal motion, at a distance of Δ over a stiffness; the nominal motion must
     /// therefore come to rest at the same distance on the other side.
     pub(super) fn shift(&self, s: &Settings) -> Vector3<f64> {
-        if !s.observer.active
-            || s.constraints != Constraints::Robust
-            || s.initial_state == InitialState::Nominal
-        {
+        if !s.observer.active || s.initial_state == InitialState::Nominal {
             return Vector3::zeros();
         }
         -self.disturbance / s.observer.stiffness

@@ -76,6 +76,19 @@ impl Plan {
         self.accelerations.first().map_or(0.0, |a| (a - self.onset.before).norm())
     }
 
+    /// Shifts the plan as in (31): drops the first interval and appends one of `h` (s) with the
+    /// acceleration `a` (rad/s²).
+    pub(super) fn shift(&mut self, a: &Vector3<f64>, h: f64) {
+        let n = self.accelerations.len();
+        let last = self.states[n];
+        self.states.rotate_left(1);
+        self.accelerations.rotate_left(1);
+        self.multipliers.rotate_left(1);
+        self.multipliers[n - 1] = [0.0; 2];
+        self.accelerations[n - 1] = *a;
+        self.states[n] = advance(&last, a, h);
+    }
+
     /// Computes the errors E = x̃ − x_r and v = a − Θ̈_r of the plan.
     pub(super) fn errors(&self, references: &[Reference], motion: &mut Motion<2>) {
         for ((error, state), reference) in

@@ -128,15 +128,15 @@ pub trait Bounded<const O: usize> {
 }
 
 /// The constraints with their bounds, from stage `first` on, as a solver receives them.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Within<'a, B> {
-    pub bounded: &'a B,
+#[derive(Clone, Copy)]
+pub(super) struct Within<'a, const O: usize> {
+    pub bounded: &'a dyn Bounded<O>,
     pub bounds: Cells<'a>,
     pub follows: bool,
     pub first: usize,
 }
 
-impl<const O: usize, B: Bounded<O>> Constraints<O> for Within<'_, B> {
+impl<const O: usize> Constraints<O> for Within<'_, O> {
     fn follows(&self) -> bool {
         self.follows
     }

@@ -13,9 +13,9 @@ impl<const O: usize> Optimiser<O> {
     /// Solves one optimisation from `start`. `previous` holds the earlier plan from the present
     /// time on, with its multipliers. Without it, the bounds and the linearised balls are set about
     /// each solution again until the solution stops changing.
-    pub fn optimise<B: Bounded<O>>(
+    pub fn optimise(
         &mut self,
-        bounded: &B,
+        bounded: &dyn Bounded<O>,
         start: &State<O>,
         affine: &[State<O>],
         previous: Option<(&Motion<O>, &[[f64; 2]])>,
@@ -38,11 +38,7 @@ impl<const O: usize> Optimiser<O> {
     }
 
     /// Finds the optimum by the solvers for the whole horizon.
-    fn over_whole_horizon<B: Bounded<O>>(
-        &mut self,
-        sample: &Sample<O, B>,
-        search: &mut Search,
-    ) -> Status {
+    fn over_whole_horizon(&mut self, sample: &Sample<O>, search: &mut Search) -> Status {
         self.prepare(sample, search);
         if sample.previous.is_none() && self.settings.is_exact_riccati() {
             if let Some(status) = self.settle(sample, search, Self::by_riccati) {
@@ -52,7 +48,7 @@ impl<const O: usize> Optimiser<O> {
             self.about.clone_from(&self.solution.motion);
             (search.follows, search.pass) = (false, 0);
         }
-        let by_any = |this: &mut Self, sample: &Sample<O, B>, search: &mut Search| {
+        let by_any = |this: &mut Self, sample: &Sample<O>, search: &mut Search| {
             this.by_riccati(sample, search).or_else(|| this.by_cone(sample, search))
         };
         self.settle(sample, search, by_any).unwrap_or(Status::Fallback)

@@ -32,8 +32,8 @@ pub struct Report {
 }
 
 /// The data of one optimisation.
-pub(super) struct Sample<'a, const O: usize, B> {
-    pub bounded: &'a B,
+pub(super) struct Sample<'a, const O: usize> {
+    pub bounded: &'a dyn Bounded<O>,
     pub start: &'a State<O>,
     pub affine: &'a [State<O>],
     /// Earlier plan from the present time on, with its multipliers.
@@ -115,11 +115,7 @@ impl<const O: usize> Optimiser<O> {
     }
 
     /// Finds the optimum with the present bounds by the Riccati method.
-    pub(super) fn by_riccati<B: Bounded<O>>(
-        &mut self,
-        sample: &Sample<O, B>,
-        search: &mut Search,
-    ) -> Option<Status> {
+    pub(super) fn by_riccati(&mut self, sample: &Sample<O>, search: &mut Search) -> Option<Status> {
         if !self.may_iterate(search) {
             return None;
         }
@@ -142,11 +138,7 @@ impl<const O: usize> Optimiser<O> {
 
     /// Finds the optimum with the present bounds and linearised balls by the cone solver. It would
     /// not find a motion within the balls in a hopeless search either.
-    pub(super) fn by_cone<B: Bounded<O>>(
-        &mut self,
-        sample: &Sample<O, B>,
-        search: &mut Search,
-    ) -> Option<Status> {
+    pub(super) fn by_cone(&mut self, sample: &Sample<O>, search: &mut Search) -> Option<Status> {
         if search.hopeless {
             return None;
         }
@@ -168,9 +160,9 @@ impl<const O: usize> Optimiser<O> {
 
     /// Runs the Riccati method on the intervals `range`, with the present bounds. The rest of the
     /// horizon is replaced by its arrival cost and its cost-to-go without balls.
-    pub(super) fn interior_point<B: Bounded<O>>(
+    pub(super) fn interior_point(
         &mut self,
-        sample: &Sample<O, B>,
+        sample: &Sample<O>,
         search: &mut Search,
         range: Range<usize>,
     ) -> Outcome {
@@ -205,9 +197,9 @@ impl<const O: usize> Optimiser<O> {
 
     /// Returns the range from the first to the last interval that the present motion violates with
     /// the bounds about itself. The intervals in `skip` and the terminal ball are not checked.
-    pub(super) fn violated<B: Bounded<O>>(
+    pub(super) fn violated(
         &mut self,
-        sample: &Sample<O, B>,
+        sample: &Sample<O>,
         skip: &Range<usize>,
     ) -> Option<Range<usize>> {
         let Self { bounds, solution: Solution { motion, .. }, .. } = self;
@@ -220,7 +212,7 @@ impl<const O: usize> Optimiser<O> {
     }
 
     /// Computes the arrival costs of the sample, once.
-    pub(super) fn arrive<B>(&mut self, sample: &Sample<O, B>, search: &mut Search) {
+    pub(super) fn arrive(&mut self, sample: &Sample<O>, search: &mut Search) {
         if !replace(&mut search.arrived, true) {
             self.unconstrained.arrive(sample.start, sample.affine);
         }
@@ -240,9 +232,9 @@ impl<const O: usize> Optimiser<O> {
 
     /// Returns the report of a plan that is followed instead of an optimum, with the bounds about
     /// the plan.
-    pub fn fall_back<B: Bounded<O>>(
+    pub fn fall_back(
         &mut self,
-        bounded: &B,
+        bounded: &dyn Bounded<O>,
         start: &State<O>,
         affine: &[State<O>],
         plan: &Motion<O>,
@@ -258,11 +250,7 @@ impl<const O: usize> Optimiser<O> {
 
     /// Returns the residuals of the present motion. `is_checked` says that the intervals without
     /// multipliers are known to satisfy their constraints.
-    pub(super) fn certificate<B: Bounded<O>>(
-        &mut self,
-        sample: &Sample<O, B>,
-        is_checked: bool,
-    ) -> Certificate {
+    pub(super) fn certificate(&mut self, sample: &Sample<O>, is_checked: bool) -> Certificate {
         let Self { layout, bounds, solution, .. } = self;
         let within = within(sample, bounds);
         Certificate::of(&problem(layout, sample, &within), solution, is_checked)
@@ -270,17 +258,14 @@ impl<const O: usize> Optimiser<O> {
 }
 
 /// Returns the constraints of all stages with fixed bounds.
-fn within<'a, const O: usize, B>(
-    sample: &Sample<'a, O, B>,
-    bounds: &'a mut Bounds,
-) -> Within<'a, B> {
+fn within<'a, const O: usize>(sample: &Sample<'a, O>, bounds: &'a mut Bounds) -> Within<'a, O> {
     Within { bounded: sample.bounded, bounds: bounds.cells(), follows: false, first: 0 }
 }
 
 /// Returns the problem of the whole horizon.
-fn problem<'a, const O: usize, B: Bounded<O>, C>(
+fn problem<'a, const O: usize, C>(
     layout: &'a Layout<O>,
-    sample: &Sample<'a, O, B>,
+    sample: &Sample<'a, O>,
     constraints: &'a C,
 ) -> Problem<'a, O, C> {
     let Layout { chain, cost, start, .. } = layout;

@@ -1,7 +1,6 @@
 //! Passes of an optimisation. Each begins with the bounds (and linearised balls) about a motion:
 //! first about the first guess, then about the optimum of the last pass.
 
-use super::bounds::Bounded;
 use super::layout::MARGIN;
 use super::optimiser::{Optimiser, Sample};
 use super::problem::Solution;
@@ -24,7 +23,7 @@ const FIRST_PASSES: usize = 20;
 impl<const O: usize> Optimiser<O> {
     /// Chooses the first guess and the motion about which the first bounds are computed. This is
     /// done once, by the first way that iterates.
-    pub(super) fn prepare<B: Bounded<O>>(&mut self, sample: &Sample<O, B>, search: &mut Search) {
+    pub(super) fn prepare(&mut self, sample: &Sample<O>, search: &mut Search) {
         if replace(&mut search.begun, true) {
             return;
         }
@@ -55,12 +54,7 @@ impl<const O: usize> Optimiser<O> {
     /// Takes the previous plan, tracked from the new start, and its multipliers as first guess if
     /// some of them are active in the range to be solved. A window is extended by the active stages
     /// just beyond its end, as it would otherwise have to grow.
-    fn start_warm<B: Bounded<O>>(
-        &mut self,
-        sample: &Sample<O, B>,
-        active: &[[f64; 2]],
-        search: &mut Search,
-    ) {
+    fn start_warm(&mut self, sample: &Sample<O>, active: &[[f64; 2]], search: &mut Search) {
         let n = self.layout.horizon;
         let mut range = search.window.clone().unwrap_or(0..n);
         let more_than = |least: f64| move |&[state, input]: &[f64; 2]| state.max(input) > least;
@@ -96,7 +90,7 @@ impl<const O: usize> Optimiser<O> {
 
     /// Lets the next search begin without the multipliers of a similar problem. Its guess may be
     /// far away, so that bounds that depend on the motion follow the iterates.
-    pub(super) fn begin_cold<B: Bounded<O>>(&self, sample: &Sample<O, B>, search: &mut Search) {
+    pub(super) fn begin_cold(&self, sample: &Sample<O>, search: &mut Search) {
         let follows = match sample.previous {
             None => sample.bounded.follows_at_first(),
             Some(_) => sample.bounded.depends_on_motion(),
@@ -106,11 +100,11 @@ impl<const O: usize> Optimiser<O> {
 
     /// Repeats `way` with the bounds (and linearised balls) about its last optimum until one is
     /// final. Returns `None` as soon as `way` finds none.
-    pub(super) fn settle<B: Bounded<O>>(
+    pub(super) fn settle(
         &mut self,
-        sample: &Sample<O, B>,
+        sample: &Sample<O>,
         search: &mut Search,
-        way: impl Fn(&mut Self, &Sample<O, B>, &mut Search) -> Option<Status>,
+        way: impl Fn(&mut Self, &Sample<O>, &mut Search) -> Option<Status>,
     ) -> Option<Status> {
         loop {
             let status = way(self, sample, search)?;
@@ -123,7 +117,7 @@ impl<const O: usize> Optimiser<O> {
     }
 
     /// Returns whether the optimum of a pass is final; otherwise `about` is set for the next pass.
-    fn is_final<B: Bounded<O>>(&mut self, sample: &Sample<O, B>, search: &mut Search) -> bool {
+    fn is_final(&mut self, sample: &Sample<O>, search: &mut Search) -> bool {
         let Self { layout, settings, about, bounds, own, solution, .. } = self;
         let motion = &solution.motion;
         if sample.previous.is_some() && settings.nonlinearity == Nonlinearity::Frozen {

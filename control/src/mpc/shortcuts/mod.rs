@@ -10,24 +10,23 @@ mod terminal_ball;
 mod windows;
 mod without_balls;
 
-use super::bounds::Bounded;
 use super::optimiser::{Optimiser, Sample};
 use super::search::Search;
 use crate::report::Status;
 
 /// A cheaper way to the optimum.
-pub(super) trait Shortcut<const O: usize, B: Bounded<O>> {
+pub(super) trait Shortcut<const O: usize> {
     /// Leaves the optimum in the optimiser's solution and returns its status, or returns `None` and
     /// leaves in `search` what the next way must solve for.
     fn optimum(
         &self,
         optimiser: &mut Optimiser<O>,
-        sample: &Sample<O, B>,
+        sample: &Sample<O>,
         search: &mut Search,
     ) -> Option<Status>;
 }
 
 /// Returns the shortcuts in the order in which they are tried.
-pub(super) fn in_order<'a, const O: usize, B: Bounded<O> + 'a>() -> [&'a dyn Shortcut<O, B>; 3] {
+pub(super) fn in_order<const O: usize>() -> [&'static dyn Shortcut<O>; 3] {
     [&without_balls::WithoutBalls, &terminal_ball::TerminalBallAlone, &windows::Windows]
 }

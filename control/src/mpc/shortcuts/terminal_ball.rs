@@ -4,7 +4,7 @@
 //! `solver.status` tells it apart, and because a window would change the last digits of the
 //! results.
 
-use super::{Bounded, Optimiser, Sample, Search, Shortcut, Status};
+use super::{Optimiser, Sample, Search, Shortcut, Status};
 use crate::mpc::lq::Unconstrained;
 use crate::mpc::problem::{Chain, Cost, Motion, State, apply, of_axis, zero_state};
 use nalgebra::{SMatrix, SVector};
@@ -15,11 +15,11 @@ pub(super) struct TerminalBallAlone;
 const SECANT_STEPS: usize = 30;
 const SECANT_TOLERANCE: f64 = 1e-12;
 
-impl<const O: usize, B: Bounded<O>> Shortcut<O, B> for TerminalBallAlone {
+impl<const O: usize> Shortcut<O> for TerminalBallAlone {
     fn optimum(
         &self,
         optimiser: &mut Optimiser<O>,
-        sample: &Sample<O, B>,
+        sample: &Sample<O>,
         search: &mut Search,
     ) -> Option<Status> {
         let radius = search.outside?;

@@ -4,18 +4,18 @@
 //! Gain: mean time 0.078 → 0.031 ms, longest 0.476 → 0.232 (CRMPC robust); 0.011 → 0.009, 0.152 →
 //! 0.039 (paper); 0.020 → 0.011, 0.102 → 0.033 (DLMPC).
 
-use super::{Bounded, Optimiser, Sample, Search, Shortcut, Status};
+use super::{Optimiser, Sample, Search, Shortcut, Status};
 
 pub(super) struct Windows;
 
 /// Largest number of windows tried before the whole horizon.
 const WINDOWS: usize = 4;
 
-impl<const O: usize, B: Bounded<O>> Shortcut<O, B> for Windows {
+impl<const O: usize> Shortcut<O> for Windows {
     fn optimum(
         &self,
         optimiser: &mut Optimiser<O>,
-        sample: &Sample<O, B>,
+        sample: &Sample<O>,
         search: &mut Search,
     ) -> Option<Status> {
         optimiser.prepare(sample, search);
@@ -24,9 +24,9 @@ impl<const O: usize, B: Bounded<O>> Shortcut<O, B> for Windows {
 }
 
 /// Finds the optimum with the present bounds.
-fn in_windows<const O: usize, B: Bounded<O>>(
+fn in_windows<const O: usize>(
     optimiser: &mut Optimiser<O>,
-    sample: &Sample<O, B>,
+    sample: &Sample<O>,
     search: &mut Search,
 ) -> Option<Status> {
     if !optimiser.may_iterate(search) {

@@ -2,15 +2,15 @@
 //!
 //! Gain: mean time 0.036 → 0.031 ms (CRMPC robust), 0.013 → 0.009 (paper), 0.013 → 0.011 (DLMPC).
 
-use super::{Bounded, Optimiser, Sample, Search, Shortcut, Status};
+use super::{Optimiser, Sample, Search, Shortcut, Status};
 
 pub(super) struct WithoutBalls;
 
-impl<const O: usize, B: Bounded<O>> Shortcut<O, B> for WithoutBalls {
+impl<const O: usize> Shortcut<O> for WithoutBalls {
     fn optimum(
         &self,
         optimiser: &mut Optimiser<O>,
-        sample: &Sample<O, B>,
+        sample: &Sample<O>,
         search: &mut Search,
     ) -> Option<Status> {
         if search.outside.is_some() {

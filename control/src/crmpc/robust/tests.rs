@@ -1,14 +1,17 @@
 //! The check of a motion compared with the bounds that it estimates.
 
 use super::*;
+use crate::crmpc::settings::Constraints;
 use crate::error_dynamics::Gain;
+use crate::linearise::{self, InverseKinematics};
+use crate::mpc::{self, Bounded};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;
 
-fn robust() -> Sets {
+fn robust() -> Robust {
     let settings = Settings::new(Constraints::Robust);
-    Sets::new(&settings, &Design::new(&settings).unwrap()).unwrap()
+    Robust::new(&settings, &Design::new(&settings).unwrap())
 }
 
 /// A wave of (Θ̃, x̃_ω, a) over the horizon, which is all that the check needs of a motion.
@@ -53,18 +56,17 @@ fn oracle_the_check_of_the_horizon_finds_what_exact_bounds_find() {
     let (violations, by_size) = (Cell::new([0; 2]), Cell::new([0; 2]));
     run(5000, |motion| {
         let n = motion.inputs.len();
-        let sets = robust();
+        let robust = robust();
         let [mut checked, mut exact] = [(); 2].map(|()| mpc::Bounds::unlimited(n));
-        let found = sets.violated(&motion, 0..n, &mut checked);
-        sets.bounds_about(&motion, 0..n, &mut exact);
-        let Kind::Robust(robust) = &sets.kind else { unreachable!() };
+        let found = robust.violated(&motion, 0..n, &mut checked);
+        robust.bounds_about(&motion, 0..n, &mut exact);
         let (of_rate, of_moment) = robust.reserves();
         let violates = |&k: &usize| {
             let input = motion.inputs.get(k + 1).copied().unwrap_or_default();
             let (rate, _) = robust.nonempty((exact.state[k + 1], 1.0));
             let (_, moment) = robust.nonempty((1.0, exact.input[k]));
-            let of_end = sets.squares(k + 1, &motion.states[k + 1], &input, (rate, 1.0)).0;
-            let of_input = sets.squares(k, &motion.states[k], &motion.inputs[k], (1.0, moment)).1;
+            let of_end = robust.squares(k + 1, &motion.states[k + 1], &input, (rate, 1.0)).0;
+            let of_input = robust.squares(k, &motion.states[k], &motion.inputs[k], (1.0, moment)).1;
             of_end.sqrt() * rate > exact.state[k + 1] + of_rate
                 || of_input.sqrt() * moment > exact.input[k] + of_moment
         };
@@ -89,9 +91,8 @@ fn oracle_the_check_of_the_horizon_finds_what_exact_bounds_find() {
 fn oracle_bounds_by_size_hold_from_any_stage() {
     let tightest = Cell::new(0.0_f64);
     run(100, |motion| {
-        let sets = robust();
-        let Kind::Robust(robust) = &sets.kind else { unreachable!() };
-        let point = |k| sets.point(&motion, k);
+        let robust = robust();
+        let point = |k| robust.stages.point(&motion, k);
         for k in 0..motion.inputs.len() {
             let (here, next) = (point(k), point(k + 1));
             let anchor = robust.anchor(&point(k - k % 10));

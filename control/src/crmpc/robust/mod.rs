@@ -1,17 +1,24 @@
 //! The robust set: bounds on ‖ω̃‖ and ‖m̃‖ about a motion, for which the limits hold whatever the
 //! error dynamics do (docs/guarantee.md).
 
+mod certificate;
+mod few_stages;
+mod norms;
+mod planning;
+#[cfg(test)]
+mod tests;
+
+pub use certificate::Margins;
+
 use super::design::Design;
 use super::guarantee::{self, Carried, Dynamics, End, Held, MomentLoss, Onset, Switching};
 use super::settings::Settings;
-use crate::linearise::{BodyMotion, InverseKinematics, Linear};
+use super::stages::{Point, Stages};
+use crate::linearise::Linear;
 use crate::mpc::Motion;
 use nalgebra::{Matrix3, Vector3};
-use serde::{Deserialize, Serialize};
-use std::cell::{OnceCell, RefCell};
-use vehicle::dynamics::RigidBody;
+use std::cell::RefCell;
 use vehicle::math::cos;
-use vehicle::reference::Reference;
 
 /// The robust set: the data from which its bounds follow.
 #[derive(Clone, Debug)]
@@ -19,6 +26,7 @@ pub(super) struct Robust {
     pub settings: Settings,
     pub design: Design,
     pub dynamics: Dynamics,
+    pub stages: Stages,
     /// Feedback ticks since the nominal motion began at the measured state.
     pub age: usize,
     /// Applied share of the tightening; below 1 only for best effort.
@@ -56,68 +64,25 @@ impl Interval {
     }
 }
 
-/// Margins that the first interval of a plan leaves to the limits, beyond the reserve for
-/// deviations from the plan, as shares of the limits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Margins {
-    /// Margin to the rate limit at the interval's end.
-    pub rate: f64,
-    /// Margin to the moment limit in the interval.
-    pub moment: f64,
-}
-
-/// One stage of a motion, with its kinematics on demand.
-pub(super) struct Point {
-    pub angles: Vector3<f64>,
-    /// Derivative of the angles, x_ω.
-    pub rates: Vector3<f64>,
-    /// Norm of the rates, ‖x_ω‖.
-    pub size: f64,
-    /// Acceleration a; zero at the last stage.
-    pub acceleration: Vector3<f64>,
-    /// Norm of the acceleration, ‖a‖.
-    pub pull: f64,
-    turned: OnceCell<InverseKinematics>,
-}
-
-impl Point {
-    pub(super) fn new(
-        angles: Vector3<f64>,
-        rates: Vector3<f64>,
-        acceleration: Vector3<f64>,
-    ) -> Self {
-        let (size, pull) = (rates.norm(), acceleration.norm());
-        Self { angles, rates, size, acceleration, pull, turned: OnceCell::new() }
-    }
-
-    pub(super) fn at(references: &[Reference], motion: &Motion<2>, k: usize) -> Self {
-        let Reference { angles, rates, accelerations } = &references[k];
-        let acceleration =
-            motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input);
-        Self::new(angles + motion.states[k][0], rates + motion.states[k][1], acceleration)
-    }
-
-    /// Returns W, which is computed at its first use.
-    pub(super) fn turned(&self) -> &InverseKinematics {
-        self.turned.get_or_init(|| InverseKinematics::at(&self.angles))
-    }
-
-    pub(super) fn motion(&self, body: &RigidBody) -> BodyMotion {
-        self.turned().motion(body, &self.rates)
-    }
-}
-
 impl Robust {
     pub(super) fn new(settings: &Settings, design: &Design) -> Self {
+        let Settings { horizon, body, period_optimisation, .. } = *settings;
         Self {
             settings: *settings,
             design: design.clone(),
             dynamics: Dynamics::new(settings),
+            stages: Stages::new(horizon, body, period_optimisation),
             age: 0,
             share: 1.0,
             onset: Onset::default(),
             carried: RefCell::new(Vec::with_capacity(settings.horizon + 1)),
         }
+    }
+
+    /// Prepares the bounds for a nominal trajectory that began at the measured state `age` feedback
+    /// ticks ago and follows on `onset`, with the given share of the tightening.
+    pub(super) fn begin(&mut self, age: usize, share: f64, onset: &Onset) {
+        (self.age, self.share, self.onset) = (age, share, *onset);
     }
 
     /// Returns what an unknown part of the delay adds, with what is carried along at stage `k`.
@@ -126,45 +91,24 @@ impl Robust {
         Some((switching, self.carried.borrow().get(k).copied().unwrap_or_default()))
     }
 
-    /// Carries along what the changes of these accelerations of the stages leave (rad/s²).
-    pub(super) fn carry(&self, accelerations: impl Iterator<Item = Vector3<f64>>) {
+    /// Carries along what the changes of acceleration of a trajectory leave.
+    pub(super) fn carry(&self, motion: &Motion<2>) {
         let Some(switching) = &self.design.tightening.switching else { return };
-        let mut all = self.carried.borrow_mut();
-        all.clear();
+        let mut carried_at_stages = self.carried.borrow_mut();
+        carried_at_stages.clear();
         let (mut carried, mut before) = (self.onset.carried, self.onset.before);
-        for a in accelerations {
+        for (input, reference) in motion.inputs.iter().zip(&self.stages.references) {
+            let a = input + reference.accelerations;
             carried = switching.begin(&carried, (a - before).norm());
-            all.push(carried);
+            carried_at_stages.push(carried);
             (carried, before) = (switching.next(&carried), a);
         }
-        all.push(carried);
+        carried_at_stages.push(carried);
     }
 
     /// Returns what is carried along at the end of the horizon.
     pub(super) fn carried_to_the_end(&self) -> Carried {
         self.carried.borrow().last().copied().unwrap_or_default()
-    }
-
-    /// Returns whether the limits hold also in the last instants before the motion, in which its
-    /// first command already acts if the delay is shorter than assumed. `size` is ‖ω̃‖ at the first
-    /// stage and `bound` its bound, `sideslip` is β̃ there.
-    ///
-    /// Either the plan before left room for such a command, or the motion does not come near the
-    /// limits in that time.
-    pub(super) fn keeps_before(&self, first: &Point, (size, bound): (f64, f64)) -> bool {
-        let Some((switching, carried)) = self.switching(0) else { return true };
-        let Onset { before, allowed, .. } = self.onset;
-        let change = (first.acceleration - before).norm();
-        if switching.pulse_of_command(change) <= allowed {
-            return true;
-        }
-        let tightening = &self.design.tightening;
-        let Settings { delay_error, sideslip_domain, .. } = self.settings;
-        let of_angle = tightening.at(self.age).angle + switching.deviation(&carried).angle;
-        let Dynamics { geometry, rate, .. } = &self.dynamics;
-        let most = first.pull.max(before.norm()) + tightening.norm + switching.turn();
-        size + delay_error * (most + geometry.drift * rate * rate) <= bound
-            && first.angles.y.abs() + of_angle + delay_error * rate <= sideslip_domain
     }
 
     /// Returns the parts of the rate limit and of the moment limit that the bounds leave free.
@@ -197,36 +141,6 @@ impl Robust {
     /// Returns the feedback ticks from the beginning of the nominal motion to prediction step `k`.
     fn tick(&self, k: usize) -> usize {
         self.age + k * self.design.ratio
-    }
-
-    /// Returns whether |β| stays within its bound throughout interval `k`, whatever the error
-    /// dynamics do.
-    ///
-    /// Within the interval β̃ is a parabola, and the deviation lies below the straight line between
-    /// its values at both ends plus the bulge, so that the largest value of the sum is exact.
-    ///
-    /// `here` holds β̃ and its derivative at the beginning, `a` is its second derivative, and `end`
-    /// is β̃ at the end.
-    pub(super) fn keeps_sideslip(&self, k: usize, here: [f64; 2], a: f64, end: f64) -> bool {
-        let Settings { period_optimisation: h, sideslip_domain, .. } = self.settings;
-        let tightening = &self.design.tightening;
-        let more = self.switching(k).map_or(0.0, |(switching, carried)| {
-            let next = self.carried.borrow().get(k + 1).copied().unwrap_or_default();
-            switching.deviation(&carried).angle + switching.early(&next).0
-        });
-        let [from, to] = [k, k + 1].map(|k| tightening.at(self.tick(k)).angle + more);
-        let slope = (to - from) / h;
-        let largest = |sign: f64| {
-            let (rate, a) = (sign * here[1] + slope, sign * a);
-            let (before, after) = (sign * here[0] + from, sign * end + to);
-            let at_top = if a < 0.0 && rate > 0.0 && rate < -a * h {
-                before - 0.5 * rate * rate / a
-            } else {
-                before
-            };
-            at_top.max(after)
-        };
-        largest(1.0).max(largest(-1.0)) + tightening.angle_bulge(self.tick(k)) <= sideslip_domain
     }
 
     /// Returns the bound on ‖ω̃‖ at prediction step k for which ‖ω‖ keeps its limit there and in
@@ -303,17 +217,6 @@ impl Robust {
         let loss = more.as_ref().unwrap_or_else(|| tightening.moment_loss(self.tick(k)));
         let needed = loss.largest_moment(&self.dynamics, ends, held);
         self.settings.limit_moment - self.reserves().1 - (needed - ends[0].moment)
-    }
-
-    /// Returns the margins of the first interval.
-    pub(super) fn margins(&self, first: &Point, second: &Point) -> Margins {
-        let Interval { rate, rate_bound, moment, moment_bound } = self.interval(0, first, second);
-        let Settings { limit_rate, limit_moment, .. } = self.settings;
-        let left = |bound: f64, value: f64, limit: f64| (bound - value) / limit + RESERVE;
-        Margins {
-            rate: left(rate_bound, rate, limit_rate),
-            moment: left(moment_bound, moment, limit_moment),
-        }
     }
 }
 

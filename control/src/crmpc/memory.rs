@@ -1,0 +1,116 @@
+//! The state that CRMPC carries from tick to tick.
+
+use super::commands::Commands;
+use super::observer::Observed;
+use super::plan::Plan;
+use super::robust::Margins;
+use super::supervision::Supervision;
+use crate::report::Report;
+use nalgebra::Vector6;
+use serde::{Deserialize, Serialize};
+
+/// The state that CRMPC carries from tick to tick.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Memory {
+    /// Plan in force, which starts at the last optimisation.
+    pub plan: Plan,
+    /// Whether `plan` has been filled by an optimisation.
+    pub started: bool,
+    /// Outcome of the last optimisation.
+    pub report: Report,
+    /// Nominal state (Θ̃, x̃_ω) at the last tick.
+    pub nominal: Vector6<f64>,
+    /// Whether the plan in force gives the guarantee, or the reason why not.
+    pub standing: Standing,
+    /// What is said of the guarantee, which takes into account what contradicts its assumptions.
+    pub supervision: Supervision,
+    /// Margins to the limits that the plan in force leaves in its first interval.
+    pub margins: Margins,
+    /// Share of the moment limit that the design leaves to the plan at rest, see
+    /// [`super::Assessment::moment_left`]; zero with the paper's set.
+    pub moment_left: f64,
+    /// Feedback ticks from the beginning of the nominal motion to the beginning of the plan in
+    /// force.
+    pub age: u32,
+    /// Feedback ticks until a pending guarantee is in force.
+    pub pending: u32,
+    /// Estimate of the disturbance with its filter state.
+    pub observed: Observed,
+    /// Recent changes of the command, if the delay is not exact.
+    pub commands: Commands,
+}
+
+/// Status of the guarantee of the robust set at a tick. While it is in force, ‖ω‖ and ‖m‖ keep
+/// their limits for as long as the assumptions hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Standing {
+    /// No optimisation has been run yet, or the sets guarantee nothing.
+    #[default]
+    None,
+    /// A plan is certified, and the guarantee comes into force once the delay has passed; until
+    /// then moments act that were commanded without it.
+    Pending,
+    /// The limits are guaranteed from this tick on.
+    InForce,
+    /// The design does not hold for the settings, so that the controller works on best effort.
+    Refused,
+    /// No plan has been found that satisfies the conditions of the theorem.
+    Uncertified,
+    /// The vehicle is further from the plan than the assumptions explain, or something else
+    /// contradicts them.
+    Exceeded,
+    /// The inputs were set before the tick.
+    Stale,
+}
+
+impl Standing {
+    pub(super) fn is_assured(self) -> bool {
+        matches!(self, Self::Pending | Self::InForce)
+    }
+}
+
+impl Memory {
+    /// Returns whether the plan in force is certified and the vehicle no further from it than the
+    /// assumptions explain.
+    pub fn assured(&self) -> bool {
+        self.standing.is_assured()
+    }
+}
+
+impl Clone for Memory {
+    fn clone(&self) -> Self {
+        let mut clone = Self::default();
+        clone.clone_from(self);
+        clone
+    }
+
+    // The derived version would allocate memory for a plan at every tick.
+    fn clone_from(&mut self, source: &Self) {
+        let Self {
+            plan,
+            started,
+            report,
+            nominal,
+            standing,
+            margins,
+            moment_left,
+            age,
+            pending,
+            supervision,
+            observed,
+            commands,
+        } = source;
+        self.plan.clone_from(plan);
+        self.started = *started;
+        self.report = *report;
+        self.nominal = *nominal;
+        self.standing = *standing;
+        self.margins = *margins;
+        self.moment_left = *moment_left;
+        self.age = *age;
+        self.pending = *pending;
+        self.supervision = *supervision;
+        self.observed = *observed;
+        self.commands.clone_from(commands);
+    }
+}

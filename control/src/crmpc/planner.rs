@@ -1,0 +1,171 @@
+//! The optimisation (10) of a nominal trajectory from a given state, and the plan that follows.
+//!
+//! The prediction is made in x̃ = (Θ̃, x̃_ω), where the nominal model (7) under ũ = a − f is an
+//! exact double integrator. The error E = x̃ − x_r is formed afterwards, so that a jump of the
+//! reference is seen in the preview and never enters the dynamics.
+
+use super::design::Design;
+use super::memory::Memory;
+use super::plan::{self, Plan};
+use super::set::ConstraintSet;
+use super::settings::{InitialState, Settings};
+use super::stages::Stages;
+use crate::controller::ReferenceAt;
+use crate::error::DesignError;
+use crate::error_dynamics::InvariantSet;
+use crate::mpc::{self, Chain, Cost, Layout, Motion, Optimiser, State, per_axis};
+use crate::report::Status;
+use nalgebra::{Vector3, Vector6};
+
+/// Largest change of any state (rad, rad/s) between passes at which the first optimisation has
+/// converged.
+const STANDSTILL: f64 = 1e-8;
+/// Typical angle error, by which the cone solver's unknowns are scaled, rad.
+const ANGLE_SCALE: f64 = 0.1;
+/// Smallest disturbance bound for which the invariant set is computed, rad/s², so that the set has
+/// an interior.
+const SMALLEST_DISTURBANCE: f64 = 1e-5;
+
+/// The optimiser with its scratch memory.
+pub(super) struct Planner {
+    pub settings: Settings,
+    pub optimiser: Optimiser<2>,
+    /// The plan as errors from the reference.
+    pub previous: Motion<2>,
+    chain: Chain<2>,
+    affine: Vec<State<2>>,
+    /// Shift of the reference's angles by the observer, rad.
+    shift: Vector3<f64>,
+}
+
+impl Planner {
+    /// Sets up the optimisation (10) within a constraint set.
+    ///
+    /// # Errors
+    /// Returns the solver's message if it refuses the data.
+    pub(super) fn new(
+        settings: &Settings,
+        design: &Design,
+        set: &dyn ConstraintSet,
+    ) -> Result<Self, DesignError> {
+        let Settings { horizon: n, period_optimisation: h, p, q, .. } = *settings;
+        let start = (settings.initial_state == InitialState::Tube).then(|| {
+            let normals = design.invariant.as_ref().map(InvariantSet::normals).unwrap_or_default();
+            let size = (design.counted * settings.disturbance_bound).max(SMALLEST_DISTURBANCE);
+            std::array::from_fn(|_| normals.iter().map(|n| n / size).collect())
+        });
+        let chain = Chain::new(h);
+        // Cost (10), sampled: Σ h (EᵀPE + vᵀQv) + E_NᵀG E_N.
+        let cost = Cost {
+            state: [Vector3::new(p[0], p[1], p[2]) * h, Vector3::new(p[3], p[4], p[5]) * h],
+            input: Vector3::from(q) * h,
+            end: per_axis(&design.g),
+        };
+        let layout = Layout {
+            chain,
+            cost,
+            horizon: n,
+            state_balls: true,
+            terminal: set.terminal_radius().is_some(),
+            start,
+            margin: set.window_margin(),
+            scale: [ANGLE_SCALE, settings.limit_rate],
+            standstill: STANDSTILL,
+        };
+        let optimiser = Optimiser::new(layout, settings.solver).map_err(DesignError::Solver)?;
+        Ok(Self {
+            settings: *settings,
+            optimiser,
+            previous: Motion::new(n),
+            chain,
+            affine: vec![[Vector3::zeros(); 2]; n],
+            shift: Vector3::zeros(),
+        })
+    }
+
+    /// Computes the references at the prediction times, with angles shifted by `shift` (rad), and
+    /// d_k = A x_r,k + B Θ̈_r,k − x_r,k+1.
+    pub(super) fn preview(
+        &mut self,
+        stages: &mut Stages,
+        time: f64,
+        reference: ReferenceAt,
+        shift: Vector3<f64>,
+    ) {
+        self.shift = shift;
+        for (k, slot) in stages.references.iter_mut().enumerate() {
+            *slot = reference(time + k as f64 * stages.step);
+            slot.angles += shift;
+        }
+        for (d, pair) in self.affine.iter_mut().zip(stages.references.windows(2)) {
+            let moved =
+                self.chain.advance(&[pair[0].angles, pair[0].rates], &pair[0].accelerations);
+            *d = [moved[0] - pair[1].angles, moved[1] - pair[1].rates];
+        }
+    }
+
+    /// Returns the optimum from `start` with the bounds about the previous plan, or about itself if
+    /// there is none (`first`).
+    pub(super) fn solve(
+        &mut self,
+        set: &dyn ConstraintSet,
+        memory: &Memory,
+        start: &Vector6<f64>,
+        first: bool,
+    ) -> mpc::Report {
+        let references = &set.stages().references;
+        let error = super::error(start, &references[0]);
+        let previous = (!first).then(|| {
+            memory.plan.errors(references, &mut self.previous);
+            // The optimum moves with the shifted reference.
+            let moved = self.shift - memory.plan.shift;
+            self.previous.states.iter_mut().for_each(|[angles, _]| *angles += moved);
+            (&self.previous, &memory.plan.multipliers[..])
+        });
+        self.optimiser.optimise(set, &error, &self.affine, previous)
+    }
+
+    /// Leaves the optimum without constraints from the plan's first state in the optimiser.
+    pub(super) fn solve_without_constraints(&mut self, stages: &Stages, plan: &Plan) {
+        plan.errors(&stages.references, &mut self.previous);
+        self.optimiser.without_constraints(&self.previous.states[0], &self.affine);
+    }
+
+    /// Makes the optimum the plan in force.
+    pub(super) fn follow_optimum(
+        &self,
+        stages: &Stages,
+        memory: &mut Memory,
+        start: &Vector6<f64>,
+    ) {
+        let start = (self.settings.initial_state != InitialState::Tube).then_some(*start);
+        memory.plan.follow(self.optimiser.motion(), start, &stages.references, stages.step);
+        memory.plan.shift = self.shift;
+        memory.plan.multipliers.clear();
+        memory.plan.multipliers.extend(self.optimiser.multipliers());
+    }
+
+    /// Keeps the present plan and returns a report on it.
+    pub(super) fn keep(
+        &mut self,
+        set: &dyn ConstraintSet,
+        memory: &Memory,
+        start: &Vector6<f64>,
+        ended: (Status, u32),
+    ) -> mpc::Report {
+        let references = &set.stages().references;
+        let error = super::error(start, &references[0]);
+        memory.plan.errors(references, &mut self.previous);
+        self.optimiser.fall_back(set, &error, &self.affine, &self.previous, ended)
+    }
+}
+
+/// Fills a plan with the trajectory from `start` under the terminal law of a constraint set.
+pub(super) fn follow_terminal_law(set: &dyn ConstraintSet, plan: &mut Plan, start: Vector6<f64>) {
+    let Stages { references, step, .. } = set.stages();
+    plan.states[0] = start;
+    for (k, reference) in references.iter().take(plan.accelerations.len()).enumerate() {
+        plan.accelerations[k] = set.terminal_law(&plan.states[k], reference);
+        plan.states[k + 1] = plan::advance(&plan.states[k], &plan.accelerations[k], *step);
+    }
+}

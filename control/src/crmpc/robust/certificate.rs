@@ -1,0 +1,141 @@
+//! The certificate of a plan: the conditions of the theorem (docs/guarantee.md), and the margins
+//! that the plan leaves.
+
+use super::{Interval, RESERVE, Robust, norm_of_columns};
+use crate::crmpc::guarantee::{self, Dynamics, Onset};
+use crate::crmpc::settings::Settings;
+use crate::crmpc::stages::Point;
+use crate::mpc::Motion;
+use serde::{Deserialize, Serialize};
+
+/// Margins that the first interval of a plan leaves to the limits, beyond the reserve for
+/// deviations from the plan, as shares of the limits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Margins {
+    /// Margin to the rate limit at the interval's end.
+    pub rate: f64,
+    /// Margin to the moment limit in the interval.
+    pub moment: f64,
+}
+
+/// Properties of a plan that satisfies the conditions of the theorem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Certified {
+    pub margins: Margins,
+    /// Braking rate beyond the horizon, see [`crate::crmpc::Plan::braking`].
+    pub braking: f64,
+}
+
+impl Robust {
+    /// Returns the certificate of a plan, or `None` if it does not satisfy the conditions of the
+    /// theorem (docs/guarantee.md), which require the whole tightening.
+    ///
+    /// `checked` says that [`crate::mpc::Bounded::violated`] has already found no violation in it.
+    pub(super) fn certify(&self, motion: &Motion<2>, checked: bool) -> Option<Certified> {
+        let Self { settings, dynamics, design, stages, .. } = self;
+        let n = motion.inputs.len();
+        if design.counted < 1.0
+            || self.share < 1.0
+            || !checked && self.first_and_last(motion, 0..n, |_, _| ()).is_some()
+        {
+            return None;
+        }
+        self.carry(motion);
+        // The first state, which no optimisation can change, and the last one, beyond which the
+        // motion brakes, are checked separately.
+        let [first, second, last] = [0, 1, n].map(|k| stages.point(motion, k));
+        let rates = first.motion(&stages.body);
+        let bound = self.rate_bound(0, norm_of_columns(&rates.rates_by_angles), &first, &second);
+        let sideslip = |k: usize| {
+            let (reference, [angles, rates]) = (&stages.references[k], &motion.states[k]);
+            [reference.angles.y + angles.y, reference.rates.y + rates.y]
+        };
+        let inside = (0..n).all(|k| {
+            let a = stages.references[k].accelerations.y + motion.inputs[k].y;
+            self.keeps_sideslip(k, sideslip(k), a, sideslip(k + 1)[0])
+        });
+        let (size, bound) = (rates.rates.norm(), bound + self.reserves().0);
+        if !inside || size > bound || !self.keeps_before(&first, (size, bound)) {
+            return None;
+        }
+        let before = stages.references[n - 1].accelerations + motion.inputs[n - 1];
+        let braking = guarantee::braking(
+            settings,
+            dynamics,
+            &design.tightening,
+            last.angles.y,
+            &last.rates,
+            (&self.carried_to_the_end(), before.norm()),
+        )?;
+        Some(Certified { margins: self.margins_of_first(&first, &second), braking })
+    }
+
+    /// Returns whether the limits hold also in the last instants before the motion, in which its
+    /// first command already acts if the delay is shorter than assumed. `size` is ‖ω̃‖ at the first
+    /// stage and `bound` its bound, `sideslip` is β̃ there.
+    ///
+    /// Either the plan before left room for such a command, or the motion does not come near the
+    /// limits in that time.
+    fn keeps_before(&self, first: &Point, (size, bound): (f64, f64)) -> bool {
+        let Some((switching, carried)) = self.switching(0) else { return true };
+        let Onset { before, allowed, .. } = self.onset;
+        let change = (first.acceleration - before).norm();
+        if switching.pulse_of_command(change) <= allowed {
+            return true;
+        }
+        let tightening = &self.design.tightening;
+        let Settings { delay_error, sideslip_domain, .. } = self.settings;
+        let of_angle = tightening.at(self.age).angle + switching.deviation(&carried).angle;
+        let Dynamics { geometry, rate, .. } = &self.dynamics;
+        let most = first.pull.max(before.norm()) + tightening.norm + switching.turn();
+        size + delay_error * (most + geometry.drift * rate * rate) <= bound
+            && first.angles.y.abs() + of_angle + delay_error * rate <= sideslip_domain
+    }
+
+    /// Returns whether |β| stays within its bound throughout interval `k`, whatever the error
+    /// dynamics do.
+    ///
+    /// Within the interval β̃ is a parabola, and the deviation lies below the straight line between
+    /// its values at both ends plus the bulge, so that the largest value of the sum is exact.
+    ///
+    /// `here` holds β̃ and its derivative at the beginning, `a` is its second derivative, and `end`
+    /// is β̃ at the end.
+    pub(super) fn keeps_sideslip(&self, k: usize, here: [f64; 2], a: f64, end: f64) -> bool {
+        let Settings { period_optimisation: h, sideslip_domain, .. } = self.settings;
+        let tightening = &self.design.tightening;
+        let more = self.switching(k).map_or(0.0, |(switching, carried)| {
+            let next = self.carried.borrow().get(k + 1).copied().unwrap_or_default();
+            switching.deviation(&carried).angle + switching.early(&next).0
+        });
+        let [from, to] = [k, k + 1].map(|k| tightening.at(self.tick(k)).angle + more);
+        let slope = (to - from) / h;
+        let largest = |sign: f64| {
+            let (rate, a) = (sign * here[1] + slope, sign * a);
+            let (before, after) = (sign * here[0] + from, sign * end + to);
+            let at_top = if a < 0.0 && rate > 0.0 && rate < -a * h {
+                before - 0.5 * rate * rate / a
+            } else {
+                before
+            };
+            at_top.max(after)
+        };
+        largest(1.0).max(largest(-1.0)) + tightening.angle_bulge(self.tick(k)) <= sideslip_domain
+    }
+
+    /// Returns the margins of a trajectory.
+    pub(super) fn margins(&self, motion: &Motion<2>) -> Margins {
+        self.carry(motion);
+        self.margins_of_first(&self.stages.point(motion, 0), &self.stages.point(motion, 1))
+    }
+
+    /// Returns the margins of the first interval.
+    fn margins_of_first(&self, first: &Point, second: &Point) -> Margins {
+        let Interval { rate, rate_bound, moment, moment_bound } = self.interval(0, first, second);
+        let Settings { limit_rate, limit_moment, .. } = self.settings;
+        let left = |bound: f64, value: f64, limit: f64| (bound - value) / limit + RESERVE;
+        Margins {
+            rate: left(rate_bound, rate, limit_rate),
+            moment: left(moment_bound, moment, limit_moment),
+        }
+    }
+}

@@ -1,0 +1,308 @@
+//! How a plan is found that satisfies the conditions of the theorem (docs/guarantee.md), and the
+//! rest of what CRMPC does with the robust set.
+
+use super::Robust;
+use super::certificate::Certified;
+use crate::controller::Explained;
+use crate::crmpc::guarantee::{self, Onset};
+use crate::crmpc::memory::{Memory, Standing};
+use crate::crmpc::plan::Plan;
+use crate::crmpc::planner::{Planner, follow_terminal_law};
+use crate::crmpc::set::{Bounds, ConstraintSet, Planned, Tick};
+use crate::crmpc::settings::InitialState;
+use crate::crmpc::stages::Stages;
+use crate::crmpc::{split, terminal};
+use crate::linearise;
+use crate::mpc::{self, Nonlinearity};
+use crate::report::Status;
+use nalgebra::{Vector3, Vector6};
+use vehicle::reference::Reference;
+
+/// Shares of the tightening that are tried if no plan is certified.
+const LESS: [f64; 2] = [0.5, 0.0];
+/// Number of steps from a kept plan towards the optimum without constraints that are tried: the
+/// first covers half of the way, each further one half as much as the one before.
+const HALVINGS: usize = 6;
+/// Share by which a window of the horizon is wider than the violated intervals, at each end. Most
+/// intervals of a window are near their bounds, and an iteration costs more than with the paper's
+/// set.
+const WINDOW_MARGIN: f64 = 0.25;
+
+impl Robust {
+    /// Returns whether the vehicle is further from the plan than the assumptions explain. The plan
+    /// is then useless: the guarantee ends, and bounds about the plan would be misleading. If the
+    /// design does not hold anyway, the plan still serves as a guess, and the result is `false`.
+    fn is_left_behind(&self, memory: &mut Memory, measured: &Vector6<f64>) -> bool {
+        let (angles, rates) = split(&(measured - memory.plan.states[0]));
+        let gain = self.settings.feedback;
+        let left = self.design.counted >= 1.0
+            && !self.explains(memory, 0, &angles, &rates, &(angles * gain.k1 + rates * gain.k2));
+        if memory.assured() && left {
+            memory.standing = Standing::Exceeded;
+        }
+        left
+    }
+
+    /// Returns what a nominal trajectory follows on that begins at the measured state.
+    fn onset_anew(&self, memory: &Memory, measured: &Vector6<f64>) -> Onset {
+        let Some(switching) = &self.design.tightening.switching else { return Onset::default() };
+        let at_rest = || {
+            let (angles, rates) = split(measured);
+            self.settings.body.drift(&angles, &rates)
+        };
+        let allowed = memory.plan.begins_with(switching).z
+            + self.design.tightening.pulse(memory.age as usize);
+        Onset {
+            carried: switching.unseen(memory.commands.changes()),
+            before: memory.observed.commanded().unwrap_or_else(at_rest),
+            allowed: if memory.assured() { allowed } else { f64::INFINITY },
+        }
+    }
+
+    /// Returns what the present plan follows on, if it goes on.
+    fn onset_going_on(&self, memory: &Memory) -> Onset {
+        let Plan { onset, .. } = &memory.plan;
+        let Some(switching) = &self.design.tightening.switching else { return *onset };
+        let allowed = switching.pulse_of_command(memory.plan.first_change());
+        Onset { allowed: if memory.assured() { allowed } else { f64::INFINITY }, ..*onset }
+    }
+
+    /// Finds a plan that satisfies the conditions of the theorem. The first choice is the optimum
+    /// from the measured state, the second the optimum from the state that the previous plan
+    /// predicted. The last is the previous plan itself, which satisfies the conditions if it did
+    /// before and the vehicle is no further from it than the assumptions explain. Without such a
+    /// plan the limits are violated as little as possible.
+    fn plan_by_the_theorem(
+        &mut self,
+        planner: &mut Planner,
+        memory: &mut Memory,
+        measured: &Vector6<f64>,
+        anew: bool,
+    ) -> mpc::Report {
+        let assured = memory.assured();
+        if !self.credible(memory) {
+            return self.violate_least(planner, memory, measured, 0);
+        }
+        let anew_from = (*measured, 0, self.onset_anew(memory, measured));
+        let goes_on = (memory.plan.states[0], memory.age, self.onset_going_on(memory));
+        let starts = match self.settings.initial_state {
+            InitialState::Nominal if assured => [Some(goes_on), None],
+            InitialState::Measured if assured => [Some(anew_from), Some(goes_on)],
+            _ => [Some(anew_from), None],
+        };
+        let mut iterations = 0;
+        for (start, age, onset) in starts.into_iter().flatten() {
+            self.begin(age as usize, 1.0, &onset);
+            let (report, certified) = self.certified(planner, memory, &start, anew);
+            iterations += report.iterations;
+            let solved = report.status != Status::Fallback;
+            // Linearised constraints serve for comparison, so their optimum is accepted without
+            // guarantee.
+            let taken = !assured || self.settings.solver.nonlinearity == Nonlinearity::Frozen;
+            if certified.is_some() || solved && taken {
+                planner.follow_optimum(&self.stages, memory, &start);
+                (memory.age, memory.plan.onset) = (age, onset);
+                self.take_over(planner, memory, certified);
+                return mpc::Report { iterations, ..report };
+            }
+        }
+        if assured {
+            self.go_towards_the_optimum(planner, memory);
+            let report = planner.keep(self, memory, measured, (Status::Kept, iterations));
+            memory.margins = self.margins(&planner.previous);
+            return report;
+        }
+        self.violate_least(planner, memory, measured, iterations)
+    }
+
+    /// Returns the optimum from `start`, with its certificate if it satisfies the conditions of the
+    /// theorem.
+    fn certified(
+        &self,
+        planner: &mut Planner,
+        memory: &Memory,
+        start: &Vector6<f64>,
+        first: bool,
+    ) -> (mpc::Report, Option<Certified>) {
+        let report = planner.solve(self, memory, start, first);
+        if report.status == Status::Fallback {
+            return (report, None);
+        }
+        (report, self.certify(planner.optimiser.motion(), report.settled))
+    }
+
+    /// Follows the trajectory that has just become the plan, under guarantee if it is certified.
+    fn take_over(&self, planner: &Planner, memory: &mut Memory, certified: Option<Certified>) {
+        let Some(Certified { margins, braking }) = certified else {
+            memory.margins = self.margins(planner.optimiser.motion());
+            memory.standing = self.without_guarantee(memory);
+            return;
+        };
+        (memory.margins, memory.plan.braking) = (margins, braking);
+        if !memory.assured() {
+            memory.standing = Standing::Pending;
+            memory.pending = self.design.delay_ticks;
+        }
+    }
+
+    /// Moves the certified plan towards the optimum without constraints as far as that is
+    /// certified, so that a plan that is kept repeatedly still leads to the reference.
+    fn go_towards_the_optimum(&mut self, planner: &mut Planner, memory: &mut Memory) {
+        self.begin(memory.age as usize, 1.0, &self.onset_going_on(memory));
+        planner.solve_without_constraints(&self.stages, &memory.plan);
+        for _ in 0..HALVINGS {
+            planner.optimiser.halve_the_way_to(&planner.previous);
+            if let Some(certified) = self.certify(planner.optimiser.motion(), false) {
+                let start = memory.plan.states[0];
+                planner.follow_optimum(&self.stages, memory, &start);
+                self.take_over(planner, memory, Some(certified));
+                return;
+            }
+        }
+    }
+
+    /// Plans by the optimum with less tightening, or by the terminal law from the measured state
+    /// within the available moment.
+    fn violate_least(
+        &mut self,
+        planner: &mut Planner,
+        memory: &mut Memory,
+        measured: &Vector6<f64>,
+        tried: u32,
+    ) -> mpc::Report {
+        memory.standing = self.without_guarantee(memory);
+        let onset = self.onset_anew(memory, measured);
+        (memory.age, memory.plan.onset) = (0, onset);
+        let mut iterations = tried;
+        for share in LESS {
+            if planner.optimiser.is_exhausted() {
+                break;
+            }
+            self.begin(0, share, &onset);
+            let report = planner.solve(self, memory, measured, true);
+            iterations += report.iterations;
+            if report.status != Status::Fallback {
+                planner.follow_optimum(&self.stages, memory, measured);
+                memory.margins = self.margins(planner.optimiser.motion());
+                return mpc::Report { iterations, ..report };
+            }
+        }
+        follow_terminal_law(self, &mut memory.plan, *measured);
+        let report = planner.keep(self, memory, measured, (Status::Fallback, iterations));
+        memory.margins = self.margins(&planner.previous);
+        report
+    }
+
+    /// Returns the reason why a plan is not certified.
+    fn without_guarantee(&self, memory: &Memory) -> Standing {
+        if self.design.counted < 1.0 {
+            Standing::Refused
+        } else if self.credible(memory) {
+            Standing::Uncertified
+        } else {
+            Standing::Exceeded
+        }
+    }
+}
+
+impl ConstraintSet for Robust {
+    fn stages(&self) -> &Stages {
+        &self.stages
+    }
+
+    fn stages_mut(&mut self) -> &mut Stages {
+        &mut self.stages
+    }
+
+    fn window_margin(&self) -> f64 {
+        WINDOW_MARGIN
+    }
+
+    fn bounds(&self, held: &mpc::Bounds) -> Bounds {
+        Bounds { rate: held.state.clone(), input: held.input.clone(), terminal: None }
+    }
+
+    fn moment_left(&self) -> f64 {
+        self.design.assessment.moment_left
+    }
+
+    fn observe(&self, memory: &mut Memory, angle_rates: &Vector3<f64>) {
+        memory.pending = memory.pending.saturating_sub(1);
+        memory.observed.observe(&self.settings, angle_rates);
+        if let Some(switching) = &self.design.tightening.switching {
+            memory.commands.observe(&self.settings, switching, &memory.observed);
+        }
+    }
+
+    /// Without guarantee the command compensates for the disturbance instead.
+    fn shift(&self, memory: &Memory) -> Vector3<f64> {
+        if memory.assured() { memory.observed.shift(&self.settings) } else { Vector3::zeros() }
+    }
+
+    fn plan(
+        &mut self,
+        planner: &mut Planner,
+        memory: &mut Memory,
+        measured: &Vector6<f64>,
+        first: bool,
+    ) -> Planned {
+        let was_assured = memory.assured();
+        if !first {
+            memory.age = memory.age.saturating_add(self.design.ratio as u32);
+        }
+        let anew = first || self.is_left_behind(memory, measured);
+        let report = self.plan_by_the_theorem(planner, memory, measured, anew);
+        Planned { report, left_behind: was_assured && anew && !first }
+    }
+
+    /// Beyond the horizon the trajectory brakes.
+    fn beyond_the_horizon(&self, plan: &Plan) -> Vector3<f64> {
+        let last = &plan.states[self.stages.horizon()];
+        let braking = Vector3::new(guarantee::BRAKING, plan.braking, guarantee::BRAKING);
+        -last.fixed_rows::<3>(3).component_mul(&braking)
+    }
+
+    fn move_on(&self, plan: &mut Plan) {
+        if let Some(switching) = &self.design.tightening.switching {
+            plan.onset.carried = switching.next(&plan.begins_with(switching));
+            plan.onset.before = plan.accelerations[0];
+        }
+    }
+
+    fn terminal_law(&self, state: &Vector6<f64>, reference: &Reference) -> Vector3<f64> {
+        terminal::acceleration_within_limits(&self.settings, state, reference)
+    }
+
+    /// Without guarantee the command compensates for the disturbance at once, because no plan
+    /// reserves moment for it.
+    fn compensation(&self, memory: &Memory) -> Vector3<f64> {
+        let compensates = self.settings.observer.active && !memory.assured();
+        if compensates { -memory.observed.disturbance } else { Vector3::zeros() }
+    }
+
+    /// The acceleration is exact in the middle of the period over which the moment is held, so that
+    /// the effects of a changing f on the rate cancel over the period.
+    fn moment(
+        &self,
+        angles: &Vector3<f64>,
+        angle_rates: &Vector3<f64>,
+        acceleration: &Vector3<f64>,
+    ) -> Vector3<f64> {
+        let half = 0.5 * self.settings.period_feedback;
+        let angles = angles + (angle_rates + acceleration * (0.5 * half)) * half;
+        let angle_rates = angle_rates + acceleration * half;
+        linearise::moment(&self.settings.body, &angles, &angle_rates, acceleration)
+    }
+
+    fn supervise(&self, memory: &mut Memory, tick: &Tick) {
+        self.judge(memory, tick);
+    }
+
+    fn limit(&self, _memory: &Memory) -> f64 {
+        self.settings.limit_moment
+    }
+
+    fn explained(&self) -> Option<Explained> {
+        Some(self.design.tightening.explained)
+    }
+}
