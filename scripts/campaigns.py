@@ -10,18 +10,18 @@ from pathlib import Path
 
 OUT = Path("out/campaigns")
 PAGE = Path("docs/campaigns-results.md")
-HEAD = """# Who keeps what, with which probability
+HEAD = """# Limits kept by each controller, with probabilities
 
-`scripts/campaigns` flies the campaigns below
+`scripts/campaigns` flies the campaigns in
 [orchestrator/experiments/campaigns](../orchestrator/experiments/campaigns) with each controller and
 writes this page. Probabilities are those of breaking a limit, with 95 % confidence by Clopper and
-Pearson; at corners, levels and for adversaries they are no more than shares. The last column is the
-mean share of the time in which CRMPC says that its guarantee is in force, and the number of cases
-that broke a limit while it was. [campaigns.md](campaigns.md) says what the numbers mean.
+Pearson; at corners, levels and for adversaries they are only shares of the cases. The last column
+has the mean share of the time in which the guarantee of CRMPC is in force, and the number of cases
+that broke a limit while it was. [campaigns.md](campaigns.md) explains the numbers.
 
-Controllers are at the settings of Chai 2022 where their names are those of experiments
-(`crmpc-robust`), and else at their units' own settings: only the inertia that they believe, the
-limits and the reference come from the scenario. None was designed for the others' scenarios. With
+Controllers with the name of an experiment (`crmpc-robust`) have the settings of Chai 2022. The
+others have the start values of their FMUs, and take only the assumed inertia, the limits and the
+reference from the scenario. No controller was designed for the other papers' scenarios. With
 sensors, CRMPC has the softer gain and the bounds of the campaign's experiment.
 """
 

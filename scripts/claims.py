@@ -39,11 +39,11 @@ VERDICTS = {
     "holds": "the test or run shows it",
     "holds in part": "it holds under a condition that the row names",
     "does not hold": "the test or run shows the contrary",
-    "reproduced": "the printed numbers come out again",
-    "redrawn": "the run draws the figure; the paper's own curves were not at hand, so nothing was compared digit by digit",
+    "reproduced": "the run gives the printed numbers",
+    "redrawn": "the run draws the figure; the paper's own curves were not available, so nothing was compared digit by digit",
     "implemented": "the code computes it, or has the value, as printed",
-    "implemented, corrected": "the code computes it otherwise than printed; [errata.md](errata.md) has the details of what the code uses",
-    "background": "a definition, a step or a remark of which nothing is computed",
+    "implemented, corrected": "the code computes it differently from the print; [errata.md](errata.md) has the details of what the code uses",
+    "background": "a definition, a step or a remark for which nothing is computed",
     "not judged": "nothing shows it; the row says why",
 }
 NEED_REASON = {"holds in part", "does not hold", "not judged"}
@@ -52,26 +52,26 @@ KINDS = ["equation", "statement", "figure", "table", "claim"]
 KEYS = {"place", "says", "setup", "verdict", "number", "shown", "study", "page", "reason"}
 
 HEAD = """\
-# Every item of the papers, and what became of it
+# Every item of the papers, and its verdict
 
 <!-- Written by scripts/claims.py from docs/claims: change that, not this page. -->
 
 This page has a row for each numbered equation, assumption, definition, lemma, theorem, remark,
-figure and table of the three papers, and for each claim of their text. A row names the place, says
-in our words what stands there, in which setup it was judged, with which verdict, and which test or
-run shows it; an item that was judged in several setups has several rows. [results.md](results.md)
-has the measured results as a report, [errata.md](errata.md) the misprints and the full references,
+figure and table of the three papers, and for each claim of their text. A row has the place, the
+item in our words, the setup in which it was judged, the verdict, and the test or run that shows it;
+an item that was judged in several setups has several rows. [results.md](results.md) has the
+measured results as a report, [errata.md](errata.md) the misprints and the full references, and
 [symbols.md](symbols.md) the symbols.
 
 Setups: *closed form* is a test against a formula, differences or another solver. *Ideal
 measurement* and *sensors and estimator* are the scenario of Chai 2022. *Direct moments* act as
 commanded; with *surfaces, jets* they go through the allocation. The *eight corners* are those of
 Wu's biases, inertia ± 5 %, air ± 10 % and coefficients ± 10 %, whose signs are not printed; *all
-biases* are an inertia of + 5 %, and air and surfaces 10 % weaker. The laws of Wu have their signs
-put right, unless the row says *as printed*; *our additions* are that the observer is told the
-achieved moment, and that the surface is laid anew while the actuators fall short. What the paper
-simulates is surfaces and jets without them. Numbers are those of the tests' bounds, of the studies'
-reports, of [results.md](results.md) or of [errata.md](errata.md).
+biases* are an inertia of + 5 %, and air and surfaces 10 % weaker. The laws of Wu have corrected
+signs unless the row says *as printed*. *Our additions* are that the observer uses the achieved
+moment, and that the surface is re-initialised while the actuators fall short; the paper simulates
+surfaces and jets without them. Numbers are those of the tests' bounds, of the studies' reports, of
+[results.md](results.md) or of [errata.md](errata.md).
 """
 
 
