@@ -36,7 +36,7 @@ impl Law for LqrLaw {
     }
 
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-        let table = table::period(table, "Time between two evaluations of the law");
+        let table = table::period(table, "control law");
         table::weights(table, |law| &mut law.settings.p, |law| &mut law.settings.q)
     }
 
