@@ -48,7 +48,7 @@ pub static PROFILES: Enumeration<Choice> = Enumeration {
         (
             Choice::External,
             "external",
-            "inputs reference.external; a law with a prediction holds the angles constant over it",
+            "inputs reference.external; predictions hold their angles constant",
         ),
     ],
 };

@@ -304,7 +304,8 @@ pub fn anti_windup_threshold() -> Real {
 
 /// Declares a component of the disturbance that a law's observer estimates.
 pub fn disturbance_estimate(axis: &str, meaning: &str) -> Real {
-    let text = format!("Estimated disturbance of the second derivative of the {meaning}");
+    let text =
+        format!("Observer's estimate of the disturbance of the second derivative of the {meaning}");
     let common = sampled_output(&format!("disturbanceEstimate.{axis}"), &text);
     common.real().unit(unit::angular_acceleration())
 }

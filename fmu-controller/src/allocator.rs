@@ -318,17 +318,22 @@ fn effectors(mut table: Variables) -> Variables {
             .real()
     };
     for i in 0..SURFACES {
-        let declaration =
-            limit("surfaceMin", i, "Smallest deflection").unit(unit::angle()).max(0.0).nominal(0.1);
+        let declaration = limit("surfaceMin", i, "Lower limit on the deflection")
+            .unit(unit::angle())
+            .max(0.0)
+            .nominal(0.1);
         table = table.real(declaration, move |m| &mut m.settings.effectors.min[i]);
     }
     for i in 0..SURFACES {
-        let declaration =
-            limit("surfaceMax", i, "Largest deflection").unit(unit::angle()).min(0.0).nominal(0.1);
+        let declaration = limit("surfaceMax", i, "Upper limit on the deflection")
+            .unit(unit::angle())
+            .min(0.0)
+            .nominal(0.1);
         table = table.real(declaration, move |m| &mut m.settings.effectors.max[i]);
     }
     for i in 0..SURFACES {
-        let declaration = limit("surfaceRate", i, "Largest deflection rate in either direction");
+        let declaration =
+            limit("surfaceRate", i, "Upper limit on the magnitude of the deflection rate");
         let declaration = declaration.unit(unit::angular_rate()).min(0.0).nominal(0.1);
         table = table.real(declaration, move |m| &mut m.settings.effectors.rate[i]);
     }

@@ -330,7 +330,7 @@ fn bounds(table: Controller) -> Controller {
     );
     let sideslip = parameter(
         "bound.sideslip",
-        "Largest sideslip angle for which the bounds of the paper's design hold",
+        "Largest magnitude of the sideslip angle for which the bounds of the paper's design hold",
     );
     let rate = parameter(
         "bound.referenceRate",
@@ -367,8 +367,10 @@ fn bounds(table: Controller) -> Controller {
 }
 
 fn guarantee(table: Controller) -> Controller {
-    let sideslip =
-        parameter("guarantee.sideslip", "Largest sideslip angle for which the guarantee is given");
+    let sideslip = parameter(
+        "guarantee.sideslip",
+        "Largest magnitude of the sideslip angle for which the guarantee is given",
+    );
     let active = parameter(
         "observer.active",
         "Whether the reference is shifted to cancel the steady deviation that the observed disturbance causes; only with constraints = robust",

@@ -41,7 +41,7 @@ impl Law for DlmpcLaw {
     type Settings = Settings;
 
     const NAME: &'static str = "DLMPC";
-    const DESCRIPTION: &'static str = "Double-layered model predictive and sliding-mode attitude controller, the comparison of Chai et al. (2022)";
+    const DESCRIPTION: &'static str = "Double-layered model predictive and sliding-mode attitude controller, a comparison law of Chai et al. (2022)";
     const DOCUMENTATION: &'static str = include_str!("dlmpc.html");
     const FIELDS: &'static Fields = &[("sliding_mode", "slidingMode")];
 

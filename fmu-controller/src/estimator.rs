@@ -384,7 +384,7 @@ fn outputs(table: Variables) -> Variables {
     for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
         let name = format!("calibration.matrix[{},{}]", row + 1, column + 1);
         let text = format!(
-            "Correction matrix of the magnetometer in force, entry ({}, {}); after a fit in 1/T",
+            "Correction matrix of the magnetometer in force, entry ({}, {}); its unit is 1/T after a fit",
             AXES[row].0, AXES[column].0
         );
         table = table.real(sampled(&name, &text).real(), move |m| {

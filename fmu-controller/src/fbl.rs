@@ -27,7 +27,7 @@ impl Law for FblLaw {
 
     const NAME: &'static str = "FBL";
     const DESCRIPTION: &'static str =
-        "Feedback linearisation of the attitude, a comparison of Wu et al. (2015)";
+        "Feedback linearisation of the attitude, a comparison law of Wu et al. (2015)";
     const DOCUMENTATION: &'static str = include_str!("fbl.html");
     const FIELDS: &'static Fields = &[("kp", "gain.p"), ("kd", "gain.d")];
 

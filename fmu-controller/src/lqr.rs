@@ -27,8 +27,7 @@ impl Law for LqrLaw {
     type Settings = LqrSettings;
 
     const NAME: &'static str = "LQR";
-    const DESCRIPTION: &'static str =
-        "Linear-quadratic attitude regulator, the unconstrained comparison of Chai et al. (2022)";
+    const DESCRIPTION: &'static str = "Linear-quadratic attitude regulator, the unconstrained comparison law of Chai et al. (2022)";
     const DOCUMENTATION: &'static str = include_str!("lqr.html");
 
     fn period() -> f64 {

@@ -36,7 +36,7 @@ static STATUSES: Enumeration<Status> = Enumeration {
 
 static METHODS: Enumeration<Method> = Enumeration {
     name: "Solver",
-    description: "Solver that is used where the shortcuts do not find the optimum",
+    description: "Solver of the optimisation, used where the shortcuts do not find the optimum",
     items: &[
         (
             Method::Riccati,

@@ -116,7 +116,7 @@ impl<V: Variant> Law for TvsmcLaw<V> {
 fn surface<V: Variant>(
     table: Table<ControllerFmu<TvsmcLaw<V>>>,
 ) -> Table<ControllerFmu<TvsmcLaw<V>>> {
-    let c = ("surface.c", "Gain c of the sliding surface on the tracking error");
+    let c = ("surface.c", "Gain c of the sliding surface");
     let lambda = parameter(
         "surface.lambda",
         "Rate lambda at which the offset of the sliding surface decays",
@@ -166,7 +166,7 @@ fn outputs<V: Variant>(
             .nominal(1e-3)
     };
     let sliding_estimate = |axis: &str, meaning: &str| {
-        let text = format!("Estimate z0 of the sliding variable of the {meaning} by the observer");
+        let text = format!("Observer's estimate z0 of the sliding variable of the {meaning}");
         sampled(format!("slidingEstimate.{axis}"), text)
             .real()
             .unit(unit::angular_rate())
@@ -201,7 +201,7 @@ pub struct Btvsmc;
 impl Variant for Btvsmc {
     type Reaching = BoundaryLayer;
     const NAME: &'static str = "BTVSMC";
-    const DESCRIPTION: &'static str = "Time-varying sliding-mode attitude controller with a boundary layer, a comparison of Wu et al. (2015)";
+    const DESCRIPTION: &'static str = "Time-varying sliding-mode attitude controller with a boundary layer, a comparison law of Wu et al. (2015)";
     const OBSERVER: bool = false;
 
     fn published() -> Settings<BoundaryLayer> {
