@@ -126,7 +126,7 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// set declares it by [`table::period`](crate::table::period).
     fn period() -> f64;
 
-    /// Adds the law's own variables to the table.
+    /// Adds the variables of the law to the table.
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         table
     }
@@ -140,7 +140,7 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// Returns an error that names the field of the settings at fault.
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError>;
 
-    /// Copies the law's own outputs from the memory in force.
+    /// Copies the outputs of the law from the memory in force.
     fn show(&mut self, _memory: &<Self::Controller as Controller>::Memory) {}
 
     /// Returns a warning for the log if something went wrong between two ticks.

@@ -10,7 +10,7 @@
 //! use fmi2_export::{Table, describe, table::parameter};
 //! use serde::{Deserialize, Serialize};
 //!
-//! /// A regulator with one weight; the value holds the law's own parameters and outputs.
+//! /// A regulator with one weight; the value holds the parameters and outputs of the law.
 //! #[derive(Serialize, Deserialize)]
 //! struct Soft {
 //!     weight: f64,

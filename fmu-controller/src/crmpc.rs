@@ -77,7 +77,7 @@ static INITIAL_STATES: Enumeration<InitialState> = Enumeration {
     ],
 };
 
-static GUARANTEES: Enumeration<Guarantee> = Enumeration {
+static POLICIES: Enumeration<Guarantee> = Enumeration {
     name: "GuaranteePolicy",
     description: "Reaction to settings for which the robust set gives no guarantee",
     items: &[
@@ -85,7 +85,7 @@ static GUARANTEES: Enumeration<Guarantee> = Enumeration {
         (Guarantee::BestEffort, "bestEffort", "the controller runs without a guarantee"),
     ],
 };
-static STANDINGS: Enumeration<Standing> = Enumeration {
+static GUARANTEE_STATUSES: Enumeration<Standing> = Enumeration {
     name: "GuaranteeStatus",
     description: "Status of the guarantee of the robust set at the last tick",
     items: &[
@@ -220,8 +220,8 @@ impl Law for CrmpcLaw {
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
         // The warning is given the first time only; `guarantee.status` shows later times.
-        let (before_then, now) = (&before.supervision, &after.supervision);
-        if now.ended == 1 && before_then.ended == 0 {
+        let (earlier, now) = (&before.supervision, &after.supervision);
+        if now.ended == 1 && earlier.ended == 0 {
             return Some(match now.contradiction {
                 Contradiction::Step => {
                     "the guarantee is no longer in force: a tick used inputs that had been set before it; step with period.feedback or a whole fraction of it"
@@ -240,7 +240,7 @@ impl Law for CrmpcLaw {
                 }
             });
         }
-        match (before_then.status, now.status) {
+        match (earlier.status, now.status) {
             (Standing::None, Standing::Uncertified) => Some(
                 "the guarantee is not in force: no plan from the present state satisfies its conditions",
             ),
@@ -382,7 +382,7 @@ fn guarantee(table: Controller) -> Controller {
         "Ratio of the estimated disturbance to the resulting shift of the reference angles",
     );
     table
-        .enumeration(parameter("guarantee.policy", GUARANTEES.description), &GUARANTEES, |m| {
+        .enumeration(parameter("guarantee.policy", POLICIES.description), &POLICIES, |m| {
             &mut m.law.settings.guarantee
         })
         .real(sideslip.real().unit(unit::angle()).min(0.0).max(0.8).nominal(0.3), |m| {
@@ -432,9 +432,11 @@ fn outputs(table: Controller) -> Controller {
             ),
             |m| &mut m.law.shown.in_force,
         )
-        .enumeration(sampled("guarantee.status", STANDINGS.description), &STANDINGS, |m| {
-            &mut m.law.shown.supervision.status
-        })
+        .enumeration(
+            sampled("guarantee.status", GUARANTEE_STATUSES.description),
+            &GUARANTEE_STATUSES,
+            |m| &mut m.law.shown.supervision.status,
+        )
         .enumeration(
             sampled("guarantee.contradiction", CONTRADICTIONS.description),
             &CONTRADICTIONS,
