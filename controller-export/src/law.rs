@@ -1,4 +1,4 @@
-//! The part of a unit that a single controller adds, and the data of the unit around it.
+//! The part of an FMU that a single control law adds, and the data that all controllers share.
 
 use crate::reference::{self, Source};
 use crate::sampled::SampledFmu;
@@ -38,13 +38,13 @@ impl Vehicle {
     }
 }
 
-/// A controller as an FMI unit, to be handed to [`fmi2_export::export_fmus!`].
-pub type ControllerFmu<L> = SampledFmu<ControllerUnit<L>>;
+/// A controller as an FMU, to be handed to [`fmi2_export::export_fmus!`].
+pub type ControllerFmu<L> = SampledFmu<ControllerInstance<L>>;
 
-/// Parameters, inputs and outputs of a controller's unit.
+/// An instance of a controller: its parameters, inputs and outputs.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
-pub struct ControllerUnit<L: Law> {
+pub struct ControllerInstance<L: Law> {
     /// Parameters that every controller has.
     pub parameters: Parameters,
     /// Inputs that every controller has.
@@ -85,7 +85,7 @@ pub struct Input {
     pub measured: Measurement,
     /// Moment that the actuators give, N m.
     pub achieved_moment: Vector3<f64>,
-    /// Reference from outside the unit.
+    /// Reference from outside the FMU.
     pub reference: Reference,
 }
 
@@ -98,7 +98,7 @@ pub struct Output {
     pub reference: Reference,
     /// Estimated delay of the loop, s.
     pub loop_delay: f64,
-    /// Whether it differs from the one that was told by more than half a period.
+    /// Whether it differs from the given delay by more than half a period.
     pub has_other_delay: bool,
 }
 
@@ -110,23 +110,23 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// All settings from which the controller is built.
     type Settings: PartialEq + Send;
 
-    /// Name of the unit in FMI.
+    /// Name of the FMU.
     const NAME: &'static str;
-    /// Description of the unit in one line.
+    /// Description of the FMU in one line.
     const DESCRIPTION: &'static str;
     /// Description of the computation, as an HTML fragment.
     const DOCUMENTATION: &'static str = "";
     /// Names of the variables that hold fields of the settings, where they differ from the fields'
-    /// own and are not in [`table::FIELDS`](crate::table::FIELDS).
+    /// names and are not in [`table::FIELDS`](crate::table::FIELDS).
     const FIELDS: &'static Fields = &[];
-    /// Version of the unit in FMI.
+    /// Version of the FMU.
     const VERSION: &'static str = env!("CARGO_PKG_VERSION");
 
     /// Returns the start value of the time between two evaluations, s. A law whose period can be
     /// set declares it by [`table::period`](crate::table::period).
     fn period() -> f64;
 
-    /// Adds the law's own variables to the table.
+    /// Adds the variables of the law to the table.
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
         table
     }
@@ -140,7 +140,7 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// Returns an error that names the field of the settings at fault.
     fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError>;
 
-    /// Copies the law's own outputs from the memory in force.
+    /// Copies the outputs of the law from the memory in force.
     fn show(&mut self, _memory: &<Self::Controller as Controller>::Memory) {}
 
     /// Returns a warning for the log if something went wrong between two ticks.

@@ -1,7 +1,7 @@
-//! This crate makes an FMI 2.0 unit of a sampled attitude controller.
+//! This crate makes an FMI 2.0 FMU of a sampled attitude controller.
 //!
 //! A control law implements [`control::Controller`] and [`Law`]. [`ControllerFmu`] adds the inputs,
-//! outputs, reference profiles, limits and delays that all controllers share, so that one unit can
+//! outputs, reference profiles, limits and delays that all controllers share, so that one FMU can
 //! replace another without rewiring:
 //!
 //! ```
@@ -10,7 +10,7 @@
 //! use fmi2_export::{Table, describe, table::parameter};
 //! use serde::{Deserialize, Serialize};
 //!
-//! /// A regulator with one weight; the value holds the law's own parameters and outputs.
+//! /// A regulator with one weight; the value holds the parameters and outputs of the law.
 //! #[derive(Serialize, Deserialize)]
 //! struct Soft {
 //!     weight: f64,
@@ -33,7 +33,7 @@
 //!     }
 //!
 //! fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-//! table.real(parameter("weight", "Weight on the errors").real().min(0.0), |m| &mut m.law.weight) }
+//! table.real(parameter("weight", "Weight on the tracking error").real().min(0.0), |m| &mut m.law.weight) }
 //!
 //!     fn settings(&self, vehicle: &Vehicle) -> LqrSettings {
 //!         let Vehicle { body, period, .. } = *vehicle;
@@ -45,25 +45,25 @@
 //!     }
 //! }
 //!
-//! // In the crate of the unit: fmi2_export::export_fmus!(ControllerFmu<Soft>);
+//! // In the crate of the FMU: fmi2_export::export_fmus!(ControllerFmu<Soft>);
 //! let description = describe::<ControllerFmu<Soft>>();
 //! assert!(description.variables.iter().any(|variable| variable.name == "moment.x"));
 //! ```
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`law`] | what a controller adds to the shared unit, and the data of that unit |
-//! | `unit` | how that unit works at its ticks |
-//! | [`sampled`] | any unit that works at ticks: steps, saved states |
+//! | [`law`] | what a control law adds, and the data that all controllers share |
+//! | `instance` | how an instance of a controller works at its ticks |
+//! | [`sampled`] | any instance that works at ticks: steps, saved states |
 //! | [`table`] | the variables that all controllers have, and declarations that laws share |
 //! | [`mod@reference`] | the source of the reference |
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+mod instance;
 pub mod law;
 pub mod reference;
 pub mod sampled;
 pub mod table;
-mod unit;
 
-pub use law::{ControllerFmu, ControllerUnit, Law, Vehicle};
-pub use sampled::{SampledFmu, SampledUnit};
+pub use law::{ControllerFmu, ControllerInstance, Law, Vehicle};
+pub use sampled::{SampledFmu, SampledInstance};

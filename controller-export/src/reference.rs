@@ -1,5 +1,5 @@
-//! The reference that a controller follows: a paper's profile, a simple course, a table, or the
-//! external inputs.
+//! The reference that a controller follows: a paper's profile, a constant, a sine, a lookup table,
+//! or the external inputs.
 
 use control::controller::Preview;
 use fmi2_export::fields::by_variable;
@@ -29,22 +29,26 @@ pub enum Choice {
 /// The choices of the parameter `reference.profile`.
 pub static PROFILES: Enumeration<Choice> = Enumeration {
     name: "ReferenceProfile",
-    description: "Where the reference attitude comes from",
+    description: "Source of the reference attitude",
     items: &[
         (
             Choice::Crmpc2022,
             "crmpc2022",
-            "the profile of Chai 2022, section 5.1, with its jump at 25 s",
+            "profile of Chai 2022, section 5.1, with its jump at 25 s",
         ),
-        (Choice::Tvsmc2015, "tvsmc2015", "the profile of Wu 2015, section 6"),
-        (Choice::TwoLoop, "twoLoop", "the step of Jia, Zhou and Zhou, section V"),
-        (Choice::Constant, "constant", "reference.angle"),
-        (Choice::Sine, "sine", "reference.angle plus reference.amplitude times a sine"),
-        (Choice::Table, "table", "interpolated from the file reference.file"),
+        (Choice::Tvsmc2015, "tvsmc2015", "profile of Wu 2015, section 6"),
+        (Choice::TwoLoop, "twoLoop", "step of Jia, Zhou and Zhou, section V"),
+        (Choice::Constant, "constant", "constant angles reference.angle"),
+        (
+            Choice::Sine,
+            "sine",
+            "reference.angle plus a sine with reference.amplitude, reference.frequency and reference.phase",
+        ),
+        (Choice::Table, "table", "values interpolated from the file reference.file"),
         (
             Choice::External,
             "external",
-            "the inputs reference.external, taken as constant over a preview",
+            "inputs reference.external; predictions hold their angles constant",
         ),
     ],
 };
@@ -52,7 +56,7 @@ pub static PROFILES: Enumeration<Choice> = Enumeration {
 /// Parameters of the reference.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Parameters {
-    /// Choice of the course.
+    /// Choice of the source.
     pub profile: Choice,
     /// Path of the CSV file of the table.
     pub file: String,
@@ -114,20 +118,20 @@ impl Source {
         }
     }
 
-    /// Returns the preview of the reference, where an external reference is valid until `known`
+    /// Returns the preview of the reference. An external reference is valid until `valid_until`
     /// (s).
-    pub(crate) fn preview(&self, known: f64, external: &Reference) -> Preview<'_> {
+    pub(crate) fn preview(&self, valid_until: f64, external: &Reference) -> Preview<'_> {
         match self {
             Self::Profile(profile) => Preview::Profile(profile),
-            Self::External => Preview::External(*external, known),
+            Self::External => Preview::External(*external, valid_until),
         }
     }
 }
 
-/// Reads the table from the file name as given, or from the unit's resources.
+/// Reads the lookup table from the file name as given, or from the resources of the FMU.
 fn table(file: &str, context: &Context) -> Result<LookupTable, Failure> {
     if file.is_empty() {
-        let text = "reference.profile is 'table' but reference.file is empty; set it to the path of a CSV file";
+        let text = "reference.profile = table, but reference.file is empty; set it to the path of a CSV file";
         return Err(Failure::Error(text.into()));
     }
     let path = Path::new(file);

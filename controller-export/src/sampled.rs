@@ -1,4 +1,4 @@
-//! Any unit that works at ticks of its own: its steps from tick to tick, and its restoration.
+//! An instance that works at ticks: its steps from tick to tick, and its restoration.
 
 use control::schedule::Sampled;
 use fmi2_export::fields::by_variable;
@@ -6,13 +6,16 @@ use fmi2_export::{Context, Description, Failure, Inputs, LastEvent, Model, Resto
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::ops::{Deref, DerefMut};
 
-/// The ticks of a unit with their memory.
-pub type Ticks<U> =
-    Sampled<<U as SampledUnit>::Memory, <U as SampledUnit>::Input, <U as SampledUnit>::Output>;
+/// The ticks of an instance with their memory.
+pub type Ticks<I> = Sampled<
+    <I as SampledInstance>::Memory,
+    <I as SampledInstance>::Input,
+    <I as SampledInstance>::Output,
+>;
 
-/// A unit that works at ticks: its parameters, inputs and outputs, and the device that is built
-/// from them.
-pub trait SampledUnit: Serialize + DeserializeOwned + Send + Sized + 'static {
+/// An instance that works at ticks: its parameters, inputs and outputs, and the device that is
+/// built from them.
+pub trait SampledInstance: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// Device that computes at the ticks. Apart from the memory it keeps nothing that a later tick
     /// could notice.
     type Device: Send;
@@ -23,10 +26,10 @@ pub trait SampledUnit: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// Output that a tick computes, besides the memory.
     type Output: Copy + Default + Serialize + DeserializeOwned + Send;
 
-    /// Returns the description of the unit, see [`Model::description`].
+    /// Returns the description of the FMU, see [`Model::description`].
     fn description() -> Description<SampledFmu<Self>>;
 
-    /// Returns the unit with its start values, see [`Model::new`].
+    /// Returns the instance with its start values, see [`Model::new`].
     fn new() -> Self;
 
     /// Loads the files that the parameters name.
@@ -93,58 +96,58 @@ pub trait SampledUnit: Serialize + DeserializeOwned + Send + Sized + 'static {
         true
     }
 
-    /// Returns what is wrong with a restored unit, apart from its ticks.
+    /// Returns what is wrong with a restored instance, apart from its ticks.
     fn problem(&self, _before: &Self) -> Option<&'static str> {
         None
     }
 }
 
-/// A unit that works at ticks, in the form that FMI requires.
+/// An instance that works at ticks, in the form that FMI requires.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
-pub struct SampledFmu<U: SampledUnit> {
-    unit: U,
-    /// Ticks of the unit; present from initialization on.
-    ticks: Option<Ticks<U>>,
+pub struct SampledFmu<I: SampledInstance> {
+    instance: I,
+    /// Ticks of the instance; present from initialization on.
+    ticks: Option<Ticks<I>>,
     #[serde(skip)]
-    device: Option<U::Device>,
+    device: Option<I::Device>,
 }
 
-impl<U: SampledUnit> Deref for SampledFmu<U> {
-    type Target = U;
-    fn deref(&self) -> &U {
-        &self.unit
+impl<I: SampledInstance> Deref for SampledFmu<I> {
+    type Target = I;
+    fn deref(&self) -> &I {
+        &self.instance
     }
 }
 
-impl<U: SampledUnit> DerefMut for SampledFmu<U> {
-    fn deref_mut(&mut self) -> &mut U {
-        &mut self.unit
+impl<I: SampledInstance> DerefMut for SampledFmu<I> {
+    fn deref_mut(&mut self) -> &mut I {
+        &mut self.instance
     }
 }
 
-/// Returns the error for a saved state that no unit can have been in.
+/// Returns the error for a saved state that no instance can have been in.
 fn misfit(problem: &str) -> Result<(), Failure> {
     Err(Failure::Error(format!("the saved state does not fit: {problem}")))
 }
 
-impl<U: SampledUnit> SampledFmu<U> {
-    /// Returns unit, device and ticks, which are present from initialization on.
-    fn parts(&mut self) -> Result<(&U, &mut U::Device, &mut Ticks<U>), Failure> {
+impl<I: SampledInstance> SampledFmu<I> {
+    /// Returns instance, device and ticks, which are present from initialization on.
+    fn parts(&mut self) -> Result<(&I, &mut I::Device, &mut Ticks<I>), Failure> {
         match (&mut self.device, &mut self.ticks) {
-            (Some(device), Some(ticks)) => Ok((&self.unit, device, ticks)),
-            _ => Err(Failure::Error("the unit is not initialized".into())),
+            (Some(device), Some(ticks)) => Ok((&self.instance, device, ticks)),
+            _ => Err(Failure::Error("the instance is not initialized".into())),
         }
     }
 }
 
-impl<U: SampledUnit> Model for SampledFmu<U> {
+impl<I: SampledInstance> Model for SampledFmu<I> {
     fn description() -> Description<Self> {
-        U::description()
+        I::description()
     }
 
     fn new() -> Self {
-        Self { unit: U::new(), ticks: None, device: None }
+        Self { instance: I::new(), ticks: None, device: None }
     }
 
     fn reset(&mut self) {
@@ -152,12 +155,12 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
     }
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
-        self.unit.load(context)?;
-        let same = |device: &mut U::Device| self.unit.is_designed(device);
-        let device = self.device.take_if(same).map_or_else(|| self.unit.design(), Ok)?;
-        vehicle::time::check_resolution(context.start_time, U::period(&device))
+        self.instance.load(context)?;
+        let same = |device: &mut I::Device| self.instance.is_designed(device);
+        let device = self.device.take_if(same).map_or_else(|| self.instance.design(), Ok)?;
+        vehicle::time::check_resolution(context.start_time, I::period(&device))
             .map_err(|error| Failure::Error(by_variable(&error, &[])))?;
-        self.ticks = Some(Sampled::new(context.start_time, U::period(&device), U::memory(&device)));
+        self.ticks = Some(Sampled::new(context.start_time, I::period(&device), I::memory(&device)));
         self.device = Some(device);
         Ok(())
     }
@@ -165,17 +168,17 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
     /// A due tick is evaluated, except after a step: the outputs are then those of the tick that
     /// was committed, which acted over that step.
     fn calculate(&mut self, time: f64, last: LastEvent) -> Result<(), Failure> {
-        let (unit, device, ticks) = self.parts()?;
+        let (instance, device, ticks) = self.parts()?;
         let holds = last == LastEvent::Step && ticks.has_committed();
         if !holds && ticks.is_due(time) {
-            unit.evaluate(device, ticks)?;
+            instance.evaluate(device, ticks)?;
         }
         if let (Some(device), Some(ticks)) = (&self.device, &self.ticks) {
             let (output, memory) = ticks.in_force();
             let before = (last == LastEvent::Initialization)
-                .then(|| U::output_before_the_first(device))
+                .then(|| I::output_before_the_first(device))
                 .flatten();
-            self.unit.show(time, device, (before.unwrap_or(output), memory));
+            self.instance.show(time, device, (before.unwrap_or(output), memory));
         }
         Ok(())
     }
@@ -193,14 +196,14 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
             let (_, _, ticks) = self.parts()?;
             let Some(tick) = ticks.next_before(to) else { return Ok(()) };
             inputs.advance(self, tick.max(from));
-            let (unit, device, ticks) = self.parts()?;
+            let (instance, device, ticks) = self.parts()?;
             if ticks.is_due(from) || inputs.are_extrapolated() {
-                unit.evaluate(device, ticks)?;
+                instance.evaluate(device, ticks)?;
             } else {
-                unit.evaluate_stale(device, ticks)?;
+                instance.evaluate_stale(device, ticks)?;
             }
             ticks.commit();
-            if let Some(text) = ticks.last_change(U::warning) {
+            if let Some(text) = ticks.last_change(I::warning) {
                 log(text);
             }
         }
@@ -208,18 +211,18 @@ impl<U: SampledUnit> Model for SampledFmu<U> {
 
     fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
         let Some(ticks) = self.ticks.as_ref().filter(|_| from.initialized) else { return Ok(()) };
-        if let Some(problem) = self.unit.problem(&from.before.unit) {
+        if let Some(problem) = self.instance.problem(&from.before.instance) {
             return misfit(problem);
         }
-        let same = |device: &mut U::Device| self.unit.is_designed(device);
-        let device = from.before.device.take_if(same).map_or_else(|| self.unit.design(), Ok)?;
+        let same = |device: &mut I::Device| self.instance.is_designed(device);
+        let device = from.before.device.take_if(same).map_or_else(|| self.instance.design(), Ok)?;
         let times = (from.start_time, from.time);
-        if ticks.fits(times, U::period(&device), from.failed, |memory| U::fits(&device, memory)) {
+        if ticks.fits(times, I::period(&device), from.failed, |memory| I::fits(&device, memory)) {
             self.device = Some(device);
             return Ok(());
         }
-        // The other unit gets back the device that was taken from it.
+        // The other instance gets back the device that was taken from it.
         from.before.device.get_or_insert(device);
-        misfit("its ticks are not those of its time, or its memory has another shape")
+        misfit("its ticks do not match its time, or its memory has another shape")
     }
 }

@@ -1,4 +1,4 @@
-//! The table of variables that every controller has; each law adds its own.
+//! The variable table that every controller has. Each law adds its own variables.
 
 use crate::law::{ControllerFmu, Law};
 use crate::reference::PROFILES;
@@ -33,6 +33,10 @@ pub const FIELDS: &Fields = &[
     ("threshold", "antiWindupThreshold"),
 ];
 
+/// Beginnings of the descriptions of the reference's derivatives; the angle's name follows.
+const FIRST_DERIVATIVE: &str = "First derivative of the reference";
+const SECOND_DERIVATIVE: &str = "Second derivative of the reference";
+
 /// Names of the inputs on which the outputs of a tick depend.
 const MEASURED: [&str; 6] =
     ["attitude.alpha", "attitude.beta", "attitude.sigma", "rate.p", "rate.q", "rate.r"];
@@ -59,7 +63,7 @@ pub fn sampled_output(name: &str, description: &str) -> Common {
     discrete_output(name, description).depends_on(sampled_inputs())
 }
 
-/// Returns the description of a controller's unit for FMI.
+/// Returns the description of a controller's FMU.
 pub fn description<L: Law>() -> Description<ControllerFmu<L>> {
     let scenario = Scenario::crmpc2022();
     let table = L::declare(vehicle(reference(outputs(inputs(Table::new())))));
@@ -111,7 +115,7 @@ fn measured_rate(axis: &str, meaning: &str) -> Real {
 
 fn achieved(axis: &str, meaning: &str) -> Real {
     let text = format!(
-        "{meaning} moment that the actuators really give; for laws with an observer, others ignore it"
+        "{meaning} moment achieved by the actuators; ignored by controllers without the parameter achievedMoment.used"
     );
     let common = input(&format!("achievedMoment.{axis}"), &capital(&text));
     common.real().unit(unit::moment()).nominal(1e5)
@@ -120,11 +124,11 @@ fn achieved(axis: &str, meaning: &str) -> Real {
 /// Declares inputs for a reference from outside.
 fn external(
     name: &'static str,
-    what: &'static str,
+    quantity: &'static str,
     unit: unit::Unit,
 ) -> impl Fn(&str, &str) -> Real {
     move |axis, meaning| {
-        let text = format!("{what} of the {meaning}, used if reference.profile is 'external'");
+        let text = format!("{quantity} {meaning}; used with reference.profile = external");
         input(&format!("reference.{name}.{axis}"), &text).real().unit(unit.clone()).nominal(0.1)
     }
 }
@@ -135,12 +139,9 @@ fn inputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     let table = vector(table, AXES, achieved, |m| &mut m.input.achieved_moment);
 
     let angles = external("external", "Reference", unit::angle());
-    let rates = external("externalRate", "First derivative of the reference", unit::angular_rate());
-    let accelerations = external(
-        "externalAcceleration",
-        "Second derivative of the reference",
-        unit::angular_acceleration(),
-    );
+    let rates = external("externalRate", FIRST_DERIVATIVE, unit::angular_rate());
+    let accelerations =
+        external("externalAcceleration", SECOND_DERIVATIVE, unit::angular_acceleration());
     let table = vector(table, ANGLES, angles, |m| &mut m.input.reference.angles);
     let table = vector(table, ANGLES, rates, |m| &mut m.input.reference.rates);
     vector(table, ANGLES, accelerations, |m| &mut m.input.reference.accelerations)
@@ -156,11 +157,11 @@ fn moment(axis: &str, meaning: &str) -> Real {
 fn in_force(
     name: &'static str,
     external: &'static str,
-    what: &'static str,
+    quantity: &'static str,
     unit: unit::Unit,
 ) -> impl Fn(&str, &str) -> Real {
     move |axis, meaning| {
-        let text = format!("{what} of the {meaning} in force");
+        let text = format!("{quantity} {meaning} at the present time");
         let source = format!("reference.{external}.{axis}");
         let common = output(&format!("{name}.{axis}"), &text).depends_on([source.as_str()]);
         common.real().unit(unit.clone()).nominal(0.1)
@@ -170,16 +171,11 @@ fn in_force(
 fn outputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     let table = vector(table, AXES, moment, |m| &mut m.output.moment);
     let angles = in_force("reference", "external", "Reference", unit::angle());
-    let rates = in_force(
-        "referenceRate",
-        "externalRate",
-        "First derivative of the reference",
-        unit::angular_rate(),
-    );
+    let rates = in_force("referenceRate", "externalRate", FIRST_DERIVATIVE, unit::angular_rate());
     let accelerations = in_force(
         "referenceAcceleration",
         "externalAcceleration",
-        "Second derivative of the reference",
+        SECOND_DERIVATIVE,
         unit::angular_acceleration(),
     );
     let table = vector(table, ANGLES, angles, |m| &mut m.output.reference.angles);
@@ -187,11 +183,11 @@ fn outputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     let table = vector(table, ANGLES, accelerations, |m| &mut m.output.reference.accelerations);
     let estimate = sampled_output(
         "loopDelay.estimate",
-        "Delay from a measurement to the moment that results from it, estimated from the motion; delay + measurement.age until the motion tells it",
+        "Estimated delay from a measurement to the resulting moment; equals delay + measurement.age until the response of the vehicle allows an estimate",
     );
     let differs = sampled_output(
         "loopDelay.differs",
-        "Whether the estimated delay differs from delay + measurement.age by more than half a period",
+        "Whether loopDelay.estimate differs from delay + measurement.age by more than half of period.feedback",
     );
     table
         .real(estimate.real().unit(unit::time()).nominal(0.1), |m| &mut m.output.loop_delay)
@@ -199,53 +195,63 @@ fn outputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
 }
 
 fn reference_angle(axis: &str, meaning: &str) -> Real {
-    let text = format!("Reference {meaning} if reference.profile is 'constant' or 'sine'");
+    let text = format!(
+        "Constant part of the reference {meaning}; used with reference.profile = constant or sine"
+    );
     parameter(&format!("reference.angle.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
 }
 
 fn amplitude(axis: &str, meaning: &str) -> Real {
-    let text = format!("Amplitude of the {meaning} if reference.profile is 'sine'");
+    let text = format!(
+        "Amplitude of the sine in the reference {meaning}; used with reference.profile = sine"
+    );
     parameter(&format!("reference.amplitude.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
 }
 
 fn reference<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
-    let profile = parameter("reference.profile", "Where the reference attitude comes from");
+    let profile = parameter("reference.profile", PROFILES.description);
     let file = parameter(
         "reference.file",
-        "CSV file with time and angles, if reference.profile is 'table'; a path, or a name inside the unit's resources",
+        "Path of a CSV file with time and angles, or name of a file in the resources of the FMU; used with reference.profile = table",
     );
-    let frequency =
-        parameter("reference.frequency", "Angular frequency if reference.profile is 'sine'").real();
-    let phase =
-        parameter("reference.phase", "Phase at t = 0 if reference.profile is 'sine'").real();
+    let frequency = parameter(
+        "reference.frequency",
+        "Angular frequency of the reference sine; used with reference.profile = sine",
+    );
+    let phase = parameter(
+        "reference.phase",
+        "Phase of the reference sine at t = 0; used with reference.profile = sine",
+    );
     let table = table
         .enumeration(profile, &PROFILES, |m| &mut m.parameters.reference.profile)
         .string(file, |m| &mut m.parameters.reference.file);
     let table = vector(table, ANGLES, reference_angle, |m| &mut m.parameters.reference.angle);
     vector(table, ANGLES, amplitude, |m| &mut m.parameters.reference.amplitude)
-        .real(frequency.unit(unit::angular_rate()).min(0.0).nominal(1.0), |m| {
+        .real(frequency.real().unit(unit::angular_rate()).min(0.0).nominal(1.0), |m| {
             &mut m.parameters.reference.frequency
         })
-        .real(phase.unit(unit::angle()), |m| &mut m.parameters.reference.phase)
+        .real(phase.real().unit(unit::angle()), |m| &mut m.parameters.reference.phase)
 }
 
 fn moment_of_inertia(name: &str, meaning: &str) -> Real {
-    let text = format!("{meaning} as the controller believes it to be");
+    let text = format!("{meaning} assumed by the controller");
     parameter(name, &text).real().unit(unit::inertia()).nominal(1e6)
 }
 
 fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
-    let rate = parameter("limit.rate", "Limit on the norm of the body rates").real();
-    let moment = parameter("limit.moment", "Limit on the norm of the control moment").real();
-    let saturation =
-        parameter("saturation", "Whether the commanded moment is scaled into limit.moment");
+    let rate = parameter("limit.rate", "Upper limit on the norm of the body rates").real();
+    let moment = parameter("limit.moment", "Upper limit on the norm of the control moment").real();
+    let saturation = parameter(
+        "saturation",
+        "Whether the commanded moment is scaled down to a norm of at most limit.moment",
+    );
     let delay = parameter(
         "delay",
-        "Time from a tick until the moment that it leads to acts on the vehicle; the law predicts the state over it",
+        "Time from a tick until the resulting moment acts on the vehicle; the law uses the state predicted over this time",
     );
     let age = parameter(
         "measurement.age",
-        "How old a measurement is when it arrives, by the delay of an estimator's filter for instance; the law predicts the state over it",
+        "Age of a measurement when it arrives, for example because of an estimator's filter; the law uses the state predicted over this time",
     );
     table
         .real(moment_of_inertia("inertia.Ixx", "Roll moment of inertia").min(1.0), |m| {
@@ -260,7 +266,7 @@ fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
         .real(
             moment_of_inertia(
                 "inertia.Ixz",
-                "Product of inertia, which stands in the tensor as -Ixz,",
+                "Product of inertia (entry -Ixz of the inertia tensor)",
             ),
             |m| &mut m.parameters.inertia.Ixz,
         )
@@ -283,14 +289,31 @@ fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
 pub fn achieved_moment<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
     let used = parameter(
         "achievedMoment.used",
-        "Whether the inputs achievedMoment are fed; if not, the commanded moment is taken to act",
+        "Whether the inputs achievedMoment are connected; otherwise the law assumes that the commanded moment acts",
     );
     table.boolean(used, |m| &mut m.parameters.achieved_moment_used)
 }
 
-/// Adds the parameter period.feedback, the time between two evaluations of what `text` says.
-pub fn period<L: Law>(table: Table<ControllerFmu<L>>, text: &str) -> Table<ControllerFmu<L>> {
-    let period = parameter("period.feedback", text).real().unit(unit::time());
+/// Declares the threshold of the actuators' saturation, which all laws with anti-windup have.
+pub fn anti_windup_threshold() -> Real {
+    let text =
+        "Norm of the missing angular acceleration above which the actuators count as saturated";
+    let common = parameter("antiWindupThreshold", text);
+    common.real().unit(unit::angular_acceleration()).min(0.0).nominal(0.01)
+}
+
+/// Declares a component of the disturbance that a law's observer estimates.
+pub fn disturbance_estimate(axis: &str, meaning: &str) -> Real {
+    let text =
+        format!("Observer's estimate of the disturbance of the second derivative of the {meaning}");
+    let common = sampled_output(&format!("disturbanceEstimate.{axis}"), &text);
+    common.real().unit(unit::angular_acceleration())
+}
+
+/// Adds the parameter period.feedback, the sampling period of `part`, such as "control law".
+pub fn period<L: Law>(table: Table<ControllerFmu<L>>, part: &str) -> Table<ControllerFmu<L>> {
+    let text = format!("Sampling period of the {part}");
+    let period = parameter("period.feedback", &text).real().unit(unit::time());
     table.real(period.min(1e-4).max(10.0).nominal(L::period()), |m| &mut m.parameters.period)
 }
 
@@ -302,8 +325,9 @@ pub fn gains<L: Law>(
     field: impl Fn(&mut L) -> &mut [f64; 3] + Copy + Send + Sync + 'static,
 ) -> Table<ControllerFmu<L>> {
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
-        let real =
-            parameter(&format!("{name}[{}]", i + 1), &format!("{text}: {meaning}")).real().min(0.0);
+        let real = parameter(&format!("{name}[{}]", i + 1), &format!("{text} for the {meaning}"))
+            .real()
+            .min(0.0);
         let real = match unit {
             Some(unit) => real.unit(unit.clone()),
             None => real,
@@ -311,6 +335,17 @@ pub fn gains<L: Law>(
         table = table.real(real, move |m| &mut field(&mut m.law)[i]);
     }
     table
+}
+
+/// Name of Θ − Θ_r in descriptions.
+pub const TRACKING_ERROR: &str = "tracking error";
+/// Name of the first derivative of Θ − Θ_r in descriptions.
+pub const ERROR_RATE: &str = "derivative of the tracking error";
+
+/// Returns the description of the weight on a `quantity` of an angle, the diagonal entry with this
+/// index of this matrix.
+pub fn weight_text(quantity: &str, angle: &str, (matrix, index): (&str, usize)) -> String {
+    format!("Weight on the {quantity} of the {angle} (diagonal entry {} of {matrix})", index + 1)
 }
 
 /// Adds the weights P and Q on the tracking error and the input.
@@ -321,16 +356,13 @@ pub fn weights<L: Law>(
 ) -> Table<ControllerFmu<L>> {
     for i in 0..6 {
         let (_, meaning) = ANGLES[i % 3];
-        let of = if i < 3 { "error" } else { "error rate" };
-        let text = format!("Diagonal entry {} of P: weight on the {of} of the {meaning}", i + 1);
+        let quantity = if i < 3 { TRACKING_ERROR } else { ERROR_RATE };
+        let text = weight_text(quantity, meaning, ("P", i));
         let real = parameter(&format!("weight.P[{}]", i + 1), &text).real().min(0.0).nominal(50.0);
         table = table.real(real, move |m| &mut p(&mut m.law)[i]);
     }
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
-        let text = format!(
-            "Diagonal entry {} of Q: weight on the second derivative of the {meaning}'s error",
-            i + 1
-        );
+        let text = weight_text("second derivative of the tracking error", meaning, ("Q", i));
         let real = parameter(&format!("weight.Q[{}]", i + 1), &text).real().min(0.0).nominal(10.0);
         table = table.real(real, move |m| &mut q(&mut m.law)[i]);
     }
@@ -349,7 +381,8 @@ pub fn shown_vector(value: &Vector3<f64>) -> Vector3<f64> {
     value.map(shown)
 }
 
-fn capital(text: &str) -> String {
+/// Returns the text with a capital first letter.
+pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

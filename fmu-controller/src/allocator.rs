@@ -3,8 +3,8 @@
 use control::allocation::{
     Allocator, Command, JetCommand, Memory, Method, Report, Settings, Status,
 };
-use controller_export::sampled::{SampledFmu, SampledUnit, Ticks};
-use controller_export::table::AXES;
+use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
+use controller_export::table::{AXES, capital};
 use fmi2_export::fields::{Fields, by_variable};
 use fmi2_export::table::{Common, discrete_output, input, parameter};
 use fmi2_export::{Description, Enumeration, Failure, Table};
@@ -17,50 +17,58 @@ use vehicle::effectors::{Effectors, JETS, Jets, SURFACES, Surfaces};
 
 static METHODS: Enumeration<Method> = Enumeration {
     name: "AllocationMethod",
-    description: "How the moment is divided",
+    description: "Method that divides the moment among the effectors",
     items: &[
         (
             Method::Optimal,
             "optimal",
-            "least moment error and use of the jets, over all effectors together",
+            "minimises the moment error and the use of the jets over all effectors together",
         ),
         (
             Method::Blending,
             "blending",
-            "surfaces first, from a dynamic pressure on and up to their limits; the remainder to the jets",
+            "the surfaces come first, within their limits and above threshold.dynamicPressure; the jets give the remainder",
         ),
     ],
 };
 static JET_COMMANDS: Enumeration<JetCommand> = Enumeration {
     name: "JetCommand",
-    description: "What goes to the jets",
+    description: "Form of the commands to the jets",
     items: &[
-        (JetCommand::Pwpf, "pwpf", "on (1) and off (0), by pulse-width pulse-frequency modulation"),
-        (JetCommand::Duty, "duty", "duty cycles from 0 to 1"),
+        (
+            JetCommand::Pwpf,
+            "pwpf",
+            "1 for on and 0 for off, by pulse-width pulse-frequency modulation",
+        ),
+        (JetCommand::Duty, "duty", "duty cycle from 0 to 1, without modulation"),
     ],
 };
 static STATUSES: Enumeration<Status> = Enumeration {
     name: "AllocationStatus",
-    description: "How an allocation came about",
+    description: "Origin of the allocation in force",
     items: &[
         (Status::None, "none", "no allocation yet"),
-        (Status::Optimal, "optimal", "the optimum"),
-        (Status::Fallback, "fallback", "the previous allocation, within the limits"),
+        (Status::Optimal, "optimal", "optimum"),
+        (
+            Status::Fallback,
+            "fallback",
+            "previous allocation within the limits, because the optimisation failed",
+        ),
     ],
 };
 
-/// The allocator as an FMI unit.
-pub type ControlAllocator = SampledFmu<AllocatorUnit>;
+/// The allocator as an FMU.
+pub type ControlAllocator = SampledFmu<AllocatorInstance>;
 
-/// Parameters, inputs and outputs of the allocator's unit.
+/// An instance of the allocator: its parameters, inputs and outputs.
 #[derive(Serialize, Deserialize)]
-pub struct AllocatorUnit {
+pub struct AllocatorInstance {
     pub(crate) settings: Settings,
     command: Command,
     output: Output,
 }
 
-/// Outputs of the allocator's unit.
+/// Outputs of the allocator.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Output {
     surfaces: Surfaces,
@@ -88,7 +96,7 @@ impl From<&Memory> for Output {
     }
 }
 
-impl SampledUnit for AllocatorUnit {
+impl SampledInstance for AllocatorInstance {
     type Device = Allocator;
     type Memory = Memory;
     type Input = Command;
@@ -148,7 +156,7 @@ impl SampledUnit for AllocatorUnit {
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
         (after.report.fallbacks > before.report.fallbacks).then_some(
-            "the optimisation did not succeed: the previous allocation is kept (solver.fallbacks)",
+            "the optimisation failed: the previous allocation is kept (see solver.fallbacks)",
         )
     }
 
@@ -186,7 +194,7 @@ fn inputs(mut table: Variables) -> Variables {
     }
     let pressure = input(
         "dynamicPressure",
-        "Dynamic pressure, which the surfaces' moments are proportional to",
+        "Dynamic pressure, to which the moments of the surfaces are proportional",
     );
     table.real(pressure.real().unit(unit::pressure()).min(0.0).nominal(1e3), |m| {
         &mut m.command.dynamic_pressure
@@ -199,13 +207,17 @@ fn sampled(name: &str, text: &str) -> Common {
 
 fn outputs(mut table: Variables) -> Variables {
     for (i, name) in Effectors::published().names.iter().enumerate() {
-        let common = sampled(&format!("surface[{}]", i + 1), &format!("Deflection of the {name}"));
+        let common =
+            sampled(&format!("surface[{}]", i + 1), &format!("Commanded deflection of the {name}"));
         table = table.real(common.real().unit(unit::angle()).nominal(0.1), move |m| {
             &mut m.output.surfaces[i]
         });
     }
     for i in 0..JETS {
-        let text = format!("Command to jet {}: on (1) or off (0), or the duty cycle", i + 1);
+        let text = format!(
+            "Command to jet {}: 1 for on and 0 for off, or the duty cycle with jets = duty",
+            i + 1
+        );
         let common = sampled(&format!("jet[{}]", i + 1), &text);
         table = table.real(common.real(), move |m| &mut m.output.jets[i]);
     }
@@ -217,30 +229,29 @@ fn outputs(mut table: Variables) -> Variables {
     let table = moment(
         table,
         "achievedMoment",
-        "moment of the last allocation, with the duty cycles of the jets before modulation",
+        "moment achieved by the last allocation, with the jets' duty cycles before modulation",
         |m| &mut m.output.achieved,
     );
     let table = moment(
         table,
         "residual",
-        "moment that the last allocation leaves: commanded minus achieved, before modulation",
+        "moment missing in the last allocation: commanded minus achieved, before modulation",
         |m| &mut m.output.residual,
     );
     let table = moment(
         table,
         "modulatedMoment",
-        "moment of surface and jet commands as they are now",
+        "moment of the present commands to surfaces and jets, after modulation",
         |m| &mut m.output.modulated,
     );
     let table =
-        moment(table, "momentBySurfaces", "moment of the surfaces of the last allocation", |m| {
+        moment(table, "momentBySurfaces", "moment of the surfaces in the last allocation", |m| {
             &mut m.output.by_surfaces
         });
-    let status = sampled("solver.status", "How the allocation in force came about");
-    let iterations = sampled("solver.iterations", "Iterations of the last allocation");
-    let fallbacks = sampled("solver.fallbacks", "Allocations so far that did not succeed");
-    let time =
-        sampled("solver.time", "Wall-clock time of the last allocation; differs from run to run");
+    let status = sampled("solver.status", STATUSES.description);
+    let iterations = sampled("solver.iterations", "Number of iterations in the last allocation");
+    let fallbacks = sampled("solver.fallbacks", "Number of allocations so far that failed");
+    let time = sampled("solver.time", "Wall-clock time of the last allocation; not reproducible");
     table
         .enumeration(status, &STATUSES, |m| &mut m.output.report.status)
         .integer(iterations, (None, None), |m| &mut m.output.report.iterations)
@@ -255,9 +266,7 @@ fn moment(
     field: impl Fn(&mut ControlAllocator) -> &mut Vector3<f64> + Copy + Send + Sync + 'static,
 ) -> Variables {
     for (i, (axis, meaning)) in AXES.into_iter().enumerate() {
-        let mut meaning = meaning.to_string();
-        meaning[..1].make_ascii_uppercase();
-        let common = sampled(&format!("{name}.{axis}"), &format!("{meaning} {text}"));
+        let common = sampled(&format!("{name}.{axis}"), &format!("{} {text}", capital(meaning)));
         table =
             table.real(common.real().unit(unit::moment()).nominal(1e5), move |m| &mut field(m)[i]);
     }
@@ -265,17 +274,18 @@ fn moment(
 }
 
 fn schedule(table: Variables) -> Variables {
-    let method = parameter("method", "How the moment is divided among the effectors");
-    let jets = parameter("jets", "What goes to the jets");
+    let method = parameter("method", METHODS.description);
+    let jets = parameter("jets", JET_COMMANDS.description);
     let period = parameter(
         "period",
-        "Time between allocations; with 'pwpf' a whole multiple of pwpf.period",
+        "Sampling period of the allocation; with jets = pwpf a whole multiple of pwpf.period",
     );
     let threshold = parameter(
         "threshold.dynamicPressure",
-        "Dynamic pressure from which 'blending' uses the surfaces",
+        "Dynamic pressure above which method = blending uses the surfaces",
     );
-    let iterations = parameter("solver.maxIterations", "Iteration limit of the cone solver");
+    let iterations =
+        parameter("solver.maxIterations", "Maximum number of iterations of the cone solver");
     let mut table = table
         .enumeration(method, &METHODS, |m| &mut m.settings.method)
         .enumeration(jets, &JET_COMMANDS, |m| &mut m.settings.jets)
@@ -287,14 +297,14 @@ fn schedule(table: Variables) -> Variables {
         })
         .integer(iterations, (Some(1), Some(1000)), |m| &mut m.settings.max_iterations);
     for (i, (_, meaning)) in AXES.into_iter().enumerate() {
-        let text = format!("W1: weight on the {meaning} moment that is left, 1/(N m)");
+        let text = format!("Weight W1 on the missing {meaning} moment, in 1/(N m)");
         let weight = parameter(&format!("weight.moment[{}]", i + 1), &text).real().min(0.0);
         table = table.real(weight, move |m| &mut m.settings.weight_moment[i]);
     }
-    let jet = parameter("weight.jet", "W2: weight on the duty cycle of each jet");
+    let jet = parameter("weight.jet", "Weight W2 on the duty cycle of each jet");
     let surface = parameter(
         "weight.surface",
-        "Weight on the halved square of each deflection by its range; 0 is the cost function as printed, whose optimum is not unique",
+        "Weight on half the squared ratio of each deflection to its range; 0 gives the cost function as printed, whose optimum is not unique",
     );
     table
         .real(jet.real().min(0.0), |m| &mut m.settings.weight_jet)
@@ -308,33 +318,39 @@ fn effectors(mut table: Variables) -> Variables {
             .real()
     };
     for i in 0..SURFACES {
-        let declaration =
-            limit("surfaceMin", i, "Least deflection").unit(unit::angle()).max(0.0).nominal(0.1);
+        let declaration = limit("surfaceMin", i, "Lower limit on the deflection")
+            .unit(unit::angle())
+            .max(0.0)
+            .nominal(0.1);
         table = table.real(declaration, move |m| &mut m.settings.effectors.min[i]);
     }
     for i in 0..SURFACES {
-        let declaration =
-            limit("surfaceMax", i, "Greatest deflection").unit(unit::angle()).min(0.0).nominal(0.1);
+        let declaration = limit("surfaceMax", i, "Upper limit on the deflection")
+            .unit(unit::angle())
+            .min(0.0)
+            .nominal(0.1);
         table = table.real(declaration, move |m| &mut m.settings.effectors.max[i]);
     }
     for i in 0..SURFACES {
-        let declaration = limit("surfaceRate", i, "Greatest deflection rate, both ways");
+        let declaration =
+            limit("surfaceRate", i, "Upper limit on the magnitude of the deflection rate");
         let declaration = declaration.unit(unit::angular_rate()).min(0.0).nominal(0.1);
         table = table.real(declaration, move |m| &mut m.settings.effectors.rate[i]);
     }
     for (i, name) in names.iter().enumerate() {
-        let text = format!("Whether the {name} may be used; else it is kept at zero");
+        let text = format!("Whether the {name} may be used; otherwise it is kept at zero");
         let common = parameter(&format!("surfaceAllowed[{}]", i + 1), &text);
         table = table.boolean(common, move |m| &mut m.settings.effectors.allowed[i]);
     }
     let pressure =
-        parameter("dynamicPressure.reference", "Dynamic pressure that surfaceMoment belongs to");
+        parameter("dynamicPressure.reference", "Dynamic pressure for which surfaceMoment is given");
     table = table.real(pressure.real().unit(unit::pressure()).min(0.0).nominal(1e3), |m| {
         &mut m.settings.effectors.reference_pressure
     });
     for (i, (_, meaning)) in AXES.into_iter().enumerate() {
         for (j, name) in names.iter().enumerate() {
-            let text = format!("D_A: {meaning} moment by deflection of the {name}");
+            let text =
+                format!("{} moment per deflection of the {name} (matrix D_A)", capital(meaning));
             let common = parameter(&format!("surfaceMoment[{},{}]", i + 1, j + 1), &text);
             table = table
                 .real(common.real().unit(unit::moment_by_angle()).nominal(1e5), move |m| {
@@ -344,7 +360,11 @@ fn effectors(mut table: Variables) -> Variables {
     }
     for (i, (_, meaning)) in AXES.into_iter().enumerate() {
         for j in 0..JETS {
-            let text = format!("D_RCS: {meaning} moment of jet {}", j + 1);
+            let text = format!(
+                "{} moment of jet {} at full thrust (matrix D_RCS)",
+                capital(meaning),
+                j + 1
+            );
             let common = parameter(&format!("jetMoment[{},{}]", i + 1, j + 1), &text);
             table = table.real(common.real().unit(unit::moment()).nominal(1e4), move |m| {
                 &mut m.settings.effectors.jet_moments[(i, j)]
@@ -355,11 +375,11 @@ fn effectors(mut table: Variables) -> Variables {
 }
 
 fn pwpf(table: Variables) -> Variables {
-    let gain = parameter("pwpf.gain", "K_m: gain of the modulator's filter");
-    let time = parameter("pwpf.timeConstant", "T_m: time constant of the modulator's filter");
-    let on = parameter("pwpf.on", "u_on: filter output at which a jet switches on");
-    let off = parameter("pwpf.off", "u_off: filter output at which a jet switches off");
-    let period = parameter("pwpf.period", "Time between two looks of the modulator");
+    let gain = parameter("pwpf.gain", "Gain K_m of the modulator's filter");
+    let time = parameter("pwpf.timeConstant", "Time constant T_m of the modulator's filter");
+    let on = parameter("pwpf.on", "Filter output u_on at which a jet switches on");
+    let off = parameter("pwpf.off", "Filter output u_off at which a jet switches off");
+    let period = parameter("pwpf.period", "Sampling period of the modulator");
     let seconds = |common: Common| common.real().unit(unit::time()).min(1e-5).max(10.0);
     table
         .real(gain.real().min(0.0), |m| &mut m.settings.pwpf.gain)

@@ -26,8 +26,8 @@ pub struct CrmpcLaw {
     shown: Shown,
 }
 
-/// Share of the moment limit below which the plan has so little left that optimisations become
-/// several times longer (`control`'s example `loop_times` with other disturbance bounds).
+/// Share of the moment limit for the plan below which optimisations take several times as long
+/// (example `loop_times` of `control` with other disturbance bounds).
 const LITTLE_MOMENT: f64 = 0.1;
 
 /// Values that the outputs show.
@@ -45,105 +45,109 @@ struct Shown {
 
 static CONSTRAINTS: Enumeration<Constraints> = Enumeration {
     name: "Constraints",
-    description: "Sets that the optimisation keeps the nominal motion in",
+    description: "Constraint sets of the optimisation for the nominal trajectory",
     items: &[
         (
             Constraints::Robust,
             "robust",
-            "the limits themselves, tightened by what the error dynamics can reach",
+            "limit.rate and limit.moment, tightened by the largest possible deviations from the nominal trajectory",
         ),
-        (Constraints::Paper, "paper", "the sets as printed, which do not imply the limits"),
+        (
+            Constraints::Paper,
+            "paper",
+            "sets as printed in the paper, which do not imply the limits",
+        ),
     ],
 };
 static INITIAL_STATES: Enumeration<InitialState> = Enumeration {
     name: "InitialState",
-    description: "Where the nominal motion starts",
+    description: "Initial state of the nominal trajectory at each optimisation",
     items: &[
-        (InitialState::Measured, "measured", "the nominal motion starts at the measured state"),
+        (InitialState::Measured, "measured", "measured state"),
         (
             InitialState::Tube,
             "tube",
-            "it starts anywhere in an invariant set around the measured state",
+            "state in an invariant set around the measured state, chosen by the optimisation",
         ),
         (
             InitialState::Nominal,
             "nominal",
-            "it starts where the previous plan put it, the first at the measured state",
+            "state predicted by the previous plan; at the first optimisation the measured state",
         ),
     ],
 };
 
-static GUARANTEES: Enumeration<Guarantee> = Enumeration {
+static POLICIES: Enumeration<Guarantee> = Enumeration {
     name: "GuaranteePolicy",
-    description: "What happens where the robust set cannot be guaranteed",
+    description: "Reaction to settings for which the robust set gives no guarantee",
     items: &[
-        (
-            Guarantee::Required,
-            "required",
-            "settings for which the robust set cannot be guaranteed are refused",
-        ),
-        (Guarantee::BestEffort, "bestEffort", "they run all the same, without guarantee"),
+        (Guarantee::Required, "required", "the settings are refused at initialization"),
+        (Guarantee::BestEffort, "bestEffort", "the controller runs without a guarantee"),
     ],
 };
-static STANDINGS: Enumeration<Standing> = Enumeration {
+static GUARANTEE_STATUSES: Enumeration<Standing> = Enumeration {
     name: "GuaranteeStatus",
-    description: "Whether the guarantee of the robust set is in force at the last tick, and why not",
+    description: "Status of the guarantee of the robust set at the last tick",
     items: &[
-        (Standing::None, "none", "no optimisation yet, or sets that guarantee nothing"),
+        (Standing::None, "none", "no optimisation yet, or constraint sets that give no guarantee"),
         (
             Standing::Pending,
             "pending",
-            "a plan is certified, but its first command has not acted yet",
+            "a plan is certified, but its first command does not act yet",
         ),
-        (Standing::InForce, "inForce", "the limits are kept for as long as the assumptions hold"),
-        (Standing::Refused, "refused", "the design does not hold for the settings: best effort"),
+        (Standing::InForce, "inForce", "the limits are kept as long as the assumptions hold"),
+        (
+            Standing::Refused,
+            "refused",
+            "no guarantee is possible with these settings; the controller runs as best effort",
+        ),
         (
             Standing::Uncertified,
             "uncertified",
-            "no plan has been found that keeps the conditions of the guarantee",
+            "no plan was found that satisfies the conditions of the guarantee",
         ),
         (
             Standing::Exceeded,
             "exceeded",
-            "an assumption is contradicted, see guarantee.contradiction, or was during the last second",
+            "an assumption was contradicted within the last second; guarantee.contradiction shows which",
         ),
         (
             Standing::Stale,
             "stale",
-            "the inputs were set before the tick, or were during the last second: step with period.feedback or a whole part of it",
+            "a tick within the last second used inputs that had been set before it; step with period.feedback or a whole fraction of it",
         ),
     ],
 };
 
 const CONTRADICTIONS: Enumeration<Contradiction> = Enumeration {
     name: "Contradiction",
-    description: "What contradicts an assumption of the guarantee, or did during the last second",
+    description: "Contradiction of an assumption of the guarantee within the last second",
     items: &[
-        (Contradiction::None, "none", "nothing"),
+        (Contradiction::None, "none", "no contradiction"),
         (
             Contradiction::Step,
             "step",
-            "the communication step: inputs were set before the tick at which they are used",
+            "a tick used inputs that had been set before it, because of the communication step",
         ),
         (
             Contradiction::Delay,
             "delay",
-            "the delay of the loop: loopDelay differs from delay + measurement.age by more than delayError",
+            "loopDelay.estimate differs from delay + measurement.age by more than delayError",
         ),
         (
             Contradiction::Disturbance,
             "disturbance",
-            "the observed disturbance: it exceeds what disturbance.bound, inertia.error and estimation.rateError explain",
+            "the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError allow",
         ),
         (
             Contradiction::Deviation,
             "deviation",
-            "the vehicle is further from the plan than disturbance, inertia, measurements and delay together explain",
+            "the deviation from the plan is larger than the assumed disturbance, inertia, measurement errors and delay allow",
         ),
         (
             Contradiction::Limit,
             "limit",
-            "a limit is exceeded, or the moment that the law asks for exceeds it",
+            "a limit is exceeded, or the law requires a moment beyond limit.moment",
         ),
     ],
 };
@@ -215,40 +219,40 @@ impl Law for CrmpcLaw {
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
-        // The warning is given the first time only; `guarantee.status` shows the later ones.
-        let (before_then, now) = (&before.supervision, &after.supervision);
-        if now.ended == 1 && before_then.ended == 0 {
+        // The warning is given the first time only; `guarantee.status` shows later times.
+        let (earlier, now) = (&before.supervision, &after.supervision);
+        if now.ended == 1 && earlier.ended == 0 {
             return Some(match now.contradiction {
                 Contradiction::Step => {
-                    "the guarantee is no longer in force: inputs were set before the tick at which they are used; step with period.feedback or a whole part of it"
+                    "the guarantee is no longer in force: a tick used inputs that had been set before it; step with period.feedback or a whole fraction of it"
                 }
                 Contradiction::Delay => {
-                    "the guarantee is no longer in force: the loop has another delay than delay, delayError and measurement.age say"
+                    "the guarantee is no longer in force: the loop delay differs from delay + measurement.age by more than delayError"
                 }
                 Contradiction::Disturbance => {
-                    "the guarantee is no longer in force: the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError explain with the delay that was told"
+                    "the guarantee is no longer in force: the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError allow with the given delay"
                 }
                 Contradiction::Limit => {
-                    "the guarantee is no longer in force: a limit is exceeded although it was guaranteed"
+                    "the guarantee is no longer in force: a guaranteed limit is exceeded"
                 }
                 Contradiction::Deviation | Contradiction::None => {
-                    "the guarantee is no longer in force: the vehicle is further from the plan than disturbance.bound, inertia.error, estimation.*, measurement.age and delay explain"
+                    "the guarantee is no longer in force: the deviation from the plan is larger than disturbance.bound, inertia.error, estimation.*, measurement.age and delay allow"
                 }
             });
         }
-        match (before_then.status, now.status) {
+        match (earlier.status, now.status) {
             (Standing::None, Standing::Uncertified) => Some(
-                "the guarantee is not in force: no plan keeps its conditions from the present state",
+                "the guarantee is not in force: no plan from the present state satisfies its conditions",
             ),
             (Standing::None, Standing::Pending | Standing::InForce)
                 if after.moment_left < LITTLE_MOMENT =>
             {
                 Some(
-                    "the settings leave less than a tenth of limit.moment to the plan, see guarantee.momentLeft: optimisations take several times as long; a smaller disturbance.bound or delay leaves more",
+                    "the settings leave less than a tenth of limit.moment to the plan (see guarantee.momentLeft), so optimisations take several times as long; a smaller disturbance.bound or delay leaves more",
                 )
             }
             (Standing::None, Standing::Refused) => Some(
-                "constraints = robust cannot be guaranteed with these settings; it runs as best effort",
+                "constraints = robust cannot be guaranteed with these settings; the controller runs as best effort",
             ),
             _ => solver::warning(&before.report, &after.report),
         }
@@ -260,11 +264,11 @@ type GainField = fn(&mut CrmpcLaw) -> &mut Gain;
 
 fn schedule(table: Controller) -> Controller {
     let constraints = parameter("constraints", CONSTRAINTS.description);
-    let initial = parameter("initialState", "Where the nominal motion starts at each optimisation");
+    let initial = parameter("initialState", INITIAL_STATES.description);
     let horizon = parameter("horizon", "Number of prediction steps");
     let optimisation = parameter(
         "period.optimisation",
-        "Time between two optimisations and prediction step; a whole multiple of period.feedback",
+        "Sampling period of the optimisation and length of a prediction step; a whole multiple of period.feedback",
     );
     let table = table
         .enumeration(constraints, &CONSTRAINTS, |m| &mut m.law.settings.constraints)
@@ -273,24 +277,21 @@ fn schedule(table: Controller) -> Controller {
         .real(optimisation.real().unit(unit::time()).min(1e-3).max(10.0).nominal(0.2), |m| {
             &mut m.law.settings.period_optimisation
         });
-    let table = table::period(table, "Time between two evaluations of the feedback law");
+    let table = table::period(table, "feedback law");
     solver::parameters(table, |law| &mut law.settings.solver)
 }
 
 fn gains(table: Controller) -> Controller {
     let mut table = table::weights(table, |law| &mut law.settings.p, |law| &mut law.settings.q);
     let sets: [(&str, &str, GainField); 3] = [
-        ("feedback", "feedback law K (20)", |law| &mut law.settings.feedback),
-        ("terminal", "terminal law (14)", |law| &mut law.settings.terminal),
-        ("tube", "paper's tube constant in (21)", |law| &mut law.settings.tube),
+        ("feedback", "of the feedback law (20)", |law| &mut law.settings.feedback),
+        ("terminal", "of the terminal law (14)", |law| &mut law.settings.terminal),
+        ("tube", "for the paper's tube constant in (21)", |law| &mut law.settings.tube),
     ];
-    for (name, of, gain) in sets {
+    for (name, purpose, gain) in sets {
         let k1 =
-            parameter(&format!("{name}.k1"), &format!("Gain on the angles of the {of}, negative"))
-                .real();
-        let k2 =
-            parameter(&format!("{name}.k2"), &format!("Gain on the rates of the {of}, negative"))
-                .real();
+            parameter(&format!("{name}.k1"), &format!("Angle gain {purpose}; negative")).real();
+        let k2 = parameter(&format!("{name}.k2"), &format!("Rate gain {purpose}; negative")).real();
         table = table
             .real(k1.unit(unit::gain_angle()).max(0.0).nominal(5.0), move |m| {
                 &mut gain(&mut m.law).k1
@@ -305,39 +306,39 @@ fn gains(table: Controller) -> Controller {
 fn bounds(table: Controller) -> Controller {
     let disturbance = parameter(
         "disturbance.bound",
-        "Bound on each component of the disturbance of the angles' second derivatives that the sets are tightened for",
+        "Bound on each component of the disturbance of the angles' second derivatives; the constraint sets are tightened for it",
     );
     let inertia = parameter(
         "inertia.error",
-        "Relative error of the inertia, as a common factor of the tensor, that the robust set is tightened for",
+        "Bound on the relative error of the inertia as a common factor of the tensor; the robust set is tightened for it",
     );
     let tensor = parameter(
         "inertia.tensorError",
-        "Relative error of the tensor of inertia, in all six entries, that the robust set is tightened for besides the common factor",
+        "Bound on the relative error of the inertia tensor in all six entries, besides the common factor; the robust set is tightened for it",
     );
     let delay_error = parameter(
         "delayError",
-        "Largest difference between the delay of the loop, which must not change, and delay + measurement.age, that the robust set is tightened for",
+        "Bound on the difference between the loop delay, which must be constant, and delay + measurement.age; the robust set is tightened for it",
     );
     let angle_error = parameter(
         "estimation.angleError",
-        "Bound on the error of each angle given that the robust set is tightened for; the error may take any value within it at each tick",
+        "Bound on the measurement error of each angle, which may change arbitrarily from tick to tick; the robust set is tightened for it",
     );
     let rate_error = parameter(
         "estimation.rateError",
-        "Bound on the error of the derivative of each angle, as it follows from what is given, that the robust set is tightened for; the error may take any value within it at each tick",
+        "Bound on the error of each angle's derivative as computed from the measurements, which may change arbitrarily from tick to tick; the robust set is tightened for it",
     );
     let sideslip = parameter(
         "bound.sideslip",
-        "Sideslip angle up to which the bounds of the paper's design hold",
+        "Largest magnitude of the sideslip angle for which the bounds of the paper's design hold",
     );
     let rate = parameter(
         "bound.referenceRate",
-        "Bound on the reference's rate in the paper's terminal set (13)",
+        "Bound on the norm of the reference's first derivative in the paper's terminal set (13)",
     );
     let acceleration = parameter(
         "bound.referenceAcceleration",
-        "Bound on the reference's acceleration in the paper's terminal set (13)",
+        "Bound on the norm of the reference's second derivative in the paper's terminal set (13)",
     );
     table
         .real(disturbance.real().unit(unit::angular_acceleration()).min(0.0).nominal(0.03), |m| {
@@ -366,20 +367,22 @@ fn bounds(table: Controller) -> Controller {
 }
 
 fn guarantee(table: Controller) -> Controller {
-    let sideslip =
-        parameter("guarantee.sideslip", "Sideslip angle up to which the guarantee is given");
+    let sideslip = parameter(
+        "guarantee.sideslip",
+        "Largest magnitude of the sideslip angle for which the guarantee is given",
+    );
     let active = parameter(
         "observer.active",
-        "Whether the robust set's reference is shifted by what the observed disturbance does to the vehicle",
+        "Whether the reference is shifted to cancel the steady deviation that the observed disturbance causes; only with constraints = robust",
     );
     let time =
         parameter("observer.timeConstant", "Time constant of the disturbance observer's filter");
     let stiffness = parameter(
         "observer.stiffness",
-        "Observed disturbance over the shift of the reference's angles",
+        "Ratio of the estimated disturbance to the resulting shift of the reference angles",
     );
     table
-        .enumeration(parameter("guarantee.policy", GUARANTEES.description), &GUARANTEES, |m| {
+        .enumeration(parameter("guarantee.policy", POLICIES.description), &POLICIES, |m| {
             &mut m.law.settings.guarantee
         })
         .real(sideslip.real().unit(unit::angle()).min(0.0).max(0.8).nominal(0.3), |m| {
@@ -401,7 +404,7 @@ fn outputs(table: Controller) -> Controller {
         sampled(&format!("nominal.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
     };
     let rate = |axis: &str, meaning: &str| {
-        let text = format!("Rate of the nominal {meaning} at the last tick");
+        let text = format!("Derivative of the nominal {meaning} at the last tick");
         sampled(&format!("nominalRate.{axis}"), &text)
             .real()
             .unit(unit::angular_rate())
@@ -411,21 +414,16 @@ fn outputs(table: Controller) -> Controller {
     let table = vector(table, ANGLES, rate, |m| &mut m.law.shown.rates);
     let margin = |name: &str, limit: &str| {
         let text = format!(
-            "What the plan leaves of the {limit} in its first interval beyond what is reserved, over the limit"
+            "Unused share of {limit} in the plan's first interval, after the reserve for deviations from the plan"
         );
         sampled(&format!("guarantee.{name}"), &text).real()
     };
     let left = sampled(
         "guarantee.momentLeft",
-        "Share of the moment limit that the reserve for disturbances, errors and delay leaves to the plan at rest",
+        "Share of limit.moment that remains for the plan at rest, after the reserve for disturbances, errors and delay",
     );
-    let observed = |axis: &str, meaning: &str| {
-        let text = format!("Observed disturbance of the second derivative of the {meaning}");
-        sampled(&format!("disturbanceEstimate.{axis}"), &text)
-            .real()
-            .unit(unit::angular_acceleration())
-            .nominal(0.03)
-    };
+    let disturbance =
+        |axis: &str, meaning: &str| table::disturbance_estimate(axis, meaning).nominal(0.03);
     let table = table
         .boolean(
             sampled(
@@ -434,17 +432,19 @@ fn outputs(table: Controller) -> Controller {
             ),
             |m| &mut m.law.shown.in_force,
         )
-        .enumeration(sampled("guarantee.status", STANDINGS.description), &STANDINGS, |m| {
-            &mut m.law.shown.supervision.status
-        })
+        .enumeration(
+            sampled("guarantee.status", GUARANTEE_STATUSES.description),
+            &GUARANTEE_STATUSES,
+            |m| &mut m.law.shown.supervision.status,
+        )
         .enumeration(
             sampled("guarantee.contradiction", CONTRADICTIONS.description),
             &CONTRADICTIONS,
             |m| &mut m.law.shown.supervision.contradiction,
         )
-        .real(margin("rateMargin", "rate limit"), |m| &mut m.law.shown.margins.rate)
-        .real(margin("momentMargin", "moment limit"), |m| &mut m.law.shown.margins.moment)
+        .real(margin("rateMargin", "limit.rate"), |m| &mut m.law.shown.margins.rate)
+        .real(margin("momentMargin", "limit.moment"), |m| &mut m.law.shown.margins.moment)
         .real(left.real(), |m| &mut m.law.shown.moment_left);
-    let table = vector(table, ANGLES, observed, |m| &mut m.law.shown.disturbance);
+    let table = vector(table, ANGLES, disturbance, |m| &mut m.law.shown.disturbance);
     solver::outputs(table, |law| &mut law.shown.report)
 }

@@ -41,7 +41,7 @@ impl Law for DlmpcLaw {
     type Settings = Settings;
 
     const NAME: &'static str = "DLMPC";
-    const DESCRIPTION: &'static str = "Double-layered model predictive and sliding-mode attitude controller, the comparison of Chai et al. (2022)";
+    const DESCRIPTION: &'static str = "Double-layered model predictive and sliding-mode attitude controller, a comparison law of Chai et al. (2022)";
     const DOCUMENTATION: &'static str = include_str!("dlmpc.html");
     const FIELDS: &'static Fields = &[("sliding_mode", "slidingMode")];
 
@@ -87,26 +87,25 @@ fn schedule(table: Controller) -> Controller {
     let horizon = parameter("horizon", "Number of prediction steps of the outer layer");
     let optimisation = parameter(
         "period.optimisation",
-        "Period of the outer layer and its prediction step; a whole multiple of period.feedback",
+        "Sampling period of the outer layer and length of a prediction step; a whole multiple of period.feedback",
     );
     let table = table
         .integer(horizon, (Some(2), Some(1000)), |m| &mut m.law.settings.horizon)
         .real(optimisation.real().unit(unit::time()).min(1e-3).max(10.0).nominal(0.2), |m| {
             &mut m.law.settings.period_optimisation
         });
-    let table = table::period(table, "Period of the inner layer");
+    let table = table::period(table, "inner layer");
     solver::parameters(table, |law| &mut law.settings.solver)
 }
 
 fn weights(mut table: Controller) -> Controller {
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
-        let text = format!("Diagonal entry {} of P: weight on the error of the {meaning}", i + 1);
+        let text = table::weight_text(table::TRACKING_ERROR, meaning, ("P", i));
         let p = parameter(&format!("weight.P[{}]", i + 1), &text).real().min(0.0).nominal(50.0);
         table = table.real(p, move |m| &mut m.law.settings.p[i]);
     }
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
-        let text =
-            format!("Diagonal entry {} of Q: weight on the error rate of the {meaning}", i + 1);
+        let text = table::weight_text(table::ERROR_RATE, meaning, ("Q", i));
         let q = parameter(&format!("weight.Q[{}]", i + 1), &text).real().min(0.0).nominal(10.0);
         table = table.real(q, move |m| &mut m.law.settings.q[i]);
     }
@@ -116,15 +115,20 @@ fn weights(mut table: Controller) -> Controller {
 fn sliding_mode(table: Controller) -> Controller {
     let q = parameter(
         "slidingMode.q",
-        "Linear reaching gain of the inner layer, below 2/period.feedback",
+        "Gain of the linear term in the reaching law of the inner layer; below 2/period.feedback",
     );
-    let p = parameter("slidingMode.p", "Reaching gain of the power rho");
+    let p = parameter(
+        "slidingMode.p",
+        "Gain of the term with exponent rho in the reaching law of the inner layer",
+    );
     let gamma = parameter(
         "slidingMode.gamma",
-        "Gain of the sliding manifold, on the integral of the power rho",
+        "Gain of the integral term in the sliding variable of the inner layer",
     );
-    let rho =
-        parameter("slidingMode.rho", "Power of manifold and reaching law, above 0 and below 1");
+    let rho = parameter(
+        "slidingMode.rho",
+        "Exponent rho in the integral term and in the reaching law of the inner layer; above 0 and below 1",
+    );
     table
         .real(q.real().unit(unit::gain_rate()).min(0.0).nominal(5.0), |m| {
             &mut m.law.settings.sliding_mode.q
@@ -138,7 +142,7 @@ fn outputs(table: Controller) -> Controller {
     let sampled = sampled_output;
     let command = |axis: &str, meaning: &str| {
         let text = format!(
-            "Body {meaning} rate that the outer layer commands, held for period.optimisation"
+            "Body {meaning} rate commanded by the outer layer, held for period.optimisation"
         );
         sampled(&format!("rateCommand.{axis}"), &text)
             .real()
@@ -154,7 +158,7 @@ fn outputs(table: Controller) -> Controller {
     };
     let time = sampled(
         "innerLaw.time",
-        "Wall-clock time of the last evaluation of the inner law; differs from run to run",
+        "Wall-clock time of the last evaluation of the inner layer; not reproducible",
     );
     let table = vector(table, RATES, command, |m| &mut m.law.shown.rate_command);
     let table = vector(table, RATES, sliding, |m| &mut m.law.shown.sliding);

@@ -4,8 +4,8 @@ use control::estimation::{
     Alignment, Calibration, CalibrationMode, CalibrationStatus, Estimate, Estimator, Health,
     LARGEST_RANGE, Line, Memory, Settings, mems_corrections,
 };
-use controller_export::sampled::{SampledFmu, SampledUnit, Ticks};
-use controller_export::table::{ANGLES, AXES, RATES, vector};
+use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
+use controller_export::table::{ANGLES, AXES, RATES, capital, vector};
 use fmi2_export::fields::{Fields, by_variable};
 use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input, parameter};
 use fmi2_export::{Description, Enumeration, Failure, Table};
@@ -20,79 +20,83 @@ use vehicle::sensor_data::SensorData;
 
 static KINEMATICS: Enumeration<Kinematics> = Enumeration {
     name: "EstimatorKinematics",
-    description: "Which body rates are shown",
+    description: "Definition of the estimated body rates; the same as in the plant",
     items: &[
         (
             Kinematics::Printed,
             "printed",
-            "rates that the matrix R as printed takes for those of the angles",
+            "rates that the matrix R, as printed, turns into the derivatives of the angles",
         ),
-        (Kinematics::Exact, "exact", "rates of the platform"),
+        (Kinematics::Exact, "exact", "true body rates of the platform"),
     ],
 };
 static ALIGNMENTS: Enumeration<Alignment> = Enumeration {
     name: "Alignment",
-    description: "Where the attitude comes from at the beginning",
+    description: "Source of the initial attitude",
     items: &[
-        (Alignment::Measured, "measured", "from the first samples"),
+        (Alignment::Measured, "measured", "first samples"),
         (
             Alignment::Given,
             "given",
-            "initial.alpha, initial.beta, initial.sigma: the platform was put there",
+            "initial.alpha, initial.beta and initial.sigma, the attitude in which the platform was placed",
         ),
     ],
 };
 static MODES: Enumeration<CalibrationMode> = Enumeration {
     name: "CalibrationMode",
-    description: "Where the magnetometer's calibration comes from",
+    description: "Source of the magnetometer's calibration",
     items: &[
-        (CalibrationMode::Given, "given", "magnetometer.matrix and magnetometer.bias"),
+        (CalibrationMode::Given, "given", "parameters magnetometer.matrix and magnetometer.bias"),
         (
             CalibrationMode::Fit,
             "fit",
-            "an ellipsoid fitted to the readings of the first calibration.duration",
+            "ellipsoid fitted to the readings of the first calibration.duration",
         ),
     ],
 };
 static STATUSES: Enumeration<CalibrationStatus> = Enumeration {
     name: "CalibrationStatus",
-    description: "Where a calibration comes from",
+    description: "Source of the magnetometer's calibration in force",
     items: &[
-        (CalibrationStatus::Given, "given", "the parameters"),
-        (CalibrationStatus::Collecting, "collecting", "readings are collected"),
-        (CalibrationStatus::Fitted, "fitted", "the fitted ellipsoid"),
+        (CalibrationStatus::Given, "given", "parameters magnetometer.matrix and magnetometer.bias"),
+        (
+            CalibrationStatus::Collecting,
+            "collecting",
+            "parameters, while readings for a fit are collected",
+        ),
+        (CalibrationStatus::Fitted, "fitted", "fitted ellipsoid"),
         (
             CalibrationStatus::Refused,
             "refused",
-            "the parameters, as the readings determine no ellipsoid",
+            "parameters, because the readings do not determine an ellipsoid",
         ),
     ],
 };
 static HEALTH: Enumeration<Health> = Enumeration {
     name: "EstimatorHealth",
-    description: "How far an estimate can be trusted",
+    description: "Health of the estimate: how far it can be trusted",
     items: &[
-        (Health::Waiting, "waiting", "nothing has arrived yet"),
-        (Health::Ok, "ok", "all is well"),
-        (Health::Bridging, "bridging", "a sample is missing: the last rate is held"),
-        (Health::Frozen, "frozen", "a sensor repeats its value: it is left out"),
-        (Health::Lost, "lost", "samples have been missing or frozen for longer than lost.after"),
-        (Health::Calibrating, "calibrating", "readings are collected"),
-        (Health::Uncalibrated, "uncalibrated", "the calibration was refused"),
+        (Health::Waiting, "waiting", "no sample has arrived yet"),
+        (Health::Ok, "ok", "the estimate uses a current sample of all sensors"),
+        (Health::Bridging, "bridging", "a sample is missing, and the last rate is held"),
+        (Health::Frozen, "frozen", "a sensor repeats its value and is ignored"),
+        (Health::Lost, "lost", "no usable sample has arrived for longer than lost.after"),
+        (Health::Calibrating, "calibrating", "readings for the calibration are collected"),
+        (Health::Uncalibrated, "uncalibrated", "the fit of the calibration was rejected"),
         (
             Health::Rejected,
             "sampleRejected",
-            "a reading of the newest sample cannot be believed: it is left out",
+            "a reading of the newest sample is implausible and is ignored",
         ),
     ],
 };
 
-/// The estimator as an FMI unit.
-pub type AttitudeEstimator = SampledFmu<EstimatorUnit>;
+/// The estimator as an FMU.
+pub type AttitudeEstimator = SampledFmu<EstimatorInstance>;
 
-/// Parameters, inputs and outputs of the estimator's unit.
+/// An instance of the estimator: its parameters, inputs and outputs.
 #[derive(Serialize, Deserialize)]
-pub struct EstimatorUnit {
+pub struct EstimatorInstance {
     pub(crate) settings: Settings,
     /// Sensor set as in the plant: 0, 1 for sensors without errors, [`MEMS_SENSORS`] for those with
     /// errors.
@@ -104,7 +108,7 @@ pub struct EstimatorUnit {
 /// Sensor set for which the corrections are used.
 const MEMS_SENSORS: i32 = 2;
 
-/// Outputs of the estimator's unit.
+/// Outputs of the estimator.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Output {
     estimate: Estimate,
@@ -112,7 +116,7 @@ struct Output {
     calibration: Calibration,
 }
 
-impl SampledUnit for EstimatorUnit {
+impl SampledInstance for EstimatorInstance {
     type Device = Estimator;
     type Memory = Memory;
     type Input = Line;
@@ -166,7 +170,7 @@ impl SampledUnit for EstimatorUnit {
         let line = self.line;
         if !(line.time.is_finite() && line.readings.iter().flatten().all(|value| value.is_finite()))
         {
-            return Err(Failure::Error("an input 'measured' is not a finite number".into()));
+            return Err(Failure::Error("an input measured.* is not a finite number".into()));
         }
         let time = ticks.next_time();
         ticks.evaluate_with(line, |memory, _| estimator.update(memory, time, &line));
@@ -175,7 +179,7 @@ impl SampledUnit for EstimatorUnit {
             return Ok(());
         }
         Err(Failure::Error(format!(
-            "the estimate at t = {time} s is not finite; see the inputs 'measured'"
+            "the estimate at t = {time} s is not finite; check the inputs measured.*"
         )))
     }
 
@@ -207,20 +211,22 @@ fn at_rest() -> Line {
 
 /// Returns the warning of a tick for the log of the importer.
 fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
-    let comes =
+    let becomes =
         |health: Health| after.estimate.health == health && before.estimate.health != health;
-    if comes(Health::Lost) {
-        Some("no usable samples for longer than lost.after: the attitude is lost (health)")
-    } else if comes(Health::Frozen) {
-        Some("a sensor repeats its value and is left out (health)")
-    } else if comes(Health::Rejected) && before.estimate.rejected == 0 {
+    if becomes(Health::Lost) {
+        Some(
+            "no usable sample has arrived for longer than lost.after: the attitude is lost (see health)",
+        )
+    } else if becomes(Health::Frozen) {
+        Some("a sensor repeats its value and is ignored (see health)")
+    } else if becomes(Health::Rejected) && before.estimate.rejected == 0 {
         // The warning is given the first time only; `rejectedSamples` counts the later ones.
         Some(
-            "a sample was left out, beyond the sensor's range or too far from the last one (health, rejectedSamples)",
+            "a sample was ignored because it is outside the sensor's range or too far from the last one (see health and rejectedSamples)",
         )
-    } else if comes(Health::Uncalibrated) {
+    } else if becomes(Health::Uncalibrated) {
         Some(
-            "the readings determine no ellipsoid: the given calibration stays in use (calibration.status)",
+            "the readings do not determine an ellipsoid: the given calibration stays in force (see calibration.status)",
         )
     } else {
         None
@@ -250,30 +256,31 @@ struct Sensor {
     quantity: &'static str,
     unit: fn() -> Unit,
     nominal: f64,
-    corrected: &'static str,
+    /// Meaning of its correction matrix.
+    correction: &'static str,
 }
 
 const SENSORS: [Sensor; 3] = [
     Sensor {
         name: "gyroscope",
-        quantity: "angular rate",
+        quantity: "Angular rate about",
         unit: unit::angular_rate,
         nominal: 0.05,
-        corrected: "inverse of scale and misalignment",
+        correction: "inverse of scale and misalignment",
     },
     Sensor {
         name: "accelerometer",
-        quantity: "specific force",
+        quantity: "Specific force along",
         unit: unit::acceleration,
         nominal: 10.0,
-        corrected: "inverse of scale and misalignment, up to a factor",
+        correction: "inverse of scale and misalignment, up to a factor",
     },
     Sensor {
         name: "magnetometer",
-        quantity: "magnetic field",
+        quantity: "Magnetic field along",
         unit: unit::flux_density,
         nominal: 5e-5,
-        corrected: "inverse of scale, misalignment and soft iron, up to a factor",
+        correction: "inverse of scale, misalignment and soft iron, up to a factor",
     },
 ];
 
@@ -298,7 +305,7 @@ fn seconds(common: Common) -> Real {
 fn inputs(mut table: Variables) -> Variables {
     for (i, sensor) in SENSORS.iter().enumerate() {
         let declare = |axis: &str, _: &str| {
-            let text = format!("Reading of the {}: {} along {axis}", sensor.name, sensor.quantity);
+            let text = format!("{} {axis}, measured by the {}", sensor.quantity, sensor.name);
             let common = input(&format!("measured.{}.{axis}", sensor.name), &text);
             common.real().unit((sensor.unit)()).nominal(sensor.nominal)
         };
@@ -307,7 +314,7 @@ fn inputs(mut table: Variables) -> Variables {
     let time = input("measured.time", "Time at which the newest sample was taken");
     let sample = discrete_input(
         "measured.sample",
-        "Number of the newest sample, from 1; 0 before the first, and throughout if samples are not counted",
+        "Number of the newest sample, counted from 1; 0 before the first sample, or always if samples are not counted",
     );
     table.real(seconds(time).nominal(1.0), |m| &mut m.line.time).integer(
         sample,
@@ -331,36 +338,37 @@ fn outputs(table: Variables) -> Variables {
     };
     let bias = |axis: &str, _: &str| {
         let text = format!(
-            "Estimated bias of the gyroscope along {axis}: given, seen at rest, and learned"
+            "Estimated gyroscope bias about {axis}: sum of the given bias, the one measured at rest and the learned one"
         );
         let common = sampled(&format!("estimatedBias.{axis}"), &text);
         common.real().unit(unit::angular_rate()).nominal(0.01)
     };
     let hard_iron = |axis: &str, _: &str| {
-        let text = format!("Bias and hard iron of the magnetometer along {axis}, in force");
+        let text = format!("Magnetometer bias along {axis} in force, including hard iron");
         let common = sampled(&format!("calibration.bias.{axis}"), &text);
         common.real().unit(unit::flux_density()).nominal(5e-5)
     };
     let table = vector(table, ANGLES, angle, |m| &mut m.output.estimate.angles);
     let table = vector(table, RATES, rate, |m| &mut m.output.estimate.rates);
-    let health = sampled("health", "How far the estimate can be trusted");
+    let health = sampled("health", HEALTH.description);
     let age = sampled("age", "Time since the newest sample was taken");
-    let dropped = sampled("droppedSamples", "Samples so far that never arrived");
+    let dropped = sampled("droppedSamples", "Number of samples so far that never arrived");
     let rejected = sampled(
         "rejectedSamples",
-        "Samples so far of which a reading, or the time, could not be believed and was left out",
+        "Number of samples so far that were ignored in whole or in part because a reading or the time was implausible",
     );
-    let delay =
-        sampled("filter.delay", "Phase delay of sensors and low-pass filter at low frequencies");
-    let status =
-        sampled("calibration.status", "Where the magnetometer's calibration in force comes from");
+    let delay = sampled(
+        "filter.delay",
+        "Phase delay of the sensors and the low-pass filter at low frequencies",
+    );
+    let status = sampled("calibration.status", STATUSES.description);
     let residual = sampled(
         "calibration.residual",
-        "Root mean square of the fitted readings' distance from the ellipsoid, as a share of its size",
+        "Root mean square distance of the readings from the fitted ellipsoid, relative to its size",
     );
     let condition = sampled(
         "calibration.condition",
-        "How badly the readings tell ellipsoids apart; 16 if all directions are seen alike, more than 1000 is refused",
+        "Condition number of the ellipsoid fit; 16 for uniform coverage, above 1000 rejected",
     );
     let table = table
         .enumeration(health, &HEALTH, |m| &mut m.output.estimate.health)
@@ -376,7 +384,7 @@ fn outputs(table: Variables) -> Variables {
     for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
         let name = format!("calibration.matrix[{},{}]", row + 1, column + 1);
         let text = format!(
-            "Matrix that corrects the magnetometer, in force: {} by {}; of a fit in 1/T",
+            "Correction matrix of the magnetometer in force, entry ({}, {}); its unit is 1/T after a fit",
             AXES[row].0, AXES[column].0
         );
         table = table.real(sampled(&name, &text).real(), move |m| {
@@ -387,22 +395,23 @@ fn outputs(table: Variables) -> Variables {
 }
 
 fn start(table: Variables) -> Variables {
-    let alignment = parameter("alignment", "Where the attitude comes from at the beginning");
+    let alignment = parameter("alignment", ALIGNMENTS.description);
     let angle = |axis: &str, meaning: &str| {
         let text = format!(
-            "The {meaning} shown before the first sample, and begun with if alignment is 'given'"
+            "{} before the first sample; with alignment = given also at the first sample",
+            capital(meaning)
         );
         let common = parameter(&format!("initial.{axis}"), &text);
         common.real().unit(unit::angle()).nominal(0.1)
     };
-    let kinematics = parameter("kinematics", "Which body rates are shown; as the plant's");
+    let kinematics = parameter("kinematics", KINEMATICS.description);
     let declination = parameter(
         "field.declination",
-        "Direction of the magnetic field's horizontal part, from the velocity's and east positive",
+        "Direction of the horizontal magnetic field relative to the velocity, positive to the east",
     );
     let rest = parameter(
         "rest.duration",
-        "Time from the first sample on for which the platform rests, so that the gyroscope shows its bias; 0 for none",
+        "Time from the first sample during which the platform rests and the gyroscope's bias is measured; 0 for none",
     );
     let table = table.enumeration(alignment, &ALIGNMENTS, |m| &mut m.settings.alignment);
     vector(table, ANGLES, angle, |m| &mut m.settings.initial)
@@ -412,24 +421,26 @@ fn start(table: Variables) -> Variables {
 }
 
 fn stages(table: Variables) -> Variables {
-    let period = parameter("period", "Time between ticks, and between samples");
+    let period = parameter("period", "Sampling period of the estimator and of the sensors");
     let cutoff = parameter(
         "filter.cutoff",
-        "Cut-off frequency of the low-pass filter on all readings; 0 for none",
+        "Cut-off frequency of the low-pass filter on all readings; 0 for no filter",
     );
-    let prediction =
-        parameter("prediction", "Whether the delays of line, sensors and filter are made up for");
+    let prediction = parameter(
+        "prediction",
+        "Whether the estimate is predicted forward over the delays of sensors, transmission and filter",
+    );
     let delay = parameter(
         "sensor.delay",
-        "Delay of the sensors' own filters at low frequencies, used with sensor.set = 2",
+        "Delay of the sensors' filters at low frequencies; used with sensor.set = 2",
     );
     let proportional = parameter(
         "fusion.proportional",
-        "Proportional gain: errors of attitude fall with this rate",
+        "Proportional gain of the sensor fusion, the rate at which attitude errors decay",
     );
     let integral = parameter(
         "fusion.integral",
-        "Integral gain, with which the gyroscope's bias is learned; 0 for never",
+        "Integral gain of the sensor fusion, which learns the gyroscope's bias; 0 for no learning",
     );
     let lost = parameter(
         "lost.after",
@@ -437,7 +448,7 @@ fn stages(table: Variables) -> Variables {
     );
     let frozen = parameter(
         "frozen.samples",
-        "Equal readings in a row from which a sensor counts as frozen; 0 for never, as for sensors without noise",
+        "Number of equal readings in a row from which a sensor counts as frozen; 0 for never, as needed for sensors without noise",
     );
     table
         .real(seconds(period).min(1e-4).max(10.0).nominal(0.01), |m| &mut m.settings.period)
@@ -461,14 +472,14 @@ fn gates(mut table: Variables) -> Variables {
         let range = parameter(
             &format!("{}.range", sensor.name),
             &format!(
-                "Largest reading of the {} along an axis; a larger one is left out",
+                "Largest plausible reading of the {} along an axis; a larger one is ignored",
                 sensor.name
             ),
         );
         let jump = parameter(
             &format!("{}.jump", sensor.name),
             &format!(
-                "Largest change of the {}'s reading from one sample to the next; after a larger one it is left out until a second confirms it",
+                "Largest plausible change of the {}'s reading between two samples; a reading beyond it is ignored until the next one confirms it",
                 sensor.name
             ),
         );
@@ -485,10 +496,11 @@ fn gates(mut table: Variables) -> Variables {
 fn calibration(table: Variables) -> Variables {
     let set = parameter(
         "sensor.set",
-        "Sensors, as the plant's: 0 and 1 are without errors; 2 uses sensor.delay and the corrections that are set, from the start those of the MEMS set",
+        "Sensor set, the same as in the plant: 0 and 1 are sensors without errors; 2 uses sensor.delay and the correction matrices and biases, by default those of the MEMS set",
     );
-    let mode = parameter("calibration.mode", "Where the magnetometer's calibration comes from");
-    let duration = parameter("calibration.duration", "How long readings are collected for a fit");
+    let mode = parameter("calibration.mode", MODES.description);
+    let duration =
+        parameter("calibration.duration", "Time during which readings are collected for the fit");
     table
         .integer(set, (Some(0), Some(MEMS_SENSORS)), |m| &mut m.sensor_set)
         .enumeration(mode, &MODES, |m| &mut m.settings.calibration)
@@ -500,14 +512,14 @@ fn corrections(mut table: Variables) -> Variables {
         for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
             let name = format!("{}.matrix[{},{}]", sensor.name, row + 1, column + 1);
             let text = format!(
-                "Matrix that corrects the {}, {}: {} by {}",
-                sensor.name, sensor.corrected, AXES[row].0, AXES[column].0
+                "Correction matrix of the {} ({}), entry ({}, {})",
+                sensor.name, sensor.correction, AXES[row].0, AXES[column].0
             );
             let real = parameter(&name, &text).real().nominal(1.0);
             table = table.real(real, move |m| &mut m.settings.corrections[i].matrix[(row, column)]);
         }
         let bias = |axis: &str, _: &str| {
-            let text = format!("Bias of the {}'s reading along {axis}", sensor.name);
+            let text = format!("Bias of the {}, component {axis}", sensor.name);
             let common = parameter(&format!("{}.bias.{axis}", sensor.name), &text);
             common.real().unit((sensor.unit)()).nominal(sensor.nominal)
         };

@@ -27,7 +27,7 @@ impl Law for FblLaw {
 
     const NAME: &'static str = "FBL";
     const DESCRIPTION: &'static str =
-        "Feedback linearisation of the attitude, a comparison of Wu et al. (2015)";
+        "Feedback linearisation of the attitude, a comparison law of Wu et al. (2015)";
     const DOCUMENTATION: &'static str = include_str!("fbl.html");
     const FIELDS: &'static Fields = &[("kp", "gain.p"), ("kd", "gain.d")];
 
@@ -36,9 +36,11 @@ impl Law for FblLaw {
     }
 
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-        let p = parameter("gain.p", "Gain on the error of the angles").real().min(0.0);
-        let d = parameter("gain.d", "Gain on the error of their rates").real().min(0.0);
-        table::period(table, "Time between two evaluations of the law")
+        let p = parameter("gain.p", "Gain on the tracking error of the angles").real().min(0.0);
+        let d = parameter("gain.d", "Gain on the derivative of the tracking error of the angles")
+            .real()
+            .min(0.0);
+        table::period(table, "control law")
             .real(p.unit(unit::gain_angle()), |m| &mut m.law.settings.kp)
             .real(d.unit(unit::gain_rate()), |m| &mut m.law.settings.kd)
     }

@@ -1,5 +1,5 @@
-//! The FMI 2.0 units of the controllers for co-simulation: the crate `control` behind tables of
-//! variables. All controllers have the same inputs and outputs, so that one can replace another
+//! The FMI 2.0 FMUs of the controllers for co-simulation: the crate `control` behind variable
+//! tables. All controllers have the same inputs and outputs, so that one can replace another
 //! without rewiring.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 

@@ -27,8 +27,7 @@ impl Law for LqrLaw {
     type Settings = LqrSettings;
 
     const NAME: &'static str = "LQR";
-    const DESCRIPTION: &'static str =
-        "Linear-quadratic attitude regulator, the unconstrained comparison of Chai et al. (2022)";
+    const DESCRIPTION: &'static str = "Linear-quadratic attitude regulator, the unconstrained comparison law of Chai et al. (2022)";
     const DOCUMENTATION: &'static str = include_str!("lqr.html");
 
     fn period() -> f64 {
@@ -36,7 +35,7 @@ impl Law for LqrLaw {
     }
 
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-        let table = table::period(table, "Time between two evaluations of the law");
+        let table = table::period(table, "control law");
         table::weights(table, |law| &mut law.settings.p, |law| &mut law.settings.q)
     }
 

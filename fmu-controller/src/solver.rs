@@ -10,49 +10,49 @@ use model_description::unit;
 
 static STATUSES: Enumeration<Status> = Enumeration {
     name: "SolverStatus",
-    description: "How a plan came about",
+    description: "Origin of the plan in force",
     items: &[
         (Status::None, "none", "no optimisation yet"),
         (
             Status::Unconstrained,
             "unconstrained",
-            "the unconstrained optimum, checked to satisfy every constraint",
+            "optimum without constraints, checked to satisfy every constraint",
         ),
         (
             Status::TerminalBall,
             "terminalBall",
-            "the optimum with the terminal ball alone, checked to satisfy every other constraint",
+            "optimum with the terminal constraint only, checked to satisfy every other constraint",
         ),
-        (Status::Constrained, "constrained", "the optimum by the Riccati method"),
-        (Status::Cone, "cone", "the optimum by the cone solver"),
-        (Status::Fallback, "fallback", "the previous plan, shifted, with the terminal law"),
+        (Status::Constrained, "constrained", "optimum found by the Riccati method"),
+        (Status::Cone, "cone", "optimum found by the cone solver"),
+        (Status::Fallback, "fallback", "shifted previous plan, continued with the terminal law"),
         (
             Status::Kept,
             "kept",
-            "the previous plan as it is, which keeps the conditions of the guarantee",
+            "previous plan, which satisfies the conditions of the guarantee; no optimum that does was found",
         ),
     ],
 };
 
 static METHODS: Enumeration<Method> = Enumeration {
     name: "Solver",
-    description: "Solver of the optimisation",
+    description: "Solver of the optimisation, used where the shortcuts do not find the optimum",
     items: &[
         (
             Method::Riccati,
             "riccati",
-            "interior point method on the Riccati recursion; the cone solver where it fails",
+            "interior-point method on the Riccati recursion; the cone solver where this method fails",
         ),
-        (Method::Cone, "cone", "the cone solver Clarabel"),
+        (Method::Cone, "cone", "cone solver Clarabel"),
     ],
 };
 
 static NONLINEARITIES: Enumeration<Nonlinearity> = Enumeration {
     name: "Nonlinearity",
-    description: "What the Riccati method is given",
+    description: "Form of the constraints for the Riccati method; the cone solver always uses linearised ones",
     items: &[
-        (Nonlinearity::Exact, "exact", "the constraints as functions of the plan"),
-        (Nonlinearity::Frozen, "frozen", "the constraints linearised about the previous plan"),
+        (Nonlinearity::Exact, "exact", "constraints as nonlinear functions of the plan"),
+        (Nonlinearity::Frozen, "frozen", "constraints linearised at the previous plan"),
     ],
 };
 
@@ -67,21 +67,22 @@ pub(crate) fn outputs<L: Law>(
     solver: impl Fn(&mut L) -> &mut Report + Copy + Send + Sync + 'static,
 ) -> Table<ControllerFmu<L>> {
     let sampled = sampled_output;
-    let status = sampled("solver.status", "How the plan in force came about");
-    let cost = sampled("solver.cost", "Optimal cost of the plan in force");
-    let time =
-        sampled("solver.time", "Wall-clock time of the last optimisation; differs from run to run");
-    let iterations =
-        sampled("solver.iterations", "Iterations of the last optimisation, over all its passes");
+    let status = sampled("solver.status", STATUSES.description);
+    let cost = sampled("solver.cost", "Cost of the plan in force");
+    let time = sampled("solver.time", "Wall-clock time of the last optimisation; not reproducible");
+    let iterations = sampled(
+        "solver.iterations",
+        "Number of iterations in the last optimisation, summed over all solvers and passes",
+    );
     let residual = sampled(
         "solver.residual",
-        "Residual of the conditions of optimality of the plan in force, relative; with the constraints as functions of the plan",
+        "Relative residual of the optimality conditions for the plan in force, evaluated with the nonlinear constraints",
     );
-    let solves = sampled("solver.solves", "Optimisations so far");
-    let fallbacks = sampled("solver.fallbacks", "Optimisations so far that did not succeed");
+    let solves = sampled("solver.solves", "Number of optimisations so far");
+    let fallbacks = sampled("solver.fallbacks", "Number of optimisations so far that failed");
     let exhausted = sampled(
         "solver.exhausted",
-        "Optimisations so far that their budget of time or iterations ended early",
+        "Number of optimisations so far that were ended early by the time or iteration budget",
     );
     table
         .enumeration(status, &STATUSES, move |m| &mut solver(&mut m.law).status)
@@ -99,28 +100,23 @@ pub(crate) fn parameters<L: Law>(
     table: Table<ControllerFmu<L>>,
     solver: impl Fn(&mut L) -> &mut SolverSettings + Copy + Send + Sync + 'static,
 ) -> Table<ControllerFmu<L>> {
-    let method = parameter(
-        "solver",
-        "Which solver is asked first where the exits do not lead to the optimum",
+    let method = parameter("solver", METHODS.description);
+    let nonlinearity = parameter("solver.nonlinearity", NONLINEARITIES.description);
+    let iterations = parameter(
+        "solver.maxIterations",
+        "Maximum number of iterations of each solver in each pass",
     );
-    let nonlinearity = parameter(
-        "solver.nonlinearity",
-        "What the Riccati method is given; the cone solver is always given linearised constraints",
-    );
-    let iterations =
-        parameter("solver.maxIterations", "Iteration limit of each solver in each of its passes");
     let shortcuts = parameter(
         "solver.exits",
-        "Whether cheaper ways to the same optimum are tried first: the optimum without constraints, that with the terminal ball alone, \
-         then windows of the horizon; otherwise the whole horizon is solved each time",
+        "Whether shortcuts to the same optimum are tried first: without constraints, with the terminal constraint only, then on windows of the horizon",
     );
     let budget = parameter(
         "solver.timeBudget",
-        "Wall-clock time of an optimisation after which no further iteration or solver is begun, 0 for none; runs with one do not repeat",
+        "Wall-clock time after which an optimisation starts no further iteration or solver; 0 for no limit; runs with a time budget are not reproducible",
     );
-    let iterations_in_all = parameter(
+    let iteration_budget = parameter(
         "solver.iterationBudget",
-        "Iterations of all solvers and passes of an optimisation after which none is begun any more, 0 for no limit; runs with one repeat",
+        "Number of iterations, summed over all solvers and passes, after which an optimisation starts no further one; 0 for no limit; runs remain reproducible",
     );
     table
         .enumeration(method, &METHODS, move |m| &mut solver(&mut m.law).method)
@@ -130,7 +126,7 @@ pub(crate) fn parameters<L: Law>(
         .real(budget.real().unit(unit::time()).min(0.0).nominal(1e-3), move |m| {
             &mut solver(&mut m.law).time_budget
         })
-        .integer(iterations_in_all, (Some(0), Some(100_000)), move |m| {
+        .integer(iteration_budget, (Some(0), Some(100_000)), move |m| {
             &mut solver(&mut m.law).iteration_budget
         })
 }
@@ -138,6 +134,6 @@ pub(crate) fn parameters<L: Law>(
 /// Returns a warning if an optimisation failed between the two reports.
 pub(crate) fn warning(before: &Report, after: &Report) -> Option<&'static str> {
     (after.fallbacks > before.fallbacks).then_some(
-        "the optimisation did not succeed: the previous plan with the terminal law is used (solver.fallbacks)",
+        "the optimisation failed: the shifted previous plan with the terminal law is used (see solver.fallbacks)",
     )
 }

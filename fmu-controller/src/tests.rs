@@ -1,4 +1,4 @@
-//! Tests of the units through the trait that the FMI shell uses.
+//! Tests of the FMUs through the trait that the FMI shell uses.
 
 mod messages;
 
@@ -33,23 +33,24 @@ fn context() -> Context<'static> {
 }
 
 fn ready<M: Model>(change: impl FnOnce(&mut M)) -> M {
-    let mut unit = M::new();
-    change(&mut unit);
-    unit.initialize(&context()).unwrap();
-    unit
+    let mut instance = M::new();
+    change(&mut instance);
+    instance.initialize(&context()).unwrap();
+    instance
 }
 
-fn step<M: Model>(unit: &mut M, from: f64, to: f64) {
-    // Neither the assumptions of CRMPC nor any command explain the motion of inputs that jump.
-    let explains = |text: &str| text.contains("the guarantee is") || text.contains("another delay");
-    unit.step(from, to, &Held, &mut |text| assert!(explains(text), "{text}")).unwrap();
-    unit.calculate(to, LastEvent::InputSet).unwrap();
+fn step<M: Model>(instance: &mut M, from: f64, to: f64) {
+    // Inputs that jump contradict the assumptions of CRMPC, and no command explains them.
+    let explains =
+        |text: &str| text.contains("the guarantee is") || text.contains("another loop delay");
+    instance.step(from, to, &Held, &mut |text| assert!(explains(text), "{text}")).unwrap();
+    instance.calculate(to, LastEvent::InputSet).unwrap();
 }
 
 fn refusal<M: Model>(change: impl FnOnce(&mut M)) -> String {
-    let mut unit = M::new();
-    change(&mut unit);
-    match unit.initialize(&context()) {
+    let mut instance = M::new();
+    change(&mut instance);
+    match instance.initialize(&context()) {
         Err(Failure::Error(text) | Failure::Discard(text)) => text,
         Ok(()) => String::new(),
     }
@@ -58,8 +59,8 @@ fn refusal<M: Model>(change: impl FnOnce(&mut M)) -> String {
 #[test]
 fn descriptions_are_consistent_and_interchangeable() {
     let names = |description: &ModelDescription, causality: Causality| -> Vec<String> {
-        let wanted = description.variables.iter().filter(|v| v.causality == causality);
-        wanted.map(|v| v.name.clone()).collect()
+        let chosen = description.variables.iter().filter(|v| v.causality == causality);
+        chosen.map(|v| v.name.clone()).collect()
     };
     let (crmpc, dlmpc, lqr) = (describe::<Crmpc>(), describe::<Dlmpc>(), describe::<Lqr>());
     let sliding =
@@ -84,16 +85,17 @@ fn a_tick_evaluated_with_other_inputs_leaves_no_trace() {
     twice.calculate(0.0, LastEvent::InputSet).unwrap();
     let other = twice.output.moment;
     twice.input.measured = measured;
-    for unit in [&mut once, &mut twice] {
-        unit.calculate(0.0, LastEvent::InputSet).unwrap();
-        step(unit, 0.0, 0.2);
+    for instance in [&mut once, &mut twice] {
+        instance.calculate(0.0, LastEvent::InputSet).unwrap();
+        step(instance, 0.0, 0.2);
     }
     assert_ne!(other, once.output.moment);
     assert_eq!(once.output.moment, twice.output.moment);
 }
 
 fn assert_any_communication_steps_give_the_same_moments<L: Law>(delay: f64) {
-    let start = || ready(|unit: &mut ControllerFmu<L>| unit.parameters.latency.action = delay);
+    let start =
+        || ready(|instance: &mut ControllerFmu<L>| instance.parameters.latency.action = delay);
     let mut reference = start();
     let expected: Vec<_> = (0..10_u32)
         .map(|k| {
@@ -102,14 +104,14 @@ fn assert_any_communication_steps_give_the_same_moments<L: Law>(delay: f64) {
         })
         .collect();
     for parts in [1, 3, 5, 10] {
-        let mut unit = start();
+        let mut instance = start();
         for (k, expected) in (0..10_u32).zip(&expected) {
             let at = |part: u32| (f64::from(k) + f64::from(part) / f64::from(parts)) * 0.2;
             for part in 0..parts {
-                step(&mut unit, at(part), at(part + 1));
+                step(&mut instance, at(part), at(part + 1));
             }
             assert_eq!(
-                unit.output.moment, *expected,
+                instance.output.moment, *expected,
                 "{parts} steps of an optimisation period, period {k}"
             );
         }
@@ -128,54 +130,54 @@ fn any_communication_steps_give_the_same_moments() {
 
 #[test]
 fn moments_are_held_between_ticks() {
-    let mut unit: Lqr = ready(|_| ());
-    step(&mut unit, 0.0, 0.05);
-    let held = unit.output.moment;
-    unit.input.measured.angles *= 2.0;
-    step(&mut unit, 0.05, 0.07);
-    assert_eq!(unit.output.moment, held);
-    step(&mut unit, 0.07, 0.08);
-    assert_ne!(unit.output.moment, held);
+    let mut instance: Lqr = ready(|_| ());
+    step(&mut instance, 0.0, 0.05);
+    let held = instance.output.moment;
+    instance.input.measured.angles *= 2.0;
+    step(&mut instance, 0.05, 0.07);
+    assert_eq!(instance.output.moment, held);
+    step(&mut instance, 0.07, 0.08);
+    assert_ne!(instance.output.moment, held);
 }
 
-fn set_feedback(unit: &mut Crmpc, k: f64, period: f64) {
-    (unit.law.settings.feedback, unit.parameters.period) = (Gain { k1: k, k2: k }, period);
+fn set_feedback(instance: &mut Crmpc, k: f64, period: f64) {
+    (instance.law.settings.feedback, instance.parameters.period) = (Gain { k1: k, k2: k }, period);
 }
 
 #[test]
 fn parameters_that_cannot_work_are_refused_by_name() {
-    let text = refusal::<Crmpc>(|unit| set_feedback(unit, -10.0, 0.2));
+    let text = refusal::<Crmpc>(|instance| set_feedback(instance, -10.0, 0.2));
     assert!(text.contains("spectral radius 1.0"), "{text}");
-    let text = refusal::<Crmpc>(|unit| set_feedback(unit, -5.0, 0.03));
+    let text = refusal::<Crmpc>(|instance| set_feedback(instance, -5.0, 0.03));
     assert!(text.contains("period.optimisation") && text.contains("period.feedback"), "{text}");
-    let text = refusal::<Lqr>(|unit| {
-        unit.parameters.reference.profile = Choice::Table;
-        unit.parameters.reference.file = "no-such-file.csv".into();
+    let text = refusal::<Lqr>(|instance| {
+        instance.parameters.reference.profile = Choice::Table;
+        instance.parameters.reference.file = "no-such-file.csv".into();
     });
     assert!(text.contains("reference.file") && text.contains("no-such-file.csv"), "{text}");
-    let text = refusal::<Lqr>(|unit| unit.parameters.inertia.Ixz = 2e6);
+    let text = refusal::<Lqr>(|instance| instance.parameters.inertia.Ixz = 2e6);
     assert!(text.contains("inertia"), "{text}");
 }
 
 #[test]
 fn the_external_reference_is_followed() {
-    let mut unit: Lqr =
-        ready(|unit: &mut Lqr| unit.parameters.reference.profile = Choice::External);
-    unit.input.reference.angles = unit.input.measured.angles;
-    unit.input.reference.rates = Vector3::zeros();
-    unit.input.reference.accelerations = Vector3::zeros();
-    unit.calculate(0.0, LastEvent::InputSet).unwrap();
-    assert_eq!(unit.output.moment, Vector3::zeros());
-    assert_eq!(unit.output.reference.angles, unit.input.measured.angles);
-    unit.input.reference.angles.x += 0.01;
-    unit.calculate(0.0, LastEvent::InputSet).unwrap();
-    assert!(unit.output.moment.y > 0.0, "a positive error of alpha asks for a pitch-up moment");
+    let mut instance: Lqr =
+        ready(|instance: &mut Lqr| instance.parameters.reference.profile = Choice::External);
+    instance.input.reference.angles = instance.input.measured.angles;
+    instance.input.reference.rates = Vector3::zeros();
+    instance.input.reference.accelerations = Vector3::zeros();
+    instance.calculate(0.0, LastEvent::InputSet).unwrap();
+    assert_eq!(instance.output.moment, Vector3::zeros());
+    assert_eq!(instance.output.reference.angles, instance.input.measured.angles);
+    instance.input.reference.angles.x += 0.01;
+    instance.calculate(0.0, LastEvent::InputSet).unwrap();
+    assert!(instance.output.moment.y > 0.0, "a positive error of alpha requires a pitch-up moment");
 }
 
 #[test]
 fn saturation_scales_into_the_limit() {
     let mut free: Lqr = ready(|_| ());
-    let mut scaled: Lqr = ready(|unit: &mut Lqr| unit.parameters.saturation = true);
+    let mut scaled: Lqr = ready(|instance: &mut Lqr| instance.parameters.saturation = true);
     free.calculate(0.0, LastEvent::InputSet).unwrap();
     scaled.calculate(0.0, LastEvent::InputSet).unwrap();
     let limit = scaled.parameters.limit_moment;
@@ -186,9 +188,9 @@ fn saturation_scales_into_the_limit() {
 
 #[test]
 fn a_singular_attitude_is_an_error_not_a_number() {
-    let mut unit: Lqr = ready(|_| ());
-    unit.input.measured.angles.y = f64::NAN;
-    let Err(Failure::Error(text)) = unit.calculate(0.0, LastEvent::InputSet) else {
+    let mut instance: Lqr = ready(|_| ());
+    instance.input.measured.angles.y = f64::NAN;
+    let Err(Failure::Error(text)) = instance.calculate(0.0, LastEvent::InputSet) else {
         panic!("accepted")
     };
     assert!(text.contains("not finite"), "{text}");
@@ -197,13 +199,13 @@ fn a_singular_attitude_is_an_error_not_a_number() {
 #[test]
 fn the_achieved_moment_counts_only_if_it_is_used() {
     let after = |used: bool, achieved: f64| {
-        let mut unit: BtvsmcDo = ready(|unit: &mut BtvsmcDo| {
-            unit.parameters.achieved_moment_used = used;
-            unit.input.achieved_moment = Vector3::repeat(achieved);
+        let mut instance: BtvsmcDo = ready(|instance: &mut BtvsmcDo| {
+            instance.parameters.achieved_moment_used = used;
+            instance.input.achieved_moment = Vector3::repeat(achieved);
         });
-        unit.calculate(0.0, LastEvent::InputSet).unwrap();
-        step(&mut unit, 0.0, 0.1);
-        unit.output.moment
+        instance.calculate(0.0, LastEvent::InputSet).unwrap();
+        step(&mut instance, 0.0, 0.1);
+        instance.output.moment
     };
     assert_eq!(after(false, 0.0), after(false, 1e5));
     assert_ne!(after(true, 0.0), after(true, 1e5));
@@ -212,30 +214,31 @@ fn the_achieved_moment_counts_only_if_it_is_used() {
 
 #[test]
 fn sliding_modes_are_scaled_into_the_limit() {
-    let mut unit: SotvsmcDo = ready(|unit: &mut SotvsmcDo| {
-        unit.parameters.saturation = true;
-        unit.parameters.limit_moment = 1e4;
+    let mut instance: SotvsmcDo = ready(|instance: &mut SotvsmcDo| {
+        instance.parameters.saturation = true;
+        instance.parameters.limit_moment = 1e4;
     });
-    unit.calculate(0.0, LastEvent::InputSet).unwrap();
-    assert!((unit.output.moment.norm() - 1e4).abs() < 1e-6);
+    instance.calculate(0.0, LastEvent::InputSet).unwrap();
+    assert!((instance.output.moment.norm() - 1e4).abs() < 1e-6);
 }
 
 /// Returns the states at the ticks of a loop with saturation, from `start` (s). The law knows the
 /// delay (s), and the plant has it.
 fn saturated_loop(start: f64, delay: f64, ticks: u32) -> Vec<State> {
-    let mut unit: Lqr = Lqr::new();
-    (unit.parameters.saturation, unit.parameters.latency.action) = (true, delay);
-    unit.initialize(&Context { start_time: start, ..context() }).unwrap();
+    let mut instance: Lqr = Lqr::new();
+    (instance.parameters.saturation, instance.parameters.latency.action) = (true, delay);
+    instance.initialize(&Context { start_time: start, ..context() }).unwrap();
     let mut config = Scenario::crmpc2022().config(0.01);
     (config.inertia_scale, config.disturbance, config.moment_delay) =
         (1.0, Disturbance::default(), delay);
     let mut plant = Plant::new(&config, start).unwrap();
     let mut go = |k: u32| {
         let [from, to] = [k, k + 1].map(|k| start + 0.04 * f64::from(k));
-        (unit.input.measured.angles, unit.input.measured.rates) = (plant.angles(), plant.rates());
-        unit.calculate(from, LastEvent::InputSet).unwrap();
-        plant.advance(from, to, unit.output.moment).unwrap();
-        unit.step(from, to, &Held, &mut |text| panic!("{text}")).unwrap();
+        (instance.input.measured.angles, instance.input.measured.rates) =
+            (plant.angles(), plant.rates());
+        instance.calculate(from, LastEvent::InputSet).unwrap();
+        plant.advance(from, to, instance.output.moment).unwrap();
+        instance.step(from, to, &Held, &mut |text| panic!("{text}")).unwrap();
         plant.state
     };
     (0..ticks).map(&mut go).collect()
@@ -256,32 +259,33 @@ fn oracle_a_known_delay_shifts_the_loop_and_does_nothing_else_even_in_saturation
 
 #[test]
 fn an_external_reference_counts_when_the_moment_acts() {
-    let mut unit: Lqr = ready(|unit: &mut Lqr| {
-        unit.parameters.reference.profile = Choice::External;
-        unit.parameters.latency.action = 0.1;
+    let mut instance: Lqr = ready(|instance: &mut Lqr| {
+        instance.parameters.reference.profile = Choice::External;
+        instance.parameters.latency.action = 0.1;
     });
-    unit.input.reference = Reference { angles: unit.input.measured.angles, ..Reference::default() };
-    unit.calculate(0.0, LastEvent::InputSet).unwrap();
-    assert_eq!(unit.output.moment, Vector3::zeros(), "at rest on the reference");
-    unit.input.reference.accelerations.x = 0.01;
-    unit.calculate(0.0, LastEvent::InputSet).unwrap();
-    assert!(unit.output.moment.y > 0.0, "the acceleration is not taken for unknown");
+    instance.input.reference =
+        Reference { angles: instance.input.measured.angles, ..Reference::default() };
+    instance.calculate(0.0, LastEvent::InputSet).unwrap();
+    assert_eq!(instance.output.moment, Vector3::zeros(), "at rest on the reference");
+    instance.input.reference.accelerations.x = 0.01;
+    instance.calculate(0.0, LastEvent::InputSet).unwrap();
+    assert!(instance.output.moment.y > 0.0, "the acceleration of the reference is used");
 }
 
 #[test]
 fn a_delay_out_of_range_is_refused_by_name() {
-    let text = refusal::<Lqr>(|unit| unit.parameters.latency.action = 1.1);
+    let text = refusal::<Lqr>(|instance| instance.parameters.latency.action = 1.1);
     assert!(text.contains("delay = 1.1 s"), "{text}");
 }
 
 #[test]
-fn a_time_budget_of_any_length_is_worked_with() {
+fn a_time_budget_of_any_length_is_accepted() {
     for budget in [1e9, 1e19, 1e300, f64::MAX] {
         let mut crmpc: Crmpc =
-            ready(|unit: &mut Crmpc| unit.law.settings.solver.time_budget = budget);
+            ready(|instance: &mut Crmpc| instance.law.settings.solver.time_budget = budget);
         crmpc.calculate(0.0, LastEvent::InputSet).unwrap();
         let mut dlmpc: Dlmpc =
-            ready(|unit: &mut Dlmpc| unit.law.settings.solver.time_budget = budget);
+            ready(|instance: &mut Dlmpc| instance.law.settings.solver.time_budget = budget);
         dlmpc.calculate(0.0, LastEvent::InputSet).unwrap();
         assert!(crmpc.output.moment.norm() > 0.0 && dlmpc.output.moment.norm() > 0.0, "{budget} s");
     }

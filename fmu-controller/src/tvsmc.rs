@@ -18,11 +18,15 @@ static FORMS: Enumeration<SecondOrderForm> = Enumeration {
     name: "SecondOrderForm",
     description: "Signs of the second-order reaching law",
     items: &[
-        (SecondOrderForm::Corrected, "corrected", "the sliding variables come to zero"),
+        (
+            SecondOrderForm::Corrected,
+            "corrected",
+            "signs with which the sliding variables converge to zero",
+        ),
         (
             SecondOrderForm::Printed,
             "printed",
-            "plus k3 and sgn twice, as (43) and (45) are printed; they do not",
+            "opposite sign of the term with k3 and a second sgn, as printed in (43) and (45); the sliding variables do not converge",
         ),
     ],
 };
@@ -31,9 +35,9 @@ static FORMS: Enumeration<SecondOrderForm> = Enumeration {
 pub trait Variant: Sized + Send + Sync + 'static {
     /// Reaching law of the variant.
     type Reaching: Reaching + PartialEq + Serialize + DeserializeOwned + Send + 'static;
-    /// Name of the unit in FMI.
+    /// Name of the FMU.
     const NAME: &'static str;
-    /// Description of the unit in one line.
+    /// Description of the FMU in one line.
     const DESCRIPTION: &'static str;
     /// Whether the variant has a disturbance observer.
     const OBSERVER: bool;
@@ -82,7 +86,7 @@ impl<V: Variant> Law for TvsmcLaw<V> {
     }
 
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-        let table = table::period(table, "Time between two evaluations of the law");
+        let table = table::period(table, "control law");
         let table = anti_windup(V::reaching(surface(table)));
         let table = if V::OBSERVER { observer(table) } else { table };
         outputs(table)
@@ -112,9 +116,13 @@ impl<V: Variant> Law for TvsmcLaw<V> {
 fn surface<V: Variant>(
     table: Table<ControllerFmu<TvsmcLaw<V>>>,
 ) -> Table<ControllerFmu<TvsmcLaw<V>>> {
-    let c = ("surface.c", "Gain c of the sliding surface on the error");
-    let lambda =
-        parameter("surface.lambda", "Rate at which the surface's offset decays").real().min(0.0);
+    let c = ("surface.c", "Gain c of the sliding surface");
+    let lambda = parameter(
+        "surface.lambda",
+        "Rate lambda at which the offset of the sliding surface decays",
+    )
+    .real()
+    .min(0.0);
     table::gains(table, c, Some(&unit::gain_rate()), |law| &mut law.settings.surface.c)
         .real(lambda.unit(unit::gain_rate()), |m| &mut m.law.settings.surface.lambda)
 }
@@ -124,17 +132,11 @@ fn anti_windup<V: Variant>(
 ) -> Table<ControllerFmu<TvsmcLaw<V>>> {
     let on = parameter(
         "antiWindup",
-        "Whether the surface is laid anew through the state while the actuators saturate; false as in the paper",
-    );
-    let threshold = parameter(
-        "antiWindupThreshold",
-        "Norm of the acceleration that the actuators fail to give, from which on they count as saturated",
+        "Whether the sliding surface is placed again through the state while the actuators saturate; false in the paper",
     );
     table::achieved_moment(table)
         .boolean(on, |m| &mut m.law.settings.anti_windup)
-        .real(threshold.real().unit(unit::angular_acceleration()).min(0.0).nominal(0.01), |m| {
-            &mut m.law.settings.threshold
-        })
+        .real(table::anti_windup_threshold(), |m| &mut m.law.settings.threshold)
 }
 
 fn observer<V: Variant>(
@@ -145,7 +147,10 @@ fn observer<V: Variant>(
         let gain = parameter(&format!("observer.lambda{i}"), &text).real().min(0.0);
         table = table.real(gain, move |m| &mut m.law.observer.lambda[i]);
     }
-    let l = ("observer.L", "Bound L on the second derivative of the uncertainty, rad/s4");
+    let l = (
+        "observer.L",
+        "Gain L of the disturbance observer, a bound on the second derivative of the disturbance in rad/s4,",
+    );
     table::gains(table, l, None, |law| &mut law.observer.l)
 }
 
@@ -160,24 +165,19 @@ fn outputs<V: Variant>(
             .unit(unit::angular_rate())
             .nominal(1e-3)
     };
-    let of_sliding = |axis: &str, meaning: &str| {
+    let sliding_estimate = |axis: &str, meaning: &str| {
         let text = format!("Observer's estimate z0 of the sliding variable of the {meaning}");
         sampled(format!("slidingEstimate.{axis}"), text)
             .real()
             .unit(unit::angular_rate())
             .nominal(1e-3)
     };
-    let of_disturbance = |axis: &str, meaning: &str| {
-        let text = format!(
-            "Observer's estimate of the uncertainty in the second derivative of the {meaning}"
-        );
-        let common = sampled(format!("disturbanceEstimate.{axis}"), text);
-        common.real().unit(unit::angular_acceleration()).nominal(0.01)
-    };
+    let disturbance =
+        |axis: &str, meaning: &str| table::disturbance_estimate(axis, meaning).nominal(0.01);
     let table = vector(table, ANGLES, sliding, |m| &mut m.law.sliding);
     if V::OBSERVER {
-        let table = vector(table, ANGLES, of_sliding, |m| &mut m.law.estimate.sliding);
-        vector(table, ANGLES, of_disturbance, |m| &mut m.law.estimate.disturbance)
+        let table = vector(table, ANGLES, sliding_estimate, |m| &mut m.law.estimate.sliding);
+        vector(table, ANGLES, disturbance, |m| &mut m.law.estimate.disturbance)
     } else {
         table
     }
@@ -201,7 +201,7 @@ pub struct Btvsmc;
 impl Variant for Btvsmc {
     type Reaching = BoundaryLayer;
     const NAME: &'static str = "BTVSMC";
-    const DESCRIPTION: &'static str = "Time-varying sliding-mode attitude controller with a boundary layer, a comparison of Wu et al. (2015)";
+    const DESCRIPTION: &'static str = "Time-varying sliding-mode attitude controller with a boundary layer, a comparison law of Wu et al. (2015)";
     const OBSERVER: bool = false;
 
     fn published() -> Settings<BoundaryLayer> {
@@ -263,8 +263,8 @@ impl Variant for SotvsmcDo {
         let angle = unit::gain_angle();
         let table =
             table::gains(table, (&n4, &t4), Some(&angle), |law| &mut law.settings.reaching.k4);
-        let m = parameter("reaching.m", "Exponent m of the reaching law, above 2").real().min(2.0);
-        let form = parameter("reaching.form", "Signs of the reaching law");
+        let m = parameter("reaching.m", "Exponent m of the reaching law; above 2").real().min(2.0);
+        let form = parameter("reaching.form", FORMS.description);
         table
             .real(m, |m| &mut m.law.settings.reaching.m)
             .enumeration(form, &FORMS, |m| &mut m.law.settings.reaching.form)

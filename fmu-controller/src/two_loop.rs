@@ -15,25 +15,25 @@ static FORMS: Enumeration<Form> = Enumeration {
     name: "ReachingForm",
     description: "Signs of the reaching terms",
     items: &[
-        (Form::Corrected, "corrected", "both loops come to their sliding surfaces"),
+        (Form::Corrected, "corrected", "signs with which both loops reach their sliding surfaces"),
         (
             Form::PrintedSign,
             "printedSign",
-            "minus I rho SIGN(s_n) in the inner loop, as (10) is printed",
+            "opposite sign of I rho SIGN(s_n) in the inner loop, as printed in (10)",
         ),
         (
             Form::PrintedFactor,
             "printedFactor",
-            "f of (7) and (11) with the minus sign it is printed with",
+            "factor f of (7) and (11) with its minus sign, as printed",
         ),
     ],
 };
 static KINEMATICS: Enumeration<OuterKinematics> = Enumeration {
     name: "OuterKinematics",
-    description: "What stands for R",
+    description: "Matrix R that the outer loop uses",
     items: &[
-        (OuterKinematics::Corrected, "corrected", "consistent in order and axes"),
-        (OuterKinematics::Printed, "printed", "(3) as it is printed"),
+        (OuterKinematics::Corrected, "corrected", "matrix with consistent order and axes"),
+        (OuterKinematics::Printed, "printed", "matrix (3) as printed"),
     ],
 };
 
@@ -82,12 +82,12 @@ impl Law for TwoLoopLaw {
     }
 
     fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-        let table = table::period(table, "Time between two evaluations of the law");
-        let outer = ["outer", "outer loop"];
+        let table = table::period(table, "control law");
+        let outer = ["outer", "outer loop", ""];
         let table = reaching(table, outer, ANGLES, &unit::angular_rate(), &unit::angle(), |law| {
             &mut law.settings.outer
         });
-        let inner = ["inner", "inner loop"];
+        let inner = ["inner", "inner loop", " rate"];
         let (rho, epsilon) = (unit::angular_acceleration(), unit::angular_rate());
         let table = reaching(table, inner, RATES, &rho, &epsilon, |law| &mut law.settings.inner);
         outputs(printed(actuators(table)))
@@ -106,21 +106,21 @@ impl Law for TwoLoopLaw {
         self.outer_sliding = shown_vector(&memory.outer_sliding);
         self.inner_sliding = shown_vector(&memory.inner_sliding);
         self.rate_command = shown_vector(&memory.rate_command);
-        let gain = |of: &Loop| Vector3::from(of.k);
-        self.outer_integral =
-            shown_vector(&gain(&self.settings.outer).component_mul(&memory.outer_integral));
-        self.inner_integral =
-            shown_vector(&gain(&self.settings.inner).component_mul(&memory.inner_integral));
+        let term = |settings: &Loop, integral: &Vector3<f64>| {
+            shown_vector(&Vector3::from(settings.k).component_mul(integral))
+        };
+        self.outer_integral = term(&self.settings.outer, &memory.outer_integral);
+        self.inner_integral = term(&self.settings.inner, &memory.inner_integral);
     }
 }
 
 type Controller = Table<ControllerFmu<TwoLoopLaw>>;
 type Field = fn(&mut Loop) -> &mut [f64; 3];
 
-/// Adds the parameters of one loop, per axis.
+/// Adds the parameters of one loop, per axis. `suffix` completes the name of an axis.
 fn reaching(
     mut table: Controller,
-    [name, of]: [&str; 2],
+    [name, loop_name, suffix]: [&str; 3],
     axes: [(&str, &str); 3],
     rho: &unit::Unit,
     epsilon: &unit::Unit,
@@ -133,11 +133,11 @@ fn reaching(
         ("epsilon", "Thickness epsilon of the boundary layer", Some(epsilon), |l| {
             &mut l.layer.epsilon
         }),
-        ("b", "Power b of the finite-time factor, below 1", None, |l| &mut l.layer.b),
+        ("b", "Exponent b (below 1) of the finite-time factor", None, |l| &mut l.layer.b),
     ];
     for (symbol, text, unit, field) in parameters {
         for (i, (_, meaning)) in axes.into_iter().enumerate() {
-            let text = format!("{text}, {of}: {meaning}");
+            let text = format!("{text} in the {loop_name} for the {meaning}{suffix}");
             let real = parameter(&format!("{name}.{symbol}[{}]", i + 1), &text).real().min(0.0);
             let real = match unit {
                 Some(unit) => real.unit(unit.clone()),
@@ -152,7 +152,7 @@ fn reaching(
 fn actuators(mut table: Controller) -> Controller {
     for (i, axis) in ["x", "y", "z"].into_iter().enumerate() {
         let text = format!(
-            "Bound on the disturbance moment about {axis} that the inner loop must overcome"
+            "Bound on the disturbance moment about the {axis} axis that the inner loop must overcome"
         );
         let bound = parameter(&format!("disturbanceMoment.bound[{}]", i + 1), &text).real();
         table = table.real(bound.unit(unit::moment()).min(0.0).nominal(1e5), move |m| {
@@ -161,24 +161,18 @@ fn actuators(mut table: Controller) -> Controller {
     }
     let filter = parameter(
         "commandFilter.frequency",
-        "Frequency of the critically damped filter of the command; 0 for none",
+        "Natural frequency of the critically damped filter on the reference; 0 for no filter",
     );
-    let on = parameter("antiWindup", "Whether the integrals rest while the actuators saturate");
-    let threshold = parameter(
-        "antiWindupThreshold",
-        "Norm of the acceleration that the actuators fail to give, from which on they count as saturated",
-    );
+    let on = parameter("antiWindup", "Whether the integrals are held while the actuators saturate");
     table::achieved_moment(table)
         .real(filter.real().unit(unit::gain_rate()).min(0.0), |m| &mut m.law.settings.filter)
         .boolean(on, |m| &mut m.law.settings.anti_windup)
-        .real(threshold.real().unit(unit::angular_acceleration()).min(0.0).nominal(0.01), |m| {
-            &mut m.law.settings.threshold
-        })
+        .real(table::anti_windup_threshold(), |m| &mut m.law.settings.threshold)
 }
 
 fn printed(table: Controller) -> Controller {
-    let form = parameter("form", "Signs of the reaching terms");
-    let kinematics = parameter("kinematics", "What the outer loop takes for R");
+    let form = parameter("form", FORMS.description);
+    let kinematics = parameter("kinematics", KINEMATICS.description);
     table.enumeration(form, &FORMS, |m| &mut m.law.settings.form).enumeration(
         kinematics,
         &KINEMATICS,
@@ -200,16 +194,15 @@ fn outputs(table: Controller) -> Controller {
             .nominal(1e-2)
     };
     let command = |axis: &str, meaning: &str| {
-        let text = format!("Body {meaning} rate that the outer loop commands");
+        let text = format!("Body {meaning} rate commanded by the outer loop");
         sampled(format!("rateCommand.{axis}"), text).real().unit(unit::angular_rate()).nominal(0.05)
     };
     let outer_integral = |axis: &str, meaning: &str| {
-        let text = format!("Part of the sliding variable of the {meaning} that is its integral");
+        let text = format!("Integral term of the sliding variable of the {meaning}");
         sampled(format!("integral.{axis}"), text).real().unit(unit::angle()).nominal(1e-2)
     };
     let inner_integral = |axis: &str, meaning: &str| {
-        let text =
-            format!("Part of the sliding variable of the {meaning} rate that is its integral");
+        let text = format!("Integral term of the sliding variable of the {meaning} rate");
         sampled(format!("innerIntegral.{axis}"), text)
             .real()
             .unit(unit::angular_rate())

@@ -1,4 +1,4 @@
-//! A law of one's own as an FMI unit: proportional and derivative, nonlinear terms cancelled.
+//! A control law as an FMU: proportional and derivative action, with nonlinear terms cancelled.
 
 use control::crmpc::{Constraints, Settings};
 use control::{Controller, DesignError, Measurement, controller::ReferenceAt as At};
@@ -26,9 +26,9 @@ impl Controller for Pd {
     type Memory = ();
 
     fn command(&mut self, (): &mut (), _: u64, t: f64, x: &Measurement, at: At) -> Vector3<f64> {
-        let (rates, wanted) = (r(&x.angles) * x.rates, at(t));
-        let (error, error_rate) = (x.angles - wanted.angles, rates - wanted.rates);
-        let a = wanted.accelerations - error * self.gains.0 - error_rate * self.gains.1;
+        let (rates, reference) = (r(&x.angles) * x.rates, at(t));
+        let (error, error_rate) = (x.angles - reference.angles, rates - reference.rates);
+        let a = reference.accelerations - error * self.gains.0 - error_rate * self.gains.1;
         control::linearise::moment(&self.body, &x.angles, &rates, &a)
     }
 }
@@ -43,9 +43,10 @@ impl Law for Pd {
         0.04 // s
     }
 
-    fn declare(own: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-        own.real(parameter("gain.p", "Gain on the angles").real().min(0.0), |m| &mut m.law.gains.0)
-            .real(parameter("gain.d", "Gain on rates").real().min(0.0), |m| &mut m.law.gains.1)
+    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+        let p = parameter("gain.p", "Gain on the tracking error of the angles").real();
+        let d = parameter("gain.d", "Gain on the derivative of the tracking error").real();
+        table.real(p.min(0.0), |m| &mut m.law.gains.0).real(d.min(0.0), |m| &mut m.law.gains.1)
     }
 
     fn settings(&self, vehicle: &Vehicle) -> Self {

@@ -1,4 +1,4 @@
-//! The library of the units whose laws are formulas: nothing is optimised while they run.
+//! The library of the FMUs whose laws are formulas: they solve no optimisation while they run.
 #![deny(clippy::disallowed_methods)]
 
 use fmu_controller::{AttitudeEstimator, Btvsmc, BtvsmcDo, Fbl, Lqr, SotvsmcDo, TwoLoopSmc};

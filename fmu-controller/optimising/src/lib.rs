@@ -1,4 +1,4 @@
-//! The library of the units that optimise while they run. Only it holds the solvers: they are a
+//! The library of the FMUs that optimise while they run. Only it holds the solvers: they are a
 //! fifth of its size.
 #![deny(clippy::disallowed_methods)]
 

@@ -1,8 +1,8 @@
-//! How the unit that all controllers share works at its ticks.
+//! How the instance of a controller works at its ticks.
 
-use crate::law::{ControllerFmu, ControllerUnit, Input, Law, Output, Parameters, Vehicle};
+use crate::law::{ControllerFmu, ControllerInstance, Input, Law, Output, Parameters, Vehicle};
 use crate::reference::{self, Source};
-use crate::sampled::{SampledUnit, Ticks};
+use crate::sampled::{SampledInstance, Ticks};
 use crate::table;
 use control::controller::{Controller, Measurement};
 use control::delay::{Delayed, Latency};
@@ -19,7 +19,7 @@ pub struct Designed<L: Law> {
     controller: Delayed<L::Controller>,
 }
 
-impl<L: Law> ControllerUnit<L> {
+impl<L: Law> ControllerInstance<L> {
     /// Returns the failure for refused settings.
     fn refusal(error: &impl ToString) -> Failure {
         Failure::Error(by_variable(error, &[table::FIELDS, L::FIELDS].concat()))
@@ -33,7 +33,7 @@ impl<L: Law> ControllerUnit<L> {
     }
 }
 
-impl<L: Law> ControllerUnit<L> {
+impl<L: Law> ControllerInstance<L> {
     /// Evaluates the first uncommitted tick. Its inputs are `stale` if they were set before it.
     fn evaluate_with(
         &self,
@@ -46,10 +46,10 @@ impl<L: Law> ControllerUnit<L> {
         let achieved_moment = parameters.achieved_moment_used.then_some(input.achieved_moment);
         let measured = Measurement { achieved_moment, stale, ..input.measured };
         let now = ticks.next_time();
-        // An external reference is only known now; the law uses its present value for the time at
-        // which its moment acts.
-        let known = now + controller.acts_after();
-        ticks.evaluate(controller, &measured, &source.preview(known, &input.reference));
+        // The future of an external reference is unknown; the law uses its present value for the
+        // time at which its moment acts.
+        let acts_at = now + controller.acts_after();
+        ticks.evaluate(controller, &measured, &source.preview(acts_at, &input.reference));
         if ticks.in_force().0.iter().all(|value| value.is_finite()) {
             return Ok(());
         }
@@ -59,7 +59,7 @@ impl<L: Law> ControllerUnit<L> {
     }
 }
 
-impl<L: Law> SampledUnit for ControllerUnit<L> {
+impl<L: Law> SampledInstance for ControllerInstance<L> {
     type Device = Designed<L>;
     type Memory = <Delayed<L::Controller> as Controller>::Memory;
     type Input = ControllerInput;
@@ -139,8 +139,8 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
         self.evaluate_with(device, ticks, true)
     }
 
-    /// With a delay no command acts at the start, and the law takes the moment for zero until its
-    /// first one does.
+    /// With a delay no command acts at the start. The law takes the moment as zero until its first
+    /// command acts.
     fn output_before_the_first(device: &Designed<L>) -> Option<Vector3<f64>> {
         (device.controller.acts_after() > 0.0).then(Vector3::zeros)
     }
@@ -148,7 +148,7 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
     fn warning(before: &Self::Memory, after: &Self::Memory) -> Option<&'static str> {
         if after.loop_delay.is_other && !before.loop_delay.is_other {
             return Some(
-                "the motion shows another delay of the loop than delay and measurement.age say: loopDelay.estimate tells which",
+                "the response of the vehicle shows another loop delay than delay + measurement.age; see loopDelay.estimate",
             );
         }
         L::warning(&before.inner, &after.inner)
@@ -175,6 +175,6 @@ impl<L: Law> SampledUnit for ControllerUnit<L> {
 
     fn problem(&self, before: &Self) -> Option<&'static str> {
         let fits = self.source == before.source || self.source.fits(&self.parameters.reference);
-        (!fits).then_some("its reference is not that of its parameters")
+        (!fits).then_some("its reference does not match its parameters")
     }
 }
