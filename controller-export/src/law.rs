@@ -6,7 +6,7 @@ use control::Controller;
 use control::controller::Measurement;
 use control::delay::Latency;
 use control::error::DesignError;
-use fmi2_export::Table;
+use fmi2_export::VariableTable;
 use fmi2_export::fields::Fields;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -127,7 +127,7 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     fn period() -> f64;
 
     /// Adds the law's own variables to the table.
-    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         table
     }
 

@@ -7,7 +7,7 @@
 //! ```
 //! use control::lqr::{Lqr, LqrSettings};
 //! use controller_export::{ControllerFmu, Law, Vehicle};
-//! use fmi2_export::{Table, describe, table::parameter};
+//! use fmi2_export::{VariableTable, describe, table::parameter};
 //! use serde::{Deserialize, Serialize};
 //!
 //! /// A regulator with one weight; the value holds the law's own parameters and outputs.
@@ -32,7 +32,7 @@
 //!         0.04
 //!     }
 //!
-//! fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+//! fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
 //! table.real(parameter("weight", "Weight on the errors").real().min(0.0), |m| &mut m.law.weight) }
 //!
 //!     fn settings(&self, vehicle: &Vehicle) -> LqrSettings {

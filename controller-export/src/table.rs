@@ -5,7 +5,7 @@ use crate::reference::PROFILES;
 use control::delay;
 use fmi2_export::fields::Fields;
 use fmi2_export::table::{
-    Common, Description, Real, Table, discrete_output, input, output, parameter,
+    Common, Description, Real, VariableTable, discrete_output, input, output, parameter,
 };
 use model_description::DefaultExperiment;
 use model_description::unit;
@@ -62,7 +62,7 @@ pub fn sampled_output(name: &str, description: &str) -> Common {
 /// Returns the description of a controller's unit for FMI.
 pub fn description<L: Law>() -> Description<ControllerFmu<L>> {
     let scenario = Scenario::crmpc2022();
-    let table = L::declare(vehicle(reference(outputs(inputs(Table::new())))));
+    let table = L::declare(vehicle(reference(outputs(inputs(VariableTable::new())))));
     Description {
         name: L::NAME,
         description: L::DESCRIPTION,
@@ -82,11 +82,11 @@ pub fn description<L: Law>() -> Description<ControllerFmu<L>> {
 
 /// Adds the three components of a vector; `declare` receives name and meaning of each axis.
 pub fn vector<M: 'static>(
-    mut table: Table<M>,
+    mut table: VariableTable<M>,
     axes: [(&'static str, &'static str); 3],
     declare: impl Fn(&str, &str) -> Real,
     field: impl Fn(&mut M) -> &mut Vector3<f64> + Copy + Send + Sync + 'static,
-) -> Table<M> {
+) -> VariableTable<M> {
     for (i, real) in declared(axes, &declare).into_iter().enumerate() {
         table = table.real(real, move |m| &mut field(m)[i]);
     }
@@ -129,7 +129,7 @@ fn external(
     }
 }
 
-fn inputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
+fn inputs<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<ControllerFmu<L>> {
     let table = vector(table, ANGLES, measured_angle, |m| &mut m.input.measured.angles);
     let table = vector(table, RATES, measured_rate, |m| &mut m.input.measured.rates);
     let table = vector(table, AXES, achieved, |m| &mut m.input.achieved_moment);
@@ -167,7 +167,7 @@ fn in_force(
     }
 }
 
-fn outputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
+fn outputs<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<ControllerFmu<L>> {
     let table = vector(table, AXES, moment, |m| &mut m.output.moment);
     let angles = in_force("reference", "external", "Reference", unit::angle());
     let rates = in_force(
@@ -208,7 +208,7 @@ fn amplitude(axis: &str, meaning: &str) -> Real {
     parameter(&format!("reference.amplitude.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
 }
 
-fn reference<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
+fn reference<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<ControllerFmu<L>> {
     let profile = parameter("reference.profile", "Where the reference attitude comes from");
     let file = parameter(
         "reference.file",
@@ -234,7 +234,7 @@ fn moment_of_inertia(name: &str, meaning: &str) -> Real {
     parameter(name, &text).real().unit(unit::inertia()).nominal(1e6)
 }
 
-fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
+fn vehicle<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<ControllerFmu<L>> {
     let rate = parameter("limit.rate", "Limit on the norm of the body rates").real();
     let moment = parameter("limit.moment", "Limit on the norm of the control moment").real();
     let saturation =
@@ -280,7 +280,9 @@ fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
 }
 
 /// Adds the parameter of laws that use the moment of the actuators.
-pub fn achieved_moment<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
+pub fn achieved_moment<L: Law>(
+    table: VariableTable<ControllerFmu<L>>,
+) -> VariableTable<ControllerFmu<L>> {
     let used = parameter(
         "achievedMoment.used",
         "Whether the inputs achievedMoment are fed; if not, the commanded moment is taken to act",
@@ -289,18 +291,21 @@ pub fn achieved_moment<L: Law>(table: Table<ControllerFmu<L>>) -> Table<Controll
 }
 
 /// Adds the parameter period.feedback, the time between two evaluations of what `text` says.
-pub fn period<L: Law>(table: Table<ControllerFmu<L>>, text: &str) -> Table<ControllerFmu<L>> {
+pub fn period<L: Law>(
+    table: VariableTable<ControllerFmu<L>>,
+    text: &str,
+) -> VariableTable<ControllerFmu<L>> {
     let period = parameter("period.feedback", text).real().unit(unit::time());
     table.real(period.min(1e-4).max(10.0).nominal(L::period()), |m| &mut m.parameters.period)
 }
 
 /// Adds the gains of the three angles, `name[1]` to `name[3]`, in the order of [`ANGLES`].
 pub fn gains<L: Law>(
-    mut table: Table<ControllerFmu<L>>,
+    mut table: VariableTable<ControllerFmu<L>>,
     (name, text): (&str, &str),
     unit: Option<&unit::Unit>,
     field: impl Fn(&mut L) -> &mut [f64; 3] + Copy + Send + Sync + 'static,
-) -> Table<ControllerFmu<L>> {
+) -> VariableTable<ControllerFmu<L>> {
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
         let real =
             parameter(&format!("{name}[{}]", i + 1), &format!("{text}: {meaning}")).real().min(0.0);
@@ -315,10 +320,10 @@ pub fn gains<L: Law>(
 
 /// Adds the weights P and Q on the tracking error and the input.
 pub fn weights<L: Law>(
-    mut table: Table<ControllerFmu<L>>,
+    mut table: VariableTable<ControllerFmu<L>>,
     p: impl Fn(&mut L) -> &mut [f64; 6] + Copy + Send + Sync + 'static,
     q: impl Fn(&mut L) -> &mut [f64; 3] + Copy + Send + Sync + 'static,
-) -> Table<ControllerFmu<L>> {
+) -> VariableTable<ControllerFmu<L>> {
     for i in 0..6 {
         let (_, meaning) = ANGLES[i % 3];
         let of = if i < 3 { "error" } else { "error rate" };

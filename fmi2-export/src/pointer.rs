@@ -109,7 +109,7 @@ pub(crate) fn apart<T, U>(
 
 /// Returns the value references of a call that gets values, with the room for the values. The
 /// caller promises what [`slice`] and [`room`] ask.
-pub(crate) unsafe fn wanted<'a, T>(
+pub(crate) unsafe fn requested<'a, T>(
     vr: *const u32,
     n: usize,
     value: *mut T,

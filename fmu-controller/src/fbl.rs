@@ -3,7 +3,7 @@
 use control::error::DesignError;
 use control::sliding::{Fbl, FblSettings};
 use controller_export::{ControllerFmu, Law, Vehicle, table};
-use fmi2_export::Table;
+use fmi2_export::VariableTable;
 use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use model_description::unit;
@@ -35,7 +35,7 @@ impl Law for FblLaw {
         FblSettings::published().period
     }
 
-    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         let p = parameter("gain.p", "Gain on the error of the angles").real().min(0.0);
         let d = parameter("gain.d", "Gain on the error of their rates").real().min(0.0);
         table::period(table, "Time between two evaluations of the law")

@@ -4,7 +4,7 @@ use control::crmpc::{Constraints, Settings};
 use control::error::DesignError;
 use control::lqr::{Lqr, LqrSettings};
 use controller_export::{ControllerFmu, Law, Vehicle, table};
-use fmi2_export::Table;
+use fmi2_export::VariableTable;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the regulator.
@@ -35,7 +35,7 @@ impl Law for LqrLaw {
         Settings::new(Constraints::Robust).period_feedback
     }
 
-    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         let table = table::period(table, "Time between two evaluations of the law");
         table::weights(table, |law| &mut law.settings.p, |law| &mut law.settings.q)
     }

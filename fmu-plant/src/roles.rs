@@ -2,7 +2,7 @@
 //! variable table.
 
 use fmi2_export::table::{Common, Real};
-use fmi2_export::{Enumeration, Table};
+use fmi2_export::{Enumeration, VariableTable};
 
 /// Role of a calculated variable. States and derivatives are counted in the order attitude, rates,
 /// deflections.
@@ -58,16 +58,16 @@ impl From<Known> for Role {
 
 /// Variable table with the role of each variable.
 pub(crate) struct Variables<M> {
-    pub(crate) table: Table<M>,
+    pub(crate) table: VariableTable<M>,
     pub(crate) roles: Vec<Role>,
 }
 
 impl<M: 'static> Variables<M> {
     pub(crate) fn new() -> Self {
-        Self { table: Table::new(), roles: Vec::new() }
+        Self { table: VariableTable::new(), roles: Vec::new() }
     }
 
-    fn add(mut self, declare: impl FnOnce(Table<M>) -> Table<M>) -> Self {
+    fn add(mut self, declare: impl FnOnce(VariableTable<M>) -> VariableTable<M>) -> Self {
         self.roles.push(Role::default());
         Self { table: declare(self.table), ..self }
     }

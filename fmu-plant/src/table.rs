@@ -146,10 +146,8 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         real.derivative_of(&format!("attitude.{axis}"))
     };
     let acceleration = |axis: &str, meaning: &str| {
-        let common = output(
-            &format!("angularAcceleration.{axis}"),
-            &format!("Time derivative of the body {meaning} rate"),
-        );
+        let text = format!("Time derivative of the body {meaning} rate");
+        let common = output(&format!("angularAcceleration.{axis}"), &text);
         let real = common
             .depends_on(motion)
             .depends_on(moment)
@@ -159,10 +157,8 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         real.unit(unit::angular_acceleration()).nominal(0.05).derivative_of(&format!("rate.{axis}"))
     };
     let applied = |axis: &str, meaning: &str| {
-        let common = output(
-            &format!("appliedMoment.{axis}"),
-            &format!("Control moment about the {meaning} axis that acts on the vehicle"),
-        );
+        let text = format!("Control moment about the {meaning} axis that acts on the vehicle");
+        let common = output(&format!("appliedMoment.{axis}"), &text);
         let common =
             common.depends_on([format!("moment.{axis}").as_str()]).depends_on(actuators.clone());
         common.real().unit(unit::moment()).nominal(1e5)
@@ -176,9 +172,8 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         common.real().unit(unit::angular_acceleration()).nominal(0.03)
     };
     let disturbing = |axis: &str, meaning: &str| {
-        let text = format!(
-            "Disturbance moment that acts about the {meaning} axis: external moment plus sine disturbance"
-        );
+        let text =
+            format!("Disturbance moment that acts about the {meaning} axis: external plus sine");
         let common = output(&format!("disturbance.moment.{axis}"), &text);
         common
             .depends_on([format!("disturbanceMoment.{axis}").as_str()])

@@ -7,7 +7,7 @@ use crate::plant::{Output, ReentryPlant};
 use crate::roles::{Known, Unknown};
 use crate::table::role;
 use fmi2_export::{Context, Failure, Inputs, LastEvent, Model, describe};
-use model_description::variable::{self, Causality, Variability};
+use model_description::variable::{Causality, Variability, VariableKind};
 use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::disturbance::{Kind, Row};
@@ -163,8 +163,8 @@ fn the_description_holds() {
     let scenario = Scenario::crmpc2022();
     let start = |name: &str| match &description.variables[description.position(name).unwrap()].kind
     {
-        variable::Kind::Real { start, .. } => start.unwrap(),
-        variable::Kind::Integer { start, .. } | variable::Kind::Enumeration { start, .. } => {
+        VariableKind::Real { start, .. } => start.unwrap(),
+        VariableKind::Integer { start, .. } | VariableKind::Enumeration { start, .. } => {
             f64::from(start.unwrap())
         }
         _ => f64::NAN,
@@ -723,7 +723,7 @@ fn an_importer_may_restart_from_other_deflections() {
 }
 
 #[test]
-fn a_restored_unit_goes_on_with_moving_surfaces() {
+fn a_restored_instance_continues_with_moving_surfaces() {
     let mut instance = commanded(FAR);
     exchange(&mut instance, 0.0, 0.2);
     let saved = serde_json::to_string(&instance).unwrap();
@@ -964,7 +964,7 @@ fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_excha
 }
 
 #[test]
-fn a_wrong_moment_is_an_error_and_the_unit_starts_again() {
+fn a_wrong_moment_is_an_error_and_the_instance_starts_again() {
     let mut instance = started(|_| {});
     instance.input.moment.x = f64::NAN;
     assert!(
@@ -995,7 +995,7 @@ fn before_initialization_it_says_so() {
 #[test]
 fn outputs_need_no_start_and_inputs_have_one() {
     for variable in describe::<ReentryPlant>().variables {
-        let variable::Kind::Real { start, unit, .. } = &variable.kind else { continue };
+        let VariableKind::Real { start, unit, .. } = &variable.kind else { continue };
         assert_eq!(start.is_none(), variable.causality == Causality::Output, "{}", variable.name);
         let plain = [
             "inertia.scale",

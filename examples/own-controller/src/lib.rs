@@ -3,7 +3,7 @@
 use control::crmpc::{Constraints, Settings};
 use control::{Controller, DesignError, Measurement, controller::ReferenceAt as At};
 use controller_export::{ControllerFmu, Law, Vehicle};
-use fmi2_export::{Table, table::parameter};
+use fmi2_export::{VariableTable, table::parameter};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::{dynamics::RigidBody, kinematics::r};
@@ -43,7 +43,7 @@ impl Law for Pd {
         0.04 // s
     }
 
-    fn declare(own: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(own: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         own.real(parameter("gain.p", "Gain on the angles").real().min(0.0), |m| &mut m.law.gains.0)
             .real(parameter("gain.d", "Gain on rates").real().min(0.0), |m| &mut m.law.gains.1)
     }
