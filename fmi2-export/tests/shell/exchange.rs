@@ -168,7 +168,7 @@ fn oracle_directional_derivatives_agree_with_differences() {
 #[test]
 fn directional_derivatives_by_or_of_the_wrong_variables_are_refused() {
     for (unknown, known, part) in [
-        (U, X, "'u' is set from outside"),
+        (U, X, "'u' is a parameter or an input"),
         (Y, GAIN, "'gain.early' is neither an input nor a state"),
         (Y, Y, "'y' is neither an input nor a state"),
         (TEXT, U, "not of type Real"),

@@ -122,7 +122,7 @@ fn only_fmus_with_states_provide_directional_derivatives() {
         if fmu.description.directional_derivatives() {
             instance.ok(status);
         } else {
-            instance.refused(status, ERROR, &["offers no directional derivatives"]);
+            instance.refused(status, ERROR, &["provides no directional derivatives"]);
         }
     }
 }
