@@ -157,7 +157,7 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         real.unit(unit::angular_acceleration()).nominal(0.05).derivative_of(&format!("rate.{axis}"))
     };
     let applied = |axis: &str, meaning: &str| {
-        let text = format!("Control moment about the {meaning} axis that acts on the vehicle");
+        let text = format!("Control moment that acts on the vehicle about the {meaning} axis");
         let common = output(&format!("appliedMoment.{axis}"), &text);
         let common =
             common.depends_on([format!("moment.{axis}").as_str()]).depends_on(actuators.clone());
@@ -172,8 +172,7 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         common.real().unit(unit::angular_acceleration()).nominal(0.03)
     };
     let disturbing = |axis: &str, meaning: &str| {
-        let text =
-            format!("Disturbance moment that acts about the {meaning} axis: external plus sine");
+        let text = format!("Disturbance moment about the {meaning} axis: external input plus sine");
         let common = output(&format!("disturbance.moment.{axis}"), &text);
         common
             .depends_on([format!("disturbanceMoment.{axis}").as_str()])
@@ -369,7 +368,7 @@ fn actuation(variables: PlantVariables) -> PlantVariables {
     let mach = parameter("flight.mach", "Mach number");
     let density = parameter(
         "density.scale",
-        "Ratio of the actual air density to the standard atmosphere: 0.9 means 10 % less",
+        "Ratio of the actual air density to that of the standard atmosphere: 0.9 means 10 % less",
     );
     let aerodynamics = parameter(
         "aerodynamics.scale",
@@ -433,7 +432,7 @@ fn inertia(variables: PlantVariables) -> PlantVariables {
         .real(
             entry(
                 "Ixz",
-                "Nominal product of inertia of roll and yaw; the inertia tensor contains -Ixz",
+                "Nominal product of inertia of the roll and yaw axes; the inertia tensor contains -Ixz",
             ),
             |m| &mut m.parameters.inertia.Ixz,
         )
@@ -469,7 +468,7 @@ fn disturbance(variables: PlantVariables) -> PlantVariables {
     );
     let direction = |axis: &str, meaning: &str| {
         let text = format!(
-            "Factor on disturbance.bound for the {meaning}, for the kinds constant and square"
+            "Factor on disturbance.bound for the {meaning}, used by the kinds constant and square"
         );
         parameter(&format!("disturbance.direction.{axis}"), &text)
             .real()

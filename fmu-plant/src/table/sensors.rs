@@ -18,7 +18,8 @@ struct Sensor {
     nominal: f64,
     /// Effects that the sensor's matrix contains, as text for the description.
     matrix: &'static str,
-    bias: &'static str,
+    /// Effect that the sensor's bias contains besides, as text for the description.
+    bias_part: &'static str,
 }
 
 const SENSORS: [Sensor; 3] = [
@@ -30,7 +31,7 @@ const SENSORS: [Sensor; 3] = [
         rate_unit: unit::angular_acceleration,
         nominal: 0.05,
         matrix: "scale and misalignment",
-        bias: "bias",
+        bias_part: "",
     },
     Sensor {
         name: "accelerometer",
@@ -40,7 +41,7 @@ const SENSORS: [Sensor; 3] = [
         rate_unit: unit::acceleration_rate,
         nominal: 10.0,
         matrix: "scale and misalignment",
-        bias: "bias",
+        bias_part: "",
     },
     Sensor {
         name: "magnetometer",
@@ -50,7 +51,7 @@ const SENSORS: [Sensor; 3] = [
         rate_unit: unit::flux_density_rate,
         nominal: 5e-5,
         matrix: "scale, misalignment and soft iron",
-        bias: "bias, including hard iron,",
+        bias_part: ", including hard iron",
     },
 ];
 
@@ -116,7 +117,7 @@ fn line(variables: PlantVariables) -> PlantVariables {
         "Probability that a sample is dropped in transmission",
     );
     let start = parameter("sensor.drop.start", "Time from which samples can be dropped");
-    let end = parameter("sensor.drop.end", "Time from which no more samples are dropped");
+    let end = parameter("sensor.drop.end", "Time from which samples are no longer dropped");
     let seed = parameter(
         "sensor.seed",
         "Seed of sensor noise and dropped samples; the same seed gives the same samples",
@@ -153,7 +154,10 @@ fn errors(mut variables: PlantVariables, i: usize, sensor: &Sensor) -> PlantVari
         }
     }
     let bias = |axis: &str, _: &str| {
-        in_sensor_unit(&format!("bias.{axis}"), &format!("{device} {} of axis {axis}", sensor.bias))
+        in_sensor_unit(
+            &format!("bias.{axis}"),
+            &format!("{device} bias of axis {axis}{}", sensor.bias_part),
+        )
     };
     let drift = |axis: &str, _: &str| {
         let text = format!("rate of change of the {device} bias of axis {axis}");
@@ -162,7 +166,7 @@ fn errors(mut variables: PlantVariables, i: usize, sensor: &Sensor) -> PlantVari
     };
     let noise = in_sensor_unit(
         "noise",
-        &format!("standard deviation of the white noise on a {device} sample"),
+        &format!("standard deviation of the white noise on the samples of the {device}"),
     );
     let bandwidth = declare(
         "bandwidth",
@@ -179,11 +183,13 @@ fn errors(mut variables: PlantVariables, i: usize, sensor: &Sensor) -> PlantVari
         "resolution",
         &format!("quantization step of the {device} reading; 0 for none"),
     );
-    let start =
-        declare("freeze.start", &format!("time from which the {device} repeats its last value"));
+    let start = declare(
+        "freeze.start",
+        &format!("time at which the {device} starts to repeat its last value"),
+    );
     let end = declare(
         "freeze.end",
-        &format!("time from which the {device} no longer repeats its last value"),
+        &format!("time at which the {device} stops repeating its last value"),
     );
     let variables = vector(variables, AXES, bias, none, move |m| &mut m.parameters.triads[i].bias);
     vector(variables, AXES, drift, none, move |m| &mut m.parameters.triads[i].drift)
