@@ -146,7 +146,7 @@ pub unsafe fn fmi2Instantiate(
                     .map(|fmu| format!("{} {}", fmu.description.name, fmu.guid))
                     .collect();
                 format!(
-                    "no FMU with GUID '{guid}' in this library, which holds {}: pack it again",
+                    "this library has no FMU with GUID '{guid}' but {}: pack the archive again",
                     list.join(", ")
                 )
             })?;

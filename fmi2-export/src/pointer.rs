@@ -17,7 +17,7 @@ pub(crate) fn check<T>(name: &str, pointer: *const T, n: usize) -> Outcome {
     not_null(name, pointer)?;
     if !pointer.is_aligned() {
         return error(format!(
-            "argument '{name}' is at {pointer:p}, where no value of {} bytes can be",
+            "argument '{name}' is at {pointer:p}, which is not aligned to {} bytes",
             align_of::<T>()
         ));
     }

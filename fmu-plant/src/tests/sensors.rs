@@ -279,7 +279,7 @@ fn impossible_sensors_and_sequences_are_refused_by_name() {
     for (set, name) in [
         (
             (|instance| {
-                instance.parameters.line.delay = 20.0 * instance.parameters.line.period * 1e3
+                instance.parameters.line.delay = 20.0 * instance.parameters.line.period * 1e3;
             }) as fn(&mut ReentryPlant),
             "sensor.delay",
         ),
