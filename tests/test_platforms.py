@@ -410,9 +410,9 @@ def built(platform: str, crate: str) -> Path:
 @pytest.mark.parametrize(
     "old, new, words",
     [
-        (None, b"0" * 64, "is made of other sources"),
+        (None, b"0" * 64, "was built from other sources"),
         (b"KERNEL32.dll", b"KERNEL99.dll", "needs kernel99.dll, which not every system has"),
-        (b"fmi2GetReal\0", b"fmi2GetReaf\0", "differs in its exported functions: "),
+        (b"fmi2GetReal\0", b"fmi2GetReaf\0", "its exported functions differ: "),
         (b"MZ", b"ZM", "Unknown file magic"),
     ],
     ids=["sources", "imports", "exports", "format"],

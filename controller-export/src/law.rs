@@ -6,7 +6,7 @@ use control::Controller;
 use control::controller::Measurement;
 use control::delay::Latency;
 use control::error::DesignError;
-use fmi2_export::Table;
+use fmi2_export::VariableTable;
 use fmi2_export::fields::Fields;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};

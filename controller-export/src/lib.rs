@@ -7,7 +7,7 @@
 //! ```
 //! use control::lqr::{Lqr, LqrSettings};
 //! use controller_export::{ControllerFmu, Law, Vehicle};
-//! use fmi2_export::{Table, describe, table::parameter};
+//! use fmi2_export::{VariableTable, describe, table::parameter};
 //! use serde::{Deserialize, Serialize};
 //!
 //! /// A regulator with one weight; the value holds the parameters and outputs of the law.

@@ -5,7 +5,7 @@ use crate::reference::PROFILES;
 use control::delay;
 use fmi2_export::fields::Fields;
 use fmi2_export::table::{
-    Common, Description, Real, Table, discrete_output, input, output, parameter,
+    Common, Description, Real, VariableTable, discrete_output, input, output, parameter,
 };
 use model_description::DefaultExperiment;
 use model_description::unit;
@@ -66,7 +66,7 @@ pub fn sampled_output(name: &str, description: &str) -> Common {
 /// Returns the description of a controller's FMU.
 pub fn description<L: Law>() -> Description<ControllerFmu<L>> {
     let scenario = Scenario::crmpc2022();
-    let table = L::declare(vehicle(reference(outputs(inputs(Table::new())))));
+    let table = L::declare(vehicle(reference(outputs(inputs(VariableTable::new())))));
     Description {
         name: L::NAME,
         description: L::DESCRIPTION,
@@ -86,11 +86,11 @@ pub fn description<L: Law>() -> Description<ControllerFmu<L>> {
 
 /// Adds the three components of a vector; `declare` receives name and meaning of each axis.
 pub fn vector<M: 'static>(
-    mut table: Table<M>,
+    mut table: VariableTable<M>,
     axes: [(&'static str, &'static str); 3],
     declare: impl Fn(&str, &str) -> Real,
     field: impl Fn(&mut M) -> &mut Vector3<f64> + Copy + Send + Sync + 'static,
-) -> Table<M> {
+) -> VariableTable<M> {
     for (i, real) in declared(axes, &declare).into_iter().enumerate() {
         table = table.real(real, move |m| &mut field(m)[i]);
     }
@@ -133,7 +133,7 @@ fn external(
     }
 }
 
-fn inputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
+fn inputs<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<ControllerFmu<L>> {
     let table = vector(table, ANGLES, measured_angle, |m| &mut m.input.measured.angles);
     let table = vector(table, RATES, measured_rate, |m| &mut m.input.measured.rates);
     let table = vector(table, AXES, achieved, |m| &mut m.input.achieved_moment);
@@ -168,7 +168,7 @@ fn in_force(
     }
 }
 
-fn outputs<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
+fn outputs<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<ControllerFmu<L>> {
     let table = vector(table, AXES, moment, |m| &mut m.output.moment);
     let angles = in_force("reference", "external", "Reference", unit::angle());
     let rates = in_force("referenceRate", "externalRate", FIRST_DERIVATIVE, unit::angular_rate());
@@ -286,7 +286,9 @@ fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
 }
 
 /// Adds the parameter of laws that use the moment of the actuators.
-pub fn achieved_moment<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
+pub fn achieved_moment<L: Law>(
+    table: VariableTable<ControllerFmu<L>>,
+) -> VariableTable<ControllerFmu<L>> {
     let used = parameter(
         "achievedMoment.used",
         "Whether the inputs achievedMoment are connected; otherwise the law assumes that the commanded moment acts",
@@ -319,11 +321,11 @@ pub fn period<L: Law>(table: Table<ControllerFmu<L>>, part: &str) -> Table<Contr
 
 /// Adds the gains of the three angles, `name[1]` to `name[3]`, in the order of [`ANGLES`].
 pub fn gains<L: Law>(
-    mut table: Table<ControllerFmu<L>>,
+    mut table: VariableTable<ControllerFmu<L>>,
     (name, text): (&str, &str),
     unit: Option<&unit::Unit>,
     field: impl Fn(&mut L) -> &mut [f64; 3] + Copy + Send + Sync + 'static,
-) -> Table<ControllerFmu<L>> {
+) -> VariableTable<ControllerFmu<L>> {
     for (i, (_, meaning)) in ANGLES.into_iter().enumerate() {
         let real = parameter(&format!("{name}[{}]", i + 1), &format!("{text} for the {meaning}"))
             .real()
@@ -350,10 +352,10 @@ pub fn weight_text(quantity: &str, angle: &str, (matrix, index): (&str, usize)) 
 
 /// Adds the weights P and Q on the tracking error and the input.
 pub fn weights<L: Law>(
-    mut table: Table<ControllerFmu<L>>,
+    mut table: VariableTable<ControllerFmu<L>>,
     p: impl Fn(&mut L) -> &mut [f64; 6] + Copy + Send + Sync + 'static,
     q: impl Fn(&mut L) -> &mut [f64; 3] + Copy + Send + Sync + 'static,
-) -> Table<ControllerFmu<L>> {
+) -> VariableTable<ControllerFmu<L>> {
     for i in 0..6 {
         let (_, meaning) = ANGLES[i % 3];
         let quantity = if i < 3 { TRACKING_ERROR } else { ERROR_RATE };

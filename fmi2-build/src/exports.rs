@@ -13,7 +13,7 @@ const FMI2: &str = "
     GetVersion Instantiate NewDiscreteStates Reset SerializeFMUstate SerializedFMUstateSize
     SetBoolean SetContinuousStates SetDebugLogging SetFMUstate SetInteger SetReal
     SetRealInputDerivatives SetString SetTime SetupExperiment Terminate";
-/// Functions by which `fmu-pack` asks for the units' descriptions.
+/// Functions by which `fmu-pack` asks for the descriptions of the FMUs.
 const DESCRIPTIONS: [&str; 2] = ["fmu_model_descriptions", "fmu_free_model_descriptions"];
 
 /// Writes the list of exported functions as a module definition file.

@@ -1,5 +1,4 @@
-//! What the build script of a crate must say whose library is exported as FMI 2.0 units. Its `main`
-//! calls [`link`].
+//! Build script of a crate whose library exports FMI 2.0 FMUs. The script's `main` calls [`link`].
 
 mod exports;
 mod sources;
@@ -9,10 +8,10 @@ use std::path::PathBuf;
 
 /// Tells the compiler and the linker what the library of an FMU needs:
 ///
-/// - On Linux the library stays loaded once it is, because thread-local destructors of a Rust
-///   library crash a host that unloads it before the thread ends.
-/// - On Windows the linker gets the list of exported functions as a file of its own, because cross
-///   linkers lose that of rustc and then export everything.
+/// - On Linux the library is never unloaded, because thread-local destructors of a Rust library
+///   crash a host that unloads it before the thread ends.
+/// - On Windows the linker gets the list of exported functions as a separate file, because cross
+///   linkers lose the list of rustc and then export everything.
 /// - The digest of all sources of the library goes into it, so that `fmu-pack` can tell whether
 ///   libraries for several platforms belong together.
 ///
@@ -34,10 +33,9 @@ pub fn link() {
     match sources::digest() {
         Ok(digest) => println!("cargo::rustc-env=FMI2_SOURCES={digest}"),
         Err(problem) => {
-            // Of a file that does not exist cargo thinks that it has changed: the next build tries
-            // again.
+            // Cargo regards a file that does not exist as changed, so the next build tries again.
             println!("cargo::rerun-if-changed=no-digest-of-the-sources");
-            println!("cargo::warning=the library gets no digest of its sources: {problem}");
+            println!("cargo::warning=the library contains no digest of its sources: {problem}");
         }
     }
 }

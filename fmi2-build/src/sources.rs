@@ -1,4 +1,4 @@
-//! A digest of everything that a library is made of.
+//! Digest of all sources of a library.
 
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
@@ -8,15 +8,15 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs, io};
 
-/// What the compiler reads of a package that is a folder on this machine.
+/// Parts of a package in a local folder that the compiler reads.
 const PARTS: [&str; 4] = ["Cargo.toml", "build.rs", "data", "src"];
 
-/// Returns the digest of the sources of the package that is being built, as 64 hexadecimal digits:
-/// of all its dependencies' names and versions, and of all files of those which are folders on this
-/// machine. The platform and the places of the folders do not enter it.
+/// Returns the digest of the sources of the package that is being built, as 64 hexadecimal digits.
+/// It covers the names and versions of all dependencies, and all files of those in local folders,
+/// but neither the platform nor the paths of the folders.
 pub(crate) fn digest() -> Result<String, String> {
     let manifest = PathBuf::from(variable("CARGO_MANIFEST_DIR")?).join("Cargo.toml");
-    // Other versions of the dependencies may change no file of ours but this one.
+    // A change of the versions of dependencies may change only this file of the project.
     let workspace = cargo(&["locate-project", "--workspace", "--message-format=plain"], &manifest)?;
     let locked = Path::new(workspace.trim_end()).with_file_name("Cargo.lock");
     if locked.exists() {
@@ -29,11 +29,11 @@ pub(crate) fn digest() -> Result<String, String> {
             None => (package.as_str(), Path::new("")),
         };
         digest.update(name);
-        // Behind the name of a package from a registry or repository stands its address.
+        // The name of a package from a registry or repository is followed by its address.
         if !folder.is_dir() {
             continue;
         }
-        // Of a path that does not exist cargo thinks that it has changed.
+        // Cargo regards a path that does not exist as changed.
         for part in PARTS.map(|part| folder.join(part)).iter().filter(|part| part.exists()) {
             println!("cargo::rerun-if-changed={}", part.display());
             for file in files(part).map_err(|error| format!("{}: {error}", part.display()))? {
@@ -56,7 +56,7 @@ pub(crate) fn digest() -> Result<String, String> {
 fn packages(manifest: &Path) -> Result<BTreeSet<String>, String> {
     let what = ["tree", "--frozen", "--prefix=none", "--edges=normal,build", "--target=all"];
     let tree = cargo(&what, manifest)?;
-    // A package that stands in the tree once more is marked.
+    // Cargo marks a package that occurs in the tree repeatedly.
     Ok(tree.lines().map(|line| line.trim_end_matches(" (*)").to_string()).collect())
 }
 
@@ -66,7 +66,7 @@ fn cargo(what: &[&str], manifest: &Path) -> Result<String, String> {
         .args(what)
         .arg("--manifest-path")
         .arg(manifest)
-        // They are for the platform of the library, and cargo would try them on this machine.
+        // These flags are for the target platform, but cargo would try them on the host.
         .env_remove("CARGO_ENCODED_RUSTFLAGS")
         .env_remove("RUSTFLAGS")
         .output()
@@ -91,10 +91,10 @@ fn files(path: &Path) -> io::Result<Vec<PathBuf>> {
         return Ok(vec![]);
     }
     let entries = fs::read_dir(path)?.collect::<io::Result<Vec<_>>>()?;
-    let mut all = vec![];
+    let mut paths = vec![];
     for entry in entries {
-        all.extend(files(&entry.path())?);
+        paths.extend(files(&entry.path())?);
     }
-    all.sort();
-    Ok(all)
+    paths.sort();
+    Ok(paths)
 }

@@ -24,7 +24,7 @@ pub(crate) enum State {
     StepFailed,
     Terminated,
     Error,
-    /// State after a panic: the instance can only be freed, and the table has no column for it.
+    /// State after a panic: the instance can only be freed, so no call has a column for it.
     Fatal,
 }
 
@@ -38,8 +38,8 @@ impl State {
             Self::StepComplete => "step complete",
             Self::StepFailed => "step failed",
             Self::Terminated => "terminated",
-            Self::Error => "error (reset the unit or restore a saved state)",
-            Self::Fatal => "fatal (free the unit)",
+            Self::Error => "error (reset the instance or restore a saved state)",
+            Self::Fatal => "fatal (free the instance)",
         }
     }
 }
@@ -66,8 +66,8 @@ impl Call {
     }
 }
 
-/// Makes a row of the table. `columns` has a character for every [`State`] but the last, in their
-/// order; `-` means that the call is not allowed.
+/// Makes a row of the table of calls. `columns` has a character for every [`State`] but the last,
+/// in their order; `-` means that the call is not allowed.
 const fn call(name: &'static str, interface: Option<Interface>, columns: &str) -> Call {
     let columns = columns.as_bytes();
     assert!(columns.len() == State::Fatal as usize);

@@ -1,13 +1,13 @@
 //! Macro that turns models into the exported functions of a library.
 
-/// Exports the models as FMI 2.0 units of the calling library. Call it once per library.
+/// Exports the models as FMI 2.0 FMUs in the calling library. Call it once per library.
 ///
 /// The macro defines a module `fmi2` with the 44 functions of FMI 2.0 under their C names, and with
-/// - `fmu_model_descriptions() -> char*`: returns a NUL-terminated JSON list of the units'
+/// - `fmu_model_descriptions() -> char*`: returns a NUL-terminated JSON list of the FMUs'
 ///   descriptions, or null on failure. The memory belongs to the library and is given back by
 /// - `fmu_free_model_descriptions(char*)`: frees that list; it accepts null.
 ///
-/// The GUID given to `fmi2Instantiate` selects the unit. The crate needs
+/// The GUID given to `fmi2Instantiate` selects the FMU. The crate needs
 /// `crate-type = ["cdylib", …]` and a build script that calls `fmi2_build::link`. The digest of the
 /// library's sources, which that build script makes, is put into a section of its own.
 ///
@@ -24,11 +24,11 @@ macro_rules! export_fmus {
             //! C interface of this library, with the functions of FMI 2.0.
             use super::*;
             use $crate::interface as shell;
-            use $crate::types::{CEventInfo, Callbacks, Status};
+            use $crate::types::{CEventInfo, Callbacks, FmiStatus};
             use ::std::ffi::{c_char, c_int, c_void};
 
             const COUNT: usize = [$(stringify!($model)),+].len();
-            static EXPORTS: [$crate::Export; COUNT] = [$($crate::Export::of::<$model>()),+];
+            static EXPORTS: [$crate::Export; COUNT] = [$($crate::Export::new::<$model>()),+];
 
             // fmu-pack reads it from the file, for any platform.
             #[cfg_attr(target_vendor = "apple", unsafe(link_section = "__DATA,__fmi2_sources"))]
@@ -72,46 +72,46 @@ macro_rules! export_fmus {
             $crate::forward! {
                 fmu_free_model_descriptions(a: *mut c_char) -> ();
                 fmi2FreeInstance(c: *mut c_void) -> ();
-                fmi2SetDebugLogging(c: *mut c_void, on: c_int, n: usize, names: *const *const c_char) -> Status;
-                fmi2SetupExperiment(c: *mut c_void, td: c_int, t: f64, start: f64, sd: c_int, stop: f64) -> Status;
-                fmi2EnterInitializationMode(c: *mut c_void) -> Status;
-                fmi2ExitInitializationMode(c: *mut c_void) -> Status;
-                fmi2Terminate(c: *mut c_void) -> Status;
-                fmi2Reset(c: *mut c_void) -> Status;
-                fmi2GetReal(c: *mut c_void, vr: *const u32, n: usize, value: *mut f64) -> Status;
-                fmi2GetInteger(c: *mut c_void, vr: *const u32, n: usize, value: *mut c_int) -> Status;
-                fmi2GetBoolean(c: *mut c_void, vr: *const u32, n: usize, value: *mut c_int) -> Status;
-                fmi2GetString(c: *mut c_void, vr: *const u32, n: usize, value: *mut *const c_char) -> Status;
-                fmi2SetReal(c: *mut c_void, vr: *const u32, n: usize, value: *const f64) -> Status;
-                fmi2SetInteger(c: *mut c_void, vr: *const u32, n: usize, value: *const c_int) -> Status;
-                fmi2SetBoolean(c: *mut c_void, vr: *const u32, n: usize, value: *const c_int) -> Status;
-                fmi2SetString(c: *mut c_void, vr: *const u32, n: usize, value: *const *const c_char) -> Status;
-                fmi2GetFMUstate(c: *mut c_void, state: *mut *mut c_void) -> Status;
-                fmi2SetFMUstate(c: *mut c_void, state: *mut c_void) -> Status;
-                fmi2FreeFMUstate(c: *mut c_void, state: *mut *mut c_void) -> Status;
-                fmi2SerializedFMUstateSize(c: *mut c_void, state: *mut c_void, size: *mut usize) -> Status;
-                fmi2SerializeFMUstate(c: *mut c_void, state: *mut c_void, to: *mut c_char, size: usize) -> Status;
-                fmi2DeSerializeFMUstate(c: *mut c_void, from: *const c_char, size: usize, state: *mut *mut c_void) -> Status;
-                fmi2GetDirectionalDerivative(c: *mut c_void, unknown: *const u32, nu: usize, known: *const u32, nk: usize, seed: *const f64, value: *mut f64) -> Status;
-                fmi2EnterEventMode(c: *mut c_void) -> Status;
-                fmi2NewDiscreteStates(c: *mut c_void, info: *mut CEventInfo) -> Status;
-                fmi2EnterContinuousTimeMode(c: *mut c_void) -> Status;
-                fmi2CompletedIntegratorStep(c: *mut c_void, no_set_prior: c_int, event: *mut c_int, end: *mut c_int) -> Status;
-                fmi2SetTime(c: *mut c_void, time: f64) -> Status;
-                fmi2SetContinuousStates(c: *mut c_void, x: *const f64, n: usize) -> Status;
-                fmi2GetDerivatives(c: *mut c_void, derivatives: *mut f64, n: usize) -> Status;
-                fmi2GetEventIndicators(c: *mut c_void, indicators: *mut f64, n: usize) -> Status;
-                fmi2GetContinuousStates(c: *mut c_void, x: *mut f64, n: usize) -> Status;
-                fmi2GetNominalsOfContinuousStates(c: *mut c_void, nominals: *mut f64, n: usize) -> Status;
-                fmi2SetRealInputDerivatives(c: *mut c_void, vr: *const u32, n: usize, order: *const c_int, value: *const f64) -> Status;
-                fmi2GetRealOutputDerivatives(c: *mut c_void, vr: *const u32, n: usize, order: *const c_int, value: *mut f64) -> Status;
-                fmi2DoStep(c: *mut c_void, point: f64, size: f64, no_set_prior: c_int) -> Status;
-                fmi2CancelStep(c: *mut c_void) -> Status;
-                fmi2GetStatus(c: *mut c_void, kind: c_int, value: *mut Status) -> Status;
-                fmi2GetRealStatus(c: *mut c_void, kind: c_int, value: *mut f64) -> Status;
-                fmi2GetIntegerStatus(c: *mut c_void, kind: c_int, value: *mut c_int) -> Status;
-                fmi2GetBooleanStatus(c: *mut c_void, kind: c_int, value: *mut c_int) -> Status;
-                fmi2GetStringStatus(c: *mut c_void, kind: c_int, value: *mut *const c_char) -> Status;
+                fmi2SetDebugLogging(c: *mut c_void, on: c_int, n: usize, names: *const *const c_char) -> FmiStatus;
+                fmi2SetupExperiment(c: *mut c_void, td: c_int, t: f64, start: f64, sd: c_int, stop: f64) -> FmiStatus;
+                fmi2EnterInitializationMode(c: *mut c_void) -> FmiStatus;
+                fmi2ExitInitializationMode(c: *mut c_void) -> FmiStatus;
+                fmi2Terminate(c: *mut c_void) -> FmiStatus;
+                fmi2Reset(c: *mut c_void) -> FmiStatus;
+                fmi2GetReal(c: *mut c_void, vr: *const u32, n: usize, value: *mut f64) -> FmiStatus;
+                fmi2GetInteger(c: *mut c_void, vr: *const u32, n: usize, value: *mut c_int) -> FmiStatus;
+                fmi2GetBoolean(c: *mut c_void, vr: *const u32, n: usize, value: *mut c_int) -> FmiStatus;
+                fmi2GetString(c: *mut c_void, vr: *const u32, n: usize, value: *mut *const c_char) -> FmiStatus;
+                fmi2SetReal(c: *mut c_void, vr: *const u32, n: usize, value: *const f64) -> FmiStatus;
+                fmi2SetInteger(c: *mut c_void, vr: *const u32, n: usize, value: *const c_int) -> FmiStatus;
+                fmi2SetBoolean(c: *mut c_void, vr: *const u32, n: usize, value: *const c_int) -> FmiStatus;
+                fmi2SetString(c: *mut c_void, vr: *const u32, n: usize, value: *const *const c_char) -> FmiStatus;
+                fmi2GetFMUstate(c: *mut c_void, state: *mut *mut c_void) -> FmiStatus;
+                fmi2SetFMUstate(c: *mut c_void, state: *mut c_void) -> FmiStatus;
+                fmi2FreeFMUstate(c: *mut c_void, state: *mut *mut c_void) -> FmiStatus;
+                fmi2SerializedFMUstateSize(c: *mut c_void, state: *mut c_void, size: *mut usize) -> FmiStatus;
+                fmi2SerializeFMUstate(c: *mut c_void, state: *mut c_void, to: *mut c_char, size: usize) -> FmiStatus;
+                fmi2DeSerializeFMUstate(c: *mut c_void, from: *const c_char, size: usize, state: *mut *mut c_void) -> FmiStatus;
+                fmi2GetDirectionalDerivative(c: *mut c_void, unknowns: *const u32, nu: usize, knowns: *const u32, nk: usize, seed: *const f64, value: *mut f64) -> FmiStatus;
+                fmi2EnterEventMode(c: *mut c_void) -> FmiStatus;
+                fmi2NewDiscreteStates(c: *mut c_void, info: *mut CEventInfo) -> FmiStatus;
+                fmi2EnterContinuousTimeMode(c: *mut c_void) -> FmiStatus;
+                fmi2CompletedIntegratorStep(c: *mut c_void, no_set_prior: c_int, event: *mut c_int, end: *mut c_int) -> FmiStatus;
+                fmi2SetTime(c: *mut c_void, time: f64) -> FmiStatus;
+                fmi2SetContinuousStates(c: *mut c_void, x: *const f64, n: usize) -> FmiStatus;
+                fmi2GetDerivatives(c: *mut c_void, derivatives: *mut f64, n: usize) -> FmiStatus;
+                fmi2GetEventIndicators(c: *mut c_void, indicators: *mut f64, n: usize) -> FmiStatus;
+                fmi2GetContinuousStates(c: *mut c_void, x: *mut f64, n: usize) -> FmiStatus;
+                fmi2GetNominalsOfContinuousStates(c: *mut c_void, nominals: *mut f64, n: usize) -> FmiStatus;
+                fmi2SetRealInputDerivatives(c: *mut c_void, vr: *const u32, n: usize, order: *const c_int, value: *const f64) -> FmiStatus;
+                fmi2GetRealOutputDerivatives(c: *mut c_void, vr: *const u32, n: usize, order: *const c_int, value: *mut f64) -> FmiStatus;
+                fmi2DoStep(c: *mut c_void, point: f64, size: f64, no_set_prior: c_int) -> FmiStatus;
+                fmi2CancelStep(c: *mut c_void) -> FmiStatus;
+                fmi2GetStatus(c: *mut c_void, kind: c_int, value: *mut FmiStatus) -> FmiStatus;
+                fmi2GetRealStatus(c: *mut c_void, kind: c_int, value: *mut f64) -> FmiStatus;
+                fmi2GetIntegerStatus(c: *mut c_void, kind: c_int, value: *mut c_int) -> FmiStatus;
+                fmi2GetBooleanStatus(c: *mut c_void, kind: c_int, value: *mut c_int) -> FmiStatus;
+                fmi2GetStringStatus(c: *mut c_void, kind: c_int, value: *mut *const c_char) -> FmiStatus;
             }
         }
     };

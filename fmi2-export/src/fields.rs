@@ -1,4 +1,5 @@
-//! Errors of a model's crate name fields, and the user of a unit is told variables.
+//! The errors of a model's crate name fields; this module replaces them by the variables that the
+//! user of an FMU sees.
 
 /// Pairs of the path of a field and the name of its variable, or of a group of them. A pair also
 /// stands for what lies below the field. `[]` in both stands for any index, which a field counts
@@ -34,8 +35,8 @@ pub fn by_variable(error: &impl ToString, fields: &Fields) -> String {
             (rest.is_empty() || rest.starts_with('.')).then(|| format!("{variable}{rest}"))
         };
         // The longest path comes closest to the field.
-        let found = fields.iter().filter_map(|pair| Some((pair.0.len(), below(pair)?)));
-        found.max().map_or_else(|| field.to_owned(), |(_, name)| name)
+        let names = fields.iter().filter_map(|pair| Some((pair.0.len(), below(pair)?)));
+        names.max().map_or_else(|| field.to_owned(), |(_, name)| name)
     };
     let error = error.to_string();
     let parts = error.split('`').enumerate();

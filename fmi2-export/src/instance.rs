@@ -1,15 +1,17 @@
-//! One instance of a unit: the part of the shell that handles no pointers.
+//! One instance of an FMU: the part of the shell that handles no pointers.
 
 use crate::call::{Call, Outcome, State, error};
 use crate::logger::{Category, Logger};
 use crate::model::{Context, EventInfo, Failure, LastEvent};
+use crate::model_instance::{
+    Export, Extrapolation, MAX_INPUT_DERIVATIVE_ORDER, ModelInstance, Progress,
+};
 use crate::pointer::Room;
 use crate::saved;
 use crate::scalar::Scalar;
-use crate::types::{Interface, Status};
-use crate::unit::{Export, Extrapolation, FmuUnit, MAX_INPUT_DERIVATIVE_ORDER, Progress};
+use crate::types::{FmiStatus, Interface};
 use model_description::ModelDescription;
-use model_description::variable::{Causality, Kind, Variability, Variable};
+use model_description::variable::{Causality, Variability, Variable, VariableKind};
 use std::any::Any;
 use std::ffi::CString;
 use std::mem;
@@ -17,8 +19,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Largest distance of the communication point from the unit's time, relative to both and to the
-/// step. It allows for importers that accumulate time.
+/// Largest distance of the communication point from the instance's time, relative to both and to
+/// the step. It allows for importers that accumulate time.
 const TIME_TOLERANCE: f64 = 1e-9;
 /// Upper bound of that distance (s), unless rounding is larger.
 const LONGEST_TOLERANCE: f64 = 1e-4;
@@ -28,9 +30,9 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// importers that accumulate time overshoot it by about 1e-9.
 const STOP_TOLERANCE: f64 = 1e-6;
 
-/// One instance of a unit with everything that the shell keeps for it.
+/// One instance of an FMU with everything that the shell keeps for it.
 pub(crate) struct Instance {
-    unit: Box<dyn FmuUnit>,
+    model: Box<dyn ModelInstance>,
     description: Arc<ModelDescription>,
     /// Value references of each state and its derivative.
     states: Vec<(usize, usize)>,
@@ -43,7 +45,7 @@ pub(crate) struct Instance {
     progress: Progress,
     /// Whether calculated variables are older than the state, the inputs or the time.
     stale: bool,
-    last_step: Status,
+    last_step: FmiStatus,
     /// Saved states handed out by fmi2GetFMUstate; the importer holds their addresses.
     #[expect(clippy::vec_box, reason = "the address is the importer's handle and must not move")]
     saved: Vec<Box<Saved>>,
@@ -54,7 +56,7 @@ pub(crate) struct Instance {
 /// A saved state. It is never empty, so every saved state has its own address.
 pub(crate) struct Saved(Box<[u8]>);
 
-/// Arguments of fmi2Instantiate, apart from the unit.
+/// Arguments of fmi2Instantiate, apart from the choice of the FMU.
 pub(crate) struct Setting {
     pub(crate) guid: String,
     pub(crate) interface: Interface,
@@ -62,29 +64,29 @@ pub(crate) struct Setting {
     pub(crate) resources: Option<PathBuf>,
 }
 
-/// Access to the variables of a unit by the type of their value.
+/// Access to the variables of an instance by the type of their value.
 pub(crate) trait Typed: Scalar {
     /// Returns the result of `look` for the variable's value, or `None` if the variable has another
     /// type.
     fn look<R>(
-        unit: &mut dyn FmuUnit,
+        model: &mut dyn ModelInstance,
         reference: usize,
         look: impl FnOnce(&Self) -> R,
     ) -> Option<R>;
     /// Sets the variable, which must have this type.
-    fn put(self, unit: &mut dyn FmuUnit, reference: usize);
+    fn put(self, model: &mut dyn ModelInstance, reference: usize);
 }
 
 impl Typed for f64 {
     fn look<R>(
-        unit: &mut dyn FmuUnit,
+        model: &mut dyn ModelInstance,
         reference: usize,
         look: impl FnOnce(&Self) -> R,
     ) -> Option<R> {
-        unit.real(reference).map(|value| look(value))
+        model.real(reference).map(|value| look(value))
     }
-    fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
-        if let Some(field) = unit.real(reference) {
+    fn put(self, model: &mut dyn ModelInstance, reference: usize) {
+        if let Some(field) = model.real(reference) {
             *field = self;
         }
     }
@@ -92,27 +94,27 @@ impl Typed for f64 {
 
 impl Typed for i32 {
     fn look<R>(
-        unit: &mut dyn FmuUnit,
+        model: &mut dyn ModelInstance,
         reference: usize,
         look: impl FnOnce(&Self) -> R,
     ) -> Option<R> {
-        unit.integer(reference).map(|value| look(&value))
+        model.integer(reference).map(|value| look(&value))
     }
-    fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
-        unit.set_integer(reference, self);
+    fn put(self, model: &mut dyn ModelInstance, reference: usize) {
+        model.set_integer(reference, self);
     }
 }
 
 impl Typed for bool {
     fn look<R>(
-        unit: &mut dyn FmuUnit,
+        model: &mut dyn ModelInstance,
         reference: usize,
         look: impl FnOnce(&Self) -> R,
     ) -> Option<R> {
-        unit.boolean(reference).map(|value| look(value))
+        model.boolean(reference).map(|value| look(value))
     }
-    fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
-        if let Some(field) = unit.boolean(reference) {
+    fn put(self, model: &mut dyn ModelInstance, reference: usize) {
+        if let Some(field) = model.boolean(reference) {
             *field = self;
         }
     }
@@ -120,14 +122,14 @@ impl Typed for bool {
 
 impl Typed for String {
     fn look<R>(
-        unit: &mut dyn FmuUnit,
+        model: &mut dyn ModelInstance,
         reference: usize,
         look: impl FnOnce(&Self) -> R,
     ) -> Option<R> {
-        unit.string(reference).map(|value| look(value))
+        model.string(reference).map(|value| look(value))
     }
-    fn put(self, unit: &mut dyn FmuUnit, reference: usize) {
-        if let Some(field) = unit.string(reference) {
+    fn put(self, model: &mut dyn ModelInstance, reference: usize) {
+        if let Some(field) = model.string(reference) {
             *field = self;
         }
     }
@@ -144,7 +146,7 @@ impl Instance {
         let mut progress = Progress::default();
         progress.extrapolations.reserve(description.variables.len());
         Self {
-            unit: (export.create)(),
+            model: (export.create)(),
             states,
             description,
             guid,
@@ -153,7 +155,7 @@ impl Instance {
             resources,
             progress,
             stale: true,
-            last_step: Status::Ok,
+            last_step: FmiStatus::Ok,
             saved: Vec::new(),
             strings: Vec::new(),
         }
@@ -161,46 +163,50 @@ impl Instance {
 
     /// Runs the body of a call: it refuses a call in a wrong state, reports failures, and stops
     /// every panic here.
-    pub(crate) fn run(&mut self, call: &Call, body: impl FnOnce(&mut Self) -> Outcome) -> Status {
+    pub(crate) fn run(
+        &mut self,
+        call: &Call,
+        body: impl FnOnce(&mut Self) -> Outcome,
+    ) -> FmiStatus {
         if self.progress.state == State::Fatal {
-            return Status::Fatal;
+            return FmiStatus::Fatal;
         }
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             self.permit(call)?;
             body(self)
         }));
         match outcome {
-            Ok(Ok(())) => Status::Ok,
+            Ok(Ok(())) => FmiStatus::Ok,
             Ok(Err(Failure::Discard(problem))) => {
                 self.logger.log(Category::Discard, &format!("{}: {problem}", call.name));
-                Status::Discard
+                FmiStatus::Discard
             }
             Ok(Err(Failure::Error(problem))) => {
                 if !call.leaves_state {
                     self.progress.state = State::Error;
                 }
                 self.logger.log(Category::Error, &format!("{}: {problem}", call.name));
-                Status::Error
+                FmiStatus::Error
             }
             Err(panic) => {
                 self.progress.state = State::Fatal;
                 let text =
-                    format!("{}: defect in the unit: {}", call.name, panic_text(panic.as_ref()));
+                    format!("{}: defect in the FMU: {}", call.name, panic_text(panic.as_ref()));
                 self.logger.log(Category::Fatal, &text);
-                // Dropping the panic's payload could run code of the unit again.
+                // Dropping the panic's payload could run code of the model again.
                 mem::forget(panic);
-                Status::Fatal
+                FmiStatus::Fatal
             }
         }
     }
 
     fn permit(&self, call: &Call) -> Outcome {
         if call.interface.is_some_and(|interface| interface != self.interface) {
-            let own = match self.interface {
+            let interface = match self.interface {
                 Interface::ModelExchange => "model exchange",
                 Interface::CoSimulation => "co-simulation",
             };
-            return error(format!("not available, as the unit was instantiated for {own}"));
+            return error(format!("not available, because this instance was made for {interface}"));
         }
         if call.allowed_in(self.progress.state) {
             return Ok(());
@@ -265,12 +271,12 @@ impl Instance {
     /// Brings the instance back to its state after fmi2Instantiate, apart from the logging and the
     /// saved states.
     pub(crate) fn reset(&mut self) {
-        self.unit.reset(self.progress.state == State::Error);
+        self.model.reset(self.progress.state == State::Error);
         let extrapolations = mem::take(&mut self.progress.extrapolations);
         self.progress = Progress { extrapolations, ..Progress::default() };
         self.progress.extrapolations.clear();
         self.stale = true;
-        self.last_step = Status::Ok;
+        self.last_step = FmiStatus::Ok;
         self.logger.log(Category::Events, "reset");
     }
 
@@ -283,7 +289,7 @@ impl Instance {
                 stop_time: self.progress.stop_time,
                 resources: self.resources.as_deref(),
             };
-            self.unit.initialize(&context)?;
+            self.model.initialize(&context)?;
             self.progress.initialized = true;
             self.stale = true;
         }
@@ -304,7 +310,7 @@ impl Instance {
                 Interface::ModelExchange => LastEvent::InputSet,
                 Interface::CoSimulation => self.progress.last_event,
             };
-            self.unit.calculate(self.progress.time, last)?;
+            self.model.calculate(self.progress.time, last)?;
             self.stale = false;
         }
         Ok(())
@@ -336,7 +342,7 @@ impl Instance {
     }
 
     fn expect_type<T: Typed>(&mut self, reference: u32) -> Outcome {
-        T::look(self.unit.as_mut(), reference as usize, |_| ())
+        T::look(self.model.as_mut(), reference as usize, |_| ())
             .ok_or_else(|| self.misfit::<T>(reference))
     }
 
@@ -354,7 +360,7 @@ impl Instance {
         }
         for (i, &reference) in references.iter().enumerate() {
             let variable = self.description.variables.get(reference as usize);
-            let shown = T::look(self.unit.as_mut(), reference as usize, |value| {
+            let shown = T::look(self.model.as_mut(), reference as usize, |value| {
                 let problem = variable.and_then(|variable| value.unpresentable(&variable.kind));
                 if problem.is_none() {
                     sink(i, value);
@@ -406,9 +412,9 @@ impl Instance {
         for (i, &reference) in references.iter().enumerate() {
             let value = value(i).map_err(Failure::Error)?;
             let same =
-                T::look(self.unit.as_mut(), reference as usize, |before| before.same(&value));
+                T::look(self.model.as_mut(), reference as usize, |before| before.same(&value));
             if same != Some(true) {
-                value.put(self.unit.as_mut(), reference as usize);
+                value.put(self.model.as_mut(), reference as usize);
                 self.stale = true;
                 if self.description.variables[reference as usize].causality == Causality::Parameter
                 {
@@ -434,7 +440,7 @@ impl Instance {
                 ))
             }
             Causality::Parameter | Causality::Input => Ok(()),
-            _ => error(format!("'{name}' is calculated by the unit and cannot be set")),
+            _ => error(format!("'{name}' is calculated by the FMU and cannot be set")),
         }
     }
 
@@ -454,7 +460,7 @@ impl Instance {
     /// Returns a handle of the present state. With `reuse`, the state behind that handle is
     /// overwritten.
     pub(crate) fn save(&mut self, reuse: Option<*const Saved>) -> Result<*const Saved, Failure> {
-        let payload = self.unit.save(&self.progress)?;
+        let payload = self.model.save(&self.progress)?;
         let bytes = saved::wrap(&self.guid, self.interface, &payload);
         match reuse {
             Some(handle) => {
@@ -467,15 +473,15 @@ impl Instance {
     }
 
     fn keep(&mut self, bytes: Box<[u8]>) -> *const Saved {
-        let kept = Box::new(Saved(bytes));
-        let handle = &raw const *kept;
-        self.saved.push(kept);
+        let saved = Box::new(Saved(bytes));
+        let handle = &raw const *saved;
+        self.saved.push(saved);
         handle
     }
 
     fn find(&self, handle: *const Saved) -> Result<usize, Failure> {
-        let found = self.saved.iter().position(|saved| std::ptr::eq(&raw const **saved, handle));
-        found.map_or_else(
+        let position = self.saved.iter().position(|saved| std::ptr::eq(&raw const **saved, handle));
+        position.map_or_else(
             || {
                 error(
                     "this FMUstate was not made by this instance, or was freed; \
@@ -490,10 +496,10 @@ impl Instance {
         let position = self.find(handle)?;
         let payload = saved::unwrap(&self.guid, self.interface, &self.saved[position].0)
             .map_err(Failure::Error)?;
-        self.progress = self.unit.restore(payload, self.interface)?;
+        self.progress = self.model.restore(payload, self.interface)?;
         self.progress.extrapolations.reserve(self.description.variables.len());
         self.stale = true;
-        self.last_step = Status::Ok;
+        self.last_step = FmiStatus::Ok;
         self.logger.log(Category::Events, "state restored");
         Ok(())
     }
@@ -541,14 +547,16 @@ impl Instance {
         }
         for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
             let reference = reference as usize;
-            let all = &mut self.progress.extrapolations;
-            let position =
-                all.iter().position(|input| input.reference == reference).unwrap_or_else(|| {
+            let extrapolations = &mut self.progress.extrapolations;
+            let position = extrapolations
+                .iter()
+                .position(|input| input.reference == reference)
+                .unwrap_or_else(|| {
                     let derivatives = [0.0; MAX_INPUT_DERIVATIVE_ORDER];
-                    all.push(Extrapolation { reference, base: 0.0, derivatives });
-                    all.len() - 1
+                    extrapolations.push(Extrapolation { reference, base: 0.0, derivatives });
+                    extrapolations.len() - 1
                 });
-            all[position].derivatives[order as usize - 1] = value;
+            extrapolations[position].derivatives[order as usize - 1] = value;
         }
         Ok(())
     }
@@ -563,7 +571,9 @@ impl Instance {
         let largest = from.abs().max(point.abs()).max(size);
         let tolerance = (TIME_TOLERANCE * largest).min(LONGEST_TOLERANCE).max(ROUNDING * largest);
         if (point - from).abs() > tolerance {
-            return error(format!("communication point {point} s, but the unit is at {from} s"));
+            return error(format!(
+                "communication point {point} s, but the instance is at {from} s"
+            ));
         }
         let to = (point + size).max(from);
         if let Some(stop) = self.progress.stop_time
@@ -574,11 +584,11 @@ impl Instance {
             ));
         }
         for input in &mut self.progress.extrapolations {
-            input.base = *self.unit.real(input.reference).expect("checked when it was set");
+            input.base = *self.model.real(input.reference).expect("checked when it was set");
         }
         let logger = &self.logger;
         let mut log = |text: &str| logger.log(Category::Warning, text);
-        match self.unit.step(from, to, &self.progress.extrapolations, &mut log) {
+        match self.model.step(from, to, &self.progress.extrapolations, &mut log) {
             Ok(()) => {
                 if to > from {
                     self.progress.last_event = LastEvent::Step;
@@ -586,13 +596,13 @@ impl Instance {
                 self.progress.time = to;
                 self.progress.extrapolations.clear();
                 self.stale = true;
-                self.last_step = Status::Ok;
+                self.last_step = FmiStatus::Ok;
                 Ok(())
             }
             Err(failure) => {
                 self.last_step = match failure {
-                    Failure::Discard(_) => Status::Discard,
-                    Failure::Error(_) => Status::Error,
+                    Failure::Discard(_) => FmiStatus::Discard,
+                    Failure::Error(_) => FmiStatus::Error,
                 };
                 self.progress.state = State::StepFailed;
                 self.stale = true;
@@ -601,7 +611,7 @@ impl Instance {
         }
     }
 
-    pub(crate) fn last_step(&self) -> Status {
+    pub(crate) fn last_step(&self) -> FmiStatus {
         self.last_step
     }
 
@@ -629,16 +639,16 @@ impl Instance {
     }
 
     pub(crate) fn new_discrete_states(&mut self) -> Result<EventInfo, Failure> {
-        let info = self.unit.new_discrete_states(self.progress.time)?;
+        let info = self.model.new_discrete_states(self.progress.time)?;
         self.stale = true;
         Ok(info)
     }
 
-    fn expect_length(what: &str, given: usize, wanted: usize) -> Outcome {
-        if given == wanted {
+    fn expect_length(what: &str, given: usize, expected: usize) -> Outcome {
+        if given == expected {
             return Ok(());
         }
-        error(format!("room for {given} {what}, but the unit has {wanted}"))
+        error(format!("room for {given} {what}, but the FMU has {expected}"))
     }
 
     pub(crate) fn set_continuous_states(&mut self, states: &[f64]) -> Outcome {
@@ -651,7 +661,7 @@ impl Instance {
                 states[i]
             )));
         }
-        self.unit.set_continuous_states(states);
+        self.model.set_continuous_states(states);
         self.stale = true;
         Ok(())
     }
@@ -661,7 +671,7 @@ impl Instance {
         if self.progress.state == State::InitializationMode {
             self.initialize()?;
         }
-        self.unit.continuous_states(states.zeroed());
+        self.model.continuous_states(states.zeroed());
         Ok(())
     }
 
@@ -669,7 +679,7 @@ impl Instance {
         Self::expect_length("derivatives", derivatives.len(), self.states.len())?;
         self.refresh()?;
         derivatives.fill(self.states.iter().map(|&(_, reference)| {
-            *self.unit.real(reference).expect("only a Real is a derivative")
+            *self.model.real(reference).expect("only a Real is a derivative")
         }));
         Ok(())
     }
@@ -681,7 +691,7 @@ impl Instance {
             self.description.event_indicators,
         )?;
         self.refresh()?;
-        self.unit.event_indicators(indicators.zeroed());
+        self.model.event_indicators(indicators.zeroed());
         Ok(())
     }
 
@@ -689,7 +699,7 @@ impl Instance {
         Self::expect_length("nominal values", nominals.len(), self.states.len())?;
         let variables = &self.description.variables;
         nominals.fill(self.states.iter().map(|&(state, _)| match variables[state].kind {
-            Kind::Real { nominal: Some(nominal), .. } => nominal,
+            VariableKind::Real { nominal: Some(nominal), .. } => nominal,
             _ => 1.0,
         }));
         Ok(())
@@ -703,14 +713,14 @@ impl Instance {
         mut derivative: Room<f64>,
     ) -> Outcome {
         if self.states.is_empty() {
-            return error("this unit offers no directional derivatives");
+            return error("this FMU provides no directional derivatives");
         }
         for &reference in unknowns {
             self.expect_type::<f64>(reference)?;
             let variable = self.variable(reference)?;
             if !variable.is_calculated() {
                 return error(format!(
-                    "'{}' is set from outside, so it has no derivative",
+                    "'{}' is a parameter or an input, so it has no derivative",
                     variable.name
                 ));
             }
@@ -727,8 +737,9 @@ impl Instance {
         let time = self.progress.time;
         for (i, &unknown) in unknowns.iter().enumerate() {
             let mut sum = 0.0;
-            for (&known, seed) in knowns.iter().zip(seed) {
-                sum += self.unit.partial_derivative(time, unknown as usize, known as usize)? * seed;
+            for (&known_variable, seed) in knowns.iter().zip(seed) {
+                let (unknown, known_variable) = (unknown as usize, known_variable as usize);
+                sum += self.model.partial_derivative(time, unknown, known_variable)? * seed;
             }
             derivative.put(i, sum);
         }

@@ -16,13 +16,13 @@ use crate::call::{Call, Outcome, error, table};
 use crate::instance::{Instance, Saved, Setting};
 use crate::logger::{Category, Logger};
 use crate::model::Failure;
-use crate::pointer::{apart, check, not_null, put, room, slice, text, wanted};
+use crate::model_instance::{Described, Export};
+use crate::pointer::{apart, check, not_null, put, requested, room, slice, text};
 use crate::resource;
 use crate::types::{
-    CEventInfo, Callbacks, DO_STEP_STATUS, Interface, LAST_SUCCESSFUL_TIME, PENDING_STATUS, Status,
-    TERMINATED,
+    CEventInfo, Callbacks, DO_STEP_STATUS, FmiStatus, Interface, LAST_SUCCESSFUL_TIME,
+    PENDING_STATUS, TERMINATED,
 };
-use crate::unit::{Described, Export};
 use std::cell::UnsafeCell;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -33,8 +33,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 type Component = *mut c_void;
 
 /// Target of `fmi2Component`: an instance that only one call at a time may use. The standard makes
-/// the importer responsible for that, but a logger that calls its unit back, or a second thread,
-/// must not find an instance that is being changed.
+/// the importer responsible for that, but a logger that calls its instance back, or a second
+/// thread, must not find an instance that is being changed.
 struct Shared {
     busy: AtomicBool,
     instance: UnsafeCell<Instance>,
@@ -66,13 +66,13 @@ unsafe fn run(
     component: Component,
     call: &Call,
     body: impl FnOnce(&mut Instance) -> Outcome,
-) -> Status {
+) -> FmiStatus {
     // SAFETY: if not null, `component` came from fmi2Instantiate, which leaked a `Box<Shared>`, and
     // was not freed. Only a shared reference is made, so other calls may hold one too.
     let Some(shared) = (unsafe { component.cast::<Shared>().as_ref() }) else {
-        return Status::Error;
+        return FmiStatus::Error;
     };
-    let Some(_busy) = Busy::begin(&shared.busy) else { return Status::Error };
+    let Some(_busy) = Busy::begin(&shared.busy) else { return FmiStatus::Error };
     // SAFETY: `_busy` holds the flag, so no other call has a reference to the instance. The flag is
     // cleared when `_busy` is dropped, after the last use of this reference.
     let instance = unsafe { &mut *shared.instance.get() };
@@ -143,10 +143,10 @@ pub unsafe fn fmi2Instantiate(
                 let list: Vec<_> = exports.iter().map(Export::described).collect();
                 let list: Vec<_> = list
                     .iter()
-                    .map(|unit| format!("{} {}", unit.description.name, unit.guid))
+                    .map(|fmu| format!("{} {}", fmu.description.name, fmu.guid))
                     .collect();
                 format!(
-                    "no unit with GUID '{guid}' in this library, which holds {}: pack it again",
+                    "this library has no FMU with GUID '{guid}' but {}: pack the archive again",
                     list.join(", ")
                 )
             })?;
@@ -172,7 +172,7 @@ pub unsafe fn fmi2Instantiate(
             null_mut()
         }
         Err(panic) => {
-            logger().log(Category::Fatal, "fmi2Instantiate: defect in the unit");
+            logger().log(Category::Fatal, "fmi2Instantiate: defect in the FMU");
             std::mem::forget(panic);
             null_mut()
         }
@@ -180,7 +180,7 @@ pub unsafe fn fmi2Instantiate(
 }
 
 /// Frees the instance. It does nothing while another call uses the instance: a logger cannot free
-/// the unit that calls it.
+/// the instance that calls it.
 pub unsafe fn fmi2FreeInstance(component: Component) {
     // SAFETY: if not null, `component` came from fmi2Instantiate, which leaked a `Box<Shared>`, and
     // was not freed. Only a shared reference is made, so other calls may hold one too.
@@ -201,7 +201,7 @@ pub unsafe fn fmi2SetDebugLogging(
     logging_on: c_int,
     n_categories: usize,
     categories: *const *const c_char,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for the array, as `slice` requires.
         let categories = unsafe { slice("categories", categories, n_categories) }?;
@@ -227,7 +227,7 @@ pub unsafe fn fmi2SetupExperiment(
     start_time: f64,
     stop_time_defined: c_int,
     stop_time: f64,
-) -> Status {
+) -> FmiStatus {
     let tolerance = (tolerance_defined != 0).then_some(tolerance);
     let stop = (stop_time_defined != 0).then_some(stop_time);
     let body = |instance: &mut Instance| instance.setup_experiment(start_time, stop, tolerance);
@@ -235,7 +235,7 @@ pub unsafe fn fmi2SetupExperiment(
     unsafe { run(component, &table::SETUP_EXPERIMENT, body) }
 }
 
-pub unsafe fn fmi2EnterInitializationMode(component: Component) -> Status {
+pub unsafe fn fmi2EnterInitializationMode(component: Component) -> FmiStatus {
     let body = |instance: &mut Instance| {
         instance.enter_initialization_mode();
         Ok(())
@@ -244,12 +244,12 @@ pub unsafe fn fmi2EnterInitializationMode(component: Component) -> Status {
     unsafe { run(component, &table::ENTER_INITIALIZATION_MODE, body) }
 }
 
-pub unsafe fn fmi2ExitInitializationMode(component: Component) -> Status {
+pub unsafe fn fmi2ExitInitializationMode(component: Component) -> FmiStatus {
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::EXIT_INITIALIZATION_MODE, Instance::exit_initialization_mode) }
 }
 
-pub unsafe fn fmi2Terminate(component: Component) -> Status {
+pub unsafe fn fmi2Terminate(component: Component) -> FmiStatus {
     let body = |instance: &mut Instance| {
         instance.terminate();
         Ok(())
@@ -258,7 +258,7 @@ pub unsafe fn fmi2Terminate(component: Component) -> Status {
     unsafe { run(component, &table::TERMINATE, body) }
 }
 
-pub unsafe fn fmi2Reset(component: Component) -> Status {
+pub unsafe fn fmi2Reset(component: Component) -> FmiStatus {
     let body = |instance: &mut Instance| {
         instance.reset();
         Ok(())
@@ -274,10 +274,10 @@ pub unsafe fn fmi2GetReal(
     vr: *const u32,
     n: usize,
     value: *mut f64,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
-        // SAFETY: the importer vouches for both arrays, as `wanted` requires.
-        let (references, mut values) = unsafe { wanted(vr, n, value) }?;
+        // SAFETY: the importer vouches for both arrays, as `requested` requires.
+        let (references, mut values) = unsafe { requested(vr, n, value) }?;
         instance.get::<f64>(references, |i, value| values.put(i, *value))
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
@@ -289,10 +289,10 @@ pub unsafe fn fmi2GetInteger(
     vr: *const u32,
     n: usize,
     value: *mut c_int,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
-        // SAFETY: the importer vouches for both arrays, as `wanted` requires.
-        let (references, mut values) = unsafe { wanted(vr, n, value) }?;
+        // SAFETY: the importer vouches for both arrays, as `requested` requires.
+        let (references, mut values) = unsafe { requested(vr, n, value) }?;
         instance.get::<i32>(references, |i, value| values.put(i, *value))
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
@@ -304,10 +304,10 @@ pub unsafe fn fmi2GetBoolean(
     vr: *const u32,
     n: usize,
     value: *mut c_int,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
-        // SAFETY: the importer vouches for both arrays, as `wanted` requires.
-        let (references, mut values) = unsafe { wanted(vr, n, value) }?;
+        // SAFETY: the importer vouches for both arrays, as `requested` requires.
+        let (references, mut values) = unsafe { requested(vr, n, value) }?;
         instance.get::<bool>(references, |i, value| values.put(i, c_int::from(*value)))
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
@@ -320,10 +320,10 @@ pub unsafe fn fmi2GetString(
     vr: *const u32,
     n: usize,
     value: *mut *const c_char,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
-        // SAFETY: the importer vouches for both arrays, as `wanted` requires.
-        let (references, mut values) = unsafe { wanted(vr, n, value) }?;
+        // SAFETY: the importer vouches for both arrays, as `requested` requires.
+        let (references, mut values) = unsafe { requested(vr, n, value) }?;
         for (i, text) in instance.get_strings(references)?.iter().enumerate() {
             values.put(i, text.as_ptr());
         }
@@ -338,7 +338,7 @@ pub unsafe fn fmi2SetReal(
     vr: *const u32,
     n: usize,
     value: *const f64,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
@@ -353,7 +353,7 @@ pub unsafe fn fmi2SetInteger(
     vr: *const u32,
     n: usize,
     value: *const c_int,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
@@ -368,7 +368,7 @@ pub unsafe fn fmi2SetBoolean(
     vr: *const u32,
     n: usize,
     value: *const c_int,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
@@ -387,7 +387,7 @@ pub unsafe fn fmi2SetString(
     vr: *const u32,
     n: usize,
     value: *const *const c_char,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, values) = unsafe { (slice("vr", vr, n)?, slice("value", value, n)?) };
@@ -401,7 +401,7 @@ pub unsafe fn fmi2SetString(
 // Saved states. Their handles are addresses that are compared and never dereferenced.
 
 /// Saves the present state. It overwrites the state behind `*state` if `*state` is not null.
-pub unsafe fn fmi2GetFMUstate(component: Component, state: *mut *mut c_void) -> Status {
+pub unsafe fn fmi2GetFMUstate(component: Component, state: *mut *mut c_void) -> FmiStatus {
     let body = |instance: &mut Instance| {
         check("FMUstate", state, 1)?;
         // SAFETY: `check` refused null and wrong alignment, and the standard demands that `*state`
@@ -416,7 +416,7 @@ pub unsafe fn fmi2GetFMUstate(component: Component, state: *mut *mut c_void) -> 
     unsafe { run(component, &table::GET_FMU_STATE, body) }
 }
 
-pub unsafe fn fmi2SetFMUstate(component: Component, state: *mut c_void) -> Status {
+pub unsafe fn fmi2SetFMUstate(component: Component, state: *mut c_void) -> FmiStatus {
     let body = |instance: &mut Instance| {
         not_null("FMUstate", state)?;
         instance.restore(state.cast())
@@ -427,7 +427,7 @@ pub unsafe fn fmi2SetFMUstate(component: Component, state: *mut c_void) -> Statu
 
 /// Frees the saved state and sets `*state` to null. It does nothing if `*state` or `state` is null
 /// already.
-pub unsafe fn fmi2FreeFMUstate(component: Component, state: *mut *mut c_void) -> Status {
+pub unsafe fn fmi2FreeFMUstate(component: Component, state: *mut *mut c_void) -> FmiStatus {
     let body = |instance: &mut Instance| {
         if state.is_null() {
             return Ok(());
@@ -451,7 +451,7 @@ pub unsafe fn fmi2SerializedFMUstateSize(
     component: Component,
     state: *mut c_void,
     size: *mut usize,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         not_null("FMUstate", state)?;
         let length = instance.serialized(state.cast())?.len();
@@ -467,7 +467,7 @@ pub unsafe fn fmi2SerializeFMUstate(
     state: *mut c_void,
     serialized: *mut c_char,
     size: usize,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         not_null("FMUstate", state)?;
         let bytes = instance.serialized(state.cast())?;
@@ -489,7 +489,7 @@ pub unsafe fn fmi2DeSerializeFMUstate(
     serialized: *const c_char,
     size: usize,
     state: *mut *mut c_void,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         check("FMUstate", state, 1)?;
         // SAFETY: the importer vouches for the array, as `slice` requires.
@@ -504,30 +504,30 @@ pub unsafe fn fmi2DeSerializeFMUstate(
 
 pub unsafe fn fmi2GetDirectionalDerivative(
     component: Component,
-    unknown: *const u32,
+    unknowns: *const u32,
     n_unknown: usize,
-    known: *const u32,
+    knowns: *const u32,
     n_known: usize,
     dv_known: *const f64,
     dv_unknown: *mut f64,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for the array, as `slice` requires.
-        let (unknowns, knowns, seed) = unsafe {
+        let (unknown_references, known_references, seed) = unsafe {
             (
-                slice("vUnknown_ref", unknown, n_unknown)?,
-                slice("vKnown_ref", known, n_known)?,
+                slice("vUnknown_ref", unknowns, n_unknown)?,
+                slice("vKnown_ref", knowns, n_known)?,
                 slice("dvKnown", dv_known, n_known)?,
             )
         };
         let written = ("dvUnknown", dv_unknown, n_unknown);
         apart(("dvKnown", dv_known, n_known), written)?;
-        apart(("vUnknown_ref", unknown, n_unknown), written)?;
-        apart(("vKnown_ref", known, n_known), written)?;
+        apart(("vUnknown_ref", unknowns, n_unknown), written)?;
+        apart(("vKnown_ref", knowns, n_known), written)?;
         // SAFETY: the importer vouches for the array, as `room` requires. It overlaps none of the
         // others.
         let derivative = unsafe { room("dvUnknown", dv_unknown, n_unknown) }?;
-        instance.directional_derivative(unknowns, knowns, seed, derivative)
+        instance.directional_derivative(unknown_references, known_references, seed, derivative)
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::DIRECTIONAL_DERIVATIVE, body) }
@@ -535,7 +535,7 @@ pub unsafe fn fmi2GetDirectionalDerivative(
 
 // Model exchange
 
-pub unsafe fn fmi2EnterEventMode(component: Component) -> Status {
+pub unsafe fn fmi2EnterEventMode(component: Component) -> FmiStatus {
     let body = |instance: &mut Instance| {
         instance.enter_event_mode();
         Ok(())
@@ -544,7 +544,10 @@ pub unsafe fn fmi2EnterEventMode(component: Component) -> Status {
     unsafe { run(component, &table::ENTER_EVENT_MODE, body) }
 }
 
-pub unsafe fn fmi2NewDiscreteStates(component: Component, event_info: *mut CEventInfo) -> Status {
+pub unsafe fn fmi2NewDiscreteStates(
+    component: Component,
+    event_info: *mut CEventInfo,
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         check("fmi2eventInfo", event_info, 1)?;
         let event = instance.new_discrete_states()?;
@@ -561,7 +564,7 @@ pub unsafe fn fmi2NewDiscreteStates(component: Component, event_info: *mut CEven
     unsafe { run(component, &table::NEW_DISCRETE_STATES, body) }
 }
 
-pub unsafe fn fmi2EnterContinuousTimeMode(component: Component) -> Status {
+pub unsafe fn fmi2EnterContinuousTimeMode(component: Component) -> FmiStatus {
     let body = |instance: &mut Instance| {
         instance.enter_continuous_time_mode();
         Ok(())
@@ -570,14 +573,14 @@ pub unsafe fn fmi2EnterContinuousTimeMode(component: Component) -> Status {
     unsafe { run(component, &table::ENTER_CONTINUOUS_TIME, body) }
 }
 
-/// Completes an integrator step. The units find their events by time or indicator, so a completed
+/// Completes an integrator step. The FMUs detect their events by time or indicator, so a completed
 /// step never asks for event mode.
 pub unsafe fn fmi2CompletedIntegratorStep(
     component: Component,
     _no_set_state_prior: c_int,
     enter_event_mode: *mut c_int,
     terminate: *mut c_int,
-) -> Status {
+) -> FmiStatus {
     // SAFETY: the importer vouches for the result pointer, as `put` requires.
     let body = |_: &mut Instance| unsafe {
         put("enterEventMode", enter_event_mode, 0)?;
@@ -587,12 +590,12 @@ pub unsafe fn fmi2CompletedIntegratorStep(
     unsafe { run(component, &table::COMPLETED_STEP, body) }
 }
 
-pub unsafe fn fmi2SetTime(component: Component, time: f64) -> Status {
+pub unsafe fn fmi2SetTime(component: Component, time: f64) -> FmiStatus {
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::SET_TIME, |instance| instance.set_time(time)) }
 }
 
-pub unsafe fn fmi2SetContinuousStates(component: Component, x: *const f64, nx: usize) -> Status {
+pub unsafe fn fmi2SetContinuousStates(component: Component, x: *const f64, nx: usize) -> FmiStatus {
     // SAFETY: the importer vouches for the array, as `slice` requires.
     let body =
         |instance: &mut Instance| instance.set_continuous_states(unsafe { slice("x", x, nx) }?);
@@ -600,7 +603,11 @@ pub unsafe fn fmi2SetContinuousStates(component: Component, x: *const f64, nx: u
     unsafe { run(component, &table::SET_CONTINUOUS_STATES, body) }
 }
 
-pub unsafe fn fmi2GetDerivatives(component: Component, derivatives: *mut f64, nx: usize) -> Status {
+pub unsafe fn fmi2GetDerivatives(
+    component: Component,
+    derivatives: *mut f64,
+    nx: usize,
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for the array, as `room` requires.
         instance.derivatives(unsafe { room("derivatives", derivatives, nx) }?)
@@ -613,7 +620,7 @@ pub unsafe fn fmi2GetEventIndicators(
     component: Component,
     indicators: *mut f64,
     ni: usize,
-) -> Status {
+) -> FmiStatus {
     let body =
         // SAFETY: the importer vouches for the array, as `room` requires.
         |instance: &mut Instance| instance.event_indicators(unsafe { room("eventIndicators", indicators, ni) }?);
@@ -621,7 +628,7 @@ pub unsafe fn fmi2GetEventIndicators(
     unsafe { run(component, &table::GET_EVENT_INDICATORS, body) }
 }
 
-pub unsafe fn fmi2GetContinuousStates(component: Component, x: *mut f64, nx: usize) -> Status {
+pub unsafe fn fmi2GetContinuousStates(component: Component, x: *mut f64, nx: usize) -> FmiStatus {
     // SAFETY: the importer vouches for the array, as `room` requires.
     let body = |instance: &mut Instance| instance.continuous_states(unsafe { room("x", x, nx) }?);
     // SAFETY: the importer vouches for `component`, as `run` requires.
@@ -632,7 +639,7 @@ pub unsafe fn fmi2GetNominalsOfContinuousStates(
     component: Component,
     nominals: *mut f64,
     nx: usize,
-) -> Status {
+) -> FmiStatus {
     // SAFETY: the importer vouches for the array, as `room` requires.
     let body =
         |instance: &mut Instance| instance.nominals(unsafe { room("x_nominal", nominals, nx) }?);
@@ -650,7 +657,7 @@ pub unsafe fn fmi2SetRealInputDerivatives(
     n: usize,
     order: *const c_int,
     value: *const f64,
-) -> Status {
+) -> FmiStatus {
     let body = |instance: &mut Instance| {
         // SAFETY: the importer vouches for the array, as `slice` requires.
         let (references, orders, values) =
@@ -667,10 +674,10 @@ pub unsafe fn fmi2GetRealOutputDerivatives(
     n: usize,
     _order: *const c_int,
     _value: *mut f64,
-) -> Status {
+) -> FmiStatus {
     let body = |_: &mut Instance| match n {
         0 => Ok(()),
-        _ => error("the units offer no output derivatives (maxOutputDerivativeOrder is 0)"),
+        _ => error("this FMU provides no output derivatives (maxOutputDerivativeOrder is 0)"),
     };
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_OUTPUT_DERIVATIVES, body) }
@@ -681,21 +688,21 @@ pub unsafe fn fmi2DoStep(
     point: f64,
     size: f64,
     _no_set_state_prior: c_int,
-) -> Status {
+) -> FmiStatus {
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::DO_STEP, |instance| instance.do_step(point, size)) }
 }
 
-pub unsafe fn fmi2CancelStep(component: Component) -> Status {
+pub unsafe fn fmi2CancelStep(component: Component) -> FmiStatus {
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::CANCEL_STEP, |_| Ok(())) }
 }
 
 fn no_status(kind: c_int) -> Outcome {
-    Err(Failure::Discard(format!("there is no status of kind {kind} here")))
+    Err(Failure::Discard(format!("there is no status of kind {kind} for this function")))
 }
 
-pub unsafe fn fmi2GetStatus(component: Component, kind: c_int, value: *mut Status) -> Status {
+pub unsafe fn fmi2GetStatus(component: Component, kind: c_int, value: *mut FmiStatus) -> FmiStatus {
     let body = |instance: &mut Instance| match kind {
         // SAFETY: the importer vouches for the result pointer, as `put` requires.
         DO_STEP_STATUS => unsafe { put("value", value, instance.last_step()) },
@@ -705,7 +712,7 @@ pub unsafe fn fmi2GetStatus(component: Component, kind: c_int, value: *mut Statu
     unsafe { run(component, &table::GET_STATUS, body) }
 }
 
-pub unsafe fn fmi2GetRealStatus(component: Component, kind: c_int, value: *mut f64) -> Status {
+pub unsafe fn fmi2GetRealStatus(component: Component, kind: c_int, value: *mut f64) -> FmiStatus {
     let body = |instance: &mut Instance| match kind {
         // SAFETY: the importer vouches for the result pointer, as `put` requires.
         LAST_SUCCESSFUL_TIME => unsafe { put("value", value, instance.time()) },
@@ -719,12 +726,16 @@ pub unsafe fn fmi2GetIntegerStatus(
     component: Component,
     kind: c_int,
     _value: *mut c_int,
-) -> Status {
+) -> FmiStatus {
     // SAFETY: the importer vouches for `component`, as `run` requires.
     unsafe { run(component, &table::GET_INTEGER_STATUS, |_| no_status(kind)) }
 }
 
-pub unsafe fn fmi2GetBooleanStatus(component: Component, kind: c_int, value: *mut c_int) -> Status {
+pub unsafe fn fmi2GetBooleanStatus(
+    component: Component,
+    kind: c_int,
+    value: *mut c_int,
+) -> FmiStatus {
     let body = |_: &mut Instance| match kind {
         // SAFETY: the importer vouches for the result pointer, as `put` requires.
         TERMINATED => unsafe { put("value", value, 0) },
@@ -738,7 +749,7 @@ pub unsafe fn fmi2GetStringStatus(
     component: Component,
     kind: c_int,
     value: *mut *const c_char,
-) -> Status {
+) -> FmiStatus {
     let body = |_: &mut Instance| match kind {
         // SAFETY: the importer vouches for the result pointer, as `put` requires.
         PENDING_STATUS => unsafe { put("value", value, c"no step is pending".as_ptr()) },

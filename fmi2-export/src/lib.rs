@@ -1,11 +1,11 @@
-//! The FMI 2.0 C interface, written once: a unit implements [`Model`], and [`export_fmus!`] makes a
-//! library of it.
+//! The FMI 2.0 C interface, written once: the model of an FMU implements [`Model`], and
+//! [`export_fmus!`] makes a library of it.
 //!
-//! | module | what it knows |
+//! | module | content |
 //! |---|---|
-//! | [`model`], [`table`] | what a unit must offer |
-//! | [`fields`] | errors of fields, told as errors of variables |
-//! | `unit` | a model bound to its table, without its type |
+//! | [`model`], [`table`] | the interface that a model must implement, and its variable table |
+//! | [`fields`] | errors of fields, reported as errors of variables |
+//! | `model_instance` | a model bound to its variable table, without its type |
 //! | `instance` | one instance: checks, laziness, saved states; no pointers |
 //! | `call` | the table of calls allowed in each state |
 //! | [`interface`], [`types`] | the C signatures |
@@ -25,6 +25,7 @@ mod instance;
 pub mod interface;
 mod logger;
 pub mod model;
+mod model_instance;
 mod numbers;
 mod pointer;
 mod resource;
@@ -33,10 +34,9 @@ mod scalar;
 pub mod table;
 #[doc(hidden)]
 pub mod types;
-mod unit;
 
 #[doc(hidden)]
 pub use export::sources;
 pub use model::{Context, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
-pub use table::{Description, Enumeration, Table};
-pub use unit::{Export, MAX_INPUT_DERIVATIVE_ORDER, describe};
+pub use model_instance::{Export, MAX_INPUT_DERIVATIVE_ORDER, describe};
+pub use table::{Description, Enumeration, VariableTable};

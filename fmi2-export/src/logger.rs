@@ -1,11 +1,11 @@
-//! Messages to the importer, which leave the unit through the importer's callback only.
+//! Messages to the importer, which leave the FMU through the importer's callback only.
 //!
 //! Errors and fatal errors are always reported, so that nobody has to repeat a run with logging on
 //! to find them. Everything else is reported only while logging is on (`loggingOn` of
 //! fmi2Instantiate, fmi2SetDebugLogging), and then only in the chosen categories.
 #![allow(unsafe_code)]
 
-use crate::types::{Callbacks, LogCallback, Status};
+use crate::types::{Callbacks, FmiStatus, LogCallback};
 use model_description::LOG_CATEGORIES;
 use std::ffi::{CString, c_void};
 
@@ -32,18 +32,18 @@ impl Category {
         LOG_CATEGORIES[self as usize].0
     }
 
-    fn status(self) -> Status {
+    fn status(self) -> FmiStatus {
         match self {
-            Self::All | Self::Events => Status::Ok,
-            Self::Warning => Status::Warning,
-            Self::Discard => Status::Discard,
-            Self::Error => Status::Error,
-            Self::Fatal => Status::Fatal,
+            Self::All | Self::Events => FmiStatus::Ok,
+            Self::Warning => FmiStatus::Warning,
+            Self::Discard => FmiStatus::Discard,
+            Self::Error => FmiStatus::Error,
+            Self::Fatal => FmiStatus::Fatal,
         }
     }
 }
 
-/// Logger of the importer, with the categories that it wants to receive.
+/// Logger of the importer, with the categories that it is to receive.
 pub(crate) struct Logger {
     callback: Option<LogCallback>,
     environment: *mut c_void,

@@ -1,4 +1,4 @@
-//! Interface that a unit must offer to become an FMU.
+//! Interface that a model must implement to become an FMU.
 
 use crate::table::Description;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -7,15 +7,15 @@ use std::path::Path;
 /// Reason why a call failed. Its text reaches the user through the FMI logger.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Failure {
-    /// The call was refused, but the unit is unchanged and can continue (`fmi2Discard`).
+    /// The call was refused, but the instance is unchanged and can continue (`fmi2Discard`).
     #[error("{0}")]
     Discard(String),
-    /// The simulation cannot continue, but the process and other units can (`fmi2Error`).
+    /// The simulation cannot continue, but the process and other instances can (`fmi2Error`).
     #[error("{0}")]
     Error(String),
 }
 
-/// Data about the experiment that a unit may use while it initializes.
+/// Data about the experiment that a model may use while it initializes.
 #[derive(Clone, Copy, Debug)]
 pub struct Context<'a> {
     /// Start time of the experiment, s.
@@ -37,7 +37,7 @@ pub trait Inputs<M> {
 }
 
 /// Last event before outputs are read. In co-simulation it decides what the outputs of a sampled
-/// unit mean: FMI 2.0 forbids reading them after an input was set, until a step has been made
+/// model mean: FMI 2.0 forbids reading them after an input was set, until a step has been made
 /// (2.0.5, section 4.2.1), so that a master which keeps to the standard reads them after a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LastEvent {
@@ -48,7 +48,7 @@ pub enum LastEvent {
     /// A step has been made, and no input was set since. The outputs are those that held over this
     /// step.
     Step,
-    /// An input was set by a call, whatever its value, or the unit runs in model exchange. The
+    /// An input was set by a call, whatever its value, or the instance runs in model exchange. The
     /// outputs respond to the inputs.
     InputSet,
 }
@@ -78,14 +78,14 @@ pub struct Restoration<'a, M> {
     pub failed: bool,
 }
 
-/// A unit: one value that holds the parameters, inputs, state and outputs. The table of the
-/// [`Description`] points at its fields.
+/// Model of an FMU: one value that holds the parameters, inputs, state and outputs. The variable
+/// table of the [`Description`] points at its fields.
 ///
 /// The shell takes care of call order, value checks, logging and memory; a model only computes.
 /// Everything that determines the future is serialised: a model that is restored in another process
 /// continues bit for bit. Scratch space is `#[serde(skip)]` and made again in [`Model::restored`].
 pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
-    /// Returns name, documentation, default experiment and the table of variables.
+    /// Returns name, documentation, default experiment and the variable table.
     fn description() -> Description<Self>;
 
     /// Makes a model with every parameter and input at its start value. The start values in the XML
@@ -139,7 +139,7 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     }
 
     /// Copies the continuous states for model exchange, in the order of the state variables in the
-    /// table.
+    /// variable table.
     fn continuous_states(&self, _states: &mut [f64]) {}
 
     /// Sets the continuous states in model exchange.
@@ -159,18 +159,18 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// the shell calls before if something changed.
     fn event_indicators(&self, _indicators: &mut [f64]) {}
 
-    /// Returns the partial derivative of the variable with value reference `unknown` with respect
-    /// to the one with value reference `known`, at the current `time`, state and inputs. The unit
-    /// offers it only if the description says so.
+    /// Returns the partial derivative of the variable with value reference `unknown_variable` with
+    /// respect to the one with value reference `known_variable`, at the current `time`, state and
+    /// inputs. It is called only if the FMU has continuous states.
     ///
     /// # Errors
     /// Names a pair of variables that has no derivative.
     fn partial_derivative(
         &mut self,
         _time: f64,
-        _unknown: usize,
-        _known: usize,
+        _unknown_variable: usize,
+        _known_variable: usize,
     ) -> Result<f64, Failure> {
-        Err(Failure::Error("this unit offers no directional derivatives".into()))
+        Err(Failure::Error("this FMU provides no directional derivatives".into()))
     }
 }

@@ -17,7 +17,7 @@ pub(crate) fn check<T>(name: &str, pointer: *const T, n: usize) -> Outcome {
     not_null(name, pointer)?;
     if !pointer.is_aligned() {
         return error(format!(
-            "argument '{name}' is at {pointer:p}, where no value of {} bytes can be",
+            "argument '{name}' is at {pointer:p}, which is not aligned to {} bytes",
             align_of::<T>()
         ));
     }
@@ -109,7 +109,7 @@ pub(crate) fn apart<T, U>(
 
 /// Returns the value references of a call that gets values, with the room for the values. The
 /// caller promises what [`slice`] and [`room`] ask.
-pub(crate) unsafe fn wanted<'a, T>(
+pub(crate) unsafe fn requested<'a, T>(
     vr: *const u32,
     n: usize,
     value: *mut T,

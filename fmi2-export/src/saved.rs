@@ -36,7 +36,7 @@ pub(crate) fn wrap(guid: &str, interface: Interface, payload: &[u8]) -> Box<[u8]
 /// Returns the payload of `bytes` after checking the header.
 ///
 /// # Errors
-/// Says why the bytes are not a state of this unit.
+/// Says why the bytes are not a state of this FMU.
 pub(crate) fn unwrap<'a>(
     guid: &str,
     interface: Interface,
@@ -54,15 +54,15 @@ pub(crate) fn unwrap<'a>(
     let (owner, header) = header.split_at(GUID);
     let (length, checksum) = header.split_at(8);
     if magic != MAGIC {
-        return Err("these bytes are not a saved state of such a unit".into());
+        return Err("these bytes are not a saved state of an FMU of this project".into());
     }
     if version != VERSION.to_le_bytes() {
-        return Err(format!("the saved state has another format version than {VERSION}"));
+        return Err(format!("the saved state has a format version other than {VERSION}"));
     }
     if owner != guid.as_bytes() {
         let owner = String::from_utf8_lossy(owner);
         return Err(format!(
-            "the saved state belongs to a unit with GUID {owner}, this one has {guid}"
+            "the saved state belongs to an FMU with GUID {owner}, but this FMU has {guid}"
         ));
     }
     if kind != [interface as u8] {

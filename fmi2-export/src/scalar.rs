@@ -1,6 +1,6 @@
-//! Types of variables' values and what is allowed for them.
+//! Types of the values of variables, and the checks of these values.
 
-use model_description::variable::Kind;
+use model_description::variable::{EnumerationType, VariableKind};
 
 /// Type of a variable's value, with the functions by which the shell checks it.
 pub(crate) trait Scalar: PartialEq + Sized {
@@ -11,11 +11,11 @@ pub(crate) trait Scalar: PartialEq + Sized {
     }
     /// Says why the value cannot be given to the importer as that of a variable of this kind, or
     /// `None` if it can.
-    fn unpresentable(&self, _kind: &Kind) -> Option<&'static str> {
+    fn unpresentable(&self, _kind: &VariableKind) -> Option<&'static str> {
         None
     }
     /// Says why the value is not allowed for a variable of this kind, or `None` if it is.
-    fn problem(&self, _kind: &Kind) -> Option<String> {
+    fn problem(&self, _kind: &VariableKind) -> Option<String> {
         None
     }
 }
@@ -26,19 +26,19 @@ impl Scalar for f64 {
         // Zero and −0 are equal, but results computed from them can differ.
         self.to_bits() == other.to_bits()
     }
-    fn unpresentable(&self, _kind: &Kind) -> Option<&'static str> {
+    fn unpresentable(&self, _kind: &VariableKind) -> Option<&'static str> {
         (!self.is_finite())
             .then_some("is not a finite number; an input or a parameter is too large")
     }
-    fn problem(&self, kind: &Kind) -> Option<String> {
+    fn problem(&self, kind: &VariableKind) -> Option<String> {
         if !self.is_finite() {
             return Some("is not a finite number".into());
         }
         match kind {
-            Kind::Real { min: Some(min), .. } if self < min => {
+            VariableKind::Real { min: Some(min), .. } if self < min => {
                 Some(format!("is below the minimum {min}"))
             }
-            Kind::Real { max: Some(max), .. } if self > max => {
+            VariableKind::Real { max: Some(max), .. } if self > max => {
                 Some(format!("is above the maximum {max}"))
             }
             _ => None,
@@ -48,21 +48,24 @@ impl Scalar for f64 {
 
 impl Scalar for i32 {
     const TYPE: &'static str = "Integer or Enumeration";
-    fn unpresentable(&self, kind: &Kind) -> Option<&'static str> {
+    fn unpresentable(&self, kind: &VariableKind) -> Option<&'static str> {
         // Only a value that `Enumeration::number` does not find has no number.
-        (matches!(kind, Kind::Enumeration { .. }) && *self < 1)
+        (matches!(kind, VariableKind::Enumeration { .. }) && *self < 1)
             .then_some("holds a value that its enumeration does not list")
     }
-    fn problem(&self, kind: &Kind) -> Option<String> {
+    fn problem(&self, kind: &VariableKind) -> Option<String> {
         match kind {
-            Kind::Integer { min: Some(min), .. } if self < min => {
+            VariableKind::Integer { min: Some(min), .. } if self < min => {
                 Some(format!("is below the minimum {min}"))
             }
-            Kind::Integer { max: Some(max), .. } if self > max => {
+            VariableKind::Integer { max: Some(max), .. } if self > max => {
                 Some(format!("is above the maximum {max}"))
             }
-            Kind::Enumeration { of, .. } if *self < 1 || *self as usize > of.items.len() => {
-                Some(format!("is not an item of {}: these are 1 to {}", of.name, of.items.len()))
+            VariableKind::Enumeration {
+                enumeration_type: EnumerationType { name, items, .. },
+                ..
+            } if *self < 1 || *self as usize > items.len() => {
+                Some(format!("is not an item of {name}: these are 1 to {}", items.len()))
             }
             _ => None,
         }

@@ -1,13 +1,15 @@
-//! Table of a unit's variables: the FMI attributes of each, and the field of the model that holds
+//! Variable table of an FMU: the FMI attributes of each, and the field of the model that holds
 //! its value.
 //!
-//! Units declare a hundred variables each, so what a declaration calls is not inlined: libraries
-//! are smaller without that.
+//! FMUs declare hundreds of variables, so the functions that a declaration calls are not inlined:
+//! libraries are smaller that way.
 
 use crate::scalar::Scalar;
 use model_description::DefaultExperiment;
 use model_description::unit::Unit;
-use model_description::variable::{Causality, EnumerationType, Kind, Variability, Variable};
+use model_description::variable::{
+    Causality, EnumerationType, Variability, Variable, VariableKind,
+};
 
 type Lens<M, T> = Box<dyn Fn(&mut M) -> &mut T + Send + Sync>;
 type Setter<M, T> = Box<dyn Fn(&mut M, T) + Send + Sync>;
@@ -76,44 +78,44 @@ impl<M> Entry<M> {
     }
 }
 
-/// Description of a unit: its texts, its default experiment and its table of variables.
+/// Description of an FMU: its texts, its default experiment and its variable table.
 pub struct Description<M> {
     /// Model name and archive name, for example `CRMPC`.
     pub name: &'static str,
-    /// Purpose of the unit, in one line.
+    /// Purpose of the FMU, in one line.
     pub description: &'static str,
-    /// HTML fragment that says what the unit computes, with equations and sources.
+    /// HTML fragment that says what the FMU computes, with equations and sources.
     pub documentation: String,
-    /// Version of the unit's crate.
+    /// Version of the FMU's crate.
     pub version: &'static str,
-    /// Whether the unit is also a model exchange unit, with states and derivatives.
+    /// Whether the FMU also supports model exchange, with states and derivatives.
     pub model_exchange: bool,
     /// Number of event indicators in model exchange.
     pub event_indicators: usize,
-    /// Default experiment that the unit proposes.
+    /// Default experiment that the FMU proposes.
     pub default_experiment: DefaultExperiment,
-    /// Table of the unit's variables.
-    pub table: Table<M>,
+    /// Variable table of the FMU.
+    pub table: VariableTable<M>,
 }
 
-/// The variables of a unit in order; the position of each is its value reference.
-pub struct Table<M> {
+/// The variables of an FMU in order; the position of each is its value reference.
+pub struct VariableTable<M> {
     pub(crate) entries: Vec<Entry<M>>,
 }
 
-impl<M> Default for Table<M> {
+impl<M> Default for VariableTable<M> {
     fn default() -> Self {
         Self { entries: Vec::new() }
     }
 }
 
-impl<M: 'static> Table<M> {
-    /// Makes an empty table.
+impl<M: 'static> VariableTable<M> {
+    /// Makes an empty variable table.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds a real variable to the table.
+    /// Adds a real variable.
     #[must_use]
     pub fn real(
         mut self,
@@ -147,18 +149,18 @@ impl<M: 'static> Table<M> {
                 }
             }),
         };
-        self.push(common, Kind::Integer { min, max, start: None }, Access::Integer(access));
+        self.push(common, VariableKind::Integer { min, max, start: None }, Access::Integer(access));
         self
     }
 
-    /// Adds a boolean variable to the table.
+    /// Adds a boolean variable.
     #[must_use]
     pub fn boolean(
         mut self,
         common: Common,
         field: impl Fn(&mut M) -> &mut bool + Send + Sync + 'static,
     ) -> Self {
-        self.push(common, Kind::Boolean { start: None }, Access::Boolean(Box::new(field)));
+        self.push(common, VariableKind::Boolean { start: None }, Access::Boolean(Box::new(field)));
         self
     }
 
@@ -167,13 +169,13 @@ impl<M: 'static> Table<M> {
     pub fn enumeration<T: Copy + PartialEq + Send + Sync>(
         mut self,
         common: Common,
-        of: &'static Enumeration<T>,
+        enumeration: &'static Enumeration<T>,
         field: impl Fn(&mut M) -> &mut T + Copy + Send + Sync + 'static,
     ) -> Self {
         let access = Integer {
-            get: Box::new(move |model| of.number(field(model))),
+            get: Box::new(move |model| enumeration.number(field(model))),
             set: Box::new(move |model, number| {
-                let item = usize::try_from(number - 1).ok().and_then(|i| of.items.get(i));
+                let item = usize::try_from(number - 1).ok().and_then(|i| enumeration.items.get(i));
                 if let Some((value, ..)) = item {
                     *field(model) = *value;
                 }
@@ -181,32 +183,32 @@ impl<M: 'static> Table<M> {
         };
         self.push(
             common,
-            Kind::Enumeration { of: of.described(), start: None },
+            VariableKind::Enumeration { enumeration_type: enumeration.described(), start: None },
             Access::Integer(access),
         );
         self
     }
 
-    /// Adds a text variable to the table.
+    /// Adds a text variable.
     #[must_use]
     pub fn string(
         mut self,
         common: Common,
         field: impl Fn(&mut M) -> &mut String + Send + Sync + 'static,
     ) -> Self {
-        self.push(common, Kind::String { start: None }, Access::String(Box::new(field)));
+        self.push(common, VariableKind::String { start: None }, Access::String(Box::new(field)));
         self
     }
 
     #[inline(never)]
     fn push_real(&mut self, declaration: Real, field: Lens<M, f64>) {
         let Real { common, unit, min, max, nominal, derivative_of } = declaration;
-        let kind = Kind::Real { unit, min, max, nominal, start: None, derivative_of };
+        let kind = VariableKind::Real { unit, min, max, nominal, start: None, derivative_of };
         self.push(common, kind, Access::Real(field));
     }
 
     #[inline(never)]
-    fn push(&mut self, common: Common, kind: Kind, access: Access<M>) {
+    fn push(&mut self, common: Common, kind: VariableKind, access: Access<M>) {
         let Common { name, description, causality, variability, dependencies } = common;
         let variable = Variable { name, description, causality, variability, kind, dependencies };
         self.entries.push(Entry { variable, access });
@@ -290,7 +292,7 @@ pub struct Real {
 }
 
 impl Real {
-    /// Declares the physical unit of the variable.
+    /// Declares the unit of measure of the variable.
     #[must_use]
     #[inline(never)]
     pub fn unit(mut self, unit: Unit) -> Self {

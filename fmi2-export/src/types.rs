@@ -6,7 +6,7 @@ use std::ffi::{c_char, c_int, c_void};
 /// C type `fmi2Status`, the result of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[repr(C)]
-pub enum Status {
+pub enum FmiStatus {
     /// Status `fmi2OK`: the call succeeded.
     Ok,
     /// Status `fmi2Warning`: the call succeeded with a warning.
@@ -28,7 +28,7 @@ pub enum Status {
 pub struct CEventInfo {
     /// Whether the event iteration must go on.
     pub new_discrete_states_needed: c_int,
-    /// Whether the unit asks for the end of the simulation.
+    /// Whether the FMU asks for the end of the simulation.
     pub terminate_simulation: c_int,
     /// Whether the event changed nominal values of states.
     pub nominals_of_continuous_states_changed: c_int,
@@ -46,7 +46,7 @@ pub struct CEventInfo {
 pub type LogCallback = unsafe extern "C-unwind" fn(
     *mut c_void,
     *const c_char,
-    Status,
+    FmiStatus,
     *const c_char,
     *const c_char,
     ...
@@ -63,7 +63,7 @@ pub struct Callbacks {
     /// Memory release of the importer, which is not used.
     pub free_memory: Option<unsafe extern "C" fn(*mut c_void)>,
     /// Notification of a finished step, which is not used because steps are synchronous.
-    pub step_finished: Option<unsafe extern "C" fn(*mut c_void, Status)>,
+    pub step_finished: Option<unsafe extern "C" fn(*mut c_void, FmiStatus)>,
     /// Pointer that is handed back to the logger.
     pub component_environment: *mut c_void,
 }

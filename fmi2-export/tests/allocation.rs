@@ -5,7 +5,7 @@
 #[allow(unreachable_pub)]
 mod lag;
 
-use fmi2_export::types::Status;
+use fmi2_export::types::FmiStatus;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::ffi::CString;
@@ -49,26 +49,26 @@ fn a_step_allocates_nothing() {
         assert!(!c.is_null());
         // A reset keeps the room that the first steps need.
         for _ in 0..2 {
-            assert_eq!(fmi2::fmi2EnterInitializationMode(c), Status::Ok);
-            assert_eq!(fmi2::fmi2ExitInitializationMode(c), Status::Ok);
+            assert_eq!(fmi2::fmi2EnterInitializationMode(c), FmiStatus::Ok);
+            assert_eq!(fmi2::fmi2ExitInitializationMode(c), FmiStatus::Ok);
             // The first calculation may enlarge buffers that are kept.
             assert_eq!(
                 fmi2::fmi2GetReal(c, references.as_ptr(), 4, values.as_mut_ptr()),
-                Status::Ok
+                FmiStatus::Ok
             );
             let before = COUNT.get();
             for k in 0..10 {
-                assert_eq!(fmi2::fmi2SetReal(c, &9, 1, &f64::from(k)), Status::Ok);
-                assert_eq!(fmi2::fmi2SetRealInputDerivatives(c, &9, 1, &1, &0.5), Status::Ok);
-                assert_eq!(fmi2::fmi2DoStep(c, f64::from(k) * 0.1, 0.1, 1), Status::Ok);
+                assert_eq!(fmi2::fmi2SetReal(c, &9, 1, &f64::from(k)), FmiStatus::Ok);
+                assert_eq!(fmi2::fmi2SetRealInputDerivatives(c, &9, 1, &1, &0.5), FmiStatus::Ok);
+                assert_eq!(fmi2::fmi2DoStep(c, f64::from(k) * 0.1, 0.1, 1), FmiStatus::Ok);
                 assert_eq!(
                     fmi2::fmi2GetReal(c, references.as_ptr(), 4, values.as_mut_ptr()),
-                    Status::Ok
+                    FmiStatus::Ok
                 );
             }
             assert_eq!(COUNT.get(), before);
             // A reset allocates, which shows that the counter works.
-            assert_eq!(fmi2::fmi2Reset(c), Status::Ok);
+            assert_eq!(fmi2::fmi2Reset(c), FmiStatus::Ok);
             assert!(COUNT.get() > before);
         }
         fmi2::fmi2FreeInstance(c);

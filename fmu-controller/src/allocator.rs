@@ -7,7 +7,7 @@ use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{AXES, capital};
 use fmi2_export::fields::{Fields, by_variable};
 use fmi2_export::table::{Common, discrete_output, input, parameter};
-use fmi2_export::{Description, Enumeration, Failure, Table};
+use fmi2_export::{Description, Enumeration, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use model_description::unit;
 use nalgebra::Vector3;
@@ -116,7 +116,7 @@ impl SampledInstance for AllocatorInstance {
                 tolerance: 1e-6,
                 step: Settings::published().period,
             },
-            table: pwpf(effectors(schedule(outputs(inputs(Table::new()))))),
+            table: pwpf(effectors(schedule(outputs(inputs(VariableTable::new()))))),
         }
     }
 
@@ -181,7 +181,7 @@ const FIELDS: &Fields = &[
     ("pwpf.time_constant", "pwpf.timeConstant"),
 ];
 
-type Variables = Table<ControlAllocator>;
+type Variables = VariableTable<ControlAllocator>;
 
 const INPUTS: [&str; 4] = ["moment.x", "moment.y", "moment.z", "dynamicPressure"];
 

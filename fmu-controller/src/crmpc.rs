@@ -12,7 +12,7 @@ use controller_export::table::{self, ANGLES, sampled_output, shown, shown_vector
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
-use fmi2_export::{Enumeration, Table};
+use fmi2_export::{Enumeration, VariableTable};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -183,7 +183,7 @@ impl Law for CrmpcLaw {
         Settings::new(Constraints::Robust).period_feedback
     }
 
-    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         outputs(guarantee(bounds(gains(schedule(table)))))
     }
 
@@ -259,7 +259,7 @@ impl Law for CrmpcLaw {
     }
 }
 
-type Controller = Table<ControllerFmu<CrmpcLaw>>;
+type Controller = VariableTable<ControllerFmu<CrmpcLaw>>;
 type GainField = fn(&mut CrmpcLaw) -> &mut Gain;
 
 fn schedule(table: Controller) -> Controller {

@@ -6,7 +6,7 @@ use control::error::DesignError;
 use control::report::Report;
 use controller_export::table::{self, ANGLES, RATES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
-use fmi2_export::Table;
+use fmi2_export::VariableTable;
 use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use model_description::unit;
@@ -49,7 +49,7 @@ impl Law for DlmpcLaw {
         Settings::published().period_feedback
     }
 
-    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         outputs(sliding_mode(weights(schedule(table))))
     }
 
@@ -81,7 +81,7 @@ impl Law for DlmpcLaw {
     }
 }
 
-type Controller = Table<ControllerFmu<DlmpcLaw>>;
+type Controller = VariableTable<ControllerFmu<DlmpcLaw>>;
 
 fn schedule(table: Controller) -> Controller {
     let horizon = parameter("horizon", "Number of prediction steps of the outer layer");

@@ -8,7 +8,7 @@ use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{ANGLES, AXES, RATES, capital, vector};
 use fmi2_export::fields::{Fields, by_variable};
 use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input, parameter};
-use fmi2_export::{Description, Enumeration, Failure, Table};
+use fmi2_export::{Description, Enumeration, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use model_description::unit::{self, Unit};
 use nalgebra::Vector3;
@@ -136,7 +136,9 @@ impl SampledInstance for EstimatorInstance {
                 tolerance: 1e-6,
                 step: Settings::default().period,
             },
-            table: corrections(calibration(gates(stages(start(outputs(inputs(Table::new()))))))),
+            table: corrections(calibration(gates(stages(start(outputs(inputs(
+                VariableTable::new(),
+            ))))))),
         }
     }
 
@@ -249,7 +251,7 @@ const FIELDS: &Fields = &[
     ("corrections[2]", "magnetometer"),
 ];
 
-type Variables = Table<AttitudeEstimator>;
+type Variables = VariableTable<AttitudeEstimator>;
 
 struct Sensor {
     name: &'static str,

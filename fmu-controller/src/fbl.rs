@@ -3,7 +3,7 @@
 use control::error::DesignError;
 use control::sliding::{Fbl, FblSettings};
 use controller_export::{ControllerFmu, Law, Vehicle, table};
-use fmi2_export::Table;
+use fmi2_export::VariableTable;
 use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
 use model_description::unit;

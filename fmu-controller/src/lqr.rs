@@ -4,7 +4,7 @@ use control::crmpc::{Constraints, Settings};
 use control::error::DesignError;
 use control::lqr::{Lqr, LqrSettings};
 use controller_export::{ControllerFmu, Law, Vehicle, table};
-use fmi2_export::Table;
+use fmi2_export::VariableTable;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the regulator.

@@ -5,7 +5,7 @@ use control::report::{Report, Status};
 use controller_export::table::{sampled_output, shown};
 use controller_export::{ControllerFmu, Law};
 use fmi2_export::table::parameter;
-use fmi2_export::{Enumeration, Table};
+use fmi2_export::{Enumeration, VariableTable};
 use model_description::unit;
 
 static STATUSES: Enumeration<Status> = Enumeration {
@@ -63,9 +63,9 @@ pub(crate) fn shown_report(report: &Report) -> Report {
 
 /// Adds the outputs of the solver.
 pub(crate) fn outputs<L: Law>(
-    table: Table<ControllerFmu<L>>,
+    table: VariableTable<ControllerFmu<L>>,
     solver: impl Fn(&mut L) -> &mut Report + Copy + Send + Sync + 'static,
-) -> Table<ControllerFmu<L>> {
+) -> VariableTable<ControllerFmu<L>> {
     let sampled = sampled_output;
     let status = sampled("solver.status", STATUSES.description);
     let cost = sampled("solver.cost", "Cost of the plan in force");
@@ -97,7 +97,7 @@ pub(crate) fn outputs<L: Law>(
 
 /// Adds the parameters of the solver.
 pub(crate) fn parameters<L: Law>(
-    table: Table<ControllerFmu<L>>,
+    table: VariableTable<ControllerFmu<L>>,
     solver: impl Fn(&mut L) -> &mut SolverSettings + Copy + Send + Sync + 'static,
 ) -> Table<ControllerFmu<L>> {
     let method = parameter("solver", METHODS.description);

@@ -9,7 +9,7 @@ use controller_export::table::{self, ANGLES, sampled_output, shown_vector, vecto
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
-use fmi2_export::{Enumeration, Table};
+use fmi2_export::{Enumeration, VariableTable};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -45,8 +45,8 @@ pub trait Variant: Sized + Send + Sync + 'static {
     fn published() -> Settings<Self::Reaching>;
     /// Adds the parameters of the reaching law.
     fn reaching(
-        table: Table<ControllerFmu<TvsmcLaw<Self>>>,
-    ) -> Table<ControllerFmu<TvsmcLaw<Self>>>;
+        table: VariableTable<ControllerFmu<TvsmcLaw<Self>>>,
+    ) -> VariableTable<ControllerFmu<TvsmcLaw<Self>>>;
 }
 
 /// Parameters and outputs of a time-varying sliding mode.
@@ -128,8 +128,8 @@ fn surface<V: Variant>(
 }
 
 fn anti_windup<V: Variant>(
-    table: Table<ControllerFmu<TvsmcLaw<V>>>,
-) -> Table<ControllerFmu<TvsmcLaw<V>>> {
+    table: VariableTable<ControllerFmu<TvsmcLaw<V>>>,
+) -> VariableTable<ControllerFmu<TvsmcLaw<V>>> {
     let on = parameter(
         "antiWindup",
         "Whether the sliding surface is placed again through the state while the actuators saturate; false in the paper",
@@ -140,8 +140,8 @@ fn anti_windup<V: Variant>(
 }
 
 fn observer<V: Variant>(
-    mut table: Table<ControllerFmu<TvsmcLaw<V>>>,
-) -> Table<ControllerFmu<TvsmcLaw<V>>> {
+    mut table: VariableTable<ControllerFmu<TvsmcLaw<V>>>,
+) -> VariableTable<ControllerFmu<TvsmcLaw<V>>> {
     for i in 0..3 {
         let text = format!("Gain lambda{i} of the disturbance observer");
         let gain = parameter(&format!("observer.lambda{i}"), &text).real().min(0.0);
@@ -155,8 +155,8 @@ fn observer<V: Variant>(
 }
 
 fn outputs<V: Variant>(
-    table: Table<ControllerFmu<TvsmcLaw<V>>>,
-) -> Table<ControllerFmu<TvsmcLaw<V>>> {
+    table: VariableTable<ControllerFmu<TvsmcLaw<V>>>,
+) -> VariableTable<ControllerFmu<TvsmcLaw<V>>> {
     let sampled = |name: String, text: String| sampled_output(&name, &text);
     let sliding = |axis: &str, meaning: &str| {
         let text = format!("Sliding variable of the {meaning} at the last tick");
@@ -184,8 +184,8 @@ fn outputs<V: Variant>(
 }
 
 fn boundary_layer<V: Variant<Reaching = BoundaryLayer>>(
-    table: Table<ControllerFmu<TvsmcLaw<V>>>,
-) -> Table<ControllerFmu<TvsmcLaw<V>>> {
+    table: VariableTable<ControllerFmu<TvsmcLaw<V>>>,
+) -> VariableTable<ControllerFmu<TvsmcLaw<V>>> {
     let eta = ("reaching.eta", "Reaching gain eta");
     let h = ("boundaryLayer.h", "Thickness h of the boundary layer");
     let table = table::gains(table, eta, Some(&unit::angular_acceleration()), |law| {
@@ -209,8 +209,8 @@ impl Variant for Btvsmc {
     }
 
     fn reaching(
-        table: Table<ControllerFmu<TvsmcLaw<Self>>>,
-    ) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
+        table: VariableTable<ControllerFmu<TvsmcLaw<Self>>>,
+    ) -> VariableTable<ControllerFmu<TvsmcLaw<Self>>> {
         boundary_layer(table)
     }
 }
@@ -230,8 +230,8 @@ impl Variant for BtvsmcDo {
     }
 
     fn reaching(
-        table: Table<ControllerFmu<TvsmcLaw<Self>>>,
-    ) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
+        table: VariableTable<ControllerFmu<TvsmcLaw<Self>>>,
+    ) -> VariableTable<ControllerFmu<TvsmcLaw<Self>>> {
         boundary_layer(table)
     }
 }
@@ -251,8 +251,8 @@ impl Variant for SotvsmcDo {
     }
 
     fn reaching(
-        table: Table<ControllerFmu<TvsmcLaw<Self>>>,
-    ) -> Table<ControllerFmu<TvsmcLaw<Self>>> {
+        table: VariableTable<ControllerFmu<TvsmcLaw<Self>>>,
+    ) -> VariableTable<ControllerFmu<TvsmcLaw<Self>>> {
         let text = |what| ("reaching.".to_owned() + what, "Reaching gain ".to_owned() + what);
         let [(n1, t1), (n2, t2), (n3, t3), (n4, t4)] = ["k1", "k2", "k3", "k4"].map(text);
         let table = table::gains(table, (&n1, &t1), None, |law| &mut law.settings.reaching.k1);

@@ -6,7 +6,7 @@ use controller_export::table::{self, ANGLES, RATES, sampled_output, shown_vector
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::fields::Fields;
 use fmi2_export::table::parameter;
-use fmi2_export::{Enumeration, Table};
+use fmi2_export::{Enumeration, VariableTable};
 use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -114,7 +114,7 @@ impl Law for TwoLoopLaw {
     }
 }
 
-type Controller = Table<ControllerFmu<TwoLoopLaw>>;
+type Controller = VariableTable<ControllerFmu<TwoLoopLaw>>;
 type Field = fn(&mut Loop) -> &mut [f64; 3];
 
 /// Adds the parameters of one loop, per axis. `suffix` completes the name of an axis.

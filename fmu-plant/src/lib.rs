@@ -1,14 +1,14 @@
-//! The FMI 2.0 unit `ReentryPlant` for co-simulation and model exchange: the crate `vehicle` behind
-//! a table of variables.
+//! The FMI 2.0 FMU `ReentryPlant` for co-simulation and model exchange: the crate `vehicle` behind
+//! a variable table.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+mod instance;
 mod parameters;
 mod plant;
 mod roles;
 mod table;
 #[cfg(test)]
 mod tests;
-mod unit;
 
 pub use plant::ReentryPlant;
 

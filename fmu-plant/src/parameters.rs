@@ -1,4 +1,4 @@
-//! Parameters of the unit. Their defaults are the scenario of Chai 2022.
+//! Parameters of the FMU. Their defaults are the scenario of Chai 2022.
 
 use fmi2_export::Enumeration;
 use nalgebra::Vector3;
@@ -28,40 +28,40 @@ const NEVER: f64 = 1e15;
 /// Kinds of disturbance as an FMI enumeration.
 pub(crate) static KINDS: Enumeration<Kind> = Enumeration {
     name: "DisturbanceKind",
-    description: "Course of the disturbance",
+    description: "Waveform of the disturbance",
     items: &[
         (Kind::None, "none", "no disturbance"),
         (
             Kind::White,
             "white",
-            "each component uniform within the bound, drawn anew every disturbance.period",
+            "each component is drawn uniformly within disturbance.bound every disturbance.period",
         ),
-        (Kind::Constant, "constant", "bound times direction"),
-        (Kind::Sine, "sine", "a moment: offset plus two sinusoids"),
+        (Kind::Constant, "constant", "disturbance.bound times disturbance.direction"),
+        (Kind::Sine, "sine", "a moment that is an offset plus two sinusoids"),
         (
             Kind::Square,
             "square",
-            "bound times direction, the sign changing every half disturbance.square.period",
+            "disturbance.bound times disturbance.direction, with the sign changing every half disturbance.square.period",
         ),
         (
             Kind::AlongRate,
             "alongRate",
-            "plus or minus the bound so that the angular rate grows fastest, chosen every disturbance.period",
+            "each component is plus or minus disturbance.bound, chosen every disturbance.period so that the angular rate grows fastest",
         ),
         (
             Kind::AgainstMoment,
             "againstMoment",
-            "plus or minus the bound against the control moment, chosen every disturbance.period",
+            "each component is plus or minus disturbance.bound, chosen every disturbance.period to oppose the control moment",
         ),
         (
             Kind::Table,
             "table",
-            "bound times the direction of the row in force, rows beginning at given times",
+            "disturbance.bound times the factors in the current row of a lookup table over time",
         ),
     ],
 };
 
-/// Number of rows for which the disturbance's table has variables.
+/// Number of rows of the disturbance's lookup table for which there are variables.
 pub(crate) const TABLE_ROWS: usize = 8;
 
 /// Source of the control moment.
@@ -75,12 +75,12 @@ pub(crate) enum Actuation {
 /// Sources of the control moment as an FMI enumeration.
 pub(crate) static ACTUATIONS: Enumeration<Actuation> = Enumeration {
     name: "Actuation",
-    description: "How the control moment comes about",
+    description: "Source of the control moment",
     items: &[
         (
             Actuation::Moment,
             "moment",
-            "the input moment acts, after actuation.delay, rounded to actuation.resolution",
+            "the input moment acts, delayed by actuation.delay and rounded to actuation.resolution",
         ),
         (
             Actuation::SurfacesAndJets,
@@ -93,25 +93,25 @@ pub(crate) static ACTUATIONS: Enumeration<Actuation> = Enumeration {
 /// Forms of the attitude kinematics as an FMI enumeration.
 pub(crate) static KINEMATICS: Enumeration<Kinematics> = Enumeration {
     name: "Kinematics",
-    description: "The matrix R of the attitude kinematics",
+    description: "Form of the matrix R in the attitude kinematics",
     items: &[
-        (Kinematics::Printed, "printed", "R as in (2) of Chai 2022 and (4) of Wu 2015"),
+        (Kinematics::Printed, "printed", "R is as printed in (2) of Chai 2022 and (4) of Wu 2015"),
         (
             Kinematics::Exact,
             "exact",
-            "with the derivative of alpha times sin beta in the bank row, (1) of Wu 2015",
+            "R includes the derivative of alpha times sin beta in the row of the bank angle, as in (1) of Wu 2015",
         ),
     ],
 };
 
-/// Value of `sensor.set` without sampling: the unit outputs the readings of ideal sensors.
+/// Value of `sensor.set` without sampling: the FMU outputs the readings of ideal sensors.
 pub(crate) const NO_SENSORS: i32 = 0;
 /// Value of `sensor.set` for sampled sensors without errors.
 const IDEAL_SENSORS: i32 = 1;
 /// Value of `sensor.set` for sampled sensors with the errors given by the parameters.
 pub(crate) const MEMS_SENSORS: i32 = 2;
 
-/// Parameters that a user sets before the simulation, named as in the table.
+/// Parameters that a user sets before the simulation, named as in the variable table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Parameters {
     pub(crate) inertia: Inertia,
@@ -126,7 +126,7 @@ pub(crate) struct Parameters {
     pub(crate) square_period: f64,
     pub(crate) sine_offset: Vector3<f64>,
     pub(crate) waves: [MomentWave; 2],
-    /// Number of rows of the table that are used.
+    /// Number of rows of the lookup table that are used.
     pub(crate) table_rows: usize,
     pub(crate) table_period: f64,
     pub(crate) table: [Row; TABLE_ROWS],
@@ -214,7 +214,7 @@ impl Parameters {
         Ok(self.flight.dynamic_pressure()? * self.density_scale)
     }
 
-    /// Table of the disturbance, with the rows that are used.
+    /// Lookup table of the disturbance, with the rows that are used.
     fn table(&self) -> Result<Table, Error> {
         let rows = self.table.get(..self.table_rows).ok_or_else(|| Error::Parameter {
             name: "disturbance.table.rows".into(),
@@ -237,7 +237,7 @@ impl Parameters {
         }))
     }
 
-    /// Configuration of the sampled sensors, or `None` if the unit outputs the readings of ideal
+    /// Configuration of the sampled sensors, or `None` if the FMU outputs the readings of ideal
     /// sensors.
     fn sensors(&self) -> Option<sensors::Config> {
         let triads = match self.sensor_set {

@@ -1,4 +1,4 @@
-//! The unit's data: parameters, inputs, outputs and the plant that computes them.
+//! Data of an instance: parameters, inputs, outputs and the plant that computes them.
 
 use crate::parameters::Parameters;
 use fmi2_export::Failure;
@@ -13,7 +13,7 @@ use vehicle::sensors::Sample;
 /// them.
 pub(crate) const MOTION: usize = 6;
 
-/// FMI unit of the re-entry vehicle.
+/// Instance of the re-entry vehicle's FMU.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ReentryPlant {
     pub(crate) parameters: Parameters,
@@ -23,16 +23,15 @@ pub struct ReentryPlant {
     /// Simulated plant, which exists from initialization on. Every step takes it out and puts it
     /// back: the box spares moving all of it.
     pub(crate) plant: Option<Box<Plant>>,
-    /// Dynamic pressure of the flight, Pa: that in force, and with the air of the standard
-    /// atmosphere.
+    /// Dynamic pressure of the flight, Pa: actual, and in the standard atmosphere.
     pub(crate) dynamic_pressure: f64,
     pub(crate) standard_pressure: f64,
-    /// Whether the unit runs in model exchange: held quantities then change at events only, and not
-    /// when time passes a tick or an input is set.
+    /// Whether the instance runs in model exchange: held quantities then change at events only, and
+    /// not when time passes a tick or an input is set.
     pub(crate) event_driven: bool,
 }
 
-/// Outputs of the unit at one instant.
+/// Outputs of the instance at one moment of time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Output {
     pub(crate) angles: Vector3<f64>,

@@ -1,9 +1,10 @@
-//! What a variable is to the equations, so that nothing depends on its position in the table.
+//! Roles of the variables in the equations, so that nothing depends on their positions in the
+//! variable table.
 
 use fmi2_export::table::{Common, Real};
-use fmi2_export::{Enumeration, Table};
+use fmi2_export::{Enumeration, VariableTable};
 
-/// What a calculated variable is. States and derivatives are counted in the order attitude, rates,
+/// Role of a calculated variable. States and derivatives are counted in the order attitude, rates,
 /// deflections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Unknown {
@@ -18,7 +19,7 @@ pub(crate) enum Unknown {
     MeasuredTime,
 }
 
-/// What a state or an input is.
+/// Role of a state or an input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Known {
     State(usize),
@@ -29,44 +30,44 @@ pub(crate) enum Known {
     Trajectory(usize),
 }
 
-/// What a variable is to the equations. Parameters have no role.
+/// Role of a variable in the equations. Parameters have no role.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Role {
-    pub(crate) unknown: Option<Unknown>,
-    pub(crate) known: Option<Known>,
+    pub(crate) as_unknown: Option<Unknown>,
+    pub(crate) as_known: Option<Known>,
 }
 
 impl Role {
     /// A state is calculated, and derivatives by it exist.
     pub(crate) fn state(i: usize) -> Self {
-        Self { unknown: Some(Unknown::State(i)), known: Some(Known::State(i)) }
+        Self { as_unknown: Some(Unknown::State(i)), as_known: Some(Known::State(i)) }
     }
 }
 
 impl From<Unknown> for Role {
     fn from(unknown: Unknown) -> Self {
-        Self { unknown: Some(unknown), known: None }
+        Self { as_unknown: Some(unknown), as_known: None }
     }
 }
 
 impl From<Known> for Role {
-    fn from(known: Known) -> Self {
-        Self { unknown: None, known: Some(known) }
+    fn from(input_or_state: Known) -> Self {
+        Self { as_unknown: None, as_known: Some(input_or_state) }
     }
 }
 
-/// Table of variables with the role of each.
+/// Variable table with the role of each variable.
 pub(crate) struct Variables<M> {
-    pub(crate) table: Table<M>,
+    pub(crate) table: VariableTable<M>,
     pub(crate) roles: Vec<Role>,
 }
 
 impl<M: 'static> Variables<M> {
     pub(crate) fn new() -> Self {
-        Self { table: Table::new(), roles: Vec::new() }
+        Self { table: VariableTable::new(), roles: Vec::new() }
     }
 
-    fn add(mut self, declare: impl FnOnce(Table<M>) -> Table<M>) -> Self {
+    fn add(mut self, declare: impl FnOnce(VariableTable<M>) -> VariableTable<M>) -> Self {
         self.roles.push(Role::default());
         Self { table: declare(self.table), ..self }
     }
@@ -107,9 +108,9 @@ impl<M: 'static> Variables<M> {
     pub(crate) fn enumeration<T: Copy + PartialEq + Send + Sync>(
         self,
         common: Common,
-        of: &'static Enumeration<T>,
+        items: &'static Enumeration<T>,
         field: impl Fn(&mut M) -> &mut T + Copy + Send + Sync + 'static,
     ) -> Self {
-        self.add(|table| table.enumeration(common, of, field))
+        self.add(|table| table.enumeration(common, items, field))
     }
 }

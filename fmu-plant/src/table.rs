@@ -1,4 +1,4 @@
-//! Table of the unit's variables.
+//! Variable table of the FMU.
 
 mod sensors;
 
@@ -48,32 +48,36 @@ pub(crate) const FIELDS: &Fields = &[
     ("sensors.triads[2]", "sensor.magnetometer"),
 ];
 
-/// Returns the role of the variable at a position in the table.
+/// Returns the role of the variable at a position in the variable table.
 pub(crate) fn role(position: usize) -> Role {
-    static ROLES: LazyLock<Vec<Role>> = LazyLock::new(|| all().roles);
+    static ROLES: LazyLock<Vec<Role>> = LazyLock::new(|| all_variables().roles);
     ROLES.get(position).copied().unwrap_or_default()
 }
 
-/// Returns all variables, in the order of the table.
-fn all() -> Plant {
-    let variables = trajectory(deflection_rates(commands(actuated(inputs(outputs(Plant::new()))))));
-    let table = disturbance(initial(inertia(variables)));
+/// Returns all variables, in the order of the variable table.
+fn all_variables() -> PlantVariables {
+    let variables =
+        trajectory(deflection_rates(commands(actuated(inputs(outputs(PlantVariables::new()))))));
+    let variables = disturbance(initial(inertia(variables)));
     let step = parameter(
         "integrator.step",
-        "Longest step of the Runge-Kutta integration in co-simulation",
+        "Maximum step size of the Runge-Kutta integration in co-simulation",
     );
-    let table = table.real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| {
-        &mut m.parameters.step
-    });
-    standard_pressure(disturbance_table(converted(sensors::all(kinematics(actuation(table))))))
+    let variables = variables
+        .real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| {
+            &mut m.parameters.step
+        });
+    standard_pressure(disturbance_table(converted(sensors::sensor_variables(kinematics(
+        actuation(variables),
+    )))))
 }
 
-/// Returns the description of the unit for FMI.
+/// Returns the description of the FMU.
 pub(crate) fn description() -> Description<ReentryPlant> {
     let scenario = Scenario::crmpc2022();
     Description {
         name: "ReentryPlant",
-        description: "Attitude motion of a re-entry vehicle under moments and bounded disturbances",
+        description: "Attitude dynamics of a re-entry vehicle under control moments and bounded disturbances",
         documentation: include_str!("plant.html").into(),
         version: env!("CARGO_PKG_VERSION"),
         model_exchange: true,
@@ -84,25 +88,25 @@ pub(crate) fn description() -> Description<ReentryPlant> {
             tolerance: 1e-8,
             step: scenario.disturbance.period,
         },
-        table: all().table,
+        table: all_variables().table,
     }
 }
 
-type Plant = Variables<ReentryPlant>;
+type PlantVariables = Variables<ReentryPlant>;
 
 /// Adds the three components of a vector; `declare` gets the name and the meaning of each axis, and
 /// `role` its number.
 fn vector(
-    mut table: Plant,
+    mut variables: PlantVariables,
     axes: [(&'static str, &'static str); 3],
     declare: impl Fn(&str, &str) -> Real,
     role: impl Fn(usize) -> Role,
     field: impl Fn(&mut ReentryPlant) -> &mut Vector3<f64> + Copy + Send + Sync + 'static,
-) -> Plant {
+) -> PlantVariables {
     for (i, (axis, meaning)) in axes.into_iter().enumerate() {
-        table = table.real(declare(axis, meaning), move |m| &mut field(m)[i]).role(role(i));
+        variables = variables.real(declare(axis, meaning), move |m| &mut field(m)[i]).role(role(i));
     }
-    table
+    variables
 }
 
 /// The role of a parameter.
@@ -110,7 +114,7 @@ fn none(_: usize) -> Role {
     Role::default()
 }
 
-fn outputs(table: Plant) -> Plant {
+fn outputs(variables: PlantVariables) -> PlantVariables {
     let motion = ["attitude.alpha", "attitude.beta", "rate.p", "rate.q", "rate.r"];
     let moment = ["moment.x", "moment.y", "moment.z"];
     let external = ["disturbanceMoment.x", "disturbanceMoment.y", "disturbanceMoment.z"];
@@ -142,8 +146,8 @@ fn outputs(table: Plant) -> Plant {
         real.derivative_of(&format!("attitude.{axis}"))
     };
     let acceleration = |axis: &str, meaning: &str| {
-        let common =
-            output(&format!("angularAcceleration.{axis}"), &format!("Body {meaning} acceleration"));
+        let text = format!("Time derivative of the body {meaning} rate");
+        let common = output(&format!("angularAcceleration.{axis}"), &text);
         let real = common
             .depends_on(motion)
             .depends_on(moment)
@@ -153,16 +157,14 @@ fn outputs(table: Plant) -> Plant {
         real.unit(unit::angular_acceleration()).nominal(0.05).derivative_of(&format!("rate.{axis}"))
     };
     let applied = |axis: &str, meaning: &str| {
-        let common = output(
-            &format!("appliedMoment.{axis}"),
-            &format!("Control {meaning} moment that acts on the vehicle"),
-        );
+        let text = format!("Control moment that acts on the vehicle about the {meaning} axis");
+        let common = output(&format!("appliedMoment.{axis}"), &text);
         let common =
             common.depends_on([format!("moment.{axis}").as_str()]).depends_on(actuators.clone());
         common.real().unit(unit::moment()).nominal(1e5)
     };
     let delta = |axis: &str, meaning: &str| {
-        let text = format!("Disturbance in force on the second derivative of the {meaning}");
+        let text = format!("Disturbance that acts on the second time derivative of the {meaning}");
         let common = discrete_output(&format!("disturbance.delta.{axis}"), &text)
             .depends_on(motion)
             .depends_on(moment)
@@ -170,7 +172,7 @@ fn outputs(table: Plant) -> Plant {
         common.real().unit(unit::angular_acceleration()).nominal(0.03)
     };
     let disturbing = |axis: &str, meaning: &str| {
-        let text = format!("Disturbance {meaning} moment in force: external and sine");
+        let text = format!("Disturbance moment about the {meaning} axis: external input plus sine");
         let common = output(&format!("disturbance.moment.{axis}"), &text);
         common
             .depends_on([format!("disturbanceMoment.{axis}").as_str()])
@@ -178,32 +180,33 @@ fn outputs(table: Plant) -> Plant {
             .unit(unit::moment())
             .nominal(1e4)
     };
-    let table = vector(table, ANGLES, angle, Role::state, |m| &mut m.output.angles);
-    let table = vector(table, RATES, rate, |i| Role::state(3 + i), |m| &mut m.output.rates);
-    let table = vector(
-        table,
+    let variables = vector(variables, ANGLES, angle, Role::state, |m| &mut m.output.angles);
+    let variables = vector(variables, RATES, rate, |i| Role::state(3 + i), |m| &mut m.output.rates);
+    let variables = vector(
+        variables,
         ANGLES,
         angle_rate,
         |i| Unknown::Derivative(i).into(),
         |m| &mut m.output.angle_rates,
     );
-    let table = vector(
-        table,
+    let variables = vector(
+        variables,
         RATES,
         acceleration,
         |i| Unknown::Derivative(3 + i).into(),
         |m| &mut m.output.angular_acceleration,
     );
-    let table = vector(
-        table,
+    let variables = vector(
+        variables,
         AXES,
         applied,
         |i| Unknown::AppliedMoment(i).into(),
         |m| &mut m.output.applied_moment,
     );
-    let table = vector(table, ANGLES, delta, |_| Unknown::Delta.into(), |m| &mut m.output.delta);
+    let variables =
+        vector(variables, ANGLES, delta, |_| Unknown::Delta.into(), |m| &mut m.output.delta);
     vector(
-        table,
+        variables,
         AXES,
         disturbing,
         |i| Unknown::DisturbanceMoment(i).into(),
@@ -211,19 +214,25 @@ fn outputs(table: Plant) -> Plant {
     )
 }
 
-fn inputs(table: Plant) -> Plant {
+fn inputs(variables: PlantVariables) -> PlantVariables {
     let control = |axis: &str, meaning: &str| {
-        let common = input(&format!("moment.{axis}"), &format!("Control {meaning} moment"));
+        let common = input(
+            &format!("moment.{axis}"),
+            &format!("Control moment about the {meaning} axis, used if actuation = moment"),
+        );
         common.real().unit(unit::moment()).nominal(1e5)
     };
     let external = |axis: &str, meaning: &str| {
-        let common =
-            input(&format!("disturbanceMoment.{axis}"), &format!("External {meaning} moment"));
+        let common = input(
+            &format!("disturbanceMoment.{axis}"),
+            &format!("External disturbance moment about the {meaning} axis"),
+        );
         common.real().unit(unit::moment()).nominal(1e4)
     };
-    let table = vector(table, AXES, control, |i| Known::Moment(i).into(), |m| &mut m.input.moment);
+    let variables =
+        vector(variables, AXES, control, |i| Known::Moment(i).into(), |m| &mut m.input.moment);
     vector(
-        table,
+        variables,
         AXES,
         external,
         |i| Known::DisturbanceMoment(i).into(),
@@ -232,17 +241,19 @@ fn inputs(table: Plant) -> Plant {
 }
 
 /// Adds the deflections of the surfaces and the flight condition.
-fn actuated(mut table: Plant) -> Plant {
+fn actuated(mut variables: PlantVariables) -> PlantVariables {
     for (i, name) in Effectors::published().names.iter().enumerate() {
-        let common =
-            output(&format!("deflection[{}]", i + 1), &format!("Deflection of the {name}"));
+        let common = output(
+            &format!("deflection[{}]", i + 1),
+            &format!("Deflection of the {name}, trailing edge down positive"),
+        );
         let real = common.real().unit(unit::angle()).nominal(0.1);
         let role = Role::state(MOTION + i);
-        table = table.real(real, move |m| &mut m.output.deflections[i]).role(role);
+        variables = variables.real(real, move |m| &mut m.output.deflections[i]).role(role);
     }
     let pressure =
-        output("flight.dynamicPressure", "Dynamic pressure of the flight, with density.scale");
-    table
+        output("flight.dynamicPressure", "Actual dynamic pressure, with density.scale applied");
+    variables
         .real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| {
             &mut m.output.dynamic_pressure
         })
@@ -250,68 +261,77 @@ fn actuated(mut table: Plant) -> Plant {
 }
 
 /// Adds the dynamic pressure that an on-board computer knows.
-fn standard_pressure(table: Plant) -> Plant {
+fn standard_pressure(variables: PlantVariables) -> PlantVariables {
     let pressure = output(
         "flight.standardDynamicPressure",
-        "Dynamic pressure with the air of the standard atmosphere, without density.scale",
+        "Dynamic pressure in the standard atmosphere, without density.scale",
     );
-    table
+    variables
         .real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| {
             &mut m.output.standard_pressure
         })
         .role(Unknown::DynamicPressure)
 }
 
-fn commands(mut table: Plant) -> Plant {
+fn commands(mut variables: PlantVariables) -> PlantVariables {
     for (i, name) in Effectors::published().names.iter().enumerate() {
         let text = format!("Commanded deflection of the {name}, trailing edge down positive");
         let common = discrete_input(&format!("surface[{}]", i + 1), &text);
         let real = common.real().unit(unit::angle()).nominal(0.1);
-        table = table.real(real, move |m| &mut m.command.surfaces[i]).role(Known::Surface(i));
+        variables =
+            variables.real(real, move |m| &mut m.command.surfaces[i]).role(Known::Surface(i));
     }
     for j in 0..JETS {
-        let text = format!("Command to jet {}: 0 off, 1 full thrust", j + 1);
+        let text = format!("Command to jet {}: 0 for off, 1 for full thrust", j + 1);
         let real = discrete_input(&format!("jet[{}]", j + 1), &text).real().nominal(1.0);
-        table = table.real(real, move |m| &mut m.command.jets[j]).role(Known::Jet(j));
+        variables = variables.real(real, move |m| &mut m.command.jets[j]).role(Known::Jet(j));
     }
-    table
+    variables
 }
 
-fn deflection_rates(mut table: Plant) -> Plant {
+fn deflection_rates(mut variables: PlantVariables) -> PlantVariables {
     for (i, name) in Effectors::published().names.iter().enumerate() {
         let (command, deflection) =
             (format!("surface[{}]", i + 1), format!("deflection[{}]", i + 1));
-        let text = format!("Rate of the deflection of the {name}: its limit, or zero at rest");
+        let text = format!(
+            "Deflection rate of the {name}: its positive or negative limit while moving, 0 at rest"
+        );
         let common = output(&format!("deflectionRate[{}]", i + 1), &text)
             .depends_on([command.as_str(), deflection.as_str()]);
         let real = common.real().unit(unit::angular_rate()).nominal(0.1).derivative_of(&deflection);
         let role = Unknown::Derivative(MOTION + i);
-        table = table.real(real, move |m| &mut m.output.deflection_rates[i]).role(role);
+        variables = variables.real(real, move |m| &mut m.output.deflection_rates[i]).role(role);
     }
-    table
+    variables
 }
 
 /// Input of the trajectory: its name, its meaning, whether it is a rate, and its field.
 type TrajectoryInput = (&'static str, &'static str, bool, fn(&mut Trajectory) -> &mut f64);
 const TRAJECTORY_INPUTS: [TrajectoryInput; 7] = [
-    ("trajectory.flightPathAngle", "Flight path angle above the horizon", false, |t| {
+    ("trajectory.flightPathAngle", "Flight path angle, positive above the horizon", false, |t| {
         &mut t.flight_path_angle
     }),
-    ("trajectory.heading", "Heading of the velocity, from north to east", false, |t| {
-        &mut t.heading
-    }),
-    ("trajectory.latitude", "Latitude, north positive", false, |t| &mut t.latitude),
+    (
+        "trajectory.heading",
+        "Heading of the velocity, measured from north towards east",
+        false,
+        |t| &mut t.heading,
+    ),
+    ("trajectory.latitude", "Latitude, positive to the north", false, |t| &mut t.latitude),
     ("trajectory.flightPathAngleRate", "Time derivative of the flight path angle", true, |t| {
         &mut t.flight_path_angle_rate
     }),
     ("trajectory.headingRate", "Time derivative of the heading", true, |t| &mut t.heading_rate),
-    ("trajectory.longitudeRate", "Time derivative of the longitude, east positive", true, |t| {
-        &mut t.longitude_rate
-    }),
+    (
+        "trajectory.longitudeRate",
+        "Time derivative of the longitude, positive to the east",
+        true,
+        |t| &mut t.longitude_rate,
+    ),
     ("trajectory.latitudeRate", "Time derivative of the latitude", true, |t| &mut t.latitude_rate),
 ];
 
-fn trajectory(mut table: Plant) -> Plant {
+fn trajectory(mut variables: PlantVariables) -> PlantVariables {
     for (i, (name, meaning, is_rate, field)) in TRAJECTORY_INPUTS.into_iter().enumerate() {
         let real = input(name, meaning).real();
         let real = if is_rate {
@@ -319,18 +339,19 @@ fn trajectory(mut table: Plant) -> Plant {
         } else {
             real.unit(unit::angle()).nominal(0.1)
         };
-        table =
-            table.real(real, move |m| field(&mut m.input.trajectory)).role(Known::Trajectory(i));
+        variables = variables
+            .real(real, move |m| field(&mut m.input.trajectory))
+            .role(Known::Trajectory(i));
     }
-    table
+    variables
 }
 
-fn kinematics(table: Plant) -> Plant {
+fn kinematics(variables: PlantVariables) -> PlantVariables {
     let earth = parameter(
         "trajectory.earthRate",
-        "Angular rate of the Earth, really 7.2921e-5 rad/s; 0 leaves it out",
+        "Angular rate of the Earth: 7.2921e-5 rad/s, or 0 to neglect the rotation",
     );
-    table
+    variables
         .enumeration(parameter("kinematics", KINEMATICS.description), &KINEMATICS, |m| {
             &mut m.parameters.kinematics
         })
@@ -339,27 +360,29 @@ fn kinematics(table: Plant) -> Plant {
         })
 }
 
-fn actuation(table: Plant) -> Plant {
-    let altitude =
-        parameter("flight.altitude", "Geometric altitude; gives air density and speed of sound");
+fn actuation(variables: PlantVariables) -> PlantVariables {
+    let altitude = parameter(
+        "flight.altitude",
+        "Geometric altitude, which determines air density and speed of sound",
+    );
     let mach = parameter("flight.mach", "Mach number");
     let density = parameter(
         "density.scale",
-        "Factor from the standard atmosphere's density: 0.9 is 10 % less",
+        "Ratio of the actual air density to that of the standard atmosphere: 0.9 means 10 % less",
     );
     let aerodynamics = parameter(
         "aerodynamics.scale",
-        "Factor from the nominal to the vehicle's surface effectiveness: 0.9 is 10 % less",
+        "Ratio of the actual to the nominal effectiveness of the surfaces: 0.9 means 10 % less",
     );
     let duty = parameter(
         "jets.duty",
-        "Jets give any thrust between 0 and 1 instead of switching on at 0.5",
+        "If true, jets give any thrust from 0 to 1; if false, they are fully on from a command of 0.5",
     );
     let symmetric = parameter(
         "jets.symmetric",
-        "Jet 4 as the mirror image of jet 8 instead of the printed column, which breaks the symmetry",
+        "If true, jet 4 mirrors jet 8; if false, it is as printed in (64) of Wu 2015, which is not symmetric",
     );
-    table
+    variables
         .enumeration(parameter("actuation", ACTUATIONS.description), &ACTUATIONS, |m| {
             &mut m.parameters.actuation
         })
@@ -376,74 +399,77 @@ fn actuation(table: Plant) -> Plant {
         .boolean(symmetric, |m| &mut m.parameters.jet_symmetric)
 }
 
-fn converted(table: Plant) -> Plant {
-    let text = "Time after which the input moment acts, held over each step; co-simulation with actuation = moment only";
+fn converted(variables: PlantVariables) -> PlantVariables {
+    let text = "Delay of the input moment, which is then held over each communication step; only for co-simulation with actuation = moment";
     let delay = parameter("actuation.delay", text).real().unit(unit::time());
-    let text = "Step of the converter that rounds the input moment, held over each step; 0 for none; co-simulation with actuation = moment only";
+    let text = "Quantization step of the input moment, which is then held over each communication step; 0 for none; only for co-simulation with actuation = moment";
     let resolution = parameter("actuation.resolution", text).real().unit(unit::moment());
-    table
+    variables
         .real(delay.min(0.0).max(transport::LONGEST).nominal(0.1), |m| {
             &mut m.parameters.moment_delay
         })
         .real(resolution.min(0.0).nominal(10.0), |m| &mut m.parameters.moment_resolution)
 }
 
-fn inertia(table: Plant) -> Plant {
+fn inertia(variables: PlantVariables) -> PlantVariables {
     let entry = |name: &str, text: &str| {
         parameter(&format!("inertia.{name}"), text).real().unit(unit::inertia()).nominal(1e6)
     };
     let scale = parameter(
         "inertia.scale",
-        "Factor from the nominal inertia to the vehicle's: 1.05 is 5 % more",
+        "Ratio of the actual to the nominal inertia: 1.05 means 5 % more",
     );
-    table
-        .real(entry("Ixx", "Nominal roll moment of inertia").min(0.0), |m| {
+    variables
+        .real(entry("Ixx", "Nominal moment of inertia about the roll axis").min(0.0), |m| {
             &mut m.parameters.inertia.Ixx
         })
-        .real(entry("Iyy", "Nominal pitch moment of inertia").min(0.0), |m| {
+        .real(entry("Iyy", "Nominal moment of inertia about the pitch axis").min(0.0), |m| {
             &mut m.parameters.inertia.Iyy
         })
-        .real(entry("Izz", "Nominal yaw moment of inertia").min(0.0), |m| {
+        .real(entry("Izz", "Nominal moment of inertia about the yaw axis").min(0.0), |m| {
             &mut m.parameters.inertia.Izz
         })
-        .real(entry("Ixz", "Nominal roll-yaw product of inertia; the tensor holds -Ixz"), |m| {
-            &mut m.parameters.inertia.Ixz
-        })
+        .real(
+            entry(
+                "Ixz",
+                "Nominal product of inertia of the roll and yaw axes; the inertia tensor contains -Ixz",
+            ),
+            |m| &mut m.parameters.inertia.Ixz,
+        )
         .real(scale.real().min(0.01).max(100.0).nominal(1.0), |m| &mut m.parameters.inertia_scale)
 }
 
-fn initial(table: Plant) -> Plant {
+fn initial(variables: PlantVariables) -> PlantVariables {
     let angle = |axis: &str, meaning: &str| {
         let limit = if axis == "beta" { BETA_LIMIT } else { 2.0 * std::f64::consts::PI };
-        let common =
-            parameter(&format!("initial.{axis}"), &format!("{} at the start", sentence(meaning)));
+        let common = parameter(&format!("initial.{axis}"), &format!("Initial {meaning}"));
         common.real().unit(unit::angle()).min(-limit).max(limit).nominal(0.1)
     };
     let rate = |axis: &str, meaning: &str| {
-        let common =
-            parameter(&format!("initial.{axis}"), &format!("Body {meaning} rate at the start"));
+        let common = parameter(&format!("initial.{axis}"), &format!("Initial body {meaning} rate"));
         common.real().unit(unit::angular_rate()).min(-10.0).max(10.0).nominal(0.05)
     };
-    let table = vector(table, ANGLES, angle, none, |m| &mut m.parameters.initial_angles);
-    vector(table, RATES, rate, none, |m| &mut m.parameters.initial_rates)
+    let variables = vector(variables, ANGLES, angle, none, |m| &mut m.parameters.initial_angles);
+    vector(variables, RATES, rate, none, |m| &mut m.parameters.initial_rates)
 }
 
-fn disturbance(table: Plant) -> Plant {
+fn disturbance(variables: PlantVariables) -> PlantVariables {
     let bound = parameter(
         "disturbance.bound",
-        "Bound on each component of the disturbance on the attitude's acceleration",
+        "Bound on the disturbance of the second time derivative of each attitude angle",
     );
     let period = parameter(
         "disturbance.period",
-        "Time for which white, alongRate and againstMoment hold a value",
+        "Time for which disturbances of the kinds white, alongRate and againstMoment are held",
     );
     let seed = parameter(
         "disturbance.seed",
-        "Seed of the white noise: the same seed gives the same noise",
+        "Seed of the white noise; the same seed gives the same noise",
     );
     let direction = |axis: &str, meaning: &str| {
-        let text =
-            format!("Factor on the bound for constant and square: component of the {meaning}");
+        let text = format!(
+            "Factor on disturbance.bound for the {meaning}, used by the kinds constant and square"
+        );
         parameter(&format!("disturbance.direction.{axis}"), &text)
             .real()
             .min(-1.0)
@@ -452,20 +478,20 @@ fn disturbance(table: Plant) -> Plant {
     };
     let square = parameter(
         "disturbance.square.period",
-        "Period of the square wave, which begins positive at disturbance.start",
+        "Period of the square wave, which starts with its positive half at disturbance.start",
     );
     let offset = |axis: &str, meaning: &str| {
-        let text = format!("Constant part of the sine disturbance's {meaning} moment");
+        let text = format!("Constant part of the sine disturbance moment about the {meaning} axis");
         parameter(&format!("disturbance.sine.offset.{axis}"), &text)
             .real()
             .unit(unit::moment())
             .nominal(1e4)
     };
-    let start = parameter("disturbance.start", "Time from which the disturbance acts");
+    let start = parameter("disturbance.start", "Time at which the disturbance starts");
     let end = parameter("disturbance.end", "Time at which the disturbance ends");
     let time = |common: fmi2_export::table::Common| common.real().unit(unit::time());
 
-    let table = table
+    let variables = variables
         .enumeration(parameter("disturbance.kind", KINDS.description), &KINDS, |m| {
             &mut m.parameters.kind
         })
@@ -475,59 +501,65 @@ fn disturbance(table: Plant) -> Plant {
         )
         .real(time(period).min(1e-4).nominal(0.04), |m| &mut m.parameters.period)
         .integer(seed, (Some(0), None), |m| &mut m.parameters.seed);
-    let table = vector(table, ANGLES, direction, none, |m| &mut m.parameters.direction)
+    let variables = vector(variables, ANGLES, direction, none, |m| &mut m.parameters.direction)
         .real(time(square).min(1e-3).nominal(10.0), |m| &mut m.parameters.square_period);
-    let table = vector(table, AXES, offset, none, |m| &mut m.parameters.sine_offset);
-    let table = sine(sine(table, "first", 0), "second", 1);
-    table.real(time(start), |m| &mut m.parameters.start).real(time(end), |m| &mut m.parameters.end)
+    let variables = vector(variables, AXES, offset, none, |m| &mut m.parameters.sine_offset);
+    let variables = sine(sine(variables, "first", 0), "second", 1);
+    variables
+        .real(time(start), |m| &mut m.parameters.start)
+        .real(time(end), |m| &mut m.parameters.end)
 }
 
-/// Adds the table of the disturbance column by column, as FMI wants the elements of an array one
-/// after the other.
-fn disturbance_table(table: Plant) -> Plant {
+/// Adds the lookup table of the disturbance column by column, as FMI wants the elements of an array
+/// one after the other.
+fn disturbance_table(variables: PlantVariables) -> PlantVariables {
     let rows = parameter(
         "disturbance.table.rows",
-        "Number of rows of the disturbance's table; those beyond are ignored",
+        "Number of rows of the disturbance's lookup table that are used; the rows after them are ignored",
     );
     let period = parameter(
         "disturbance.table.period",
-        "Period with which the table repeats, from disturbance.start on; 0: the last row holds",
+        "Period with which the lookup table repeats from disturbance.start on; 0 holds the last row instead",
     );
-    let mut table = table
+    let mut variables = variables
         .integer(rows, (Some(0), i32::try_from(TABLE_ROWS).ok()), |m| &mut m.parameters.table_rows)
         .real(period.real().unit(unit::time()).min(0.0).nominal(10.0), |m| {
             &mut m.parameters.table_period
         });
     for i in 0..TABLE_ROWS {
         let name = format!("disturbance.table.time[{}]", i + 1);
-        let text = format!("Time from which row {} holds, after disturbance.start", i + 1);
+        let text = format!("Time after disturbance.start at which row {} takes effect", i + 1);
         let real = parameter(&name, &text).real().unit(unit::time()).min(0.0).nominal(10.0);
-        table = table.real(real, move |m| &mut m.parameters.table[i].time);
+        variables = variables.real(real, move |m| &mut m.parameters.table[i].time);
     }
     for (component, (axis, meaning)) in ANGLES.into_iter().enumerate() {
         for i in 0..TABLE_ROWS {
             let name = format!("disturbance.table.{axis}[{}]", i + 1);
-            let text = format!("Factor on the bound in row {}: component of the {meaning}", i + 1);
+            let text = format!("Factor on disturbance.bound for the {meaning} in row {}", i + 1);
             let real = parameter(&name, &text).real().min(-1.0).max(1.0).nominal(1.0);
-            table = table.real(real, move |m| &mut m.parameters.table[i].direction[component]);
+            variables =
+                variables.real(real, move |m| &mut m.parameters.table[i].direction[component]);
         }
     }
-    table
+    variables
 }
 
-fn sine(table: Plant, which: &'static str, i: usize) -> Plant {
+fn sine(variables: PlantVariables, which: &'static str, i: usize) -> PlantVariables {
     let name = |part: &str| format!("disturbance.sine.{which}.{part}");
     let amplitude = |axis: &str, meaning: &str| {
-        let text = format!("Amplitude of the {which} sinusoid's {meaning} moment");
+        let text = format!("Amplitude of the {which} sinusoidal moment about the {meaning} axis");
         parameter(&name(&format!("amplitude.{axis}")), &text)
             .real()
             .unit(unit::moment())
             .nominal(1e4)
     };
-    let frequency =
-        parameter(&name("frequency"), &format!("Angular frequency of the {which} sinusoid"));
-    let phase = parameter(&name("phase"), &format!("Phase of the {which} sinusoid at time 0"));
-    vector(table, AXES, amplitude, none, move |m| &mut m.parameters.waves[i].amplitude)
+    let frequency = parameter(
+        &name("frequency"),
+        &format!("Angular frequency of the {which} sinusoidal moment"),
+    );
+    let phase =
+        parameter(&name("phase"), &format!("Phase of the {which} sinusoidal moment at time 0"));
+    vector(variables, AXES, amplitude, none, move |m| &mut m.parameters.waves[i].amplitude)
         .real(frequency.real().unit(unit::angular_rate()).min(0.0).nominal(1.0), move |m| {
             &mut m.parameters.waves[i].frequency
         })

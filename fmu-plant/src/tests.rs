@@ -1,4 +1,4 @@
-//! Tests of the unit through the interface that the shell uses.
+//! Tests of the instance through the interface that the shell uses.
 
 mod sensors;
 
@@ -7,7 +7,7 @@ use crate::plant::{Output, ReentryPlant};
 use crate::roles::{Known, Unknown};
 use crate::table::role;
 use fmi2_export::{Context, Failure, Inputs, LastEvent, Model, describe};
-use model_description::variable::{self, Causality, Variability};
+use model_description::variable::{Causality, Variability, VariableKind};
 use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::disturbance::{Kind, Row};
@@ -39,28 +39,28 @@ impl Inputs<ReentryPlant> for Ramp {
 }
 
 fn started(set: impl Fn(&mut ReentryPlant)) -> ReentryPlant {
-    let mut unit = ReentryPlant::new();
-    set(&mut unit);
-    unit.initialize(&CONTEXT).unwrap();
-    unit
+    let mut instance = ReentryPlant::new();
+    set(&mut instance);
+    instance.initialize(&CONTEXT).unwrap();
+    instance
 }
 
-fn step(unit: &mut ReentryPlant, from: f64, to: f64) -> Result<(), Failure> {
-    unit.step(from, to, &Constant, &mut |_| {})
+fn step(instance: &mut ReentryPlant, from: f64, to: f64) -> Result<(), Failure> {
+    instance.step(from, to, &Constant, &mut |_| {})
 }
 
-fn outputs(unit: &mut ReentryPlant, time: f64) -> Output {
-    unit.calculate(time, LastEvent::InputSet).unwrap();
-    unit.output
+fn outputs(instance: &mut ReentryPlant, time: f64) -> Output {
+    instance.calculate(time, LastEvent::InputSet).unwrap();
+    instance.output
 }
 
 /// Position of the first sensor reading in the table.
 const MEASURED: usize = 113;
 
 /// Calculated variables with their positions in the table.
-fn calculated(unit: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {
-    let o = outputs(unit, time);
-    let all = [
+fn calculated(instance: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {
+    let o = outputs(instance, time);
+    let vectors = [
         o.angles,
         o.rates,
         o.angle_rates,
@@ -74,7 +74,7 @@ fn calculated(unit: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {
     let readings = o.measured.readings;
     let measured = readings.iter().flatten().copied().chain([o.measured.time]);
     let groups = (0..21)
-        .zip(all.iter().flatten().copied())
+        .zip(vectors.iter().flatten().copied())
         .chain((27..36).zip(rest))
         .chain((54..62).zip(last));
     groups.chain((MEASURED..).zip(measured)).collect()
@@ -86,7 +86,7 @@ fn positions_and_names_agree() {
         describe::<ReentryPlant>().variables.into_iter().map(|variable| variable.name).collect();
     for (position, name) in names.iter().enumerate() {
         let group = name.split(['.', '[']).next().unwrap();
-        let unknown = match role(position).unknown {
+        let unknown = match role(position).as_unknown {
             Some(Unknown::State(0..3)) => "attitude",
             Some(Unknown::State(3..6)) => "rate",
             Some(Unknown::State(_)) => "deflection",
@@ -97,7 +97,7 @@ fn positions_and_names_agree() {
             Some(Unknown::Delta | Unknown::DisturbanceMoment(_)) => "disturbance",
             Some(Unknown::DynamicPressure) => "flight",
             Some(Unknown::Measured(_) | Unknown::MeasuredTime) => "measured",
-            None => match role(position).known {
+            None => match role(position).as_known {
                 Some(Known::Moment(_)) => "moment",
                 Some(Known::DisturbanceMoment(_)) => "disturbanceMoment",
                 Some(Known::Surface(_)) => "surface",
@@ -140,9 +140,9 @@ fn positions_and_names_agree() {
             "measured.sample",
         ]
     );
-    assert_eq!(role(MEASURED).unknown, Some(Unknown::Measured(0)));
-    assert_eq!(role(MEASURED + 9).unknown, Some(Unknown::MeasuredTime));
-    assert_eq!(role(MEASURED + 10).unknown, None, "an integer");
+    assert_eq!(role(MEASURED).as_unknown, Some(Unknown::Measured(0)));
+    assert_eq!(role(MEASURED + 9).as_unknown, Some(Unknown::MeasuredTime));
+    assert_eq!(role(MEASURED + 10).as_unknown, None, "an integer");
 }
 
 #[test]
@@ -163,8 +163,8 @@ fn the_description_holds() {
     let scenario = Scenario::crmpc2022();
     let start = |name: &str| match &description.variables[description.position(name).unwrap()].kind
     {
-        variable::Kind::Real { start, .. } => start.unwrap(),
-        variable::Kind::Integer { start, .. } | variable::Kind::Enumeration { start, .. } => {
+        VariableKind::Real { start, .. } => start.unwrap(),
+        VariableKind::Integer { start, .. } | VariableKind::Enumeration { start, .. } => {
             f64::from(start.unwrap())
         }
         _ => f64::NAN,
@@ -205,43 +205,44 @@ fn all_kinds() -> impl Iterator<Item = Kind> {
     KINDS.items.iter().map(|(kind, ..)| *kind)
 }
 
-/// Returns a unit in model exchange after the first event, in a general attitude, with a
+/// Returns an instance in model exchange after the first event, in a general attitude, with a
 /// disturbance of this kind.
 fn in_model_exchange(kind: Kind) -> ReentryPlant {
-    let mut unit = started(|unit| unit.parameters.kind = kind);
-    unit.input.moment = Vector3::new(3e4, -2e4, 1e4);
-    unit.input.disturbance_moment = Vector3::new(1e3, 2e3, -3e3);
-    unit.set_continuous_states(&STATES);
-    unit.new_discrete_states(0.0).unwrap();
-    unit
+    let mut instance = started(|instance| instance.parameters.kind = kind);
+    instance.input.moment = Vector3::new(3e4, -2e4, 1e4);
+    instance.input.disturbance_moment = Vector3::new(1e3, 2e3, -3e3);
+    instance.set_continuous_states(&STATES);
+    instance.new_discrete_states(0.0).unwrap();
+    instance
 }
 
 /// Selects surfaces and jets as the source of the control moment.
-fn actuate(unit: &mut ReentryPlant) {
-    unit.parameters.actuation = Actuation::SurfacesAndJets;
-    unit.command.surfaces = Surfaces::from([-5.0, -2.0, -1.0, -4.0, 3.0, -6.0, 1.0, 2.0]) * 0.02;
-    unit.command.jets = Jets::repeat(0.5);
+fn actuate(instance: &mut ReentryPlant) {
+    instance.parameters.actuation = Actuation::SurfacesAndJets;
+    instance.command.surfaces =
+        Surfaces::from([-5.0, -2.0, -1.0, -4.0, 3.0, -6.0, 1.0, 2.0]) * 0.02;
+    instance.command.jets = Jets::repeat(0.5);
 }
 
-/// Returns a unit with actuators in model exchange; its jets take a duty cycle or switch.
+/// Returns an instance with actuators in model exchange; its jets take a duty cycle or switch.
 fn actuated_in_model_exchange(duty: bool) -> ReentryPlant {
-    let mut unit = in_model_exchange(Kind::None);
-    unit.parameters.jet_duty = duty;
-    actuate(&mut unit);
-    unit.initialize(&CONTEXT).unwrap();
-    unit.set_continuous_states(&STATES);
-    unit.new_discrete_states(0.0).unwrap();
-    unit
+    let mut instance = in_model_exchange(Kind::None);
+    instance.parameters.jet_duty = duty;
+    actuate(&mut instance);
+    instance.initialize(&CONTEXT).unwrap();
+    instance.set_continuous_states(&STATES);
+    instance.new_discrete_states(0.0).unwrap();
+    instance
 }
 
-/// Returns a unit in model exchange on a trajectory that turns in every way.
+/// Returns an instance in model exchange on a trajectory that turns in every way.
 fn along_a_trajectory(kind: Kind, kinematics: Kinematics) -> ReentryPlant {
-    let mut unit = in_model_exchange(kind);
-    unit.parameters.kinematics = kinematics;
-    unit.parameters.earth_rate = 7.2921e-5;
-    unit.initialize(&CONTEXT).unwrap();
-    unit.set_continuous_states(&STATES);
-    unit.input.trajectory = Trajectory {
+    let mut instance = in_model_exchange(kind);
+    instance.parameters.kinematics = kinematics;
+    instance.parameters.earth_rate = 7.2921e-5;
+    instance.initialize(&CONTEXT).unwrap();
+    instance.set_continuous_states(&STATES);
+    instance.input.trajectory = Trajectory {
         flight_path_angle: -0.1,
         heading: 0.8,
         latitude: 0.4,
@@ -250,48 +251,48 @@ fn along_a_trajectory(kind: Kind, kinematics: Kinematics) -> ReentryPlant {
         longitude_rate: 0.03,
         latitude_rate: 0.01,
     };
-    unit.new_discrete_states(0.0).unwrap();
-    unit
+    instance.new_discrete_states(0.0).unwrap();
+    instance
 }
 
-/// Returns a unit in co-simulation at a communication point, with jets that take a duty cycle.
+/// Returns an instance in co-simulation at a communication point, with jets that take a duty cycle.
 fn at_a_communication_point() -> ReentryPlant {
-    let mut unit = started(|unit| {
-        unit.parameters.kind = Kind::None;
-        unit.parameters.jet_duty = true;
-        actuate(unit);
+    let mut instance = started(|instance| {
+        instance.parameters.kind = Kind::None;
+        instance.parameters.jet_duty = true;
+        actuate(instance);
     });
-    unit.set_continuous_states(&STATES);
-    unit
+    instance.set_continuous_states(&STATES);
+    instance
 }
 
-/// Returns a unit in co-simulation on which a moment commanded earlier acts.
+/// Returns an instance in co-simulation on which a moment commanded earlier acts.
 fn under_a_delayed_moment() -> ReentryPlant {
-    let mut unit = delayed(0.01);
-    unit.input.moment = Vector3::new(3e4, -2e4, 1e4);
-    step(&mut unit, 0.0, 0.02).unwrap();
-    unit
+    let mut instance = delayed(0.01);
+    instance.input.moment = Vector3::new(3e4, -2e4, 1e4);
+    step(&mut instance, 0.0, 0.02).unwrap();
+    instance
 }
 
-fn known_positions() -> impl Iterator<Item = usize> {
-    (0..69).filter(|&position| role(position).known.is_some())
+fn positions_of_knowns() -> impl Iterator<Item = usize> {
+    (0..69).filter(|&position| role(position).as_known.is_some())
 }
 
 /// Adds a number to the state or input at a position in the table.
-fn nudge(unit: &mut ReentryPlant, known: usize, by: f64) {
-    match role(known).known.unwrap() {
+fn nudge(instance: &mut ReentryPlant, known_position: usize, by: f64) {
+    match role(known_position).as_known.unwrap() {
         Known::State(i) => {
             let mut states = [0.0; 14];
-            unit.continuous_states(&mut states);
+            instance.continuous_states(&mut states);
             states[i] += by;
-            unit.set_continuous_states(&states);
+            instance.set_continuous_states(&states);
         }
-        Known::Moment(i) => unit.input.moment[i] += by,
-        Known::DisturbanceMoment(i) => unit.input.disturbance_moment[i] += by,
-        Known::Surface(i) => unit.command.surfaces[i] += by,
-        Known::Jet(j) => unit.command.jets[j] += by,
+        Known::Moment(i) => instance.input.moment[i] += by,
+        Known::DisturbanceMoment(i) => instance.input.disturbance_moment[i] += by,
+        Known::Surface(i) => instance.command.surfaces[i] += by,
+        Known::Jet(j) => instance.command.jets[j] += by,
         Known::Trajectory(i) => {
-            let t = &mut unit.input.trajectory;
+            let t = &mut instance.input.trajectory;
             *[
                 &mut t.flight_path_angle,
                 &mut t.heading,
@@ -308,7 +309,7 @@ fn nudge(unit: &mut ReentryPlant, known: usize, by: f64) {
 #[test]
 fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
     let description = describe::<ReentryPlant>();
-    let units = all_kinds()
+    let instances = all_kinds()
         .map(in_model_exchange)
         .chain([false, true].map(actuated_in_model_exchange))
         .chain([
@@ -317,22 +318,22 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
             along_a_trajectory(Kind::AgainstMoment, Kinematics::Exact),
         ])
         .chain([at_a_communication_point(), under_a_delayed_moment()]);
-    for (case, mut unit) in units.enumerate() {
-        for known in known_positions() {
-            let by = match known {
+    for (case, mut instance) in instances.enumerate() {
+        for known_position in positions_of_knowns() {
+            let by = match known_position {
                 21..27 => 1e3,
                 36..44 => 1e-3,
                 44..54 => 0.1,
                 _ => 1e-5,
             };
-            nudge(&mut unit, known, by);
-            let above = calculated(&mut unit, 0.02);
-            nudge(&mut unit, known, -2.0 * by);
-            let below = calculated(&mut unit, 0.02);
-            nudge(&mut unit, known, by);
-            let known_name = &description.variables[known].name;
+            nudge(&mut instance, known_position, by);
+            let above = calculated(&mut instance, 0.02);
+            nudge(&mut instance, known_position, -2.0 * by);
+            let below = calculated(&mut instance, 0.02);
+            nudge(&mut instance, known_position, by);
+            let known_name = &description.variables[known_position].name;
             for ((unknown, above), (_, below)) in above.iter().zip(&below) {
-                let exact = unit.partial_derivative(0.02, *unknown, known).unwrap();
+                let exact = instance.partial_derivative(0.02, *unknown, known_position).unwrap();
                 let numeric = (above - below) / (2.0 * by);
                 let variable = &description.variables[*unknown];
                 assert!(
@@ -340,7 +341,7 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
                     "{case}: {} by {known_name}: {exact}, not {numeric}",
                     variable.name
                 );
-                if exact != 0.0 && *unknown != known {
+                if exact != 0.0 && *unknown != known_position {
                     assert!(
                         variable.dependencies.contains(known_name),
                         "{} depends on {known_name}",
@@ -361,17 +362,22 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
 
 #[test]
 fn derivatives_by_parameters_are_refused() {
-    let mut unit = in_model_exchange(Kind::None);
-    for (unknown, known) in [(6, 69), (6, 6), (6, 35), (69, 0), (21, 21), (36, 36), (62, 62)] {
-        assert!(unit.partial_derivative(0.0, unknown, known).is_err(), "{unknown} by {known}");
+    let mut instance = in_model_exchange(Kind::None);
+    for (unknown, known_position) in
+        [(6, 69), (6, 6), (6, 35), (69, 0), (21, 21), (36, 36), (62, 62)]
+    {
+        assert!(
+            instance.partial_derivative(0.0, unknown, known_position).is_err(),
+            "{unknown} by {known_position}"
+        );
     }
 }
 
 #[test]
 fn outputs_are_right_from_initialization_on() {
-    let mut unit = started(|_| {});
+    let mut instance = started(|_| {});
     let scenario = Scenario::crmpc2022();
-    let output = outputs(&mut unit, 0.0);
+    let output = outputs(&mut instance, 0.0);
     assert_eq!((output.angles, output.rates), (scenario.initial_angles, scenario.initial_rates));
     assert!(output.delta.amax() > 0.0 && output.delta.amax() <= scenario.disturbance.bound);
     // At rest ω̇ = R⁻¹ Δ holds.
@@ -382,20 +388,20 @@ fn outputs_are_right_from_initialization_on() {
 #[test]
 fn at_a_tick_the_outputs_show_the_disturbance_of_the_step_to_come() {
     for kind in [Kind::White, Kind::AlongRate, Kind::AgainstMoment] {
-        let mut unit = started(|unit| unit.parameters.kind = kind);
-        unit.input.moment = Vector3::new(1e4, -1e4, 1e4);
-        step(&mut unit, 0.0, 0.04).unwrap();
-        unit.input.moment *= -1.0;
-        let announced = outputs(&mut unit, 0.04).delta;
-        step(&mut unit, 0.04, 0.08 - 1e-6).unwrap();
-        assert_eq!(outputs(&mut unit, 0.08 - 1e-6).delta, announced, "kind {kind:?}");
+        let mut instance = started(|instance| instance.parameters.kind = kind);
+        instance.input.moment = Vector3::new(1e4, -1e4, 1e4);
+        step(&mut instance, 0.0, 0.04).unwrap();
+        instance.input.moment *= -1.0;
+        let announced = outputs(&mut instance, 0.04).delta;
+        step(&mut instance, 0.04, 0.08 - 1e-6).unwrap();
+        assert_eq!(outputs(&mut instance, 0.08 - 1e-6).delta, announced, "kind {kind:?}");
     }
 }
 
 #[test]
 fn looking_changes_nothing() {
     let [mut looked_at, mut left_alone] =
-        [0, 1].map(|_| started(|unit| unit.parameters.kind = Kind::AgainstMoment));
+        [0, 1].map(|_| started(|instance| instance.parameters.kind = Kind::AgainstMoment));
     for k in 0..50 {
         let [from, to] = [0.04 * f64::from(k), 0.04 * f64::from(k + 1)];
         looked_at.input.moment = Vector3::repeat(-1e4);
@@ -411,46 +417,47 @@ fn looking_changes_nothing() {
 
 type States = nalgebra::SVector<f64, 14>;
 
-fn states(unit: &ReentryPlant) -> States {
+fn states(instance: &ReentryPlant) -> States {
     let mut states = States::zeros();
-    unit.continuous_states(states.as_mut_slice());
+    instance.continuous_states(states.as_mut_slice());
     states
 }
 
-fn indicators(unit: &mut ReentryPlant, time: f64) -> [f64; 8] {
-    unit.calculate(time, LastEvent::InputSet).unwrap();
+fn indicators(instance: &mut ReentryPlant, time: f64) -> [f64; 8] {
+    instance.calculate(time, LastEvent::InputSet).unwrap();
     let mut indicators = [f64::NAN; 8];
-    unit.event_indicators(&mut indicators);
+    instance.event_indicators(&mut indicators);
     indicators
 }
 
 /// Integrates accurately to `end`, or to the state event before it, which is located by bisection.
 /// Returns the time reached.
-fn integrate(unit: &mut ReentryPlant, begin: f64, end: f64) -> f64 {
-    let crossed = |unit: &mut ReentryPlant, time| indicators(unit, time).iter().any(|z| *z <= 0.0);
-    assert!(!crossed(unit, begin), "an event is due at {begin} s");
+fn integrate(instance: &mut ReentryPlant, begin: f64, end: f64) -> f64 {
+    let crossed =
+        |instance: &mut ReentryPlant, time| indicators(instance, time).iter().any(|z| *z <= 0.0);
+    assert!(!crossed(instance, begin), "an event is due at {begin} s");
     let steps = vehicle::integrator::equal_steps(end - begin, 0.001);
     let h = (end - begin) / steps as f64;
     for i in 0..steps {
-        let (time, y) = (begin + i as f64 * h, states(unit));
-        let advance = |unit: &mut ReentryPlant, h: f64| {
+        let (time, y) = (begin + i as f64 * h, states(instance));
+        let advance = |instance: &mut ReentryPlant, h: f64| {
             let mut f = |t: f64, y: &States| {
-                unit.set_continuous_states(y.as_slice());
-                let o = outputs(unit, t);
+                instance.set_continuous_states(y.as_slice());
+                let o = outputs(instance, t);
                 let motion = o.angle_rates.iter().chain(o.angular_acceleration.iter());
                 States::from_iterator(motion.chain(o.deflection_rates.iter()).copied())
             };
             let y = vehicle::integrator::rk4(&mut f, time, &y, h);
-            unit.set_continuous_states(y.as_slice());
-            crossed(unit, time + h)
+            instance.set_continuous_states(y.as_slice());
+            crossed(instance, time + h)
         };
-        if advance(unit, h) {
+        if advance(instance, h) {
             let (mut before, mut after) = (0.0, h);
             while after - before > 1e-15 {
                 let middle = 0.5 * (before + after);
-                if advance(unit, middle) { after = middle } else { before = middle }
+                if advance(instance, middle) { after = middle } else { before = middle }
             }
-            advance(unit, after);
+            advance(instance, after);
             return time + after;
         }
     }
@@ -458,12 +465,13 @@ fn integrate(unit: &mut ReentryPlant, begin: f64, end: f64) -> f64 {
 }
 
 /// Runs model exchange to `end` and returns the times of the events.
-fn exchange(unit: &mut ReentryPlant, begin: f64, end: f64) -> Vec<f64> {
+fn exchange(instance: &mut ReentryPlant, begin: f64, end: f64) -> Vec<f64> {
     let mut times = vec![begin];
     loop {
         let time = times[times.len() - 1];
-        let next = unit.new_discrete_states(time).unwrap().next_event_time.unwrap_or(end).min(end);
-        let reached = integrate(unit, time, next);
+        let next =
+            instance.new_discrete_states(time).unwrap().next_event_time.unwrap_or(end).min(end);
+        let reached = integrate(instance, time, next);
         if reached >= end {
             return times;
         }
@@ -479,13 +487,13 @@ fn assert_same_motion(cs: &Output, me: &Output, case: &str) {
 #[test]
 fn oracle_model_exchange_agrees_with_co_simulation() {
     for kind in all_kinds() {
-        let set = |unit: &mut ReentryPlant| {
-            unit.parameters.kind = kind;
-            unit.parameters.start = 0.3;
-            unit.parameters.end = 1.7;
-            unit.parameters.square_period = 0.9;
-            tabulate(unit, 0.9, &TABLE);
-            unit.input.moment = Vector3::new(2e4, -1e4, 1e4);
+        let set = |instance: &mut ReentryPlant| {
+            instance.parameters.kind = kind;
+            instance.parameters.start = 0.3;
+            instance.parameters.end = 1.7;
+            instance.parameters.square_period = 0.9;
+            tabulate(instance, 0.9, &TABLE);
+            instance.input.moment = Vector3::new(2e4, -1e4, 1e4);
         };
         let [mut cs, mut me] = [0, 1].map(|_| started(set));
         for k in 0..50 {
@@ -507,37 +515,37 @@ const TABLE: [(f64, [f64; 3]); 3] =
     [(0.05, [1.0, 0.0, -1.0]), (0.33, [-0.5, 1.0, 0.0]), (0.61, [0.0, -1.0, 0.7])];
 
 /// Sets the rows of the disturbance's table, and its period in s.
-fn tabulate(unit: &mut ReentryPlant, period: f64, rows: &[(f64, [f64; 3])]) {
-    unit.parameters.table_period = period;
-    unit.parameters.table_rows = rows.len();
-    for (row, &(time, direction)) in unit.parameters.table.iter_mut().zip(rows) {
+fn tabulate(instance: &mut ReentryPlant, period: f64, rows: &[(f64, [f64; 3])]) {
+    instance.parameters.table_period = period;
+    instance.parameters.table_rows = rows.len();
+    for (row, &(time, direction)) in instance.parameters.table.iter_mut().zip(rows) {
         *row = Row { time, direction: direction.into() };
     }
 }
 
-/// Returns a unit under a table that does not repeat and begins at 0.3 s.
+/// Returns an instance under a table that does not repeat and begins at 0.3 s.
 fn tabulated() -> ReentryPlant {
-    started(|unit| {
-        unit.parameters.kind = Kind::Table;
-        unit.parameters.start = 0.3;
-        tabulate(unit, 0.0, &TABLE);
+    started(|instance| {
+        instance.parameters.kind = Kind::Table;
+        instance.parameters.start = 0.3;
+        tabulate(instance, 0.0, &TABLE);
     })
 }
 
 #[test]
 fn a_table_has_its_time_events_at_its_rows_and_shows_the_row_in_force() {
-    let mut unit = tabulated();
+    let mut instance = tabulated();
     let expected = [0.0, 0.3, 0.3 + 0.05, 0.3 + 0.33, 0.3 + 0.61];
-    assert_eq!(exchange(&mut unit, 0.0, 2.0), expected, "to the last bit");
-    let bound = unit.parameters.bound;
-    assert_eq!(outputs(&mut unit, 2.0).delta, Vector3::from(TABLE[2].1) * bound);
+    assert_eq!(exchange(&mut instance, 0.0, 2.0), expected, "to the last bit");
+    let bound = instance.parameters.bound;
+    assert_eq!(outputs(&mut instance, 2.0).delta, Vector3::from(TABLE[2].1) * bound);
     // In co-simulation the last step holds two jumps.
-    let mut unit = tabulated();
+    let mut instance = tabulated();
     for (from, to, direction) in
         [(0.0, 0.34, [0.0; 3]), (0.34, 0.4, TABLE[0].1), (0.4, 1.0, TABLE[2].1)]
     {
-        step(&mut unit, from, to).unwrap();
-        assert_eq!(outputs(&mut unit, to).delta, Vector3::from(direction) * bound, "{to}");
+        step(&mut instance, from, to).unwrap();
+        assert_eq!(outputs(&mut instance, to).delta, Vector3::from(direction) * bound, "{to}");
     }
 }
 
@@ -546,30 +554,30 @@ fn rows_of_the_table_that_are_not_used_are_ignored() {
     let [mut plain, mut other] = [0, 1].map(|_| tabulated());
     other.parameters.table[3] = Row { time: -1.0, direction: Vector3::repeat(f64::NAN) };
     other.initialize(&CONTEXT).unwrap();
-    for unit in [&mut plain, &mut other] {
-        step(unit, 0.0, 2.0).unwrap();
+    for instance in [&mut plain, &mut other] {
+        step(instance, 0.0, 2.0).unwrap();
     }
     assert_eq!(outputs(&mut plain, 2.0), outputs(&mut other, 2.0));
 }
 
 #[test]
 fn a_state_saved_in_the_middle_of_the_table_goes_on_bit_for_bit() {
-    let saved = |unit: &ReentryPlant| -> ReentryPlant {
-        serde_json::from_str(&serde_json::to_string(unit).unwrap()).unwrap()
+    let saved = |instance: &ReentryPlant| -> ReentryPlant {
+        serde_json::from_str(&serde_json::to_string(instance).unwrap()).unwrap()
     };
-    let mut unit = tabulated();
-    step(&mut unit, 0.0, 0.5).unwrap();
-    let mut restored = saved(&unit);
-    for unit in [&mut unit, &mut restored] {
-        step(unit, 0.5, 0.7).unwrap();
-        step(unit, 0.7, 1.5).unwrap();
+    let mut instance = tabulated();
+    step(&mut instance, 0.0, 0.5).unwrap();
+    let mut restored = saved(&instance);
+    for instance in [&mut instance, &mut restored] {
+        step(instance, 0.5, 0.7).unwrap();
+        step(instance, 0.7, 1.5).unwrap();
     }
-    assert_eq!(outputs(&mut unit, 1.5), outputs(&mut restored, 1.5));
-    let mut unit = tabulated();
-    exchange(&mut unit, 0.0, 0.5);
-    let mut restored = saved(&unit);
-    assert_eq!(exchange(&mut unit, 0.5, 1.5), exchange(&mut restored, 0.5, 1.5));
-    assert_eq!(outputs(&mut unit, 1.5), outputs(&mut restored, 1.5));
+    assert_eq!(outputs(&mut instance, 1.5), outputs(&mut restored, 1.5));
+    let mut instance = tabulated();
+    exchange(&mut instance, 0.0, 0.5);
+    let mut restored = saved(&instance);
+    assert_eq!(exchange(&mut instance, 0.5, 1.5), exchange(&mut restored, 0.5, 1.5));
+    assert_eq!(outputs(&mut instance, 1.5), outputs(&mut restored, 1.5));
 }
 
 #[test]
@@ -577,22 +585,22 @@ fn oracle_model_exchange_agrees_with_co_simulation_under_surfaces_and_jets() {
     for (kind, duty) in
         [Kind::None, Kind::AgainstMoment].into_iter().flat_map(|kind| [(kind, false), (kind, true)])
     {
-        let set = |unit: &mut ReentryPlant| {
-            unit.parameters.kind = kind;
-            unit.parameters.jet_duty = duty;
-            actuate(unit);
+        let set = |instance: &mut ReentryPlant| {
+            instance.parameters.kind = kind;
+            instance.parameters.jet_duty = duty;
+            actuate(instance);
         };
         let [mut cs, mut me] = [0, 1].map(|_| started(set));
         for k in 0..10 {
             let [begin, end] = [0.2 * f64::from(k), 0.2 * f64::from(k + 1)];
-            for unit in [&mut cs, &mut me] {
-                unit.command.jets[k as usize] = 0.9;
-                unit.command.jets[9 - k as usize] = 0.2;
-                unit.command.surfaces[4] = 0.1 * begin.sin();
+            for instance in [&mut cs, &mut me] {
+                instance.command.jets[k as usize] = 0.9;
+                instance.command.jets[9 - k as usize] = 0.2;
+                instance.command.surfaces[4] = 0.1 * begin.sin();
             }
             step(&mut cs, begin, end).unwrap();
             exchange(&mut me, begin, end);
-            let [cs, me] = [&mut cs, &mut me].map(|unit| outputs(unit, end));
+            let [cs, me] = [&mut cs, &mut me].map(|instance| outputs(instance, end));
             assert_same_motion(&cs, &me, &format!("kind {kind:?}, duty {duty}, tick {k}"));
             assert!(
                 (cs.deflections - me.deflections).amax() < 1e-13,
@@ -608,49 +616,49 @@ fn oracle_model_exchange_agrees_with_co_simulation_under_surfaces_and_jets() {
 const FAR: [f64; 8] = [-90.0, 4.0, -3.0, 0.0, 90.0, 0.0, 0.0, 0.0];
 
 fn commanded(degrees: [f64; 8]) -> ReentryPlant {
-    started(|unit| {
-        unit.parameters.kind = Kind::None;
-        actuate(unit);
-        unit.command.surfaces = Surfaces::from(degrees).map(f64::to_radians);
+    started(|instance| {
+        instance.parameters.kind = Kind::None;
+        actuate(instance);
+        instance.command.surfaces = Surfaces::from(degrees).map(f64::to_radians);
     })
 }
 
 #[test]
 fn published_rate_limit_and_state_events_where_surfaces_stop() {
     // Wu 2015, (63): 10 deg/s; commands beyond the limits of -25, 0 and 30 deg stop there.
-    let mut unit = commanded(FAR);
-    let events = exchange(&mut unit, 0.0, 4.0);
+    let mut instance = commanded(FAR);
+    let events = exchange(&mut instance, 0.0, 4.0);
     let expected = [0.0, 0.3, 2.5, 3.0];
     assert_eq!(events.len(), expected.len(), "{events:?}");
     assert!(events.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{events:?}");
     let stop = [-25.0, 0.0, -3.0, 0.0, 30.0, 0.0, 0.0, 0.0].map(f64::to_radians);
-    assert_eq!(outputs(&mut unit, 4.0).deflections, Surfaces::from(stop), "to the last bit");
-    assert_eq!(indicators(&mut unit, 4.0), [1.0; 8]);
+    assert_eq!(outputs(&mut instance, 4.0).deflections, Surfaces::from(stop), "to the last bit");
+    assert_eq!(indicators(&mut instance, 4.0), [1.0; 8]);
 }
 
 #[test]
 fn between_events_indicators_are_the_time_left_whatever_trial_states_are_set() {
-    let mut unit = commanded(FAR);
-    unit.new_discrete_states(0.0).unwrap();
-    let start = states(&unit);
+    let mut instance = commanded(FAR);
+    instance.new_discrete_states(0.0).unwrap();
+    let start = states(&instance);
     let expected = [2.5, 1.0, 0.3, 1.0, 3.0, 1.0, 1.0, 1.0];
-    let near = |found: [f64; 8], shift: f64| {
+    let near = |actual: [f64; 8], shift: f64| {
         let expected = [2.5 - shift, 1.0, 0.3 - shift, 1.0, 3.0 - shift, 1.0, 1.0, 1.0];
-        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{found:?}");
+        assert!(actual.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{actual:?}");
     };
-    near(indicators(&mut unit, 0.0), 0.0);
-    let rates = outputs(&mut unit, 0.0).deflection_rates;
+    near(indicators(&mut instance, 0.0), 0.0);
+    let rates = outputs(&mut instance, 0.0).deflection_rates;
     for reach in [0.1, 0.3 + 1e-9, 0.4, 7.0] {
         let mut trial = start;
         for i in 0..8 {
             trial[6 + i] += rates[i] * reach;
         }
-        unit.set_continuous_states(trial.as_slice());
-        near(indicators(&mut unit, reach), reach);
-        assert_eq!(outputs(&mut unit, reach).deflection_rates, rates);
+        instance.set_continuous_states(trial.as_slice());
+        near(indicators(&mut instance, reach), reach);
+        assert_eq!(outputs(&mut instance, reach).deflection_rates, rates);
     }
-    unit.set_continuous_states(start.as_slice());
-    assert_eq!(indicators(&mut unit, 0.0).map(|z| (z * 1e12).round() / 1e12), expected);
+    instance.set_continuous_states(start.as_slice());
+    assert_eq!(indicators(&mut instance, 0.0).map(|z| (z * 1e12).round() / 1e12), expected);
 }
 
 #[test]
@@ -659,113 +667,117 @@ fn an_event_puts_a_deflection_on_its_target_however_it_was_located() {
     for (late, arrives) in
         [(-1e-3, false), (-1e-8, false), (-1e-12, true), (0.0, true), (1e-9, true), (0.04, true)]
     {
-        let mut unit = commanded(FAR);
-        unit.new_discrete_states(0.0).unwrap();
-        let rates = outputs(&mut unit, 0.0).deflection_rates;
-        let mut y = states(&unit);
+        let mut instance = commanded(FAR);
+        instance.new_discrete_states(0.0).unwrap();
+        let rates = outputs(&mut instance, 0.0).deflection_rates;
+        let mut y = states(&instance);
         for i in 0..8 {
             y[6 + i] += rates[i] * (0.3 + late);
         }
-        unit.set_continuous_states(y.as_slice());
-        let before = states(&unit);
-        let info = unit.new_discrete_states(0.3 + late).unwrap();
-        let found = outputs(&mut unit, 0.3 + late);
-        assert_eq!(info.states_changed, states(&unit) != before, "{late}");
-        assert_eq!(found.deflection_rates[2] == 0.0, arrives, "{late}");
+        instance.set_continuous_states(y.as_slice());
+        let before = states(&instance);
+        let info = instance.new_discrete_states(0.3 + late).unwrap();
+        let actual = outputs(&mut instance, 0.3 + late);
+        assert_eq!(info.states_changed, states(&instance) != before, "{late}");
+        assert_eq!(actual.deflection_rates[2] == 0.0, arrives, "{late}");
         if arrives {
-            assert_eq!(found.deflections[2], (-3f64).to_radians(), "{late}");
+            assert_eq!(actual.deflections[2], (-3f64).to_radians(), "{late}");
         }
-        assert!(indicators(&mut unit, 0.3 + late).iter().all(|z| *z > 0.0), "{late}");
+        assert!(indicators(&mut instance, 0.3 + late).iter().all(|z| *z > 0.0), "{late}");
         // A second event at the same time, or a later one, changes nothing but the readings of the
         // sensors.
-        let after = (states(&unit), found);
+        let after = (states(&instance), actual);
         for time in [0.3 + late, 0.3 + late + 1e-6] {
-            assert!(!unit.new_discrete_states(time).unwrap().states_changed);
-            let found = Output { measured: found.measured, ..outputs(&mut unit, time) };
-            assert_eq!((states(&unit), found), after, "{late}");
+            assert!(!instance.new_discrete_states(time).unwrap().states_changed);
+            let actual = Output { measured: actual.measured, ..outputs(&mut instance, time) };
+            assert_eq!((states(&instance), actual), after, "{late}");
         }
     }
 }
 
 #[test]
 fn a_new_command_at_an_event_starts_from_the_old_target() {
-    let mut unit = commanded(FAR);
-    unit.new_discrete_states(0.0).unwrap();
-    let mut y = states(&unit);
+    let mut instance = commanded(FAR);
+    instance.new_discrete_states(0.0).unwrap();
+    let mut y = states(&instance);
     y[6 + 2] = (-3.5f64).to_radians();
-    unit.set_continuous_states(y.as_slice());
-    unit.command.surfaces[2] = (-1f64).to_radians();
-    assert!(unit.new_discrete_states(0.35).unwrap().states_changed);
-    let found = outputs(&mut unit, 0.35);
-    assert_eq!(found.deflections[2], (-3f64).to_radians());
-    assert!((found.deflection_rates[2].to_degrees() - 10.0).abs() < 1e-12);
+    instance.set_continuous_states(y.as_slice());
+    instance.command.surfaces[2] = (-1f64).to_radians();
+    assert!(instance.new_discrete_states(0.35).unwrap().states_changed);
+    let actual = outputs(&mut instance, 0.35);
+    assert_eq!(actual.deflections[2], (-3f64).to_radians());
+    assert!((actual.deflection_rates[2].to_degrees() - 10.0).abs() < 1e-12);
 }
 
 #[test]
 fn an_importer_may_restart_from_other_deflections() {
-    let mut unit = commanded([0.0; 8]);
-    unit.new_discrete_states(0.0).unwrap();
-    let mut y = states(&unit);
+    let mut instance = commanded([0.0; 8]);
+    instance.new_discrete_states(0.0).unwrap();
+    let mut y = states(&instance);
     y[6 + 4] = 0.1;
-    unit.set_continuous_states(y.as_slice());
-    assert!(!unit.new_discrete_states(0.0).unwrap().states_changed);
-    let found = outputs(&mut unit, 0.0);
-    assert_eq!(found.deflections[4], 0.1);
-    assert!((found.deflection_rates[4].to_degrees() + 10.0).abs() < 1e-12);
+    instance.set_continuous_states(y.as_slice());
+    assert!(!instance.new_discrete_states(0.0).unwrap().states_changed);
+    let actual = outputs(&mut instance, 0.0);
+    assert_eq!(actual.deflections[4], 0.1);
+    assert!((actual.deflection_rates[4].to_degrees() + 10.0).abs() < 1e-12);
 }
 
 #[test]
-fn a_restored_unit_goes_on_with_moving_surfaces() {
-    let mut unit = commanded(FAR);
-    exchange(&mut unit, 0.0, 0.2);
-    let saved = serde_json::to_string(&unit).unwrap();
+fn a_restored_instance_continues_with_moving_surfaces() {
+    let mut instance = commanded(FAR);
+    exchange(&mut instance, 0.0, 0.2);
+    let saved = serde_json::to_string(&instance).unwrap();
     let mut restored: ReentryPlant = serde_json::from_str(&saved).unwrap();
-    let events = exchange(&mut unit, 0.2, 1.0);
+    let events = exchange(&mut instance, 0.2, 1.0);
     assert_eq!(exchange(&mut restored, 0.2, 1.0), events);
-    assert_eq!(outputs(&mut restored, 1.0), outputs(&mut unit, 1.0));
+    assert_eq!(outputs(&mut restored, 1.0), outputs(&mut instance, 1.0));
 }
 
 #[test]
 fn published_moments_of_jets_act_from_the_communication_point_on() {
     // Wu 2015, (64): column 4 as printed and as the mirror image of column 8.
     for (symmetric, pitch) in [(false, 10944.0), (true, 11798.0)] {
-        let mut unit = started(|unit| {
-            unit.parameters.actuation = Actuation::SurfacesAndJets;
-            unit.parameters.jet_symmetric = symmetric;
+        let mut instance = started(|instance| {
+            instance.parameters.actuation = Actuation::SurfacesAndJets;
+            instance.parameters.jet_symmetric = symmetric;
         });
-        assert_eq!(outputs(&mut unit, 0.0).applied_moment, Vector3::zeros());
-        unit.command.jets[3] = 1.0;
-        assert_eq!(outputs(&mut unit, 0.0).applied_moment, Vector3::new(-6912.0, pitch, -11798.0));
+        assert_eq!(outputs(&mut instance, 0.0).applied_moment, Vector3::zeros());
+        instance.command.jets[3] = 1.0;
+        assert_eq!(
+            outputs(&mut instance, 0.0).applied_moment,
+            Vector3::new(-6912.0, pitch, -11798.0)
+        );
     }
 }
 
 #[test]
 fn in_model_exchange_jets_switch_and_surfaces_turn_at_events_only() {
-    let mut unit = started(|unit| unit.parameters.actuation = Actuation::SurfacesAndJets);
-    unit.new_discrete_states(0.0).unwrap();
-    unit.command.jets[0] = 1.0;
-    unit.command.surfaces[4] = 0.1;
-    let before = outputs(&mut unit, 0.01);
+    let mut instance =
+        started(|instance| instance.parameters.actuation = Actuation::SurfacesAndJets);
+    instance.new_discrete_states(0.0).unwrap();
+    instance.command.jets[0] = 1.0;
+    instance.command.surfaces[4] = 0.1;
+    let before = outputs(&mut instance, 0.01);
     assert_eq!((before.applied_moment, before.deflections), (Vector3::zeros(), Surfaces::zeros()));
     assert_eq!(before.deflection_rates, Surfaces::zeros());
-    unit.new_discrete_states(0.01).unwrap();
-    assert_eq!(outputs(&mut unit, 0.01).applied_moment, Vector3::new(0.0, -498.0, 19897.0));
-    let reached = integrate(&mut unit, 0.01, 0.02);
-    assert!((outputs(&mut unit, reached).deflections[4].to_degrees() - 0.1).abs() < 1e-12);
+    instance.new_discrete_states(0.01).unwrap();
+    assert_eq!(outputs(&mut instance, 0.01).applied_moment, Vector3::new(0.0, -498.0, 19897.0));
+    let reached = integrate(&mut instance, 0.01, 0.02);
+    assert!((outputs(&mut instance, reached).deflections[4].to_degrees() - 0.1).abs() < 1e-12);
 }
 
 #[test]
 fn oracle_dynamic_pressure_and_biases_of_aerodynamics_and_density() {
     let flaps = |scale: f64| {
-        let mut unit = started(|unit| {
-            unit.parameters.actuation = Actuation::SurfacesAndJets;
-            unit.parameters.density_scale = scale;
-            unit.parameters.aerodynamics_scale = scale;
-            unit.command.surfaces[4] = 0.1;
-            unit.command.surfaces[5] = 0.1;
+        let mut instance = started(|instance| {
+            instance.parameters.actuation = Actuation::SurfacesAndJets;
+            instance.parameters.density_scale = scale;
+            instance.parameters.aerodynamics_scale = scale;
+            instance.command.surfaces[4] = 0.1;
+            instance.command.surfaces[5] = 0.1;
         });
-        step(&mut unit, 0.0, 1.0).unwrap();
-        outputs(&mut unit, 1.0)
+        step(&mut instance, 0.0, 1.0).unwrap();
+        outputs(&mut instance, 1.0)
     };
     let [nominal, biased] = [1.0, 0.9].map(flaps);
     // Flight at 55 km and Mach 9.8 in the US Standard Atmosphere 1976.
@@ -781,9 +793,9 @@ fn with_a_moment_actuators_stay_at_rest_and_commands_do_nothing() {
     let [mut plain, mut commanded] = [0, 1].map(|_| started(|_| {}));
     commanded.command.surfaces = Surfaces::repeat(-0.1);
     commanded.command.jets = Jets::repeat(1.0);
-    for unit in [&mut plain, &mut commanded] {
-        unit.input.moment = Vector3::new(1e4, -2e4, 3e4);
-        step(unit, 0.0, 0.5).unwrap();
+    for instance in [&mut plain, &mut commanded] {
+        instance.input.moment = Vector3::new(1e4, -2e4, 3e4);
+        step(instance, 0.0, 0.5).unwrap();
     }
     let output = outputs(&mut commanded, 0.5);
     assert_eq!(output, outputs(&mut plain, 0.5));
@@ -795,132 +807,132 @@ fn with_a_moment_actuators_stay_at_rest_and_commands_do_nothing() {
 
 #[test]
 fn between_events_the_disturbance_is_held_even_beyond_a_tick() {
-    let mut unit = in_model_exchange(Kind::White);
-    let held = outputs(&mut unit, 0.0).delta;
+    let mut instance = in_model_exchange(Kind::White);
+    let held = outputs(&mut instance, 0.0).delta;
     for time in [0.01, 0.04, 0.041] {
-        assert_eq!(outputs(&mut unit, time).delta, held);
+        assert_eq!(outputs(&mut instance, time).delta, held);
     }
-    assert_eq!(unit.new_discrete_states(0.04).unwrap().next_event_time, Some(0.08));
-    assert_ne!(outputs(&mut unit, 0.04).delta, held);
+    assert_eq!(instance.new_discrete_states(0.04).unwrap().next_event_time, Some(0.08));
+    assert_ne!(outputs(&mut instance, 0.04).delta, held);
 }
 
 #[test]
 fn an_event_iteration_sees_the_latest_moment() {
-    let mut unit = started(|unit| unit.parameters.kind = Kind::AgainstMoment);
-    unit.new_discrete_states(0.0).unwrap();
-    let before = outputs(&mut unit, 0.0).delta;
-    unit.input.moment = vehicle::kinematics::r_inverse(&unit.output.angles) * before * 1e7;
-    unit.new_discrete_states(0.0).unwrap();
-    assert_ne!(outputs(&mut unit, 0.0).delta, before);
-    unit.input.moment = Vector3::zeros();
-    unit.new_discrete_states(0.02).unwrap();
-    assert_ne!(outputs(&mut unit, 0.02).delta, before, "between ticks the value is kept");
+    let mut instance = started(|instance| instance.parameters.kind = Kind::AgainstMoment);
+    instance.new_discrete_states(0.0).unwrap();
+    let before = outputs(&mut instance, 0.0).delta;
+    instance.input.moment = vehicle::kinematics::r_inverse(&instance.output.angles) * before * 1e7;
+    instance.new_discrete_states(0.0).unwrap();
+    assert_ne!(outputs(&mut instance, 0.0).delta, before);
+    instance.input.moment = Vector3::zeros();
+    instance.new_discrete_states(0.02).unwrap();
+    assert_ne!(outputs(&mut instance, 0.02).delta, before, "between ticks the value is kept");
 }
 
 #[test]
 fn oracle_input_derivatives_are_integrated() {
     // At beta = 0 a pitch moment k t alone gives q = k t² / 2 Iyy.
-    let mut unit = started(|unit| {
-        unit.parameters.kind = Kind::None;
-        unit.parameters.initial_angles = Vector3::new(0.1, 0.0, 0.2);
+    let mut instance = started(|instance| {
+        instance.parameters.kind = Kind::None;
+        instance.parameters.initial_angles = Vector3::new(0.1, 0.0, 0.2);
     });
-    unit.step(0.0, 2.0, &Ramp(1e4), &mut |_| {}).unwrap();
+    instance.step(0.0, 2.0, &Ramp(1e4), &mut |_| {}).unwrap();
     let exact = 1e4 * 2.0 * 2.0 / 2.0 / (1303212.0 * 1.05);
-    assert!((outputs(&mut unit, 2.0).rates.y - exact).abs() < 1e-15);
+    assert!((outputs(&mut instance, 2.0).rates.y - exact).abs() < 1e-15);
 }
 
 #[test]
 fn refusals_name_variables() {
     let changes: [fn(&mut ReentryPlant); 46] = [
-        |unit| unit.parameters.inertia.Ixx = 0.0,
-        |unit| unit.parameters.inertia.Ixz = 2e6,
-        |unit| unit.parameters.inertia.Iyy = 1e7,
-        |unit| unit.parameters.inertia_scale = 0.0,
-        |unit| unit.parameters.initial_angles.x = f64::NAN,
-        |unit| unit.parameters.initial_angles.y = 1.6,
-        |unit| unit.parameters.step = 0.0,
-        |unit| unit.parameters.earth_rate = f64::NAN,
-        |unit| unit.parameters.moment_delay = -1.0,
-        |unit| {
-            unit.parameters.actuation = Actuation::SurfacesAndJets;
-            unit.parameters.moment_delay = 0.1;
+        |instance| instance.parameters.inertia.Ixx = 0.0,
+        |instance| instance.parameters.inertia.Ixz = 2e6,
+        |instance| instance.parameters.inertia.Iyy = 1e7,
+        |instance| instance.parameters.inertia_scale = 0.0,
+        |instance| instance.parameters.initial_angles.x = f64::NAN,
+        |instance| instance.parameters.initial_angles.y = 1.6,
+        |instance| instance.parameters.step = 0.0,
+        |instance| instance.parameters.earth_rate = f64::NAN,
+        |instance| instance.parameters.moment_delay = -1.0,
+        |instance| {
+            instance.parameters.actuation = Actuation::SurfacesAndJets;
+            instance.parameters.moment_delay = 0.1;
         },
-        |unit| unit.parameters.moment_resolution = -1.0,
-        |unit| {
-            unit.parameters.actuation = Actuation::SurfacesAndJets;
-            unit.parameters.moment_resolution = 8.0;
+        |instance| instance.parameters.moment_resolution = -1.0,
+        |instance| {
+            instance.parameters.actuation = Actuation::SurfacesAndJets;
+            instance.parameters.moment_resolution = 8.0;
         },
-        |unit| {
-            unit.parameters.actuation = Actuation::SurfacesAndJets;
-            unit.parameters.aerodynamics_scale = -1.0;
+        |instance| {
+            instance.parameters.actuation = Actuation::SurfacesAndJets;
+            instance.parameters.aerodynamics_scale = -1.0;
         },
-        |unit| unit.parameters.flight.altitude = 1e5,
-        |unit| unit.parameters.flight.mach = -1.0,
-        |unit| unit.parameters.bound = -1.0,
-        |unit| unit.parameters.period = 0.0,
-        |unit| unit.parameters.square_period = 0.0,
-        |unit| unit.parameters.direction.x = 2.0,
-        |unit| unit.parameters.end = -1.0,
-        |unit| unit.parameters.waves[0].phase = f64::NAN,
-        |unit| unit.parameters.table_rows = 9,
-        |unit| unit.parameters.table_period = -1.0,
-        |unit| tabulate(unit, 0.0, &[(-1.0, [0.0; 3])]),
-        |unit| tabulate(unit, 0.0, &[(1.0, [0.0; 3]), (1.0, [0.0; 3])]),
-        |unit| tabulate(unit, 2.0, &[(0.0, [0.0; 3]), (1.0, [0.0; 3]), (2.0, [0.0; 3])]),
-        |unit| tabulate(unit, 0.0, &[(0.0, [0.0; 3]), (1.0, [2.0, 0.0, 0.0])]),
-        |unit| tabulate(unit, 0.0, &[(0.0, [0.0, -2.0, 0.0])]),
-        |unit| tabulate(unit, 0.0, &[(0.0, [0.0, 0.0, f64::NAN])]),
-        |unit| unit.parameters.surroundings.gravity = -1.0,
-        |unit| unit.parameters.surroundings.field.x = f64::NAN,
-        |unit| {
-            unit.parameters.calibrates = true;
-            unit.parameters.sequence.beta_amplitude = 1.5;
+        |instance| instance.parameters.flight.altitude = 1e5,
+        |instance| instance.parameters.flight.mach = -1.0,
+        |instance| instance.parameters.bound = -1.0,
+        |instance| instance.parameters.period = 0.0,
+        |instance| instance.parameters.square_period = 0.0,
+        |instance| instance.parameters.direction.x = 2.0,
+        |instance| instance.parameters.end = -1.0,
+        |instance| instance.parameters.waves[0].phase = f64::NAN,
+        |instance| instance.parameters.table_rows = 9,
+        |instance| instance.parameters.table_period = -1.0,
+        |instance| tabulate(instance, 0.0, &[(-1.0, [0.0; 3])]),
+        |instance| tabulate(instance, 0.0, &[(1.0, [0.0; 3]), (1.0, [0.0; 3])]),
+        |instance| tabulate(instance, 2.0, &[(0.0, [0.0; 3]), (1.0, [0.0; 3]), (2.0, [0.0; 3])]),
+        |instance| tabulate(instance, 0.0, &[(0.0, [0.0; 3]), (1.0, [2.0, 0.0, 0.0])]),
+        |instance| tabulate(instance, 0.0, &[(0.0, [0.0, -2.0, 0.0])]),
+        |instance| tabulate(instance, 0.0, &[(0.0, [0.0, 0.0, f64::NAN])]),
+        |instance| instance.parameters.surroundings.gravity = -1.0,
+        |instance| instance.parameters.surroundings.field.x = f64::NAN,
+        |instance| {
+            instance.parameters.calibrates = true;
+            instance.parameters.sequence.beta_amplitude = 1.5;
         },
-        |unit| {
-            unit.parameters.calibrates = true;
-            unit.parameters.sequence.alpha_rate = f64::NAN;
+        |instance| {
+            instance.parameters.calibrates = true;
+            instance.parameters.sequence.alpha_rate = f64::NAN;
         },
-        |unit| unit.parameters.line.period = 0.0,
-        |unit| unit.parameters.line.delay = 1e3,
-        |unit| unit.parameters.line.drop_probability = 2.0,
-        |unit| unit.parameters.triads[0].noise = -1.0,
-        |unit| unit.parameters.triads[1].bandwidth = -1.0,
-        |unit| unit.parameters.triads[2].range = -1.0,
-        |unit| unit.parameters.triads[2].resolution = -1.0,
-        |unit| unit.parameters.triads[0].matrix.fill(f64::NAN),
-        |unit| unit.parameters.triads[1].bias.fill(f64::NAN),
-        |unit| unit.parameters.triads[1].drift.fill(f64::NAN),
-        |unit| unit.parameters.turntable.bandwidth = -1.0,
-        |unit| unit.parameters.turntable.rate = -1.0,
-        |unit| {
-            unit.parameters.sensor_set = 0;
-            unit.parameters.turntable.bandwidth = 10.0;
+        |instance| instance.parameters.line.period = 0.0,
+        |instance| instance.parameters.line.delay = 1e3,
+        |instance| instance.parameters.line.drop_probability = 2.0,
+        |instance| instance.parameters.triads[0].noise = -1.0,
+        |instance| instance.parameters.triads[1].bandwidth = -1.0,
+        |instance| instance.parameters.triads[2].range = -1.0,
+        |instance| instance.parameters.triads[2].resolution = -1.0,
+        |instance| instance.parameters.triads[0].matrix.fill(f64::NAN),
+        |instance| instance.parameters.triads[1].bias.fill(f64::NAN),
+        |instance| instance.parameters.triads[1].drift.fill(f64::NAN),
+        |instance| instance.parameters.turntable.bandwidth = -1.0,
+        |instance| instance.parameters.turntable.rate = -1.0,
+        |instance| {
+            instance.parameters.sensor_set = 0;
+            instance.parameters.turntable.bandwidth = 10.0;
         },
     ];
     let refusal = |set: &fn(&mut ReentryPlant)| {
-        let mut unit = ReentryPlant::new();
-        unit.parameters.sensor_set = 2;
-        set(&mut unit);
-        unit.initialize(&CONTEXT).unwrap_err().to_string()
+        let mut instance = ReentryPlant::new();
+        instance.parameters.sensor_set = 2;
+        set(&mut instance);
+        instance.initialize(&CONTEXT).unwrap_err().to_string()
     };
-    let found: Vec<String> = changes.iter().map(refusal).collect();
+    let actual: Vec<String> = changes.iter().map(refusal).collect();
     let expected: Vec<&str> = include_str!("tests/messages.txt").lines().collect();
-    assert_eq!(found, expected);
+    assert_eq!(actual, expected);
 }
 
 #[test]
 fn impossible_parameters_are_refused_by_name() {
     let refusal = |set: fn(&mut ReentryPlant)| {
-        let mut unit = ReentryPlant::new();
-        set(&mut unit);
-        unit.initialize(&CONTEXT).unwrap_err().to_string()
+        let mut instance = ReentryPlant::new();
+        set(&mut instance);
+        instance.initialize(&CONTEXT).unwrap_err().to_string()
     };
     for (message, name) in [
-        (refusal(|unit| unit.parameters.inertia.Ixx = 0.0), "inertia.Ixx"),
-        (refusal(|unit| unit.parameters.inertia.Ixz = 2e6), "inertia.Ixz"),
-        (refusal(|unit| unit.parameters.inertia.Iyy = 1e7), "inertia.Iyy"),
-        (refusal(|unit| unit.parameters.end = -1.0), "disturbance.end"),
-        (refusal(|unit| unit.parameters.flight.altitude = 1e5), "flight.altitude"),
+        (refusal(|instance| instance.parameters.inertia.Ixx = 0.0), "inertia.Ixx"),
+        (refusal(|instance| instance.parameters.inertia.Ixz = 2e6), "inertia.Ixz"),
+        (refusal(|instance| instance.parameters.inertia.Iyy = 1e7), "inertia.Iyy"),
+        (refusal(|instance| instance.parameters.end = -1.0), "disturbance.end"),
+        (refusal(|instance| instance.parameters.flight.altitude = 1e5), "flight.altitude"),
     ] {
         assert!(message.contains(name), "{message}");
     }
@@ -930,56 +942,60 @@ fn impossible_parameters_are_refused_by_name() {
 fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_exchange() {
     let mut singular = [0.0; 14];
     singular[1] = 1.6;
-    let mut unit = in_model_exchange(Kind::None);
-    unit.set_continuous_states(&singular);
+    let mut instance = in_model_exchange(Kind::None);
+    instance.set_continuous_states(&singular);
     assert!(
-        matches!(unit.calculate(0.1, LastEvent::InputSet), Err(Failure::Discard(text)) if text.contains("singular"))
+        matches!(instance.calculate(0.1, LastEvent::InputSet), Err(Failure::Discard(text)) if text.contains("singular"))
     );
-    let mut unit = started(|_| {});
-    unit.set_continuous_states(&singular);
+    let mut instance = started(|_| {});
+    instance.set_continuous_states(&singular);
     assert!(
-        matches!(unit.calculate(0.0, LastEvent::InputSet), Err(Failure::Error(text)) if text.contains("singular"))
+        matches!(instance.calculate(0.0, LastEvent::InputSet), Err(Failure::Error(text)) if text.contains("singular"))
     );
-    let mut unit = started(|unit| {
-        unit.parameters.kind = Kind::None;
-        unit.parameters.inertia.Ixz = 0.0;
-        unit.parameters.initial_angles = Vector3::new(0.0, 1.5, 0.0);
-        unit.parameters.initial_rates = Vector3::new(0.0, 0.0, -0.5);
+    let mut instance = started(|instance| {
+        instance.parameters.kind = Kind::None;
+        instance.parameters.inertia.Ixz = 0.0;
+        instance.parameters.initial_angles = Vector3::new(0.0, 1.5, 0.0);
+        instance.parameters.initial_rates = Vector3::new(0.0, 0.0, -0.5);
     });
     assert!(
-        matches!(step(&mut unit, 0.0, 1.0), Err(Failure::Error(text)) if text.contains("beta"))
+        matches!(step(&mut instance, 0.0, 1.0), Err(Failure::Error(text)) if text.contains("beta"))
     );
 }
 
 #[test]
-fn a_wrong_moment_is_an_error_and_the_unit_starts_again() {
-    let mut unit = started(|_| {});
-    unit.input.moment.x = f64::NAN;
+fn a_wrong_moment_is_an_error_and_the_instance_starts_again() {
+    let mut instance = started(|_| {});
+    instance.input.moment.x = f64::NAN;
     assert!(
-        matches!(unit.calculate(0.0, LastEvent::InputSet), Err(Failure::Error(text)) if text.contains("moment"))
+        matches!(instance.calculate(0.0, LastEvent::InputSet), Err(Failure::Error(text)) if text.contains("moment"))
     );
     assert!(
-        matches!(step(&mut unit, 0.0, 0.04), Err(Failure::Error(text)) if text.contains("moment"))
+        matches!(step(&mut instance, 0.0, 0.04), Err(Failure::Error(text)) if text.contains("moment"))
     );
-    unit.input.moment.x = 0.0;
-    unit.initialize(&CONTEXT).unwrap();
-    step(&mut unit, 0.0, 0.04).unwrap();
+    instance.input.moment.x = 0.0;
+    instance.initialize(&CONTEXT).unwrap();
+    step(&mut instance, 0.0, 0.04).unwrap();
 }
 
 #[test]
 fn before_initialization_it_says_so() {
-    let mut unit = ReentryPlant::new();
+    let mut instance = ReentryPlant::new();
     assert!(
-        unit.calculate(0.0, LastEvent::InputSet).unwrap_err().to_string().contains("initialized")
+        instance
+            .calculate(0.0, LastEvent::InputSet)
+            .unwrap_err()
+            .to_string()
+            .contains("initialized")
     );
-    assert!(step(&mut unit, 0.0, 1.0).is_err());
-    assert!(unit.new_discrete_states(0.0).is_err());
+    assert!(step(&mut instance, 0.0, 1.0).is_err());
+    assert!(instance.new_discrete_states(0.0).is_err());
 }
 
 #[test]
 fn outputs_need_no_start_and_inputs_have_one() {
     for variable in describe::<ReentryPlant>().variables {
-        let variable::Kind::Real { start, unit, .. } = &variable.kind else { continue };
+        let VariableKind::Real { start, unit, .. } = &variable.kind else { continue };
         assert_eq!(start.is_none(), variable.causality == Causality::Output, "{}", variable.name);
         let plain = [
             "inertia.scale",
@@ -1006,38 +1022,39 @@ fn outputs_need_no_start_and_inputs_have_one() {
 }
 
 fn delayed(delay: f64) -> ReentryPlant {
-    started(|unit| unit.parameters.moment_delay = delay)
+    started(|instance| instance.parameters.moment_delay = delay)
 }
 
 #[test]
 fn oracle_a_delayed_moment_is_shown_when_it_acts() {
-    let mut unit = delayed(0.1);
+    let mut instance = delayed(0.1);
     let pitch = |k: u32| Vector3::new(0.0, 1e4 * f64::from(k + 1), 0.0);
     for k in 0..20_u32 {
         let time = 0.04 * f64::from(k);
-        unit.input.moment = pitch(k);
+        instance.input.moment = pitch(k);
         // The delay of 0.1 s is two and a half steps.
         let acts = if k < 3 { Vector3::zeros() } else { pitch(k - 3) };
-        assert_eq!(outputs(&mut unit, time).applied_moment, acts, "{k}");
-        step(&mut unit, time, time + 0.04).unwrap();
+        assert_eq!(outputs(&mut instance, time).applied_moment, acts, "{k}");
+        step(&mut instance, time, time + 0.04).unwrap();
     }
 }
 
 #[test]
 fn moments_under_way_are_part_of_the_saved_state() {
-    let mut unit = delayed(0.117);
+    let mut instance = delayed(0.117);
     let mut restored: Option<ReentryPlant> = None;
     for k in 0..20_u32 {
         let time = 0.04 * f64::from(k);
-        for unit in std::iter::once(&mut unit).chain(restored.as_mut()) {
-            unit.input.moment = Vector3::new(1e4 * time.sin(), -1e4 * time.cos(), 5e3);
-            step(unit, time, time + 0.04).unwrap();
+        for instance in std::iter::once(&mut instance).chain(restored.as_mut()) {
+            instance.input.moment = Vector3::new(1e4 * time.sin(), -1e4 * time.cos(), 5e3);
+            step(instance, time, time + 0.04).unwrap();
         }
         if k == 7 {
-            restored = Some(serde_json::from_str(&serde_json::to_string(&unit).unwrap()).unwrap());
+            restored =
+                Some(serde_json::from_str(&serde_json::to_string(&instance).unwrap()).unwrap());
         }
     }
-    assert_eq!(outputs(&mut unit, 0.8), outputs(&mut restored.unwrap(), 0.8));
+    assert_eq!(outputs(&mut instance, 0.8), outputs(&mut restored.unwrap(), 0.8));
 }
 
 #[test]
@@ -1051,7 +1068,7 @@ fn a_delay_is_refused_by_name_where_it_cannot_work() {
     assert!(delayed(0.0).new_discrete_states(0.0).is_ok());
     let ramp = text(delayed(0.1).step(0.0, 0.04, &Ramp(1e5), &mut |_| {}).unwrap_err());
     assert!(ramp.contains("actuation.delay") && ramp.contains("derivatives"), "{ramp}");
-    let mut converted = started(|unit| unit.parameters.moment_resolution = 8.0);
+    let mut converted = started(|instance| instance.parameters.moment_resolution = 8.0);
     let in_model_exchange = text(converted.new_discrete_states(0.0).unwrap_err());
     assert!(in_model_exchange.contains("actuation.resolution = 8 N m"), "{in_model_exchange}");
     let mut actuated = ReentryPlant::new();

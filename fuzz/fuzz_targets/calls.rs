@@ -1,4 +1,4 @@
-//! Calls functions of a unit in any order.
+//! Calls functions of an FMU in any order.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz::calls(data));

@@ -1,18 +1,18 @@
-//! What a target makes of random bytes: numbers, units and references.
+//! Numbers, FMUs and value references that a target makes of random bytes.
 
-use conformance::{Unit, units};
-use model_description::variable::Kind;
+use conformance::{Fmu, fmus};
+use model_description::variable::VariableKind;
 use std::ffi::c_int;
 use std::sync::LazyLock;
 
 thread_local! {
-    // The handles of a library are of one thread here: units are made and freed in it.
-    static UNITS: LazyLock<Vec<Unit>> = LazyLock::new(units);
+    // Each thread has its instances of the libraries, which it makes and frees.
+    static FMUS: LazyLock<Vec<Fmu>> = LazyLock::new(fmus);
 }
 
-/// Returns one of the units.
-pub(crate) fn unit(bytes: &mut Bytes) -> Unit {
-    UNITS.with(|units| units[bytes.below(units.len())].clone())
+/// Returns one of the FMUs.
+pub(crate) fn fmu(bytes: &mut Bytes) -> Fmu {
+    FMUS.with(|fmus| fmus[bytes.below(fmus.len())].clone())
 }
 
 /// Random bytes that are taken one after the other; after the last one come zeros.
@@ -37,7 +37,7 @@ impl Bytes<'_> {
         u64::from_le_bytes(std::array::from_fn(|_| self.byte()))
     }
 
-    /// A number: mostly one that a user might take.
+    /// A number, mostly one that a user might choose.
     pub(crate) fn real(&mut self) -> f64 {
         const EDGES: [f64; 8] =
             [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN, 5e-324, -0.0, 1e17];
@@ -53,16 +53,20 @@ impl Bytes<'_> {
         if self.is(8) { self.bits() as c_int } else { c_int::from(self.byte().cast_signed()) / 8 }
     }
 
-    /// References: mostly of variables that are there, and of that type.
-    pub(crate) fn references(&mut self, unit: &Unit, of: fn(&Kind) -> bool) -> Vec<u32> {
-        let known = unit.references(|variable| of(&variable.kind));
-        let all = unit.description.variables.len();
+    /// Value references, mostly of variables that exist and have the chosen type.
+    pub(crate) fn references(
+        &mut self,
+        fmu: &Fmu,
+        is_chosen: fn(&VariableKind) -> bool,
+    ) -> Vec<u32> {
+        let chosen = fmu.references(|variable| is_chosen(&variable.kind));
+        let count = fmu.description.variables.len();
         (0..self.byte() % 6)
             .map(|_| match self.byte() {
                 0..=3 => self.bits() as u32,
-                4..=15 => self.below(all) as u32,
-                _ if known.is_empty() => 0,
-                _ => known[self.below(known.len())],
+                4..=15 => self.below(count) as u32,
+                _ if chosen.is_empty() => 0,
+                _ => chosen[self.below(chosen.len())],
             })
             .collect()
     }

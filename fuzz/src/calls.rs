@@ -2,11 +2,11 @@
 
 #![allow(clippy::borrow_as_ptr, reason = "calls read better as in C")]
 
-use crate::bytes::{Bytes, unit};
+use crate::bytes::{Bytes, fmu};
 use conformance::interface::{DISCARD, ERROR, EventInfo, FmuState, MODEL_EXCHANGE, OK, Status};
 use conformance::table::{Row, State, TABLE, settable};
 use conformance::{Instance, c};
-use model_description::variable::Kind;
+use model_description::variable::VariableKind;
 use std::ffi::{CStr, CString, c_int};
 use std::ptr::{null, null_mut};
 
@@ -15,13 +15,13 @@ const CALLS: usize = 200;
 /// Largest number of saved states that are kept at the same time.
 const SAVED: usize = 8;
 
-/// What the standard says of an instance: the state that it is in and the states that it saved.
+/// Model of an instance by the standard: its present state and its saved states.
 struct Model {
     instance: Instance,
     fmu_type: c_int,
     state: State,
     saved: Vec<(FmuState, State)>,
-    /// Time that the unit has reached, as far as is known.
+    /// Time that the instance has reached, or NaN.
     time: f64,
 }
 
@@ -33,14 +33,14 @@ struct Answer {
     next: State,
 }
 
-/// Calls functions of a unit in any order with any values, as far as they are valid in C. Each
-/// answer must be one that the standard has for the state, and values must be values.
+/// Calls functions of an FMU in any order with any values that are valid in C. Each answer must be
+/// one that the standard allows in the state, and all results must be valid values.
 pub fn calls(data: &[u8]) {
     let mut bytes = Bytes(data);
-    let unit = unit(&mut bytes);
-    let kinds = unit.interfaces();
+    let fmu = fmu(&mut bytes);
+    let kinds = fmu.interfaces();
     let fmu_type = kinds[bytes.below(kinds.len())];
-    let instance = unit.instance(fmu_type);
+    let instance = fmu.instance(fmu_type);
     let state = State::Instantiated;
     let mut model = Model { instance, fmu_type, state, saved: Vec::new(), time: 0.0 };
     for _ in 0..CALLS {
@@ -55,15 +55,15 @@ impl Model {
     /// Makes one call and checks its answer.
     fn call(&mut self, row: &Row, bytes: &mut Bytes) {
         let &Row(name, ..) = row;
-        let unit = self.instance.unit.clone();
+        let fmu = self.instance.fmu.clone();
         let before = self.state;
         self.instance.forget();
         let Answer { status, is_right, next } = self.ask(row, bytes);
         let texts: Vec<_> = self.instance.messages().into_iter().map(|said| said.text).collect();
-        let what = format!("{}: {name} in {before:?} gave {status}: {texts:?}", unit.name());
+        let what = format!("{}: {name} in {before:?} gave {status}: {texts:?}", fmu.name());
         assert!([OK, DISCARD, ERROR].contains(&status), "{what}");
         let is_offered =
-            name != "fmi2GetDirectionalDerivative" || unit.description.directional_derivatives();
+            name != "fmi2GetDirectionalDerivative" || fmu.description.directional_derivatives();
         if !row.is_allowed(self.fmu_type, before) || !is_offered {
             assert_eq!(status, ERROR, "{what}");
         }
@@ -90,12 +90,12 @@ impl Model {
     /// Looks at all values. Those that cannot be had put the instance into the error state, so it
     /// is brought back.
     fn look(&mut self, what: &str) {
-        let here = self.instance.save();
+        let saved_state = self.instance.save();
         let wrong = self.instance.wrong_value();
         assert!(wrong.is_none(), "{what}: then {wrong:?}");
-        self.instance.restore(here);
+        self.instance.restore(saved_state);
         let component = self.instance.component;
-        self.instance.ok(c!(self.instance, fmi2FreeFMUstate(component, &mut { here })));
+        self.instance.ok(c!(self.instance, fmi2FreeFMUstate(component, &mut { saved_state })));
     }
 
     #[allow(clippy::too_many_lines, reason = "a table")]
@@ -106,7 +106,7 @@ impl Model {
         };
         let &Row(name, call, ..) = row;
         let i = &self.instance;
-        let (it, unit) = (i.component, &i.unit);
+        let (it, fmu) = (i.component, &i.fmu);
         let mut next = self.state;
         let mut is_right = true;
         let status = match name {
@@ -151,7 +151,8 @@ impl Model {
                 call(i, null_mut())
             }
             "fmi2GetReal" => {
-                let references = bytes.references(unit, |kind| matches!(kind, Kind::Real { .. }));
+                let references =
+                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Real { .. }));
                 let mut values = vec![f64::NAN; references.len()];
                 let n = references.len();
                 let status = c!(i, fmi2GetReal(it, references.as_ptr(), n, values.as_mut_ptr()));
@@ -159,48 +160,51 @@ impl Model {
                 status
             }
             "fmi2GetInteger" => {
-                let references = bytes.references(unit, is_whole);
+                let references = bytes.references(fmu, is_whole);
                 let (n, mut values) = (references.len(), vec![0; references.len()]);
                 c!(i, fmi2GetInteger(it, references.as_ptr(), n, values.as_mut_ptr()))
             }
             "fmi2GetBoolean" => {
                 let references =
-                    bytes.references(unit, |kind| matches!(kind, Kind::Boolean { .. }));
+                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Boolean { .. }));
                 let (n, mut values) = (references.len(), vec![0; references.len()]);
                 let status = c!(i, fmi2GetBoolean(it, references.as_ptr(), n, values.as_mut_ptr()));
                 is_right = values.iter().all(|value| [0, 1].contains(value));
                 status
             }
             "fmi2GetString" => {
-                let references = bytes.references(unit, |kind| matches!(kind, Kind::String { .. }));
+                let references =
+                    bytes.references(fmu, |kind| matches!(kind, VariableKind::String { .. }));
                 let (n, mut values) = (references.len(), vec![null(); references.len()]);
                 let status = c!(i, fmi2GetString(it, references.as_ptr(), n, values.as_mut_ptr()));
                 is_right = values.iter().all(|value| !value.is_null());
                 status
             }
             "fmi2SetReal" => {
-                let references = bytes.references(unit, |kind| matches!(kind, Kind::Real { .. }));
+                let references =
+                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Real { .. }));
                 let values: Vec<_> = references.iter().map(|_| bytes.real()).collect();
                 is_right =
                     self.are_settable(&references) && values.iter().all(|value| value.is_finite());
                 c!(i, fmi2SetReal(it, references.as_ptr(), values.len(), values.as_ptr()))
             }
             "fmi2SetInteger" => {
-                let references = bytes.references(unit, is_whole);
+                let references = bytes.references(fmu, is_whole);
                 let values: Vec<_> = references.iter().map(|_| bytes.whole()).collect();
                 is_right = self.are_settable(&references);
                 c!(i, fmi2SetInteger(it, references.as_ptr(), values.len(), values.as_ptr()))
             }
             "fmi2SetBoolean" => {
                 let references =
-                    bytes.references(unit, |kind| matches!(kind, Kind::Boolean { .. }));
+                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Boolean { .. }));
                 let values: Vec<_> = references.iter().map(|_| bytes.whole()).collect();
                 is_right = self.are_settable(&references)
                     && values.iter().all(|value| [0, 1].contains(value));
                 c!(i, fmi2SetBoolean(it, references.as_ptr(), values.len(), values.as_ptr()))
             }
             "fmi2SetString" => {
-                let references = bytes.references(unit, |kind| matches!(kind, Kind::String { .. }));
+                let references =
+                    bytes.references(fmu, |kind| matches!(kind, VariableKind::String { .. }));
                 let text = CString::new(vec![1 + bytes.byte() % 255; bytes.below(40)]);
                 let text = text.expect("no zero");
                 let values = vec![text.as_ptr(); references.len()];
@@ -225,7 +229,7 @@ impl Model {
                 next = saved.unwrap_or(next);
                 self.time = f64::NAN;
                 let status = call(i, handle);
-                // Only a unit that runs says where it is.
+                // Only an instance that has been initialized reports its time.
                 if status == OK && next == StepComplete {
                     c!(i, fmi2GetRealStatus(it, 2, &mut self.time));
                 }
@@ -234,11 +238,11 @@ impl Model {
             "fmi2FreeFMUstate" => {
                 let (mut handle, saved) = self.handle(bytes);
                 is_right = saved.is_some() || handle.is_null();
-                let own = handle;
+                let freed = handle;
                 let status = c!(i, fmi2FreeFMUstate(it, &mut handle));
                 if status == OK {
                     assert!(handle.is_null());
-                    self.saved.retain(|(handle, _)| *handle != own);
+                    self.saved.retain(|(handle, _)| *handle != freed);
                 }
                 status
             }
@@ -261,12 +265,14 @@ impl Model {
                 status
             }
             "fmi2GetDirectionalDerivative" => {
-                let unknown = bytes.references(unit, |kind| matches!(kind, Kind::Real { .. }));
-                let known = bytes.references(unit, |kind| matches!(kind, Kind::Real { .. }));
-                let seed: Vec<_> = known.iter().map(|_| bytes.real()).collect();
-                let mut values = vec![0.0; unknown.len()];
-                let (nu, nk) = (unknown.len(), known.len());
-                let (u, k) = (unknown.as_ptr(), known.as_ptr());
+                let unknowns =
+                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Real { .. }));
+                let knowns =
+                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Real { .. }));
+                let seed: Vec<_> = knowns.iter().map(|_| bytes.real()).collect();
+                let mut values = vec![0.0; unknowns.len()];
+                let (nu, nk) = (unknowns.len(), knowns.len());
+                let (u, k) = (unknowns.as_ptr(), knowns.as_ptr());
                 let to = values.as_mut_ptr();
                 c!(i, fmi2GetDirectionalDerivative(it, u, nu, k, nk, seed.as_ptr(), to))
             }
@@ -276,7 +282,7 @@ impl Model {
                 c!(i, fmi2SetTime(it, time))
             }
             "fmi2SetContinuousStates" => {
-                let n = unit.description.states().len();
+                let n = fmu.description.states().len();
                 let states: Vec<_> = (0..n).map(|_| bytes.real()).collect();
                 is_right = states.iter().all(|state| state.is_finite());
                 c!(i, fmi2SetContinuousStates(it, states.as_ptr(), n))
@@ -288,7 +294,8 @@ impl Model {
                 status
             }
             "fmi2SetRealInputDerivatives" => {
-                let references = bytes.references(unit, |kind| matches!(kind, Kind::Real { .. }));
+                let references =
+                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Real { .. }));
                 let orders: Vec<_> = references.iter().map(|_| bytes.whole()).collect();
                 let values: Vec<_> = references.iter().map(|_| bytes.real()).collect();
                 is_right = self.are_settable(&references)
@@ -300,7 +307,7 @@ impl Model {
             "fmi2DoStep" => {
                 let at = if bytes.is(16) { bytes.real() } else { self.time };
                 let size = match bytes.byte() {
-                    0..=63 => unit.description.default_experiment.step,
+                    0..=63 => fmu.description.default_experiment.step,
                     64..=79 => bytes.real(),
                     _ => f64::from(bytes.byte()) * 0.01,
                 };
@@ -318,7 +325,7 @@ impl Model {
 
     /// Whether each variable may be set now.
     fn are_settable(&self, references: &[u32]) -> bool {
-        let variables = &self.instance.unit.description.variables;
+        let variables = &self.instance.fmu.description.variables;
         references.iter().all(|reference| {
             variables
                 .get(*reference as usize)
@@ -340,8 +347,8 @@ impl Model {
     }
 }
 
-fn is_whole(kind: &Kind) -> bool {
-    matches!(kind, Kind::Integer { .. } | Kind::Enumeration { .. })
+fn is_whole(kind: &VariableKind) -> bool {
+    matches!(kind, VariableKind::Integer { .. } | VariableKind::Enumeration { .. })
 }
 
 /// Whether an error of a function leaves the instance in its state.

@@ -1,4 +1,5 @@
-//! What is fuzzed: everything that reads text or files of others, and the C interface of the units.
+//! Targets for fuzzing: everything that reads text or files of others, and the C interface of the
+//! FMUs.
 //! A target returns whatever comes; a panic, a crash, a hang or memory without bound is a fault.
 #![allow(clippy::missing_panics_doc, reason = "a target fails by panicking")]
 
@@ -47,8 +48,8 @@ pub fn description(data: &[u8]) {
         assert!(!fault.is_empty() && !fault.contains('\n'), "{fault}");
     }
     for (position, variable) in description.variables.iter().enumerate() {
-        let (first, found) = description.find(&variable.name).expect("a name that is there");
-        assert!(first <= position && found.name == variable.name);
+        let (first, same) = description.find(&variable.name).expect("a name that exists");
+        assert!(first <= position && same.name == variable.name);
     }
 }
 
@@ -78,12 +79,12 @@ pub fn campaign(data: &[u8]) {
     let _ = Campaign::load(&file("campaign.toml", data));
 }
 
-/// Converts a number with a unit: one line with the text, one with the unit that is wanted.
+/// Converts a quantity: the first line is the quantity, the second the unit to convert it to.
 pub fn quantity(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    let (text, wanted) = text.split_once('\n').unwrap_or((text, "rad"));
-    if let Ok(value) = quantity::convert(text, Some(wanted), &[]) {
-        assert!(!value.is_nan(), "{text:?} in {wanted:?}");
+    let (text, unit) = text.split_once('\n').unwrap_or((text, "rad"));
+    if let Ok(value) = quantity::convert(text, Some(unit), &[]) {
+        assert!(!value.is_nan(), "{text:?} in {unit:?}");
     }
 }
 
@@ -98,7 +99,7 @@ pub fn ssp(data: &[u8]) {
     let _ = ssp::load(&file("a.ssp", &bytes), &Overrides::default());
 }
 
-/// What takes any bytes.
+/// Function that accepts any bytes.
 pub type Target = fn(&[u8]);
 
 /// All targets with their names, which are those of the folders of `corpus/`.
@@ -115,22 +116,23 @@ pub const TARGETS: [(&str, Target); 10] = [
     ("table", table),
 ];
 
-/// Reads a table of reference values, and one that is a unit, whose outputs are finite at any time.
+/// Reads a lookup table of reference values, and one that is a component, whose outputs are finite
+/// at any time.
 pub fn table(data: &[u8]) {
     let _ = LookupTable::from_csv("t.csv", data);
     let Ok(fmu) = Fmu::open(&file("t.csv", data)) else { return };
-    let mut unit = fmu.instantiate("t", None).expect("a table needs no library");
+    let mut instance = fmu.instantiate("t", None).expect("a lookup table needs no library");
     let description = &fmu.description;
-    let (_, interpolation) = description.find("interpolation").expect("every table has it");
+    let (_, interpolation) = description.find("interpolation").expect("every lookup table has it");
     for mode in [1, 2] {
-        unit.reset().expect("nothing is wrong");
-        unit.set_integer(&[interpolation.reference], &[mode]).expect("1 is hold, 2 is linear");
-        unit.enter_initialization(0.0, 1.0).expect("the rows are in order");
+        instance.reset().expect("nothing is wrong");
+        instance.set_integer(&[interpolation.reference], &[mode]).expect("1 is hold, 2 is linear");
+        instance.enter_initialization(0.0, 1.0).expect("the rows are in order");
         for time in [-1e9, 0.0, 0.5, 1.0, 7.0, 1e9] {
-            unit.do_step(time, 0.0).expect("a step does nothing else");
+            instance.do_step(time, 0.0).expect("a step does nothing else");
             for output in description.variables.iter().filter(|v| v.causality == "output") {
                 let mut value = [0.0];
-                unit.get_real(&[output.reference], &mut value).expect("the variable is there");
+                instance.get_real(&[output.reference], &mut value).expect("the variable is there");
                 assert!(value[0].is_finite(), "{} at {time} s", output.name);
             }
         }

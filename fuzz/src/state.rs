@@ -1,19 +1,19 @@
 //! Saved states that were changed.
 
-use crate::bytes::{Bytes, unit};
+use crate::bytes::{Bytes, fmu};
 use conformance::c;
 use conformance::interface::{CO_SIMULATION, DISCARD, ERROR, OK};
 
 /// Bytes of a saved state before its content, the last of which are its length and checksum.
 const HEADER: usize = 61;
 
-/// Gives a unit a saved state that was changed, with a checksum that fits. The unit may refuse it,
-/// or must go on with it like any other.
+/// Gives an instance a saved state that was changed, with a checksum that fits. The instance must
+/// either refuse it or continue from it as from any other.
 pub fn state(data: &[u8]) {
     let mut bytes = Bytes(data);
-    let unit = unit(&mut bytes);
-    let instance = unit.instance(CO_SIMULATION).initialized();
-    let step = unit.description.default_experiment.step;
+    let fmu = fmu(&mut bytes);
+    let instance = fmu.instance(CO_SIMULATION).initialized();
+    let step = fmu.description.default_experiment.step;
     for tick in 0..bytes.byte() % 4 {
         instance.ok(instance.step(f64::from(tick) * step, step));
     }
@@ -43,12 +43,12 @@ pub fn state(data: &[u8]) {
     instance.ok(status);
     let component = instance.component;
     let restored = c!(instance, fmi2SetFMUstate(component, handle));
-    assert!([OK, ERROR].contains(&restored), "{}: {restored}", unit.name());
-    assert!(restored == OK || content != saved, "{}: its own state is refused", unit.name());
+    assert!([OK, ERROR].contains(&restored), "{}: {restored}", fmu.name());
+    assert!(restored == OK || content != saved, "{}: an unchanged state is refused", fmu.name());
     if restored == ERROR {
         // The instance is as it was.
         let wrong = instance.wrong_value();
-        assert!(wrong.is_none(), "{}: {wrong:?}", unit.name());
+        assert!(wrong.is_none(), "{}: {wrong:?}", fmu.name());
         return;
     }
     let mut time = 0.0;
@@ -57,11 +57,11 @@ pub fn state(data: &[u8]) {
     }
     for tick in 0..3 {
         let status = instance.step(time + f64::from(tick) * step, step);
-        assert!([OK, ERROR, DISCARD].contains(&status), "{}: {status}", unit.name());
+        assert!([OK, ERROR, DISCARD].contains(&status), "{}: {status}", fmu.name());
         if status != OK {
             return;
         }
         let wrong = instance.wrong_value();
-        assert!(wrong.is_none(), "{}: {wrong:?}", unit.name());
+        assert!(wrong.is_none(), "{}: {wrong:?}", fmu.name());
     }
 }

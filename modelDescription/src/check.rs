@@ -1,7 +1,8 @@
-//! Search for contradictions in a table, so that they are found before an importer meets them.
+//! Search for contradictions in a description, so that they are detected before an importer meets
+//! them.
 
 use crate::unit::Unit;
-use crate::variable::{Causality, EnumerationType, Kind, Variability, Variable};
+use crate::variable::{Causality, EnumerationType, Variability, Variable, VariableKind};
 use crate::{Error, ModelDescription};
 use std::collections::{HashMap, HashSet};
 
@@ -12,7 +13,7 @@ impl ModelDescription {
     /// Names the first variable at fault and says what is wrong with it.
     pub fn check(&self) -> Result<(), Error> {
         self.find_problem()
-            .map_or(Ok(()), |problem| Err(Error::Description { unit: self.name.clone(), problem }))
+            .map_or(Ok(()), |problem| Err(Error::Description { fmu: self.name.clone(), problem }))
     }
 
     fn find_problem(&self) -> Option<String> {
@@ -26,7 +27,7 @@ impl ModelDescription {
             );
         }
         if !self.co_simulation && !self.model_exchange {
-            return Some("is neither for co-simulation nor for model exchange".into());
+            return Some("it is neither for co-simulation nor for model exchange".into());
         }
         let experiment = self.default_experiment;
         if ![experiment.start, experiment.stop, experiment.tolerance, experiment.step]
@@ -58,7 +59,7 @@ impl ModelDescription {
                 return Some(format!("'{state}' has a second derivative, '{name}'"));
             }
             match &variable.kind {
-                Kind::Real { unit: Some(unit), .. }
+                VariableKind::Real { unit: Some(unit), .. }
                     if *units.entry(&unit.name).or_insert(unit) != unit =>
                 {
                     return Some(format!(
@@ -66,12 +67,13 @@ impl ModelDescription {
                         unit.name
                     ));
                 }
-                Kind::Enumeration { of, .. }
-                    if *enumerations.entry(&of.name).or_insert(of) != of =>
+                VariableKind::Enumeration { enumeration_type, .. }
+                    if *enumerations.entry(&enumeration_type.name).or_insert(enumeration_type)
+                        != enumeration_type =>
                 {
                     return Some(format!(
                         "'{name}' defines '{}' differently from a variable before it",
-                        of.name
+                        enumeration_type.name
                     ));
                 }
                 _ => {}
@@ -82,7 +84,7 @@ impl ModelDescription {
 
     fn find_problem_in(&self, variable: &Variable) -> Option<String> {
         if variable.variability == Variability::Continuous
-            && !matches!(variable.kind, Kind::Real { .. })
+            && !matches!(variable.kind, VariableKind::Real { .. })
         {
             return Some("is not a Real, so it must be fixed or discrete".into());
         }
@@ -91,14 +93,13 @@ impl ModelDescription {
         {
             return Some("must be both a parameter and fixed, or neither".into());
         }
-        let known = |name: &&String| {
-            let found = self.variables.iter().find(|other| other.name == **name);
-            found.is_some_and(|other| {
-                other.causality == Causality::Input
-                    || self.variables.iter().any(|of| of.derivative_of() == Some(name.as_str()))
+        let is_input_or_state = |name: &&String| {
+            self.variables.iter().find(|other| other.name == **name).is_some_and(|other| {
+                let is_derivative = |variable: &Variable| variable.derivative_of() == Some(name);
+                other.causality == Causality::Input || self.variables.iter().any(is_derivative)
             })
         };
-        if let Some(name) = variable.dependencies.iter().find(|name| !known(name)) {
+        if let Some(name) = variable.dependencies.iter().find(|name| !is_input_or_state(name)) {
             return Some(format!("depends on '{name}', which is neither an input nor a state"));
         }
         if let Some(state) = variable.derivative_of() {
@@ -113,26 +114,33 @@ impl ModelDescription {
                 ));
             }
         }
-        let wanted = !variable.is_calculated();
+        let needs_start = !variable.is_calculated();
         let (present, in_range) = match &variable.kind {
-            Kind::Real { min, max, start, .. } => {
-                let all = [*min, *max, *start];
-                if all.iter().flatten().any(|x| !x.is_finite()) {
+            VariableKind::Real { min, max, start, .. } => {
+                let numbers = [*min, *max, *start];
+                if numbers.iter().flatten().any(|x| !x.is_finite()) {
                     return Some("has a limit or start value that is not finite".into());
                 }
                 (start.is_some(), within(*min, *start, *max))
             }
-            Kind::Integer { min, max, start } => (start.is_some(), within(*min, *start, *max)),
-            Kind::Enumeration { of, start } => {
-                (start.is_some(), within(Some(1), *start, i32::try_from(of.items.len()).ok()))
+            VariableKind::Integer { min, max, start } => {
+                (start.is_some(), within(*min, *start, *max))
             }
-            Kind::Boolean { start } => (start.is_some(), true),
-            Kind::String { start } => (start.is_some(), true),
+            VariableKind::Enumeration { enumeration_type, start } => {
+                let last = i32::try_from(enumeration_type.items.len()).ok();
+                (start.is_some(), within(Some(1), *start, last))
+            }
+            VariableKind::Boolean { start } => (start.is_some(), true),
+            VariableKind::String { start } => (start.is_some(), true),
         };
-        if present != wanted {
+        if present != needs_start {
             return Some(
-                if wanted { "needs a start value" } else { "is calculated and has a start value" }
-                    .into(),
+                if needs_start {
+                    "needs a start value"
+                } else {
+                    "is calculated and has a start value"
+                }
+                .into(),
             );
         }
         (!in_range).then(|| "has a start value outside its limits".into())

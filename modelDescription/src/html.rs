@@ -1,6 +1,6 @@
-//! The page `documentation/index.html` of a unit, made from its table.
+//! The page `documentation/index.html` of an FMU, made from its description.
 
-use crate::variable::{Causality, Kind, Variable};
+use crate::variable::{Causality, Variable, VariableKind};
 use crate::{AUTHOR, LICENSE, ModelDescription};
 use quick_xml::escape::escape;
 use std::fmt::Write;
@@ -20,7 +20,7 @@ dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.2rem}dd{margin
 ";
 
 impl ModelDescription {
-    /// Returns the page `documentation/index.html`: the unit's own text, then tables of its
+    /// Returns the page `documentation/index.html`: the FMU's text, then tables of its
     /// variables. The page needs no network.
     ///
     /// # Panics
@@ -33,7 +33,7 @@ impl ModelDescription {
 
     fn write_html(&self, page: &mut String) -> std::fmt::Result {
         let name = escape(&self.name);
-        let kind = match (self.co_simulation, self.model_exchange) {
+        let interface = match (self.co_simulation, self.model_exchange) {
             (true, true) => "co-simulation and model exchange",
             (true, false) => "co-simulation",
             (false, _) => "model exchange",
@@ -45,9 +45,9 @@ impl ModelDescription {
              <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
              <title>{name}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
              <h1>{name}</h1>\n<p class=\"lead\">{}</p>\n\
-             <dl>\n<dt>Interface</dt><dd>FMI 2.0, {kind}</dd>\n<dt>Version</dt><dd>{}</dd>\n\
+             <dl>\n<dt>Interface</dt><dd>FMI 2.0, {interface}</dd>\n<dt>Version</dt><dd>{}</dd>\n\
              <dt>GUID</dt><dd><code>{}</code></dd>\n\
-             <dt>Proposed experiment</dt><dd>{} s to {} s, communication step {} s</dd>\n</dl>\n\
+             <dt>Default experiment</dt><dd>{} s to {} s, communication step {} s</dd>\n</dl>\n\
              {}\n",
             escape(&self.description),
             escape(&self.version),
@@ -106,18 +106,20 @@ impl ModelDescription {
     fn write_enumeration_lists(&self, page: &mut String) -> std::fmt::Result {
         let mut seen = vec![];
         for variable in &self.variables {
-            let Kind::Enumeration { of, .. } = &variable.kind else { continue };
-            if seen.contains(&&of.name) {
+            let VariableKind::Enumeration { enumeration_type, .. } = &variable.kind else {
+                continue;
+            };
+            if seen.contains(&&enumeration_type.name) {
                 continue;
             }
-            seen.push(&of.name);
+            seen.push(&enumeration_type.name);
             write!(
                 page,
                 "<h2>{}</h2>\n<p>{}</p>\n<dl>\n",
-                escape(&of.name),
-                escape(&of.description)
+                escape(&enumeration_type.name),
+                escape(&enumeration_type.description)
             )?;
-            for ((item, description), value) in of.items.iter().zip(1..) {
+            for ((item, description), value) in enumeration_type.items.iter().zip(1..) {
                 let (item, description) = (escape(item), escape(description));
                 writeln!(page, "<dt>{value} <code>{item}</code></dt><dd>{description}</dd>")?;
             }
@@ -137,42 +139,44 @@ fn number(x: f64) -> String {
 
 fn unit(variable: &Variable) -> String {
     match &variable.kind {
-        Kind::Real { unit: Some(unit), .. } => match &unit.display {
+        VariableKind::Real { unit: Some(unit), .. } => match &unit.display {
             Some(display) => format!("{} (shown in {})", unit.name, display.name),
             None => unit.name.clone(),
         },
-        Kind::Real { unit: None, .. } => "–".into(),
-        Kind::Integer { .. } => "Integer".into(),
-        Kind::Boolean { .. } => "Boolean".into(),
-        Kind::Enumeration { of, .. } => of.name.clone(),
-        Kind::String { .. } => "String".into(),
+        VariableKind::Real { unit: None, .. } => "–".into(),
+        VariableKind::Integer { .. } => "Integer".into(),
+        VariableKind::Boolean { .. } => "Boolean".into(),
+        VariableKind::Enumeration { enumeration_type, .. } => enumeration_type.name.clone(),
+        VariableKind::String { .. } => "String".into(),
     }
 }
 
 fn start_value(variable: &Variable) -> String {
     match &variable.kind {
-        Kind::Real { start: Some(start), unit, .. } => {
+        VariableKind::Real { start: Some(start), unit, .. } => {
             let display = unit.as_ref().and_then(|unit| unit.display.as_ref());
             let shown = display.filter(|_| *start != 0.0);
             let shown = shown
                 .map(|display| format!(" = {} {}", number(start * display.factor), display.name));
             number(*start) + &shown.unwrap_or_default()
         }
-        Kind::Integer { start: Some(start), .. } => start.to_string(),
-        Kind::Boolean { start: Some(start) } => start.to_string(),
-        Kind::Enumeration { of, start: Some(start) } => {
-            let item = usize::try_from(start - 1).ok().and_then(|i| of.items.get(i));
+        VariableKind::Integer { start: Some(start), .. } => start.to_string(),
+        VariableKind::Boolean { start: Some(start) } => start.to_string(),
+        VariableKind::Enumeration { enumeration_type, start: Some(start) } => {
+            let item = usize::try_from(start - 1).ok().and_then(|i| enumeration_type.items.get(i));
             item.map_or_else(|| start.to_string(), |(name, _)| name.clone())
         }
-        Kind::String { start: Some(start) } => format!("\"{start}\""),
+        VariableKind::String { start: Some(start) } => format!("\"{start}\""),
         _ => String::new(),
     }
 }
 
 fn limits(variable: &Variable) -> String {
     let (min, max) = match &variable.kind {
-        Kind::Real { min, max, .. } => (min.map(number), max.map(number)),
-        Kind::Integer { min, max, .. } => (min.map(|x| x.to_string()), max.map(|x| x.to_string())),
+        VariableKind::Real { min, max, .. } => (min.map(number), max.map(number)),
+        VariableKind::Integer { min, max, .. } => {
+            (min.map(|x| x.to_string()), max.map(|x| x.to_string()))
+        }
         _ => (None, None),
     };
     match (min, max) {

@@ -1,13 +1,13 @@
-//! Description of an FMI 2.0 unit as data, the XML made from it, and the packing of `.fmu`
-//! archives (feature `pack`). The crate knows no physics.
+//! Description of an FMI 2.0 FMU as data, the XML made from it, and the packing of the archives
+//! (feature `pack`). The crate knows no physics.
 
-#[cfg(feature = "pack")]
-pub mod binary;
 pub mod check;
 #[cfg(feature = "pack")]
 pub mod html;
 #[cfg(feature = "pack")]
 pub mod library;
+#[cfg(feature = "pack")]
+pub mod library_file;
 #[cfg(feature = "pack")]
 pub mod pack;
 pub mod structure;
@@ -22,32 +22,38 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use variable::Variable;
 
-/// Author of the units, as `modelDescription.xml` names them.
+/// Author of the FMUs, as `modelDescription.xml` names them.
 pub const AUTHOR: &str = "Re-entry Attitude Control contributors";
-/// SPDX expression of the licence of every unit.
+/// SPDX expression of the licence of every FMU.
 pub const LICENSE: &str = env!("CARGO_PKG_LICENSE");
 
-/// Log categories that every unit declares, each with its name and the messages reported under it.
+/// Log categories that every FMU declares, each with its name and the messages reported under it.
 pub const LOG_CATEGORIES: [(&str, &str); 6] = [
-    ("logAll", "Everything below"),
-    ("logEvents", "Changes of the call state: initialized, reset, state restored, terminated"),
-    ("logStatusWarning", "Something is not as it should be, but the result holds"),
-    ("logStatusDiscard", "A call was refused, the unit can go on"),
+    ("logAll", "Messages of all other categories"),
+    (
+        "logEvents",
+        "Changes of the state of the instance: initialized, reset, state restored, terminated",
+    ),
+    ("logStatusWarning", "Warnings about conditions that do not invalidate the results"),
+    ("logStatusDiscard", "A call was refused, but the simulation can continue"),
     (
         "logStatusError",
-        "A call failed: reset the unit or restore a saved state; reported even if logging is off",
+        "A call failed: reset the instance or restore a saved state. These messages appear even if logging is off",
     ),
-    ("logStatusFatal", "A defect in the unit: free it; reported even if logging is off"),
+    (
+        "logStatusFatal",
+        "The FMU has a defect: free the instance. These messages appear even if logging is off",
+    ),
 ];
 
-/// Reason why a unit could not be described or packed.
+/// Reason why an FMU could not be described or packed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The table of variables contradicts itself or FMI 2.0.
-    #[error("unit '{unit}': {problem}")]
+    /// The variable table contradicts itself or FMI 2.0.
+    #[error("FMU '{fmu}': {problem}")]
     Description {
-        /// Name of the unit at fault.
-        unit: String,
+        /// Name of the FMU at fault.
+        fmu: String,
         /// Description of the fault, with the variable's name.
         problem: String,
     },
@@ -60,24 +66,24 @@ pub enum Error {
         /// Reason that the loader gave.
         source: libloading::Error,
     },
-    /// The library does not hand out descriptions.
-    #[error("'{}' hands out no unit descriptions ({problem}): build it with fmi2-export's export_fmus!", path.display())]
+    /// The library provides no model descriptions.
+    #[error("library '{}' provides no model descriptions ({problem}): build it with export_fmus! of fmi2-export", path.display())]
     NoDescriptions {
         /// Path of the library file.
         path: PathBuf,
         /// Description of what the library lacks.
         problem: String,
     },
-    /// The file is no library that can be packed.
+    /// The file is not a library that can be packed.
     #[error("library '{}': {problem}", path.display())]
-    Binary {
+    Library {
         /// Path of the library file.
         path: PathBuf,
         /// Description of what is wrong with it.
         problem: String,
     },
-    /// Two libraries, or two units of one library, have the same name.
-    #[error("two units are named '{0}': their archives would overwrite each other")]
+    /// Two FMUs of the given libraries have the same name.
+    #[error("two FMUs are named '{0}', so their archives would overwrite each other")]
     SameName(String),
     /// A file could not be read or written.
     #[error("'{}': {source}", path.display())]
@@ -98,32 +104,32 @@ pub enum Error {
     },
 }
 
-/// Content of a unit's `modelDescription.xml`. A built library hands it out as JSON through its
+/// Content of an FMU's `modelDescription.xml`. A built library provides it as JSON through its
 /// exported function `fmu_model_descriptions`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelDescription {
     /// Model name, which is also the model identifier and the archive's name, for example `CRMPC`.
     pub name: String,
-    /// Purpose of the unit, in one line.
+    /// Purpose of the FMU, in one line.
     pub description: String,
-    /// HTML fragment for `documentation/index.html` that says what the unit computes, with
+    /// HTML fragment for `documentation/index.html` that says what the FMU computes, with
     /// equations and their sources.
     pub documentation: String,
-    /// Version of the crate that made the unit.
+    /// Version of the crate that made the FMU.
     pub version: String,
-    /// Whether the unit can be used for co-simulation.
+    /// Whether the FMU can be used for co-simulation.
     pub co_simulation: bool,
-    /// Whether the unit can be used for model exchange.
+    /// Whether the FMU can be used for model exchange.
     pub model_exchange: bool,
     /// Number of event indicators in model exchange.
     pub event_indicators: usize,
-    /// Experiment that a tool proposes to its user.
+    /// Experiment that importers propose to their users.
     pub default_experiment: DefaultExperiment,
-    /// All variables of the unit; the value reference of each is its index here.
+    /// All variables of the FMU; the value reference of each is its index here.
     pub variables: Vec<Variable>,
 }
 
-/// Simulation settings that a tool proposes.
+/// Simulation settings that importers propose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DefaultExperiment {
     /// Start time of the experiment, s.
@@ -138,8 +144,8 @@ pub struct DefaultExperiment {
 
 impl ModelDescription {
     /// Returns the GUID: SHA-256 over the description as JSON, cut to 128 bits and written as a
-    /// UUID (version 8). Two libraries have the same GUID exactly if their tables, texts and
-    /// versions agree.
+    /// UUID (version 8). Two FMUs have the same GUID exactly if their variable tables, texts
+    /// and versions agree.
     ///
     /// # Panics
     /// This never panics, because JSON can express every part of the description.

@@ -1,11 +1,11 @@
-//! Loading of a built library to ask it for the descriptions of its units.
+//! Loading of a built library to ask it for the descriptions of its FMUs.
 #![allow(unsafe_code)]
 
 use crate::{Error, ModelDescription};
 use std::ffi::{CStr, c_char};
 use std::path::Path;
 
-/// Returns the descriptions of all units in the library at `path`, in the order in which it exports
+/// Returns the descriptions of all FMUs in the library at `path`, in the order in which it exports
 /// them.
 ///
 /// The library must be built with `fmi2-export`: `fmu_model_descriptions` returns a NUL-terminated

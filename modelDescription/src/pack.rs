@@ -1,7 +1,7 @@
-//! Packing of a unit's `.fmu` archive. The same input gives the same bytes, because entries are
+//! Packing of an FMU's archive. The same input gives the same bytes, because entries are
 //! sorted and times and permissions are fixed.
 
-use crate::binary::Binary;
+use crate::library_file::LibraryFile;
 use crate::{Error, LICENSE, ModelDescription};
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -9,14 +9,14 @@ use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-/// Contents of the archives besides the unit itself, and where its libraries go.
+/// Contents of the archives besides the model, and where the libraries go.
 #[derive(Clone, Debug, Default)]
 pub struct Extras {
     /// Folder whose files go under `resources/`.
     pub resources: Option<PathBuf>,
     /// Paths of licence texts for `documentation/licenses/`.
     pub licenses: Vec<PathBuf>,
-    /// Folder of icons, with `NAME.png` for the unit of that name.
+    /// Folder of icons, with `NAME.png` for the FMU of that name.
     pub icons: Option<PathBuf>,
     /// Only folder below `binaries/` that receives libraries; all folders of a platform if it is
     /// `None`.
@@ -24,18 +24,18 @@ pub struct Extras {
 }
 
 /// Text that keeps the folder in the archive, because some importers pass no resource location for
-/// a unit without it.
+/// an FMU without it.
 const RESOURCES_README: &str =
-    "Files that the unit reads while it initializes. This unit needs none.\n";
+    "This folder holds files that an FMU reads during initialization. This FMU needs none.\n";
 
-/// Writes the archive `NAME.fmu` of one unit into the folder `output` and returns its path.
-/// `binaries` are the builds of the unit's library, one for each platform.
+/// Writes the archive `NAME.fmu` of one FMU into the folder `output` and returns its path.
+/// `libraries` are the builds of the FMU's library, one for each platform.
 ///
 /// # Errors
 /// Reports a description that contradicts itself, or a file that cannot be read or written.
 pub fn pack(
     description: &ModelDescription,
-    binaries: &[Binary],
+    libraries: &[LibraryFile],
     output: &Path,
     extras: &Extras,
 ) -> Result<PathBuf, Error> {
@@ -44,11 +44,11 @@ pub fn pack(
         ("modelDescription.xml".to_string(), description.to_xml()?.into_bytes()),
         ("documentation/index.html".to_string(), description.to_html().into_bytes()),
     ];
-    for Binary { path, folders, suffix, .. } in binaries {
-        let library = read(path)?;
-        let file = |folder| (format!("binaries/{folder}/{name}.{suffix}"), library.clone());
-        let wanted = |of: &&&str| extras.folder.as_ref().is_none_or(|folder| folder == **of);
-        entries.extend(folders.iter().filter(wanted).map(file));
+    for LibraryFile { path, folders, suffix, .. } in libraries {
+        let content = read(path)?;
+        let entry = |folder| (format!("binaries/{folder}/{name}.{suffix}"), content.clone());
+        let chosen = |folder: &&&str| extras.folder.as_ref().is_none_or(|only| only == **folder);
+        entries.extend(folders.iter().filter(chosen).map(entry));
     }
     if let Some(icons) = &extras.icons {
         entries.push(("model.png".into(), read(&icons.join(format!("{name}.png")))?));

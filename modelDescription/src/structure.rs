@@ -1,11 +1,11 @@
-//! Structure that follows from the table: calculated variables, states, derivatives, and
+//! Structure that follows from the variable table: calculated variables, states, derivatives, and
 //! dependencies.
 
 use crate::ModelDescription;
-use crate::variable::{Causality, Kind, Variable};
+use crate::variable::{Causality, Variable, VariableKind};
 
 impl Variable {
-    /// Whether the unit computes the variable; otherwise the importer sets it.
+    /// Whether the FMU computes the variable; otherwise the importer sets it.
     pub fn is_calculated(&self) -> bool {
         !matches!(self.causality, Causality::Parameter | Causality::Input)
     }
@@ -13,7 +13,7 @@ impl Variable {
     /// Name of the state whose time derivative this variable is.
     pub fn derivative_of(&self) -> Option<&str> {
         match &self.kind {
-            Kind::Real { derivative_of, .. } => derivative_of.as_deref(),
+            VariableKind::Real { derivative_of, .. } => derivative_of.as_deref(),
             _ => None,
         }
     }
@@ -26,7 +26,7 @@ impl ModelDescription {
     }
 
     /// Continuous states and their derivatives as pairs of value references, in the order of the
-    /// states in the table.
+    /// states in the variable table.
     pub fn states(&self) -> Vec<(usize, usize)> {
         let mut states: Vec<_> = self
             .variables
@@ -40,8 +40,8 @@ impl ModelDescription {
         states
     }
 
-    /// Whether the unit offers directional derivatives, which is so exactly for units with
-    /// continuous states.
+    /// Whether the FMU provides directional derivatives, as exactly the FMUs with continuous states
+    /// do.
     pub fn directional_derivatives(&self) -> bool {
         self.variables.iter().any(|variable| variable.derivative_of().is_some())
     }
@@ -56,10 +56,10 @@ impl ModelDescription {
             return vec![reference];
         }
         let names = &self.variables[reference].dependencies;
-        let mut known: Vec<_> = names.iter().filter_map(|name| self.position(name)).collect();
-        known.sort_unstable();
-        known.dedup();
-        known
+        let mut references: Vec<_> = names.iter().filter_map(|name| self.position(name)).collect();
+        references.sort_unstable();
+        references.dedup();
+        references
     }
 
     /// Value references, ascending, of the inputs and parameters on which the variable at
@@ -70,12 +70,12 @@ impl ModelDescription {
         states: &[(usize, usize)],
     ) -> Vec<usize> {
         let inputs = self.dependencies(reference, states);
-        let known = |(i, variable): (usize, &Variable)| match variable.causality {
+        let dependency = |(i, variable): (usize, &Variable)| match variable.causality {
             Causality::Parameter => Some(i),
             Causality::Input => inputs.contains(&i).then_some(i),
             _ => None,
         };
-        self.variables.iter().enumerate().filter_map(known).collect()
+        self.variables.iter().enumerate().filter_map(dependency).collect()
     }
 
     /// Value references, ascending, of the unknowns of initialization: calculated outputs, states

@@ -1,4 +1,4 @@
-//! Physical units as exponents of SI base units, and the display units that engineers read.
+//! Units of measure as exponents of SI base units, and the display units that engineers read.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ pub struct DisplayUnit {
     pub factor: f64,
 }
 
-/// Unit with a name that FMI tools expect and the exponents of the SI base units.
+/// Unit of measure with a name that importers expect and the exponents of the SI base units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Unit {
     /// Name of the unit, for example `rad/s`.
@@ -29,7 +29,7 @@ pub struct Unit {
     pub kelvin: i32,
     /// Exponent of the radian in the unit.
     pub rad: i32,
-    /// Unit in which the value is displayed, if not in the unit itself.
+    /// Unit in which the value is displayed, if it is another one.
     pub display: Option<DisplayUnit>,
 }
 

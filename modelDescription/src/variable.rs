@@ -1,4 +1,4 @@
-//! One variable of a unit: everything that `modelDescription.xml` says about it, and nothing about
+//! One variable of an FMU: everything that `modelDescription.xml` says about it, and nothing about
 //! how it is computed.
 
 use crate::unit::Unit;
@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 pub enum Causality {
     /// The user sets it before the simulation, and it stays constant.
     Parameter,
-    /// Another unit provides its value.
+    /// Another FMU provides its value.
     Input,
-    /// This unit computes it for others.
+    /// This FMU computes it for others.
     Output,
-    /// This unit computes it for observation only.
+    /// This FMU computes it for observation only.
     Local,
     /// It is the simulation time.
     Independent,
@@ -42,12 +42,12 @@ pub struct EnumerationType {
 }
 
 /// Type of a variable, with the attributes that only this type has. Limits and start values are in
-/// the unit itself, never in its display unit.
+/// the unit of the variable, never in its display unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Kind {
+pub enum VariableKind {
     /// A floating-point number of 64 bits.
     Real {
-        /// Physical unit of the value, or `None` for a plain number.
+        /// Unit of measure of the value, or `None` for a plain number.
         unit: Option<Unit>,
         /// Smallest allowed value of the variable.
         min: Option<f64>,
@@ -77,7 +77,8 @@ pub enum Kind {
     /// One item of an enumeration type.
     Enumeration {
         /// Enumeration type with the allowed items.
-        of: EnumerationType,
+        #[serde(rename = "of")]
+        enumeration_type: EnumerationType,
         /// Start value as the item's number, counted from 1; it is present exactly where FMI
         /// demands one.
         start: Option<i32>,
@@ -90,19 +91,19 @@ pub enum Kind {
 }
 
 /// A variable as `modelDescription.xml` declares it. Its value reference is its position in the
-/// table, for all types.
+/// variable table, for all types.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Variable {
     /// Structured name with dots, for example `inertia.scale`.
     pub name: String,
     /// Description of the variable, in one line.
     pub description: String,
-    /// Role of the variable in the unit.
+    /// Role of the variable in the FMU.
     pub causality: Causality,
     /// Times at which the variable may change.
     pub variability: Variability,
     /// Type of the variable with unit, limits and start value.
-    pub kind: Kind,
+    pub kind: VariableKind,
     /// Names of the inputs and states on which a calculated variable depends at the same instant.
     pub dependencies: Vec<String>,
 }

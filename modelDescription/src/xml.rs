@@ -1,7 +1,7 @@
-//! Text of a unit's `modelDescription.xml`, FMI 2.0 section 2.2.
+//! Text of an FMU's `modelDescription.xml`, FMI 2.0 section 2.2.
 
 use crate::unit::Unit;
-use crate::variable::{Causality, EnumerationType, Kind, Variability, Variable};
+use crate::variable::{Causality, EnumerationType, Variability, Variable, VariableKind};
 use crate::{AUTHOR, Error, LICENSE, LOG_CATEGORIES, ModelDescription};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
@@ -84,21 +84,21 @@ impl ModelDescription {
         ];
         let identifier = vec![("modelIdentifier", self.name.clone())];
         if self.model_exchange {
-            let own = vec![("completedIntegratorStepNotNeeded", "true".into())];
+            let flags = vec![("completedIntegratorStepNotNeeded", "true".into())];
             leaf(
                 xml,
                 "ModelExchange",
-                [identifier.clone(), own, state.clone(), derivatives.clone()].concat(),
+                [identifier.clone(), flags, state.clone(), derivatives.clone()].concat(),
             )?;
         }
         if self.co_simulation {
-            let own = vec![
+            let flags = vec![
                 ("canHandleVariableCommunicationStepSize", "true".into()),
                 ("canInterpolateInputs", "true".into()),
                 ("maxOutputDerivativeOrder", "0".into()),
                 ("canBeInstantiatedOnlyOncePerProcess", "false".into()),
             ];
-            leaf(xml, "CoSimulation", [identifier, own, state, derivatives].concat())?;
+            leaf(xml, "CoSimulation", [identifier, flags, state, derivatives].concat())?;
         }
         Ok(())
     }
@@ -106,7 +106,7 @@ impl ModelDescription {
     fn write_units(&self, xml: &mut Xml) -> io::Result<()> {
         let mut units: Vec<&Unit> = vec![];
         for variable in &self.variables {
-            if let Kind::Real { unit: Some(unit), .. } = &variable.kind
+            if let VariableKind::Real { unit: Some(unit), .. } = &variable.kind
                 && !units.contains(&unit)
             {
                 units.push(unit);
@@ -146,10 +146,10 @@ impl ModelDescription {
     fn write_enumerations(&self, xml: &mut Xml) -> io::Result<()> {
         let mut enumerations: Vec<&EnumerationType> = vec![];
         for variable in &self.variables {
-            if let Kind::Enumeration { of, .. } = &variable.kind
-                && !enumerations.contains(&of)
+            if let VariableKind::Enumeration { enumeration_type, .. } = &variable.kind
+                && !enumerations.contains(&enumeration_type)
             {
-                enumerations.push(of);
+                enumerations.push(enumeration_type);
             }
         }
         if enumerations.is_empty() {
@@ -157,19 +157,23 @@ impl ModelDescription {
         }
         enumerations.sort_by(|a, b| a.name.cmp(&b.name));
         parent(xml, "TypeDefinitions", vec![], |xml| {
-            enumerations.iter().try_for_each(|of| {
-                let attributes =
-                    vec![("name", of.name.clone()), ("description", of.description.clone())];
+            enumerations.iter().try_for_each(|enumeration| {
+                let attributes = vec![
+                    ("name", enumeration.name.clone()),
+                    ("description", enumeration.description.clone()),
+                ];
                 parent(xml, "SimpleType", attributes, |xml| {
                     parent(xml, "Enumeration", vec![], |xml| {
-                        of.items.iter().zip(1..).try_for_each(|((name, description), value)| {
-                            let attributes = vec![
-                                ("name", name.clone()),
-                                ("value", value.to_string()),
-                                ("description", description.clone()),
-                            ];
-                            leaf(xml, "Item", attributes)
-                        })
+                        enumeration.items.iter().zip(1..).try_for_each(
+                            |((name, description), value)| {
+                                let attributes = vec![
+                                    ("name", name.clone()),
+                                    ("value", value.to_string()),
+                                    ("description", description.clone()),
+                                ];
+                                leaf(xml, "Item", attributes)
+                            },
+                        )
                     })
                 })
             })
@@ -188,7 +192,7 @@ impl ModelDescription {
             ("variability", variability(variable).into()),
         ];
         parent(xml, "ScalarVariable", attributes, |xml| match &variable.kind {
-            Kind::Real { unit, min, max, nominal, start, derivative_of } => {
+            VariableKind::Real { unit, min, max, nominal, start, derivative_of } => {
                 let index =
                     derivative_of.as_deref().and_then(|name| self.position(name)).map(|i| i + 1);
                 let display = unit.as_ref().and_then(|unit| unit.display.as_ref());
@@ -203,7 +207,7 @@ impl ModelDescription {
                 ];
                 leaf(xml, "Real", given(attributes))
             }
-            Kind::Integer { min, max, start } => {
+            VariableKind::Integer { min, max, start } => {
                 let attributes = [("min", *min), ("max", *max), ("start", *start)];
                 leaf(
                     xml,
@@ -211,17 +215,19 @@ impl ModelDescription {
                     given(attributes.map(|(name, x)| (name, x.map(|x| x.to_string())))),
                 )
             }
-            Kind::Boolean { start } => {
+            VariableKind::Boolean { start } => {
                 leaf(xml, "Boolean", given([("start", start.map(|x| x.to_string()))]))
             }
-            Kind::Enumeration { of, start } => {
+            VariableKind::Enumeration { enumeration_type, start } => {
                 let attributes = [
-                    ("declaredType", Some(of.name.clone())),
+                    ("declaredType", Some(enumeration_type.name.clone())),
                     ("start", start.map(|x| x.to_string())),
                 ];
                 leaf(xml, "Enumeration", given(attributes))
             }
-            Kind::String { start } => leaf(xml, "String", given([("start", start.clone())])),
+            VariableKind::String { start } => {
+                leaf(xml, "String", given([("start", start.clone())]))
+            }
         })
     }
 
@@ -230,11 +236,11 @@ impl ModelDescription {
         let is_output = |i: &usize| self.variables[*i].causality == Causality::Output;
         let outputs: Vec<_> = (0..self.variables.len()).filter(is_output).collect();
         let derivatives: Vec<_> = states.iter().map(|&(_, derivative)| derivative).collect();
-        let of = |i| self.dependencies(i, &states);
+        let at_runtime = |i| self.dependencies(i, &states);
         let initially = |i| self.initial_dependencies(i, &states);
         parent(xml, "ModelStructure", vec![], |xml| {
-            unknowns(xml, "Outputs", &outputs, of)?;
-            unknowns(xml, "Derivatives", &derivatives, of)?;
+            unknowns(xml, "Outputs", &outputs, at_runtime)?;
+            unknowns(xml, "Derivatives", &derivatives, at_runtime)?;
             unknowns(xml, "InitialUnknowns", &self.initial_unknowns(&states), initially)
         })
     }
@@ -253,12 +259,12 @@ fn unknowns(
     }
     parent(xml, name, vec![], |xml| {
         list.iter().try_for_each(|&i| {
-            let known: Vec<_> =
-                dependencies(i).iter().map(|known| (known + 1).to_string()).collect();
+            let indices: Vec<_> =
+                dependencies(i).iter().map(|reference| (reference + 1).to_string()).collect();
             leaf(
                 xml,
                 "Unknown",
-                vec![("index", (i + 1).to_string()), ("dependencies", known.join(" "))],
+                vec![("index", (i + 1).to_string()), ("dependencies", indices.join(" "))],
             )
         })
     })

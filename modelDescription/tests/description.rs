@@ -1,27 +1,34 @@
-//! Tests with a small unit described by hand: its GUID, checks, XML, page and archive.
+//! Tests with a small FMU described by hand: its GUID, checks, XML, page and archive.
 
-use model_description::binary::Binary;
+use model_description::library_file::LibraryFile;
 use model_description::pack::{Extras, pack};
 use model_description::unit::{angle, angular_rate};
-use model_description::variable::{Causality, EnumerationType, Kind, Variability, Variable};
+use model_description::variable::{
+    Causality, EnumerationType, Variability, Variable, VariableKind,
+};
 use model_description::{DefaultExperiment, Error, ModelDescription, library};
 use std::fs;
 use std::io::Read;
 use std::path::Path;
 
 /// A library for Linux of which nothing but its file matters.
-fn binary(path: &Path) -> Binary {
+fn library_file(path: &Path) -> LibraryFile {
     let path = path.to_owned();
-    Binary { path, folders: &["linux64"], suffix: "so", exports: [].into(), sources: None }
+    LibraryFile { path, folders: &["linux64"], suffix: "so", exports: [].into(), sources: None }
 }
 
-fn variable(name: &str, causality: Causality, variability: Variability, kind: Kind) -> Variable {
+fn variable(
+    name: &str,
+    causality: Causality,
+    variability: Variability,
+    kind: VariableKind,
+) -> Variable {
     let description = format!("What <{name}> & co. are");
     Variable { name: name.into(), description, causality, variability, kind, dependencies: vec![] }
 }
 
-fn real(start: Option<f64>) -> Kind {
-    Kind::Real {
+fn real(start: Option<f64>) -> VariableKind {
+    VariableKind::Real {
         unit: Some(angle()),
         min: None,
         max: None,
@@ -31,17 +38,17 @@ fn real(start: Option<f64>) -> Kind {
     }
 }
 
-/// A unit with these positions: 0 parameter, 1 enumeration, 2 input, 3 state, 4 derivative, 5
+/// An FMU with these positions: 0 parameter, 1 enumeration, 2 input, 3 state, 4 derivative, 5
 /// output with feedthrough.
-fn unit() -> ModelDescription {
+fn fmu() -> ModelDescription {
     use Causality::{Input, Local, Output, Parameter};
     use Variability::{Continuous, Discrete, Fixed};
-    let kind = EnumerationType {
+    let enumeration_type = EnumerationType {
         name: "Shape".into(),
         description: "How".into(),
         items: vec![("flat".into(), "Nothing".into()), ("steep".into(), "Much".into())],
     };
-    let rate = Kind::Real {
+    let rate = VariableKind::Real {
         unit: Some(angular_rate()),
         min: None,
         max: None,
@@ -54,7 +61,7 @@ fn unit() -> ModelDescription {
             "gain",
             Parameter,
             Fixed,
-            Kind::Real {
+            VariableKind::Real {
                 unit: None,
                 min: Some(0.0),
                 max: Some(10.0),
@@ -63,19 +70,29 @@ fn unit() -> ModelDescription {
                 derivative_of: None,
             },
         ),
-        variable("shape", Parameter, Fixed, Kind::Enumeration { of: kind, start: Some(2) }),
+        variable(
+            "shape",
+            Parameter,
+            Fixed,
+            VariableKind::Enumeration { enumeration_type, start: Some(2) },
+        ),
         variable("u[1]", Input, Continuous, real(Some(std::f64::consts::PI / 180.0))),
         variable("angle", Output, Continuous, real(None)),
         variable("der(angle)", Local, Continuous, rate),
         variable("y", Output, Continuous, real(None)),
-        variable("count", Output, Discrete, Kind::Integer { min: None, max: None, start: None }),
+        variable(
+            "count",
+            Output,
+            Discrete,
+            VariableKind::Integer { min: None, max: None, start: None },
+        ),
     ];
     for (i, names) in [(4, vec!["u[1]"]), (5, vec!["angle", "u[1]"])] {
         variables[i].dependencies = names.into_iter().map(String::from).collect();
     }
     ModelDescription {
         name: "Small".into(),
-        description: "A small unit".into(),
+        description: "A small FMU".into(),
         documentation: "<p>Not much.</p>".into(),
         version: "1.2.3".into(),
         co_simulation: true,
@@ -93,15 +110,15 @@ fn unit() -> ModelDescription {
 
 #[test]
 fn the_guid_is_a_uuid_that_follows_every_change() {
-    let guid = unit().guid();
-    assert_eq!(guid, unit().guid());
+    let guid = fmu().guid();
+    assert_eq!(guid, fmu().guid());
     let parts: Vec<_> = guid.split('-').collect();
     assert_eq!(parts.iter().map(|part| part.len()).collect::<Vec<_>>(), [8, 4, 4, 4, 12]);
     assert!(guid.chars().all(|c| c == '-' || c.is_ascii_digit() || ('a'..='f').contains(&c)));
-    let mut other = unit();
+    let mut other = fmu();
     other.variables[0].description.push('.');
     assert_ne!(other.guid(), guid);
-    let mut other = unit();
+    let mut other = fmu();
     other.version = "1.2.4".into();
     assert_ne!(other.guid(), guid);
 }
@@ -110,59 +127,56 @@ fn the_guid_is_a_uuid_that_follows_every_change() {
 fn contradictions_are_found_and_name_the_variable() {
     type Change = fn(&mut ModelDescription);
     let cases: &[(Change, &str)] = &[
-        (|unit| unit.name = "a b".into(), "C identifier"),
-        (|unit| unit.variables[5].name = "angle".into(), "'angle' is declared twice"),
-        (|unit| unit.variables[2].name = "u[1".into(), "'u[1' is not a structured name"),
-        (|unit| unit.variables[2].name = "1u".into(), "not a structured name"),
-        (|unit| unit.variables[5].dependencies.push("gain".into()), "'y' depends on 'gain'"),
-        (|unit| unit.variables[5].dependencies.push("v".into()), "'y' depends on 'v'"),
-        (|unit| unit.variables[2].kind = real(None), "'u[1]' needs a start value"),
+        (|fmu| fmu.name = "a b".into(), "C identifier"),
+        (|fmu| fmu.variables[5].name = "angle".into(), "'angle' is declared twice"),
+        (|fmu| fmu.variables[2].name = "u[1".into(), "'u[1' is not a structured name"),
+        (|fmu| fmu.variables[2].name = "1u".into(), "not a structured name"),
+        (|fmu| fmu.variables[5].dependencies.push("gain".into()), "'y' depends on 'gain'"),
+        (|fmu| fmu.variables[5].dependencies.push("v".into()), "'y' depends on 'v'"),
+        (|fmu| fmu.variables[2].kind = real(None), "'u[1]' needs a start value"),
+        (|fmu| fmu.variables[5].kind = real(Some(1.0)), "'y' is calculated and has a start value"),
+        (|fmu| fmu.variables[6].variability = Variability::Continuous, "'count' is not a Real"),
         (
-            |unit| unit.variables[5].kind = real(Some(1.0)),
-            "'y' is calculated and has a start value",
-        ),
-        (|unit| unit.variables[6].variability = Variability::Continuous, "'count' is not a Real"),
-        (
-            |unit| unit.variables[0].variability = Variability::Discrete,
+            |fmu| fmu.variables[0].variability = Variability::Discrete,
             "'gain' must be both a parameter and fixed",
         ),
         (
-            |unit| {
-                if let Kind::Real { start, .. } = &mut unit.variables[0].kind {
+            |fmu| {
+                if let VariableKind::Real { start, .. } = &mut fmu.variables[0].kind {
                     *start = Some(11.0);
                 }
             },
             "'gain' has a start value outside its limits",
         ),
         (
-            |unit| {
-                if let Kind::Enumeration { start, .. } = &mut unit.variables[1].kind {
+            |fmu| {
+                if let VariableKind::Enumeration { start, .. } = &mut fmu.variables[1].kind {
                     *start = Some(0);
                 }
             },
             "'shape' has a start value outside its limits",
         ),
         (
-            |unit| {
-                if let Kind::Real { derivative_of, .. } = &mut unit.variables[4].kind {
+            |fmu| {
+                if let VariableKind::Real { derivative_of, .. } = &mut fmu.variables[4].kind {
                     *derivative_of = Some("gain".into());
                 }
             },
             "'der(angle)' is the derivative of 'gain'",
         ),
         (
-            |unit| {
-                if let Kind::Real { unit: Some(unit), .. } = &mut unit.variables[5].kind {
+            |fmu| {
+                if let VariableKind::Real { unit: Some(unit), .. } = &mut fmu.variables[5].kind {
                     unit.m = 1;
                 }
             },
             "'y' defines unit 'rad' differently",
         ),
-        (|unit| unit.default_experiment.step = f64::NAN, "default experiment"),
+        (|fmu| fmu.default_experiment.step = f64::NAN, "default experiment"),
     ];
-    assert!(unit().check().is_ok());
+    assert!(fmu().check().is_ok());
     for (change, part) in cases {
-        let mut changed = unit();
+        let mut changed = fmu();
         change(&mut changed);
         let text = changed.to_xml().expect_err(part).to_string();
         assert!(text.contains(part), "no '{part}' in '{text}'");
@@ -170,11 +184,11 @@ fn contradictions_are_found_and_name_the_variable() {
 }
 
 #[test]
-fn the_xml_says_what_the_table_says() {
-    let xml = unit().to_xml().unwrap();
+fn the_xml_says_what_the_variable_table_says() {
+    let xml = fmu().to_xml().unwrap();
     for part in [
         "fmiVersion=\"2.0\"",
-        &format!("guid=\"{}\"", unit().guid()),
+        &format!("guid=\"{}\"", fmu().guid()),
         "<ModelExchange modelIdentifier=\"Small\"",
         "<CoSimulation modelIdentifier=\"Small\"",
         "<DisplayUnit name=\"deg\" factor=\"57.29577951308232\"/>",
@@ -195,7 +209,7 @@ fn the_xml_says_what_the_table_says() {
 
 #[test]
 fn the_model_structure_has_true_dependencies() {
-    let xml = unit().to_xml().unwrap();
+    let xml = fmu().to_xml().unwrap();
     let structure: Vec<_> =
         xml.lines().map(str::trim).skip_while(|line| *line != "<ModelStructure>").collect();
     assert_eq!(
@@ -223,7 +237,7 @@ fn the_model_structure_has_true_dependencies() {
 
 #[test]
 fn the_page_shows_start_values_in_display_units_and_enumerations_by_name() {
-    let page = unit().to_html();
+    let page = fmu().to_html();
     for part in [
         "<p>Not much.</p>",
         "<code>gain</code></td><td>–</td><td>2.5</td><td>0 to 10</td>",
@@ -265,7 +279,7 @@ fn the_archive_is_complete_and_the_same_every_time() {
         icons: None,
         folder: None,
     };
-    let path = pack(&unit(), &[binary(&at("library"))], folder.path(), &extras).unwrap();
+    let path = pack(&fmu(), &[library_file(&at("library"))], folder.path(), &extras).unwrap();
     assert_eq!(path, at("Small.fmu"));
     let first = fs::read(&path).unwrap();
     let content = entries(&path);
@@ -284,12 +298,12 @@ fn the_archive_is_complete_and_the_same_every_time() {
         ]
     );
     assert_eq!(content[1].1, "machine code");
-    assert_eq!(content[0].1, unit().to_xml().unwrap());
+    assert_eq!(content[0].1, fmu().to_xml().unwrap());
 
     // Another time and another order of the folder still give the same bytes.
     std::thread::sleep(std::time::Duration::from_millis(20));
     fs::write(at("data/z.csv"), "1").unwrap();
-    pack(&unit(), &[binary(&at("library"))], folder.path(), &extras).unwrap();
+    pack(&fmu(), &[library_file(&at("library"))], folder.path(), &extras).unwrap();
     assert_eq!(fs::read(&path).unwrap(), first);
     assert!(!at("Small.fmu.part").exists());
 }
@@ -299,15 +313,15 @@ fn a_library_goes_into_every_folder_of_its_platform() {
     let folder = tempfile::tempdir().unwrap();
     let library = folder.path().join("library");
     fs::write(&library, "machine code").unwrap();
-    let aarch64 = Binary { folders: &["aarch64-linux", "linux64"], ..binary(&library) };
-    let path = pack(&unit(), &[aarch64], folder.path(), &Extras::default()).unwrap();
+    let aarch64 = LibraryFile { folders: &["aarch64-linux", "linux64"], ..library_file(&library) };
+    let path = pack(&fmu(), &[aarch64], folder.path(), &Extras::default()).unwrap();
     let names: Vec<_> = entries(&path).into_iter().map(|(name, _)| name).collect();
     for folder in ["aarch64-linux", "linux64"] {
         assert!(names.contains(&format!("binaries/{folder}/Small.so")), "{names:?}");
     }
-    let aarch64 = Binary { folders: &["aarch64-linux", "linux64"], ..binary(&library) };
+    let aarch64 = LibraryFile { folders: &["aarch64-linux", "linux64"], ..library_file(&library) };
     let extras = Extras { folder: Some("linux64".into()), ..Extras::default() };
-    let path = pack(&unit(), &[aarch64], folder.path(), &extras).unwrap();
+    let path = pack(&fmu(), &[aarch64], folder.path(), &extras).unwrap();
     let binaries = entries(&path).into_iter().filter(|(name, _)| name.starts_with("binaries/"));
     assert_eq!(binaries.map(|(name, _)| name).collect::<Vec<_>>(), ["binaries/linux64/Small.so"]);
 }
@@ -317,12 +331,12 @@ fn an_archive_without_resources_has_the_folder_all_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let library = folder.path().join("library");
     fs::write(&library, "machine code").unwrap();
-    let path = pack(&unit(), &[binary(&library)], folder.path(), &Extras::default()).unwrap();
+    let path = pack(&fmu(), &[library_file(&library)], folder.path(), &Extras::default()).unwrap();
     assert!(entries(&path).iter().any(|(name, _)| name == "resources/README.txt"));
 }
 
 #[test]
-fn files_that_are_no_unit_library_are_refused() {
+fn files_that_are_no_library_of_fmus_are_refused() {
     let missing = library::descriptions(Path::new("/no/such/library.so")).unwrap_err();
     assert!(matches!(missing, Error::File { .. }), "{missing}");
     let folder = tempfile::tempdir().unwrap();
@@ -330,7 +344,7 @@ fn files_that_are_no_unit_library_are_refused() {
     fs::write(&text, "not a library").unwrap();
     let error = library::descriptions(&text).unwrap_err();
     assert!(matches!(error, Error::Open { .. }), "{error}");
-    let nothing = binary(&folder.path().join("nothing"));
-    let missing = pack(&unit(), &[nothing], folder.path(), &Extras::default()).unwrap_err();
+    let nothing = library_file(&folder.path().join("nothing"));
+    let missing = pack(&fmu(), &[nothing], folder.path(), &Extras::default()).unwrap_err();
     assert!(missing.to_string().contains("nothing"));
 }

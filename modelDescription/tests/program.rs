@@ -31,7 +31,7 @@ fn a_wrong_library_ends_with_1_and_is_named() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_library_without_units_is_told_how_to_get_some() {
+fn a_library_without_fmus_is_refused_with_instructions() {
     let folder = tempfile::tempdir().unwrap();
     // The library is certain to exist, because this test itself runs with it.
     let maps = std::fs::read_to_string("/proc/self/maps").unwrap();

@@ -3,7 +3,7 @@
 use control::crmpc::{Constraints, Settings};
 use control::{Controller, DesignError, Measurement, controller::ReferenceAt as At};
 use controller_export::{ControllerFmu, Law, Vehicle};
-use fmi2_export::{Table, table::parameter};
+use fmi2_export::{VariableTable, table::parameter};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::{dynamics::RigidBody, kinematics::r};

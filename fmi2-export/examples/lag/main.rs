@@ -1,4 +1,4 @@
-//! The smallest complete unit. Build it with `cargo build --example lag` and pack it with
+//! The smallest complete FMU. Build it with `cargo build --example lag` and pack it with
 //! `fmu-pack liblag.so --output DIR`.
 
 pub mod model;

@@ -3,7 +3,7 @@
 
 use fmi2_export::table::{discrete_input, discrete_output, input, local, output, parameter};
 use fmi2_export::{
-    Context, Description, Enumeration, EventInfo, Failure, Inputs, LastEvent, Model, Table,
+    Context, Description, Enumeration, EventInfo, Failure, Inputs, LastEvent, Model, VariableTable,
 };
 use model_description::DefaultExperiment;
 use model_description::unit;
@@ -20,10 +20,10 @@ enum Shape {
 
 static SHAPES: Enumeration<Shape> = Enumeration {
     name: "Shape",
-    description: "What is done to the output",
+    description: "Limiter at the output",
     items: &[
-        (Shape::Linear, "linear", "Nothing"),
-        (Shape::Saturated, "saturated", "Kept between -1 and 1"),
+        (Shape::Linear, "linear", "No limiter"),
+        (Shape::Saturated, "saturated", "Output limited to between -1 and 1"),
     ],
 };
 
@@ -84,7 +84,7 @@ impl Lag {
 
 impl Model for Lag {
     fn description() -> Description<Self> {
-        let table = Table::new()
+        let table = VariableTable::new()
             .real(
                 parameter("timeConstant", "Time constant T")
                     .real()
@@ -95,23 +95,24 @@ impl Model for Lag {
             )
             .real(parameter("gain.early", "Gain k before the switch").real(), |m| &mut m.gain)
             .real(parameter("gain.late", "Gain k after the switch").real(), |m| &mut m.late_gain)
-            .real(parameter("switchTime", "When the gain changes").real().unit(unit::time()), |m| {
-                &mut m.switch_time
-            })
+            .real(
+                parameter("switchTime", "Time at which the gain changes").real().unit(unit::time()),
+                |m| &mut m.switch_time,
+            )
             .real(parameter("initial.x", "Initial state").real().unit(unit::angle()), |m| {
                 &mut m.initial
             })
             .integer(
-                parameter("order", "Order of the lag; only 1 is there"),
+                parameter("order", "Order of the lag; only 1 is supported"),
                 (Some(1), Some(2)),
                 |m| &mut m.order,
             )
-            .boolean(parameter("inverted", "Whether the gain changes its sign"), |m| {
+            .boolean(parameter("inverted", "If true, the sign of the gain is inverted"), |m| {
                 &mut m.inverted
             })
             .enumeration(parameter("shape", SHAPES.description), &SHAPES, |m| &mut m.shape)
             .string(
-                parameter("label", "Text that is passed on; \"boom\" makes the unit panic"),
+                parameter("label", "Text that is passed on; \"boom\" makes the FMU panic"),
                 |m| &mut m.label,
             )
             .real(input("u", "Input").real().unit(unit::angle()).min(-100.0).max(100.0), |m| {
@@ -127,19 +128,21 @@ impl Model for Lag {
                 |m| &mut m.derivative,
             )
             .real(
-                output("y", "State plus input and offset, shaped")
+                output("y", "Sum of state, input and offset, after the limiter")
                     .depends_on(["u", "x", "offset"])
                     .real()
                     .unit(unit::angle()),
                 |m| &mut m.y,
             )
-            .real(discrete_output("gain.now", "Gain in force").real(), |m| &mut m.gain_now)
-            .boolean(discrete_output("switched", "Whether the switch is behind"), |m| {
+            .real(discrete_output("gain.now", "Current gain k").real(), |m| &mut m.gain_now)
+            .boolean(discrete_output("switched", "True after the gain has changed"), |m| {
                 &mut m.switched
             })
-            .string(discrete_output("text", "The label"), |m| &mut m.description)
+            .string(discrete_output("text", "Label as passed on"), |m| &mut m.description)
             .real(
-                discrete_input("offset", "Added to the output").real().unit(unit::angle()),
+                discrete_input("offset", "Offset that is added to the output")
+                    .real()
+                    .unit(unit::angle()),
                 |m| &mut m.offset,
             );
         Description {
@@ -184,7 +187,7 @@ impl Model for Lag {
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         if self.order != 1 {
-            return Err(Failure::Error(format!("order = {}, but only 1 is there", self.order)));
+            return Err(Failure::Error(format!("order = {}, but only 1 is supported", self.order)));
         }
         self.x = self.initial;
         self.switched = context.start_time >= self.switch_time;
@@ -247,11 +250,11 @@ impl Model for Lag {
     fn partial_derivative(
         &mut self,
         time: f64,
-        unknown: usize,
-        known: usize,
+        unknown_variable: usize,
+        known_variable: usize,
     ) -> Result<f64, Failure> {
         let gain = self.gain(time);
-        match (unknown, known) {
+        match (unknown_variable, known_variable) {
             (11, 9) => Ok(gain / self.time_constant),
             (11, 10) => Ok(-1.0 / self.time_constant),
             (10, 10) | (12, 9 | 10) => Ok(1.0),

@@ -1,7 +1,7 @@
 //! Tests of the calls that are allowed in each state.
 
 use crate::support::{CO_SIMULATION, Instance, MODEL_EXCHANGE, U, X, c};
-use fmi2_export::types::{CEventInfo, Status};
+use fmi2_export::types::{CEventInfo, FmiStatus};
 use std::ffi::{c_int, c_void};
 use std::ptr::{null, null_mut};
 
@@ -21,17 +21,17 @@ const CS_STATES: &[(char, Maker)] = &[
         let instance = Instance::lag(CO_SIMULATION);
         instance.set_string(crate::support::LABEL, c"refuse");
         instance.initialize();
-        assert_eq!(instance.step(0.0, 0.75), Status::Discard);
+        assert_eq!(instance.step(0.0, 0.75), FmiStatus::Discard);
         instance
     }),
     ('T', || {
         let instance = Instance::stepping();
-        assert_eq!(c!(fmi2Terminate(instance.component)), Status::Ok);
+        assert_eq!(c!(fmi2Terminate(instance.component)), FmiStatus::Ok);
         instance
     }),
     ('X', || {
         let instance = Instance::stepping();
-        assert_eq!(instance.set_real(U, f64::NAN), Status::Error);
+        assert_eq!(instance.set_real(U, f64::NAN), FmiStatus::Error);
         instance
     }),
 ];
@@ -46,22 +46,22 @@ const ME_STATES: &[(char, Maker)] = &[
     ('E', Instance::in_event_mode),
     ('C', || {
         let instance = Instance::in_event_mode();
-        assert_eq!(c!(fmi2EnterContinuousTimeMode(instance.component)), Status::Ok);
+        assert_eq!(c!(fmi2EnterContinuousTimeMode(instance.component)), FmiStatus::Ok);
         instance
     }),
     ('T', || {
         let instance = Instance::in_event_mode();
-        assert_eq!(c!(fmi2Terminate(instance.component)), Status::Ok);
+        assert_eq!(c!(fmi2Terminate(instance.component)), FmiStatus::Ok);
         instance
     }),
     ('X', || {
         let instance = Instance::in_event_mode();
-        assert_eq!(instance.set_real(U, f64::INFINITY), Status::Error);
+        assert_eq!(instance.set_real(U, f64::INFINITY), FmiStatus::Error);
         instance
     }),
 ];
 
-type Caller = fn(*mut c_void) -> Status;
+type Caller = fn(*mut c_void) -> FmiStatus;
 
 /// Functions that take a component and return a status, with valid arguments, and the states of
 /// co-simulation and model exchange in which FMI 2.0 (4.2.4, 3.2.3) allows each.
@@ -86,7 +86,7 @@ const FUNCTIONS: &[(&str, Caller, &str, &str)] = &[
         "fmi2SetFMUstate",
         |c| {
             let mut state = null_mut();
-            assert_eq!(c!(fmi2GetFMUstate(c, &mut state)), Status::Ok);
+            assert_eq!(c!(fmi2GetFMUstate(c, &mut state)), FmiStatus::Ok);
             c!(fmi2SetFMUstate(c, state))
         },
         "INSFTX",
@@ -137,7 +137,7 @@ const FUNCTIONS: &[(&str, Caller, &str, &str)] = &[
     ),
     ("fmi2DoStep", |c| c!(fmi2DoStep(c, 0.0, 0.1, 1)), "S", ""),
     ("fmi2CancelStep", |c| c!(fmi2CancelStep(c)), "", ""),
-    ("fmi2GetStatus", |c| c!(fmi2GetStatus(c, 0, &mut { Status::Ok })), "SFT", ""),
+    ("fmi2GetStatus", |c| c!(fmi2GetStatus(c, 0, &mut { FmiStatus::Ok })), "SFT", ""),
     ("fmi2GetRealStatus", |c| c!(fmi2GetRealStatus(c, 2, &mut 0.0)), "SFT", ""),
     ("fmi2GetBooleanStatus", |c| c!(fmi2GetBooleanStatus(c, 3, &mut 0)), "SFT", ""),
     ("fmi2GetStringStatus", |c| c!(fmi2GetStringStatus(c, 1, &mut null())), "SFT", ""),
@@ -159,13 +159,13 @@ fn check(
             if allowed(function).contains(letter) {
                 assert_eq!(
                     status,
-                    Status::Ok,
+                    FmiStatus::Ok,
                     "{name} in {letter}: {:?}",
                     instance.messages().last()
                 );
                 continue;
             }
-            assert_eq!(status, Status::Error, "{name} in {letter} must be refused");
+            assert_eq!(status, FmiStatus::Error, "{name} in {letter} must be refused");
             let messages = instance.messages();
             assert_eq!(messages.len(), before + 1, "{name} in {letter} says so once");
             let text = &messages[before].text;
@@ -175,7 +175,7 @@ fn check(
                 "{text}"
             );
             // After that call the instance is usable again.
-            assert_eq!(c!(fmi2Reset(instance.component)), Status::Ok);
+            assert_eq!(c!(fmi2Reset(instance.component)), FmiStatus::Ok);
             instance.initialize();
             assert_eq!(instance.real(X), 0.5);
         }
@@ -196,10 +196,10 @@ fn oracle_calls_of_model_exchange_are_allowed_where_the_standard_says() {
 fn a_null_component_is_an_error() {
     for (name, caller, ..) in FUNCTIONS {
         if *name != "fmi2SetFMUstate" {
-            assert_eq!(caller(null_mut()), Status::Error, "{name}");
+            assert_eq!(caller(null_mut()), FmiStatus::Error, "{name}");
         }
     }
-    assert_eq!(c!(fmi2SetFMUstate(null_mut(), null_mut())), Status::Error);
+    assert_eq!(c!(fmi2SetFMUstate(null_mut(), null_mut())), FmiStatus::Error);
     c!(fmi2FreeInstance(null_mut()));
     c!(fmu_free_model_descriptions(null_mut()));
 }
@@ -233,13 +233,13 @@ fn null_arguments_are_named() {
     for (part, caller) in in_init {
         let instance = Instance::lag(CO_SIMULATION);
         instance.enter_initialization();
-        assert_eq!(caller(instance.component), Status::Error, "{part}");
+        assert_eq!(caller(instance.component), FmiStatus::Error, "{part}");
         instance.said(&[part]);
     }
     let instance = Instance::in_event_mode();
-    assert_eq!(c!(fmi2NewDiscreteStates(instance.component, null_mut())), Status::Error);
+    assert_eq!(c!(fmi2NewDiscreteStates(instance.component, null_mut())), FmiStatus::Error);
     instance.said(&["'fmi2eventInfo' is NULL"]);
     let instance = Instance::stepping();
-    assert_eq!(c!(fmi2GetRealStatus(instance.component, 2, null_mut())), Status::Error);
+    assert_eq!(c!(fmi2GetRealStatus(instance.component, 2, null_mut())), FmiStatus::Error);
     instance.said(&["'value' is NULL"]);
 }

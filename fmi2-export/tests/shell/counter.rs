@@ -1,13 +1,15 @@
-//! The second unit of the library, for co-simulation only. It has a defect for every place where a
+//! The second FMU of the library, for co-simulation only. It has a defect for every place where a
 //! panic can start.
 
 use fmi2_export::table::{discrete_output, input, parameter};
-use fmi2_export::{Context, Description, Enumeration, Failure, Inputs, LastEvent, Model, Table};
+use fmi2_export::{
+    Context, Description, Enumeration, Failure, Inputs, LastEvent, Model, VariableTable,
+};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Whether the count is even. The enumeration below leaves one out, as a unit's author might.
+/// Whether the count is even. The enumeration below leaves one out, as an FMU's author might.
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 enum Parity {
     Even,
@@ -53,7 +55,7 @@ impl Model for Counter {
                 tolerance: 1e-6,
                 step: 0.1,
             },
-            table: Table::new()
+            table: VariableTable::new()
                 .string(parameter("defect", "Where to panic"), |m: &mut Self| &mut m.defect)
                 .real(input("increment", "What a step adds").real(), |m| &mut m.increment)
                 .real(discrete_output("count", "Sum of the increments").real(), |m| &mut m.seen)

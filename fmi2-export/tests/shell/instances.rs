@@ -1,7 +1,7 @@
-//! Tests of instantiation, of several instances and units side by side, and of panics.
+//! Tests of instantiation, of several instances and FMUs side by side, and of panics.
 
 use crate::support::*;
-use fmi2_export::types::{Callbacks, LogCallback, Status};
+use fmi2_export::types::{Callbacks, FmiStatus, LogCallback};
 use std::ffi::{CStr, c_char, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;
@@ -18,35 +18,41 @@ fn the_library_says_what_it_is() {
 
 #[test]
 fn what_cannot_be_instantiated_is_refused_with_a_message() {
-    let own = guid("Counter");
+    let guid_text = guid("Counter");
     let cases = [
-        (None, CO_SIMULATION, Some(own.as_c_str()), None, "'instanceName' is NULL"),
-        (Some(c""), CO_SIMULATION, Some(&own), None, "instance name is empty"),
-        (Some(c"\xff"), CO_SIMULATION, Some(&own), None, "is not UTF-8"),
+        (None, CO_SIMULATION, Some(guid_text.as_c_str()), None, "'instanceName' is NULL"),
+        (Some(c""), CO_SIMULATION, Some(&guid_text), None, "instance name is empty"),
+        (Some(c"\xff"), CO_SIMULATION, Some(&guid_text), None, "is not UTF-8"),
         (Some(c"it"), CO_SIMULATION, None, None, "'fmuGUID' is NULL"),
-        (Some(c"it"), CO_SIMULATION, Some(c"{8c4e810f}"), None, "no unit with GUID '{8c4e810f}'"),
-        (Some(c"it"), 2, Some(&own), None, "fmuType 2"),
-        (Some(c"it"), MODEL_EXCHANGE, Some(&own), None, "Counter is for co-simulation only"),
-        (Some(c"it"), CO_SIMULATION, Some(&own), Some(c"http://example.org"), "scheme 'http'"),
+        (Some(c"it"), CO_SIMULATION, Some(c"{8c4e810f}"), None, "no FMU with GUID '{8c4e810f}'"),
+        (Some(c"it"), 2, Some(&guid_text), None, "fmuType 2"),
+        (Some(c"it"), MODEL_EXCHANGE, Some(&guid_text), None, "Counter is for co-simulation only"),
+        (
+            Some(c"it"),
+            CO_SIMULATION,
+            Some(&guid_text),
+            Some(c"http://example.org"),
+            "scheme 'http'",
+        ),
     ];
     for (name, fmu_type, guid, resources, part) in cases {
         let refused = instantiate(name, fmu_type, guid, resources, false);
         assert!(refused.component.is_null(), "{part}");
         refused.said(&["fmi2Instantiate", part]);
-        assert_eq!(refused.messages()[0].status, Status::Error);
+        assert_eq!(refused.messages()[0].status, FmiStatus::Error);
     }
 }
 
 #[test]
 fn no_callbacks_and_no_logger_are_fine() {
-    let own = guid("Lag");
+    let guid_text = guid("Lag");
     let mut silent = callbacks(null());
     silent.logger = None;
     for callbacks in [null(), &raw const silent] {
         let component =
-            c!(fmi2Instantiate(c"it".as_ptr(), 1, own.as_ptr(), null(), callbacks, 0, 1));
+            c!(fmi2Instantiate(c"it".as_ptr(), 1, guid_text.as_ptr(), null(), callbacks, 0, 1));
         assert!(!component.is_null());
-        assert_eq!(c!(fmi2DoStep(component, 0.0, 0.1, 1)), Status::Error);
+        assert_eq!(c!(fmi2DoStep(component, 0.0, 0.1, 1)), FmiStatus::Error);
         c!(fmi2FreeInstance(component));
         assert_eq!(
             c!(fmi2Instantiate(c"it".as_ptr(), 1, c"x".as_ptr(), null(), callbacks, 0, 1)),
@@ -56,7 +62,7 @@ fn no_callbacks_and_no_logger_are_fine() {
 }
 
 #[test]
-fn the_resource_folder_reaches_the_unit() {
+fn the_resource_folder_reaches_the_model() {
     const RESOURCES: u32 = 3;
     for (uri, expected) in [
         (None, "none"),
@@ -70,27 +76,27 @@ fn the_resource_folder_reaches_the_unit() {
 }
 
 #[test]
-fn interleaved_instances_and_units_do_not_see_each_other() {
+fn interleaved_instances_and_fmus_do_not_affect_each_other() {
     const COUNT: u32 = 2;
     let alone = |gain: f64| {
         let instance = Instance::lag(CO_SIMULATION);
-        assert_eq!(instance.set_real(GAIN, gain), Status::Ok);
+        assert_eq!(instance.set_real(GAIN, gain), FmiStatus::Ok);
         instance.initialize();
-        assert_eq!(instance.set_real(U, 1.0), Status::Ok);
+        assert_eq!(instance.set_real(U, 1.0), FmiStatus::Ok);
         instance
     };
     let steps = |instance: &Instance, k: i32| {
-        assert_eq!(instance.step(f64::from(k) * 0.1, 0.1), Status::Ok);
+        assert_eq!(instance.step(f64::from(k) * 0.1, 0.1), FmiStatus::Ok);
         instance.real(X).to_bits()
     };
     let (one, two) = (alone(2.0), alone(-3.0));
     let expected: Vec<_> =
         (0..20).map(|k| steps(&one, k)).zip((0..20).map(|k| steps(&two, k))).collect();
-    let (one, two, counter) = (alone(2.0), alone(-3.0), Instance::of("Counter", CO_SIMULATION));
+    let (one, two, counter) = (alone(2.0), alone(-3.0), Instance::new("Counter", CO_SIMULATION));
     counter.initialize();
     for k in 0..20 {
         assert_eq!((steps(&one, k), steps(&two, k)), expected[k as usize]);
-        assert_eq!(counter.step(f64::from(k) * 0.1, 0.1), Status::Ok);
+        assert_eq!(counter.step(f64::from(k) * 0.1, 0.1), FmiStatus::Ok);
         assert_eq!(counter.real(COUNT), f64::from(k + 1));
     }
 }
@@ -99,18 +105,18 @@ fn interleaved_instances_and_units_do_not_see_each_other() {
 fn a_reset_keeps_the_model_unless_it_has_failed() {
     const COUNT: u32 = 2;
     const RESETS: u32 = 5;
-    let counter = Instance::of("Counter", CO_SIMULATION);
+    let counter = Instance::new("Counter", CO_SIMULATION);
     for resets in 1..4 {
         counter.initialize();
-        assert_eq!(counter.step(0.0, 0.1), Status::Ok);
-        assert_eq!(c!(fmi2Reset(counter.component)), Status::Ok);
+        assert_eq!(counter.step(0.0, 0.1), FmiStatus::Ok);
+        assert_eq!(c!(fmi2Reset(counter.component)), FmiStatus::Ok);
         counter.enter_initialization();
         assert_eq!((counter.integer(RESETS), counter.real(COUNT)), (2 * resets - 1, 0.0));
-        assert_eq!(c!(fmi2Reset(counter.component)), Status::Ok);
+        assert_eq!(c!(fmi2Reset(counter.component)), FmiStatus::Ok);
     }
     // A refused value puts it into the error state.
-    assert_eq!(counter.set_real(COUNT, 1.0), Status::Error);
-    assert_eq!(c!(fmi2Reset(counter.component)), Status::Ok);
+    assert_eq!(counter.set_real(COUNT, 1.0), FmiStatus::Error);
+    assert_eq!(c!(fmi2Reset(counter.component)), FmiStatus::Ok);
     counter.enter_initialization();
     assert_eq!(counter.integer(RESETS), 0);
 }
@@ -119,41 +125,41 @@ fn a_reset_keeps_the_model_unless_it_has_failed() {
 fn a_panic_is_fatal_for_the_instance_only() {
     const DEFECT: u32 = 0;
     const COUNT: u32 = 2;
-    type Provoke = fn(&Instance) -> Status;
+    type Provoke = fn(&Instance) -> FmiStatus;
     let bystander = Instance::stepping();
     let places: [(&CStr, Provoke); 3] = [
         (c"initialize", |instance| c!(fmi2ExitInitializationMode(instance.component))),
         (c"calculate", |instance| instance.get_real(COUNT).0),
         (c"step", |instance| {
-            assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), Status::Ok);
+            assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), FmiStatus::Ok);
             instance.step(0.0, 0.1)
         }),
     ];
     for (place, provoke) in places {
-        let instance = Instance::of("Counter", CO_SIMULATION);
-        assert_eq!(instance.set_string(DEFECT, place), Status::Ok);
+        let instance = Instance::new("Counter", CO_SIMULATION);
+        assert_eq!(instance.set_string(DEFECT, place), FmiStatus::Ok);
         instance.enter_initialization();
-        assert_eq!(provoke(&instance), Status::Fatal);
-        instance.said(&["defect in the unit: defect in", place.to_str().unwrap()]);
-        assert_eq!(instance.messages().last().unwrap().status, Status::Fatal);
+        assert_eq!(provoke(&instance), FmiStatus::Fatal);
+        instance.said(&["defect in the FMU: defect in", place.to_str().unwrap()]);
+        assert_eq!(instance.messages().last().unwrap().status, FmiStatus::Fatal);
         // From now on every call returns the same status until the instance is freed.
-        assert_eq!(c!(fmi2Reset(instance.component)), Status::Fatal);
-        assert_eq!(instance.get_real(COUNT).0, Status::Fatal);
-        assert_eq!(instance.step(0.0, 0.1), Status::Fatal);
+        assert_eq!(c!(fmi2Reset(instance.component)), FmiStatus::Fatal);
+        assert_eq!(instance.get_real(COUNT).0, FmiStatus::Fatal);
+        assert_eq!(instance.step(0.0, 0.1), FmiStatus::Fatal);
     }
-    assert_eq!(bystander.step(0.0, 0.1), Status::Ok);
+    assert_eq!(bystander.step(0.0, 0.1), FmiStatus::Ok);
 }
 
-/// State of a logger that calls its unit back, with the answers that it got.
+/// State of a logger that calls its instance back, with the answers that it got.
 #[derive(Default)]
 struct Caller {
     component: AtomicPtr<c_void>,
-    answers: Mutex<Vec<Status>>,
+    answers: Mutex<Vec<FmiStatus>>,
     /// Answers to another thread that calls at the same time.
-    other: Mutex<Option<Vec<Status>>>,
+    other: Mutex<Option<Vec<FmiStatus>>>,
 }
 
-fn call_all(component: *mut c_void) -> Vec<Status> {
+fn call_all(component: *mut c_void) -> Vec<FmiStatus> {
     let mut value = 0.0;
     let mut state = null_mut();
     vec![
@@ -168,7 +174,7 @@ fn call_all(component: *mut c_void) -> Vec<Status> {
 extern "C" fn calls_back(
     environment: *mut c_void,
     _: *const c_char,
-    _: Status,
+    _: FmiStatus,
     _: *const c_char,
     _: *const c_char,
 ) {
@@ -186,7 +192,7 @@ extern "C" fn calls_back(
 #[test]
 #[allow(unsafe_code)]
 fn calls_during_a_call_are_refused_whoever_makes_them() {
-    type Fixed = extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char);
+    type Fixed = extern "C" fn(*mut c_void, *const c_char, FmiStatus, *const c_char, *const c_char);
     let caller = Caller::default();
     // SAFETY: the two types differ only in the variadic part, and on the supported platforms a
     // variadic call without variadic arguments passes the fixed ones like any other call.
@@ -202,18 +208,18 @@ fn calls_during_a_call_are_refused_whoever_makes_them() {
     let component =
         c!(fmi2Instantiate(c"it".as_ptr(), CO_SIMULATION, guid.as_ptr(), null(), &callbacks, 0, 0));
     caller.component.store(component, Ordering::SeqCst);
-    assert_eq!(c!(fmi2SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0)), Status::Ok);
-    assert_eq!(c!(fmi2EnterInitializationMode(component)), Status::Ok);
-    assert_eq!(c!(fmi2ExitInitializationMode(component)), Status::Ok);
+    assert_eq!(c!(fmi2SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0)), FmiStatus::Ok);
+    assert_eq!(c!(fmi2EnterInitializationMode(component)), FmiStatus::Ok);
+    assert_eq!(c!(fmi2ExitInitializationMode(component)), FmiStatus::Ok);
     assert!(caller.answers.lock().unwrap().is_empty(), "nothing was said yet");
     // The error is logged, and every call that the logger and the other thread try meanwhile is
     // refused.
-    assert_eq!(c!(fmi2SetReal(component, &X, 1, &1.0)), Status::Error);
-    assert_eq!(*caller.answers.lock().unwrap(), [Status::Error; 4]);
-    assert_eq!(*caller.other.lock().unwrap(), Some(vec![Status::Error; 4]));
+    assert_eq!(c!(fmi2SetReal(component, &X, 1, &1.0)), FmiStatus::Error);
+    assert_eq!(*caller.answers.lock().unwrap(), [FmiStatus::Error; 4]);
+    assert_eq!(*caller.other.lock().unwrap(), Some(vec![FmiStatus::Error; 4]));
     // The instance is unchanged and free again.
     let mut value = f64::NAN;
-    assert_eq!(c!(fmi2GetReal(component, &U, 1, &mut value)), Status::Ok);
-    assert_eq!(c!(fmi2Reset(component)), Status::Ok);
+    assert_eq!(c!(fmi2GetReal(component, &U, 1, &mut value)), FmiStatus::Ok);
+    assert_eq!(c!(fmi2Reset(component)), FmiStatus::Ok);
     c!(fmi2FreeInstance(component));
 }

@@ -1,4 +1,4 @@
-//! Tests that drive the exported C functions of a library with two units, as an importer does.
+//! Tests that drive the exported C functions of a library with two FMUs, as an importer does.
 #![allow(clippy::borrow_as_ptr, reason = "calls read better with `&x`")]
 
 mod counter;

@@ -2,7 +2,7 @@
 //! refused.
 
 use crate::support::*;
-use fmi2_export::types::Status;
+use fmi2_export::types::FmiStatus;
 use std::ptr::null_mut;
 
 /// Drives an instance over three steps from `k` on and returns the bits of all its outputs.
@@ -10,8 +10,8 @@ fn run(instance: &Instance, from: i32) -> Vec<u64> {
     let h = 0.3;
     let mut bits = vec![];
     for k in from..from + 3 {
-        assert_eq!(instance.set_real(U, f64::from(k).sin()), Status::Ok);
-        assert_eq!(instance.step(f64::from(k) * h, h), Status::Ok);
+        assert_eq!(instance.set_real(U, f64::from(k).sin()), FmiStatus::Ok);
+        assert_eq!(instance.step(f64::from(k) * h, h), FmiStatus::Ok);
         bits.extend([X, DERIVATIVE, Y].map(|reference| instance.real(reference).to_bits()));
         bits.push(instance.boolean(SWITCHED) as u64);
     }
@@ -25,13 +25,13 @@ fn a_restored_state_goes_on_bit_for_bit() {
     let mut state = instance.save();
     let expected = run(&instance, 3);
     for _ in 0..2 {
-        assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), Status::Ok);
+        assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), FmiStatus::Ok);
         assert_eq!(run(&instance, 3), expected);
     }
-    assert_eq!(c!(fmi2FreeFMUstate(instance.component, &mut state)), Status::Ok);
+    assert_eq!(c!(fmi2FreeFMUstate(instance.component, &mut state)), FmiStatus::Ok);
     assert!(state.is_null());
-    assert_eq!(c!(fmi2FreeFMUstate(instance.component, &mut state)), Status::Ok);
-    assert_eq!(c!(fmi2FreeFMUstate(instance.component, null_mut())), Status::Ok);
+    assert_eq!(c!(fmi2FreeFMUstate(instance.component, &mut state)), FmiStatus::Ok);
+    assert_eq!(c!(fmi2FreeFMUstate(instance.component, null_mut())), FmiStatus::Ok);
 }
 
 #[test]
@@ -40,10 +40,10 @@ fn a_state_can_be_written_over() {
     let mut state = instance.save();
     run(&instance, 0);
     let before = state;
-    assert_eq!(c!(fmi2GetFMUstate(instance.component, &mut state)), Status::Ok);
+    assert_eq!(c!(fmi2GetFMUstate(instance.component, &mut state)), FmiStatus::Ok);
     assert_eq!(state, before);
     let expected = run(&instance, 3);
-    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), Status::Ok);
+    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), FmiStatus::Ok);
     assert_eq!(run(&instance, 3), expected);
 }
 
@@ -54,8 +54,8 @@ fn bytes_restore_another_instance_bit_for_bit() {
     let bytes = first.serialize();
     let second = Instance::lag(CO_SIMULATION);
     let (status, state) = second.deserialize(&bytes);
-    assert_eq!(status, Status::Ok);
-    assert_eq!(c!(fmi2SetFMUstate(second.component, state)), Status::Ok);
+    assert_eq!(status, FmiStatus::Ok);
+    assert_eq!(c!(fmi2SetFMUstate(second.component, state)), FmiStatus::Ok);
     assert_eq!(second.serialize(), bytes);
     assert_eq!(run(&second, 3), run(&first, 3));
 }
@@ -66,12 +66,12 @@ fn pending_input_derivatives_are_part_of_the_state() {
     let (order, value) = (1, 2.0);
     let component = instance.component;
     let status = c!(fmi2SetRealInputDerivatives(component, &U, 1, &order, &value));
-    assert_eq!(status, Status::Ok);
+    assert_eq!(status, FmiStatus::Ok);
     let state = instance.save();
-    assert_eq!(instance.step(0.0, 0.5), Status::Ok);
+    assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
     let expected = instance.real(X);
-    assert_eq!(c!(fmi2SetFMUstate(component, state)), Status::Ok);
-    assert_eq!(instance.step(0.0, 0.5), Status::Ok);
+    assert_eq!(c!(fmi2SetFMUstate(component, state)), FmiStatus::Ok);
+    assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
     assert_eq!(instance.real(X).to_bits(), expected.to_bits());
 }
 
@@ -82,7 +82,7 @@ fn every_damaged_byte_and_every_truncation_is_refused() {
     let bytes = instance.serialize();
     let refused = |bytes: &[u8], what: &str| {
         let (status, state) = instance.deserialize(bytes);
-        assert_eq!(status, Status::Error, "{what}");
+        assert_eq!(status, FmiStatus::Error, "{what}");
         assert!(state.is_null());
         instance.said(&["fmi2DeSerializeFMUstate", "saved state"]);
     };
@@ -102,35 +102,35 @@ fn every_damaged_byte_and_every_truncation_is_refused() {
 }
 
 #[test]
-fn a_state_of_another_unit_or_interface_is_refused() {
+fn a_state_of_another_fmu_or_interface_is_refused() {
     let lag = Instance::stepping();
     let bytes = lag.serialize();
-    let counter = Instance::of("Counter", CO_SIMULATION);
-    assert_eq!(counter.deserialize(&bytes).0, Status::Error);
-    counter.said(&["belongs to a unit with GUID"]);
+    let counter = Instance::new("Counter", CO_SIMULATION);
+    assert_eq!(counter.deserialize(&bytes).0, FmiStatus::Error);
+    counter.said(&["belongs to an FMU with GUID"]);
     let exchange = Instance::lag(MODEL_EXCHANGE);
-    assert_eq!(exchange.deserialize(&bytes).0, Status::Error);
+    assert_eq!(exchange.deserialize(&bytes).0, FmiStatus::Error);
     exchange.said(&["other interface"]);
     let empty = lag.deserialize(&[]);
-    assert_eq!(empty.0, Status::Error);
+    assert_eq!(empty.0, FmiStatus::Error);
 }
 
 #[test]
 fn a_handle_that_is_not_ones_own_is_refused() {
     let (one, other) = (Instance::stepping(), Instance::stepping());
     let state = one.save();
-    assert_eq!(c!(fmi2SetFMUstate(other.component, state)), Status::Error);
+    assert_eq!(c!(fmi2SetFMUstate(other.component, state)), FmiStatus::Error);
     other.said(&["not made by this instance"]);
     let mut freed = state;
-    assert_eq!(c!(fmi2FreeFMUstate(one.component, &mut freed)), Status::Ok);
-    assert_eq!(c!(fmi2SetFMUstate(one.component, state)), Status::Error);
+    assert_eq!(c!(fmi2FreeFMUstate(one.component, &mut freed)), FmiStatus::Ok);
+    assert_eq!(c!(fmi2SetFMUstate(one.component, state)), FmiStatus::Error);
     let mut twice = state;
-    assert_eq!(c!(fmi2FreeFMUstate(one.component, &mut twice)), Status::Error);
+    assert_eq!(c!(fmi2FreeFMUstate(one.component, &mut twice)), FmiStatus::Error);
     let mut size = 0;
-    assert_eq!(c!(fmi2SerializedFMUstateSize(one.component, state, &mut size)), Status::Error);
+    assert_eq!(c!(fmi2SerializedFMUstateSize(one.component, state, &mut size)), FmiStatus::Error);
     // None of these refusals ends the simulation.
-    assert_eq!(one.step(0.0, 0.1), Status::Ok);
-    assert_eq!(other.step(0.0, 0.1), Status::Ok);
+    assert_eq!(one.step(0.0, 0.1), FmiStatus::Ok);
+    assert_eq!(other.step(0.0, 0.1), FmiStatus::Ok);
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn a_buffer_that_is_too_small_is_refused() {
     let component = instance.component;
     assert_eq!(
         c!(fmi2SerializeFMUstate(component, state, buffer.as_mut_ptr().cast(), 8)),
-        Status::Error
+        FmiStatus::Error
     );
     instance.said(&["room for 8 bytes"]);
     assert_eq!(buffer, [0; 8]);
@@ -152,9 +152,9 @@ fn an_instance_in_error_goes_on_from_a_saved_state() {
     let instance = Instance::stepping();
     run(&instance, 0);
     let state = instance.save();
-    assert_eq!(instance.set_real(U, f64::NAN), Status::Error);
-    assert_eq!(instance.step(0.9, 0.3), Status::Error);
-    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), Status::Ok);
+    assert_eq!(instance.set_real(U, f64::NAN), FmiStatus::Error);
+    assert_eq!(instance.step(0.9, 0.3), FmiStatus::Error);
+    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), FmiStatus::Ok);
     run(&instance, 3);
 }
 
@@ -162,11 +162,11 @@ fn an_instance_in_error_goes_on_from_a_saved_state() {
 fn reset_equals_a_new_instance_bit_for_bit() {
     let new = Instance::lag(CO_SIMULATION);
     let used = Instance::lag(CO_SIMULATION);
-    assert_eq!(used.set_real(GAIN, 9.0), Status::Ok);
-    assert_eq!(used.set_string(LABEL, c"used"), Status::Ok);
+    assert_eq!(used.set_real(GAIN, 9.0), FmiStatus::Ok);
+    assert_eq!(used.set_string(LABEL, c"used"), FmiStatus::Ok);
     used.initialize();
     run(&used, 0);
-    assert_eq!(c!(fmi2Reset(used.component)), Status::Ok);
+    assert_eq!(c!(fmi2Reset(used.component)), FmiStatus::Ok);
     assert_eq!(used.serialize(), new.serialize());
     new.initialize();
     used.initialize();

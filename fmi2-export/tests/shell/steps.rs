@@ -1,17 +1,17 @@
 //! Tests of co-simulation: time, input derivatives and status.
 
 use crate::support::*;
-use fmi2_export::types::Status;
+use fmi2_export::types::FmiStatus;
 use std::ffi::CStr;
 use std::ptr::null;
 
 #[test]
 fn oracle_the_step_response_is_the_exponential() {
     let instance = Instance::stepping();
-    assert_eq!(instance.set_real(U, 1.0), Status::Ok);
+    assert_eq!(instance.set_real(U, 1.0), FmiStatus::Ok);
     let h = 0.01;
     for k in 0..100 {
-        assert_eq!(instance.step(f64::from(k) * h, h), Status::Ok);
+        assert_eq!(instance.step(f64::from(k) * h, h), FmiStatus::Ok);
     }
     // The solution is x(t) = k u + (x₀ − k u) e^(−t/T).
     let exact = 2.0 + (0.5 - 2.0) * (-1.0f64 / 0.5).exp();
@@ -21,15 +21,15 @@ fn oracle_the_step_response_is_the_exponential() {
 #[test]
 fn the_last_step_may_be_shorter_by_rounding_or_empty() {
     let instance = Instance::stepping();
-    assert_eq!(instance.step(0.0, 0.1), Status::Ok);
-    assert_eq!(instance.step(0.1, 0.1 - 1e-17), Status::Ok);
+    assert_eq!(instance.step(0.0, 0.1), FmiStatus::Ok);
+    assert_eq!(instance.step(0.1, 0.1 - 1e-17), FmiStatus::Ok);
     let before = instance.real(X);
-    assert_eq!(instance.step(0.2, 0.0), Status::Ok);
+    assert_eq!(instance.step(0.2, 0.0), FmiStatus::Ok);
     assert_eq!(instance.real(X), before);
     // A master that accumulates its time does not reach 1 with ten steps of 0.1.
     let mut time = 0.2;
     for _ in 0..300 {
-        assert_eq!(instance.step(time, 0.1), Status::Ok);
+        assert_eq!(instance.step(time, 0.1), FmiStatus::Ok);
         time += 0.1;
     }
 }
@@ -37,13 +37,13 @@ fn the_last_step_may_be_shorter_by_rounding_or_empty() {
 #[test]
 fn a_wrong_communication_point_or_step_is_refused() {
     for (point, size, part) in [
-        (0.2, 0.1, "communication point 0.2 s, but the unit is at 0 s"),
+        (0.2, 0.1, "communication point 0.2 s, but the instance is at 0 s"),
         (0.0, -0.1, "cannot step"),
         (0.0, f64::NAN, "cannot step"),
         (f64::INFINITY, 0.1, "cannot step"),
     ] {
         let instance = Instance::stepping();
-        assert_eq!(instance.step(point, size), Status::Error);
+        assert_eq!(instance.step(point, size), FmiStatus::Error);
         instance.said(&["fmi2DoStep", part]);
     }
 }
@@ -52,17 +52,20 @@ fn a_wrong_communication_point_or_step_is_refused() {
 fn the_stop_time_holds_if_it_is_defined() {
     let with_stop = |stop| {
         let instance = Instance::lag(CO_SIMULATION);
-        assert_eq!(c!(fmi2SetupExperiment(instance.component, 0, 0.0, 0.0, 1, stop)), Status::Ok);
-        assert_eq!(c!(fmi2EnterInitializationMode(instance.component)), Status::Ok);
-        assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), Status::Ok);
+        assert_eq!(
+            c!(fmi2SetupExperiment(instance.component, 0, 0.0, 0.0, 1, stop)),
+            FmiStatus::Ok
+        );
+        assert_eq!(c!(fmi2EnterInitializationMode(instance.component)), FmiStatus::Ok);
+        assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), FmiStatus::Ok);
         instance
     };
-    assert_eq!(with_stop(0.5).step(0.0, 0.5 + 1e-9), Status::Ok);
-    assert_eq!(with_stop(f64::INFINITY).step(0.0, 1e3), Status::Ok);
+    assert_eq!(with_stop(0.5).step(0.0, 0.5 + 1e-9), FmiStatus::Ok);
+    assert_eq!(with_stop(f64::INFINITY).step(0.0, 1e3), FmiStatus::Ok);
     let instance = with_stop(0.5);
-    assert_eq!(instance.step(0.0, 0.6), Status::Error);
+    assert_eq!(instance.step(0.0, 0.6), FmiStatus::Error);
     instance.said(&["beyond the stop time 0.5 s"]);
-    assert_eq!(Instance::stepping().step(0.0, 100.0), Status::Ok);
+    assert_eq!(Instance::stepping().step(0.0, 100.0), FmiStatus::Ok);
 }
 
 #[test]
@@ -70,30 +73,36 @@ fn a_senseless_experiment_is_refused() {
     let instance = || Instance::lag(CO_SIMULATION);
     assert_eq!(
         c!(fmi2SetupExperiment(instance().component, 0, 0.0, f64::NAN, 0, 0.0)),
-        Status::Error
+        FmiStatus::Error
     );
-    assert_eq!(c!(fmi2SetupExperiment(instance().component, 0, 0.0, 1.0, 1, 0.5)), Status::Error);
-    assert_eq!(c!(fmi2SetupExperiment(instance().component, 1, -1.0, 0.0, 0, 0.0)), Status::Error);
+    assert_eq!(
+        c!(fmi2SetupExperiment(instance().component, 0, 0.0, 1.0, 1, 0.5)),
+        FmiStatus::Error
+    );
+    assert_eq!(
+        c!(fmi2SetupExperiment(instance().component, 1, -1.0, 0.0, 0, 0.0)),
+        FmiStatus::Error
+    );
     assert_eq!(
         c!(fmi2SetupExperiment(instance().component, 0, f64::NAN, 0.0, 0, f64::NAN)),
-        Status::Ok
+        FmiStatus::Ok
     );
 }
 
 #[test]
 fn an_experiment_may_end_where_it_starts() {
     let instance = Instance::lag(CO_SIMULATION);
-    assert_eq!(c!(fmi2SetupExperiment(instance.component, 0, 0.0, 2.0, 1, 2.0)), Status::Ok);
+    assert_eq!(c!(fmi2SetupExperiment(instance.component, 0, 0.0, 2.0, 1, 2.0)), FmiStatus::Ok);
 }
 
-/// Returns a unit at that time, which it reached in one step.
+/// Returns an instance at that time, which it reached in one step.
 fn at(time: f64, stop: Option<f64>) -> Instance {
     let instance = Instance::lag(CO_SIMULATION);
     let (component, stops) = (instance.component, i32::from(stop.is_some()));
     let stop = stop.unwrap_or_default();
-    assert_eq!(c!(fmi2SetupExperiment(component, 0, 0.0, time, stops, stop)), Status::Ok);
-    assert_eq!(c!(fmi2EnterInitializationMode(component)), Status::Ok);
-    assert_eq!(c!(fmi2ExitInitializationMode(component)), Status::Ok);
+    assert_eq!(c!(fmi2SetupExperiment(component, 0, 0.0, time, stops, stop)), FmiStatus::Ok);
+    assert_eq!(c!(fmi2EnterInitializationMode(component)), FmiStatus::Ok);
+    assert_eq!(c!(fmi2ExitInitializationMode(component)), FmiStatus::Ok);
     instance
 }
 
@@ -108,23 +117,23 @@ fn the_communication_point_may_differ_by_rounding_only() {
         (1e13, 5e-3, 2e-2),
         (1e-3, 5e-13, 2e-10),
     ] {
-        assert_eq!(at(time, None).step(time + near, 1e-6), Status::Ok, "{time}");
-        assert_eq!(at(time, None).step(time - near, 1e-6), Status::Ok, "{time}");
-        assert_eq!(at(time, None).step(time + far, 1e-6), Status::Error, "{time}");
-        assert_eq!(at(time, None).step(time - far, 1e-6), Status::Error, "{time}");
+        assert_eq!(at(time, None).step(time + near, 1e-6), FmiStatus::Ok, "{time}");
+        assert_eq!(at(time, None).step(time - near, 1e-6), FmiStatus::Ok, "{time}");
+        assert_eq!(at(time, None).step(time + far, 1e-6), FmiStatus::Error, "{time}");
+        assert_eq!(at(time, None).step(time - far, 1e-6), FmiStatus::Error, "{time}");
     }
 }
 
 #[test]
 fn the_stop_time_may_be_passed_by_rounding_only() {
     // 1e-6 of the stop time, but never more than the step.
-    assert_eq!(at(99.0, Some(100.0)).step(99.0, 1.0 + 5e-5), Status::Ok);
-    assert_eq!(at(99.0, Some(100.0)).step(99.0, 1.0 + 2e-4), Status::Error);
-    assert_eq!(at(0.0, Some(1e-9)).step(0.0, 1e-9 + 5e-16), Status::Ok);
-    assert_eq!(at(0.0, Some(1e-9)).step(0.0, 1e-9 + 5e-15), Status::Error);
+    assert_eq!(at(99.0, Some(100.0)).step(99.0, 1.0 + 5e-5), FmiStatus::Ok);
+    assert_eq!(at(99.0, Some(100.0)).step(99.0, 1.0 + 2e-4), FmiStatus::Error);
+    assert_eq!(at(0.0, Some(1e-9)).step(0.0, 1e-9 + 5e-16), FmiStatus::Ok);
+    assert_eq!(at(0.0, Some(1e-9)).step(0.0, 1e-9 + 5e-15), FmiStatus::Error);
 }
 
-fn set_derivative(instance: &Instance, reference: u32, order: i32, value: f64) -> Status {
+fn set_derivative(instance: &Instance, reference: u32, order: i32, value: f64) -> FmiStatus {
     let component = instance.component;
     c!(fmi2SetRealInputDerivatives(component, &reference, 1, &order, &value))
 }
@@ -135,9 +144,9 @@ fn oracle_input_derivatives_make_a_ramp() {
     let h = 0.01;
     for k in 0..100 {
         let t = f64::from(k) * h;
-        assert_eq!(set_derivative(&instance, U, 1, 3.0), Status::Ok);
-        assert_eq!(instance.set_real(U, 3.0 * t), Status::Ok);
-        assert_eq!(instance.step(t, h), Status::Ok);
+        assert_eq!(set_derivative(&instance, U, 1, 3.0), FmiStatus::Ok);
+        assert_eq!(instance.set_real(U, 3.0 * t), FmiStatus::Ok);
+        assert_eq!(instance.step(t, h), FmiStatus::Ok);
     }
     // The ramp u = a t gives x(t) = k a (t − T) + (x₀ + k a T) e^(−t/T).
     let (k, a, time_constant) = (2.0, 3.0, 0.5);
@@ -150,10 +159,10 @@ fn oracle_input_derivatives_make_a_ramp() {
 #[test]
 fn input_derivatives_hold_for_one_step() {
     let instance = Instance::stepping();
-    assert_eq!(set_derivative(&instance, U, 2, 4.0), Status::Ok);
-    assert_eq!(instance.step(0.0, 0.5), Status::Ok);
+    assert_eq!(set_derivative(&instance, U, 2, 4.0), FmiStatus::Ok);
+    assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
     assert_eq!(instance.real(U), 4.0 * 0.25 / 2.0);
-    assert_eq!(instance.step(0.5, 0.5), Status::Ok);
+    assert_eq!(instance.step(0.5, 0.5), FmiStatus::Ok);
     assert_eq!(instance.real(U), 0.5);
 }
 
@@ -161,10 +170,10 @@ fn input_derivatives_hold_for_one_step() {
 fn oracle_derivatives_of_several_orders_add_up() {
     let instance = Instance::stepping();
     for (order, value) in [(1, 2.0), (2, 6.0), (3, -12.0)] {
-        assert_eq!(set_derivative(&instance, U, order, value), Status::Ok);
+        assert_eq!(set_derivative(&instance, U, order, value), FmiStatus::Ok);
     }
     let h = 0.5;
-    assert_eq!(instance.step(0.0, h), Status::Ok);
+    assert_eq!(instance.step(0.0, h), FmiStatus::Ok);
     assert_eq!(instance.real(U), 2.0 * h + 6.0 * h * h / 2.0 - 12.0 * h * h * h / 6.0);
 }
 
@@ -180,7 +189,7 @@ fn senseless_input_derivatives_are_refused() {
         (99, 1, 1.0, "does not exist"),
     ] {
         let instance = Instance::stepping();
-        assert_eq!(set_derivative(&instance, reference, order, value), Status::Error);
+        assert_eq!(set_derivative(&instance, reference, order, value), FmiStatus::Error);
         instance.said(&["fmi2SetRealInputDerivatives", part]);
     }
 }
@@ -190,30 +199,30 @@ fn output_derivatives_are_not_offered() {
     let instance = Instance::stepping();
     let mut value = 0.0;
     let status = c!(fmi2GetRealOutputDerivatives(instance.component, &X, 1, &1, &mut value));
-    assert_eq!(status, Status::Error);
+    assert_eq!(status, FmiStatus::Error);
     instance.said(&["maxOutputDerivativeOrder is 0"]);
 }
 
 #[test]
-fn a_step_that_the_unit_refuses_can_be_taken_again_from_a_saved_state() {
+fn a_step_that_the_model_refuses_can_be_repeated_from_a_saved_state() {
     let instance = Instance::lag(CO_SIMULATION);
-    assert_eq!(instance.set_string(LABEL, c"refuse"), Status::Ok);
+    assert_eq!(instance.set_string(LABEL, c"refuse"), FmiStatus::Ok);
     instance.initialize();
-    assert_eq!(instance.step(0.0, 0.5), Status::Ok);
+    assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
     let state = instance.save();
-    assert_eq!(instance.step(0.5, 0.75), Status::Discard);
+    assert_eq!(instance.step(0.5, 0.75), FmiStatus::Discard);
     instance.said(&["fmi2DoStep: steps above 0.5 s are too long"]);
     let mut time = f64::NAN;
-    assert_eq!(c!(fmi2GetRealStatus(instance.component, 2, &mut time)), Status::Ok);
+    assert_eq!(c!(fmi2GetRealStatus(instance.component, 2, &mut time)), FmiStatus::Ok);
     assert_eq!(time, 0.5);
-    let mut status = Status::Ok;
-    assert_eq!(c!(fmi2GetStatus(instance.component, 0, &mut status)), Status::Ok);
-    assert_eq!(status, Status::Discard);
+    let mut status = FmiStatus::Ok;
+    assert_eq!(c!(fmi2GetStatus(instance.component, 0, &mut status)), FmiStatus::Ok);
+    assert_eq!(status, FmiStatus::Discard);
     let mut terminated = -1;
-    assert_eq!(c!(fmi2GetBooleanStatus(instance.component, 3, &mut terminated)), Status::Ok);
+    assert_eq!(c!(fmi2GetBooleanStatus(instance.component, 3, &mut terminated)), FmiStatus::Ok);
     assert_eq!(terminated, 0);
-    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), Status::Ok);
-    assert_eq!(instance.step(0.5, 0.25), Status::Ok);
+    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), FmiStatus::Ok);
+    assert_eq!(instance.step(0.5, 0.25), FmiStatus::Ok);
 }
 
 #[test]
@@ -221,12 +230,12 @@ fn a_step_that_the_unit_refuses_can_be_taken_again_from_a_saved_state() {
 fn status_of_other_kinds_is_discarded() {
     let instance = Instance::stepping();
     let mut text = null();
-    assert_eq!(c!(fmi2GetStringStatus(instance.component, 1, &mut text)), Status::Ok);
+    assert_eq!(c!(fmi2GetStringStatus(instance.component, 1, &mut text)), FmiStatus::Ok);
     // SAFETY: the call succeeded, so `text` points to a static NUL-terminated text of the library.
     assert_eq!(unsafe { CStr::from_ptr(text) }, c"no step is pending");
     let mut integer = 0;
-    assert_eq!(c!(fmi2GetIntegerStatus(instance.component, 2, &mut integer)), Status::Discard);
+    assert_eq!(c!(fmi2GetIntegerStatus(instance.component, 2, &mut integer)), FmiStatus::Discard);
     let mut real = 0.0;
-    assert_eq!(c!(fmi2GetRealStatus(instance.component, 7, &mut real)), Status::Discard);
-    assert_eq!(instance.step(0.0, 0.1), Status::Ok);
+    assert_eq!(c!(fmi2GetRealStatus(instance.component, 7, &mut real)), FmiStatus::Discard);
+    assert_eq!(instance.step(0.0, 0.1), FmiStatus::Ok);
 }

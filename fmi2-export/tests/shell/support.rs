@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use crate::fmi2;
-use fmi2_export::types::{CEventInfo, Callbacks, LogCallback, Status};
+use fmi2_export::types::{CEventInfo, Callbacks, FmiStatus, LogCallback};
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;
@@ -10,7 +10,7 @@ use std::sync::Mutex;
 pub(crate) const MODEL_EXCHANGE: c_int = 0;
 pub(crate) const CO_SIMULATION: c_int = 1;
 
-/// Value references of the variables of the unit `Lag`.
+/// Value references of the variables of the FMU `Lag`.
 pub(crate) const TIME_CONSTANT: u32 = 0;
 pub(crate) const GAIN: u32 = 1;
 pub(crate) const INITIAL: u32 = 4;
@@ -29,7 +29,7 @@ pub(crate) const OFFSET: u32 = 16;
 /// Message that the importer's logger received.
 #[derive(Clone, Debug)]
 pub(crate) struct Message {
-    pub(crate) status: Status,
+    pub(crate) status: FmiStatus,
     pub(crate) category: String,
     pub(crate) text: String,
     pub(crate) instance: String,
@@ -40,7 +40,7 @@ type Log = Mutex<Vec<Message>>;
 extern "C" fn log(
     environment: *mut c_void,
     instance: *const c_char,
-    status: Status,
+    status: FmiStatus,
     category: *const c_char,
     message: *const c_char,
 ) {
@@ -55,7 +55,7 @@ extern "C" fn log(
 }
 
 pub(crate) fn callbacks(log_to: *const Log) -> Callbacks {
-    type Fixed = extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char);
+    type Fixed = extern "C" fn(*mut c_void, *const c_char, FmiStatus, *const c_char, *const c_char);
     // SAFETY: the two types differ only in the variadic part, and on the supported platforms a
     // variadic call without variadic arguments passes the fixed ones like any other call.
     let logger = unsafe { std::mem::transmute::<Fixed, LogCallback>(log) };
@@ -92,7 +92,7 @@ impl Drop for Instance {
     }
 }
 
-/// Returns the GUID of the unit with that name in this library.
+/// Returns the GUID of the FMU with that name in this library.
 pub(crate) fn guid(name: &str) -> CString {
     let text = fmi2::fmu_model_descriptions();
     assert!(!text.is_null());
@@ -100,9 +100,9 @@ pub(crate) fn guid(name: &str) -> CString {
     // use.
     let json = unsafe { CStr::from_ptr(text) }.to_str().unwrap().to_owned();
     c!(fmu_free_model_descriptions(text));
-    let units: Vec<model_description::ModelDescription> = serde_json::from_str(&json).unwrap();
-    let unit = units.iter().find(|unit| unit.name == name).unwrap();
-    CString::new(unit.guid()).unwrap()
+    let fmus: Vec<model_description::ModelDescription> = serde_json::from_str(&json).unwrap();
+    let fmu = fmus.iter().find(|fmu| fmu.name == name).unwrap();
+    CString::new(fmu.guid()).unwrap()
 }
 
 /// Makes an instance; its component is null if the library refused it.
@@ -132,11 +132,11 @@ pub(crate) fn instantiate(
 
 impl Instance {
     pub(crate) fn lag(fmu_type: c_int) -> Self {
-        Self::of("Lag", fmu_type)
+        Self::new("Lag", fmu_type)
     }
 
-    pub(crate) fn of(unit: &str, fmu_type: c_int) -> Self {
-        let instance = instantiate(Some(c"it"), fmu_type, Some(&guid(unit)), None, true);
+    pub(crate) fn new(fmu: &str, fmu_type: c_int) -> Self {
+        let instance = instantiate(Some(c"it"), fmu_type, Some(&guid(fmu)), None, true);
         assert!(!instance.component.is_null(), "{:?}", instance.messages());
         instance
     }
@@ -159,15 +159,15 @@ impl Instance {
         self.enter_initialization();
         assert_eq!(
             c!(fmi2ExitInitializationMode(self.component)),
-            Status::Ok,
+            FmiStatus::Ok,
             "{:?}",
             self.messages()
         );
     }
 
     pub(crate) fn enter_initialization(&self) {
-        assert_eq!(c!(fmi2SetupExperiment(self.component, 1, 1e-4, 0.0, 0, 0.0)), Status::Ok);
-        assert_eq!(c!(fmi2EnterInitializationMode(self.component)), Status::Ok);
+        assert_eq!(c!(fmi2SetupExperiment(self.component, 1, 1e-4, 0.0, 0, 0.0)), FmiStatus::Ok);
+        assert_eq!(c!(fmi2EnterInitializationMode(self.component)), FmiStatus::Ok);
     }
 
     pub(crate) fn messages(&self) -> Vec<Message> {
@@ -184,24 +184,24 @@ impl Instance {
         }
     }
 
-    pub(crate) fn set_real(&self, reference: u32, value: f64) -> Status {
+    pub(crate) fn set_real(&self, reference: u32, value: f64) -> FmiStatus {
         c!(fmi2SetReal(self.component, &reference, 1, &value))
     }
 
-    pub(crate) fn set_integer(&self, reference: u32, value: i32) -> Status {
+    pub(crate) fn set_integer(&self, reference: u32, value: i32) -> FmiStatus {
         c!(fmi2SetInteger(self.component, &reference, 1, &value))
     }
 
-    pub(crate) fn set_boolean(&self, reference: u32, value: i32) -> Status {
+    pub(crate) fn set_boolean(&self, reference: u32, value: i32) -> FmiStatus {
         c!(fmi2SetBoolean(self.component, &reference, 1, &value))
     }
 
-    pub(crate) fn set_string(&self, reference: u32, value: &CStr) -> Status {
+    pub(crate) fn set_string(&self, reference: u32, value: &CStr) -> FmiStatus {
         let value = value.as_ptr();
         c!(fmi2SetString(self.component, &reference, 1, &value))
     }
 
-    pub(crate) fn get_real(&self, reference: u32) -> (Status, f64) {
+    pub(crate) fn get_real(&self, reference: u32) -> (FmiStatus, f64) {
         let mut value = f64::NAN;
         (c!(fmi2GetReal(self.component, &reference, 1, &mut value)), value)
     }
@@ -209,37 +209,37 @@ impl Instance {
     #[track_caller]
     pub(crate) fn real(&self, reference: u32) -> f64 {
         let (status, value) = self.get_real(reference);
-        assert_eq!(status, Status::Ok, "{:?}", self.messages());
+        assert_eq!(status, FmiStatus::Ok, "{:?}", self.messages());
         value
     }
 
     pub(crate) fn integer(&self, reference: u32) -> i32 {
         let mut value = i32::MIN;
-        assert_eq!(c!(fmi2GetInteger(self.component, &reference, 1, &mut value)), Status::Ok);
+        assert_eq!(c!(fmi2GetInteger(self.component, &reference, 1, &mut value)), FmiStatus::Ok);
         value
     }
 
     pub(crate) fn boolean(&self, reference: u32) -> i32 {
         let mut value = i32::MIN;
-        assert_eq!(c!(fmi2GetBoolean(self.component, &reference, 1, &mut value)), Status::Ok);
+        assert_eq!(c!(fmi2GetBoolean(self.component, &reference, 1, &mut value)), FmiStatus::Ok);
         value
     }
 
     pub(crate) fn string(&self, reference: u32) -> String {
         let mut value = null();
-        assert_eq!(c!(fmi2GetString(self.component, &reference, 1, &mut value)), Status::Ok);
+        assert_eq!(c!(fmi2GetString(self.component, &reference, 1, &mut value)), FmiStatus::Ok);
         // SAFETY: the call succeeded, so `value` points to a text that is NUL-terminated and lives
         // until the next fmi2GetString.
         unsafe { CStr::from_ptr(value) }.to_str().unwrap().to_owned()
     }
 
-    pub(crate) fn step(&self, point: f64, size: f64) -> Status {
+    pub(crate) fn step(&self, point: f64, size: f64) -> FmiStatus {
         c!(fmi2DoStep(self.component, point, size, 1))
     }
 
     pub(crate) fn event_info(&self) -> CEventInfo {
         let mut info = CEventInfo::default();
-        assert_eq!(c!(fmi2NewDiscreteStates(self.component, &mut info)), Status::Ok);
+        assert_eq!(c!(fmi2NewDiscreteStates(self.component, &mut info)), FmiStatus::Ok);
         info
     }
 
@@ -247,7 +247,7 @@ impl Instance {
         let mut state = null_mut();
         assert_eq!(
             c!(fmi2GetFMUstate(self.component, &mut state)),
-            Status::Ok,
+            FmiStatus::Ok,
             "{:?}",
             self.messages()
         );
@@ -258,17 +258,17 @@ impl Instance {
     pub(crate) fn serialize(&self) -> Vec<u8> {
         let mut state = self.save();
         let mut size = 0;
-        assert_eq!(c!(fmi2SerializedFMUstateSize(self.component, state, &mut size)), Status::Ok);
+        assert_eq!(c!(fmi2SerializedFMUstateSize(self.component, state, &mut size)), FmiStatus::Ok);
         let mut bytes = vec![0u8; size];
         assert_eq!(
             c!(fmi2SerializeFMUstate(self.component, state, bytes.as_mut_ptr().cast(), size)),
-            Status::Ok
+            FmiStatus::Ok
         );
-        assert_eq!(c!(fmi2FreeFMUstate(self.component, &mut state)), Status::Ok);
+        assert_eq!(c!(fmi2FreeFMUstate(self.component, &mut state)), FmiStatus::Ok);
         bytes
     }
 
-    pub(crate) fn deserialize(&self, bytes: &[u8]) -> (Status, *mut c_void) {
+    pub(crate) fn deserialize(&self, bytes: &[u8]) -> (FmiStatus, *mut c_void) {
         let mut state = null_mut();
         let status = c!(fmi2DeSerializeFMUstate(
             self.component,

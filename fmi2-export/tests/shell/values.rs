@@ -1,7 +1,7 @@
 //! Tests of getting and setting values: types, limits, causality and laziness.
 
 use crate::support::*;
-use fmi2_export::types::Status;
+use fmi2_export::types::FmiStatus;
 use std::ptr::null;
 
 fn initializing() -> Instance {
@@ -17,7 +17,7 @@ fn a_refused_value_leaves_the_old_one_in_place() {
         (TIME_CONSTANT, f64::NEG_INFINITY, "is not a finite number"),
         (TIME_CONSTANT, 0.0, "'timeConstant' = 0.0 is below the minimum 0.001"),
         (U, 100.5, "'u' = 100.5 is above the maximum 100"),
-        (X, 1.0, "'x' is calculated by the unit"),
+        (X, 1.0, "'x' is calculated by the FMU"),
         (ORDER, 1.0, "'order' (value reference 5) is not of type Real"),
         (17, 1.0, "value reference 17 does not exist"),
         (u32::MAX, 1.0, "does not exist"),
@@ -25,7 +25,7 @@ fn a_refused_value_leaves_the_old_one_in_place() {
     for &(reference, value, part) in cases {
         let instance = initializing();
         let before = (reference < 5 || reference == U).then(|| instance.real(reference));
-        assert_eq!(instance.set_real(reference, value), Status::Error);
+        assert_eq!(instance.set_real(reference, value), FmiStatus::Error);
         instance.said(&["fmi2SetReal", part]);
         if let Some(before) = before {
             assert_eq!(instance.real(reference), before);
@@ -40,7 +40,7 @@ fn one_refused_value_refuses_all_of_the_call() {
     let values = [7.0, -1.0];
     assert_eq!(
         c!(fmi2SetReal(instance.component, references.as_ptr(), 2, values.as_ptr())),
-        Status::Error
+        FmiStatus::Error
     );
     assert_eq!(instance.real(GAIN), 2.0);
 }
@@ -48,23 +48,23 @@ fn one_refused_value_refuses_all_of_the_call() {
 #[test]
 fn integers_enumerations_booleans_and_strings_are_checked() {
     let instance = initializing();
-    assert_eq!(instance.set_integer(ORDER, 3), Status::Error);
+    assert_eq!(instance.set_integer(ORDER, 3), FmiStatus::Error);
     instance.said(&["'order' = 3 is above the maximum 2"]);
 
     for item in [0, 3, i32::MIN] {
         let instance = initializing();
-        assert_eq!(instance.set_integer(SHAPE, item), Status::Error);
+        assert_eq!(instance.set_integer(SHAPE, item), FmiStatus::Error);
         instance.said(&["'shape'", "is not an item of Shape: these are 1 to 2"]);
         assert_eq!(instance.integer(SHAPE), 1);
     }
 
     let instance = initializing();
-    assert_eq!(instance.set_boolean(INVERTED, 2), Status::Error);
+    assert_eq!(instance.set_boolean(INVERTED, 2), FmiStatus::Error);
     instance.said(&["'inverted'", "neither fmi2False (0) nor fmi2True (1)"]);
     assert_eq!(instance.boolean(INVERTED), 0);
 
     let instance = initializing();
-    assert_eq!(instance.set_string(LABEL, c"Gr\xf6\xdfe"), Status::Error);
+    assert_eq!(instance.set_string(LABEL, c"Gr\xf6\xdfe"), FmiStatus::Error);
     instance.said(&["'label'", "is not UTF-8"]);
     assert_eq!(instance.string(LABEL), "lag");
 }
@@ -72,10 +72,10 @@ fn integers_enumerations_booleans_and_strings_are_checked() {
 #[test]
 fn every_type_is_set_and_read_back() {
     let instance = initializing();
-    assert_eq!(instance.set_real(TIME_CONSTANT, 0.25), Status::Ok);
-    assert_eq!(instance.set_integer(SHAPE, 2), Status::Ok);
-    assert_eq!(instance.set_boolean(INVERTED, 1), Status::Ok);
-    assert_eq!(instance.set_string(LABEL, c"Größe"), Status::Ok);
+    assert_eq!(instance.set_real(TIME_CONSTANT, 0.25), FmiStatus::Ok);
+    assert_eq!(instance.set_integer(SHAPE, 2), FmiStatus::Ok);
+    assert_eq!(instance.set_boolean(INVERTED, 1), FmiStatus::Ok);
+    assert_eq!(instance.set_string(LABEL, c"Größe"), FmiStatus::Ok);
     assert_eq!(instance.real(TIME_CONSTANT), 0.25);
     assert_eq!(instance.integer(SHAPE), 2);
     assert_eq!(instance.boolean(INVERTED), 1);
@@ -87,7 +87,7 @@ fn every_type_is_set_and_read_back() {
 #[test]
 fn a_fixed_parameter_cannot_be_set_after_initialization() {
     let instance = Instance::stepping();
-    assert_eq!(instance.set_real(GAIN, 3.0), Status::Error);
+    assert_eq!(instance.set_real(GAIN, 3.0), FmiStatus::Error);
     instance.said(&["'gain.early' is a fixed parameter"]);
     assert_eq!(instance.real(GAIN), 2.0);
 }
@@ -96,63 +96,63 @@ fn a_fixed_parameter_cannot_be_set_after_initialization() {
 fn parameters_set_in_initialization_mode_are_taken_up_before_the_next_read() {
     let instance = initializing();
     assert_eq!(instance.real(X), 0.5);
-    assert_eq!(instance.set_real(INITIAL, 3.0), Status::Ok);
+    assert_eq!(instance.set_real(INITIAL, 3.0), FmiStatus::Ok);
     assert_eq!(instance.real(X), 3.0);
-    assert_eq!(instance.set_real(U, 1.0), Status::Ok);
+    assert_eq!(instance.set_real(U, 1.0), FmiStatus::Ok);
     assert_eq!(instance.real(Y), 4.0);
     // The derivative is der(x) = (k u − x) / T.
     assert_eq!(instance.real(DERIVATIVE), (2.0 * 1.0 - 3.0) / 0.5);
-    assert_eq!(instance.set_real(INITIAL, -1.0), Status::Ok);
-    assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), Status::Ok);
+    assert_eq!(instance.set_real(INITIAL, -1.0), FmiStatus::Ok);
+    assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), FmiStatus::Ok);
     assert_eq!(instance.real(X), -1.0);
 }
 
 #[test]
-fn a_parameter_that_the_unit_refuses_stops_initialization() {
+fn a_parameter_that_the_model_refuses_stops_initialization() {
     let instance = initializing();
-    assert_eq!(instance.set_integer(ORDER, 2), Status::Ok);
-    assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), Status::Error);
-    instance.said(&["fmi2ExitInitializationMode: order = 2, but only 1 is there"]);
-    assert_eq!(c!(fmi2Reset(instance.component)), Status::Ok);
+    assert_eq!(instance.set_integer(ORDER, 2), FmiStatus::Ok);
+    assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), FmiStatus::Error);
+    instance.said(&["fmi2ExitInitializationMode: order = 2, but only 1 is supported"]);
+    assert_eq!(c!(fmi2Reset(instance.component)), FmiStatus::Ok);
     instance.initialize();
 }
 
 #[test]
 fn after_an_error_values_can_be_read_but_not_set() {
     let instance = Instance::stepping();
-    assert_eq!(instance.set_real(U, f64::NAN), Status::Error);
-    assert_eq!(instance.get_real(U), (Status::Ok, 0.0));
-    assert_eq!(instance.set_real(U, 1.0), Status::Error);
+    assert_eq!(instance.set_real(U, f64::NAN), FmiStatus::Error);
+    assert_eq!(instance.get_real(U), (FmiStatus::Ok, 0.0));
+    assert_eq!(instance.set_real(U, 1.0), FmiStatus::Error);
     instance.said(&["not allowed in state error"]);
-    assert_eq!(instance.step(0.0, 0.1), Status::Error);
-    assert_eq!(c!(fmi2Reset(instance.component)), Status::Ok);
+    assert_eq!(instance.step(0.0, 0.1), FmiStatus::Error);
+    assert_eq!(c!(fmi2Reset(instance.component)), FmiStatus::Ok);
     instance.initialize();
-    assert_eq!(instance.set_real(U, 1.0), Status::Ok);
-    assert_eq!(instance.step(0.0, 0.1), Status::Ok);
+    assert_eq!(instance.set_real(U, 1.0), FmiStatus::Ok);
+    assert_eq!(instance.step(0.0, 0.1), FmiStatus::Ok);
 }
 
 #[test]
 fn no_values_need_no_pointers() {
     let instance = Instance::stepping();
-    assert_eq!(c!(fmi2SetReal(instance.component, null(), 0, null())), Status::Ok);
+    assert_eq!(c!(fmi2SetReal(instance.component, null(), 0, null())), FmiStatus::Ok);
 }
 
 #[test]
 fn negative_zero_is_another_value_than_zero() {
     let instance = initializing();
-    assert_eq!(instance.set_real(U, -0.0), Status::Ok);
+    assert_eq!(instance.set_real(U, -0.0), FmiStatus::Ok);
     assert!(instance.real(U).is_sign_negative());
 }
 
 #[test]
 fn a_value_that_an_enumeration_does_not_list_is_an_error() {
     const PARITY: u32 = 4;
-    let counter = Instance::of("Counter", CO_SIMULATION);
+    let counter = Instance::new("Counter", CO_SIMULATION);
     counter.initialize();
     assert_eq!(counter.integer(PARITY), 1);
-    assert_eq!(counter.step(0.0, 0.1), Status::Ok);
+    assert_eq!(counter.step(0.0, 0.1), FmiStatus::Ok);
     let mut value = -7;
     let status = c!(fmi2GetInteger(counter.component, &PARITY, 1, &mut value));
-    assert_eq!((status, value), (Status::Error, -7));
+    assert_eq!((status, value), (FmiStatus::Error, -7));
     counter.said(&["'parity' holds a value that its enumeration does not list"]);
 }

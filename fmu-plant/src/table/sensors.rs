@@ -1,6 +1,6 @@
 //! Variables of the sensors and of their calibration.
 
-use super::{AXES, Plant, RATES, TRAJECTORY_INPUTS, none, vector};
+use super::{AXES, PlantVariables, RATES, TRAJECTORY_INPUTS, none, vector};
 use crate::parameters::{MEMS_SENSORS, NO_SENSORS};
 use crate::roles::Unknown;
 use fmi2_export::table::{Common, Real, discrete_output, output, parameter};
@@ -10,56 +10,67 @@ struct Sensor {
     name: &'static str,
     /// Name of the quantity that the sensor measures.
     quantity: &'static str,
+    /// Whether the quantity is measured about or along an axis.
+    along: &'static str,
     unit: fn() -> Unit,
     /// Unit of the quantity's rate of change.
     rate_unit: fn() -> Unit,
     nominal: f64,
     /// Effects that the sensor's matrix contains, as text for the description.
     matrix: &'static str,
-    bias: &'static str,
+    /// Effect that the sensor's bias contains besides, as text for the description.
+    bias_part: &'static str,
 }
 
 const SENSORS: [Sensor; 3] = [
     Sensor {
         name: "gyroscope",
         quantity: "angular rate",
+        along: "about",
         unit: unit::angular_rate,
         rate_unit: unit::angular_acceleration,
         nominal: 0.05,
         matrix: "scale and misalignment",
-        bias: "bias",
+        bias_part: "",
     },
     Sensor {
         name: "accelerometer",
         quantity: "specific force",
+        along: "along",
         unit: unit::acceleration,
         rate_unit: unit::acceleration_rate,
         nominal: 10.0,
         matrix: "scale and misalignment",
-        bias: "bias",
+        bias_part: "",
     },
     Sensor {
         name: "magnetometer",
         quantity: "magnetic field",
+        along: "along",
         unit: unit::flux_density,
         rate_unit: unit::flux_density_rate,
         nominal: 5e-5,
         matrix: "scale, misalignment and soft iron",
-        bias: "bias and hard iron",
+        bias_part: ", including hard iron",
     },
 ];
 
-pub(super) fn all(table: Plant) -> Plant {
-    let table = line(measured(table));
-    let table =
-        SENSORS.iter().enumerate().fold(table, |table, (i, sensor)| errors(table, i, sensor));
-    turntable(calibration(surroundings(table)))
+pub(super) fn sensor_variables(variables: PlantVariables) -> PlantVariables {
+    let variables = line(measured(variables));
+    let variables = SENSORS
+        .iter()
+        .enumerate()
+        .fold(variables, |variables, (i, sensor)| errors(variables, i, sensor));
+    turntable(calibration(surroundings(variables)))
 }
 
-fn measured(mut table: Plant) -> Plant {
+fn measured(mut variables: PlantVariables) -> PlantVariables {
     for (i, sensor) in SENSORS.iter().enumerate() {
         let declare = |axis: &str, meaning: &str| {
-            let text = format!("The {}'s {meaning} {}", sensor.name, sensor.quantity);
+            let text = format!(
+                "{} reading of the {} {} the {meaning} axis",
+                sensor.name, sensor.quantity, sensor.along
+            );
             let common =
                 output(&format!("measured.{}.{axis}", sensor.name), &super::sentence(&text))
                     .depends_on(["attitude.alpha", "attitude.beta", "attitude.sigma"]);
@@ -76,38 +87,42 @@ fn measured(mut table: Plant) -> Plant {
         let axes =
             if i == 0 { AXES } else { [("x", "forward"), ("y", "right"), ("z", "downward")] };
         let role = |axis| Unknown::Measured(3 * i + axis).into();
-        table = vector(table, axes, declare, role, move |m| &mut m.output.measured.readings[i]);
+        variables =
+            vector(variables, axes, declare, role, move |m| &mut m.output.measured.readings[i]);
     }
-    let time = output("measured.time", "Time at which the newest sample was taken");
+    let time = output("measured.time", "Time at which the latest received sample was taken");
     let number = discrete_output(
         "measured.sample",
-        "Number of the newest sample, from 1; 0 before the first",
+        "Number of the latest received sample, counted from 1; 0 before the first",
     );
-    table.real(seconds(time), |m| &mut m.output.measured.time).role(Unknown::MeasuredTime).integer(
-        number,
-        (Some(0), None),
-        |m| &mut m.output.measured.number,
-    )
+    variables
+        .real(seconds(time), |m| &mut m.output.measured.time)
+        .role(Unknown::MeasuredTime)
+        .integer(number, (Some(0), None), |m| &mut m.output.measured.number)
 }
 
 fn seconds(common: Common) -> Real {
     common.real().unit(unit::time()).nominal(1.0)
 }
 
-fn line(table: Plant) -> Plant {
+fn line(variables: PlantVariables) -> PlantVariables {
     let set = parameter(
         "sensor.set",
-        "Sensors: 0 shows what they feel as it is; 1 samples it without errors; 2 with the errors that are set, from the start a typical MEMS set",
+        "Sensor set: 0 for ideal continuous readings, 1 for samples without errors, 2 for samples with errors, which are those of a typical MEMS set by default",
     );
-    let period = parameter("sensor.period", "Time between samples");
-    let delay = parameter("sensor.delay", "Time from taking a sample to its arrival");
-    let probability =
-        parameter("sensor.drop.probability", "Probability that a sample is dropped on its way");
+    let period = parameter("sensor.period", "Sampling period of the sensors");
+    let delay = parameter("sensor.delay", "Delay between taking a sample and receiving it");
+    let probability = parameter(
+        "sensor.drop.probability",
+        "Probability that a sample is dropped in transmission",
+    );
     let start = parameter("sensor.drop.start", "Time from which samples can be dropped");
-    let end = parameter("sensor.drop.end", "Time at which no more samples are dropped");
-    let seed =
-        parameter("sensor.seed", "Seed of noise and drops: the same seed gives the same samples");
-    table
+    let end = parameter("sensor.drop.end", "Time from which samples are no longer dropped");
+    let seed = parameter(
+        "sensor.seed",
+        "Seed of sensor noise and dropped samples; the same seed gives the same samples",
+    );
+    variables
         .integer(set, (Some(NO_SENSORS), Some(MEMS_SENSORS)), |m| &mut m.parameters.sensor_set)
         .real(seconds(period).min(1e-4).nominal(0.01), |m| &mut m.parameters.line.period)
         .real(seconds(delay).min(0.0).max(10.0).nominal(0.01), |m| &mut m.parameters.line.delay)
@@ -119,37 +134,65 @@ fn line(table: Plant) -> Plant {
         .integer(seed, (Some(0), None), |m| &mut m.parameters.sensor_seed)
 }
 
-fn errors(mut table: Plant, i: usize, sensor: &Sensor) -> Plant {
+fn errors(mut variables: PlantVariables, i: usize, sensor: &Sensor) -> PlantVariables {
     let name = |part: &str| format!("sensor.{}.{part}", sensor.name);
-    let declare =
-        |part: &str, text: &str| parameter(&name(part), &format!("The {}'s {text}", sensor.name));
-    let own = |part: &str, text: &str| {
+    let declare = |part: &str, text: &str| parameter(&name(part), &super::sentence(text));
+    let in_sensor_unit = |part: &str, text: &str| {
         declare(part, text).real().unit((sensor.unit)()).nominal(sensor.nominal)
     };
+    let device = sensor.name;
     for (row, (axis, _)) in AXES.into_iter().enumerate() {
         for (column, (from, _)) in AXES.into_iter().enumerate() {
-            let text = format!("{}: {axis} by {from}", sensor.matrix);
+            let text = format!(
+                "{device} matrix of {}: response of axis {axis} to axis {from}",
+                sensor.matrix
+            );
             let real =
                 declare(&format!("matrix[{},{}]", row + 1, column + 1), &text).real().nominal(1.0);
-            table = table.real(real, move |m| &mut m.parameters.triads[i].matrix[(row, column)]);
+            variables =
+                variables.real(real, move |m| &mut m.parameters.triads[i].matrix[(row, column)]);
         }
     }
     let bias = |axis: &str, _: &str| {
-        own(&format!("bias.{axis}"), &format!("{} along {axis}", sensor.bias))
+        in_sensor_unit(
+            &format!("bias.{axis}"),
+            &format!("{device} bias of axis {axis}{}", sensor.bias_part),
+        )
     };
     let drift = |axis: &str, _: &str| {
-        let text = format!("change of the bias along {axis} in a second");
+        let text = format!("rate of change of the {device} bias of axis {axis}");
         let real = declare(&format!("drift.{axis}"), &text).real();
         real.unit((sensor.rate_unit)()).nominal(1e-3 * sensor.nominal)
     };
-    let noise = own("noise", "standard deviation of white noise on a sample");
-    let bandwidth = declare("bandwidth", "bandwidth of first order, 3 dB; 0 for none").real();
-    let range = own("range", "range either way; 0 for no limit");
-    let resolution = own("resolution", "step of the converter; 0 for none");
-    let start = declare("freeze.start", "time from which it repeats its last value");
-    let end = declare("freeze.end", "time at which it no longer repeats its last value");
-    let table = vector(table, AXES, bias, none, move |m| &mut m.parameters.triads[i].bias);
-    vector(table, AXES, drift, none, move |m| &mut m.parameters.triads[i].drift)
+    let noise = in_sensor_unit(
+        "noise",
+        &format!("standard deviation of the white noise on the samples of the {device}"),
+    );
+    let bandwidth = declare(
+        "bandwidth",
+        &format!(
+            "bandwidth (3 dB) of the first-order low-pass filter in the {device}; 0 for no filter"
+        ),
+    )
+    .real();
+    let range = in_sensor_unit(
+        "range",
+        &format!("largest magnitude that the {device} can output; 0 for no limit"),
+    );
+    let resolution = in_sensor_unit(
+        "resolution",
+        &format!("quantization step of the {device} reading; 0 for none"),
+    );
+    let start = declare(
+        "freeze.start",
+        &format!("time at which the {device} starts to repeat its last value"),
+    );
+    let end = declare(
+        "freeze.end",
+        &format!("time at which the {device} stops repeating its last value"),
+    );
+    let variables = vector(variables, AXES, bias, none, move |m| &mut m.parameters.triads[i].bias);
+    vector(variables, AXES, drift, none, move |m| &mut m.parameters.triads[i].drift)
         .real(noise.min(0.0), move |m| &mut m.parameters.triads[i].noise)
         .real(bandwidth.unit(unit::frequency()).min(0.0).nominal(50.0), move |m| {
             &mut m.parameters.triads[i].bandwidth
@@ -160,61 +203,73 @@ fn errors(mut table: Plant, i: usize, sensor: &Sensor) -> Plant {
         .real(seconds(end), move |m| &mut m.parameters.triads[i].freeze.end)
 }
 
-fn surroundings(table: Plant) -> Plant {
-    let gravity = parameter("sensor.gravity", "Gravity that the accelerometer feels, down");
-    let field = |axis: &str, _: &str| {
-        let text =
-            format!("The Earth's magnetic field that the magnetometer feels, component {axis}");
+fn surroundings(variables: PlantVariables) -> PlantVariables {
+    let gravity = parameter(
+        "sensor.gravity",
+        "Gravitational acceleration at the accelerometer, directed down",
+    );
+    let field = |axis: &str, meaning: &str| {
+        let text = format!("{meaning} component of the Earth's magnetic field at the magnetometer");
         parameter(&format!("sensor.field.{axis}"), &text)
             .real()
             .unit(unit::flux_density())
             .nominal(5e-5)
     };
-    let axes = [("north", ""), ("east", ""), ("down", "")];
+    let axes = [("north", "North"), ("east", "East"), ("down", "Downward")];
     let gravity = gravity.real().unit(unit::acceleration()).min(0.0).nominal(10.0);
-    let table = table.real(gravity, |m| &mut m.parameters.surroundings.gravity);
-    vector(table, axes, field, none, |m| &mut m.parameters.surroundings.field)
+    let variables = variables.real(gravity, |m| &mut m.parameters.surroundings.gravity);
+    vector(variables, axes, field, none, |m| &mut m.parameters.surroundings.field)
 }
 
-fn calibration(table: Plant) -> Plant {
+fn calibration(variables: PlantVariables) -> PlantVariables {
     let rate = |name: &str, text: &str| {
         parameter(name, text).real().unit(unit::angular_rate()).nominal(0.1)
     };
     let active = parameter(
         "calibration.active",
-        "The platform flies a sequence of rotations, not its dynamics",
+        "If true, the attitude follows a prescribed calibration sequence instead of the dynamics",
     );
-    let amplitude =
-        parameter("calibration.beta.amplitude", "Amplitude of the sideslip in the sequence");
-    table
+    let amplitude = parameter(
+        "calibration.beta.amplitude",
+        "Amplitude of the sideslip angle in the calibration sequence",
+    );
+    variables
         .boolean(active, |m| &mut m.parameters.calibrates)
-        .real(rate("calibration.rate.alpha", "Rate of the angle of attack in the sequence"), |m| {
-            &mut m.parameters.sequence.alpha_rate
-        })
-        .real(rate("calibration.rate.sigma", "Rate of the bank angle in the sequence"), |m| {
-            &mut m.parameters.sequence.sigma_rate
-        })
+        .real(
+            rate(
+                "calibration.rate.alpha",
+                "Rate of the angle of attack in the calibration sequence",
+            ),
+            |m| &mut m.parameters.sequence.alpha_rate,
+        )
+        .real(
+            rate("calibration.rate.sigma", "Rate of the bank angle in the calibration sequence"),
+            |m| &mut m.parameters.sequence.sigma_rate,
+        )
         .real(amplitude.real().unit(unit::angle()).min(0.0).nominal(0.5), |m| {
             &mut m.parameters.sequence.beta_amplitude
         })
         .real(
-            rate("calibration.beta.frequency", "Angular frequency of the sideslip in the sequence"),
+            rate(
+                "calibration.beta.frequency",
+                "Angular frequency of the sideslip angle in the calibration sequence",
+            ),
             |m| &mut m.parameters.sequence.beta_frequency,
         )
 }
 
-fn turntable(table: Plant) -> Plant {
+fn turntable(variables: PlantVariables) -> PlantVariables {
     let bandwidth = parameter(
         "turntable.bandwidth",
-        "Bandwidth of first order of the turntable that carries the sampled sensors; 0 for sensors on the vehicle",
+        "Bandwidth of the first-order servo of a turntable that carries the sampled sensors; 0 for sensors on the vehicle",
     );
     let rate =
-        parameter("turntable.rate", "Largest rate of the turntable's angles; 0 for no limit");
+        parameter("turntable.rate", "Maximum rate of the turntable's angles; 0 for no limit");
     let resolution = parameter(
         "turntable.resolution",
-        "Step of the converter that commands the turntable's angles; 0 for none",
+        "Quantization step of the angles commanded to the turntable; 0 for none",
     );
-    table
+    variables
         .real(bandwidth.real().unit(unit::frequency()).min(0.0).nominal(10.0), |m| {
             &mut m.parameters.turntable.bandwidth
         })

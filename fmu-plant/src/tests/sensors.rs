@@ -1,4 +1,4 @@
-//! Tests of the sensors and the calibration sequence through the unit's interface.
+//! Tests of the sensors and the calibration sequence through the instance's interface.
 
 use super::{Constant, assert_same_motion, exchange, integrate, outputs, started, step};
 use crate::plant::ReentryPlant;
@@ -11,8 +11,8 @@ use vehicle::triad::Window;
 
 /// Selects a typical MEMS set with every effect that samples can have, on ticks that are exact
 /// numbers.
-fn mems(unit: &mut ReentryPlant) {
-    let p = &mut unit.parameters;
+fn mems(instance: &mut ReentryPlant) {
+    let p = &mut instance.parameters;
     p.kind = Kind::None;
     p.step = 1.0 / 128.0;
     p.sensor_set = 2;
@@ -20,22 +20,22 @@ fn mems(unit: &mut ReentryPlant) {
     p.line.delay = 2.5 / 64.0;
     p.line.drop_probability = 0.2;
     p.triads[1].freeze = Window { start: 0.5, end: 0.75 };
-    unit.input.moment = Vector3::new(2e4, -1e4, 1e4);
+    instance.input.moment = Vector3::new(2e4, -1e4, 1e4);
 }
 
-fn sample(unit: &mut ReentryPlant, time: f64) -> Sample {
-    outputs(unit, time).measured
+fn sample(instance: &mut ReentryPlant, time: f64) -> Sample {
+    outputs(instance, time).measured
 }
 
 /// Returns the sample shown at every 1/16 s until 2 s, in communication steps of `length` s.
-fn stepped(unit: &mut ReentryPlant, length: f64) -> Vec<Sample> {
-    let mut shown = vec![sample(unit, 0.0)];
+fn stepped(instance: &mut ReentryPlant, length: f64) -> Vec<Sample> {
+    let mut shown = vec![sample(instance, 0.0)];
     let mut time = 0.0;
     while time < 2.0 {
-        step(unit, time, time + length).unwrap();
+        step(instance, time, time + length).unwrap();
         time += length;
         if (16.0 * time).fract() == 0.0 {
-            shown.push(sample(unit, time));
+            shown.push(sample(instance, time));
         }
     }
     shown
@@ -43,12 +43,12 @@ fn stepped(unit: &mut ReentryPlant, length: f64) -> Vec<Sample> {
 
 #[test]
 fn without_sensors_what_they_would_feel_is_shown_at_all_times() {
-    let mut unit = started(|unit| {
-        unit.parameters.kind = Kind::None;
-        unit.input.moment = Vector3::new(1e5, 2e5, -1e5);
+    let mut instance = started(|instance| {
+        instance.parameters.kind = Kind::None;
+        instance.input.moment = Vector3::new(1e5, 2e5, -1e5);
     });
-    step(&mut unit, 0.0, 0.37).unwrap();
-    let output = outputs(&mut unit, 0.37);
+    step(&mut instance, 0.0, 0.37).unwrap();
+    let output = outputs(&mut instance, 0.37);
     let [rate, force, field] = output.measured.readings;
     assert_eq!((output.measured.number, output.measured.time), (0, 0.37));
     // The gyroscope shows ω less α̇ sin β about the bank axis, which is the R⁻¹ column of σ.
@@ -56,7 +56,7 @@ fn without_sensors_what_they_would_feel_is_shown_at_all_times() {
         - r_inverse(&output.angles).column(2) * (output.angle_rates.x * output.angles.y.sin());
     assert!((rate - expected).amax() < 1e-16 && (rate - output.rates).amax() > 1e-4);
     assert!((force.norm() - 9.80665).abs() < 1e-14 && (field.norm() - 5.094e-5).abs() < 1e-9);
-    let mut exact = started(|unit| unit.parameters.kinematics = Kinematics::Exact);
+    let mut exact = started(|instance| instance.parameters.kinematics = Kinematics::Exact);
     step(&mut exact, 0.0, 0.5).unwrap();
     let output = outputs(&mut exact, 0.5);
     assert_eq!(output.measured.readings[0], output.rates, "with the exact kinematics the same");
@@ -64,24 +64,24 @@ fn without_sensors_what_they_would_feel_is_shown_at_all_times() {
 
 #[test]
 fn ideal_sensors_show_the_truth_of_their_ticks_and_leave_the_line_as_it_is() {
-    let mut unit = started(|unit| {
-        mems(unit);
-        unit.parameters.sensor_set = 1;
-        unit.parameters.line.drop_probability = 0.0;
-        unit.parameters.triads[1].freeze = Window::default();
+    let mut instance = started(|instance| {
+        mems(instance);
+        instance.parameters.sensor_set = 1;
+        instance.parameters.line.drop_probability = 0.0;
+        instance.parameters.triads[1].freeze = Window::default();
     });
-    let mut truth = started(|unit| {
-        mems(unit);
-        unit.parameters.sensor_set = 0;
+    let mut truth = started(|instance| {
+        mems(instance);
+        instance.parameters.sensor_set = 0;
     });
     let mut felt = vec![sample(&mut truth, 0.0)];
     for k in 0..40 {
         let [from, to] = [f64::from(k), f64::from(k + 1)].map(|tick| tick / 64.0);
-        for unit in [&mut truth, &mut unit] {
-            step(unit, from, to).unwrap();
+        for instance in [&mut truth, &mut instance] {
+            step(instance, from, to).unwrap();
         }
         felt.push(sample(&mut truth, to));
-        let shown = sample(&mut unit, to);
+        let shown = sample(&mut instance, to);
         // The sample shown was taken two and a half ticks before.
         let Some(number) = (k + 1i32).checked_sub(2).filter(|&number| number > 0) else {
             assert_eq!((shown.number, shown.readings), (0, Sample::default().readings));
@@ -103,18 +103,20 @@ fn samples_are_the_same_bits_whatever_the_communication_step() {
         assert_eq!(stepped(&mut started(mems), length), expected, "{length}");
     }
     // The next communication step meets no tick.
-    let mut unit = started(mems);
+    let mut instance = started(mems);
     let mut time = 0.0;
     while time < 2.0 {
         let next = f64::min(time + 0.0301, 2.0);
-        step(&mut unit, time, next).unwrap();
+        step(&mut instance, time, next).unwrap();
         time = next;
     }
-    let [found, expected] = [sample(&mut unit, 2.0), *expected.last().unwrap()];
-    assert_eq!((found.number, found.time), (expected.number, expected.time));
-    for (i, step) in unit.parameters.triads.map(|triad| triad.resolution).into_iter().enumerate() {
+    let [actual, expected] = [sample(&mut instance, 2.0), *expected.last().unwrap()];
+    assert_eq!((actual.number, actual.time), (expected.number, expected.time));
+    for (i, step) in
+        instance.parameters.triads.map(|triad| triad.resolution).into_iter().enumerate()
+    {
         assert!(
-            (found.readings[i] - expected.readings[i]).amax() < 1.5 * step,
+            (actual.readings[i] - expected.readings[i]).amax() < 1.5 * step,
             "at most a step of the converter"
         );
     }
@@ -128,8 +130,8 @@ fn looking_and_repeated_looking_take_no_samples() {
         for _ in 0..3 {
             sample(&mut looked_at, from);
         }
-        for unit in [&mut looked_at, &mut left_alone] {
-            step(unit, from, to).unwrap();
+        for instance in [&mut looked_at, &mut left_alone] {
+            step(instance, from, to).unwrap();
         }
     }
     assert_eq!(sample(&mut looked_at, 1.28), sample(&mut left_alone, 1.28));
@@ -144,7 +146,7 @@ fn oracle_model_exchange_takes_the_samples_of_co_simulation_at_time_events() {
         step(&mut cs, from, to).unwrap();
         events.extend(exchange(&mut me, from, to));
         me.new_discrete_states(to).unwrap();
-        let [cs, me] = [&mut cs, &mut me].map(|unit| outputs(unit, to));
+        let [cs, me] = [&mut cs, &mut me].map(|instance| outputs(instance, to));
         assert_same_motion(&cs, &me, &format!("{to}"));
         assert_eq!(
             (cs.measured.number, cs.measured.time),
@@ -170,65 +172,65 @@ fn oracle_model_exchange_takes_the_samples_of_co_simulation_at_time_events() {
 
 #[test]
 fn in_model_exchange_what_is_shown_changes_at_events_only() {
-    let mut unit = started(|unit| {
-        mems(unit);
-        unit.parameters.line.delay = 0.0;
+    let mut instance = started(|instance| {
+        mems(instance);
+        instance.parameters.line.delay = 0.0;
     });
-    unit.new_discrete_states(0.0).unwrap();
-    let first = sample(&mut unit, 0.0);
+    instance.new_discrete_states(0.0).unwrap();
+    let first = sample(&mut instance, 0.0);
     assert_eq!(first.number, 1);
-    integrate(&mut unit, 0.0, 0.05);
-    assert_eq!(sample(&mut unit, 0.05), first);
-    unit.new_discrete_states(0.05).unwrap();
-    assert_eq!(sample(&mut unit, 0.05).number, 4);
+    integrate(&mut instance, 0.0, 0.05);
+    assert_eq!(sample(&mut instance, 0.05), first);
+    instance.new_discrete_states(0.05).unwrap();
+    assert_eq!(sample(&mut instance, 0.05).number, 4);
 }
 
 #[test]
 fn a_saved_state_takes_the_same_samples() {
     for model_exchange in [false, true] {
-        let mut unit = started(mems);
-        let forward = |unit: &mut ReentryPlant, from: f64, to: f64| {
+        let mut instance = started(mems);
+        let forward = |instance: &mut ReentryPlant, from: f64, to: f64| {
             if model_exchange {
-                exchange(unit, from, to);
+                exchange(instance, from, to);
             } else {
-                step(unit, from, to).unwrap();
+                step(instance, from, to).unwrap();
             }
         };
-        forward(&mut unit, 0.0, 0.6);
-        let saved = serde_json::to_string(&unit).unwrap();
+        forward(&mut instance, 0.0, 0.6);
+        let saved = serde_json::to_string(&instance).unwrap();
         let mut restored: ReentryPlant = serde_json::from_str(&saved).unwrap();
         for k in 0..40 {
             let [from, to] = [0.6 + 0.02 * f64::from(k), 0.6 + 0.02 * f64::from(k + 1)];
-            for unit in [&mut unit, &mut restored] {
-                forward(unit, from, to);
+            for instance in [&mut instance, &mut restored] {
+                forward(instance, from, to);
             }
-            assert_eq!(outputs(&mut unit, to), outputs(&mut restored, to), "{to}");
+            assert_eq!(outputs(&mut instance, to), outputs(&mut restored, to), "{to}");
         }
     }
 }
 
 #[test]
 fn initializing_again_starts_the_samples_again() {
-    let mut unit = started(mems);
-    let first = stepped(&mut unit, 1.0 / 16.0);
-    unit.initialize(&super::CONTEXT).unwrap();
-    assert_eq!(stepped(&mut unit, 1.0 / 16.0), first);
+    let mut instance = started(mems);
+    let first = stepped(&mut instance, 1.0 / 16.0);
+    instance.initialize(&super::CONTEXT).unwrap();
+    assert_eq!(stepped(&mut instance, 1.0 / 16.0), first);
 }
 
 #[test]
 fn the_calibration_sequence_is_flown_in_both_interfaces_whatever_the_moment() {
-    let set = |unit: &mut ReentryPlant| {
-        unit.parameters.calibrates = true;
-        unit.input.moment = Vector3::new(1e6, -1e6, 1e6);
-        unit.input.disturbance_moment = Vector3::new(1e6, 0.0, 0.0);
-        unit.input.trajectory.heading_rate = 0.1;
+    let set = |instance: &mut ReentryPlant| {
+        instance.parameters.calibrates = true;
+        instance.input.moment = Vector3::new(1e6, -1e6, 1e6);
+        instance.input.disturbance_moment = Vector3::new(1e6, 0.0, 0.0);
+        instance.input.trajectory.heading_rate = 0.1;
     };
     let [mut cs, mut me] = [0, 1].map(|_| started(set));
     for k in 0..50 {
         step(&mut cs, 0.2 * f64::from(k), 0.2 * f64::from(k + 1)).unwrap();
     }
     exchange(&mut me, 0.0, 10.0);
-    let [cs, me] = [&mut cs, &mut me].map(|unit| outputs(unit, 10.0));
+    let [cs, me] = [&mut cs, &mut me].map(|instance| outputs(instance, 10.0));
     assert!((cs.angles - me.angles).amax() < 1e-10 && (cs.rates - me.rates).amax() < 1e-10);
     // 7.5 + 37·10, 10 + 40 sin 113 deg, -30 + 60·10
     let expected = [377.5, 10.0 + 40.0 * 113f64.to_radians().sin(), 570.0].map(f64::to_radians);
@@ -241,32 +243,33 @@ fn the_calibration_sequence_is_flown_in_both_interfaces_whatever_the_moment() {
 
 #[test]
 fn oracle_in_the_calibration_sequence_nothing_but_what_is_felt_depends_on_the_state() {
-    let mut unit = started(|unit| unit.parameters.calibrates = true);
-    step(&mut unit, 0.0, 1.0).unwrap();
+    let mut instance = started(|instance| instance.parameters.calibrates = true);
+    step(&mut instance, 0.0, 1.0).unwrap();
     for unknown in 6..12 {
-        for known in (0..6).chain(21..24).chain(62..69) {
+        for known_position in (0..6).chain(21..24).chain(62..69) {
             assert_eq!(
-                unit.partial_derivative(1.0, unknown, known).unwrap(),
+                instance.partial_derivative(1.0, unknown, known_position).unwrap(),
                 0.0,
-                "{unknown} {known}"
+                "{unknown} {known_position}"
             );
         }
     }
-    for known in 0..6 {
+    for known_position in 0..6 {
         let by = 1e-5;
         let mut shifted = |shift: f64| {
             let mut states = [0.0; 14];
-            unit.continuous_states(&mut states);
-            states[known] += shift;
-            unit.set_continuous_states(&states);
-            sample(&mut unit, 1.0).readings
+            instance.continuous_states(&mut states);
+            states[known_position] += shift;
+            instance.set_continuous_states(&states);
+            sample(&mut instance, 1.0).readings
         };
         let [above, below] = [shifted(by), shifted(-2.0 * by)];
         shifted(by);
         for i in 0..9 {
             let numeric = (above[i / 3][i % 3] - below[i / 3][i % 3]) / (2.0 * by);
-            let exact = unit.partial_derivative(1.0, super::MEASURED + i, known).unwrap();
-            assert!((numeric - exact).abs() < 1e-8, "{i} {known}: {numeric} {exact}");
+            let exact =
+                instance.partial_derivative(1.0, super::MEASURED + i, known_position).unwrap();
+            assert!((numeric - exact).abs() < 1e-8, "{i} {known_position}: {numeric} {exact}");
         }
     }
 }
@@ -275,24 +278,25 @@ fn oracle_in_the_calibration_sequence_nothing_but_what_is_felt_depends_on_the_st
 fn impossible_sensors_and_sequences_are_refused_by_name() {
     for (set, name) in [
         (
-            (|unit| unit.parameters.line.delay = 20.0 * unit.parameters.line.period * 1e3)
-                as fn(&mut ReentryPlant),
+            (|instance| {
+                instance.parameters.line.delay = 20.0 * instance.parameters.line.period * 1e3;
+            }) as fn(&mut ReentryPlant),
             "sensor.delay",
         ),
-        (|unit| unit.parameters.line.period = 0.0, "sensor.period"),
-        (|unit| unit.parameters.triads[2].range = -1.0, "sensor.magnetometer.range"),
+        (|instance| instance.parameters.line.period = 0.0, "sensor.period"),
+        (|instance| instance.parameters.triads[2].range = -1.0, "sensor.magnetometer.range"),
         (
-            |unit| {
-                unit.parameters.calibrates = true;
-                unit.parameters.sequence.beta_amplitude = 1.5;
+            |instance| {
+                instance.parameters.calibrates = true;
+                instance.parameters.sequence.beta_amplitude = 1.5;
             },
             "calibration.beta.amplitude",
         ),
     ] {
-        let mut unit = ReentryPlant::new();
-        unit.parameters.sensor_set = 2;
-        set(&mut unit);
-        let Err(Failure::Error(message)) = unit.initialize(&super::CONTEXT) else {
+        let mut instance = ReentryPlant::new();
+        instance.parameters.sensor_set = 2;
+        set(&mut instance);
+        let Err(Failure::Error(message)) = instance.initialize(&super::CONTEXT) else {
             panic!("{name}")
         };
         assert!(message.starts_with(name), "{message}");
@@ -301,7 +305,7 @@ fn impossible_sensors_and_sequences_are_refused_by_name() {
 
 #[test]
 fn a_wrong_trajectory_is_an_error_while_samples_are_taken() {
-    let mut unit = started(mems);
-    unit.input.trajectory.heading_rate = f64::NAN;
-    assert!(unit.step(0.0, 0.5, &Constant, &mut |_| {}).is_err());
+    let mut instance = started(mems);
+    instance.input.trajectory.heading_rate = f64::NAN;
+    assert!(instance.step(0.0, 0.5, &Constant, &mut |_| {}).is_err());
 }

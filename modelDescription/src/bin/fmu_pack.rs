@@ -1,7 +1,7 @@
-//! `fmu-pack LIBRARY… --output DIR`: makes one `.fmu` of every unit in the libraries.
+//! `fmu-pack LIBRARY… --output DIR`: packs every FMU in the libraries into an archive.
 
 use clap::Parser;
-use model_description::binary::Binary;
+use model_description::library_file::LibraryFile;
 use model_description::pack::{Extras, pack};
 use model_description::{Error, ModelDescription, library};
 use std::collections::HashSet;
@@ -9,41 +9,41 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::{fs, io};
 
-/// Makes one NAME.fmu of every FMI 2.0 unit in the given libraries.
+/// Packs every FMI 2.0 FMU in the given libraries into an archive NAME.fmu.
 ///
-/// Each library, built with fmi2-export, is opened and asked for the descriptions of its units. Its
-/// builds for other platforms, given by --also, are only read: they must be made of the same
-/// sources and export the same functions. No library may need others than every system of its
-/// platform has. The same input gives the same bytes. Exit code 0: done; 1: a library or file is at
-/// fault; 2: the command line is.
+/// Each library must be built with fmi2-export. The program loads it and asks it for the
+/// descriptions of its FMUs. Builds of the libraries for other platforms, given by --also, are only
+/// read; they must be built from the same sources and export the same functions. A library may only
+/// need libraries that every system of its platform has. The same input gives the same bytes. Exit
+/// codes: 0 for success, 1 for an error in a library or file, 2 for an error in the command line.
 #[derive(Parser)]
 #[command(version, name = "fmu-pack")]
 struct Arguments {
     /// Built libraries, for example target/release/libfmu_plant.so
     #[arg(required = true)]
     libraries: Vec<PathBuf>,
-    /// Build of one of the libraries for another platform; may be given several times
+    /// Build of one of the libraries for another platform; can be repeated
     #[arg(long, value_name = "FILE")]
     also: Vec<PathBuf>,
-    /// Leaves the libraries themselves out of the archives, which then hold those of --also alone
+    /// Packs only the libraries given by --also
     #[arg(long, requires = "also")]
     only_also: bool,
-    /// Puts libraries into this folder below binaries/ alone, where a platform has several
+    /// Folder below binaries/ to use for a platform that has several
     #[arg(long, value_name = "NAME")]
     folder: Option<String>,
-    /// Folder for the archives; made if it does not exist
+    /// Folder for the archives; it is created if it does not exist
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Folder that also receives each modelDescription.xml as NAME.xml
+    /// Folder into which each modelDescription.xml is also written, as NAME.xml
     #[arg(long, value_name = "DIR")]
     xml_snapshot: Option<PathBuf>,
-    /// Folder whose files go under resources/ in every archive
+    /// Folder whose files are added to every archive under resources/
     #[arg(long, value_name = "DIR")]
     resources: Option<PathBuf>,
-    /// Folder with an icon NAME.png of each unit
+    /// Folder with an icon NAME.png for each FMU
     #[arg(long, value_name = "DIR")]
     icons: Option<PathBuf>,
-    /// Licence text for documentation/licenses/; may be given several times
+    /// Licence text for documentation/licenses/; can be repeated
     #[arg(long = "license", value_name = "FILE")]
     licenses: Vec<PathBuf>,
 }
@@ -64,11 +64,13 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         libraries.push(Library::open(path, arguments.only_also)?);
     }
     for path in &arguments.also {
-        add(&mut libraries, Binary::read(path)?)?;
+        add(&mut libraries, LibraryFile::read(path)?)?;
     }
-    let units = || libraries.iter().flat_map(|of| of.units.iter().map(|unit| (unit, &of.packed)));
+    let fmus = || {
+        libraries.iter().flat_map(|library| library.fmus.iter().map(|fmu| (fmu, &library.packed)))
+    };
     let mut names = HashSet::new();
-    if let Some((twice, _)) = units().find(|(unit, _)| !names.insert(&unit.name)) {
+    if let Some((twice, _)) = fmus().find(|(fmu, _)| !names.insert(&fmu.name)) {
         return Err(Error::SameName(twice.name.clone()));
     }
     let Arguments { resources, licenses, icons, folder, .. } = arguments;
@@ -79,54 +81,57 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         folder: folder.clone(),
     };
     make_folder(&arguments.output)?;
-    for (unit, binaries) in units() {
-        let archive = pack(unit, binaries, &arguments.output, &extras)?;
+    for (fmu, files) in fmus() {
+        let archive = pack(fmu, files, &arguments.output, &extras)?;
         println!("{}", archive.display());
     }
     if let Some(folder) = &arguments.xml_snapshot {
         make_folder(folder)?;
-        for (unit, _) in units() {
-            let path = folder.join(format!("{}.xml", unit.name));
-            fs::write(&path, unit.to_xml()?).map_err(at(&path))?;
+        for (fmu, _) in fmus() {
+            let path = folder.join(format!("{}.xml", fmu.name));
+            fs::write(&path, fmu.to_xml()?).map_err(at(&path))?;
         }
     }
     Ok(())
 }
 
-/// A library that this machine can open, and what goes into the archives of its units.
+/// A library that this machine can load, and the files that go into the archives of its FMUs.
 struct Library {
-    units: Vec<ModelDescription>,
-    own: Binary,
-    packed: Vec<Binary>,
+    fmus: Vec<ModelDescription>,
+    loaded: LibraryFile,
+    packed: Vec<LibraryFile>,
 }
 
 impl Library {
     fn open(path: &Path, leave_out: bool) -> Result<Self, Error> {
-        // Reading comes first: a file for another platform is told as such.
-        let own = Binary::read(path)?;
-        let units = library::descriptions(path)?;
-        let packed = if leave_out { vec![] } else { vec![own.clone()] };
-        Ok(Self { units, own, packed })
+        // Reading comes before loading, so that a file for another platform is reported as such.
+        let loaded = LibraryFile::read(path)?;
+        let fmus = library::descriptions(path)?;
+        let packed = if leave_out { vec![] } else { vec![loaded.clone()] };
+        Ok(Self { fmus, loaded, packed })
     }
 }
 
 /// Adds a build for another platform to the library that is made of the same sources.
-fn add(libraries: &mut [Library], also: Binary) -> Result<(), Error> {
-    let fault = |problem: String| Error::Binary { path: also.path.clone(), problem };
+fn add(libraries: &mut [Library], also: LibraryFile) -> Result<(), Error> {
+    let fault = |problem: String| Error::Library { path: also.path.clone(), problem };
     if also.sources.is_none() {
-        return Err(fault("has no digest of its sources: see fmi2_build::link".into()));
+        return Err(fault("it has no digest of its sources: see fmi2_build::link".into()));
     }
-    let Some(library) = libraries.iter_mut().find(|library| library.own.sources == also.sources)
+    let Some(library) = libraries.iter_mut().find(|library| library.loaded.sources == also.sources)
     else {
-        return Err(fault("is made of other sources than the libraries: build them again".into()));
+        return Err(fault(
+            "it was built from other sources than the libraries: build them again".into(),
+        ));
     };
-    let unequal: Vec<_> = library.own.exports.symmetric_difference(&also.exports).collect();
+    let unequal: Vec<_> = library.loaded.exports.symmetric_difference(&also.exports).collect();
     if !unequal.is_empty() {
-        return Err(fault(format!("differs in its exported functions: {unequal:?}")));
+        return Err(fault(format!("its exported functions differ: {unequal:?}")));
     }
-    let taken = |other: &&Binary| other.folders.iter().any(|folder| also.folders.contains(folder));
+    let taken =
+        |other: &&LibraryFile| other.folders.iter().any(|folder| also.folders.contains(folder));
     if let Some(other) = library.packed.iter().find(taken) {
-        return Err(fault(format!("is for the same platform as {}", other.path.display())));
+        return Err(fault(format!("it is for the same platform as {}", other.path.display())));
     }
     library.packed.push(also);
     Ok(())

@@ -6,15 +6,15 @@
 //! initialization are not timed, and nothing is recorded.
 
 use conformance::interface::CO_SIMULATION;
-use conformance::{Instance, Unit, c, unit};
+use conformance::{Fmu, Instance, c, fmu};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 
 const STEP: f64 = 0.04;
 const TICKS: u32 = 1250;
 
 /// Value references of a vector's components.
-fn vector(unit: &Unit, name: &str, axes: [&str; 3]) -> [u32; 3] {
-    axes.map(|axis| unit.reference(&format!("{name}.{axis}")))
+fn vector(fmu: &Fmu, name: &str, axes: [&str; 3]) -> [u32; 3] {
+    axes.map(|axis| fmu.reference(&format!("{name}.{axis}")))
 }
 
 fn get<const N: usize>(from: &Instance, references: &[u32; N]) -> [f64; N] {
@@ -37,17 +37,17 @@ struct Loop {
 }
 
 impl Loop {
-    fn new(plant: &Unit, controller: &Unit, constraints: Option<&str>) -> Self {
-        let motion = [plant, controller].map(|unit| {
-            let [alpha, beta, sigma] = vector(unit, "attitude", ["alpha", "beta", "sigma"]);
-            let [p, q, r] = vector(unit, "rate", ["p", "q", "r"]);
+    fn new(plant: &Fmu, controller: &Fmu, constraints: Option<&str>) -> Self {
+        let motion = [plant, controller].map(|fmu| {
+            let [alpha, beta, sigma] = vector(fmu, "attitude", ["alpha", "beta", "sigma"]);
+            let [p, q, r] = vector(fmu, "rate", ["p", "q", "r"]);
             [alpha, beta, sigma, p, q, r]
         });
-        let moment = [plant, controller].map(|unit| vector(unit, "moment", ["x", "y", "z"]));
+        let moment = [plant, controller].map(|fmu| vector(fmu, "moment", ["x", "y", "z"]));
         let (plant, controller) =
             (plant.instance(CO_SIMULATION), controller.instance(CO_SIMULATION));
         plant.choose("disturbance.kind", "white");
-        plant.ok(plant.set_real(plant.unit.reference("inertia.scale"), 1.05));
+        plant.ok(plant.set_real(plant.fmu.reference("inertia.scale"), 1.05));
         if let Some(constraints) = constraints {
             controller.choose("constraints", constraints);
         }
@@ -72,7 +72,7 @@ impl Loop {
 }
 
 fn loops(criterion: &mut Criterion) {
-    let (plant, crmpc) = (unit("ReentryPlant"), unit("CRMPC"));
+    let (plant, crmpc) = (fmu("ReentryPlant"), fmu("CRMPC"));
     let mut group = criterion.benchmark_group("fmi2DoStep");
     let alone = plant.instance(CO_SIMULATION).initialized();
     let (start, mut tick) = (alone.save(), 0);
@@ -114,7 +114,7 @@ fn loops(criterion: &mut Criterion) {
     for (name, controller, constraints) in [
         ("CRMPC robust", &crmpc, Some("robust")),
         ("CRMPC paper", &crmpc, Some("paper")),
-        ("LQR", &unit("LQR"), None),
+        ("LQR", &fmu("LQR"), None),
     ] {
         group.bench_function(name, |bencher| {
             bencher.iter_batched_ref(

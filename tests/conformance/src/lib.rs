@@ -1,14 +1,13 @@
 //! An importer for testing. It opens the FMU libraries that cargo has built at run time and calls
 //! them through the C interface of FMI 2.0.
 //!
-//! It knows of a unit only what the unit's description says, and nothing of the crates that make
-//! the units.
+//! It uses only the description of an FMU and nothing of the crates that make the FMUs.
 #![allow(unsafe_code)]
 #![allow(clippy::borrow_as_ptr, reason = "calls read better as in C")]
 #![allow(clippy::missing_panics_doc, reason = "a test fails by panicking")]
 #![allow(
     clippy::not_unsafe_ptr_arg_deref,
-    reason = "handles are the library's: they are not followed here"
+    reason = "handles belong to the library and are not followed by the tests"
 )]
 
 pub mod interface;
@@ -18,13 +17,13 @@ use interface::{
     CO_SIMULATION, Callbacks, Component, EventInfo, FATAL, Interface, Logger, OK, Status, Text,
 };
 use model_description::ModelDescription;
-use model_description::variable::{Causality, Kind, Variability, Variable};
+use model_description::variable::{Causality, Variability, Variable, VariableKind};
 use std::ffi::{CStr, CString, c_int, c_void};
 use std::path::PathBuf;
 use std::ptr::{null, null_mut};
 use std::sync::{Arc, Mutex};
 
-/// Calls a function of the library to which an instance or unit belongs:
+/// Calls a function of the library to which an instance or FMU belongs:
 /// `c!(instance, fmi2Reset(component))`.
 #[macro_export]
 macro_rules! c {
@@ -51,24 +50,24 @@ pub fn library(krate: &str) -> PathBuf {
         .unwrap_or_else(|| panic!("{file} is not near {}", program.display()))
 }
 
-/// One unit of a library.
+/// One FMU of a library.
 #[derive(Clone)]
-pub struct Unit {
-    /// Functions of the library that holds the unit.
+pub struct Fmu {
+    /// Functions of the library that holds the FMU.
     pub interface: Arc<Interface>,
-    /// Description that the unit gives of itself.
+    /// Model description of the FMU.
     pub description: ModelDescription,
     guid: CString,
 }
 
-/// Opens the libraries and lists their units, the plant first.
-pub fn units() -> Vec<Unit> {
+/// Opens the libraries and lists their FMUs, the plant first.
+pub fn fmus() -> Vec<Fmu> {
     let open = |krate| {
         let path = library(krate);
         let interface = Arc::new(Interface::open(&path).unwrap_or_else(|error| panic!("{error}")));
         let descriptions = model_description::library::descriptions(&path)
             .unwrap_or_else(|error| panic!("{error}"));
-        descriptions.into_iter().map(move |description| Unit {
+        descriptions.into_iter().map(move |description| Fmu {
             interface: interface.clone(),
             guid: CString::new(description.guid()).expect("hexadecimal digits"),
             description,
@@ -77,23 +76,23 @@ pub fn units() -> Vec<Unit> {
     ["fmu_plant", "fmu_optimising", "fmu_feedback"].into_iter().flat_map(open).collect()
 }
 
-/// Returns the unit with that name.
-pub fn unit(name: &str) -> Unit {
-    units().into_iter().find(|unit| unit.name() == name).unwrap_or_else(|| panic!("no unit {name}"))
+/// Returns the FMU with that name.
+pub fn fmu(name: &str) -> Fmu {
+    fmus().into_iter().find(|fmu| fmu.name() == name).unwrap_or_else(|| panic!("no FMU {name}"))
 }
 
-impl Unit {
-    /// Model name of the unit.
+impl Fmu {
+    /// Model name of the FMU.
     pub fn name(&self) -> &str {
         &self.description.name
     }
 
-    /// GUID of the unit as C text.
+    /// GUID of the FMU as C text.
     pub fn guid(&self) -> &CStr {
         &self.guid
     }
 
-    /// Interface types that the unit offers.
+    /// Interface types that the FMU supports.
     pub fn interfaces(&self) -> &[c_int] {
         if self.description.model_exchange {
             &[interface::MODEL_EXCHANGE, CO_SIMULATION]
@@ -102,10 +101,13 @@ impl Unit {
         }
     }
 
-    /// Value references of the variables for which `wanted` holds.
-    pub fn references(&self, wanted: impl Fn(&Variable) -> bool) -> Vec<u32> {
+    /// Value references of the variables for which `is_chosen` holds.
+    pub fn references(&self, is_chosen: impl Fn(&Variable) -> bool) -> Vec<u32> {
         let variables = self.description.variables.iter().zip(0..);
-        variables.filter(|(variable, _)| wanted(variable)).map(|(_, reference)| reference).collect()
+        variables
+            .filter(|(variable, _)| is_chosen(variable))
+            .map(|(_, reference)| reference)
+            .collect()
     }
 
     /// Value reference of the variable with that name.
@@ -116,13 +118,13 @@ impl Unit {
             .unwrap_or_else(|| panic!("no {name}"))
     }
 
-    /// Value reference of a continuous input whose change affects every unit.
+    /// Value reference of a continuous input whose change affects every FMU.
     pub fn input(&self) -> u32 {
         let is_input = |name: &&str| {
             !self.references(|v| v.name == *name && v.causality == Causality::Input).is_empty()
         };
         let name = ["moment.y", "rate.q", "measured.gyroscope.y"].into_iter().find(is_input);
-        self.reference(name.expect("an input that is known here"))
+        self.reference(name.expect("one of these inputs"))
     }
 
     /// Value references of all calculated variables except wall-clock times.
@@ -140,7 +142,7 @@ impl Unit {
         instance
     }
 
-    /// Makes an instance with these arguments; its component is null if the unit refused. The
+    /// Makes an instance with these arguments; its component is null if it was refused. The
     /// callbacks are freed as soon as the call returns, as some importers do.
     pub fn instantiate(
         &self,
@@ -164,7 +166,7 @@ impl Unit {
                 1
             )
         );
-        Instance { interface: self.interface.clone(), unit: self.clone(), component, log }
+        Instance { interface: self.interface.clone(), fmu: self.clone(), component, log }
     }
 }
 
@@ -216,10 +218,10 @@ pub fn callbacks(log_to: &Log) -> Callbacks {
 
 /// An instance with its log. Dropping it frees the instance, whatever its state.
 pub struct Instance {
-    /// Functions of the library that holds the unit.
+    /// Functions of the library that holds the FMU.
     pub interface: Arc<Interface>,
-    /// Unit to which the instance belongs.
-    pub unit: Unit,
+    /// FMU to which the instance belongs.
+    pub fmu: Fmu,
     /// Pointer `fmi2Component` of the instance.
     pub component: Component,
     log: Box<Log>,
@@ -252,18 +254,18 @@ impl Instance {
     /// Asserts that the call succeeded.
     #[track_caller]
     pub fn ok(&self, status: Status) {
-        assert_eq!(status, OK, "{}: {:?}", self.unit.name(), self.messages().last());
+        assert_eq!(status, OK, "{}: {:?}", self.fmu.name(), self.messages().last());
     }
 
-    /// Asserts that the call was refused with the status `wanted`, and that the last message holds
-    /// all of `parts`.
+    /// Asserts that the call was refused with the status `expected`, and that the last message
+    /// holds all of `parts`.
     #[track_caller]
-    pub fn refused(&self, status: Status, wanted: Status, parts: &[&str]) {
+    pub fn refused(&self, status: Status, expected: Status, parts: &[&str]) {
         let messages = self.messages();
         let last = messages.last().map_or("", |message| &message.text);
-        assert_eq!(status, wanted, "{}: {last}", self.unit.name());
+        assert_eq!(status, expected, "{}: {last}", self.fmu.name());
         for part in parts {
-            assert!(last.contains(part), "{}: no '{part}' in '{last}'", self.unit.name());
+            assert!(last.contains(part), "{}: no '{part}' in '{last}'", self.fmu.name());
         }
     }
 
@@ -296,22 +298,22 @@ impl Instance {
 
     /// Sets an enumeration to the item with that name.
     pub fn choose(&self, name: &str, item: &str) {
-        let reference = self.unit.reference(name);
-        let Kind::Enumeration { of, .. } =
-            &self.unit.description.variables[reference as usize].kind
+        let reference = self.fmu.reference(name);
+        let VariableKind::Enumeration { enumeration_type, .. } =
+            &self.fmu.description.variables[reference as usize].kind
         else {
             panic!("{name} is not an enumeration");
         };
-        let numbered = of.items.iter().zip(1..);
+        let numbered = enumeration_type.items.iter().zip(1..);
         let value: c_int =
-            numbered.filter(|((own, _), _)| own == item).map(|(_, i)| i).next().expect("an item");
+            numbered.filter(|((name, _), _)| name == item).map(|(_, i)| i).next().expect("an item");
         self.ok(c!(self, fmi2SetInteger(self.component, &reference, 1, &value)));
     }
 
     /// Sets a String variable to a value.
     pub fn set_string(&self, name: &str, value: &CStr) -> Status {
         let value = value.as_ptr();
-        c!(self, fmi2SetString(self.component, &self.unit.reference(name), 1, &value))
+        c!(self, fmi2SetString(self.component, &self.fmu.reference(name), 1, &value))
     }
 
     /// Performs a step with `fmi2DoStep`.
@@ -321,13 +323,15 @@ impl Instance {
 
     /// Returns the bits of the variables, read with one call per type.
     pub fn bits(&self, references: &[u32]) -> Bits {
-        let variables = &self.unit.description.variables;
+        let variables = &self.fmu.description.variables;
         let mut bits = vec![0; references.len()];
-        let of = |wanted: fn(&Kind) -> bool| -> (Vec<usize>, Vec<u32>) {
-            let all = references.iter().copied().enumerate();
-            all.filter(|&(_, reference)| wanted(&variables[reference as usize].kind)).unzip()
+        let places_of = |is_chosen: fn(&VariableKind) -> bool| -> (Vec<usize>, Vec<u32>) {
+            let numbered = references.iter().copied().enumerate();
+            numbered
+                .filter(|&(_, reference)| is_chosen(&variables[reference as usize].kind))
+                .unzip()
         };
-        let (places, list) = of(|kind| matches!(kind, Kind::Real { .. }));
+        let (places, list) = places_of(|kind| matches!(kind, VariableKind::Real { .. }));
         let mut reals = vec![0.0; list.len()];
         self.ok(c!(
             self,
@@ -336,8 +340,9 @@ impl Instance {
         for (&place, value) in places.iter().zip(reals) {
             bits[place] = value.to_bits();
         }
-        let (places, list) =
-            of(|kind| matches!(kind, Kind::Integer { .. } | Kind::Enumeration { .. }));
+        let (places, list) = places_of(|kind| {
+            matches!(kind, VariableKind::Integer { .. } | VariableKind::Enumeration { .. })
+        });
         let mut integers = vec![0; list.len()];
         self.ok(c!(
             self,
@@ -346,7 +351,7 @@ impl Instance {
         for (&place, value) in places.iter().zip(integers) {
             bits[place] = value as u64;
         }
-        let (places, list) = of(|kind| matches!(kind, Kind::Boolean { .. }));
+        let (places, list) = places_of(|kind| matches!(kind, VariableKind::Boolean { .. }));
         let mut booleans = vec![0; list.len()];
         self.ok(c!(
             self,
@@ -355,7 +360,7 @@ impl Instance {
         for (&place, value) in places.iter().zip(booleans) {
             bits[place] = value as u64;
         }
-        let (places, list) = of(|kind| matches!(kind, Kind::String { .. }));
+        let (places, list) = places_of(|kind| matches!(kind, VariableKind::String { .. }));
         let mut texts = vec![null(); list.len()];
         self.ok(c!(
             self,
@@ -376,23 +381,24 @@ impl Instance {
     /// neither true nor false.
     pub fn wrong_value(&self) -> Option<String> {
         let component = self.component;
-        let variables = &self.unit.description.variables;
+        let variables = &self.fmu.description.variables;
         for (variable, reference) in variables.iter().zip(0_u32..) {
             let (mut real, mut whole) = (0.0, 0);
             let is_wrong = match &variable.kind {
-                Kind::Real { .. } => {
+                VariableKind::Real { .. } => {
                     let status = c!(self, fmi2GetReal(component, &reference, 1, &mut real));
                     status == OK && !real.is_finite()
                 }
-                Kind::Enumeration { of, .. } => {
+                VariableKind::Enumeration { enumeration_type, .. } => {
                     let status = c!(self, fmi2GetInteger(component, &reference, 1, &mut whole));
-                    status == OK && !(1..).zip(&of.items).any(|(item, _)| item == whole)
+                    status == OK
+                        && !(1..).zip(&enumeration_type.items).any(|(item, _)| item == whole)
                 }
-                Kind::Boolean { .. } => {
+                VariableKind::Boolean { .. } => {
                     let status = c!(self, fmi2GetBoolean(component, &reference, 1, &mut whole));
                     status == OK && !(0..=1).contains(&whole)
                 }
-                Kind::Integer { .. } | Kind::String { .. } => false,
+                VariableKind::Integer { .. } | VariableKind::String { .. } => false,
             };
             if is_wrong {
                 return Some(format!("{} = {real}, {whole}", variable.name));
@@ -402,8 +408,8 @@ impl Instance {
     }
 
     /// Value of the input at a tick of [`Instance::drive`]: small, and different at every tick.
-    pub fn course(&self, tick: u32) -> f64 {
-        let name = &self.unit.description.variables[self.unit.input() as usize].name;
+    pub fn input_at(&self, tick: u32) -> f64 {
+        let name = &self.fmu.description.variables[self.fmu.input() as usize].name;
         let size = if name == "moment.y" { 1e3 } else { 1e-4 };
         size * f64::from(tick)
     }
@@ -411,11 +417,11 @@ impl Instance {
     /// Runs co-simulation with the proposed step over `ticks` and a moving input. Returns the
     /// results at each tick, read after the inputs of this tick were set.
     pub fn drive(&self, ticks: std::ops::Range<u32>) -> Vec<Bits> {
-        let h = self.unit.description.default_experiment.step;
-        let (input, results) = (self.unit.input(), self.unit.results());
+        let h = self.fmu.description.default_experiment.step;
+        let (input, results) = (self.fmu.input(), self.fmu.results());
         let mut rows = vec![];
         for tick in ticks {
-            self.ok(self.set_real(input, self.course(tick)));
+            self.ok(self.set_real(input, self.input_at(tick)));
             rows.push(self.bits(&results));
             self.ok(self.step(f64::from(tick) * h, h));
         }
@@ -425,14 +431,14 @@ impl Instance {
     /// Runs model exchange with Euler steps of the proposed length, each from event mode to event
     /// mode. Returns the results at each tick.
     pub fn integrate(&self, ticks: std::ops::Range<u32>) -> Vec<Bits> {
-        let h = self.unit.description.default_experiment.step;
-        let n = self.unit.description.states().len();
+        let h = self.fmu.description.default_experiment.step;
+        let n = self.fmu.description.states().len();
         let (mut x, mut derivatives) = (vec![0.0; n], vec![0.0; n]);
-        let mut indicators = vec![0.0; self.unit.description.event_indicators];
-        let (component, input, results) = (self.component, self.unit.input(), self.unit.results());
+        let mut indicators = vec![0.0; self.fmu.description.event_indicators];
+        let (component, input, results) = (self.component, self.fmu.input(), self.fmu.results());
         let mut rows = vec![];
         for tick in ticks {
-            self.ok(self.set_real(input, self.course(tick)));
+            self.ok(self.set_real(input, self.input_at(tick)));
             let mut info = EventInfo::default();
             self.ok(c!(self, fmi2NewDiscreteStates(component, &mut info)));
             assert_eq!((info.new_discrete_states_needed, info.terminate_simulation), (0, 0));
@@ -496,5 +502,6 @@ impl Instance {
 
 /// Whether a variable is a Real that may change at any time.
 pub fn is_continuous_real(variable: &Variable) -> bool {
-    matches!(variable.kind, Kind::Real { .. }) && variable.variability == Variability::Continuous
+    matches!(variable.kind, VariableKind::Real { .. })
+        && variable.variability == Variability::Continuous
 }

@@ -2,13 +2,13 @@
 //! 2.0.4, sections 3.2.3 (model exchange) and 4.2.4 (co-simulation).
 
 use crate::interface::{DISCARD, ERROR, EventInfo, FmuState, MODEL_EXCHANGE, OK, Status};
-use crate::{Instance, Unit, c};
-use model_description::variable::{Causality, Kind, Variable};
+use crate::{Fmu, Instance, c};
+use model_description::variable::{Causality, Variable, VariableKind};
 use std::ffi::c_int;
 use std::ptr::{null, null_mut};
 
 /// Columns of the tables that an instance can be in. The column `start` has no instance, `fatal` is
-/// not reached, and steps are never in progress, because no unit computes them asynchronously.
+/// not reached, and steps are never in progress, because no FMU computes them asynchronously.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the names are the standard's")]
 pub enum State {
@@ -43,16 +43,16 @@ impl State {
 
 /// Returns the states of an interface.
 pub fn states(fmu_type: c_int) -> Vec<State> {
-    let own = match fmu_type {
+    let running = match fmu_type {
         MODEL_EXCHANGE => vec![EventMode, ContinuousTimeMode],
         _ => vec![StepComplete],
     };
-    [vec![Instantiated, InitializationMode], own, vec![Terminated, Error]].concat()
+    [vec![Instantiated, InitializationMode], running, vec![Terminated, Error]].concat()
 }
 
 /// Makes a new instance and brings it to that state.
-pub fn instance_in(unit: &Unit, fmu_type: c_int, state: State) -> Instance {
-    let instance = unit.instance(fmu_type);
+pub fn instance_in(fmu: &Fmu, fmu_type: c_int, state: State) -> Instance {
+    let instance = fmu.instance(fmu_type);
     let component = instance.component;
     match state {
         Instantiated => instance,
@@ -74,7 +74,7 @@ pub fn instance_in(unit: &Unit, fmu_type: c_int, state: State) -> Instance {
         }
         Error => {
             let instance = instance.initialized();
-            assert_eq!(instance.set_real(unit.input(), f64::NAN), ERROR);
+            assert_eq!(instance.set_real(fmu.input(), f64::NAN), ERROR);
             instance
         }
     }
@@ -101,7 +101,7 @@ impl Row {
 /// test, as have the functions that need no instance.
 ///
 /// The variables that may be set are fewer, as [`settable`] tells. The standard allows `fmi2GetXXX`
-/// in initialization mode for outputs, states and derivatives only; the units return every
+/// in initialization mode for outputs, states and derivatives only; the FMUs return every
 /// variable.
 #[rustfmt::skip]
 pub const TABLE: &[Row] = &[
@@ -115,7 +115,7 @@ pub const TABLE: &[Row] = &[
     Row("fmi2GetInteger",                    |i, _| get_integer(i),                                               "NECTX",  "NSTX",  OK),
     Row("fmi2GetBoolean",                    |i, _| get_boolean(i),                                               "NECTX",  "NSTX",  OK),
     Row("fmi2GetString",                     |i, _| get_string(i),                                                "NECTX",  "NSTX",  OK),
-    Row("fmi2SetReal",                       |i, _| i.set_real(i.unit.input(), 0.01),                             "INEC",   "INS",   OK),
+    Row("fmi2SetReal",                       |i, _| i.set_real(i.fmu.input(), 0.01),                             "INEC",   "INS",   OK),
     Row("fmi2SetInteger",                    |i, _| c!(i, fmi2SetInteger(i.component, null(), 0, null())),        "INE",    "INS",   OK),
     Row("fmi2SetBoolean",                    |i, _| c!(i, fmi2SetBoolean(i.component, null(), 0, null())),        "INE",    "INS",   OK),
     Row("fmi2SetString",                     |i, _| c!(i, fmi2SetString(i.component, null(), 0, null())),         "INE",    "INS",   OK),
@@ -138,9 +138,9 @@ pub const TABLE: &[Row] = &[
     Row("fmi2GetContinuousStates",           |i, _| with_states(i, |i, x, n| c!(i, fmi2GetContinuousStates(i.component, x, n))), "NECTX", "", OK),
     Row("fmi2GetNominalsOfContinuousStates", |i, _| with_states(i, |i, x, n| c!(i, fmi2GetNominalsOfContinuousStates(i.component, x, n))), "IECTX", "", OK),
 
-    Row("fmi2SetRealInputDerivatives",       |i, _| c!(i, fmi2SetRealInputDerivatives(i.component, &i.unit.input(), 1, &1, &0.1)), "", "INS", OK),
+    Row("fmi2SetRealInputDerivatives",       |i, _| c!(i, fmi2SetRealInputDerivatives(i.component, &i.fmu.input(), 1, &1, &0.1)), "", "INS", OK),
     Row("fmi2GetRealOutputDerivatives",      |i, _| c!(i, fmi2GetRealOutputDerivatives(i.component, null(), 0, null(), null_mut())), "", "STX", OK),
-    Row("fmi2DoStep",                        |i, _| i.step(0.0, i.unit.description.default_experiment.step),      "",       "S",     OK),
+    Row("fmi2DoStep",                        |i, _| i.step(0.0, i.fmu.description.default_experiment.step),      "",       "S",     OK),
     Row("fmi2CancelStep",                    |i, _| c!(i, fmi2CancelStep(i.component)),                           "",       "",      OK),
     Row("fmi2GetStatus",                     |i, _| c!(i, fmi2GetStatus(i.component, 0, &mut 0)),                 "",       "ST",    OK),
     Row("fmi2GetRealStatus",                 |i, _| c!(i, fmi2GetRealStatus(i.component, 2, &mut 0.0)),           "",       "ST",    OK),
@@ -151,26 +151,28 @@ pub const TABLE: &[Row] = &[
 ];
 
 fn get_real(i: &Instance) -> Status {
-    let references = i.unit.references(|v| matches!(v.kind, Kind::Real { .. }));
+    let references = i.fmu.references(|v| matches!(v.kind, VariableKind::Real { .. }));
     let mut values = vec![0.0; references.len()];
     c!(i, fmi2GetReal(i.component, references.as_ptr(), references.len(), values.as_mut_ptr()))
 }
 
 fn get_integer(i: &Instance) -> Status {
-    let wanted = |v: &Variable| matches!(v.kind, Kind::Integer { .. } | Kind::Enumeration { .. });
-    let references = i.unit.references(wanted);
+    let is_whole = |v: &Variable| {
+        matches!(v.kind, VariableKind::Integer { .. } | VariableKind::Enumeration { .. })
+    };
+    let references = i.fmu.references(is_whole);
     let mut values = vec![0; references.len()];
     c!(i, fmi2GetInteger(i.component, references.as_ptr(), references.len(), values.as_mut_ptr()))
 }
 
 fn get_boolean(i: &Instance) -> Status {
-    let references = i.unit.references(|v| matches!(v.kind, Kind::Boolean { .. }));
+    let references = i.fmu.references(|v| matches!(v.kind, VariableKind::Boolean { .. }));
     let mut values = vec![0; references.len()];
     c!(i, fmi2GetBoolean(i.component, references.as_ptr(), references.len(), values.as_mut_ptr()))
 }
 
 fn get_string(i: &Instance) -> Status {
-    let references = i.unit.references(|v| matches!(v.kind, Kind::String { .. }));
+    let references = i.fmu.references(|v| matches!(v.kind, VariableKind::String { .. }));
     let mut values = vec![null(); references.len()];
     c!(i, fmi2GetString(i.component, references.as_ptr(), references.len(), values.as_mut_ptr()))
 }
@@ -185,19 +187,19 @@ fn serialize(i: &Instance, state: FmuState) -> Status {
 }
 
 /// Asks for the derivative of the first state derivative with respect to the first state, or for
-/// none if the unit has no states.
+/// none if the FMU has no states.
 fn directional_derivative(i: &Instance) -> Status {
-    let states = i.unit.description.states();
-    let (known, unknown): (Vec<_>, Vec<_>) =
+    let states = i.fmu.description.states();
+    let (states, derivatives): (Vec<_>, Vec<_>) =
         states.iter().take(1).map(|&(state, derivative)| (state as u32, derivative as u32)).unzip();
-    let n = known.len();
+    let n = states.len();
     c!(
         i,
         fmi2GetDirectionalDerivative(
             i.component,
-            unknown.as_ptr(),
+            derivatives.as_ptr(),
             n,
-            known.as_ptr(),
+            states.as_ptr(),
             n,
             &1.0,
             &mut 0.0
@@ -206,7 +208,7 @@ fn directional_derivative(i: &Instance) -> Status {
 }
 
 fn with_states(i: &Instance, call: fn(&Instance, *mut f64, usize) -> Status) -> Status {
-    let mut x = vec![0.0; i.unit.description.states().len()];
+    let mut x = vec![0.0; i.fmu.description.states().len()];
     call(i, x.as_mut_ptr(), x.len())
 }
 
@@ -215,20 +217,20 @@ fn set_states(i: &Instance) -> Status {
     with_states(i, |i, x, n| {
         // In states where they cannot be read they cannot be set either; the second call must be
         // the one that reports it.
-        let here = i.save();
+        let saved_state = i.save();
         if c!(i, fmi2GetContinuousStates(i.component, x, n)) != OK {
-            i.restore(here);
+            i.restore(saved_state);
         }
         c!(i, fmi2SetContinuousStates(i.component, x, n))
     })
 }
 
 fn indicators(i: &Instance) -> Status {
-    let mut values = vec![0.0; i.unit.description.event_indicators];
+    let mut values = vec![0.0; i.fmu.description.event_indicators];
     c!(i, fmi2GetEventIndicators(i.component, values.as_mut_ptr(), values.len()))
 }
 
-/// Whether a variable may be set in a state: conditions 1, 3, 4, 5 and 6 of the tables. No unit has
+/// Whether a variable may be set in a state: conditions 1, 3, 4, 5 and 6 of the tables. No FMU has
 /// tunable parameters or constants.
 ///
 /// There are two differences from the tables. An input may also be set before initialization,
@@ -236,7 +238,7 @@ fn indicators(i: &Instance) -> Status {
 /// allows only continuous inputs in continuous-time mode, but FMPy sets all inputs there: a
 /// discrete Real is accepted and waits for the next event.
 pub fn settable(variable: &Variable, state: State) -> bool {
-    let real = matches!(variable.kind, Kind::Real { .. });
+    let real = matches!(variable.kind, VariableKind::Real { .. });
     match variable.causality {
         Causality::Parameter => matches!(state, Instantiated | InitializationMode),
         Causality::Input => match state {

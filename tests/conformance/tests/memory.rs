@@ -3,7 +3,7 @@
 #![cfg(all(target_os = "linux", target_env = "gnu"))]
 
 use conformance::interface::CO_SIMULATION;
-use conformance::{Instance, Unit, units};
+use conformance::{Fmu, Instance, fmus};
 
 /// Bytes that the C library's allocator handed out and did not get back. Rust's allocations go
 /// through it too. Resident memory would also count its free lists, which grow irregularly.
@@ -36,31 +36,30 @@ fn live(instance: Instance) {
     instance.save();
 }
 
-fn kinds(units: &[Unit]) -> Vec<(&Unit, i32)> {
-    units
-        .iter()
-        .flat_map(|unit| unit.interfaces().iter().map(move |&fmu_type| (unit, fmu_type)))
+fn kinds(fmus: &[Fmu]) -> Vec<(&Fmu, i32)> {
+    fmus.iter()
+        .flat_map(|fmu| fmu.interfaces().iter().map(move |&fmu_type| (fmu, fmu_type)))
         .collect()
 }
 
 #[test]
 fn three_thousand_instances_and_three_hundred_libraries_leave_nothing_behind() {
-    let units = units();
-    let kinds = kinds(&units);
+    let fmus = fmus();
+    let kinds = kinds(&fmus);
     let instances = growth(300, 3000, |i| {
-        let (unit, fmu_type) = kinds[i % kinds.len()];
+        let (fmu, fmu_type) = kinds[i % kinds.len()];
         match fmu_type {
-            CO_SIMULATION => live(unit.instance(fmu_type)),
-            _ => drop(unit.instance(fmu_type).initialized().integrate(0..1)),
+            CO_SIMULATION => live(fmu.instance(fmu_type)),
+            _ => drop(fmu.instance(fmu_type).initialized().integrate(0..1)),
         }
     });
     assert!(instances < ALLOWED, "3000 instances have left {instances} bytes");
-    let names: Vec<_> = units.iter().map(|unit| unit.name().to_owned()).collect();
-    drop(units);
+    let names: Vec<_> = fmus.iter().map(|fmu| fmu.name().to_owned()).collect();
+    drop(fmus);
     let libraries = growth(60, 300, |i| {
         let name = names[i % names.len()].clone();
         // The thread ends after the libraries are closed, and releases what it kept for them.
-        std::thread::spawn(move || live(conformance::unit(&name).instance(CO_SIMULATION)))
+        std::thread::spawn(move || live(conformance::fmu(&name).instance(CO_SIMULATION)))
             .join()
             .unwrap();
     });

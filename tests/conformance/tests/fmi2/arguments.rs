@@ -3,8 +3,8 @@
 //! standard or importers need that.
 
 use conformance::interface::{CO_SIMULATION, Callbacks, ERROR, MODEL_EXCHANGE, OK, Status};
-use conformance::{Instance, c, units};
-use model_description::variable::Kind;
+use conformance::{Instance, c, fmus};
+use model_description::variable::VariableKind;
 use std::ffi::{CStr, c_int};
 use std::ptr::{null, null_mut};
 use std::sync::atomic::AtomicU64;
@@ -106,7 +106,7 @@ const NULLS_OF_EXCHANGE: &[(Call, &str)] = &[
     (|i| c!(i, fmi2GetEventIndicators(i.component, null_mut(), 1)), "fmi2GetEventIndicators: argument 'eventIndicators' is NULL"),
     (|i| c!(i, fmi2GetContinuousStates(i.component, null_mut(), 1)), "fmi2GetContinuousStates: argument 'x' is NULL"),
     (|i| c!(i, fmi2GetNominalsOfContinuousStates(i.component, null_mut(), 1)), "fmi2GetNominalsOfContinuousStates: argument 'x_nominal' is NULL"),
-    // No values are requested, although the unit has some.
+    // No values are requested, although the FMU has some.
     (|i| c!(i, fmi2GetDerivatives(i.component, null_mut(), 0)), "fmi2GetDerivatives: room for 0"),
     (|i| c!(i, fmi2GetEventIndicators(i.component, null_mut(), 0)), "fmi2GetEventIndicators: room for 0"),
     (|i| c!(i, fmi2GetContinuousStates(i.component, null_mut(), 0)), "fmi2GetContinuousStates: room for 0"),
@@ -151,22 +151,22 @@ const NOTHING: &[Call] = &[
 ];
 
 fn check(instance: &Instance, calls: &[(Call, &str)]) {
-    let (here, before) = (instance.save(), instance.serialize());
+    let (saved_state, before) = (instance.save(), instance.serialize());
     for (call, message) in calls {
         instance.forget();
         let status = call(instance);
         instance.refused(status, ERROR, &[message]);
         assert_eq!(instance.messages().len(), 1, "{message}: said once");
-        instance.restore(here);
+        instance.restore(saved_state);
         assert!(instance.serialize() == before, "{message}");
     }
 }
 
 #[test]
 fn wrong_pointers_are_errors_that_name_them() {
-    for unit in units() {
-        for &fmu_type in unit.interfaces() {
-            let instance = unit.instance(fmu_type).initialized();
+    for fmu in fmus() {
+        for &fmu_type in fmu.interfaces() {
+            let instance = fmu.instance(fmu_type).initialized();
             check(&instance, NULLS);
             check(&instance, BETWEEN);
             check(&instance, OVERLAPS);
@@ -196,8 +196,8 @@ fn wrong_pointers_are_errors_that_name_them() {
 
 #[test]
 fn what_cannot_be_given_leaves_the_room_as_it_was() {
-    for unit in units() {
-        let instance = unit.instance(CO_SIMULATION);
+    for fmu in fmus() {
+        let instance = fmu.instance(CO_SIMULATION);
         let mut value = 7.5;
         let status = c!(instance, fmi2GetReal(instance.component, &u32::MAX, 1, &mut value));
         instance.refused(status, ERROR, &["fmi2GetReal"]);
@@ -207,10 +207,12 @@ fn what_cannot_be_given_leaves_the_room_as_it_was() {
 
 #[test]
 fn null_is_not_taken_for_a_text() {
-    for unit in units() {
-        for reference in unit.references(|variable| matches!(variable.kind, Kind::String { .. })) {
-            let instance = unit.instance(CO_SIMULATION);
-            let name = &unit.description.variables[reference as usize].name;
+    for fmu in fmus() {
+        for reference in
+            fmu.references(|variable| matches!(variable.kind, VariableKind::String { .. }))
+        {
+            let instance = fmu.instance(CO_SIMULATION);
+            let name = &fmu.description.variables[reference as usize].name;
             let status = c!(instance, fmi2SetString(instance.component, &reference, 1, &null()));
             instance.refused(status, ERROR, &[&format!("'{name}'"), "NULL"]);
         }
@@ -226,25 +228,25 @@ fn no_callbacks_or_none_of_their_functions_are_fine() {
         step_finished: None,
         component_environment: null_mut(),
     };
-    for unit in units() {
+    for fmu in fmus() {
         for callbacks in [null(), &raw const none] {
             let instantiate = |name| {
-                let guid = unit.guid().as_ptr();
-                c!(unit, fmi2Instantiate(name, CO_SIMULATION, guid, null(), callbacks, 0, 1))
+                let guid = fmu.guid().as_ptr();
+                c!(fmu, fmi2Instantiate(name, CO_SIMULATION, guid, null(), callbacks, 0, 1))
             };
             let component = instantiate(c"it".as_ptr());
-            assert!(!component.is_null(), "{}", unit.name());
+            assert!(!component.is_null(), "{}", fmu.name());
             // A premature step is refused, and there is no logger to report it to.
-            assert_eq!(c!(unit, fmi2DoStep(component, 0.0, 0.1, 1)), ERROR);
-            assert_eq!(c!(unit, fmi2Reset(component)), OK);
-            assert_eq!(c!(unit, fmi2EnterInitializationMode(component)), OK);
-            assert_eq!(c!(unit, fmi2ExitInitializationMode(component)), OK);
-            assert_eq!(c!(unit, fmi2DoStep(component, 0.0, 0.01, 1)), OK);
-            c!(unit, fmi2FreeInstance(component));
+            assert_eq!(c!(fmu, fmi2DoStep(component, 0.0, 0.1, 1)), ERROR);
+            assert_eq!(c!(fmu, fmi2Reset(component)), OK);
+            assert_eq!(c!(fmu, fmi2EnterInitializationMode(component)), OK);
+            assert_eq!(c!(fmu, fmi2ExitInitializationMode(component)), OK);
+            assert_eq!(c!(fmu, fmi2DoStep(component, 0.0, 0.01, 1)), OK);
+            c!(fmu, fmi2FreeInstance(component));
             // A refused instantiation has no logger either.
             assert!(instantiate(null()).is_null());
-            let (name, guid) = (c"it".as_ptr(), unit.guid().as_ptr());
-            let made = c!(unit, fmi2Instantiate(name, 1, guid, null(), between(), 0, 1));
+            let (name, guid) = (c"it".as_ptr(), fmu.guid().as_ptr());
+            let made = c!(fmu, fmi2Instantiate(name, 1, guid, null(), between(), 0, 1));
             assert!(made.is_null());
         }
     }
@@ -252,24 +254,24 @@ fn no_callbacks_or_none_of_their_functions_are_fine() {
 
 #[test]
 fn what_cannot_be_instantiated_is_refused_by_name() {
-    for unit in units() {
-        let own = Some(unit.guid());
+    for fmu in fmus() {
+        let fmu_guid = Some(fmu.guid());
         let cases: [(Option<&CStr>, c_int, Option<&CStr>, &str); 8] = [
-            (None, CO_SIMULATION, own, "'instanceName' is NULL"),
-            (Some(c""), CO_SIMULATION, own, "instance name is empty"),
+            (None, CO_SIMULATION, fmu_guid, "'instanceName' is NULL"),
+            (Some(c""), CO_SIMULATION, fmu_guid, "instance name is empty"),
             (Some(c"it"), CO_SIMULATION, None, "'fmuGUID' is NULL"),
-            (Some(c"it"), CO_SIMULATION, Some(c""), "no unit with GUID ''"),
-            (Some(c"it"), CO_SIMULATION, Some(c"{0}"), "no unit with GUID '{0}'"),
-            (Some(c"it"), -1, own, "fmuType -1"),
-            (Some(c"it"), 2, own, "fmuType 2"),
-            (Some(c"it"), MODEL_EXCHANGE, own, "is for co-simulation only"),
+            (Some(c"it"), CO_SIMULATION, Some(c""), "no FMU with GUID ''"),
+            (Some(c"it"), CO_SIMULATION, Some(c"{0}"), "no FMU with GUID '{0}'"),
+            (Some(c"it"), -1, fmu_guid, "fmuType -1"),
+            (Some(c"it"), 2, fmu_guid, "fmuType 2"),
+            (Some(c"it"), MODEL_EXCHANGE, fmu_guid, "is for co-simulation only"),
         ];
         for (name, fmu_type, guid, part) in cases {
-            if fmu_type == MODEL_EXCHANGE && unit.description.model_exchange {
+            if fmu_type == MODEL_EXCHANGE && fmu.description.model_exchange {
                 continue;
             }
-            let refused = unit.instantiate(name, fmu_type, guid, None);
-            assert!(refused.component.is_null(), "{}: {part}", unit.name());
+            let refused = fmu.instantiate(name, fmu_type, guid, None);
+            assert!(refused.component.is_null(), "{}: {part}", fmu.name());
             assert_eq!(refused.messages().len(), 1, "{part}: said once");
             refused.refused(refused.messages()[0].status, ERROR, &["fmi2Instantiate: ", part]);
         }

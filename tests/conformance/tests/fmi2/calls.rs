@@ -2,8 +2,8 @@
 
 use conformance::interface::{CO_SIMULATION, ERROR, FUNCTIONS, MODEL_EXCHANGE, OK, Status};
 use conformance::table::{Row, TABLE, instance_in, settable, states};
-use conformance::{Instance, c, units};
-use model_description::variable::Kind;
+use conformance::{Instance, c, fmus};
+use model_description::variable::VariableKind;
 use std::ffi::{CString, c_int};
 use std::ptr::null_mut;
 
@@ -23,9 +23,9 @@ const OWN_ARGUMENTS: [&str; 3] =
 
 #[test]
 fn without_an_instance_every_call_is_an_error() {
-    for unit in units() {
+    for fmu in fmus() {
         // A refused instantiation leaves NULL.
-        let nobody = unit.instantiate(None, CO_SIMULATION, None, None);
+        let nobody = fmu.instantiate(None, CO_SIMULATION, None, None);
         assert!(nobody.component.is_null());
         nobody.forget();
         for &Row(name, call, ..) in TABLE.iter().filter(|row| !OWN_ARGUMENTS.contains(&row.0)) {
@@ -41,20 +41,20 @@ fn without_an_instance_every_call_is_an_error() {
 }
 
 fn check(fmu_type: c_int) {
-    let units: Vec<_> =
-        units().into_iter().filter(|unit| unit.interfaces().contains(&fmu_type)).collect();
-    for unit in &units {
+    let fmus: Vec<_> =
+        fmus().into_iter().filter(|fmu| fmu.interfaces().contains(&fmu_type)).collect();
+    for fmu in &fmus {
         for state in states(fmu_type) {
-            let instance = instance_in(unit, fmu_type, state);
-            let (here, before) = (instance.save(), instance.serialize());
+            let instance = instance_in(fmu, fmu_type, state);
+            let (saved_state, before) = (instance.save(), instance.serialize());
             for row @ &Row(name, call, .., answer) in TABLE {
-                let what = format!("{}: {name} in {state:?}", unit.name());
+                let what = format!("{}: {name} in {state:?}", fmu.name());
                 let allowed = row.is_allowed(fmu_type, state);
-                // This is the one function that not every unit offers.
+                // This is the one function that not every FMU supports.
                 let offered = name != "fmi2GetDirectionalDerivative"
-                    || unit.description.directional_derivatives();
+                    || fmu.description.directional_derivatives();
                 instance.forget();
-                let status = call(&instance, here);
+                let status = call(&instance, saved_state);
                 let text = instance
                     .messages()
                     .last()
@@ -74,7 +74,7 @@ fn check(fmu_type: c_int) {
                 }
                 // The instance returns to its state before the call, bit for bit, whatever was
                 // refused.
-                instance.restore(here);
+                instance.restore(saved_state);
                 assert!(instance.serialize() == before, "{what}");
             }
         }
@@ -92,20 +92,20 @@ fn oracle_calls_of_model_exchange_are_allowed_where_the_standard_says() {
 }
 
 #[test]
-fn after_a_refused_call_a_reset_makes_a_new_unit() {
-    for unit in units() {
-        for &fmu_type in unit.interfaces() {
+fn after_a_refused_call_a_reset_makes_a_new_instance() {
+    for fmu in fmus() {
+        for &fmu_type in fmu.interfaces() {
             let drive =
                 if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive };
-            let expected = drive(&unit.instance(fmu_type).initialized(), 0..3);
+            let expected = drive(&fmu.instance(fmu_type).initialized(), 0..3);
             for state in states(fmu_type) {
-                let instance = instance_in(&unit, fmu_type, state);
+                let instance = instance_in(&fmu, fmu_type, state);
                 assert_eq!(c!(instance, fmi2CancelStep(instance.component)), ERROR);
                 instance.ok(c!(instance, fmi2Reset(instance.component)));
                 assert!(
                     drive(&instance.initialized(), 0..3) == expected,
                     "{} from {state:?}",
-                    unit.name()
+                    fmu.name()
                 );
             }
         }
@@ -113,13 +113,13 @@ fn after_a_refused_call_a_reset_makes_a_new_unit() {
 }
 
 #[test]
-fn a_unit_can_be_freed_in_every_state() {
-    for unit in units() {
-        for &fmu_type in unit.interfaces() {
+fn an_instance_can_be_freed_in_every_state() {
+    for fmu in fmus() {
+        for &fmu_type in fmu.interfaces() {
             for state in states(fmu_type) {
                 // The instance is freed at the end of its scope, with a saved state that was not
                 // freed.
-                instance_in(&unit, fmu_type, state).save();
+                instance_in(&fmu, fmu_type, state).save();
             }
         }
     }
@@ -128,19 +128,19 @@ fn a_unit_can_be_freed_in_every_state() {
 /// Sets a variable to its start value, and a calculated one to any value.
 fn set(instance: &Instance, reference: u32) -> (&'static str, Status) {
     let component = instance.component;
-    match &instance.unit.description.variables[reference as usize].kind {
-        Kind::Real { start, .. } => {
+    match &instance.fmu.description.variables[reference as usize].kind {
+        VariableKind::Real { start, .. } => {
             ("fmi2SetReal", instance.set_real(reference, start.unwrap_or_default()))
         }
-        Kind::Integer { start, .. } | Kind::Enumeration { start, .. } => {
+        VariableKind::Integer { start, .. } | VariableKind::Enumeration { start, .. } => {
             let value = start.unwrap_or(1);
             ("fmi2SetInteger", c!(instance, fmi2SetInteger(component, &reference, 1, &value)))
         }
-        Kind::Boolean { start } => {
+        VariableKind::Boolean { start } => {
             let value = c_int::from(start.unwrap_or_default());
             ("fmi2SetBoolean", c!(instance, fmi2SetBoolean(component, &reference, 1, &value)))
         }
-        Kind::String { start } => {
+        VariableKind::String { start } => {
             let value = CString::new(start.clone().unwrap_or_default()).unwrap();
             (
                 "fmi2SetString",
@@ -152,15 +152,15 @@ fn set(instance: &Instance, reference: u32) -> (&'static str, Status) {
 
 #[test]
 fn oracle_variables_can_be_set_where_the_standard_says() {
-    for unit in units() {
-        for &fmu_type in unit.interfaces() {
+    for fmu in fmus() {
+        for &fmu_type in fmu.interfaces() {
             for state in states(fmu_type) {
-                let instance = instance_in(&unit, fmu_type, state);
-                let here = instance.save();
-                for (variable, reference) in unit.description.variables.iter().zip(0..) {
+                let instance = instance_in(&fmu, fmu_type, state);
+                let saved_state = instance.save();
+                for (variable, reference) in fmu.description.variables.iter().zip(0..) {
                     instance.forget();
                     let (function, status) = set(&instance, reference);
-                    let what = format!("{}: {} in {state:?}", unit.name(), variable.name);
+                    let what = format!("{}: {} in {state:?}", fmu.name(), variable.name);
                     if settable(variable, state) {
                         assert_eq!(status, OK, "{what}: {:?}", instance.messages());
                     } else {
@@ -169,7 +169,7 @@ fn oracle_variables_can_be_set_where_the_standard_says() {
                         let named = text.contains(&format!("'{}'", variable.name));
                         assert!(text.starts_with(function), "{what}: {text}");
                         assert!(named || text.contains("not allowed in state"), "{what}: {text}");
-                        instance.restore(here);
+                        instance.restore(saved_state);
                     }
                 }
             }

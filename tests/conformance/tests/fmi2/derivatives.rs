@@ -1,8 +1,8 @@
-//! Tests of the time derivatives of inputs and outputs in co-simulation, and of the units that
+//! Tests of the time derivatives of inputs and outputs in co-simulation, and of the FMUs that
 //! offer directional derivatives.
 
 use conformance::interface::{CO_SIMULATION, ERROR, Status};
-use conformance::{Instance, c, is_continuous_real, units};
+use conformance::{Instance, c, fmus, is_continuous_real};
 use model_description::variable::{Causality, Variable};
 
 fn set(instance: &Instance, reference: u32, order: i32, value: f64) -> Status {
@@ -15,14 +15,14 @@ fn takes_derivatives(variable: &Variable) -> bool {
 
 #[test]
 fn derivatives_of_continuous_inputs_are_taken_and_no_others() {
-    for unit in units() {
-        let instance = unit.instance(CO_SIMULATION).initialized();
-        let here = instance.save();
-        for (variable, reference) in unit.description.variables.iter().zip(0..) {
+    for fmu in fmus() {
+        let instance = fmu.instance(CO_SIMULATION).initialized();
+        let saved_state = instance.save();
+        for (variable, reference) in fmu.description.variables.iter().zip(0..) {
             let named = format!("'{}'", variable.name);
             let refused = |status, parts: &[&str]| {
                 instance.refused(status, ERROR, parts);
-                instance.restore(here);
+                instance.restore(saved_state);
             };
             if !takes_derivatives(variable) {
                 refused(
@@ -47,11 +47,11 @@ fn derivatives_of_continuous_inputs_are_taken_and_no_others() {
 
 #[test]
 fn oracle_inputs_follow_their_derivatives_for_one_step() {
-    for unit in units() {
-        let h = unit.description.default_experiment.step;
-        for reference in unit.references(takes_derivatives) {
-            let instance = unit.instance(CO_SIMULATION).initialized();
-            let name = &unit.description.variables[reference as usize].name;
+    for fmu in fmus() {
+        let h = fmu.description.default_experiment.step;
+        for reference in fmu.references(takes_derivatives) {
+            let instance = fmu.instance(CO_SIMULATION).initialized();
+            let name = &fmu.description.variables[reference as usize].name;
             let start = instance.real(reference);
             // The derivatives are small and together do not move the value away from zero.
             let [first, second, third] =
@@ -66,38 +66,38 @@ fn oracle_inputs_follow_their_derivatives_for_one_step() {
             let expected = start + first * h + second * h * h / 2.0 + third * h * h * h / 6.0;
             let end = instance.real(reference);
             let near = (end - expected).abs() <= 2.0 * f64::EPSILON * expected.abs();
-            assert!(near, "{}: {name} = {end}, not {expected}", unit.name());
-            assert_ne!(end, start, "{}: {name}", unit.name());
+            assert!(near, "{}: {name} = {end}, not {expected}", fmu.name());
+            assert_ne!(end, start, "{}: {name}", fmu.name());
             instance.ok(instance.step(h, h));
-            assert_eq!(instance.real(reference), end, "{}: {name} in the next step", unit.name());
+            assert_eq!(instance.real(reference), end, "{}: {name} in the next step", fmu.name());
         }
     }
 }
 
 #[test]
 fn a_derivative_acts_within_the_step() {
-    for unit in units() {
-        // The end is no tick of any unit, so values sampled within the step are still held there.
-        let (input, size) = (unit.input(), 4.33 * unit.description.default_experiment.step);
+    for fmu in fmus() {
+        // The end is no tick of any FMU, so values sampled within the step are still held there.
+        let (input, size) = (fmu.input(), 4.33 * fmu.description.default_experiment.step);
         let after = |slope: f64| {
-            let instance = unit.instance(CO_SIMULATION).initialized();
+            let instance = fmu.instance(CO_SIMULATION).initialized();
             instance.ok(set(&instance, input, 1, slope));
             instance.ok(instance.step(0.0, size));
-            // The input is reset, so that only its course within the step can make a difference.
+            // The input is reset, so that only its change within the step can make a difference.
             instance.ok(instance.set_real(input, 0.0));
-            instance.bits(&unit.results())
+            instance.bits(&fmu.results())
         };
-        let slope = unit.instance(CO_SIMULATION).course(100);
-        assert!(after(0.0) != after(slope), "{}", unit.name());
-        assert!(after(slope) == after(slope), "{}", unit.name());
+        let slope = fmu.instance(CO_SIMULATION).input_at(100);
+        assert!(after(0.0) != after(slope), "{}", fmu.name());
+        assert!(after(slope) == after(slope), "{}", fmu.name());
     }
 }
 
 #[test]
-fn no_unit_offers_derivatives_of_outputs() {
-    for unit in units() {
-        for reference in unit.references(|variable| variable.causality == Causality::Output) {
-            let instance = unit.instance(CO_SIMULATION).initialized();
+fn no_fmu_provides_derivatives_of_outputs() {
+    for fmu in fmus() {
+        for reference in fmu.references(|variable| variable.causality == Causality::Output) {
+            let instance = fmu.instance(CO_SIMULATION).initialized();
             let component = instance.component;
             let status =
                 c!(instance, fmi2GetRealOutputDerivatives(component, &reference, 1, &1, &mut 0.0));
@@ -111,18 +111,18 @@ fn no_unit_offers_derivatives_of_outputs() {
 }
 
 #[test]
-fn only_units_with_states_offer_directional_derivatives() {
-    for unit in units() {
-        let instance = unit.instance(CO_SIMULATION).initialized();
-        let (output, input, component) = (unit.results()[0], unit.input(), instance.component);
+fn only_fmus_with_states_provide_directional_derivatives() {
+    for fmu in fmus() {
+        let instance = fmu.instance(CO_SIMULATION).initialized();
+        let (output, input, component) = (fmu.results()[0], fmu.input(), instance.component);
         let status = c!(
             instance,
             fmi2GetDirectionalDerivative(component, &output, 1, &input, 1, &1.0, &mut 0.0)
         );
-        if unit.description.directional_derivatives() {
+        if fmu.description.directional_derivatives() {
             instance.ok(status);
         } else {
-            instance.refused(status, ERROR, &["offers no directional derivatives"]);
+            instance.refused(status, ERROR, &["provides no directional derivatives"]);
         }
     }
 }

@@ -1,16 +1,17 @@
-//! A property of every unit: whatever finite values it accepts, what it then gives with `fmi2OK` is
-//! finite, an item of its enumeration, and true or false.
+//! A property of every FMU: whatever finite values it accepts, the values that it then returns with
+//! `fmi2OK` are finite, items of their enumerations, or true or false.
 
 use conformance::interface::{CO_SIMULATION, DISCARD, ERROR, OK};
-use conformance::{Instance, Unit, c, units};
-use model_description::variable::{Causality, Kind};
+use conformance::{Fmu, Instance, c, fmus};
+use model_description::variable::{Causality, VariableKind};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;
 
-/// Number of random courses of each unit; the environment variable PROPTEST_CASES asks for others.
-const COURSES: u32 = 40;
+/// Number of random sequences of calls for each FMU, unless the environment variable
+/// PROPTEST_CASES gives another.
+const SEQUENCES: u32 = 40;
 
 /// A variable, chosen by a number, with a value for each type that it may have. A Real is taken as
 /// it is, or as that part of the start value by which it differs from it.
@@ -18,7 +19,7 @@ type Change = (usize, bool, f64, i32);
 
 /// Calls: parameters that are set, and inputs that are set before each step, with the step's
 /// length.
-type Course = (Vec<Change>, Vec<(Vec<Change>, f64)>);
+type CallSequence = (Vec<Change>, Vec<(Vec<Change>, f64)>);
 
 /// Finite numbers of all sizes, with those at the edges more often.
 fn number() -> impl Strategy<Value = f64> {
@@ -37,7 +38,7 @@ fn change() -> impl Strategy<Value = Change> {
         .prop_map(|(which, (near, real), whole)| (which, near, real, whole))
 }
 
-fn courses() -> impl Strategy<Value = Course> {
+fn call_sequences() -> impl Strategy<Value = CallSequence> {
     let step = prop_oneof![3 => Just(0.2), 1 => 1e-9..10.0_f64];
     (vec(change(), 0..6), vec((vec(change(), 0..6), step), 1..6))
 }
@@ -45,49 +46,50 @@ fn courses() -> impl Strategy<Value = Course> {
 /// Sets a variable to a value. A refusal is in order, and leaves the instance as it was.
 fn set(instance: &Instance, reference: u32, &(_, near, real, whole): &Change) {
     let component = instance.component;
-    let mut here = instance.save();
-    let status = match &instance.unit.description.variables[reference as usize].kind {
-        Kind::Real { start, .. } => {
+    let mut saved_state = instance.save();
+    let status = match &instance.fmu.description.variables[reference as usize].kind {
+        VariableKind::Real { start, .. } => {
             let near_start = match start {
                 Some(start) if *start != 0.0 => start * (1.0 + real),
                 _ => real,
             };
             instance.set_real(reference, if near { near_start } else { real })
         }
-        Kind::Integer { .. } | Kind::Enumeration { .. } => {
+        VariableKind::Integer { .. } | VariableKind::Enumeration { .. } => {
             c!(instance, fmi2SetInteger(component, &reference, 1, &whole))
         }
-        Kind::Boolean { .. } => {
+        VariableKind::Boolean { .. } => {
             c!(instance, fmi2SetBoolean(component, &reference, 1, &(whole & 1)))
         }
-        Kind::String { .. } => OK,
+        VariableKind::String { .. } => OK,
     };
-    assert!([OK, ERROR].contains(&status), "{}: status {status}", instance.unit.name());
+    assert!([OK, ERROR].contains(&status), "{}: status {status}", instance.fmu.name());
     if status == ERROR {
-        instance.restore(here);
+        instance.restore(saved_state);
     }
-    instance.ok(c!(instance, fmi2FreeFMUstate(component, &mut here)));
+    instance.ok(c!(instance, fmi2FreeFMUstate(component, &mut saved_state)));
 }
 
-/// Follows a course until the unit refuses to go on, and counts the steps. Returns the first value
-/// that is none.
-fn follow(unit: &Unit, (parameters, steps): &Course, count: &Cell<u32>) -> Option<String> {
-    let of = |causality| {
-        unit.references(|variable| {
-            variable.causality == causality && !matches!(variable.kind, Kind::String { .. })
+/// Follows a sequence of calls until the FMU refuses to continue, and counts the steps. Returns the
+/// first value that is not valid.
+fn follow(fmu: &Fmu, (parameters, steps): &CallSequence, count: &Cell<u32>) -> Option<String> {
+    let references_of = |causality| {
+        fmu.references(|variable| {
+            variable.causality == causality && !matches!(variable.kind, VariableKind::String { .. })
         })
     };
-    let (known, inputs) = (of(Causality::Parameter), of(Causality::Input));
-    let instance = unit.instance(CO_SIMULATION);
+    let (parameter_references, input_references) =
+        (references_of(Causality::Parameter), references_of(Causality::Input));
+    let instance = fmu.instance(CO_SIMULATION);
     let component = instance.component;
-    let change = |of: &[u32], changes: &[Change]| {
-        for change in changes.iter().filter(|_| !of.is_empty()) {
-            set(&instance, of[change.0 % of.len()], change);
+    let change = |references: &[u32], changes: &[Change]| {
+        for change in changes.iter().filter(|_| !references.is_empty()) {
+            set(&instance, references[change.0 % references.len()], change);
         }
     };
-    change(&known, parameters);
+    change(&parameter_references, parameters);
     let goes_on = |status| {
-        assert!([OK, ERROR, DISCARD].contains(&status), "{}: status {status}", unit.name());
+        assert!([OK, ERROR, DISCARD].contains(&status), "{}: status {status}", fmu.name());
         status == OK
     };
     if !goes_on(c!(instance, fmi2SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0)))
@@ -98,7 +100,7 @@ fn follow(unit: &Unit, (parameters, steps): &Course, count: &Cell<u32>) -> Optio
     }
     let mut time = 0.0;
     for (changes, step) in steps {
-        change(&inputs, changes);
+        change(&input_references, changes);
         if let Some(wrong) = instance.wrong_value() {
             return Some(wrong);
         }
@@ -112,24 +114,24 @@ fn follow(unit: &Unit, (parameters, steps): &Course, count: &Cell<u32>) -> Optio
 }
 
 #[test]
-fn what_a_unit_gives_is_finite_whatever_it_accepted() {
-    for unit in units() {
+fn the_values_of_an_fmu_are_finite_whatever_it_accepted() {
+    for fmu in fmus() {
         let mut config = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
         if std::env::var_os("PROPTEST_CASES").is_none() {
-            config.cases = COURSES;
+            config.cases = SEQUENCES;
         }
-        // The same courses in every run.
+        // Every run uses the same sequences.
         let random = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
-        let (courses_run, count) = (config.cases, Cell::new(0));
-        let outcome = TestRunner::new_with_rng(config, random).run(&courses(), |course| {
-            let wrong = follow(&unit, &course, &count);
-            prop_assert!(wrong.is_none(), "{}: {}", unit.name(), wrong.unwrap_or_default());
+        let (sequences_run, count) = (config.cases, Cell::new(0));
+        let outcome = TestRunner::new_with_rng(config, random).run(&call_sequences(), |sequence| {
+            let wrong = follow(&fmu, &sequence, &count);
+            prop_assert!(wrong.is_none(), "{}: {}", fmu.name(), wrong.unwrap_or_default());
             Ok(())
         });
         if let Err(error) = outcome {
-            panic!("{}: {error}", unit.name());
+            panic!("{}: {error}", fmu.name());
         }
-        // The property says little where most courses end before the first step.
-        assert!(count.get() >= courses_run, "{}: {} steps", unit.name(), count.get());
+        // The property says little where most sequences end before the first step.
+        assert!(count.get() >= sequences_run, "{}: {} steps", fmu.name(), count.get());
     }
 }

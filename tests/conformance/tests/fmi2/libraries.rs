@@ -1,14 +1,14 @@
 //! Tests of the libraries themselves.
 
 use conformance::interface::CO_SIMULATION;
-use conformance::{c, units};
+use conformance::{c, fmus};
 use std::ffi::CStr;
 use std::process::Command;
 
 #[test]
 fn both_libraries_have_every_function_and_say_what_they_are() {
-    for unit in units() {
-        let texts = [c!(unit, fmi2GetVersion()), c!(unit, fmi2GetTypesPlatform())];
+    for fmu in fmus() {
+        let texts = [c!(fmu, fmi2GetVersion()), c!(fmu, fmi2GetTypesPlatform())];
         // SAFETY: both functions return static NUL-terminated texts of the library.
         #[allow(unsafe_code)]
         let texts = texts.map(|text| unsafe { CStr::from_ptr(text) });
@@ -17,20 +17,20 @@ fn both_libraries_have_every_function_and_say_what_they_are() {
 }
 
 #[test]
-fn the_guid_picks_the_unit() {
-    let units = units();
-    assert_eq!(units.len(), 11);
-    for unit in &units {
+fn the_guid_selects_the_fmu() {
+    let fmus = fmus();
+    assert_eq!(fmus.len(), 11);
+    for fmu in &fmus {
         assert_eq!(
-            units.iter().filter(|other| other.guid() == unit.guid()).count(),
+            fmus.iter().filter(|other| other.guid() == fmu.guid()).count(),
             1,
             "{}",
-            unit.name()
+            fmu.name()
         );
-        // A saved state tells to which unit it belongs.
-        let state = unit.instance(CO_SIMULATION).serialize();
-        let guid = unit.guid().to_bytes();
-        assert!(state.windows(guid.len()).any(|part| part == guid), "{}", unit.name());
+        // A saved state tells to which FMU it belongs.
+        let state = fmu.instance(CO_SIMULATION).serialize();
+        let guid = fmu.guid().to_bytes();
+        assert!(state.windows(guid.len()).any(|part| part == guid), "{}", fmu.name());
     }
 }
 

@@ -1,5 +1,5 @@
-//! Tests of every unit of the built libraries against FMI 2.0.4. The calls allowed in the state
-//! stepFailed are tested with the shell, because no unit discards a step.
+//! Tests of every FMU of the built libraries against FMI 2.0.4. The calls allowed in the state
+//! stepFailed are tested with the shell, because no FMU discards a step.
 #![allow(clippy::borrow_as_ptr, reason = "calls read better as in C")]
 
 mod arguments;

@@ -1,4 +1,4 @@
-//! Tests that the units give the same bits on every platform.
+//! Tests that the FMUs give the same bits on every platform.
 
 use conformance::library;
 use object::{File, Object};
@@ -54,7 +54,7 @@ fn taken_from_the_platform(krate: &str) -> BTreeSet<&'static str> {
 }
 
 #[test]
-fn units_without_a_solver_take_no_elementary_function_from_the_platform() {
+fn fmus_without_a_solver_take_no_elementary_function_from_the_platform() {
     for library in ["fmu_plant", "fmu_feedback"] {
         assert_eq!(taken_from_the_platform(library), BTreeSet::new(), "{library}");
     }
@@ -63,7 +63,7 @@ fn units_without_a_solver_take_no_elementary_function_from_the_platform() {
 /// Clarabel's cones of exponentials and powers call these three. No optimisation here has such
 /// cones (control/tests/platform_functions.rs).
 #[test]
-fn units_with_a_solver_take_no_other_elementary_function_from_the_platform() {
+fn fmus_with_a_solver_take_no_other_elementary_function_from_the_platform() {
     let of_clarabel = BTreeSet::from(["exp", "log", "pow"]);
     let taken = taken_from_the_platform("fmu_optimising");
     assert!(taken.is_subset(&of_clarabel), "{taken:?}");

@@ -2,16 +2,16 @@
 #![cfg(unix)]
 
 use conformance::interface::{CO_SIMULATION, ERROR};
-use conformance::{Instance, Unit, c, unit, units};
+use conformance::{Fmu, Instance, c, fmu, fmus};
 use std::ffi::CString;
 use std::path::Path;
 
 const TABLE: &str = "time_s,alpha_deg,beta_deg,sigma_deg\n0,40,0,0\n10,30,1,2\n";
 
-/// Returns a unit in initialization mode that must read a file found only in its resources.
-fn reading(unit: &Unit, uri: Option<&str>, file: &str) -> Instance {
+/// Returns an instance in initialization mode that must read a file found only in its resources.
+fn reading(fmu: &Fmu, uri: Option<&str>, file: &str) -> Instance {
     let uri = uri.map(|uri| CString::new(uri).unwrap());
-    let instance = unit.instantiate(Some(c"it"), CO_SIMULATION, Some(unit.guid()), uri.as_deref());
+    let instance = fmu.instantiate(Some(c"it"), CO_SIMULATION, Some(fmu.guid()), uri.as_deref());
     assert!(!instance.component.is_null(), "{uri:?}: {:?}", instance.messages());
     instance.choose("reference.profile", "table");
     instance.ok(instance.set_string("reference.file", &CString::new(file).unwrap()));
@@ -42,12 +42,12 @@ fn percent(path: &str) -> String {
 
 #[test]
 fn a_file_in_the_resources_is_found_whatever_the_form_of_the_location() {
-    let unit = unit("LQR");
+    let fmu = fmu("LQR");
     let temporary = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     for name in ["plain", "with space", "Größe 100%", "再突入"] {
         let folder = temporary.path().join(name);
         std::fs::create_dir(&folder).unwrap();
-        std::fs::write(folder.join("course.csv"), TABLE).unwrap();
+        std::fs::write(folder.join("reference.csv"), TABLE).unwrap();
         let path = folder.to_str().unwrap();
         let encoded = percent(path);
         for uri in [
@@ -63,11 +63,11 @@ fn a_file_in_the_resources_is_found_whatever_the_form_of_the_location() {
             format!("{path}/"),
             relative(path),
         ] {
-            let instance = reading(&unit, Some(&uri), "course.csv");
+            let instance = reading(&fmu, Some(&uri), "reference.csv");
             let status = c!(instance, fmi2ExitInitializationMode(instance.component));
             assert_eq!(status, 0, "{uri}: {:?}", instance.messages());
             assert_eq!(
-                instance.real(unit.reference("reference.alpha")),
+                instance.real(fmu.reference("reference.alpha")),
                 40f64.to_radians(),
                 "{uri}"
             );
@@ -77,16 +77,16 @@ fn a_file_in_the_resources_is_found_whatever_the_form_of_the_location() {
 
 #[test]
 fn without_resources_the_missing_file_is_named() {
-    let unit = unit("LQR");
+    let fmu = fmu("LQR");
     for uri in [None, Some("file:///nowhere"), Some("file:///"), Some("")] {
-        let instance = reading(&unit, uri, "course.csv");
+        let instance = reading(&fmu, uri, "reference.csv");
         let status = c!(instance, fmi2ExitInitializationMode(instance.component));
-        instance.refused(status, ERROR, &["reference.file", "course.csv"]);
+        instance.refused(status, ERROR, &["reference.file", "reference.csv"]);
     }
 }
 
 #[test]
-fn every_unit_takes_every_form_and_refuses_what_it_cannot_read() {
+fn every_fmu_takes_every_form_and_refuses_what_it_cannot_read() {
     let cases = [
         (None, None),
         (Some(c"file:///"), None),
@@ -101,9 +101,9 @@ fn every_unit_takes_every_form_and_refuses_what_it_cannot_read() {
         (Some(c"file:///%FF"), Some("UTF-8")),
         (Some(c"file:///\xff"), Some("UTF-8")),
     ];
-    for unit in units() {
+    for fmu in fmus() {
         for (uri, refusal) in cases {
-            let instance = unit.instantiate(Some(c"it"), CO_SIMULATION, Some(unit.guid()), uri);
+            let instance = fmu.instantiate(Some(c"it"), CO_SIMULATION, Some(fmu.guid()), uri);
             match refusal {
                 None => {
                     assert!(!instance.component.is_null(), "{uri:?}: {:?}", instance.messages());

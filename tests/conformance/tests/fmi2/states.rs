@@ -1,10 +1,10 @@
-//! Tests of the saved states of every unit: they restore the unit bit for bit, and are refused if
+//! Tests of the saved states of every FMU: they restore an instance bit for bit, and are refused if
 //! anything is wrong with them. Their use in another process is tested with the packed archives
 //! (tests/test_states.py).
 
 use conformance::interface::{CO_SIMULATION, ERROR, FATAL, MODEL_EXCHANGE, OK};
-use conformance::{Bits, Instance, Unit, c, units};
-use model_description::variable::Kind;
+use conformance::{Bits, Fmu, Instance, c, fmus};
+use model_description::variable::VariableKind;
 use std::ops::Range;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
@@ -15,8 +15,8 @@ fn driver(fmu_type: i32) -> fn(&Instance, Range<u32>) -> Vec<Bits> {
 }
 
 /// Returns an instance in the middle of a simulation.
-fn running(unit: &Unit, fmu_type: i32) -> Instance {
-    let instance = unit.instance(fmu_type).initialized();
+fn running(fmu: &Fmu, fmu_type: i32) -> Instance {
+    let instance = fmu.instance(fmu_type).initialized();
     driver(fmu_type)(&instance, 0..4);
     instance.forget();
     instance
@@ -24,27 +24,27 @@ fn running(unit: &Unit, fmu_type: i32) -> Instance {
 
 #[test]
 fn handles_and_bytes_bring_back_the_same_future() {
-    for unit in units() {
-        for &fmu_type in unit.interfaces() {
+    for fmu in fmus() {
+        for &fmu_type in fmu.interfaces() {
             let drive = driver(fmu_type);
-            let instance = running(&unit, fmu_type);
+            let instance = running(&fmu, fmu_type);
             let (mut handle, bytes) = (instance.save(), instance.serialize());
             let expected = drive(&instance, 4..12);
             instance.restore(handle);
-            assert!(drive(&instance, 4..12) == expected, "{}", unit.name());
+            assert!(drive(&instance, 4..12) == expected, "{}", fmu.name());
             // The same handle is overwritten with the present state.
             let (before, present) = (handle, instance.serialize());
             instance.ok(c!(instance, fmi2GetFMUstate(instance.component, &mut handle)));
             assert_eq!(handle, before);
             instance.ok(c!(instance, fmi2Reset(instance.component)));
             instance.restore(handle);
-            assert!(instance.serialize() == present, "{}", unit.name());
+            assert!(instance.serialize() == present, "{}", fmu.name());
             // A state from bytes works in an instance that was never initialized.
-            let other = unit.instance(fmu_type);
+            let other = fmu.instance(fmu_type);
             let (status, state) = other.deserialize(&bytes);
             other.ok(status);
             other.restore(state);
-            assert!(drive(&other, 4..12) == expected, "{}", unit.name());
+            assert!(drive(&other, 4..12) == expected, "{}", fmu.name());
             // Freeing sets the handle to NULL, and freeing NULL is allowed.
             instance.ok(c!(instance, fmi2FreeFMUstate(instance.component, &mut handle)));
             assert!(handle.is_null());
@@ -57,21 +57,21 @@ fn handles_and_bytes_bring_back_the_same_future() {
 
 /// Medians of the durations of 201 calls, s: of saving, and of restoring the last and the first
 /// state in turn. The parameters are the same in both states.
-fn durations(unit: &Unit, fmu_type: i32) -> [f64; 2] {
-    let instance = unit.instance(fmu_type).initialized();
+fn durations(fmu: &Fmu, fmu_type: i32) -> [f64; 2] {
+    let instance = fmu.instance(fmu_type).initialized();
     let first = instance.save();
     driver(fmu_type)(&instance, 0..12);
     let mut last = instance.save();
     let median = |call: &mut dyn FnMut()| {
-        let mut all: Vec<_> = (0..201)
+        let mut durations: Vec<_> = (0..201)
             .map(|_| {
                 let clock = Instant::now();
                 call();
                 clock.elapsed().as_secs_f64()
             })
             .collect();
-        all.sort_by(f64::total_cmp);
-        all[100]
+        durations.sort_by(f64::total_cmp);
+        durations[100]
     };
     let get =
         median(&mut || instance.ok(c!(instance, fmi2GetFMUstate(instance.component, &mut last))));
@@ -87,26 +87,26 @@ fn durations(unit: &Unit, fmu_type: i32) -> [f64; 2] {
 #[test]
 #[ignore = "measures time"]
 fn taking_back_a_state_takes_little_time() {
-    println!("{:<20} {:>12} {:>12}", "unit", "get (us)", "set (us)");
-    for unit in units() {
-        for &fmu_type in unit.interfaces() {
-            let [get, set] = durations(&unit, fmu_type);
-            println!("{:<20} {:>12.2} {:>12.2}", unit.name(), get * 1e6, set * 1e6);
-            assert!(set <= 20e-6, "{}: {} us", unit.name(), set * 1e6);
+    println!("{:<20} {:>12} {:>12}", "FMU", "get (us)", "set (us)");
+    for fmu in fmus() {
+        for &fmu_type in fmu.interfaces() {
+            let [get, set] = durations(&fmu, fmu_type);
+            println!("{:<20} {:>12.2} {:>12.2}", fmu.name(), get * 1e6, set * 1e6);
+            assert!(set <= 20e-6, "{}: {} us", fmu.name(), set * 1e6);
         }
     }
 }
 
 #[test]
 fn every_truncation_and_every_damaged_byte_is_refused() {
-    for unit in units() {
-        for &fmu_type in unit.interfaces() {
-            let instance = running(&unit, fmu_type);
+    for fmu in fmus() {
+        for &fmu_type in fmu.interfaces() {
+            let instance = running(&fmu, fmu_type);
             let bytes = instance.serialize();
             let refuse = |bytes: &[u8], what: &str| {
                 let (status, state) = instance.deserialize(bytes);
-                assert_eq!(status, ERROR, "{}: {what}", unit.name());
-                assert!(state.is_null(), "{}: {what}", unit.name());
+                assert_eq!(status, ERROR, "{}: {what}", fmu.name());
+                assert!(state.is_null(), "{}: {what}", fmu.name());
             };
             for length in 0..bytes.len() {
                 refuse(&bytes[..length], &format!("cut to {length} bytes"));
@@ -123,28 +123,27 @@ fn every_truncation_and_every_damaged_byte_is_refused() {
                 assert!(message.text.starts_with("fmi2DeSerializeFMUstate: "), "{}", message.text);
             }
             // None of these attempts left a trace.
-            assert!(instance.serialize() == bytes, "{}", unit.name());
+            assert!(instance.serialize() == bytes, "{}", fmu.name());
             driver(fmu_type)(&instance, 4..6);
         }
     }
 }
 
 #[test]
-fn states_of_other_units_and_interfaces_are_refused() {
-    let units = units();
-    let kinds =
-        units.iter().flat_map(|unit| unit.interfaces().iter().map(move |&kind| (unit, kind)));
-    let all: Vec<_> = kinds.map(|(unit, kind)| running(unit, kind)).collect();
-    for (i, instance) in all.iter().enumerate() {
+fn states_of_other_fmus_and_interfaces_are_refused() {
+    let fmus = fmus();
+    let kinds = fmus.iter().flat_map(|fmu| fmu.interfaces().iter().map(move |&kind| (fmu, kind)));
+    let instances: Vec<_> = kinds.map(|(fmu, kind)| running(fmu, kind)).collect();
+    for (i, instance) in instances.iter().enumerate() {
         let (component, before) = (instance.component, instance.serialize());
-        for (_, other) in all.iter().enumerate().filter(|&(j, _)| j != i) {
-            let part = if instance.unit.guid() == other.unit.guid() {
+        for (_, other) in instances.iter().enumerate().filter(|&(j, _)| j != i) {
+            let part = if instance.fmu.guid() == other.fmu.guid() {
                 "other interface"
             } else {
                 "with GUID"
             };
             instance.refused(instance.deserialize(&other.serialize()).0, ERROR, &[part]);
-            // A handle of another instance is refused too, whatever its unit.
+            // A handle of another instance is refused too, whatever its FMU.
             let mut foreign = other.save();
             let refused = |status| instance.refused(status, ERROR, &["not made by this instance"]);
             refused(c!(instance, fmi2SetFMUstate(component, foreign)));
@@ -153,14 +152,14 @@ fn states_of_other_units_and_interfaces_are_refused() {
             refused(c!(instance, fmi2SerializedFMUstateSize(component, foreign, &mut 0)));
             other.ok(c!(other, fmi2FreeFMUstate(other.component, &mut foreign)));
         }
-        assert!(instance.serialize() == before, "{}", instance.unit.name());
+        assert!(instance.serialize() == before, "{}", instance.fmu.name());
     }
 }
 
 #[test]
 fn bytes_fill_the_room_that_was_asked_for_and_no_more() {
-    for unit in units() {
-        let instance = running(&unit, CO_SIMULATION);
+    for fmu in fmus() {
+        let instance = running(&fmu, CO_SIMULATION);
         let (state, component, bytes) = (instance.save(), instance.component, instance.serialize());
         let mut room = vec![0xaa_u8; bytes.len() + 16];
         let mut serialize = |size| {
@@ -181,7 +180,7 @@ fn bytes_fill_the_room_that_was_asked_for_and_no_more() {
         }
         let (status, room) = serialize(bytes.len() + 16);
         instance.ok(status);
-        assert!(room == [bytes.as_slice(), &[0xaa; 16]].concat(), "{}", unit.name());
+        assert!(room == [bytes.as_slice(), &[0xaa; 16]].concat(), "{}", fmu.name());
     }
 }
 
@@ -197,22 +196,23 @@ fn checksum(bytes: &[u8]) -> u32 {
 /// Length of the header, whose last four bytes are the checksum of the rest.
 const HEADER: usize = 61;
 
-/// Restores each forgery and, where the unit accepts it, steps on. `doing` holds a description of
-/// the last attempt. Returns the number of forgeries accepted.
+/// Restores each forgery and, where the instance accepts it, continues with steps. `doing` holds a
+/// description of the last attempt. Returns the number of forgeries accepted.
 fn survive_forgeries(
-    unit: &Unit,
+    fmu: &Fmu,
     fmu_type: i32,
     prepare: fn(&Instance),
     doing: &Mutex<String>,
 ) -> usize {
-    let instance = unit.instance(fmu_type);
+    let instance = fmu.instance(fmu_type);
     prepare(&instance);
     let instance = instance.initialized();
     let drive = driver(fmu_type);
     drive(&instance, 0..7);
     let (genuine, component) = (instance.serialize(), instance.component);
-    let results = unit.references(|v| v.is_calculated() && matches!(v.kind, Kind::Real { .. }));
-    let h = unit.description.default_experiment.step;
+    let results =
+        fmu.references(|v| v.is_calculated() && matches!(v.kind, VariableKind::Real { .. }));
+    let h = fmu.description.default_experiment.step;
     let (mut values, mut taken) = (vec![0.0; results.len()], 0);
     let replacements: [[u8; 8]; 9] = [
         f64::NAN.to_le_bytes(),
@@ -242,7 +242,7 @@ fn survive_forgeries(
         });
         for (kind, mut bytes) in overwritten.chain(flipped).enumerate() {
             *doing.lock().unwrap() =
-                format!("{}: byte {offset} of {length}, forgery {kind}", unit.name());
+                format!("{}: byte {offset} of {length}, forgery {kind}", fmu.name());
             let sum = checksum(&bytes[HEADER..]).to_le_bytes();
             bytes[HEADER - 4..HEADER].copy_from_slice(&sum);
             let (status, mut state) = instance.deserialize(&bytes);
@@ -254,8 +254,8 @@ fn survive_forgeries(
                 taken += 1;
                 let mut time = 7.0 * h;
                 for _ in 0..3 {
-                    let (all, n) = (results.as_ptr(), results.len());
-                    let got = c!(instance, fmi2GetReal(component, all, n, values.as_mut_ptr()));
+                    let (pointer, n) = (results.as_ptr(), results.len());
+                    let got = c!(instance, fmi2GetReal(component, pointer, n, values.as_mut_ptr()));
                     let stepped = c!(instance, fmi2DoStep(component, time, h, 1));
                     assert!(got != FATAL && stepped != FATAL, "{}", doing.lock().unwrap());
                     time += h;
@@ -270,7 +270,7 @@ fn survive_forgeries(
 
 /// Sets a table of the disturbance that repeats and jumps between the communication points.
 fn tabulate(instance: &Instance) {
-    let reference = |name: &str| instance.unit.reference(&format!("disturbance.{name}"));
+    let reference = |name: &str| instance.fmu.reference(&format!("disturbance.{name}"));
     instance.choose("disturbance.kind", "table");
     instance.ok(c!(instance, fmi2SetInteger(instance.component, &reference("table.rows"), 1, &3)));
     for (name, value) in [
@@ -290,10 +290,10 @@ fn tabulate(instance: &Instance) {
 
 #[test]
 fn a_state_saved_in_the_middle_of_a_table_brings_back_the_same_future() {
-    let unit = conformance::unit("ReentryPlant");
-    for &fmu_type in unit.interfaces() {
+    let fmu = conformance::fmu("ReentryPlant");
+    for &fmu_type in fmu.interfaces() {
         let drive = driver(fmu_type);
-        let instance = unit.instance(fmu_type);
+        let instance = fmu.instance(fmu_type);
         tabulate(&instance);
         let instance = instance.initialized();
         drive(&instance, 0..4);
@@ -301,18 +301,18 @@ fn a_state_saved_in_the_middle_of_a_table_brings_back_the_same_future() {
         let expected = drive(&instance, 4..20);
         instance.restore(handle);
         assert!(drive(&instance, 4..20) == expected);
-        let other = unit.instance(fmu_type);
+        let other = fmu.instance(fmu_type);
         let (status, state) = other.deserialize(&bytes);
         other.ok(status);
         other.restore(state);
         assert!(drive(&other, 4..20) == expected);
-        let real = |name: &str| other.real(unit.reference(&format!("disturbance.{name}")));
+        let real = |name: &str| other.real(fmu.reference(&format!("disturbance.{name}")));
         let delta = ["alpha", "beta", "sigma"].map(|axis| real(&format!("delta.{axis}")).abs());
         assert_eq!(delta.into_iter().fold(0.0, f64::max), real("bound"), "the table acts");
     }
 }
 
-/// Approximate number of forgeries for each unit.
+/// Approximate number of forgeries for each FMU.
 const FORGERIES: usize = 6000;
 
 #[test]
@@ -320,24 +320,24 @@ fn forged_states_neither_hang_nor_panic() {
     let plants: [fn(&Instance); 4] = [
         |_| (),
         |instance| {
-            let reference = instance.unit.reference("sensor.set");
+            let reference = instance.fmu.reference("sensor.set");
             instance.ok(c!(instance, fmi2SetInteger(instance.component, &reference, 1, &2)));
             instance.choose("actuation", "surfacesAndJets");
         },
         |instance| {
-            let reference = instance.unit.reference("actuation.delay");
+            let reference = instance.fmu.reference("actuation.delay");
             instance.ok(instance.set_real(reference, 0.1));
         },
         tabulate,
     ];
-    for unit in units() {
-        let all = if unit.name() == "ReentryPlant" { &plants[..] } else { &plants[..1] };
-        for &prepare in all {
+    for fmu in fmus() {
+        let prepared = if fmu.name() == "ReentryPlant" { &plants[..] } else { &plants[..1] };
+        for &prepare in prepared {
             let doing = Arc::new(Mutex::new(String::new()));
             let (done, finished) = channel();
-            let (name, unit, shared) = (unit.name().to_owned(), unit.clone(), doing.clone());
+            let (name, fmu, shared) = (fmu.name().to_owned(), fmu.clone(), doing.clone());
             let thread = std::thread::spawn(move || {
-                let taken = survive_forgeries(&unit, CO_SIMULATION, prepare, &shared);
+                let taken = survive_forgeries(&fmu, CO_SIMULATION, prepare, &shared);
                 let _ = done.send(taken);
             });
             let mut last = String::new();

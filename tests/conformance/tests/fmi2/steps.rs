@@ -1,8 +1,8 @@
 //! Tests of the experiment's definition and of the steps of co-simulation.
 
 use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE};
-use conformance::{Bits, Instance, Unit, c, units};
-use model_description::variable::Kind;
+use conformance::{Bits, Fmu, Instance, c, fmus};
+use model_description::variable::VariableKind;
 use std::ffi::c_int;
 
 /// Tolerance, start time and stop time; NaN is passed for a value that is not defined.
@@ -15,8 +15,8 @@ fn set_up(instance: &Instance, (tolerance, start, stop): Experiment) -> c_int {
     c!(instance, fmi2SetupExperiment(component, with_tolerance, tolerance, start, with_stop, stop))
 }
 
-fn begun(unit: &Unit, experiment: Experiment) -> Instance {
-    let instance = unit.instance(CO_SIMULATION);
+fn begun(fmu: &Fmu, experiment: Experiment) -> Instance {
+    let instance = fmu.instance(CO_SIMULATION);
     instance.ok(set_up(&instance, experiment));
     through_initialization(&instance);
     instance
@@ -29,8 +29,8 @@ fn through_initialization(instance: &Instance) {
 
 #[test]
 fn neither_tolerance_nor_stop_time_changes_a_result() {
-    for unit in units() {
-        let without = begun(&unit, (None, 0.0, None)).drive(0..6);
+    for fmu in fmus() {
+        let without = begun(&fmu, (None, 0.0, None)).drive(0..6);
         for (tolerance, stop) in [
             (Some(1e-4), None),
             (Some(0.0), None),
@@ -38,20 +38,20 @@ fn neither_tolerance_nor_stop_time_changes_a_result() {
             (Some(1e-6), Some(100.0)),
             (None, Some(f64::INFINITY)),
         ] {
-            let with = begun(&unit, (tolerance, 0.0, stop)).drive(0..6);
-            assert!(with == without, "{}: {tolerance:?} {stop:?}", unit.name());
+            let with = begun(&fmu, (tolerance, 0.0, stop)).drive(0..6);
+            assert!(with == without, "{}: {tolerance:?} {stop:?}", fmu.name());
         }
         // Some importers do not call this function.
-        let instance = unit.instance(CO_SIMULATION);
+        let instance = fmu.instance(CO_SIMULATION);
         through_initialization(&instance);
-        assert!(instance.drive(0..6) == without, "{}", unit.name());
+        assert!(instance.drive(0..6) == without, "{}", fmu.name());
     }
 }
 
 #[test]
 fn an_experiment_without_sense_is_refused() {
-    for unit in units() {
-        for &fmu_type in unit.interfaces() {
+    for fmu in fmus() {
+        for &fmu_type in fmu.interfaces() {
             for (experiment, part) in [
                 ((None, f64::NAN, None), "start time NaN"),
                 ((None, f64::INFINITY, None), "start time inf"),
@@ -62,7 +62,7 @@ fn an_experiment_without_sense_is_refused() {
                 ((Some(-1e-4), 0.0, None), "tolerance -0.0001"),
                 ((Some(f64::INFINITY), 0.0, None), "tolerance inf"),
             ] {
-                let instance = unit.instance(fmu_type);
+                let instance = fmu.instance(fmu_type);
                 instance.refused(
                     set_up(&instance, experiment),
                     ERROR,
@@ -77,20 +77,20 @@ fn an_experiment_without_sense_is_refused() {
 
 #[test]
 fn an_experiment_may_start_at_any_time_that_ticks_can_be_told_apart_at() {
-    for unit in units() {
-        let h = unit.description.default_experiment.step;
+    for fmu in fmus() {
+        let h = fmu.description.default_experiment.step;
         for start in [-3.0, 1.0, 1e6, 1.7e9, -1e10] {
-            let instance = begun(&unit, (None, start, None));
+            let instance = begun(&fmu, (None, start, None));
             for k in 0..3 {
                 instance.ok(instance.step(start + f64::from(k) * h, h));
-                instance.bits(&unit.results());
+                instance.bits(&fmu.results());
             }
             let mut time = f64::NAN;
             instance.ok(c!(instance, fmi2GetRealStatus(instance.component, 2, &mut time)));
             assert!(
                 (time - (start + 3.0 * h)).abs() < 1e-9 * start.abs().max(1.0),
                 "{}",
-                unit.name()
+                fmu.name()
             );
         }
     }
@@ -98,20 +98,20 @@ fn an_experiment_may_start_at_any_time_that_ticks_can_be_told_apart_at() {
 
 #[test]
 fn a_last_step_that_is_short_by_rounding_ends_in_the_same_place() {
-    for unit in units() {
-        let h = unit.description.default_experiment.step;
-        let mut reals = unit.results();
+    for fmu in fmus() {
+        let h = fmu.description.default_experiment.step;
+        let mut reals = fmu.results();
         reals.retain(|&reference| {
-            matches!(unit.description.variables[reference as usize].kind, Kind::Real { .. })
+            matches!(fmu.description.variables[reference as usize].kind, VariableKind::Real { .. })
         });
         let after = |last: f64| -> Bits {
-            let instance = begun(&unit, (None, 0.0, Some(10.0 * h)));
+            let instance = begun(&fmu, (None, 0.0, Some(10.0 * h)));
             instance.drive(0..9);
             instance.ok(instance.step(9.0 * h, last));
             instance.bits(&reals)
         };
         let exact = after(h);
-        assert!(after(h - 1e-17) == exact, "{}", unit.name());
+        assert!(after(h - 1e-17) == exact, "{}", fmu.name());
         // A change of 1e-17 is lost in the step's length. The difference of two instants and the
         // neighbouring lengths are not lost.
         for near in [10.0 * h - 9.0 * h, h.next_down(), h.next_up()] {
@@ -120,7 +120,7 @@ fn a_last_step_that_is_short_by_rounding_ends_in_the_same_place() {
                 assert!(
                     (a - b).abs() <= 1e-9 * a.abs().max(b.abs()).max(1e-9),
                     "{}: {a} {b}",
-                    unit.name()
+                    fmu.name()
                 );
             }
         }
@@ -129,9 +129,9 @@ fn a_last_step_that_is_short_by_rounding_ends_in_the_same_place() {
 
 #[test]
 fn a_master_that_adds_up_its_time_is_followed() {
-    for unit in units() {
-        let h = unit.description.default_experiment.step;
-        let instance = begun(&unit, (None, 0.0, None));
+    for fmu in fmus() {
+        let h = fmu.description.default_experiment.step;
+        let instance = begun(&fmu, (None, 0.0, None));
         let mut time = 0.0;
         for _ in 0..100 {
             instance.ok(instance.step(time, h));
@@ -143,14 +143,14 @@ fn a_master_that_adds_up_its_time_is_followed() {
 
 #[test]
 fn a_step_of_no_length_changes_nothing() {
-    for unit in units() {
-        let instance = begun(&unit, (None, 0.0, None));
-        let h = unit.description.default_experiment.step;
+    for fmu in fmus() {
+        let instance = begun(&fmu, (None, 0.0, None));
+        let h = fmu.description.default_experiment.step;
         instance.drive(0..3);
-        let before = instance.bits(&unit.results());
+        let before = instance.bits(&fmu.results());
         for _ in 0..3 {
             instance.ok(instance.step(3.0 * h, 0.0));
-            assert!(instance.bits(&unit.results()) == before, "{}", unit.name());
+            assert!(instance.bits(&fmu.results()) == before, "{}", fmu.name());
         }
         instance.drive(3..6);
         // This is the smallest positive length.
@@ -160,11 +160,11 @@ fn a_step_of_no_length_changes_nothing() {
 
 #[test]
 fn steps_without_sense_are_refused() {
-    for unit in units() {
-        let h = unit.description.default_experiment.step;
-        let instance = begun(&unit, (None, 0.0, Some(10.0 * h)));
+    for fmu in fmus() {
+        let h = fmu.description.default_experiment.step;
+        let instance = begun(&fmu, (None, 0.0, Some(10.0 * h)));
         instance.drive(0..5);
-        let (here, before, now) = (instance.save(), instance.serialize(), 5.0 * h);
+        let (saved_state, before, now) = (instance.save(), instance.serialize(), 5.0 * h);
         for (point, size, part) in [
             (now, -h, "cannot step"),
             (now, f64::NAN, "cannot step"),
@@ -180,14 +180,14 @@ fn steps_without_sense_are_refused() {
             (now, 1e300, "beyond the stop time"),
         ] {
             instance.refused(instance.step(point, size), ERROR, &["fmi2DoStep", part]);
-            // The unit is in state error until its state is restored or it is reset.
+            // The instance is in state error until its state is restored or it is reset.
             instance.refused(
                 instance.step(now, h),
                 ERROR,
                 &["fmi2DoStep", "not allowed in state error"],
             );
-            instance.restore(here);
-            assert!(instance.serialize() == before, "{}: {point} {size}", unit.name());
+            instance.restore(saved_state);
+            assert!(instance.serialize() == before, "{}: {point} {size}", fmu.name());
         }
         instance.drive(5..10);
         // At the stop time only a step of zero length is possible.
@@ -198,8 +198,8 @@ fn steps_without_sense_are_refused() {
 
 #[test]
 fn a_defined_stop_time_may_be_the_start_time() {
-    for unit in units() {
-        let instance = begun(&unit, (None, 1.0, Some(1.0)));
+    for fmu in fmus() {
+        let instance = begun(&fmu, (None, 1.0, Some(1.0)));
         instance.ok(instance.step(1.0, 0.0));
         instance.refused(instance.step(1.0, 0.1), ERROR, &["beyond the stop time 1 s"]);
     }
@@ -207,21 +207,21 @@ fn a_defined_stop_time_may_be_the_start_time() {
 
 #[test]
 fn times_of_model_exchange_are_checked() {
-    for unit in units().iter().filter(|unit| unit.description.model_exchange) {
+    for fmu in fmus().iter().filter(|fmu| fmu.description.model_exchange) {
         // Solvers look back, even before the start, and disturbances are functions of time.
         for time in [-1e-3, -1.0, -1e300, 1e300] {
-            let instance = unit.instance(MODEL_EXCHANGE);
+            let instance = fmu.instance(MODEL_EXCHANGE);
             instance.choose("disturbance.kind", "white");
             let instance = instance.initialized();
             instance.ok(c!(instance, fmi2SetTime(instance.component, time)));
-            let before = instance.bits(&unit.results());
+            let before = instance.bits(&fmu.results());
             instance.ok(c!(instance, fmi2SetTime(instance.component, 0.0)));
-            instance.bits(&unit.results());
+            instance.bits(&fmu.results());
             instance.ok(c!(instance, fmi2SetTime(instance.component, time)));
-            assert!(instance.bits(&unit.results()) == before, "{time}");
+            assert!(instance.bits(&fmu.results()) == before, "{time}");
         }
         for time in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            let instance = unit.instance(MODEL_EXCHANGE).initialized();
+            let instance = fmu.instance(MODEL_EXCHANGE).initialized();
             let status = c!(instance, fmi2SetTime(instance.component, time));
             instance.refused(status, ERROR, &["fmi2SetTime", "not finite"]);
         }
@@ -230,23 +230,23 @@ fn times_of_model_exchange_are_checked() {
 
 /// Results after 50 s from `start` on, in steps of 0.04 s with a clock that the importer
 /// accumulates.
-fn after_50_seconds(unit: &Unit, start: f64, names: &[&str]) -> Vec<f64> {
-    let instance = begun(unit, (None, start, None));
+fn after_50_seconds(fmu: &Fmu, start: f64, names: &[&str]) -> Vec<f64> {
+    let instance = begun(fmu, (None, start, None));
     let component = instance.component;
     let mut time = start;
     for _ in 0..1250 {
         instance.ok(c!(instance, fmi2DoStep(component, time, 0.04, 1)));
         time += 0.04;
     }
-    names.iter().map(|name| instance.real(unit.reference(name))).collect()
+    names.iter().map(|name| instance.real(fmu.reference(name))).collect()
 }
 
 #[test]
 fn an_experiment_that_starts_at_unix_time_has_the_same_ticks() {
     for name in ["CRMPC", "DLMPC"] {
-        let unit = conformance::unit(name);
+        let fmu = conformance::fmu(name);
         let instance = |start: f64| {
-            let instance = unit.instance(CO_SIMULATION);
+            let instance = fmu.instance(CO_SIMULATION);
             instance.choose("reference.profile", "constant");
             instance.ok(set_up(&instance, (None, start, None)));
             through_initialization(&instance);
@@ -254,7 +254,7 @@ fn an_experiment_that_starts_at_unix_time_has_the_same_ticks() {
         };
         for start in [0.0, 1e6, 1.7e9, -1.7e9] {
             let instance = instance(start);
-            let (reference, mut time, mut solves) = (unit.reference("solver.solves"), start, 0);
+            let (reference, mut time, mut solves) = (fmu.reference("solver.solves"), start, 0);
             for _ in 0..1250 {
                 instance.ok(c!(instance, fmi2DoStep(instance.component, time, 0.04, 1)));
                 time += 0.04;
@@ -266,15 +266,15 @@ fn an_experiment_that_starts_at_unix_time_has_the_same_ticks() {
         }
     }
     // The noise of the disturbance is a function of the tick's number.
-    let plant = conformance::unit("ReentryPlant");
+    let plant = conformance::fmu("ReentryPlant");
     let names = ["attitude.alpha", "attitude.sigma", "rate.p", "rate.q", "rate.r"];
     let expected = after_50_seconds(&plant, 0.0, &names);
     for start in [1e6, 1.7e9] {
-        let found = after_50_seconds(&plant, start, &names);
-        for (found, expected) in found.iter().zip(&expected) {
+        let actual = after_50_seconds(&plant, start, &names);
+        for (actual, expected) in actual.iter().zip(&expected) {
             assert!(
-                (found - expected).abs() < 1e-4 * expected.abs(),
-                "{found} {expected} from {start} s on"
+                (actual - expected).abs() < 1e-4 * expected.abs(),
+                "{actual} {expected} from {start} s on"
             );
         }
     }
@@ -282,9 +282,9 @@ fn an_experiment_that_starts_at_unix_time_has_the_same_ticks() {
 
 #[test]
 fn a_start_at_which_ticks_cannot_be_told_apart_is_refused() {
-    for unit in units() {
+    for fmu in fmus() {
         for start in [1e16, 1e300, f64::MAX, -1e300] {
-            let instance = unit.instance(CO_SIMULATION);
+            let instance = fmu.instance(CO_SIMULATION);
             instance.ok(set_up(&instance, (None, start, None)));
             instance.ok(c!(instance, fmi2EnterInitializationMode(instance.component)));
             let status = c!(instance, fmi2ExitInitializationMode(instance.component));

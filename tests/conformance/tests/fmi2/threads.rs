@@ -1,42 +1,42 @@
 //! Tests of instances in several threads of one process.
 
 use conformance::interface::CO_SIMULATION;
-use conformance::{Bits, Instance, Unit, units};
+use conformance::{Bits, Fmu, Instance, fmus};
 use std::sync::Barrier;
 
 /// Number of ticks, large enough for the threads to overlap within optimisations.
 const TICKS: u32 = 30;
 
-fn run(unit: &Unit) -> Vec<Bits> {
-    unit.instance(CO_SIMULATION).initialized().drive(0..TICKS)
+fn run(fmu: &Fmu) -> Vec<Bits> {
+    fmu.instance(CO_SIMULATION).initialized().drive(0..TICKS)
 }
 
 #[test]
 fn eight_instances_in_eight_threads_give_the_bits_of_one() {
-    for unit in units() {
-        let alone = run(&unit);
+    for fmu in fmus() {
+        let alone = run(&fmu);
         let start = Barrier::new(8);
         let one_of_eight = || {
             start.wait();
-            run(&unit)
+            run(&fmu)
         };
         std::thread::scope(|scope| {
             let runs: Vec<_> = (0..8).map(|_| scope.spawn(one_of_eight)).collect();
             for (k, result) in runs.into_iter().enumerate() {
-                assert!(result.join().unwrap() == alone, "{} in thread {k}", unit.name());
+                assert!(result.join().unwrap() == alone, "{} in thread {k}", fmu.name());
             }
         });
     }
 }
 
 #[test]
-fn different_units_in_threads_do_not_see_each_other() {
-    let units = units();
-    let alone: Vec<_> = units.iter().map(run).collect();
+fn different_fmus_in_threads_do_not_affect_each_other() {
+    let fmus = fmus();
+    let alone: Vec<_> = fmus.iter().map(run).collect();
     std::thread::scope(|scope| {
-        let runs: Vec<_> = units.iter().map(|unit| scope.spawn(|| run(unit))).collect();
-        for ((result, alone), unit) in runs.into_iter().zip(alone).zip(&units) {
-            assert!(result.join().unwrap() == alone, "{}", unit.name());
+        let runs: Vec<_> = fmus.iter().map(|fmu| scope.spawn(|| run(fmu))).collect();
+        for ((result, alone), fmu) in runs.into_iter().zip(alone).zip(&fmus) {
+            assert!(result.join().unwrap() == alone, "{}", fmu.name());
         }
     });
 }
@@ -55,15 +55,15 @@ impl Moving {
 
 #[test]
 fn an_instance_may_move_from_thread_to_thread() {
-    for unit in units() {
-        let alone = run(&unit);
-        let moving = Moving(unit.instance(CO_SIMULATION).initialized());
+    for fmu in fmus() {
+        let alone = run(&fmu);
+        let moving = Moving(fmu.instance(CO_SIMULATION).initialized());
         let mut rows = vec![];
         for tick in 0..TICKS {
             rows.extend(std::thread::scope(|scope| {
                 scope.spawn(|| moving.drive(tick)).join().unwrap()
             }));
         }
-        assert!(rows == alone, "{}", unit.name());
+        assert!(rows == alone, "{}", fmu.name());
     }
 }

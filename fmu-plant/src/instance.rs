@@ -1,4 +1,4 @@
-//! The unit as FMI calls it.
+//! The calls of FMI to an instance.
 
 use crate::parameters::Parameters;
 use crate::plant::{MOTION, Output, ReentryPlant};
@@ -130,7 +130,7 @@ impl Model for ReentryPlant {
             return Ok(());
         }
         let text =
-            "the saved state does not fit: its plant is not that of its parameters and its time";
+            "the saved state does not fit: its plant does not match its parameters and its time";
         Err(Failure::Error(text.into()))
     }
 
@@ -183,8 +183,8 @@ impl Model for ReentryPlant {
     fn partial_derivative(
         &mut self,
         time: f64,
-        unknown: usize,
-        known: usize,
+        unknown_variable: usize,
+        known_variable: usize,
     ) -> Result<f64, Failure> {
         let plant = self.ready()?;
         self.check(&plant.state, time)?;
@@ -200,7 +200,7 @@ impl Model for ReentryPlant {
             plant.applied_moment_by_jets(&self.command)
         };
         let by_applied = |column: Vector3<f64>, i: usize| (partials.by_moment * column)[i];
-        Ok(match (table::role(unknown).unknown, table::role(known).known) {
+        Ok(match (table::role(unknown_variable).as_unknown, table::role(known_variable).as_known) {
             (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::State(j @ 0..MOTION))) => {
                 partials.by_state[(i, j)]
             }
@@ -238,9 +238,9 @@ impl Model for ReentryPlant {
             }
             (Some(_), Some(_)) => 0.0,
             _ => {
-                let text = "there are derivatives of outputs by states and inputs only";
+                let text = "derivatives exist only of outputs with respect to states and inputs";
                 return Err(Failure::Error(format!(
-                    "variable {unknown} by variable {known}: {text}"
+                    "variable {unknown_variable} by variable {known_variable}: {text}"
                 )));
             }
         })

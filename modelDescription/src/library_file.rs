@@ -1,5 +1,5 @@
-//! Built libraries read as files, for any platform: what they are for, what they export and import,
-//! and which sources they were made of. Nothing is loaded.
+//! Built libraries read as files, for any platform: their platform, their exports and imports, and
+//! the sources of which they were made. Nothing is loaded.
 
 use crate::Error;
 use object::elf::{FileHeader32, FileHeader64};
@@ -12,7 +12,7 @@ use std::str;
 
 /// A built library, without the code.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Binary {
+pub struct LibraryFile {
     /// Path of the file.
     pub path: PathBuf,
     /// Names of its folders below `binaries/` in an archive.
@@ -44,19 +44,20 @@ const WINDOWS: &[&str] = &[
     "ws2_32.",
 ];
 
-impl Binary {
-    /// Reads the library at `path`. That of macOS may hold several architectures.
+impl LibraryFile {
+    /// Reads the library at `path`. A library for macOS may hold several architectures.
     ///
     /// # Errors
-    /// Reports a file that cannot be read, is no library for a platform that FMI 2.0 knows, or
-    /// needs libraries that a bare system lacks.
+    /// Reports a file that cannot be read, is not a library for a platform that FMI 2.0 defines,
+    /// or needs libraries that a bare system lacks.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let bytes =
             std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
-        let fault = |problem| Error::Binary { path: path.to_owned(), problem };
+        let fault = |problem| Error::Library { path: path.to_owned(), problem };
         let slices = slices(&bytes).map_err(|error| fault(error.to_string()))?;
-        let mut parts = slices.iter().map(|slice| Self::of_slice(path, slice).map_err(fault));
-        let first = parts.next().unwrap_or_else(|| Err(fault("holds no library".into())))?;
+        let mut parts = slices.iter().map(|slice| Self::from_slice(path, slice).map_err(fault));
+        let first =
+            parts.next().unwrap_or_else(|| Err(fault("the file holds no library".into())))?;
         for part in parts {
             if part? != first {
                 return Err(fault("its architectures differ in sources or exports".into()));
@@ -65,13 +66,13 @@ impl Binary {
         Ok(first)
     }
 
-    fn of_slice(path: &Path, bytes: &[u8]) -> Result<Self, String> {
+    fn from_slice(path: &Path, bytes: &[u8]) -> Result<Self, String> {
         let file = File::parse(bytes).map_err(|error| error.to_string())?;
         let (folders, suffix, bare) = platform(&file)?;
         let needed = needed(&file, bytes).map_err(|error| error.to_string())?;
-        let foreign = |name: &&String| !bare.iter().any(|known| name.starts_with(known));
+        let foreign = |name: &&String| !bare.iter().any(|prefix| name.starts_with(prefix));
         if let Some(name) = needed.iter().find(foreign) {
-            return Err(format!("needs {name}, which not every system has"));
+            return Err(format!("it needs {name}, which not every system has"));
         }
         Ok(Self {
             path: path.to_owned(),
@@ -94,13 +95,13 @@ fn slices(bytes: &[u8]) -> object::Result<Vec<&[u8]>> {
 
 type Platform = (&'static [&'static str], &'static str, &'static [&'static str]);
 
-/// Returns the platform's folders and file suffix, and what its systems have.
+/// Returns the platform's folders and file suffix, and the libraries that its systems have.
 fn platform(file: &File) -> Result<Platform, String> {
     use Architecture::{Aarch64, I386, X86_64};
     Ok(match (file.format(), file.architecture()) {
         (BinaryFormat::Elf, X86_64) => (&["linux64"], "so", LINUX),
         (BinaryFormat::Elf, I386) => (&["linux32"], "so", LINUX),
-        // FMI 2.0 has no name for it: some importers take one, some the other.
+        // FMI 2.0 has no name for this platform: some importers use one, some the other.
         (BinaryFormat::Elf, Aarch64) => (&["aarch64-linux", "linux64"], "so", LINUX),
         (BinaryFormat::Pe, X86_64) => (&["win64"], "dll", WINDOWS),
         (BinaryFormat::Pe, I386) => (&["win32"], "dll", WINDOWS),

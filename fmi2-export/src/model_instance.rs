@@ -1,12 +1,12 @@
-//! A model bound to its table behind a trait that hides the model's type, for use by the shell.
+//! A model bound to its variable table behind a trait that hides the model's type, for the shell.
 
 use crate::call::State;
 use crate::model::{Context, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
 use crate::numbers::are_numbers;
-use crate::table::{Access, Description, Table};
+use crate::table::{Access, Description, VariableTable};
 use crate::types::Interface;
 use model_description::ModelDescription;
-use model_description::variable::{Causality, Kind, Variability, Variable};
+use model_description::variable::{Causality, Variability, Variable, VariableKind};
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
 
@@ -34,7 +34,7 @@ impl Extrapolation {
     }
 }
 
-/// The shell's own part of the state that determines the future.
+/// The shell's part of the state that determines the future.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Progress {
     pub(crate) state: State,
@@ -64,7 +64,7 @@ impl Default for Progress {
 
 impl Progress {
     /// Says why no instance can have this progress, or `None` if one can.
-    fn problem<M>(&self, table: &Table<M>, interface: Interface) -> Option<String> {
+    fn problem<M>(&self, table: &VariableTable<M>, interface: Interface) -> Option<String> {
         let Self { state, time, start_time, stop_time, initialized, extrapolations, .. } = self;
         if !(time.is_finite() && start_time.is_finite() && !stop_time.is_some_and(f64::is_nan)) {
             return Some("it holds a time that is not a finite number".into());
@@ -76,12 +76,12 @@ impl Progress {
             }
         };
         if *state == State::Fatal || !possible {
-            return Some(format!("a unit cannot go on in state {}", state.name()));
+            return Some(format!("an instance cannot go on in state {}", state.name()));
         }
         let running =
             matches!(state, State::EventMode | State::ContinuousTimeMode | State::StepComplete);
         if running && !initialized {
-            return Some("it runs but was not initialized".into());
+            return Some("it is running but was not initialized".into());
         }
         let continuous = |input: &Extrapolation| {
             let entry = table.entries.get(input.reference);
@@ -96,14 +96,16 @@ impl Progress {
                 && input.derivatives.iter().all(|value| value.is_finite())
         };
         if extrapolations.len() > table.entries.len() || !extrapolations.iter().all(continuous) {
-            return Some("it holds derivatives of what is not a continuous input".into());
+            return Some(
+                "it holds derivatives of a variable that is not a continuous input".into(),
+            );
         }
         None
     }
 }
 
-/// A model together with its table, seen without the model's type.
-pub(crate) trait FmuUnit: Send {
+/// A model together with its variable table, seen without the model's type.
+pub(crate) trait ModelInstance: Send {
     fn real(&mut self, reference: usize) -> Option<&mut f64>;
     /// Returns the value of an integer or enumeration variable.
     fn integer(&mut self, reference: usize) -> Option<i32>;
@@ -112,7 +114,7 @@ pub(crate) trait FmuUnit: Send {
     fn boolean(&mut self, reference: usize) -> Option<&mut bool>;
     fn string(&mut self, reference: usize) -> Option<&mut String>;
 
-    /// Brings all variables back to their start values; with `failed` nothing else is kept either.
+    /// Resets all variables to their start values; with `failed` it makes a new model.
     fn reset(&mut self, failed: bool);
     fn initialize(&mut self, context: &Context) -> Result<(), Failure>;
     fn calculate(&mut self, time: f64, last: LastEvent) -> Result<(), Failure>;
@@ -136,19 +138,19 @@ pub(crate) trait FmuUnit: Send {
     fn partial_derivative(
         &mut self,
         time: f64,
-        unknown: usize,
-        known: usize,
+        unknown_variable: usize,
+        known_variable: usize,
     ) -> Result<f64, Failure>;
 }
 
 struct Bound<M> {
     model: M,
-    table: Table<M>,
+    table: VariableTable<M>,
 }
 
 /// Inputs of one step, for the model with its type.
 struct Extrapolated<'a, M> {
-    table: &'a Table<M>,
+    table: &'a VariableTable<M>,
     from: f64,
     inputs: &'a [Extrapolation],
 }
@@ -167,7 +169,7 @@ impl<M> Inputs<M> for Extrapolated<'_, M> {
     }
 }
 
-impl<M: Model> FmuUnit for Bound<M> {
+impl<M: Model> ModelInstance for Bound<M> {
     fn real(&mut self, reference: usize) -> Option<&mut f64> {
         match &self.table.entries.get(reference)?.access {
             Access::Real(field) => Some(field(&mut self.model)),
@@ -289,29 +291,29 @@ impl<M: Model> FmuUnit for Bound<M> {
     fn partial_derivative(
         &mut self,
         time: f64,
-        unknown: usize,
-        known: usize,
+        unknown_variable: usize,
+        known_variable: usize,
     ) -> Result<f64, Failure> {
-        self.model.partial_derivative(time, unknown, known)
+        self.model.partial_derivative(time, unknown_variable, known_variable)
     }
 }
 
-/// A unit that a library exports.
+/// An FMU that a library exports.
 pub struct Export {
     describe: fn() -> ModelDescription,
-    pub(crate) create: fn() -> Box<dyn FmuUnit>,
+    pub(crate) create: fn() -> Box<dyn ModelInstance>,
     described: OnceLock<Described>,
 }
 
-/// Description of a unit as importers see it, with its GUID.
+/// Description of an FMU as importers see it, with its GUID.
 pub(crate) struct Described {
     pub(crate) guid: String,
     pub(crate) description: Arc<ModelDescription>,
 }
 
 impl Export {
-    /// Makes the export of the unit whose model is `M`.
-    pub const fn of<M: Model>() -> Self {
+    /// Makes the export of the FMU whose model is `M`.
+    pub const fn new<M: Model>() -> Self {
         Self { describe: describe::<M>, create: create::<M>, described: OnceLock::new() }
     }
 
@@ -324,11 +326,11 @@ impl Export {
     }
 }
 
-fn create<M: Model>() -> Box<dyn FmuUnit> {
+fn create<M: Model>() -> Box<dyn ModelInstance> {
     Box::new(Bound { model: M::new(), table: M::description().table })
 }
 
-/// Returns the description of the unit whose model is `M`. The start values of parameters and
+/// Returns the description of the FMU whose model is `M`. The start values of parameters and
 /// inputs are those of `M::new()`.
 pub fn describe<M: Model>() -> ModelDescription {
     let Description {
@@ -347,23 +349,23 @@ pub fn describe<M: Model>() -> ModelDescription {
         let mut variable = entry.variable;
         if !variable.is_calculated() {
             match (&mut variable.kind, &entry.access) {
-                (Kind::Real { start, .. }, Access::Real(field)) => {
+                (VariableKind::Real { start, .. }, Access::Real(field)) => {
                     *start = Some(*field(&mut model));
                 }
                 (
-                    Kind::Integer { start, .. } | Kind::Enumeration { start, .. },
+                    VariableKind::Integer { start, .. } | VariableKind::Enumeration { start, .. },
                     Access::Integer(field),
                 ) => {
                     *start = Some((field.get)(&mut model));
                 }
-                (Kind::Boolean { start }, Access::Boolean(field)) => {
+                (VariableKind::Boolean { start }, Access::Boolean(field)) => {
                     *start = Some(*field(&mut model));
                 }
-                (Kind::String { start }, Access::String(field)) => {
+                (VariableKind::String { start }, Access::String(field)) => {
                     *start = Some(field(&mut model).clone());
                 }
                 _ => unreachable!(
-                    "Table::push is called with a kind and a field of the same type only"
+                    "VariableTable::push is called with a kind and a field of the same type only"
                 ),
             }
         }
