@@ -11,7 +11,7 @@ use cosim::search;
 use cosim::system::System;
 use cosim::variation::Target;
 use cosim_report::metrics::{Meters, Metrics};
-use fmu_import::description::Kind as Type;
+use fmu_import::description::VariableKind as Type;
 use fmu_import::names;
 use std::collections::BTreeMap;
 use std::fs;
@@ -195,7 +195,10 @@ pub(crate) fn recorded(campaign: &Campaign, observe: &Observe, meters: &Meters) 
         .map(|name| Recorded {
             unit: units.get(&name).cloned().unwrap_or_default(),
             is_never: observe.metrics.get(&name).is_some_and(|measure| {
-                matches!(measure.kind, experiment::Kind::Settling | experiment::Kind::Leaving)
+                matches!(
+                    measure.kind,
+                    experiment::MeasureKind::Settling | experiment::MeasureKind::Leaving
+                )
             }),
             name,
         })

@@ -1,5 +1,5 @@
 //! Checks an experiment in one pass: every name in it is looked up, and everything that cannot be
-//! run is refused. After that only the units themselves can fail.
+//! run is refused. After that only the instances themselves can fail.
 
 use crate::clock::Clock;
 use crate::delay;
@@ -11,8 +11,8 @@ use crate::system::{Opened, System, parts, periods};
 use crate::wiring::{self, Part};
 use fmu_import::faults;
 use fmu_import::fmu::Fmu;
+use fmu_import::lookup_table::is_lookup_table;
 use fmu_import::names;
-use fmu_import::table::is_table;
 use fmu_import::warnings;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -62,7 +62,7 @@ pub fn check(
     if let Some(names) = delay::algebraic_loop(&parts, &wires) {
         let message = format!(
             "algebraic loop: each of these inputs depends on the next at the same instant: {}. \
-             Put a unit with a state or a delay between them",
+             Put an instance with a state or a delay between them",
             names.join(" <- ")
         );
         return Err(experiment.source.error(&(0..0), message));
@@ -110,12 +110,12 @@ fn whereabouts(target: &str, parts: &[Part]) -> String {
     format!("there is no component \"{component}\"{hint}")
 }
 
-/// Largest number of steps. Beyond it the times of two steps coincide, because units treat instants
-/// as equal if they differ by less than 1e-9 of their size.
+/// Largest number of steps. Beyond it the times of two steps coincide, because instances treat
+/// instants as equal if they differ by less than 1e-9 of their size.
 const MOST_STEPS: u64 = 1_000_000_000;
 /// Approximate size of a number in `results.csv`, bytes.
 const NUMBER: f64 = 20.0;
-/// Lower bound of the computing time of a step of two small units, s.
+/// Lower bound of the computing time of a step of two small instances, s.
 const QUICK: f64 = 1e-5;
 
 /// Rejects experiments that no machine can run, and warns of results that fill a disk.
@@ -209,14 +209,14 @@ fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
     Ok(order.iter().cloned().chain(others.map(ToString::to_string)).collect())
 }
 
-/// Finds the archive of a component: beside the experiment, in the given folders, or where units
-/// are found from any folder.
+/// Finds the archive of a component: beside the experiment, in the given folders, or where
+/// instances are found from any folder.
 fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result<PathBuf, Error> {
     let written = &experiment.components[name].fmu;
     let mut folders: Vec<PathBuf> = experiment.source.folders().map(Path::to_path_buf).collect();
     folders.dedup();
     folders.extend(fmu_dirs.iter().cloned());
-    folders.extend(search::units());
+    folders.extend(search::fmu_folders());
     if let Some(path) =
         folders.iter().map(|folder| folder.join(written.get_ref())).find(|path| path.is_file())
     {
@@ -234,7 +234,7 @@ fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
         .filter(|file| {
             let path = Path::new(file);
-            path.extension().is_some_and(|extension| extension == "fmu") || is_table(path)
+            path.extension().is_some_and(|extension| extension == "fmu") || is_lookup_table(path)
         })
         .collect();
     let hint = names::hint(written.get_ref(), there.iter().map(String::as_str));

@@ -11,7 +11,7 @@
 use crate::experiment::Coupling;
 use crate::settings::{Setting, SettingValue};
 use crate::wiring::{Part, Port, Wire};
-use fmu_import::description::Kind;
+use fmu_import::description::VariableKind;
 use fmu_import::quantity::rounded;
 use std::collections::BTreeSet;
 
@@ -315,7 +315,8 @@ pub fn warnings(
 /// `None` if there is no such parameter.
 fn duration(name: &str, part: Part, settings: &[Setting]) -> Option<f64> {
     let (_, variable) = part.description.find(name)?;
-    let is_duration = matches!(&variable.kind, Kind::Real { unit: Some(unit), .. } if unit == "s");
+    let is_duration =
+        matches!(&variable.kind, VariableKind::Real { unit: Some(unit), .. } if unit == "s");
     if !is_duration || variable.causality != "parameter" {
         return None;
     }

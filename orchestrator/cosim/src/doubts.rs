@@ -41,7 +41,8 @@ fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>,
             let mut other = system.settings.clone();
             other[component][index].value =
                 SettingValue::Integer(if seed > 0 { seed - 1 } else { seed + 1 });
-            // Messages of the units are hidden here, because they appear again in the run itself.
+            // Messages of the instances are hidden here, because they appear again in the run
+            // itself.
             let same = with_default(NoSubscriber::default(), || {
                 let _warnings = warnings::collect();
                 are_same(system, &other, interrupt)

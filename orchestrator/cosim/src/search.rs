@@ -44,7 +44,7 @@ pub fn experiments() -> Vec<PathBuf> {
 }
 
 /// Returns the folders that hold units.
-pub fn units() -> Vec<PathBuf> {
+pub fn fmu_folders() -> Vec<PathBuf> {
     let mut folders = vec![PathBuf::from("target/fmu")];
     folders.extend(by_variable());
     folders.extend(beside_program(&["fmu", "../fmu"]));

@@ -12,7 +12,7 @@ use crate::settings::{self, Setting};
 use crate::signal::{Resolved, Signal, Term};
 use crate::watch::Watched;
 use crate::wiring::{self, Column, Part, Port, Wire};
-use fmu_import::description::{Kind, ModelDescription};
+use fmu_import::description::{ModelDescription, VariableKind};
 use fmu_import::fmu::Fmu;
 use fmu_import::names;
 use serde_json::Value;
@@ -134,7 +134,7 @@ impl System {
         })?;
         let place = self.place(port);
         let unit = match self.kind(port) {
-            Kind::Real { unit, .. } => unit.clone().unwrap_or_default(),
+            VariableKind::Real { unit, .. } => unit.clone().unwrap_or_default(),
             _ => String::new(),
         };
         Ok(Probed { name: path.into(), place, unit, items: self.items(port) })
@@ -176,7 +176,7 @@ impl System {
             (factor, unit) = (factor / own, String::new());
         }
         let is_integer = matches!(terms[..], [Term { value, minus: None }]
-            if !matches!(self.kind(self.probes[value]), Kind::Real { .. }));
+            if !matches!(self.kind(self.probes[value]), VariableKind::Real { .. }));
         let responds = terms
             .iter()
             .flat_map(|term: &Term<usize>| [Some(term.value), term.minus])
@@ -205,13 +205,13 @@ impl System {
             .collect()
     }
 
-    fn kind(&self, port: Port) -> &Kind {
+    fn kind(&self, port: Port) -> &VariableKind {
         &self.fmus[port.component].description.variables[port.variable].kind
     }
 
     fn items(&self, port: Port) -> Vec<(String, i32)> {
         match self.kind(port) {
-            Kind::Enumeration { items } => items.clone(),
+            VariableKind::Enumeration { items } => items.clone(),
             _ => Vec::new(),
         }
     }
@@ -219,7 +219,7 @@ impl System {
     /// Returns the unit in which a variable is to be displayed, with the factor to that unit. Units
     /// with an offset stay as they are.
     fn display(&self, port: Port) -> (f64, String) {
-        let Kind::Real { unit: Some(unit), display_unit, .. } = self.kind(port) else {
+        let VariableKind::Real { unit: Some(unit), display_unit, .. } = self.kind(port) else {
             return (1.0, String::new());
         };
         let units = &self.fmus[port.component].description.units;
@@ -268,16 +268,14 @@ impl System {
             let fmu = &self.fmus[index];
             let isolates = self.isolates(index);
             let limits = isolates.then(|| self.experiment.isolation.limits());
-            let unit = fmu.instantiate(name, limits.as_ref())?;
+            let instance = fmu.instantiate(name, limits.as_ref())?;
             let on_invalid = self.experiment.simulation.on_invalid;
-            let mut unit = Watched::around(unit, name, fmu, on_invalid);
-            settings::apply(&settings[index], unit.as_mut()).map_err(|failure| Error::Unit {
-                component: name.clone(),
-                time: self.clock.start(),
-                failure,
+            let mut instance = Watched::around(instance, name, fmu, on_invalid);
+            settings::apply(&settings[index], instance.as_mut()).map_err(|failure| {
+                Error::Call { component: name.clone(), time: self.clock.start(), failure }
             })?;
             let (name, every) = (name.clone(), every[index]);
-            members.push(Member { name, every, ahead: isolates, unit });
+            members.push(Member { name, every, ahead: isolates, instance });
         }
         let coupling = self.experiment.simulation.coupling;
         let parts = self.parts();
@@ -321,7 +319,7 @@ impl System {
         let column = |column: &Column| {
             let port = column.port;
             let unit = match self.kind(port) {
-                Kind::Real { unit, .. } => unit.clone(),
+                VariableKind::Real { unit, .. } => unit.clone(),
                 _ => None,
             };
             let (name, carrier) = (column.name.clone(), port.carrier);
@@ -344,12 +342,12 @@ pub(crate) fn periods(experiment: &Experiment, order: &[String]) -> Vec<u32> {
 
 fn plain_value(description: &ModelDescription, port: Port, value: f64) -> Value {
     match &description.variables[port.variable].kind {
-        Kind::Boolean => (value != 0.0).into(),
-        Kind::Integer { .. } => (value as i64).into(),
-        Kind::Enumeration { items } => items
+        VariableKind::Boolean => (value != 0.0).into(),
+        VariableKind::Integer { .. } => (value as i64).into(),
+        VariableKind::Enumeration { items } => items
             .iter()
             .find(|(_, item)| f64::from(*item) == value)
             .map_or_else(|| (value as i64).into(), |(name, _)| name.as_str().into()),
-        Kind::Real { .. } | Kind::String => value.into(),
+        VariableKind::Real { .. } | VariableKind::String => value.into(),
     }
 }

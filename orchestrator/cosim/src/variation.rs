@@ -1,5 +1,5 @@
-//! Runs of one system that differ in the values of parameters: the units are made once, and reset
-//! between two runs.
+//! Runs of one system that differ in the values of parameters: the instances are made once, and
+//! reset between two runs.
 
 use crate::error::Error;
 use crate::interrupt::Interrupt;
@@ -52,8 +52,8 @@ impl System {
     }
 
     /// Returns the value that a target has in this system: that of the experiment, or else the
-    /// start value of the unit. There is none if the unit does not state it, or if it is not of
-    /// type Real.
+    /// start value of the instance. There is none if the instance does not state it, or if it is
+    /// not of type Real.
     pub fn nominal(&self, target: Target) -> Option<f64> {
         let variable = self.variable(target);
         let own = self.settings[target.component].iter().find(|own| own.name == variable.name);
@@ -64,11 +64,11 @@ impl System {
         }
     }
 
-    /// Creates, sets and initializes the units as [`Self::start`] does, with other values for some
-    /// targets.
+    /// Creates, sets and initializes the instances as [`Self::start`] does, with other values for
+    /// some targets.
     ///
     /// # Errors
-    /// Returns an error if a unit cannot be instantiated or initialized.
+    /// Returns an error if an instance cannot be instantiated or initialized.
     pub fn start_varied(
         &self,
         changes: &[(Target, SettingValue)],
@@ -77,18 +77,18 @@ impl System {
         self.start_with(&self.varied(changes), interrupt)
     }
 
-    /// Resets the units of a master that this system has made, and sets and initializes them for
-    /// another run.
+    /// Resets the instances of a master that this system has made, and sets and initializes them
+    /// for another run.
     ///
     /// # Errors
-    /// Returns an error if a call of a unit fails.
+    /// Returns an error if a call of an instance fails.
     pub fn restart(
         &self,
         master: &mut Master,
         changes: &[(Target, SettingValue)],
     ) -> Result<(), Error> {
         let settings = self.varied(changes);
-        master.reset(|index, unit| settings::apply(&settings[index], unit))?;
+        master.reset(|index, instance| settings::apply(&settings[index], instance))?;
         master.initialize()
     }
 

@@ -1,4 +1,4 @@
-//! Says which unit and which call it was when a unit in this process ends the process.
+//! Says which instance and which call it was when an instance in this process ends the process.
 
 #![allow(unsafe_code)]
 
@@ -6,7 +6,7 @@ use std::cell::Cell;
 use std::marker::PhantomData;
 
 thread_local! {
-    /// Name of the unit that this thread calls, and name of the call; `None` between calls. A
+    /// Name of the instance that this thread calls, and name of the call; `None` between calls. A
     /// constant initialiser keeps the access free of locks and allocation, as in a signal handler
     /// nothing else is allowed.
     static CURRENT: Cell<Option<(*const str, &'static str)>> = const { Cell::new(None) };
@@ -16,10 +16,10 @@ thread_local! {
 pub(crate) struct Calling<'a>(PhantomData<&'a str>);
 
 impl<'a> Calling<'a> {
-    /// Says that this thread makes this call to the unit of this name.
+    /// Says that this thread makes this call to the instance of this name.
     #[inline]
-    pub(crate) fn new(unit: &'a str, call: &'static str) -> Self {
-        CURRENT.set(Some((unit, call)));
+    pub(crate) fn new(instance: &'a str, call: &'static str) -> Self {
+        CURRENT.set(Some((instance, call)));
         Self(PhantomData)
     }
 }
@@ -31,8 +31,8 @@ impl Drop for Calling<'_> {
     }
 }
 
-/// Watches for signals that end this process, and for calls of `exit`, from now on. If a unit was
-/// being called, one line on standard error names it.
+/// Watches for signals that end this process, and for calls of `exit`, from now on. If an instance
+/// was being called, one line on standard error names it.
 #[cfg(unix)]
 pub fn watch() {
     for (place, (signal, _)) in SIGNALS.iter().enumerate() {
@@ -51,7 +51,7 @@ pub fn watch() {
 }
 
 /// Watches for crashes, which the C library passes on as signals, and for calls of `exit`, from now
-/// on. If a unit was being called, one line on standard error names it.
+/// on. If an instance was being called, one line on standard error names it.
 #[cfg(windows)]
 pub fn watch() {
     for (signal, _) in SIGNALS {
@@ -120,20 +120,21 @@ extern "C" fn on_signal(
 #[cfg(any(unix, windows))]
 extern "C" fn on_exit() {
     if tell("exit") {
-        // SAFETY: this ends the process at once. A unit that ends it must not pass for success.
+        // SAFETY: this ends the process at once. An instance that ends it must not pass for
+        // success.
         unsafe { libc::_exit(1) };
     }
 }
 
-/// Writes which unit is being called, with system calls only. Returns whether there is one.
+/// Writes which instance is being called, with system calls only. Returns whether there is one.
 #[cfg(any(unix, windows))]
 fn tell(what: &str) -> bool {
-    let Some((unit, call)) = CURRENT.get() else { return false };
+    let Some((instance, call)) = CURRENT.get() else { return false };
     // SAFETY: `Calling` borrows the name as long as the call lasts, which has not returned.
-    let unit = unsafe { &*unit };
+    let instance = unsafe { &*instance };
     let parts = [
         "error: ",
-        unit,
+        instance,
         " ended this process in ",
         call,
         " (",

@@ -46,7 +46,7 @@ pub struct ModelDescription {
     /// only for outputs that declare them.
     pub dependencies: BTreeMap<usize, Vec<usize>>,
     /// Whether this describes a table, whose units are only named.
-    pub is_table: bool,
+    pub is_lookup_table: bool,
     /// Whether the file has a `ModelStructure`, which FMI requires.
     pub has_structure: bool,
     /// Index of the variables by name.
@@ -101,14 +101,14 @@ pub struct Variable {
     /// Variability: `fixed`, `discrete`, `continuous`, ….
     pub variability: Cow<'static, str>,
     /// Type of the variable, with its attributes.
-    pub kind: Kind,
+    pub kind: VariableKind,
     /// Start value as the file writes it.
     pub start: Option<String>,
 }
 
 /// Type of a variable, with the attributes of that type.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub enum Kind {
+pub enum VariableKind {
     /// A real number, held as a 64-bit float.
     Real {
         /// Name of the unit, if any.
@@ -139,7 +139,7 @@ pub enum Kind {
     String,
 }
 
-impl Kind {
+impl VariableKind {
     /// Returns the name of the type in FMI.
     pub fn name(&self) -> &'static str {
         match self {
@@ -174,7 +174,7 @@ impl ModelDescription {
         to: &Self,
         wanted: Option<&str>,
     ) -> Result<Scaling, String> {
-        if self.is_table {
+        if self.is_lookup_table {
             quantity::named(unit, wanted, &to.units)
         } else {
             quantity::conversion(unit, &self.units, wanted, &to.units)
@@ -215,12 +215,12 @@ pub enum Carrier {
 impl Carrier {
     /// Returns the type in which values of a kind are transferred; `None` for texts, which are not
     /// transferred.
-    pub fn of(kind: &Kind) -> Option<Self> {
+    pub fn of(kind: &VariableKind) -> Option<Self> {
         match kind {
-            Kind::Real { .. } => Some(Self::Real),
-            Kind::Integer { .. } | Kind::Enumeration { .. } => Some(Self::Integer),
-            Kind::Boolean => Some(Self::Boolean),
-            Kind::String => None,
+            VariableKind::Real { .. } => Some(Self::Real),
+            VariableKind::Integer { .. } | VariableKind::Enumeration { .. } => Some(Self::Integer),
+            VariableKind::Boolean => Some(Self::Boolean),
+            VariableKind::String => None,
         }
     }
 }

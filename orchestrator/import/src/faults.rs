@@ -1,7 +1,9 @@
 //! Faults of a model description that do not keep it from being read. Units run with most of them,
 //! but not everywhere, and not always as intended.
 
-use crate::description::{CAUSALITIES, Carrier, Kind, ModelDescription, VARIABILITIES, Variable};
+use crate::description::{
+    CAUSALITIES, Carrier, ModelDescription, VARIABILITIES, Variable, VariableKind,
+};
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// Lists the faults of a description, one line for each, in the order of the file.
@@ -62,18 +64,18 @@ fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<Str
             variability.escape_default()
         ));
     }
-    if let Kind::Real { unit: Some(unit), .. } = kind
+    if let VariableKind::Real { unit: Some(unit), .. } = kind
         && !units.contains(unit.as_str())
     {
         faults.push(format!("the unit \"{}\" of \"{name}\" is not defined", unit.escape_default()));
     }
     match kind {
-        Kind::Real { min: Some(min), max: Some(max), .. } if min > max => {
+        VariableKind::Real { min: Some(min), max: Some(max), .. } if min > max => {
             faults.push(format!(
                 "the smallest value of \"{name}\", {min}, is above its largest, {max}"
             ));
         }
-        Kind::Integer { min: Some(min), max: Some(max) } if min > max => {
+        VariableKind::Integer { min: Some(min), max: Some(max) } if min > max => {
             faults.push(format!(
                 "the smallest value of \"{name}\", {min}, is above its largest, {max}"
             ));
@@ -88,32 +90,32 @@ fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<Str
 }
 
 /// Describes the fault of a start value, if it has one.
-fn start_fault(start: &str, kind: &Kind) -> Option<String> {
+fn start_fault(start: &str, kind: &VariableKind) -> Option<String> {
     let outside = |below: bool, above: bool| {
         (below || above).then(|| "is outside its min and max".to_string())
     };
     match kind {
-        Kind::Real { min, max, .. } => match start.parse::<f64>() {
+        VariableKind::Real { min, max, .. } => match start.parse::<f64>() {
             Ok(value) if value.is_nan() => Some("is not a number".into()),
             Ok(value) => {
                 outside(min.is_some_and(|min| value < min), max.is_some_and(|max| value > max))
             }
             Err(_) => Some("is not a number".into()),
         },
-        Kind::Integer { min, max } => match start.parse::<i32>() {
+        VariableKind::Integer { min, max } => match start.parse::<i32>() {
             Ok(value) => {
                 outside(min.is_some_and(|min| value < min), max.is_some_and(|max| value > max))
             }
             Err(_) => Some("is not a whole number of 32 bits".into()),
         },
-        Kind::Boolean => (!matches!(start, "true" | "false" | "1" | "0"))
+        VariableKind::Boolean => (!matches!(start, "true" | "false" | "1" | "0"))
             .then(|| "is neither true nor false".into()),
-        Kind::Enumeration { items } => {
+        VariableKind::Enumeration { items } => {
             let known =
                 start.parse::<i32>().is_ok_and(|value| items.iter().any(|item| item.1 == value));
             (!known).then(|| "is no item of its type".into())
         }
-        Kind::String => None,
+        VariableKind::String => None,
     }
 }
 

@@ -1,16 +1,16 @@
-//! Opens `.fmu` archives, checks their libraries, and instantiates co-simulation units from them.
-//! Tables are opened like archives.
+//! Opens `.fmu` archives, checks their libraries, and instantiates co-simulation instances from
+//! them. Tables are opened like archives.
 
 use crate::archive;
 use crate::description::ModelDescription;
 use crate::error::{Error, with_causes};
 use crate::faults;
 use crate::folder::TemporaryFolder;
-use crate::instance::{FmuUnit, Functions};
+use crate::instance::Instance;
 use crate::isolation::{self, Isolation, Library, Loaded};
+use crate::library::{FmuInstance, Functions};
 use crate::log::Log;
-use crate::table::{self, Table, TableUnit};
-use crate::unit::CoSimulationUnit;
+use crate::lookup_table::{self, LookupTable, LookupTableInstance};
 use crate::warnings;
 use crate::xml;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use url::Url;
 
-/// An unpacked archive or a table, of which several units can be instantiated.
+/// An unpacked archive or a table, of which several instances can be instantiated.
 pub struct Fmu {
     /// Path of the archive or table.
     pub path: PathBuf,
@@ -32,7 +32,7 @@ pub struct Fmu {
 
 enum Content {
     Archive(Archive),
-    Table(Table),
+    LookupTable(LookupTable),
 }
 
 /// An unpacked archive.
@@ -50,11 +50,11 @@ impl Fmu {
     /// table has a fault.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
-        if table::is_table(path) {
-            let table = Table::open(path).map_err(refuse)?;
+        if lookup_table::is_lookup_table(path) {
+            let table = LookupTable::open(path).map_err(refuse)?;
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
             let description = table.description(&name).map_err(refuse)?;
-            let content = Content::Table(table);
+            let content = Content::LookupTable(table);
             return Ok(Self { path: path.to_path_buf(), description, content });
         }
         let folder = archive::unpack(path)?;
@@ -73,7 +73,7 @@ impl Fmu {
     pub fn platforms(&self) -> Vec<String> {
         match &self.content {
             Content::Archive(archive) => archive.platforms(),
-            Content::Table(_) => Vec::new(),
+            Content::LookupTable(_) => Vec::new(),
         }
     }
 
@@ -93,12 +93,12 @@ impl Fmu {
     }
 
     /// Returns whether the file is a table, which runs no code of its own.
-    pub fn is_table(&self) -> bool {
-        self.description.is_table
+    pub fn is_lookup_table(&self) -> bool {
+        self.description.is_lookup_table
     }
 
-    /// Returns whether this project's packer made the unit, so that it is trusted to do no harm to
-    /// the process that it is loaded into.
+    /// Returns whether this project's packer made the instance, so that it is trusted to do no harm
+    /// to the process that it is loaded into.
     pub fn is_own(&self) -> bool {
         self.description.generation_tool.starts_with("fmu-pack ")
     }
@@ -116,7 +116,7 @@ impl Fmu {
         }
         let identifier = &interface.model_identifier;
         // The identifier becomes part of a path. FMI 2.0, section 2.2.7, requires a C identifier,
-        // but other programs accept units with a hyphen in it.
+        // but other programs accept instances with a hyphen in it.
         if identifier.is_empty() || identifier.contains(['/', '\\', '.', ':', '\0']) {
             return Err(format!(
                 "the model identifier \"{}\" is refused: it must be the name of a file without folder and ending",
@@ -140,8 +140,8 @@ impl Fmu {
         Ok((file, entry))
     }
 
-    /// Loads the library and instantiates a co-simulation unit called `name`: in this process, or
-    /// in one of its own if `isolation` is given. A table is always in this process.
+    /// Loads the library and instantiates a co-simulation instance called `name`: in this process,
+    /// or in one of its own if `isolation` is given. A table is always in this process.
     ///
     /// # Errors
     /// Returns an error if the FMU has no binary for this platform or offers no co-simulation, if
@@ -150,20 +150,22 @@ impl Fmu {
         &self,
         name: &str,
         isolation: Option<&Isolation>,
-    ) -> Result<Box<dyn CoSimulationUnit>, Error> {
+    ) -> Result<Box<dyn Instance>, Error> {
         let refuse = |message: String| Error::Fmu { path: self.path.clone(), message };
         let archive = match &self.content {
             Content::Archive(archive) => archive,
-            Content::Table(table) => return Ok(Box::new(TableUnit::new(table.clone()))),
+            Content::LookupTable(table) => {
+                return Ok(Box::new(LookupTableInstance::new(table.clone())));
+            }
         };
         let (file, entry) = self.library(archive).map_err(refuse)?;
         let resources = Url::from_directory_path(archive.folder.path().join("resources"))
             .map_err(|()| refuse("the temporary folder has no absolute path".into()))?;
         let guid = &self.description.guid;
-        let (unit, fault) = if let Some(isolation) = isolation {
+        let (instance, fault) = if let Some(isolation) = isolation {
             let library = Library { file, folder: archive.folder.path(), isolation };
             match library.instantiate(name, guid, resources.as_str()) {
-                Loaded::Whole(unit, fault) => (unit, fault),
+                Loaded::Whole(instance, fault) => (instance, fault),
                 Loaded::Unloadable(reason) => {
                     return Err(refuse(archive.not_loaded(&entry, &reason)));
                 }
@@ -174,14 +176,14 @@ impl Fmu {
                 .map_err(|error| refuse(archive.not_loaded(&entry, &with_causes(&error))))?;
             let fault = functions.version_fault();
             let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&archive.folder)));
-            let unit = FmuUnit::new(functions, log, guid, resources.as_str(), folder)
+            let instance = FmuInstance::new(functions, log, guid, resources.as_str(), folder)
                 .map_err(|reason| refuse(format!("the component \"{name}\" {reason}")))?;
-            (Box::new(unit) as Box<dyn CoSimulationUnit>, fault)
+            (Box::new(instance) as Box<dyn Instance>, fault)
         };
         if let Some(fault) = fault {
             warnings::warn_once(format!("{}: {fault}", self.path.display()));
         }
-        Ok(unit)
+        Ok(instance)
     }
 
     /// Loads the library in a process of its own where that is possible, and returns what is wrong

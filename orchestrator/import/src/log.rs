@@ -1,4 +1,4 @@
-//! Log messages of units.
+//! Log messages of instances.
 
 use crate::fmi::Status;
 use crate::warnings;
@@ -9,13 +9,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Largest number of messages of a unit that are printed in a second, or held until somebody takes
-/// them.
+/// Largest number of messages of an instance that are printed in a second, or held until somebody
+/// takes them.
 const MOST: u64 = 100;
 /// Largest number of bytes of a message.
 const LONGEST: usize = 2000;
 
-/// A message that a unit logged.
+/// A message that an instance logged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Said {
     pub(crate) status: c_int,
@@ -27,8 +27,8 @@ pub(crate) struct Said {
 pub(crate) struct Log {
     pub(crate) component: String,
     last: Mutex<Option<String>>,
-    /// Whether the unit is being instantiated. Messages about problems are then part of the error
-    /// that follows.
+    /// Whether the instance is being instantiated. Messages about problems are then part of the
+    /// error that follows.
     instantiates: AtomicBool,
     sink: Sink,
 }
@@ -116,7 +116,7 @@ impl Log {
         }
     }
 
-    /// Says that the unit is instantiated.
+    /// Says that the instance is instantiated.
     pub(crate) fn is_instantiated(&self) {
         self.instantiates.store(false, Ordering::Relaxed);
     }
@@ -187,7 +187,7 @@ impl Log {
     }
 }
 
-// Units may log from threads of their own.
+// Instances may log from threads of their own.
 const _: () = {
     const fn is_sync<T: Sync>() {}
     is_sync::<Log>();

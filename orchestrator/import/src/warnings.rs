@@ -1,15 +1,15 @@
-//! Collects the warnings of units during a run: each is printed once, at the end, with the time at
-//! which it first came and the number of times it came.
+//! Collects the warnings of instances during a run: each is printed once, at the end, with the time
+//! at which it first came and the number of times it came.
 
 use parking_lot::Mutex;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
-/// Largest number of different warnings that are collected, in case a unit never says the same
+/// Largest number of different warnings that are collected, in case an instance never says the same
 /// twice.
 const MOST: usize = 100;
 
-/// A warning of a unit, in its own words.
+/// A warning of an instance, in its own words.
 struct Warning {
     text: String,
     first: f64,
@@ -27,7 +27,7 @@ thread_local! {
     static HEARD: RefCell<Option<Heard>> = const { RefCell::new(None) };
 }
 
-/// A guard: warnings of this thread's units are collected as long as this value lives.
+/// A guard: warnings of this thread's instances are collected as long as this value lives.
 pub struct Collection(());
 
 /// Begins to collect warnings. If no collection is active, warnings are printed as they come.
@@ -45,14 +45,14 @@ pub fn at(time: f64) {
     });
 }
 
-/// Records or prints a warning of a unit.
+/// Records or prints a warning of an instance.
 pub fn warn(text: &str) {
     if !collected(text) {
         tracing::warn!("{text}");
     }
 }
 
-/// Records a warning of a unit. Returns whether there was room for it.
+/// Records a warning of an instance. Returns whether there was room for it.
 pub(crate) fn collected(text: &str) -> bool {
     HEARD.with_borrow_mut(|heard| {
         let Some(Heard { now, warnings }) = heard else { return false };

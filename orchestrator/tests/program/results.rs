@@ -115,13 +115,13 @@ none = { kind = "mean", signals = "none", optional = true }
         let message = observed(&section.replacen(from, to, 1)).refusal(&[]);
         assert!(message.contains(said), "{message}");
     }
-    // A unit of the command line may lack variables of its own, but not those of others.
+    // An FMU of the command line may lack variables of its own, but not those of others.
     let wrong = section.replace("/ plant.output.integral", "/ plant.output.integal");
-    let message = observed(&wrong).refusal(&["--fmu", "gain=Unit.fmu"]);
+    let message = observed(&wrong).refusal(&["--fmu", "gain=Model.fmu"]);
     assert!(message.contains("there is no variable \"plant.output.integal\""), "{message}");
-    let own = section.replace("\"gain.output.direct /", "\"gain.output.dirct /");
-    let bench = observed(&own);
-    let (code, _, errors) = bench.run(&["--fmu", "gain=Unit.fmu"]);
+    let exchanged = section.replace("\"gain.output.direct /", "\"gain.output.dirct /");
+    let bench = observed(&exchanged);
+    let (code, _, errors) = bench.run(&["--fmu", "gain=Model.fmu"]);
     assert_eq!(code, 0, "{errors}");
     assert!(bench.json("out/loop/metrics.json")["ratio"].is_null());
 }
@@ -237,7 +237,7 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
 }
 
 #[test]
-fn a_failing_unit_ends_the_run_with_its_own_words_and_keeps_the_results() {
+fn a_failing_instance_ends_the_run_with_its_own_words_and_keeps_the_results() {
     let bench = Bench::new();
     // The statuses are fmi2Discard, fmi2Error, and fmi2Fatal, after which not even fmi2FreeInstance
     // may be called.

@@ -1,9 +1,9 @@
-//! Tables as units, which drive a unit whose answer can be computed by hand.
+//! Lookup tables as components, which drive an FMU whose answer can be computed by hand.
 
 use crate::bench::Bench;
 use std::fs;
 
-/// The unit's first output is twice its input.
+/// The FMU's first output is twice its input.
 const DRIVEN: &str = r#"
 title = "a table drives a gain"
 [simulation]
@@ -13,7 +13,7 @@ order = ["drive", "gain"]
 [components.drive]
 fmu = "drive.csv"
 [components.gain]
-fmu = "Unit.fmu"
+fmu = "Model.fmu"
 [[connections]]
 from = "drive.input"
 to = "gain.input"

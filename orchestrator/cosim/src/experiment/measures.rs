@@ -43,7 +43,7 @@ pub struct Measure {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub id: String,
     /// Quantity that is computed from the signals.
-    pub kind: Kind,
+    pub kind: MeasureKind,
     /// Name of the list of signals that the number is computed from.
     #[schemars(with = "String")]
     pub signals: Spanned<String>,
@@ -97,7 +97,7 @@ pub struct Measure {
 /// Quantity that a measure computes from its signals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum MeasureKind {
     /// Square root of the mean of the sum of the signals' squares.
     Rms,
     /// Arithmetic mean of the first signal.
@@ -256,21 +256,25 @@ impl Measure {
             "every = 0: at least 1"
         } else if self.over.is_some_and(|[from, to]| from >= to) {
             "over must be [from, to] with from below to"
-        } else if is(Kind::Leaving) && !self.bound.is_some_and(|bound| bound > 0.0) {
+        } else if is(MeasureKind::Leaving) && !self.bound.is_some_and(|bound| bound > 0.0) {
             "leaving wants a bound above 0"
-        } else if !matches!(self.kind, Kind::Leaving | Kind::Settling | Kind::Rises)
-            && self.bound.is_some()
+        } else if !matches!(
+            self.kind,
+            MeasureKind::Leaving | MeasureKind::Settling | MeasureKind::Rises
+        ) && self.bound.is_some()
         {
             "bound is for leaving, settling and rises only"
-        } else if is(Kind::Settling)
+        } else if is(MeasureKind::Settling)
             && !(self.band.xor(self.bound).is_some_and(|band| band > 0.0) && self.hold >= 0.0)
         {
             "settling wants either a band or a bound above 0, and a hold not below"
-        } else if !is(Kind::Settling) && self.band.is_some() {
+        } else if !is(MeasureKind::Settling) && self.band.is_some() {
             "band is for settling only"
-        } else if !is(Kind::Settling) && self.hold != 0.0 {
+        } else if !is(MeasureKind::Settling) && self.hold != 0.0 {
             "hold is for settling only"
-        } else if is(Kind::RmsAbove) != self.frequency.is_some_and(|frequency| frequency > 0.0) {
+        } else if is(MeasureKind::RmsAbove)
+            != self.frequency.is_some_and(|frequency| frequency > 0.0)
+        {
             "rms-above, and nothing else, wants a frequency above 0"
         } else {
             return None;

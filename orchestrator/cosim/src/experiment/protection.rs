@@ -56,7 +56,7 @@ impl Protection {
     /// Returns whether a component gets a process of its own.
     pub fn isolates(&self, component: &Component, fmu: &Fmu) -> bool {
         let asked = component.isolate.or(self.isolate);
-        isolation::is_enabled() && !fmu.is_table() && asked.unwrap_or_else(|| !fmu.is_own())
+        isolation::is_enabled() && !fmu.is_lookup_table() && asked.unwrap_or_else(|| !fmu.is_own())
     }
 
     /// Returns what the process of a unit is given.

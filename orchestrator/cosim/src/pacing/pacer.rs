@@ -40,7 +40,7 @@ pub struct Step {
     pub component: usize,
     /// Simulated time of the communication point at its end, s.
     pub time: f64,
-    /// Computing time spent in the unit.
+    /// Computing time spent in the instance.
     pub duration: Duration,
 }
 
@@ -92,7 +92,7 @@ pub struct Pacer {
     began: Duration,
     elapsed: Duration,
     /// Instant at which the work of the current tick began. `tick_spent` is the computing time of
-    /// all units up to then.
+    /// all instances up to then.
     tick_began: Duration,
     tick_spent: Duration,
     /// Wake-up jitter of the current tick, if there was a wait.
@@ -299,8 +299,8 @@ impl Pacer {
     }
 
     fn count_own(&mut self, now: Duration) {
-        let in_units = self.spent().saturating_sub(self.tick_spent);
-        self.own.record(now.saturating_sub(self.tick_began).saturating_sub(in_units));
+        let in_instances = self.spent().saturating_sub(self.tick_spent);
+        self.own.record(now.saturating_sub(self.tick_began).saturating_sub(in_instances));
     }
 
     fn update(&self, change: impl FnOnce(&mut Tally)) {

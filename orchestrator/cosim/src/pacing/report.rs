@@ -80,7 +80,7 @@ pub struct Component {
     pub period_ms: f64,
     /// Number of deadlines that the component missed.
     pub misses: u64,
-    /// Computing time of the unit per step, over all of its calls.
+    /// Computing time of the instance per step, over all of its calls.
     pub step_ms: Summary,
     /// Time from the instant of the communication point until the component's values are ready. It
     /// must be shorter than the period.

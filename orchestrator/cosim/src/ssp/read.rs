@@ -147,9 +147,9 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     for component in &structure.components {
         let fmu = structure.folder.join(&component.source);
         if !opened.contains_key(&fmu) {
-            let unit =
+            let archive =
                 Fmu::open(&fmu).map_err(|error| of_entry(error.into(), path, folder.path()))?;
-            opened.insert(fmu.clone(), Rc::new(unit));
+            opened.insert(fmu.clone(), Rc::new(archive));
         }
     }
     let of = |component: &Found| &opened[&structure.folder.join(&component.source)].description;

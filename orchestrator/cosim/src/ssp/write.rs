@@ -8,7 +8,7 @@ use crate::files;
 use crate::interrupt::Interrupt;
 use crate::settings::SettingValue;
 use crate::system::System;
-use fmu_import::description::{Kind, Variable};
+use fmu_import::description::{Variable, VariableKind};
 use fmu_import::quantity::Scaling;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
@@ -56,7 +56,9 @@ pub fn pack(
     interrupt: &Interrupt,
 ) -> Result<(), Error> {
     let goes_on = || interrupt.asked().map_or(Ok(()), |request| Err(Error::Ended(request)));
-    if let Some((name, _)) = system.order.iter().zip(&system.fmus).find(|(_, fmu)| fmu.is_table()) {
+    if let Some((name, _)) =
+        system.order.iter().zip(&system.fmus).find(|(_, fmu)| fmu.is_lookup_table())
+    {
         let message = format!("[components.{name}] is a table, which other tools cannot run");
         return Err(system.experiment.source.error(&(0..0), message));
     }
@@ -202,8 +204,8 @@ fn connectors<'a>(system: &'a Source, index: usize) -> impl Iterator<Item = &'a 
         match &*variable.causality {
             "input" if is_connected(position) => Some(variable),
             "output" => match variable.kind {
-                Kind::String => None,
-                Kind::Enumeration { .. } => system.enumerations.then_some(variable),
+                VariableKind::String => None,
+                VariableKind::Enumeration { .. } => system.enumerations.then_some(variable),
                 _ => Some(variable),
             },
             _ => None,
@@ -217,7 +219,7 @@ fn kinds<'a>(system: &'a Source) -> Vec<(String, &'a [(String, i32)])> {
     let mut kinds: Vec<(String, &'a [(String, i32)])> = Vec::new();
     for (index, fmu) in system.fmus.iter().enumerate() {
         for variable in connectors(system, index) {
-            if let Kind::Enumeration { items } = &variable.kind
+            if let VariableKind::Enumeration { items } = &variable.kind
                 && !kinds.iter().any(|(_, known)| *known == items.as_slice())
             {
                 let name = identifier(&format!("{}_{}", fmu.description.model_name, variable.name));
@@ -248,8 +250,8 @@ fn connector(xml: &mut Xml, system: &Source, variable: &Variable) -> io::Result<
     let attributes = [("name", variable.name.clone()), ("kind", variable.causality.to_string())];
     element(xml, "ssd:Connector", &attributes, |xml| {
         let unit = match &variable.kind {
-            Kind::Real { unit: Some(unit), .. } => vec![("unit", unit.clone())],
-            Kind::Enumeration { items } => {
+            VariableKind::Real { unit: Some(unit), .. } => vec![("unit", unit.clone())],
+            VariableKind::Enumeration { items } => {
                 let kinds = kinds(system).into_iter();
                 let known = kinds.filter(|(_, known)| *known == items.as_slice());
                 known.map(|(name, _)| ("name", name)).collect()
@@ -345,7 +347,7 @@ fn units(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let mut units = BTreeMap::new();
     for (index, fmu) in system.fmus.iter().enumerate() {
         for variable in connectors(system, index) {
-            let Kind::Real { unit: Some(unit), .. } = &variable.kind else { continue };
+            let VariableKind::Real { unit: Some(unit), .. } = &variable.kind else { continue };
             if let Some(defined) =
                 fmu.description.units.iter().find(|defined| defined.name == *unit)
             {

@@ -1,8 +1,8 @@
 //! Builds a description from the elements of the file.
 
 use super::{
-    ByName, CAUSALITIES, DefaultExperiment, Interface, Kind, ModelDescription, VARIABILITIES,
-    Variable,
+    ByName, CAUSALITIES, DefaultExperiment, Interface, ModelDescription, VARIABILITIES, Variable,
+    VariableKind,
 };
 use crate::quantity::UnitDefinition;
 use crate::xml::Element;
@@ -119,7 +119,7 @@ pub(super) fn description(
         },
         units: units.map(unit).collect::<Result<_, _>>()?,
         dependencies: dependencies(root, variables.len())?,
-        is_table: false,
+        is_lookup_table: false,
         has_structure: root.child("ModelStructure").is_some(),
         variables,
         by_name: ByName::default(),
@@ -188,7 +188,7 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
                 own => Ok(own),
             };
             let (min, max) = (bound("min")?, bound("max")?);
-            Kind::Real { unit: text("unit"), display_unit: text("displayUnit"), min, max }
+            VariableKind::Real { unit: text("unit"), display_unit: text("displayUnit"), min, max }
         }
         "Integer" => {
             let bound = |name: &str| match own.parsed(name, "a whole number")? {
@@ -197,10 +197,10 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
                 }
                 own => Ok::<_, String>(own),
             };
-            Kind::Integer { min: bound("min")?, max: bound("max")? }
+            VariableKind::Integer { min: bound("min")?, max: bound("max")? }
         }
-        "Boolean" => Kind::Boolean,
-        "String" => Kind::String,
+        "Boolean" => VariableKind::Boolean,
+        "String" => VariableKind::String,
         _ => {
             let declared =
                 declared.ok_or_else(|| format!("{} has no type definition", element.title()))?;
@@ -211,7 +211,7 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
                 Ok((item.required("name")?.to_string(), value))
             };
             let items = declared.children.iter().filter(|child| child.name == "Item");
-            Kind::Enumeration { items: items.map(item).collect::<Result<_, String>>()? }
+            VariableKind::Enumeration { items: items.map(item).collect::<Result<_, String>>()? }
         }
     };
     let reference = element.parsed("valueReference", "a whole number from 0 to 4294967295")?;

@@ -42,11 +42,15 @@ fn everything_needed_is_read() {
     assert_eq!(description.default_experiment.stop, Some(50.0));
     assert_eq!(description.units[0].displays[0].0, "deg");
     let (_, u) = description.find("u").unwrap();
-    let real =
-        Kind::Real { unit: Some("rad".into()), display_unit: None, min: None, max: Some(2.0) };
+    let real = VariableKind::Real {
+        unit: Some("rad".into()),
+        display_unit: None,
+        min: None,
+        max: Some(2.0),
+    };
     assert_eq!((u.reference, &u.kind, u.start.as_deref()), (7, &real, Some("0.5")));
     let items = vec![("none".to_string(), 1), ("white".to_string(), 2)];
-    assert_eq!(description.find("kind").unwrap().1.kind, Kind::Enumeration { items });
+    assert_eq!(description.find("kind").unwrap().1.kind, VariableKind::Enumeration { items });
     // A declaration of no dependencies is distinguished from a missing declaration.
     assert_eq!(description.dependencies, BTreeMap::from([(1, vec![0])]));
 }

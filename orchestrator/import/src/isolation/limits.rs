@@ -1,4 +1,4 @@
-//! Limits that the process of a unit sets itself before it loads the library.
+//! Limits that the process of an instance sets itself before it loads the library.
 
 use super::protocol::Limits;
 #[cfg(unix)]

@@ -1,13 +1,13 @@
-//! Units in processes of their own. A unit that crashes, ends its process, or never answers then
-//! fails like one that returns an error: the master goes on, and says which unit it was and in
-//! which call.
+//! Instances in processes of their own. An instance that crashes, ends its process, or never
+//! answers then fails like one that returns an error: the master goes on, and says which instance
+//! it was and in which call.
 //!
 //! | module | what it knows |
 //! |---|---|
 //! | `channel` | memory that both processes share |
 //! | `protocol` | the messages in it |
-//! | `host` | the process of the unit, which makes the calls |
-//! | `process`, `remote` | its master's side: a process that is watched, and the unit it stands for |
+//! | `host` | the process of the instance, which makes the calls |
+//! | `process`, `remote` | its master's side: a process that is watched, and the instance it stands for |
 //! | `settings`, `limits`, `sandbox` | what the process may use |
 
 mod channel;
@@ -24,18 +24,18 @@ pub use host::serve;
 pub use process::late_failures;
 pub use settings::{COMMAND, Isolation};
 
-use crate::unit::CoSimulationUnit;
+use crate::instance::Instance;
 use process::Process;
-use protocol::{InstanceOf, Limits, Ready, Setup};
-use remote::RemoteUnit;
+use protocol::{InstanceArguments, Limits, Ready, Setup};
+use remote::RemoteInstance;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Program that is started for a unit.
+/// Program that is started for an instance.
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
-/// Says that this process' program has the command [`COMMAND`], so that units can have processes
-/// of their own.
+/// Says that this process' program has the command [`COMMAND`], so that instances can have
+/// processes of their own.
 pub fn enable() {
     // On Linux this is the program that runs, also if its file was replaced since. Other systems
     // may have such a file, too: under Wine it is Wine itself.
@@ -50,7 +50,7 @@ pub fn enable() {
     }
 }
 
-/// Returns whether units can have processes of their own.
+/// Returns whether instances can have processes of their own.
 pub fn is_enabled() -> bool {
     PROGRAM.get().is_some()
 }
@@ -61,7 +61,7 @@ pub(crate) enum Loaded<T> {
     Whole(T, Option<String>),
     /// The system could not load it, for this reason.
     Unloadable(String),
-    /// The unit refused or failed, for this reason.
+    /// The instance refused or failed, for this reason.
     Refused(String),
 }
 
@@ -80,13 +80,13 @@ impl Library<'_> {
         name: &str,
         guid: &str,
         resources: &str,
-    ) -> Loaded<Box<dyn CoSimulationUnit>> {
+    ) -> Loaded<Box<dyn Instance>> {
         let (guid, resources) = (guid.into(), resources.into());
-        let instance = InstanceOf { name: name.into(), guid, resources };
+        let instance = InstanceArguments { name: name.into(), guid, resources };
         let refused = |reason: &str| Loaded::Refused(format!("the component \"{name}\" {reason}"));
         match self.load(name, Some(instance)) {
             Loaded::Whole(process, fault) => {
-                Loaded::Whole(Box::new(RemoteUnit::new(process)), fault)
+                Loaded::Whole(Box::new(RemoteInstance::new(process)), fault)
             }
             Loaded::Unloadable(reason) => Loaded::Unloadable(reason),
             Loaded::Refused(reason) => refused(&reason),
@@ -102,7 +102,7 @@ impl Library<'_> {
         }
     }
 
-    fn load(self, name: &str, instance: Option<InstanceOf>) -> Loaded<Process> {
+    fn load(self, name: &str, instance: Option<InstanceArguments>) -> Loaded<Process> {
         let Some(program) = PROGRAM.get() else {
             return Loaded::Refused("has no process: this program cannot make any".into());
         };
@@ -119,7 +119,7 @@ impl Library<'_> {
             Ok(Ready::Loaded { version_fault, without, .. }) => {
                 if let Some(without) = without {
                     crate::warnings::warn_once(format!(
-                        "this system does not limit these for units: {without}"
+                        "this system does not limit these for instances: {without}"
                     ));
                 }
                 Loaded::Whole(process, version_fault)

@@ -1,11 +1,11 @@
-//! The process of a unit, as the master sees it: it is started, asked, watched, and ended.
+//! The process of an instance, as the master sees it: it is started, asked, watched, and ended.
 
 use super::channel::{Channel, LARGEST, Slot};
 use super::protocol::{Action, Ready, Reply, Request, Setup};
 use super::settings::{COMMAND, Isolation};
 use crate::fmi;
+use crate::instance::CallFailure;
 use crate::log::{Log, Said};
-use crate::unit::UnitFailure;
 use parking_lot::Mutex;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -17,23 +17,23 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tempfile::NamedTempFile;
 
-/// Time within which a unit must be freed, and its process ended.
+/// Time within which an instance must be freed, and its process ended.
 const FAREWELL: Duration = Duration::from_secs(10);
 /// Time within which what an ended process has printed must have arrived.
 const ECHO: Duration = Duration::from_millis(200);
-/// Largest number of bytes of a line of a unit that is passed on.
+/// Largest number of bytes of a line of an instance that is passed on.
 const LINE: usize = 2000;
 
-/// Failures that came when the unit's run was over.
+/// Failures that came when the instance's run was over.
 static LATE: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// Returns the failures that came when a run was over: units that could not be freed. They are
+/// Returns the failures that came when a run was over: instances that could not be freed. They are
 /// forgotten by this call.
 pub fn late_failures() -> Vec<String> {
     std::mem::take(&mut LATE.lock())
 }
 
-/// The process of a unit.
+/// The process of an instance.
 pub(super) struct Process {
     child: Child,
     channel: Channel,
@@ -105,7 +105,7 @@ impl Process {
     }
 
     /// Lets the process load its library and make an instance.
-    pub(super) fn set_up(&mut self, setup: &Setup) -> Result<Ready, UnitFailure> {
+    pub(super) fn set_up(&mut self, setup: &Setup) -> Result<Ready, CallFailure> {
         self.put("instantiate", setup)?;
         let mut ready = self.answer("instantiate")?;
         // Both have opened it. Systems that keep a file which is in use remove it later.
@@ -128,7 +128,7 @@ impl Process {
         &mut self,
         call: &'static str,
         request: &Request,
-    ) -> Result<Reply, UnitFailure> {
+    ) -> Result<Reply, CallFailure> {
         self.send(call, request)?;
         self.reply(call)
     }
@@ -138,7 +138,7 @@ impl Process {
         &mut self,
         call: &'static str,
         request: &Request,
-    ) -> Result<(), UnitFailure> {
+    ) -> Result<(), CallFailure> {
         // Whoever failed to fetch the last answer no longer wants it.
         if let Some(last) = self.pending.take() {
             self.reply(last)?;
@@ -149,7 +149,7 @@ impl Process {
     }
 
     /// Waits for the answer to what was sent.
-    pub(super) fn reply(&mut self, call: &'static str) -> Result<Reply, UnitFailure> {
+    pub(super) fn reply(&mut self, call: &'static str) -> Result<Reply, CallFailure> {
         self.pending = None;
         let mut reply: Reply = self.answer(call)?;
         self.repeat(std::mem::take(&mut reply.said));
@@ -162,22 +162,22 @@ impl Process {
         }
     }
 
-    fn put(&mut self, call: &'static str, message: &impl Serialize) -> Result<(), UnitFailure> {
+    fn put(&mut self, call: &'static str, message: &impl Serialize) -> Result<(), CallFailure> {
         if let Some(reason) = &self.gone {
-            return Err(UnitFailure::new(call, reason.clone()));
+            return Err(CallFailure::new(call, reason.clone()));
         }
         self.bytes.clear();
         let bytes = postcard::to_extend(message, std::mem::take(&mut self.bytes));
-        self.bytes = bytes.map_err(|error| UnitFailure::new(call, error.to_string()))?;
+        self.bytes = bytes.map_err(|error| CallFailure::new(call, error.to_string()))?;
         if self.bytes.len() > LARGEST {
-            return Err(UnitFailure::new(call, "the values are too many for one message"));
+            return Err(CallFailure::new(call, "the values are too many for one message"));
         }
         self.number = self.number.wrapping_add(1);
         self.channel.put(Slot::Request, self.number, &self.bytes);
         Ok(())
     }
 
-    fn answer<T: DeserializeOwned>(&mut self, call: &'static str) -> Result<T, UnitFailure> {
+    fn answer<T: DeserializeOwned>(&mut self, call: &'static str) -> Result<T, CallFailure> {
         let (child, timeout) = (&mut self.child, self.timeout);
         let waited = self.channel.wait(Slot::Reply, self.number, |waited| match child.try_wait() {
             Ok(Some(status)) => Err(Silence::Ended(status)),
@@ -207,14 +207,14 @@ impl Process {
     }
 
     /// Returns the failure of a process whose answer is none. It is not asked again.
-    pub(super) fn nonsense(&mut self, call: &'static str) -> UnitFailure {
+    pub(super) fn nonsense(&mut self, call: &'static str) -> CallFailure {
         self.kill();
         let reason = "its process has lost its way: what it answers makes no sense";
         self.gone = Some(reason.into());
-        UnitFailure::new(call, reason)
+        CallFailure::new(call, reason)
     }
 
-    fn end(&mut self, call: &'static str, silence: &Silence) -> UnitFailure {
+    fn end(&mut self, call: &'static str, silence: &Silence) -> CallFailure {
         let reason = match silence {
             Silence::Ended(status) => ended(*status),
             Silence::Late => {
@@ -227,10 +227,10 @@ impl Process {
         let words = words.map(|words| format!("; its last words: {words}")).unwrap_or_default();
         let reason = reason + &words;
         self.gone = Some(format!("its process is gone: {reason}"));
-        UnitFailure::new(call, reason)
+        CallFailure::new(call, reason)
     }
 
-    /// Returns what the unit said last: about a problem, or else what it printed.
+    /// Returns what the instance said last: about a problem, or else what it printed.
     fn last_words(&self) -> Option<String> {
         let begin = Instant::now();
         while !self.printed.is_over.load(Ordering::SeqCst) && begin.elapsed() < ECHO {
@@ -249,10 +249,10 @@ impl Process {
         let _ = self.child.wait();
     }
 
-    /// Frees the unit and ends the process.
-    fn free(&mut self) -> Result<(), UnitFailure> {
+    /// Frees the instance and ends the process.
+    fn free(&mut self) -> Result<(), CallFailure> {
         self.timeout = self.timeout.min(FAREWELL);
-        // The run ended, by the failure of another unit, before it wanted this answer.
+        // The run ended, by the failure of another instance, before it wanted this answer.
         if let Some(last) = self.pending.take()
             && self.reply(last).is_err()
         {

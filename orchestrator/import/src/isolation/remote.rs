@@ -1,4 +1,4 @@
-//! A unit in a process of its own, as the master sees it.
+//! An instance in a process of its own, as the master sees it.
 //!
 //! Set calls are kept until the next call that needs an answer, and each answer to a step or a get
 //! call brings the values of all lists of variables that were read before: at a communication
@@ -8,7 +8,7 @@
 use super::process::Process;
 use super::protocol::{Action, List, Request, Set};
 use crate::description::Carrier;
-use crate::unit::{CoSimulationUnit, Outcome, UnitFailure};
+use crate::instance::{CallFailure, Instance, Outcome};
 
 /// Number of values that are set or read by one message; longer lists are cut.
 const CHUNK: usize = 4096;
@@ -17,8 +17,8 @@ const PREFETCHED: usize = 1 << 18;
 /// Number of bytes of a text that can be set.
 const TEXT: usize = 1 << 19;
 
-/// A unit in a process of its own.
-pub(crate) struct RemoteUnit {
+/// An instance in a process of its own.
+pub(crate) struct RemoteInstance {
     process: Process,
     /// Calls that wait for the next request, and the number of their values.
     sets: Vec<Set>,
@@ -27,14 +27,15 @@ pub(crate) struct RemoteUnit {
     lists: Vec<List>,
     size: usize,
     /// Lists that could not be read, by their places.
-    unread: Vec<(usize, UnitFailure)>,
-    /// Whether the values of the last answer are those of the lists and still those of the unit.
+    unread: Vec<(usize, CallFailure)>,
+    /// Whether the values of the last answer are those of the lists and still those of the
+    /// instance.
     is_fresh: bool,
     /// Step whose answer was not waited for yet.
     begun: Option<Action>,
 }
 
-impl RemoteUnit {
+impl RemoteInstance {
     pub(super) fn new(process: Process) -> Self {
         Self {
             process,
@@ -94,7 +95,7 @@ impl RemoteUnit {
     }
 
     /// Returns the bytes of the values of a list.
-    fn read(&mut self, carrier: Carrier, references: &[u32]) -> Result<&[u8], UnitFailure> {
+    fn read(&mut self, carrier: Carrier, references: &[u32]) -> Result<&[u8], CallFailure> {
         let is_it = |list: &List| list.carrier == carrier && list.references == references;
         let mut known = self.lists.iter().position(is_it);
         if known.is_none() {
@@ -147,7 +148,7 @@ impl RemoteUnit {
     }
 }
 
-impl CoSimulationUnit for RemoteUnit {
+impl Instance for RemoteInstance {
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
         self.get(Carrier::Real, references, values, f64::from_le_bytes)
     }
@@ -175,7 +176,7 @@ impl CoSimulationUnit for RemoteUnit {
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
         if value.len() > TEXT {
             let message = format!("the text has {} bytes, at most {TEXT} can be set", value.len());
-            return Err(UnitFailure::new("setString", message));
+            return Err(CallFailure::new("setString", message));
         }
         // A long text is sent at once.
         self.set(Set::Text(reference, value.to_string()), 1 + value.len() / 16)

@@ -1,5 +1,5 @@
-//! What the process of a unit may not do under Linux: write to files of others, use the network, or
-//! reach into other processes.
+//! What the process of an instance may not do under Linux: write to files of others, use the
+//! network, or reach into other processes.
 
 use landlock::{
     ABI, AccessFs, PathBeneath, PathFd, Ruleset, RulesetAttr, RulesetCreatedAttr, RulesetError,
@@ -46,7 +46,7 @@ fn close_calls() -> Result<(), Error> {
         Ok(vec![SeccompRule::new(vec![other.map_err(Error::Backend)?]).map_err(Error::Backend)?])
     };
     let refused = BTreeMap::from([
-        // Not even to programs of this machine, which could do what the unit may not.
+        // Not even to programs of this machine, which could do what the instance may not.
         (libc::SYS_socket, Vec::new()),
         // It would open sockets and files past these rules.
         (libc::SYS_io_uring_setup, Vec::new()),

@@ -2,16 +2,16 @@
 //! described, set, stepped and read as other units are.
 
 mod description;
-mod unit;
+mod instance;
 
+pub(crate) use instance::LookupTableInstance;
 use std::fs;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
-pub(crate) use unit::TableUnit;
 
 /// Returns whether a path is that of a table, by its extension.
-pub fn is_table(path: &Path) -> bool {
+pub fn is_lookup_table(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
 }
 
@@ -25,7 +25,7 @@ const LONGEST: f64 = 1e12;
 
 /// The columns of a file over time.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Table {
+pub(crate) struct LookupTable {
     columns: Vec<Column>,
     /// Times of the rows, s, none earlier than the one before.
     times: Arc<Vec<f64>>,
@@ -80,7 +80,7 @@ fn number(text: &str) -> Result<f64, &'static str> {
     text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or("a finite number")
 }
 
-impl Table {
+impl LookupTable {
     /// Reads a table. Its first line names the columns: `time`, and then the outputs as
     /// [`Column::new`] reads them. Lines that begin with `#` are comments.
     ///

@@ -1,7 +1,7 @@
 //! The variables of a table as a unit.
 
-use super::{Column, Form, MOST_PARAMETERS, Table};
-use crate::description::{Interface, Kind, ModelDescription, Variable};
+use super::{Column, Form, LookupTable, MOST_PARAMETERS};
+use crate::description::{Interface, ModelDescription, Variable, VariableKind};
 use crate::quantity::UnitDefinition;
 use std::collections::BTreeSet;
 
@@ -24,7 +24,7 @@ pub(super) enum Place {
     Value(usize),
 }
 
-impl Table {
+impl LookupTable {
     /// Lists what the variables stand for. The position in the list is the value reference.
     pub(super) fn places(&self) -> Vec<Place> {
         let (columns, rows) = (self.columns.len(), self.times.len());
@@ -61,7 +61,7 @@ impl Table {
             }),
             units: units.into_iter().map(unit).collect(),
             dependencies: (0..self.columns.len()).map(|output| (output, Vec::new())).collect(),
-            is_table: true,
+            is_lookup_table: true,
             has_structure: true,
             variables,
             ..ModelDescription::default()
@@ -87,7 +87,7 @@ impl Table {
             }
             Place::Interpolation => (
                 "interpolation".into(),
-                Kind::Enumeration { items: items() },
+                VariableKind::Enumeration { items: items() },
                 start(HOLD.into()),
                 "Course between two rows: the value of the first one, or a straight line. Whole \
                  numbers and truth values are held"
@@ -108,7 +108,7 @@ impl Table {
             Place::Value(index) => {
                 let (column, row) = (&self.columns[index % count], index / count + 1);
                 let kind = column.kind();
-                let start = if kind == Kind::Boolean {
+                let start = if kind == VariableKind::Boolean {
                     Some((self.values[index] != 0.0).to_string())
                 } else {
                     start(self.values[index])
@@ -134,24 +134,24 @@ impl Column {
         if let Form::Real(unit) = &self.form { unit.as_deref() } else { None }
     }
 
-    fn kind(&self) -> Kind {
+    fn kind(&self) -> VariableKind {
         self.form.kind()
     }
 }
 
 impl Form {
-    fn kind(&self) -> Kind {
+    fn kind(&self) -> VariableKind {
         match self {
             Self::Real(unit) => {
-                Kind::Real { unit: unit.clone(), display_unit: None, min: None, max: None }
+                VariableKind::Real { unit: unit.clone(), display_unit: None, min: None, max: None }
             }
-            Self::Integer => Kind::Integer { min: None, max: None },
-            Self::Boolean => Kind::Boolean,
+            Self::Integer => VariableKind::Integer { min: None, max: None },
+            Self::Boolean => VariableKind::Boolean,
         }
     }
 }
 
-fn seconds() -> Kind {
+fn seconds() -> VariableKind {
     Form::Real(Some("s".into())).kind()
 }
 
