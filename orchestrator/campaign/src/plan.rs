@@ -267,7 +267,7 @@ impl Plan {
             .map(|limit| &limit.measure)
             .chain(&self.campaign.keep.by)
             .chain(self.campaign.search.as_ref().map(|search| &search.largest));
-        source.known(referred, "metric or measure", names())?;
+        source.check_names(referred, "metric or measure", names())?;
         for limit in self.campaign.limits.iter().filter(|limit| limit.ends) {
             let measure = self.experiment.observe.metrics.get(limit.measure.get_ref());
             if measure.is_none_or(|measure| measure.kind != experiment::MeasureKind::Largest) {

@@ -89,7 +89,7 @@ pub(crate) fn observe(campaign: &Campaign, own: &Observe) -> Result<Observe, Err
     signals.extend(campaign.signals.clone());
     let known = Metrics::names(own);
     let known = || known.iter().map(String::as_str).filter(|name| !OF_THE_MACHINE.contains(name));
-    source.known(&campaign.metrics, "metric of the experiment", known())?;
+    source.check_names(&campaign.metrics, "metric of the experiment", known())?;
     let mut metrics = BTreeMap::new();
     for name in &campaign.metrics {
         let Some(measure) = own.metrics.get(name.get_ref()) else { continue };
@@ -103,7 +103,11 @@ pub(crate) fn observe(campaign: &Campaign, own: &Observe) -> Result<Observe, Err
         metrics.insert(name.get_ref().clone(), measure.clone());
     }
     for measure in &campaign.measures {
-        source.known([&measure.signals], "list of signals", signals.keys().map(String::as_str))?;
+        source.check_names(
+            [&measure.signals],
+            "list of signals",
+            signals.keys().map(String::as_str),
+        )?;
         let mut measure = measure.clone();
         let id = std::mem::take(&mut measure.id);
         if metrics.contains_key(&id) || known().any(|name| name == id) {

@@ -21,7 +21,7 @@ pub enum Error {
     /// An archive cannot be used.
     #[error(transparent)]
     Import(#[from] fmu_import::error::Error),
-    /// An instance failed in a call.
+    /// A call of an instance failed.
     #[error("{component} failed at t = {} s in {}: {}", rounded(*time), failure.call, failure.message)]
     Call {
         /// Name of the component in the experiment.
@@ -43,7 +43,7 @@ pub enum Error {
     },
     /// A deadline was missed in a run that was to end in this case.
     #[error(
-        "{component} missed its deadline at t = {} s by {late_ms:.3} ms, which was to end the run (--on-miss stop)",
+        "{component} missed its deadline at t = {} s by {late_ms:.3} ms, which ends the run, as --on-miss stop asks",
         rounded(*time)
     )]
     Deadline {

@@ -1,5 +1,5 @@
-//! Steps FMI 2.0 instances as an experiment file describes. This crate knows instances only; the
-//! experiment says what their variables stand for.
+//! Steps FMI 2.0 instances as an experiment file describes. What their variables stand for is known
+//! to the experiment alone.
 //!
 //! An [`experiment`] is read ([`document`]) and [checked](mod@check) once, from the top down, into
 //! a [`system::System`] (`wiring`, `settings`, [`delay`]). After this no name is looked up. The

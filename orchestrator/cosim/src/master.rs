@@ -6,7 +6,7 @@
 //! is set and stepped. With sequential coupling this is done instance by instance, so that outputs
 //! which respond to inputs, such as the moment of a controller, are handed on at once: they are
 //! read after the step for which the inputs were set. All other outputs are those that were read
-//! when the instance came to t_k, even if it has been stepped since. So nothing shows of an
+//! when the instance came to t_k, even if it has been stepped since. So no value shows an
 //! instance's future, and an instance that steps at every n-th tick only is stepped when its
 //! interval begins.
 
@@ -57,7 +57,7 @@ pub trait Observer {
 /// Index of an instance whose call failed, with the failure.
 type Culprit = (usize, CallFailure);
 
-/// The instances with their connections, which are ready to run.
+/// The instances with their connections, ready to run.
 pub struct Master {
     clock: Clock,
     coupling: Coupling,
@@ -132,7 +132,8 @@ impl Master {
         (self.members, self.spent) = members
             .map(|Member { name, every, instance, .. }| {
                 let (instance, spent) = Stopwatch::new(instance, Rc::clone(timer));
-                // What two instances compute at the same time could not be told apart.
+                // Computing times of two instances that work at the same time could not be told
+                // apart.
                 (Member { name, every, ahead: false, instance: Box::new(instance) }, spent)
             })
             .unzip();
@@ -254,7 +255,7 @@ impl Master {
         Ok(())
     }
 
-    /// Does the round of this tick, which must follow the last one; tick 0 follows initialization.
+    /// Does the steps of this tick, which must follow the last one; tick 0 follows initialization.
     /// Returns the probed values at this tick, in the order in which the probes were requested.
     ///
     /// # Errors
@@ -327,8 +328,8 @@ impl Master {
         inputs.scatter(self.members[index].instance.as_mut()).map_err(|failure| (index, failure))
     }
 
-    /// Begins the step of an instance at this tick. Only one in a process of its own is not
-    /// finished yet then.
+    /// Begins the step of an instance at this tick. Only an instance in a process of its own still
+    /// computes when this returns.
     fn begin(&mut self, index: usize, tick: u64) -> Result<(), Culprit> {
         self.stepping[index] = true;
         if !self.members[index].ahead {

@@ -20,7 +20,9 @@ pub fn metadata(
     let simulation = &experiment.simulation;
     let seeds: BTreeMap<String, &Value> = parameters
         .iter()
-        .flat_map(|(component, own)| own.iter().map(move |(name, value)| (component, name, value)))
+        .flat_map(|(component, values)| {
+            values.iter().map(move |(name, value)| (component, name, value))
+        })
         .filter(|(_, name, _)| is_seed(name))
         .map(|(component, name, value)| (format!("{component}.{name}"), value))
         .collect();

@@ -94,7 +94,7 @@ pub(crate) fn resolve(
 }
 
 /// Returns the position of a variable that may be set, among the variables of its component. With
-/// `is_whole` a hint names it together with the component.
+/// `is_whole` a hint names the component as well.
 pub(crate) fn position(
     name: &str,
     component: usize,
@@ -103,11 +103,11 @@ pub(crate) fn position(
     is_whole: bool,
 ) -> Result<usize, String> {
     let (position, variable) = part.description.find(name).ok_or_else(|| {
-        let known = part.description.names("parameter").chain(part.description.names("input"));
-        let known: Vec<&str> = known.collect();
-        let hint = match names::nearest(name, known.iter().copied()) {
+        let names = part.description.names("parameter").chain(part.description.names("input"));
+        let names: Vec<&str> = names.collect();
+        let hint = match names::nearest(name, names.iter().copied()) {
             Some(near) if is_whole => format!("; did you mean \"{}.{near}\"?", part.name),
-            _ => names::hint(name, known.iter().copied()),
+            _ => names::hint(name, names.iter().copied()),
         };
         format!("there is no such parameter{hint}")
     })?;
@@ -127,7 +127,7 @@ pub(crate) fn value(
     variable: &Variable,
     part: Part,
 ) -> Result<SettingValue, String> {
-    let mismatch = |wanted: &str| Err(format!("wants {wanted}, not {written}"));
+    let mismatch = |expected: &str| Err(format!("must be {expected}, not {written}"));
     match (&variable.kind, written) {
         (VariableKind::Real { unit, min, max, .. }, _) => {
             let value = match written {
@@ -136,7 +136,7 @@ pub(crate) fn value(
                 Value::String(text) => {
                     quantity::convert(text, unit.as_deref(), &part.description.units)?
                 }
-                _ => return mismatch("a number, or text with a number and a unit"),
+                _ => return mismatch("a number, or a text with a number and a unit"),
             };
             let unit = unit.as_ref().map(|unit| format!(" {unit}")).unwrap_or_default();
             if let Some(min) = min.filter(|min| value < *min) {
@@ -162,15 +162,15 @@ pub(crate) fn value(
             .find(|(name, _)| name == text)
             .map(|(name, value)| SettingValue::Item(name.clone(), *value))
             .ok_or_else(|| {
-                let known: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
-                format!("has no item \"{text}\"{}", names::hint(text, known.iter().copied()))
+                let names: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
+                format!("has no item \"{text}\"{}", names::hint(text, names.iter().copied()))
             }),
         (VariableKind::Enumeration { items }, _) => {
-            let known: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
-            mismatch(&format!("the name of an item ({})", known.join(", ")))
+            let names: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
+            mismatch(&format!("the name of an item ({})", names.join(", ")))
         }
         (VariableKind::String, Value::String(text)) => Ok(SettingValue::Text(text.clone())),
-        (VariableKind::String, _) => mismatch("text"),
+        (VariableKind::String, _) => mismatch("a text"),
     }
 }
 

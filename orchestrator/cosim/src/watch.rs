@@ -1,5 +1,5 @@
 //! Watches the values that an instance gives. A value that is not finite, no item of its
-//! enumeration, or neither true nor false would otherwise spread through the loop and pass for a
+//! enumeration, or neither true nor false would otherwise spread through the loop and look like a
 //! result.
 
 use fmu_import::description::{Carrier, Variable, VariableKind};
@@ -29,7 +29,7 @@ pub enum OnInvalid {
 pub(crate) struct Watched {
     instance: Box<dyn Instance>,
     name: String,
-    /// FMU of the instance, which knows the names of the variables.
+    /// FMU of the instance, with the names of the variables.
     fmu: Rc<Fmu>,
     /// Value references of the enumerations, sorted, with the values of their items.
     items: Vec<(u32, Vec<i32>)>,
@@ -75,15 +75,19 @@ impl Watched {
         value: &str,
         what: &str,
     ) -> Outcome {
-        let is_meant = |known: &&Variable| {
-            (Carrier::of(&known.kind), known.reference) == (Some(carrier), reference)
+        let is_meant = |variable: &&Variable| {
+            (Carrier::for_kind(&variable.kind), variable.reference) == (Some(carrier), reference)
         };
-        let known = self.fmu.description.variables.iter().find(is_meant);
-        let variable = known
-            .map_or_else(|| format!("variable {reference}"), |known| format!("\"{}\"", known.name));
+        let variable = self.fmu.description.variables.iter().find(is_meant).map_or_else(
+            || format!("variable {reference}"),
+            |variable| format!("\"{}\"", variable.name),
+        );
         if !self.warns {
-            let remedy = "--on-invalid warn lets the run go on";
-            return Err(CallFailure::new(call, format!("{variable} is {value}, {what}; {remedy}")));
+            let remedy = "with --on-invalid warn the run continues";
+            return Err(CallFailure::new(
+                call,
+                format!("{variable} is {value}, which is {what}; {remedy}"),
+            ));
         }
         warnings::warn(&format!("{}: {variable} is {what}", self.name));
         Ok(())

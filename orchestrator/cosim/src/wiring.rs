@@ -118,7 +118,7 @@ impl<'a> Reference<'a> {
 }
 
 pub(crate) fn port(component: usize, position: usize, variable: &Variable) -> Option<Port> {
-    let carrier = Carrier::of(&variable.kind)?;
+    let carrier = Carrier::for_kind(&variable.kind)?;
     Some(Port { component, variable: position, reference: variable.reference, carrier })
 }
 

@@ -1,4 +1,4 @@
-//! Says which instance and which call it was when an instance in this process ends the process.
+//! Names the instance and the call when an instance ends the process that it runs in.
 
 #![allow(unsafe_code)]
 
@@ -7,8 +7,8 @@ use std::marker::PhantomData;
 
 thread_local! {
     /// Name of the instance that this thread calls, and name of the call; `None` between calls. A
-    /// constant initialiser keeps the access free of locks and allocation, as in a signal handler
-    /// nothing else is allowed.
+    /// constant initialiser keeps the access free of locks and allocation, which a signal handler
+    /// must not use.
     static CURRENT: Cell<Option<(*const str, &'static str)>> = const { Cell::new(None) };
 }
 
@@ -16,7 +16,7 @@ thread_local! {
 pub(crate) struct Calling<'a>(PhantomData<&'a str>);
 
 impl<'a> Calling<'a> {
-    /// Says that this thread makes this call to the instance of this name.
+    /// Records that this thread makes this call of the instance with this name.
     #[inline]
     pub(crate) fn new(instance: &'a str, call: &'static str) -> Self {
         CURRENT.set(Some((instance, call)));
@@ -62,7 +62,7 @@ pub fn watch() {
     unsafe { libc::atexit(on_exit) };
 }
 
-/// Watches for nothing: nothing is known of this system.
+/// Does nothing, because such signals are not supported on this system.
 #[cfg(not(any(unix, windows)))]
 pub fn watch() {}
 
@@ -79,13 +79,13 @@ const SIGNALS: &[(libc::c_int, &str)] = &[
 /// Ends the process. The code of `abort` would be that of a run in which the attitude is lost.
 #[cfg(windows)]
 extern "C" fn on_signal(signal: libc::c_int) {
-    let known = SIGNALS.iter().find(|(known, _)| *known == signal);
-    tell(known.map_or("a signal", |(_, name)| name));
+    let entry = SIGNALS.iter().find(|(number, _)| *number == signal);
+    tell(entry.map_or("a signal", |(_, name)| name));
     // SAFETY: this ends the process at once.
     unsafe { libc::_exit(1) };
 }
 
-/// The handlers that were there before: Rust's own tells of a stack that is used up.
+/// The previous handlers. That of Rust reports a stack overflow.
 #[cfg(unix)]
 static mut PREVIOUS: [std::mem::MaybeUninit<libc::sigaction>; SIGNALS.len()] =
     [const { std::mem::MaybeUninit::zeroed() }; SIGNALS.len()];
@@ -99,16 +99,17 @@ extern "C" fn on_signal(
     information: *mut libc::siginfo_t,
     _context: *mut libc::c_void,
 ) {
-    for (place, (known, name)) in SIGNALS.iter().enumerate() {
-        if *known == signal {
+    for (place, (number, name)) in SIGNALS.iter().enumerate() {
+        if *number == signal {
             tell(name);
             // SAFETY: the handler was stored by `watch`, and the system passes the information.
             let code = unsafe {
                 libc::sigaction(signal, (&raw const PREVIOUS[place]).cast(), std::ptr::null_mut());
                 (*information).si_code
             };
-            // An instruction that made the signal is run again and meets the former handler. A
-            // signal that was sent comes once, and must be sent again. (Only Linux tells which.)
+            // A faulty instruction is run again and meets the former handler. A signal that was
+            // sent by a process comes only once, and must be sent again. (Only Linux tells them
+            // apart.)
             if code <= 0 || !cfg!(target_os = "linux") {
                 // SAFETY: the number is that of a signal. It is delivered when this returns.
                 unsafe { libc::raise(signal) };
@@ -126,7 +127,8 @@ extern "C" fn on_exit() {
     }
 }
 
-/// Writes which instance is being called, with system calls only. Returns whether there is one.
+/// Writes which instance is being called, with system calls only. Returns whether one is being
+/// called.
 #[cfg(any(unix, windows))]
 fn tell(what: &str) -> bool {
     let Some((instance, call)) = CURRENT.get() else { return false };
@@ -139,10 +141,11 @@ fn tell(what: &str) -> bool {
         call,
         " (",
         what,
-        "); with --isolate the run would go on to its end in order\n",
+        "); with --isolate the run would end in order and keep its results\n",
     ];
     for part in parts {
-        // SAFETY: pointer and length are those of the text. Nobody can be told of a failure.
+        // SAFETY: pointer and length are those of the text. There is nobody left to tell of a
+        // failure.
         unsafe { libc::write(2, part.as_ptr().cast(), part.len() as _) };
     }
     true

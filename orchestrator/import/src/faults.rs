@@ -1,5 +1,5 @@
-//! Faults of a model description that do not keep it from being read. Units run with most of them,
-//! but not everywhere, and not always as intended.
+//! Faults of a model description that do not keep it from being read. FMUs run with most of them,
+//! but not in every importer, and not always as intended.
 
 use crate::description::{
     CAUSALITIES, Carrier, ModelDescription, VARIABILITIES, Variable, VariableKind,
@@ -22,10 +22,10 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
         .as_ref()
         .is_some_and(|interface| interface.has("needsExecutionTool"))
     {
-        faults.push("needs the tool that made it on this machine (needsExecutionTool)".to_string());
+        faults.push("needs the program that exported it to be installed on this machine (needsExecutionTool)".to_string());
     }
     if !description.has_structure {
-        faults.push("has no ModelStructure, which says what the outputs are".to_string());
+        faults.push("has no ModelStructure, which lists the outputs".to_string());
     }
     let units: BTreeSet<&str> = description.units.iter().map(|unit| unit.name.as_str()).collect();
     let (mut names, mut handles) = (HashSet::new(), HashMap::new());
@@ -37,7 +37,7 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
         // Other variables may share a reference as aliases. Of two that are both set, the later one
         // would overwrite the first.
         if matches!(&*variable.causality, "input" | "parameter") {
-            let handle = (variable.reference, Carrier::of(&variable.kind));
+            let handle = (variable.reference, Carrier::for_kind(&variable.kind));
             if let Some(other) = handles.insert(handle, name) {
                 faults.push(format!(
                     "\"{other}\" and \"{name}\" have the same value reference {}",
@@ -45,12 +45,12 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
                 ));
             }
         }
-        of_variable(variable, &units, &mut faults);
+        check_variable(variable, &units, &mut faults);
     }
     faults
 }
 
-fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<String>) {
+fn check_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<String>) {
     let Variable { name, causality, variability, kind, .. } = variable;
     if !CAUSALITIES.contains(&&**causality) {
         faults.push(format!(
@@ -111,9 +111,9 @@ fn start_fault(start: &str, kind: &VariableKind) -> Option<String> {
         VariableKind::Boolean => (!matches!(start, "true" | "false" | "1" | "0"))
             .then(|| "is neither true nor false".into()),
         VariableKind::Enumeration { items } => {
-            let known =
+            let is_item =
                 start.parse::<i32>().is_ok_and(|value| items.iter().any(|item| item.1 == value));
-            (!known).then(|| "is no item of its type".into())
+            (!is_item).then(|| "is no item of its type".into())
         }
         VariableKind::String => None,
     }
@@ -138,8 +138,8 @@ mod tests {
 
     #[test]
     fn each_fault_is_named_by_its_variable() {
-        let of = |text: &str| faults(&ModelDescription::parse(text).unwrap());
-        assert_eq!(of(GOOD), Vec::<String>::new());
+        let faults_of = |text: &str| faults(&ModelDescription::parse(text).unwrap());
+        assert_eq!(faults_of(GOOD), Vec::<String>::new());
         for (from, to, fault) in [
             (
                 "start=\"1\"/></ScalarVariable>\n    <ScalarVariable name=\"n\"",
@@ -186,13 +186,13 @@ mod tests {
             (
                 "modelIdentifier=\"a\"",
                 "modelIdentifier=\"a\" needsExecutionTool=\"true\"",
-                "needs the tool that made it",
+                "needs the program that exported it",
             ),
         ] {
             let text = GOOD.replacen(from, to, 1);
             assert_ne!(text, GOOD, "{from}");
-            let found = of(&text);
-            assert!(found.len() == 1 && found[0].starts_with(fault), "{fault}: {found:?}");
+            let listed = faults_of(&text);
+            assert!(listed.len() == 1 && listed[0].starts_with(fault), "{fault}: {listed:?}");
         }
     }
 }

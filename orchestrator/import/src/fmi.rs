@@ -26,12 +26,12 @@ pub(crate) fn status(code: c_int) -> Result<Status, c_int> {
 /// Formats the status that a call returned.
 pub(crate) fn name_of(status: Result<Status, c_int>) -> String {
     match status {
-        Ok(known) => format!("{known:?}"),
+        Ok(status) => format!("{status:?}"),
         Err(code) => format!("status {code}, which FMI 2.0 does not have"),
     }
 }
 
-/// Pointer to an instance, fmi2Component.
+/// Pointer to an instance, which FMI calls fmi2Component.
 pub(crate) type Handle = *mut c_void;
 /// Pointer to a C string that ends with a zero byte.
 pub(crate) type Text = *const c_char;

@@ -1,5 +1,5 @@
-//! The interface between the master and a co-simulation instance, which may be an FMU or a mock in
-//! a test.
+//! The interface between the master and an instance, which may be that of an FMU, a lookup table,
+//! or a mock in a test.
 
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -11,7 +11,7 @@ pub struct CallFailure {
     pub ends: bool,
     /// Name of the call, for example `doStep`.
     pub call: Cow<'static, str>,
-    /// Message of the instance, or its status if it gave none.
+    /// Message of the instance, or its status if there is none.
     pub message: String,
 }
 
@@ -25,9 +25,9 @@ impl CallFailure {
 /// Outcome of a call to an instance.
 pub type Outcome = Result<(), CallFailure>;
 
-/// An instance that is set, stepped and read by value references, in the order that FMI 2.0
-/// prescribes. Booleans are transferred as 0 and 1, and enumerations as the values of their items.
-/// All slices of one call have the same length.
+/// A running copy of an FMU. It is set, stepped and read by value references, in the order that FMI
+/// 2.0 prescribes. Booleans are transferred as 0 and 1, and enumerations as the values of their
+/// items. All slices of one call have the same length.
 pub trait Instance {
     /// Reads real variables.
     ///
@@ -93,8 +93,7 @@ pub trait Instance {
     /// # Errors
     /// Returns an error if the instance reports a failure.
     fn terminate(&mut self) -> Outcome;
-    /// Sets all variables back to their start values, so that the instance is as if it had just
-    /// been instantiated.
+    /// Sets all variables back to their start values, so that the instance is as if it were new.
     ///
     /// # Errors
     /// Returns an error if the instance reports a failure.

@@ -1,7 +1,7 @@
-//! Imports FMI 2.0 units. An [`fmu::Fmu`] is unpacked ([`archive`]), its description is read
-//! ([`description`], [`xml`], [`quantity`]), and the description is searched for [`faults`]. Units
-//! that are instantiated from it are called through the trait [`unit::Instance`]. A [`table`] is a
-//! unit, too.
+//! Imports FMI 2.0 FMUs. An [`fmu::Fmu`] is unpacked ([`archive`]), its description is read
+//! ([`description`], [`xml`], [`quantity`]), and the description is searched for [`faults`]. Its
+//! instances are called through the trait [`instance::Instance`]. A [`lookup_table`] is opened and
+//! called in the same way.
 
 pub mod archive;
 pub mod crash;

@@ -1,7 +1,7 @@
 //! Calls an FMU's library.
 //!
 //! The logger that expands `printf` arguments comes from `fmi-rs`. The calls go through libloading,
-//! because `fmi-rs` frees the callback structure after fmi2Instantiate, while instances of several
+//! because `fmi-rs` frees the callback structure after fmi2Instantiate, while FMUs of several
 //! exporters keep the pointer to it and crash when they log. The C types are in [`fmi`], because
 //! those of `fmi-rs` represent a status as an enumeration.
 
@@ -21,7 +21,7 @@ unsafe extern "C" {
     /// Wraps the logger in a C function that expands the `printf` arguments of a message. It is
     /// part of `fmi-rs`.
     fn add_logger_proxy(functions: *mut fmi::Callbacks);
-    /// The C library's `calloc`, for instances that request memory from their environment.
+    /// The C library's `calloc`, for FMUs that request memory from their environment.
     fn calloc(count: usize, size: usize) -> *mut c_void;
     /// The C library's `free`, which releases that memory.
     fn free(memory: *mut c_void);
@@ -45,7 +45,7 @@ pub(crate) struct Functions {
     do_step: fmi::DoStep,
     get_real_status: fmi::GetStatus<f64>,
     get_boolean_status: fmi::GetStatus<c_int>,
-    /// Optional, because nothing depends on it and some instances lack it.
+    /// Optional, because nothing depends on it and some libraries lack it.
     get_version: Option<fmi::GetText>,
     /// Optional, because a new instance does the same.
     reset: Option<fmi::Plain>,
@@ -91,9 +91,9 @@ impl Functions {
         };
         // SAFETY: FMI 2.0 gives the function this type and allows the call at any time.
         let version = text_of(unsafe { get_version() });
-        let is_known = version == "2.0" || version.starts_with("2.0.");
-        (!is_known)
-            .then(|| format!("its library says that it is of FMI \"{}\"", version.escape_default()))
+        let is_supported = version == "2.0" || version.starts_with("2.0.");
+        (!is_supported)
+            .then(|| format!("its library reports version \"{}\" of FMI", version.escape_default()))
     }
 }
 
@@ -122,14 +122,14 @@ unsafe extern "C" fn receive_message(
     }
 }
 
-/// The data that must live as long as an instance's instance.
+/// The data that must live as long as an instance.
 struct InstanceData {
     functions: Functions,
     _callbacks: Rc<fmi::Callbacks>,
     log: Rc<Log>,
 }
 
-/// A co-simulation instance that was instantiated from an FMU.
+/// An instance of an FMU, in this process.
 pub(crate) struct FmuInstance {
     handle: fmi::Handle,
     data: Rc<InstanceData>,
@@ -138,8 +138,8 @@ pub(crate) struct FmuInstance {
 }
 
 impl FmuInstance {
-    /// Instantiates a co-simulation instance that is called as its log says. `folder` holds the
-    /// unpacked archive, if it would vanish otherwise.
+    /// Makes an instance with the name in its log. `folder` holds the unpacked archive, if it would
+    /// vanish otherwise.
     pub(crate) fn new(
         functions: Functions,
         log: Rc<Log>,
@@ -147,12 +147,13 @@ impl FmuInstance {
         resources: &str,
         folder: Option<Rc<TemporaryFolder>>,
     ) -> Result<Self, String> {
-        let text =
-            |text: &str| CString::new(text).map_err(|_| format!("\"{text:?}\" holds a zero byte"));
+        let text = |text: &str| {
+            CString::new(text).map_err(|_| format!("\"{text:?}\" contains a zero byte"))
+        };
         let (name, guid, resources) = (text(&log.component)?, text(guid)?, text(resources)?);
 
-        // Some instances refuse to start without memory functions although they declare that they
-        // need none.
+        // Some FMUs refuse to start without memory functions although they declare that they need
+        // none.
         let mut callbacks = fmi::Callbacks {
             logger: receive_message,
             allocate: Some(calloc),
@@ -181,15 +182,16 @@ impl FmuInstance {
         };
         drop(calling);
         if handle.is_null() {
-            let message = log.take().unwrap_or_else(|| "fmi2Instantiate gave no instance".into());
-            return Err(format!("could not be made of it: {message}"));
+            let message =
+                log.take().unwrap_or_else(|| "fmi2Instantiate returned no instance".into());
+            return Err(format!("could not be instantiated: {message}"));
         }
         log.is_instantiated();
         let data = Rc::new(InstanceData { functions, _callbacks: callbacks, log });
         Ok(Self { handle, data, fatal: false, _folder: folder })
     }
 
-    /// Makes a call, and names it meanwhile to who asks what a crash came from.
+    /// Makes a call, whose name is recorded meanwhile in case it crashes.
     #[inline]
     fn call(
         &mut self,
@@ -206,8 +208,8 @@ impl FmuInstance {
     }
 
     fn call_plain(&mut self, call: &'static str, function: fmi::Plain) -> Outcome {
-        // SAFETY: the instance is alive until the instance is dropped, and the function is one of
-        // its library with the type that FMI gives it.
+        // SAFETY: the instance is alive until this value is dropped, and the function is one of its
+        // library with the type that FMI gives it.
         self.call(call, |_, handle| unsafe { function(handle) })
     }
 
@@ -219,15 +221,15 @@ impl FmuInstance {
             return self.discarded(said);
         }
         if status == Ok(Status::Pending) {
-            let message = "it wants to step asynchronously, which is not supported";
+            let message = "the step is asynchronous, which is not supported";
             return CallFailure::new(call, format!("{message} ({:?})", Status::Pending));
         }
-        let said = said.unwrap_or_else(|| "no message in its log".into());
+        let said = said.unwrap_or_else(|| "its log holds no message".into());
         CallFailure::new(call, format!("{said} ({})", fmi::name_of(status)))
     }
 
-    /// Describes why a step was discarded. FMI 2.0, section 4.2.3, lets an instance end the
-    /// simulation in this way.
+    /// Describes why a step was discarded. FMI 2.0, section 4.2.3, lets an FMU end the simulation
+    /// in this way.
     fn discarded(&mut self, said: Option<String>) -> CallFailure {
         let Functions { get_real_status, get_boolean_status, .. } = self.data.functions;
         let (mut time, mut terminated) = (f64::NAN, fmi::FALSE);
@@ -245,7 +247,7 @@ impl FmuInstance {
         let ends = knows_end && terminated != fmi::FALSE;
         let mut parts: Vec<String> = said.into_iter().collect();
         if !ends && parts.is_empty() {
-            parts.push("no message in its log".into());
+            parts.push("its log holds no message".into());
         }
         if knows_time && time.is_finite() {
             parts.push(format!("it got as far as t = {time} s"));
@@ -309,7 +311,7 @@ impl Instance for FmuInstance {
 
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
         let text = CString::new(value).map_err(|_| {
-            CallFailure::new("setString", format!("the text {value:?} holds a zero byte"))
+            CallFailure::new("setString", format!("the text {value:?} contains a zero byte"))
         })?;
         let (references, values) = ([reference], [text.as_ptr()]);
         call_with_values!(self, set_string, "setString", references, values, values.as_ptr())

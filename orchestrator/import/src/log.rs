@@ -9,8 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Largest number of messages of an instance that are printed in a second, or held until somebody
-/// takes them.
+/// Largest number of messages of an instance that are printed in a second, or held until they are
+/// taken.
 const MOST: u64 = 100;
 /// Largest number of bytes of a message.
 const LONGEST: usize = 2000;
@@ -23,7 +23,7 @@ pub(crate) struct Said {
     pub(crate) text: String,
 }
 
-/// Forwards an FMU's log messages, and keeps the last one that reports a problem.
+/// Forwards the log messages of an instance, and stores the last one that reports a problem.
 pub(crate) struct Log {
     pub(crate) component: String,
     last: Mutex<Option<String>>,
@@ -47,7 +47,7 @@ enum Sink {
 #[derive(Default)]
 pub(crate) struct Held(Mutex<(Vec<Said>, u64)>);
 
-/// Messages of the second that is running.
+/// Number of messages in the current second.
 #[derive(Default)]
 struct Pace {
     since: Option<Instant>,
@@ -116,7 +116,7 @@ impl Log {
         }
     }
 
-    /// Says that the instance is instantiated.
+    /// Records that the instance is made.
     pub(crate) fn is_instantiated(&self) {
         self.instantiates.store(false, Ordering::Relaxed);
     }

@@ -1,12 +1,12 @@
-//! Collects the warnings of instances during a run: each is printed once, at the end, with the time
-//! at which it first came and the number of times it came.
+//! Collects the warnings of instances during a run. Each is printed once, at the end, with the time
+//! at which it first came and with its count.
 
 use parking_lot::Mutex;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
-/// Largest number of different warnings that are collected, in case an instance never says the same
-/// twice.
+/// Largest number of different warnings that are collected, in case an instance never repeats
+/// itself.
 const MOST: usize = 100;
 
 /// A warning of an instance, in its own words.

@@ -106,7 +106,7 @@ fn what_is_wrong_with_a_library_is_told_by_its_entry() {
     let misnamed = message_with(&Recipe { name: "other.so", ..Recipe::default() });
     assert!(
         misnamed.ends_with(
-            "has no binaries/linux64/model.so, which its model identifier asks for; there is: other.so"
+            "has no binaries/linux64/model.so, which its model identifier names; the folder holds: other.so"
         ),
         "{misnamed}"
     );
@@ -122,7 +122,7 @@ fn what_is_wrong_with_a_library_is_told_by_its_entry() {
     );
     let torn =
         message_with(&Recipe { library: &|bytes| bytes[..200].to_vec(), ..Recipe::default() });
-    assert!(torn.contains("binaries/linux64/model.so is no sound library"), "{torn}");
+    assert!(torn.contains("binaries/linux64/model.so is damaged or not a library"), "{torn}");
     let without = message_with(&Recipe { flags: &["-Dfmi2DoStep=step"], ..Recipe::default() });
     assert!(
         without.contains("binaries/linux64/model.so: undefined symbol: fmi2DoStep"),
@@ -193,16 +193,16 @@ fn doubtful_fmus_are_warned_of_and_checked() {
     let expected = "Model.fmu: the causality \"paramter\" of \"flag\" is not known\n\
                     Model.fmu: the unit \"knots\" of \"speed\" is not defined\n\
                     Model.fmu: the start value \"fast\" of \"speed\" is not a number\n\
-                    Model.fmu: its library says that it is of FMI \"1.0\"\n";
+                    Model.fmu: its library reports version \"1.0\" of FMI\n";
     assert_eq!((code, text.as_str()), (1, expected));
     assert_eq!(errors, "error: Model.fmu: 4 faults\n");
     let (code, _, errors) = bench.run(&["--quiet"]);
     assert_eq!(code, 0, "{errors}");
     assert!(
-        errors.contains("\"flag\" is not known (2 more: orchestrator inspect --check)"),
+        errors.contains("\"flag\" is not known (2 more, which orchestrator inspect --check lists)"),
         "{errors}"
     );
-    assert_eq!(errors.matches("its library says that it is of FMI \"1.0\"").count(), 1, "{errors}");
+    assert_eq!(errors.matches("its library reports version \"1.0\" of FMI").count(), 1, "{errors}");
     let (_, text, _) = bench.call(&["inspect", "Model.fmu"]);
     assert!(text.contains("\nparamter (1)\n"), "{text}");
 
@@ -252,7 +252,10 @@ fn values_that_are_none_end_the_run() {
         let bench = Bench::made(&recorded, &Recipe { flags: &[flag], ..Recipe::default() });
         let (code, _, errors) = bench.run(&["--quiet"]);
         assert_eq!(code, 1, "{flag}: {errors}");
-        assert!(errors.contains(&format!("{place} is {value}, {what}")), "{flag}: {errors}");
+        assert!(
+            errors.contains(&format!("{place} is {value}, which is {what}")),
+            "{flag}: {errors}"
+        );
         assert_eq!(
             fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(),
             3

@@ -86,7 +86,7 @@ const CONTENTS: &[(&str, Change, &str)] = &[
     ("attribute twice", |e| change(e, "fmiVersion=", b"fmiVersion=\"2.0\" fmiVersion="), ""),
     ("entities of entities", entities, "modelDescription.xml"),
     ("deep nesting", nesting, "modelDescription.xml"),
-    ("no library", |e| drop(e.remove(1)), "has no binary for linux64"),
+    ("no library", |e| drop(e.remove(1)), "has no library for linux64"),
     ("library for Windows", |e| e[1].0 = "binaries/win64/model.dll".into(), "linux64"),
     ("empty library", |e| e[1].1.clear(), "binaries/linux64/model.so"),
     ("library of text", |e| e[1].1 = b"#!/bin/sh\n".to_vec(), "binaries/linux64/model.so"),

@@ -95,7 +95,11 @@ none = { kind = "mean", signals = "none", optional = true }
             "out = [\"gain.output.direct\", \"plant.steps\"]",
             "mixes signals in",
         ),
-        ("steps = true", "every = 0", "[observe.metrics.mean_square] every = 0: at least 1"),
+        (
+            "steps = true",
+            "every = 0",
+            "[observe.metrics.mean_square] every = 0: it must be at least 1",
+        ),
         (
             "ratio = { kind",
             "samples = { kind",
@@ -104,7 +108,7 @@ none = { kind = "mean", signals = "none", optional = true }
         (
             "ratio = { kind",
             "ratio = { id = \"share\", kind",
-            "[observe.metrics.ratio] id = \"share\": the key is the name",
+            "[observe.metrics.ratio] id = \"share\": leave it out, the key is the name",
         ),
         (
             "reference = \"plant.",

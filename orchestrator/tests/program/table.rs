@@ -140,5 +140,5 @@ fn a_table_can_be_looked_at_but_not_packed_for_other_tools() {
     assert_eq!(bench.call(&["inspect", "--check", "drive.csv"]), (0, String::new(), String::new()));
     let (code, _, errors) = bench.call(&["pack", "loop.toml", "--ssp"]);
     assert_eq!(code, 2);
-    assert!(errors.contains("[components.drive] is a table"), "{errors}");
+    assert!(errors.contains("[components.drive] is a lookup table"), "{errors}");
 }

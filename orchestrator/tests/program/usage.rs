@@ -116,7 +116,7 @@ fn an_fmu_is_exchanged_from_the_command_line() {
     assert_eq!(metadata["components"]["gain"]["set"]["amplification"], 0.5);
     for (assignment, told) in [
         ("gian=mine/My.fmu", "did you mean \"gain\""),
-        ("mine/My.fmu", "wants component=file"),
+        ("mine/My.fmu", "expected component=file"),
         ("gain=mine/Me.fmu", "there is no file \"mine/Me.fmu\""),
         ("gain=Modle.fmu", "did you mean \"Model.fmu\""),
     ] {
@@ -209,16 +209,16 @@ fn wrong_settings_are_refused() {
     let bench = Bench::new();
     for (setting, remedy) in [
         ("gain.gian=1", "did you mean \"gain.gain\""),
-        ("noise.seed=1", "of which component? Write gain.noise.seed or plant.noise.seed"),
+        ("noise.seed=1", "the component is missing: write gain.noise.seed or plant.noise.seed"),
         ("palnt.gain=1", "did you mean \"plant.gain\""),
         ("gain.seed=1", "did you mean \"gain.noise.seed\""),
         ("gain.kind=ruogh", "did you mean \"rough\""),
         ("gain.kind=2", "the name of an item (calm, rough)"),
-        ("gain.gain=1 m/s", "measure different things"),
+        ("gain.gain=1 m/s", "measure different quantities"),
         ("gain.gain=1 mmm", "did you mean \"mm\""),
         ("gain.gain=2000", "above its maximum 1000"),
         ("gain.fail.status=7", "not between 2 and 4"),
-        ("gain.flag=1", "wants true or false"),
+        ("gain.flag=1", "must be true or false"),
         ("gain.steps=1", "is of causality output"),
         ("gain.input=1", "is an input with a connection"),
     ] {

@@ -21,7 +21,7 @@ pub struct Observe {
     /// Names of the metrics that the summary prints, in this order.
     #[serde(default)]
     pub summary: Vec<String>,
-    /// Variables in which a unit reports whether it guarantees that limits are kept.
+    /// Variables in which a component reports whether it guarantees that limits are kept.
     #[serde(default)]
     pub guarantee: Option<Guarantee>,
     /// Condition under which a run counts as lost.
@@ -54,7 +54,7 @@ pub struct Measure {
     /// has grown.
     #[serde(default)]
     pub each: Option<String>,
-    /// Number n, if only every n-th communication point is used, counted from the start.
+    /// Number n, if only every n-th communication point from the start is used.
     #[serde(default = "super::one")]
     pub every: u32,
     /// Whether only those communication points are used at which a step begins, which are all but
@@ -73,7 +73,7 @@ pub struct Measure {
     /// Name of the metric that is the limit of this one.
     #[serde(default)]
     pub limit: Option<String>,
-    /// Whether the number may be null because the units lack a variable.
+    /// Whether the number may be null because the FMUs lack a variable.
     #[serde(default)]
     pub optional: bool,
     /// Whether the number is a computing time, which differs from run to run.
@@ -123,7 +123,7 @@ pub enum MeasureKind {
     Rises,
     /// Total variation: sum over the signals of the magnitudes of all changes.
     Variation,
-    /// Root mean square of what the signals contain above `frequency`, over all signals, by the
+    /// Root mean square of the signals' content above `frequency`, over all signals, by the
     /// discrete Fourier transform with a Hann window.
     RmsAbove,
 }
@@ -138,7 +138,7 @@ pub struct Scaled {
     pub factor: f64,
 }
 
-/// Variables in which a unit reports whether it guarantees that limits are kept.
+/// Variables in which a component reports whether it guarantees that limits are kept.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Guarantee {
@@ -147,15 +147,15 @@ pub struct Guarantee {
     /// Variable that tells why the guarantee is or is not in force, of an enumeration type.
     #[serde(default)]
     pub status: Option<String>,
-    /// Variables with the share of each limit that is left beyond what is reserved, by the names of
-    /// the limits.
+    /// Variables with the unused share of each limit after the reserve for disturbances, by the
+    /// names of the limits.
     #[serde(default)]
     pub margins: BTreeMap<String, String>,
     /// Name of a list of signals that must not exceed 1 while the guarantee is in force. If one
     /// does, the guarantee is broken.
     #[serde(default)]
     pub keeps: Option<String>,
-    /// Whether the units may lack `in_force`, `status` and the margins.
+    /// Whether the FMUs may lack `in_force`, `status` and the margins.
     #[serde(default)]
     pub optional: bool,
 }
@@ -164,7 +164,7 @@ pub struct Guarantee {
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Loss {
-    /// Name of what is lost, for the message.
+    /// Name of the lost quantity, for the message.
     pub what: String,
     /// Name of the list of signals whose norm decides.
     pub signals: String,
@@ -204,8 +204,8 @@ pub struct Curve {
     pub reference: Option<Signal>,
 }
 
-fn hint<'a>(wrong: &str, known: impl Iterator<Item = &'a String> + Clone) -> String {
-    names::hint(wrong, known.map(String::as_str))
+fn hint<'a>(wrong: &str, names: impl Iterator<Item = &'a String> + Clone) -> String {
+    names::hint(wrong, names.map(String::as_str))
 }
 
 impl Observe {
@@ -226,8 +226,8 @@ impl Observe {
         }
     }
 
-    /// Describes a metric with an id of its own, or one that the summary or another metric names
-    /// and that is not there.
+    /// Describes a metric that has an id of its own, or one that the summary or another metric
+    /// names and that does not exist.
     pub fn fault(&self) -> Option<String> {
         let unknown = |place: &str, name: &String| {
             let hint = hint(name, self.metrics.keys());
@@ -239,7 +239,10 @@ impl Observe {
         };
         let id = |(name, measure): (&String, &Measure)| {
             (!measure.id.is_empty()).then(|| {
-                format!("[observe.metrics.{name}] id = \"{}\": the key is the name", measure.id)
+                format!(
+                    "[observe.metrics.{name}] id = \"{}\": leave it out, the key is the name",
+                    measure.id
+                )
             })
         };
         let mut summary = self.summary.iter().filter_map(|name| unknown("[observe] summary", name));
@@ -253,11 +256,11 @@ impl Measure {
     pub fn fault(&self) -> Option<String> {
         let is = |kind| self.kind == kind;
         let fault = if self.every == 0 {
-            "every = 0: at least 1"
+            "every = 0: it must be at least 1"
         } else if self.over.is_some_and(|[from, to]| from >= to) {
             "over must be [from, to] with from below to"
         } else if is(MeasureKind::Leaving) && !self.bound.is_some_and(|bound| bound > 0.0) {
-            "leaving wants a bound above 0"
+            "leaving needs a bound above 0"
         } else if !matches!(
             self.kind,
             MeasureKind::Leaving | MeasureKind::Settling | MeasureKind::Rises
@@ -267,7 +270,7 @@ impl Measure {
         } else if is(MeasureKind::Settling)
             && !(self.band.xor(self.bound).is_some_and(|band| band > 0.0) && self.hold >= 0.0)
         {
-            "settling wants either a band or a bound above 0, and a hold not below"
+            "settling needs either a band or a bound above 0, and a hold of at least 0"
         } else if !is(MeasureKind::Settling) && self.band.is_some() {
             "band is for settling only"
         } else if !is(MeasureKind::Settling) && self.hold != 0.0 {
@@ -275,7 +278,7 @@ impl Measure {
         } else if is(MeasureKind::RmsAbove)
             != self.frequency.is_some_and(|frequency| frequency > 0.0)
         {
-            "rms-above, and nothing else, wants a frequency above 0"
+            "rms-above needs a frequency above 0, and no other kind has one"
         } else {
             return None;
         };

@@ -43,7 +43,8 @@ pub(super) struct Values {
 }
 
 impl Values {
-    /// Provides for what this number of instances give to one another, `wired`, and to observers.
+    /// Makes room for the values that this number of instances give to one another (`wired`) and to
+    /// observers (`probed`).
     pub(super) fn new(instances: usize, wired: &[Port], probed: &[Port]) -> Self {
         let mut values =
             Self { ports: Vec::new(), reads: Vec::new(), before: Vec::new(), latest: Vec::new() };
@@ -76,11 +77,12 @@ impl Values {
     }
 
     fn place(&self, port: &Port) -> usize {
-        let place = self.ports.iter().position(|known| known == port);
+        let place = self.ports.iter().position(|other| other == port);
         place.expect("every connected or probed output has a place")
     }
 
-    /// Reads the connected outputs of an instance, and with `probed` what observers ask for.
+    /// Reads the connected outputs of an instance, and with `probed` also the variables that
+    /// observers ask for.
     pub(super) fn read(
         &mut self,
         index: usize,
@@ -103,7 +105,7 @@ impl Values {
         Ok(())
     }
 
-    /// Makes the values that an instance shows at its communication point those before its step.
+    /// Keeps the values that an instance has at its communication point as those before its step.
     pub(super) fn arrive(&mut self, index: usize) {
         for read in self.reads[index].iter().flatten() {
             let range = read.first..read.first + read.references.len();
@@ -120,7 +122,7 @@ struct Place {
 }
 
 impl Place {
-    fn of(self, values: &Values) -> f64 {
+    fn value(self, values: &Values) -> f64 {
         match self.reading {
             Reading::BeforeStep => values.before[self.index],
             Reading::AfterStep => values.latest[self.index],
@@ -146,7 +148,7 @@ impl Row {
 
     pub(super) fn fill(&mut self, values: &Values) {
         for (value, place) in self.values.iter_mut().zip(&self.places) {
-            *value = place.of(values);
+            *value = place.value(values);
         }
     }
 }
@@ -184,8 +186,9 @@ impl<T: Copy + Default> Bundle<T> {
     /// Takes the values over; `convert` is exact for what was read.
     fn gather(&mut self, values: &Values, convert: impl Fn(f64) -> T) {
         for (value, (place, scaling)) in self.values.iter_mut().zip(&self.places) {
-            let read = place.of(values);
-            *value = convert(if *scaling == Scaling::default() { read } else { scaling.of(read) });
+            let read = place.value(values);
+            *value =
+                convert(if *scaling == Scaling::default() { read } else { scaling.apply(read) });
         }
     }
 }

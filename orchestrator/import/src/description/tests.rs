@@ -60,7 +60,9 @@ fn what_cannot_be_used_is_refused() {
     let other = TEXT.replace("fmiVersion=\"2.0\"", "fmiVersion=\"3.0\"");
     assert!(ModelDescription::parse(&other).unwrap_err().contains("FMI 3.0"));
     let index = TEXT.replace("index=\"4\"", "index=\"5\"");
-    assert!(ModelDescription::parse(&index).unwrap_err().contains("variable 5 of 4"));
+    assert!(
+        ModelDescription::parse(&index).unwrap_err().contains("variable 5, but there are only 4")
+    );
     let reference = TEXT.replace("valueReference=\"9\"", "valueReference=\"-1\"");
     let fault = "valueReference = \"-1\" of the element ScalarVariable \"kind\" in line 19 is not a whole number";
     assert!(ModelDescription::parse(&reference).unwrap_err().starts_with(fault));

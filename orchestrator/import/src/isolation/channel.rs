@@ -1,7 +1,7 @@
-//! Memory that two processes share, through which one asks and the other answers.
+//! Memory that two processes share, through which one sends requests and the other answers.
 //!
-//! Whoever waits looks at the memory for about a millisecond first, and leaves the processor to
-//! others in between: on one machine an answer comes faster than the system wakes a process.
+//! A waiting process first looks at the memory for about a millisecond, and yields the processor in
+//! between: an answer comes faster than the system wakes a process.
 
 #![allow(unsafe_code)]
 
@@ -29,7 +29,7 @@ const NAP: Duration = Duration::from_millis(20);
 pub(crate) enum Slot {
     Request = 0,
     Reply = 1,
-    /// What a unit said last about a problem, which is read when its process has ended.
+    /// Last message of the instance about a problem, which is read when its process has ended.
     LastWords = 2,
 }
 
@@ -53,7 +53,7 @@ impl Channel {
         Ok(Self { map: MmapOptions::new().len(SIZE).map_raw(file)? })
     }
 
-    /// The counters of a slot: number of the message, length, and whether somebody sleeps.
+    /// The counters of a slot: number of the message, length, and whether a process sleeps.
     fn counter(&self, slot: Slot, which: usize) -> &AtomicU32 {
         let offset = (3 * slot as usize + which) * LINE;
         // SAFETY: the offset is a multiple of the alignment and less than HEAD, the map begins at
@@ -82,7 +82,7 @@ impl Channel {
 
     /// Copies the message that lies in a slot into `message`.
     pub(crate) fn copy(&self, slot: Slot, message: &mut Vec<u8>) {
-        // The other process may be broken and have written anything.
+        // A broken process may have written any length.
         let length = (self.counter(slot, 1).load(Ordering::Relaxed) as usize).min(LARGEST);
         message.clear();
         message.reserve(length);

@@ -1,4 +1,4 @@
-//! The process of an instance: it loads the library and makes the calls that the master asks for.
+//! The process of an instance: it loads the library and makes the calls that the master requests.
 
 use super::channel::{Channel, LARGEST, Slot};
 use super::limits;
@@ -17,15 +17,15 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Serves one instance by the memory in this file, and ends when the instance is freed or the
-/// master is gone.
+/// Serves one instance through the shared memory in this file, and ends when the instance is freed
+/// or the master has ended.
 ///
 /// # Errors
 /// Returns an error if the file is not what the master makes, or if a message cannot be decoded.
 pub fn serve(memory: &Path) -> io::Result<()> {
     let file = OpenOptions::new().read(true).write(true).open(memory)?;
     let channel = Arc::new(Channel::open(&file)?);
-    // An instance must not find the file open: if it cut it off, the master would crash.
+    // An instance must not find the file open: if it truncated the file, the master would crash.
     drop(file);
     // The master holds the other end of this pipe, which the system closes when the master ends.
     std::thread::spawn(|| {
@@ -89,7 +89,7 @@ impl Host {
         self.send_with(message, &[])
     }
 
-    /// Sends a message with these bytes behind it.
+    /// Sends a message, followed by these bytes.
     fn send_with(&mut self, message: &impl Serialize, behind: &[u8]) -> io::Result<()> {
         self.bytes.clear();
         self.bytes = postcard::to_extend(message, std::mem::take(&mut self.bytes))
@@ -131,7 +131,7 @@ impl Values {
     }
 }
 
-/// Makes the calls of a request until one fails, and reads what is to be read.
+/// Makes the calls of a request until one fails, and reads the requested variables.
 fn answer(
     instance: &mut impl Instance,
     request: Request,
@@ -139,8 +139,10 @@ fn answer(
     bytes: &mut Vec<u8>,
 ) -> Reply {
     let Request { sets, action, reads, once } = request;
-    let outcome =
-        sets.iter().try_for_each(|own| set(instance, own)).and_then(|()| act(instance, action));
+    let outcome = sets
+        .iter()
+        .try_for_each(|values| set(instance, values))
+        .and_then(|()| act(instance, action));
     if !action.reads() {
         lists.clear();
     }

@@ -19,16 +19,16 @@ use tempfile::NamedTempFile;
 
 /// Time within which an instance must be freed, and its process ended.
 const FAREWELL: Duration = Duration::from_secs(10);
-/// Time within which what an ended process has printed must have arrived.
+/// Time within which the last output of an ended process must have arrived.
 const ECHO: Duration = Duration::from_millis(200);
-/// Largest number of bytes of a line of an instance that is passed on.
+/// Largest number of bytes of a printed line that is passed on.
 const LINE: usize = 2000;
 
-/// Failures that came when the instance's run was over.
+/// Failures that came when the run was over.
 static LATE: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// Returns the failures that came when a run was over: instances that could not be freed. They are
-/// forgotten by this call.
+/// Returns the failures that came when a run was over, of instances that could not be freed, and
+/// clears them.
 pub fn late_failures() -> Vec<String> {
     std::mem::take(&mut LATE.lock())
 }
@@ -40,7 +40,7 @@ pub(super) struct Process {
     /// File of the memory, until the process has opened it.
     memory: Option<NamedTempFile>,
     number: u32,
-    /// The last message, and where the values behind it begin.
+    /// The last message, and the position at which the values behind it begin.
     bytes: Vec<u8>,
     values: usize,
     log: Log,
@@ -48,7 +48,7 @@ pub(super) struct Process {
     timeout: Duration,
     /// Call whose answer was not waited for yet.
     pending: Option<&'static str>,
-    /// Why the process can no longer be asked.
+    /// Reason why the process can no longer be called, if so.
     gone: Option<String>,
 }
 
@@ -59,7 +59,7 @@ struct Printed {
     is_over: AtomicBool,
 }
 
-/// Why a wait has ended without an answer.
+/// Reason why a wait has ended without an answer.
 enum Silence {
     Ended(ExitStatus),
     Late,
@@ -69,7 +69,7 @@ enum Silence {
 impl Process {
     /// Starts a process, which then waits for [`Self::set_up`].
     pub(super) fn start(program: &Path, name: &str, isolation: &Isolation) -> io::Result<Self> {
-        // Memory that is no file of a disk, where the system has it.
+        // Where the system offers it, the file is in memory and not on a disk.
         let folder = Path::new("/dev/shm");
         let prefix = format!("fmu-{}-", std::process::id());
         let memory = if cfg!(target_os = "linux") && folder.is_dir() {
@@ -84,7 +84,8 @@ impl Process {
         command.stdout(pipe.try_clone()?).stderr(pipe);
         apart(&mut command);
         let child = command.spawn()?;
-        // It holds the writing end of the pipe, which must end with the process.
+        // The command holds the writing end of the pipe, which must be closed when the process
+        // ends.
         drop(command);
         let printed = Arc::new(Printed::default());
         let (heard, component) = (Arc::clone(&printed), name.to_string());
@@ -108,7 +109,8 @@ impl Process {
     pub(super) fn set_up(&mut self, setup: &Setup) -> Result<Ready, CallFailure> {
         self.put("instantiate", setup)?;
         let mut ready = self.answer("instantiate")?;
-        // Both have opened it. Systems that keep a file which is in use remove it later.
+        // Both processes have opened the file. Systems that cannot remove a file in use remove it
+        // later.
         if cfg!(unix) {
             self.memory = None;
         }
@@ -139,7 +141,7 @@ impl Process {
         call: &'static str,
         request: &Request,
     ) -> Result<(), CallFailure> {
-        // Whoever failed to fetch the last answer no longer wants it.
+        // An answer that was never fetched is no longer needed.
         if let Some(last) = self.pending.take() {
             self.reply(last)?;
         }
@@ -170,7 +172,7 @@ impl Process {
         let bytes = postcard::to_extend(message, std::mem::take(&mut self.bytes));
         self.bytes = bytes.map_err(|error| CallFailure::new(call, error.to_string()))?;
         if self.bytes.len() > LARGEST {
-            return Err(CallFailure::new(call, "the values are too many for one message"));
+            return Err(CallFailure::new(call, "there are too many values for one message"));
         }
         self.number = self.number.wrapping_add(1);
         self.channel.put(Slot::Request, self.number, &self.bytes);
@@ -197,7 +199,7 @@ impl Process {
                 self.values = self.bytes.len() - behind.len();
                 Ok(answer)
             }
-            Err(_) => Err(self.nonsense(call)),
+            Err(_) => Err(self.undecodable(call)),
         }
     }
 
@@ -206,10 +208,10 @@ impl Process {
         &self.bytes[self.values..]
     }
 
-    /// Returns the failure of a process whose answer is none. It is not asked again.
-    pub(super) fn nonsense(&mut self, call: &'static str) -> CallFailure {
+    /// Ends a process whose answer cannot be decoded, and returns the failure.
+    pub(super) fn undecodable(&mut self, call: &'static str) -> CallFailure {
         self.kill();
-        let reason = "its process has lost its way: what it answers makes no sense";
+        let reason = "its process gave an answer that cannot be decoded";
         self.gone = Some(reason.into());
         CallFailure::new(call, reason)
     }
@@ -226,11 +228,12 @@ impl Process {
         let words = self.last_words();
         let words = words.map(|words| format!("; its last words: {words}")).unwrap_or_default();
         let reason = reason + &words;
-        self.gone = Some(format!("its process is gone: {reason}"));
+        self.gone = Some(format!("its process has ended: {reason}"));
         CallFailure::new(call, reason)
     }
 
-    /// Returns what the instance said last: about a problem, or else what it printed.
+    /// Returns the last message of the instance about a problem, or else the last line that it
+    /// printed.
     fn last_words(&self) -> Option<String> {
         let begin = Instant::now();
         while !self.printed.is_over.load(Ordering::SeqCst) && begin.elapsed() < ECHO {
@@ -244,7 +247,7 @@ impl Process {
     }
 
     fn kill(&mut self) {
-        // It may be gone already.
+        // It may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -252,7 +255,7 @@ impl Process {
     /// Frees the instance and ends the process.
     fn free(&mut self) -> Result<(), CallFailure> {
         self.timeout = self.timeout.min(FAREWELL);
-        // The run ended, by the failure of another instance, before it wanted this answer.
+        // The run ended, by the failure of another instance, before it needed this answer.
         if let Some(last) = self.pending.take()
             && self.reply(last).is_err()
         {
@@ -324,7 +327,7 @@ fn apart(command: &mut Command) {
 #[cfg(not(any(unix, windows)))]
 fn apart(_command: &mut Command) {}
 
-/// Tells how a process has ended.
+/// Describes how a process has ended.
 fn ended(status: ExitStatus) -> String {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {

@@ -1,4 +1,4 @@
-//! What the master and the process of an instance say to each other.
+//! Messages between the master and the process of an instance.
 
 use crate::description::Carrier;
 use crate::instance::CallFailure;
@@ -6,12 +6,12 @@ use crate::log::Said;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// First message: what is to be loaded.
+/// First message: the library to be loaded.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Setup {
     /// The instance's library.
     pub(super) library: PathBuf,
-    /// What an instance needs; `None` if the library is only loaded to see whether it can be.
+    /// Arguments of the instance; `None` if the library is only loaded to see whether it can be.
     pub(super) instance: Option<InstanceArguments>,
     pub(super) limits: Limits,
 }
@@ -24,7 +24,7 @@ pub(super) struct InstanceArguments {
     pub(super) resources: String,
 }
 
-/// What the process of an instance may use.
+/// Resources that the process of an instance may use.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Limits {
     /// Number of bytes of memory that it may write.
@@ -38,8 +38,8 @@ pub(super) struct Limits {
 /// Answer to [`Setup`].
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) enum Ready {
-    /// The library is loaded and the instance made. The texts say what is wrong with the version
-    /// of FMI that the library names, and which limits the system does not know.
+    /// The library is loaded and the instance made. The texts say what is wrong with the version of
+    /// FMI that the library names, and which limits the system does not support.
     Loaded { version_fault: Option<String>, without: Option<String>, said: Vec<Said> },
     /// The library cannot be loaded, as the system says.
     Unloadable(String),
@@ -126,7 +126,7 @@ impl List {
 pub(super) struct Reply {
     /// Failure of a set call or of the action, after which nothing is read.
     pub(super) failure: Option<CallFailure>,
-    /// Lists that could not be read, by their places. Their values are of no meaning.
+    /// Lists that could not be read, by their places. Their values have no meaning.
     pub(super) unread: Vec<(usize, CallFailure)>,
     pub(super) said: Vec<Said>,
 }

@@ -1,9 +1,9 @@
 //! An instance in a process of its own, as the master sees it.
 //!
 //! Set calls are kept until the next call that needs an answer, and each answer to a step or a get
-//! call brings the values of all lists of variables that were read before: at a communication
-//! point there is one round trip for the step and one for the exchange of values. A set call that
-//! fails is told by the call that follows it.
+//! call brings the values of all lists of variables that were read before: at a communication point
+//! there is one round trip for the step and one for the exchange of values. A set call that fails
+//! is reported by the call that follows it.
 
 use super::process::Process;
 use super::protocol::{Action, List, Request, Set};
@@ -77,7 +77,7 @@ impl RemoteInstance {
         reply.failure.map_or(Ok(()), Err)?;
         self.unread = reply.unread;
         if action.reads() && self.process.values().len() != once.unwrap_or(self.size) {
-            return Err(self.process.nonsense(action.call()));
+            return Err(self.process.undecodable(action.call()));
         }
         self.is_fresh = action.reads() && once.is_none();
         Ok(())
@@ -97,20 +97,20 @@ impl RemoteInstance {
     /// Returns the bytes of the values of a list.
     fn read(&mut self, carrier: Carrier, references: &[u32]) -> Result<&[u8], CallFailure> {
         let is_it = |list: &List| list.carrier == carrier && list.references == references;
-        let mut known = self.lists.iter().position(is_it);
-        if known.is_none() {
+        let mut prefetched = self.lists.iter().position(is_it);
+        if prefetched.is_none() {
             let list = List { carrier, references: references.to_vec() };
             if self.size + list.size() > PREFETCHED {
                 self.ask(Action::Read, Vec::new(), vec![list])?;
             } else {
-                known = Some(self.lists.len());
+                prefetched = Some(self.lists.len());
                 self.ask(Action::Read, vec![list], Vec::new())?;
             }
         } else if !self.is_fresh {
             self.act(Action::Read)?;
         }
-        // A list that is read only this time stands alone.
-        let place = known.unwrap_or(0);
+        // A list that is read only this time is the only one.
+        let place = prefetched.unwrap_or(0);
         if let Some((_, failure)) = self.unread.iter().find(|(unread, _)| *unread == place) {
             return Err(failure.clone());
         }
@@ -124,12 +124,12 @@ impl RemoteInstance {
         carrier: Carrier,
         references: &[u32],
         values: &mut [T],
-        of: fn([u8; N]) -> T,
+        decode: fn([u8; N]) -> T,
     ) -> Outcome {
         for (references, values) in references.chunks(CHUNK).zip(values.chunks_mut(CHUNK)) {
             let bytes = self.read(carrier, references)?.as_chunks::<N>().0;
             for (value, bytes) in values.iter_mut().zip(bytes) {
-                *value = of(*bytes);
+                *value = decode(*bytes);
             }
         }
         Ok(())
@@ -140,10 +140,10 @@ impl RemoteInstance {
         &mut self,
         references: &[u32],
         values: &[T],
-        of: fn(Vec<u32>, Vec<T>) -> Set,
+        to_set: fn(Vec<u32>, Vec<T>) -> Set,
     ) -> Outcome {
         references.chunks(CHUNK).zip(values.chunks(CHUNK)).try_for_each(|(references, values)| {
-            self.set(of(references.to_vec(), values.to_vec()), values.len())
+            self.set(to_set(references.to_vec(), values.to_vec()), values.len())
         })
     }
 }
@@ -178,7 +178,7 @@ impl Instance for RemoteInstance {
             let message = format!("the text has {} bytes, at most {TEXT} can be set", value.len());
             return Err(CallFailure::new("setString", message));
         }
-        // A long text is sent at once.
+        // A long text fills the message at once.
         self.set(Set::Text(reference, value.to_string()), 1 + value.len() / 16)
     }
 

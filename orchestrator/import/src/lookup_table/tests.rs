@@ -10,7 +10,7 @@ const FILE: &str = "\u{feff}time,gust.x [N.m],count [Integer],open [Boolean],pla
                     2,-20,5,1,1.5\r\n\
                     4,0,6,false,2.5\r\n";
 
-fn instance(text: &str) -> (LookupTableInstance, crate::description::ModelDescription) {
+fn opened(text: &str) -> (LookupTableInstance, crate::description::ModelDescription) {
     let table = LookupTable::parse(text.as_bytes()).unwrap();
     let description = table.description("gusts").unwrap();
     (LookupTableInstance::new(table), description)
@@ -31,7 +31,7 @@ fn reference(description: &crate::description::ModelDescription, name: &str) -> 
 
 #[test]
 fn oracle_rows_hold_until_the_next_one() {
-    let (mut instance, _) = instance(FILE);
+    let (mut instance, _) = opened(FILE);
     instance.enter_initialization(0.0, 5.0).unwrap();
     for (time, row) in [
         (0.0, (10.0, 3, 1, 0.5)),
@@ -49,7 +49,7 @@ fn oracle_rows_hold_until_the_next_one() {
 
 #[test]
 fn oracle_lines_between_rows_and_jumps_at_equal_times() {
-    let (mut instance, description) = instance(FILE);
+    let (mut instance, description) = opened(FILE);
     instance.set_integer(&[reference(&description, "interpolation")], &[2]).unwrap();
     instance.set_real(&[reference(&description, "shift")], &[0.5]).unwrap();
     instance.set_real(&[reference(&description, "scale.gust.x")], &[2.0]).unwrap();
@@ -67,7 +67,7 @@ fn oracle_lines_between_rows_and_jumps_at_equal_times() {
 
 #[test]
 fn times_and_values_are_parameters_until_the_run_begins() {
-    let (mut instance, description) = instance(FILE);
+    let (mut instance, description) = opened(FILE);
     let variable = description.find("gust.x[3]").unwrap().1;
     let kind = &variable.kind;
     assert!(
@@ -97,8 +97,8 @@ fn times_and_values_are_parameters_until_the_run_begins() {
 #[test]
 fn large_tables_have_no_parameters_for_their_values() {
     let rows = "0,1\n".repeat(500);
-    assert!(instance(&format!("time,x\n{rows}")).1.find("x[500]").is_some());
-    assert!(instance(&format!("time,x\n{rows}0,1\n")).1.find("x[1]").is_none());
+    assert!(opened(&format!("time,x\n{rows}")).1.find("x[500]").is_some());
+    assert!(opened(&format!("time,x\n{rows}0,1\n")).1.find("x[1]").is_none());
 }
 
 #[test]
@@ -108,14 +108,14 @@ fn faults_name_line_and_column() {
         table.and_then(|table| table.description("gusts").map(drop)).unwrap_err()
     };
     for (text, message) in [
-        ("", "is no table: the first column is \"\", not \"time\""),
-        ("time;x\n0;1\n", "is no table: there must be commas between the columns"),
-        ("t,x\n0,1\n", "is no table: the first column is \"t\", not \"time\""),
-        ("time\n0\n", "is a table without columns beside \"time\""),
-        ("time,x\n", "is a table without rows"),
-        ("time,\n0,1\n", "is a table with a column that has no name"),
-        ("time,x,x\n0,1,1\n", "is a table in which \"x\" has two meanings"),
-        ("time,shift\n0,1\n", "is a table in which \"shift\" has two meanings"),
+        ("", "is not a lookup table: the first column is \"\", not \"time\""),
+        ("time;x\n0;1\n", "is not a lookup table: there must be commas between the columns"),
+        ("t,x\n0,1\n", "is not a lookup table: the first column is \"t\", not \"time\""),
+        ("time\n0\n", "is a lookup table without columns beside \"time\""),
+        ("time,x\n", "is a lookup table without rows"),
+        ("time,\n0,1\n", "is a lookup table with a column that has no name"),
+        ("time,x,x\n0,1,1\n", "is a lookup table in which \"x\" has two meanings"),
+        ("time,shift\n0,1\n", "is a lookup table in which \"shift\" has two meanings"),
         ("time,x\n0,1\n1\n", "line 3 has 1 values for 2 columns"),
         ("time,x\n0,1\n1,2,3\n", "line 3 has 3 values for 2 columns"),
         ("time,x\nnow,1\n", "line 2: \"time\" is \"now\", it must be a finite number"),
@@ -137,7 +137,9 @@ fn faults_name_line_and_column() {
     ] {
         assert_eq!(fault(text), message, "{text}");
     }
-    assert!(LookupTable::parse(b"time,x\n0,\xff\n").unwrap_err().starts_with("is no table: "));
+    assert!(
+        LookupTable::parse(b"time,x\n0,\xff\n").unwrap_err().starts_with("is not a lookup table: ")
+    );
 }
 
 proptest! {
@@ -150,7 +152,7 @@ proptest! {
         rows.sort_by(|a, b| a.0.total_cmp(&b.0));
         let lines = rows.iter().map(|(time, value)| format!("{time},{value}"));
         let text = std::iter::once("time,x".to_string()).chain(lines).collect::<Vec<_>>().join("\n");
-        let (mut instance, description) = instance(&text);
+        let (mut instance, description) = opened(&text);
         instance.set_integer(&[reference(&description, "interpolation")], &[2]).unwrap();
         instance.enter_initialization(0.0, 12.0).unwrap();
         instance.do_step(time, 0.0).unwrap();
