@@ -346,7 +346,7 @@ def test_windows_names_a_culprit_in_a_path_with_backslashes(wine):
     ("how", "alone", "together"),
     [
         ("EXIT", "it ended its process with exit code 0", "(exit)"),
-        ("ABORT", "its last words: a bolt is loose", "(SIGABRT)"),
+        ("ABORT", "its last output: a bolt is loose", "(SIGABRT)"),
         ("SEGFAULT", "exception 0xc0000005 (access to memory that is not its own)", "(SIGSEGV)"),
     ],
 )

@@ -102,7 +102,7 @@ impl Master {
 
     /// Sets the interrupt through which the run can be ended from outside. It must be set before
     /// [`Self::pace`] is called.
-    pub fn heed(&mut self, interrupt: &Interrupt) {
+    pub fn set_interrupt(&mut self, interrupt: &Interrupt) {
         self.interrupt = interrupt.clone();
     }
 

@@ -289,7 +289,7 @@ impl System {
         let wires = delay::readings_of_wires(&parts, &self.wires, coupling);
         let probes = delay::readings_of_probes(&parts, &self.wires, &self.probes);
         let mut master = Master::new(self.clock, coupling, members, &wires, &probes);
-        master.heed(interrupt);
+        master.set_interrupt(interrupt);
         master.initialize()?;
         Ok(master)
     }

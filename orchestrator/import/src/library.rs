@@ -216,21 +216,21 @@ impl FmuInstance {
     #[cold]
     fn failure(&mut self, call: &'static str, status: Result<Status, c_int>) -> CallFailure {
         self.fatal |= status == Ok(Status::Fatal);
-        let said = self.data.log.take();
+        let message = self.data.log.take();
         if status == Ok(Status::Discard) && call == "doStep" {
-            return self.discarded(said);
+            return self.discarded(message);
         }
         if status == Ok(Status::Pending) {
             let message = "the step is asynchronous, which is not supported";
             return CallFailure::new(call, format!("{message} ({:?})", Status::Pending));
         }
-        let said = said.unwrap_or_else(|| "its log holds no message".into());
-        CallFailure::new(call, format!("{said} ({})", fmi::name_of(status)))
+        let message = message.unwrap_or_else(|| "its log holds no message".into());
+        CallFailure::new(call, format!("{message} ({})", fmi::name_of(status)))
     }
 
     /// Describes why a step was discarded. FMI 2.0, section 4.2.3, lets an FMU end the simulation
     /// in this way.
-    fn discarded(&mut self, said: Option<String>) -> CallFailure {
+    fn discarded(&mut self, message: Option<String>) -> CallFailure {
         let Functions { get_real_status, get_boolean_status, .. } = self.data.functions;
         let (mut time, mut terminated) = (f64::NAN, fmi::FALSE);
         let calling = Calling::new(&self.data.log.component, "getStatus");
@@ -245,7 +245,7 @@ impl FmuInstance {
         drop(calling);
         let [knows_time, knows_end] = statuses.map(|status| fmi::status(status) == Ok(Status::Ok));
         let ends = knows_end && terminated != fmi::FALSE;
-        let mut parts: Vec<String> = said.into_iter().collect();
+        let mut parts: Vec<String> = message.into_iter().collect();
         if !ends && parts.is_empty() {
             parts.push("its log holds no message".into());
         }

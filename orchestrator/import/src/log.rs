@@ -17,7 +17,7 @@ const LONGEST: usize = 2000;
 
 /// A message that an instance logged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Said {
+pub(crate) struct LogMessage {
     pub(crate) status: c_int,
     pub(crate) category: String,
     pub(crate) text: String,
@@ -34,18 +34,18 @@ pub(crate) struct Log {
 }
 
 /// Function that is handed a text.
-type Tell = Box<dyn Fn(&[u8]) + Send + Sync>;
+type ReportProblem = Box<dyn Fn(&[u8]) + Send + Sync>;
 
 enum Sink {
     /// Prints messages as `tracing` does.
     Printed(Mutex<Pace>),
     /// Holds messages for another process, and hands on the text of problems at once.
-    Held(Arc<Held>, Tell),
+    Held(Arc<Held>, ReportProblem),
 }
 
 /// Messages that are held until they are taken.
 #[derive(Default)]
-pub(crate) struct Held(Mutex<(Vec<Said>, u64)>);
+pub(crate) struct Held(Mutex<(Vec<LogMessage>, u64)>);
 
 /// Number of messages in the current second.
 #[derive(Default)]
@@ -76,18 +76,22 @@ impl Pace {
 
 impl Held {
     /// Takes the messages that came since the last call.
-    pub(crate) fn take(&self) -> Vec<Said> {
-        let (mut said, lost) = std::mem::take(&mut *self.0.lock());
+    pub(crate) fn take(&self) -> Vec<LogMessage> {
+        let (mut messages, lost) = std::mem::take(&mut *self.0.lock());
         if lost > 0 {
             let text = format!("{lost} further messages are left out");
-            said.push(Said { status: Status::Warning as c_int, category: "log".into(), text });
+            messages.push(LogMessage {
+                status: Status::Warning as c_int,
+                category: "log".into(),
+                text,
+            });
         }
-        said
+        messages
     }
 
-    fn add(&self, said: Said) {
+    fn add(&self, message: LogMessage) {
         let mut held = self.0.lock();
-        if (held.0.len() as u64) < MOST { held.0.push(said) } else { held.1 += 1 }
+        if (held.0.len() as u64) < MOST { held.0.push(message) } else { held.1 += 1 }
     }
 }
 
@@ -135,7 +139,7 @@ impl Log {
                 }
                 let status = status.map_or_else(|code| code, |status| status as c_int);
                 let (category, text) = (cut(category).to_string(), message.clone());
-                held.add(Said { status, category, text });
+                held.add(LogMessage { status, category, text });
             }
             Sink::Printed(pace) => self.print(pace, status, cut(category), &message),
         }
@@ -144,7 +148,7 @@ impl Log {
         }
     }
 
-    fn tell_lost(&self, lost: u64) {
+    fn report_lost(&self, lost: u64) {
         if lost > 0 {
             tracing::warn!("{}: {lost} further messages are left out", self.component);
         }
@@ -169,7 +173,7 @@ impl Log {
             _ => {}
         }
         let (may_print, lost) = pace.lock().count();
-        self.tell_lost(lost);
+        self.report_lost(lost);
         if !may_print {
             return;
         }
@@ -197,7 +201,7 @@ impl Drop for Log {
     fn drop(&mut self) {
         if let Sink::Printed(pace) = &self.sink {
             let lost = pace.lock().lost();
-            self.tell_lost(lost);
+            self.report_lost(lost);
         }
     }
 }
@@ -221,10 +225,10 @@ mod tests {
         for number in 0..1000 {
             log.message(Ok(Status::Error), "c", &format!("{number} {}", "é".repeat(2000)));
         }
-        let said = held.take();
-        assert_eq!(said.len() as u64, MOST + 1);
-        assert_eq!(said[MOST as usize].text, "900 further messages are left out");
-        assert!(said.iter().all(|said| said.text.len() <= LONGEST));
+        let messages = held.take();
+        assert_eq!(messages.len() as u64, MOST + 1);
+        assert_eq!(messages[MOST as usize].text, "900 further messages are left out");
+        assert!(messages.iter().all(|message| message.text.len() <= LONGEST));
         assert!(words.lock().starts_with(b"999 "));
         assert!(log.take().unwrap().starts_with("999 ") && log.take().is_none());
         assert!(held.take().is_empty());

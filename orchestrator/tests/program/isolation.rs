@@ -11,12 +11,12 @@ use std::time::{Duration, Instant};
 const HARM: [(&str, &str); 8] = [
     ("EXIT", "it ended its process with exit code 0"),
     ("QUICK_EXIT", "it ended its process with exit code 0"),
-    ("ABORT", "killed by signal 6 (SIGABRT, an abort); its last words: a bolt is loose"),
+    ("ABORT", "killed by signal 6 (SIGABRT, an abort); its last output: a bolt is loose"),
     ("SEGFAULT", "killed by signal 11 (SIGSEGV"),
     ("DIVISION", "killed by signal 8 (SIGFPE"),
     ("ENDLESS", "no answer within 0.5 s (call_timeout)"),
     ("OVERWRITE", "killed by signal 11 (SIGSEGV"),
-    ("MEMORY", "killed by signal 6 (SIGABRT, an abort); its last words: no memory is left"),
+    ("MEMORY", "killed by signal 6 (SIGABRT, an abort); its last output: no memory is left"),
 ];
 
 /// Limits with which an instance that never answers, or takes all memory, does so soon.

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use toml::Spanned;
 
-/// The section `[observe]` of an experiment, which says what is measured, watched and drawn of a
-/// run.
+/// The section `[observe]` of an experiment: the signals of a run that are measured, watched and
+/// drawn.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Observe {
@@ -67,7 +67,7 @@ pub struct Measure {
     /// Heading of the number's line in the summary. Metrics with the same heading share a line.
     #[serde(default)]
     pub label: String,
-    /// Label that tells the number apart from others in the same line of the summary.
+    /// Label that distinguishes the number from others in the same line of the summary.
     #[serde(default)]
     pub part: String,
     /// Name of the metric that is the limit of this one.
@@ -82,7 +82,8 @@ pub struct Measure {
     /// For `settling`, the width of the band as a fraction of a signal's first magnitude.
     #[serde(default)]
     pub band: Option<f64>,
-    /// For `settling`, the least time for which the signals must have been seen within the band, s.
+    /// For `settling`, the shortest time for which the signals must have been observed within the
+    /// band, s.
     #[serde(default)]
     pub hold: f64,
     /// For `leaving`, the magnitude that a signal must exceed. For `settling`, in place of `band`,
@@ -178,7 +179,7 @@ pub struct Loss {
 pub struct Panel {
     /// Short name of the panel, for the live view.
     pub name: String,
-    /// Label of the vertical axis without the unit. Without it the name is the label.
+    /// Label of the vertical axis, without the unit. By default it is the name of the panel.
     #[serde(default)]
     pub label: String,
     /// Unit of the vertical axis, in place of the display unit of the signals.

@@ -37,7 +37,7 @@ pub fn serve(memory: &Path) -> io::Result<()> {
     let held = Arc::new(Held::default());
     let words = Arc::clone(&host.channel);
     let log = |name: &str| {
-        Log::held(name, Arc::clone(&held), move |text| words.put(Slot::LastWords, 1, text))
+        Log::held(name, Arc::clone(&held), move |text| words.put(Slot::LastMessage, 1, text))
     };
     let without = limits::apply(&setup.limits);
     let functions = match Functions::load(&setup.library) {
@@ -46,7 +46,7 @@ pub fn serve(memory: &Path) -> io::Result<()> {
     };
     let version_fault = functions.version_fault();
     let Some(InstanceArguments { name, guid, resources }) = setup.instance else {
-        host.send(&Ready::Loaded { version_fault, without, said: Vec::new() })?;
+        host.send(&Ready::Loaded { version_fault, without, messages: Vec::new() })?;
         host.receive::<Request>()?;
         drop(functions);
         return host.send(&Reply::default());
@@ -54,18 +54,18 @@ pub fn serve(memory: &Path) -> io::Result<()> {
     let mut instance =
         match FmuInstance::new(functions, Rc::new(log(&name)), &guid, &resources, None) {
             Ok(instance) => instance,
-            Err(reason) => return host.send(&Ready::Refused { reason, said: held.take() }),
+            Err(reason) => return host.send(&Ready::Refused { reason, messages: held.take() }),
         };
-    host.send(&Ready::Loaded { version_fault, without, said: held.take() })?;
+    host.send(&Ready::Loaded { version_fault, without, messages: held.take() })?;
     let (mut lists, mut values) = (Vec::new(), Vec::new());
     loop {
         let request: Request = host.receive()?;
         if request.action == Action::Free {
             drop(instance);
-            return host.send(&Reply { said: held.take(), ..Reply::default() });
+            return host.send(&Reply { messages: held.take(), ..Reply::default() });
         }
         let reply = answer(&mut instance, request, &mut lists, &mut values);
-        host.send_with(&Reply { said: held.take(), ..reply }, &values)?;
+        host.send_with(&Reply { messages: held.take(), ..reply }, &values)?;
     }
 }
 

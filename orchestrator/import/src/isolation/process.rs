@@ -5,7 +5,7 @@ use super::protocol::{Action, Ready, Reply, Request, Setup};
 use super::settings::{COMMAND, Isolation};
 use crate::fmi;
 use crate::instance::CallFailure;
-use crate::log::{Log, Said};
+use crate::log::{Log, LogMessage};
 use parking_lot::Mutex;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -18,9 +18,9 @@ use std::time::{Duration, Instant};
 use tempfile::NamedTempFile;
 
 /// Time within which an instance must be freed, and its process ended.
-const FAREWELL: Duration = Duration::from_secs(10);
+const FREE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Time within which the last output of an ended process must have arrived.
-const ECHO: Duration = Duration::from_millis(200);
+const OUTPUT_TIMEOUT: Duration = Duration::from_millis(200);
 /// Largest number of bytes of a printed line that is passed on.
 const LINE: usize = 2000;
 
@@ -60,7 +60,7 @@ struct Printed {
 }
 
 /// Reason why a wait has ended without an answer.
-enum Silence {
+enum NoAnswer {
     Ended(ExitStatus),
     Late,
     Fault(io::Error),
@@ -114,8 +114,8 @@ impl Process {
         if cfg!(unix) {
             self.memory = None;
         }
-        if let Ready::Loaded { said, .. } | Ready::Refused { said, .. } = &mut ready {
-            self.repeat(std::mem::take(said));
+        if let Ready::Loaded { messages, .. } | Ready::Refused { messages, .. } = &mut ready {
+            self.repeat(std::mem::take(messages));
         }
         self.log.is_instantiated();
         if !matches!(ready, Ready::Loaded { .. }) {
@@ -154,12 +154,12 @@ impl Process {
     pub(super) fn reply(&mut self, call: &'static str) -> Result<Reply, CallFailure> {
         self.pending = None;
         let mut reply: Reply = self.answer(call)?;
-        self.repeat(std::mem::take(&mut reply.said));
+        self.repeat(std::mem::take(&mut reply.messages));
         Ok(reply)
     }
 
-    fn repeat(&self, said: Vec<Said>) {
-        for Said { status, category, text } in said {
+    fn repeat(&self, messages: Vec<LogMessage>) {
+        for LogMessage { status, category, text } in messages {
             self.log.message(fmi::status(status), &category, &text);
         }
     }
@@ -182,16 +182,16 @@ impl Process {
     fn answer<T: DeserializeOwned>(&mut self, call: &'static str) -> Result<T, CallFailure> {
         let (child, timeout) = (&mut self.child, self.timeout);
         let waited = self.channel.wait(Slot::Reply, self.number, |waited| match child.try_wait() {
-            Ok(Some(status)) => Err(Silence::Ended(status)),
-            Err(error) => Err(Silence::Fault(error)),
-            Ok(None) if waited > timeout => Err(Silence::Late),
+            Ok(Some(status)) => Err(NoAnswer::Ended(status)),
+            Err(error) => Err(NoAnswer::Fault(error)),
+            Ok(None) if waited > timeout => Err(NoAnswer::Late),
             Ok(None) => Ok(()),
         });
         // A process may end right after its last answer.
-        if let Err(silence) = waited
+        if let Err(no_answer) = waited
             && !self.channel.has(Slot::Reply, self.number)
         {
-            return Err(self.end(call, &silence));
+            return Err(self.end(call, &no_answer));
         }
         self.channel.copy(Slot::Reply, &mut self.bytes);
         match postcard::take_from_bytes(&self.bytes) {
@@ -216,34 +216,34 @@ impl Process {
         CallFailure::new(call, reason)
     }
 
-    fn end(&mut self, call: &'static str, silence: &Silence) -> CallFailure {
-        let reason = match silence {
-            Silence::Ended(status) => ended(*status),
-            Silence::Late => {
+    fn end(&mut self, call: &'static str, no_answer: &NoAnswer) -> CallFailure {
+        let reason = match no_answer {
+            NoAnswer::Ended(status) => ended(*status),
+            NoAnswer::Late => {
                 format!("no answer within {} s (call_timeout)", self.timeout.as_secs_f64())
             }
-            Silence::Fault(error) => format!("its process cannot be watched: {error}"),
+            NoAnswer::Fault(error) => format!("its process cannot be watched: {error}"),
         };
         self.kill();
-        let words = self.last_words();
-        let words = words.map(|words| format!("; its last words: {words}")).unwrap_or_default();
-        let reason = reason + &words;
+        let output = self.last_message();
+        let output = output.map(|text| format!("; its last output: {text}")).unwrap_or_default();
+        let reason = reason + &output;
         self.gone = Some(format!("its process has ended: {reason}"));
         CallFailure::new(call, reason)
     }
 
     /// Returns the last message of the instance about a problem, or else the last line that it
     /// printed.
-    fn last_words(&self) -> Option<String> {
+    fn last_message(&self) -> Option<String> {
         let begin = Instant::now();
-        while !self.printed.is_over.load(Ordering::SeqCst) && begin.elapsed() < ECHO {
+        while !self.printed.is_over.load(Ordering::SeqCst) && begin.elapsed() < OUTPUT_TIMEOUT {
             std::thread::sleep(Duration::from_millis(1));
         }
-        let mut said = Vec::new();
-        self.channel.copy(Slot::LastWords, &mut said);
-        let said = String::from_utf8_lossy(&said[..said.len().min(LINE)]).into_owned();
+        let mut bytes = Vec::new();
+        self.channel.copy(Slot::LastMessage, &mut bytes);
+        let logged = String::from_utf8_lossy(&bytes[..bytes.len().min(LINE)]).into_owned();
         let printed = self.printed.last.lock().clone();
-        [said, printed].into_iter().find(|words| !words.is_empty())
+        [logged, printed].into_iter().find(|text| !text.is_empty())
     }
 
     fn kill(&mut self) {
@@ -254,7 +254,7 @@ impl Process {
 
     /// Frees the instance and ends the process.
     fn free(&mut self) -> Result<(), CallFailure> {
-        self.timeout = self.timeout.min(FAREWELL);
+        self.timeout = self.timeout.min(FREE_TIMEOUT);
         // The run ended, by the failure of another instance, before it needed this answer.
         if let Some(last) = self.pending.take()
             && self.reply(last).is_err()
@@ -267,12 +267,12 @@ impl Process {
         loop {
             match self.child.try_wait() {
                 Ok(Some(status)) if status.success() => return Ok(()),
-                Ok(Some(status)) => return Err(self.end(call, &Silence::Ended(status))),
+                Ok(Some(status)) => return Err(self.end(call, &NoAnswer::Ended(status))),
                 Ok(None) if begin.elapsed() > self.timeout => {
-                    return Err(self.end(call, &Silence::Late));
+                    return Err(self.end(call, &NoAnswer::Late));
                 }
                 Ok(None) => std::thread::sleep(Duration::from_micros(200)),
-                Err(error) => return Err(self.end(call, &Silence::Fault(error))),
+                Err(error) => return Err(self.end(call, &NoAnswer::Fault(error))),
             }
         }
     }

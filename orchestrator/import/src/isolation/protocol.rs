@@ -2,7 +2,7 @@
 
 use crate::description::Carrier;
 use crate::instance::CallFailure;
-use crate::log::Said;
+use crate::log::LogMessage;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -40,11 +40,11 @@ pub(super) struct Limits {
 pub(super) enum Ready {
     /// The library is loaded and the instance made. The texts say what is wrong with the version of
     /// FMI that the library names, and which limits the system does not support.
-    Loaded { version_fault: Option<String>, without: Option<String>, said: Vec<Said> },
+    Loaded { version_fault: Option<String>, without: Option<String>, messages: Vec<LogMessage> },
     /// The library cannot be loaded, as the system says.
     Unloadable(String),
     /// The instance refused.
-    Refused { reason: String, said: Vec<Said> },
+    Refused { reason: String, messages: Vec<LogMessage> },
 }
 
 /// Calls that are made one after the other until one fails, and values that are read then.
@@ -128,5 +128,5 @@ pub(super) struct Reply {
     pub(super) failure: Option<CallFailure>,
     /// Lists that could not be read, by their places. Their values have no meaning.
     pub(super) unread: Vec<(usize, CallFailure)>,
-    pub(super) said: Vec<Said>,
+    pub(super) messages: Vec<LogMessage>,
 }
