@@ -107,7 +107,7 @@ fn variable(variable: &Variable) -> Value {
                 (json!(unit), json!(min), json!(max));
         }
         VariableKind::Integer { min, max } => {
-            (printed["min"], printed["max"]) = (json!(min), json!(max))
+            (printed["min"], printed["max"]) = (json!(min), json!(max));
         }
         VariableKind::Enumeration { items } => {
             printed["items"] =

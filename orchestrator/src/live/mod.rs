@@ -112,7 +112,7 @@ impl Drop for Live {
         match outcome {
             Some(Ok(Err(error))) => tracing::warn!("the live view ended early: {error}"),
             Some(Err(_)) => {
-                tracing::warn!("the live view ended early because of a defect in this program")
+                tracing::warn!("the live view ended early because of a defect in this program");
             }
             _ => {}
         }

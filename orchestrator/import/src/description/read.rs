@@ -30,7 +30,7 @@ type Types = BTreeMap<String, Element>;
 /// Variables that are taken from the file as it is read, so that their elements need not be stored.
 #[derive(Default)]
 pub(super) struct Variables {
-    variables: Vec<Variable>,
+    listed: Vec<Variable>,
     /// Definitions of types by name, once the first variable is read.
     types: Option<Types>,
     /// Variables that come before the definition of their type, with their places.
@@ -56,10 +56,10 @@ impl Variables {
             kind.attribute("declaredType").is_some_and(|name| !types.contains_key(name))
         };
         if element.children.iter().any(is_early) {
-            self.early.push((self.variables.len(), element));
-            self.variables.push(Variable::default());
+            self.early.push((self.listed.len(), element));
+            self.listed.push(Variable::default());
         } else {
-            self.variables.push(variable(&element, types)?);
+            self.listed.push(variable(&element, types)?);
         }
         Ok(None)
     }
@@ -69,10 +69,10 @@ impl Variables {
         if !self.early.is_empty() {
             let types = types(root);
             for (place, element) in self.early {
-                self.variables[place] = variable(&element, &types)?;
+                self.listed[place] = variable(&element, &types)?;
             }
         }
-        Ok(self.variables)
+        Ok(self.listed)
     }
 }
 
